@@ -1,0 +1,1 @@
+"""Simulator of the swimming robot: batched discrete elastic rods with resistive force theory."""

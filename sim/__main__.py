@@ -1,0 +1,111 @@
+"""Command line of the simulator.
+
+python -m sim steady POINTS.csv --out OUT.csv      mean motion of each row at constant motor speed
+python -m sim replay PLAN.json --out TRACK.csv     track of a switching schedule
+python -m sim robot PRESET --out robot.toml        write a preset robot, to start from
+python -m sim check                                the paper's measured point beside ours
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from tqdm import tqdm
+
+from sim.artefact import whole_file, write_text
+from sim.errors import InputError, run_command
+
+
+def read_points(path: str) -> pd.DataFrame:
+    """A CSV of robots, one a row.
+
+    Raises:
+        InputError: the file is empty or no table.
+    """
+    try:
+        return pd.read_csv(path)
+    except (pd.errors.EmptyDataError, pd.errors.ParserError, UnicodeDecodeError) as broken:
+        raise InputError(f"{path} is no CSV table: {broken}; give a header and a row a robot") from None
+
+
+def _steady(arguments: argparse.Namespace) -> None:
+    from sim.batches import steady_columns
+    from sim.steady import STEADY_COLUMNS
+
+    points = read_points(arguments.points)
+    replaced = [name for name in STEADY_COLUMNS if name in points]
+    if replaced:
+        print(f"note: computed anew, not read: {', '.join(replaced)}", file=sys.stderr)
+        points = points.drop(columns=replaced)
+    result = steady_columns({str(c): points[c].to_numpy() for c in points}, jobs=arguments.jobs)
+    table = pd.concat([points, pd.DataFrame(result)], axis=1)
+    with whole_file(arguments.out) as part:
+        table.to_csv(part, index=False, float_format="%.8g")
+    ended = table["converged"].to_numpy()
+    touching = int(np.count_nonzero(table["tail_gap"] < 1))
+    print(f"{len(table)} rows, {int(ended.sum())} converged, tails touch in {touching} -> {arguments.out}")
+
+
+def _replay(arguments: argparse.Namespace) -> None:
+    from sim.replay import load_schedule, replay
+
+    schedule = load_schedule(arguments.plan)
+    with tqdm(total=len(schedule.dwells), desc="replay", unit="dwell", delay=1.0) as bar:
+        track = replay([schedule], progress=bar.update)[0]
+    with whole_file(arguments.out) as part:
+        track.to_csv(part, index=False, float_format="%.8g")
+    end = track.iloc[-1]
+    print(
+        f"{len(schedule.dwells)} dwells, {end.time_s:.1f} s, "
+        f"ends at ({end.x_over_l:.3f}, {end.y_over_l:.3f}) l -> {arguments.out}"
+    )
+
+
+def _robot(arguments: argparse.Namespace) -> None:
+    from sim.robot import PRESETS, robot_toml
+
+    if arguments.preset not in PRESETS:
+        raise InputError(f"no preset {arguments.preset!r}; there are {', '.join(PRESETS)}")
+    write_text(arguments.out, robot_toml(PRESETS[arguments.preset]))
+    print(f"{arguments.preset} -> {Path(arguments.out)}")
+
+
+def _check(_: argparse.Namespace) -> None:
+    from sim.robot import PRESETS
+    from sim.steady import steady
+
+    motion, _state = steady(PRESETS["paper-measured"].groups())
+    share = float((motion.omega_h / (motion.omega_h - motion.omega_t)).abs())
+    print("N = 4, l = 11 cm, motor at 143.66 rpm: head's share of the motor speed, omega_h/omega")
+    print("  measured in the paper       0.441")
+    print(f"  this simulator, its fit     {share:.3f}")
+
+
+def main(argv: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(prog="python -m sim", description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    steady = commands.add_parser("steady", help="mean motion of robots at constant motor speed")
+    steady.add_argument("points", help="CSV: C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…")
+    steady.add_argument("--out", required=True, help="CSV to write: the same rows and their motion")
+    steady.add_argument("--jobs", type=int, help="processes (default: all processors)")
+    steady.set_defaults(run=_steady)
+    replay = commands.add_parser("replay", help="simulate a planned schedule")
+    replay.add_argument("plan", help="plan.json")
+    replay.add_argument("--out", required=True, help="CSV to write: the track")
+    replay.set_defaults(run=_replay)
+    robot = commands.add_parser("robot", help="write a preset robot as TOML")
+    robot.add_argument("preset")
+    robot.add_argument("--out", required=True)
+    robot.set_defaults(run=_robot)
+    check = commands.add_parser("check", help="the paper's measured point beside ours")
+    check.set_defaults(run=_check)
+    arguments = parser.parse_args(argv)
+    arguments.run(arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(run_command(main))
