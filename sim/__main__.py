@@ -18,25 +18,14 @@ from tqdm import tqdm
 
 from sim.artefact import whole_file, write_text
 from sim.errors import InputError, run_command
-
-
-def read_points(path: str) -> pd.DataFrame:
-    """A CSV of robots, one a row.
-
-    Raises:
-        InputError: the file is empty or no table.
-    """
-    try:
-        return pd.read_csv(path)
-    except (pd.errors.EmptyDataError, pd.errors.ParserError, UnicodeDecodeError) as broken:
-        raise InputError(f"{path} is no CSV table: {broken}; give a header and a row a robot") from None
+from sim.tables import read_table
 
 
 def _steady(arguments: argparse.Namespace) -> None:
     from sim.batches import steady_columns
     from sim.steady import STEADY_COLUMNS
 
-    points = read_points(arguments.points)
+    points = read_table(arguments.points)
     replaced = [name for name in STEADY_COLUMNS if name in points]
     if replaced:
         print(f"note: computed anew, not read: {', '.join(replaced)}", file=sys.stderr)

@@ -30,6 +30,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -70,7 +71,7 @@ class Swimmer:
 
     def select(self, lanes: Tensor) -> Swimmer:
         """The robots at `lanes`, (K,) indices."""
-        fields = {
+        fields: dict[str, Any] = {
             name: value[..., lanes] for name, value in vars(self).items() if torch.is_tensor(value)
         }
         return replace(self, **fields)
@@ -145,9 +146,7 @@ def _node_drag(swimmer: Swimmer, shape: rod.Stretching, velocity: Tensor) -> _Dr
     perp = voronoi * swimmer.zeta_perp
     excess = voronoi * (swimmer.zeta_parallel - swimmer.zeta_perp)
     along = dot(tangent, velocity)
-    return _Drag(
-        tangent, spread, along, perp, excess, -(perp * velocity + excess * along * tangent)
-    )
+    return _Drag(tangent, spread, along, perp, excess, -(perp * velocity + excess * along * tangent))
 
 
 def _body_velocity(u: Tensor, omega: Tensor) -> Tensor:
@@ -198,9 +197,7 @@ def newton_correction(
     G_total[3] += turned / rate
     border = -drag_.resist(G_total)
 
-    foot, corner, total = _body_rows(
-        swimmer, elastic, drag_, G, e_x, e_y, border[:, 0], rate, u
-    )
+    foot, corner, total = _body_rows(swimmer, elastic, drag_, G, e_x, e_y, border[:, 0], rate, u)
     return matrix.solve_bordered(-residual, border[:, 1:], foot, corner, -total)
 
 

@@ -27,7 +27,10 @@ Result = TypeVar("Result")
 
 
 def split(
-    tails: NDArray[np.float64], omega_bar: NDArray[np.float64], *, then_by: NDArray[np.float64] | None = None
+    tails: NDArray[np.float64],
+    omega_bar: NDArray[np.float64],
+    *,
+    then_by: NDArray[np.float64] | None = None,
 ) -> list[NDArray[np.int64]]:
     """Row numbers of batches with one N and one default resolution, similar in |ω̄| (and in `then_by`)."""
     speed = np.abs(omega_bar)

@@ -33,9 +33,7 @@ def tail_coefficients(l_over_r0: Tensor) -> tuple[Tensor, Tensor]:
     return 2 * math.pi / (log_slenderness - 0.5), 4 * math.pi / (log_slenderness + 0.5)
 
 
-def head_resistance(
-    C_t: Tensor, C_r: Tensor, C_yr: Tensor, head_radius: Tensor, head_length: Tensor
-) -> Tensor:
+def head_resistance(C_t: Tensor, C_r: Tensor, C_yr: Tensor, head_radius: Tensor, head_length: Tensor) -> Tensor:
     """Resistance matrix R_h of the head about the disc centre J.
 
     Args:

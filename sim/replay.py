@@ -70,7 +70,7 @@ def replay(
     schedules: Sequence[Schedule],
     *,
     resolution: Resolution | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int], object] | None = None,
 ) -> list[pd.DataFrame]:
     """Simulate schedules, those of equal N side by side.
 
@@ -95,7 +95,7 @@ def replay(
 def _replay_batch(
     schedules: list[Schedule],
     resolution: Resolution | None,
-    progress: Callable[[int], None] | None,
+    progress: Callable[[int], object] | None,
 ) -> list[pd.DataFrame]:
     names = sorted({name for s in schedules for name in s.robot})
     groups = Groups.from_columns(

@@ -24,6 +24,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -144,9 +145,7 @@ class Groups:
         if len(counts) != 1:
             raise InputError(f"a batch has one N; these rows have {counts.astype(int).tolist()}: split them")
         tensors = {
-            name: torch.tensor(array, dtype=torch.float64)
-            for name, array in values.items()
-            if name != "N"
+            name: torch.tensor(array, dtype=torch.float64) for name, array in values.items() if name != "N"
         }
         effects = {name: tensors.pop(name) for name in list(tensors) if name in catalogue()}
         return Groups(**tensors, N=int(counts[0]), effects=effects)
@@ -154,18 +153,14 @@ class Groups:
     def select(self, lanes: Tensor) -> Groups:
         """The rows at `lanes`."""
         own = {f.name: getattr(self, f.name) for f in fields(self)}
-        picked = {k: v[lanes] for k, v in own.items() if torch.is_tensor(v)}
-        return replace(
-            self, **picked, effects={name: size[lanes] for name, size in self.effects.items()}
-        )
+        picked: dict[str, Any] = {k: v[lanes] for k, v in own.items() if torch.is_tensor(v)}
+        return replace(self, **picked, effects={name: size[lanes] for name, size in self.effects.items()})
 
     def to(self, device: torch.device | str) -> Groups:
         """The same robots on another device."""
         own = {f.name: getattr(self, f.name) for f in fields(self)}
-        moved = {k: v.to(device) for k, v in own.items() if torch.is_tensor(v)}
-        return replace(
-            self, **moved, effects={name: size.to(device) for name, size in self.effects.items()}
-        )
+        moved: dict[str, Any] = {k: v.to(device) for k, v in own.items() if torch.is_tensor(v)}
+        return replace(self, **moved, effects={name: size.to(device) for name, size in self.effects.items()})
 
 
 def check_columns(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -325,7 +320,5 @@ PRESETS: dict[str, Robot] = {
     # Control section: N = 2, ω̄ = ±10, C = (3.0, 2.8, 2.0).
     "paper-control": _paper("paper-control").with_motor(10.0),
     # Its one measured point: N = 4, l = 11 cm, 143.66 rpm; also the robot of its first figure.
-    "paper-measured": _paper(
-        "paper-measured", tails=4, motor_speed=143.66 * 2 * math.pi / 60, **_FITTED
-    ),
+    "paper-measured": _paper("paper-measured", tails=4, motor_speed=143.66 * 2 * math.pi / 60, **_FITTED),
 }

@@ -115,9 +115,7 @@ def edge_forces(shape: Stretching, axial_stiffness: Tensor) -> Tensor:
     return _edge_forces(shape, bending, _shifted(bending.first), axial_stiffness)
 
 
-def _edge_forces(
-    shape: Stretching, bending: _Bending, first_after: Tensor, axial_stiffness: Tensor
-) -> Tensor:
+def _edge_forces(shape: Stretching, bending: _Bending, first_after: Tensor, axial_stiffness: Tensor) -> Tensor:
     n = shape.length.shape[0]
     force = (axial_stiffness * (shape.length * n - 1)) * shape.tangent[1:]
     force.addcmul_(bending.first, bending.by_next)
@@ -174,12 +172,8 @@ def respond(shape: Stretching, axial_stiffness: Tensor) -> ElasticResponse:
         (_identity(root) - tangent[0].unsqueeze(1) * tangent[0].unsqueeze(0)) / length[0],
         dim=0,
     )
-    moment_by_edge = -(
-        second[0] * axis.unsqueeze(1) * by_next[0].unsqueeze(0) + first[0] * projected
-    )
-    return ElasticResponse(
-        force, EdgeStiffness(diagonal, upper), -first[0] * axis, moment_by_edge
-    )
+    moment_by_edge = -(second[0] * axis.unsqueeze(1) * by_next[0].unsqueeze(0) + first[0] * projected)
+    return ElasticResponse(force, EdgeStiffness(diagonal, upper), -first[0] * axis, moment_by_edge)
 
 
 def _identity(like: Tensor) -> Tensor:

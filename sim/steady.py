@@ -111,7 +111,7 @@ def steady(
     groups: Groups,
     *,
     resolution: Resolution | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int], object] | None = None,
 ) -> tuple[Steady, State]:
     """Steady motion of a batch of robots of one N.
 
@@ -141,7 +141,7 @@ def _replace(into: dict[str, object], lanes: Tensor, values: dict[str, object]) 
 
 
 def _run(
-    groups: Groups, resolution: Resolution, progress: Callable[[int], None] | None
+    groups: Groups, resolution: Resolution, progress: Callable[[int], object] | None
 ) -> tuple[Steady, State]:
     swimmer = assemble(groups, edges=resolution.edges)
     omega = groups.omega_bar
@@ -166,9 +166,7 @@ def _run(
             continue
         lanes = torch.nonzero(done).squeeze(1)
         gap = history.smallest_gap(swimmer, lanes)
-        ended.append(
-            (rows[lanes], state.select(lanes), means[:, lanes], drift[lanes], converged[lanes], gap)
-        )
+        ended.append((rows[lanes], state.select(lanes), means[:, lanes], drift[lanes], converged[lanes], gap))
         if progress is not None:
             progress(len(lanes))
         rest = torch.nonzero(~done).squeeze(1)
@@ -199,10 +197,7 @@ def _run(
 
 def _concatenate(states: list[State], order: Tensor) -> State:
     return State(
-        **{
-            name: torch.cat([getattr(s, name) for s in states], -1)[..., order]
-            for name in vars(states[0])
-        }
+        **{name: torch.cat([getattr(s, name) for s in states], -1)[..., order] for name in vars(states[0])}
     )
 
 

@@ -88,9 +88,7 @@ def at_rest(swimmer: Swimmer, phase: float = 0.0) -> State:
     )
 
 
-def step(
-    swimmer: Swimmer, state: State, omega: Tensor, dt: Tensor, *, tolerance: float = TOLERANCE
-) -> State:
+def step(swimmer: Swimmer, state: State, omega: Tensor, dt: Tensor, *, tolerance: float = TOLERANCE) -> State:
     """Advance every robot by its own dt at constant motor speed ω; omega and dt are (B,)."""
     if state.x_before is None or state.pose_before is None or state.u_before is None:
         return _first_step(swimmer, state, omega, dt, tolerance)
@@ -103,11 +101,9 @@ def step(
     return _accept(state, dt, x, x_dot, pose, u, failed)
 
 
-def _first_step(
-    swimmer: Swimmer, state: State, omega: Tensor, dt: Tensor, tolerance: float
-) -> State:
+def _first_step(swimmer: Swimmer, state: State, omega: Tensor, dt: Tensor, tolerance: float) -> State:
     tau = _GAMMA * dt
-    x1, x_dot1, pose1, u1, failed1 = _stage(
+    _, x_dot1, pose1, u1, failed1 = _stage(
         swimmer, state.x, state.pose, tau, omega, state.x + tau * state.x_dot, state.u, tolerance
     )
     weight = (1 - _GAMMA) * dt

@@ -13,7 +13,7 @@ With equal dwells of T the robot zigzags along a line at the net speed
     v̄ = |p + Rot(Δψ) M p| / 2T,   g = (p, Δψ),  M the mirror image,
 
 since a reversed motor mirrors the motion. Both come from one run: from the steady state the motor flips
-K times, until flips older than the tails' memory are forgotten, and g is the mean over the last two
+until the start is forgotten (once, where T exceeds the tails' memory), and g is the mean over the last
 half-periods and over two disc phases half a tail spacing apart at the first flip (the phase at a flip matters
 for N = 2, and a planner does not know it).
 
@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import torch
@@ -38,7 +39,7 @@ from sim.steady import Resolution, Steady, time_step
 from sim.stepper import YAW, State, X, Y, step
 
 MEMORY = 1.2  # time units after which a flip is forgotten: the tails turn over in about 0.7
-_AVERAGED = 2  # half-periods that the mean is taken over
+_AVERAGED = 2  # half-periods that the mean is taken over, where there are as many
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,7 @@ class SwitchResponse:
     failed: NDArray[np.bool_]
 
 
-def segment(
-    swimmer: Swimmer, state: State, omega: Tensor, duration: Tensor, resolution: Resolution
-) -> State:
+def segment(swimmer: Swimmer, state: State, omega: Tensor, duration: Tensor, resolution: Resolution) -> State:
     """Advance by `duration` (B,) at constant ω, in equal steps, the same number for all robots."""
     count = max(1, math.ceil(float((duration / time_step(omega, resolution)).max()) - 1e-9))
     for _ in range(count):
@@ -93,7 +92,7 @@ def switch_response(
     omega = groups.omega_bar[both]
     changes: list[NDArray[np.float64]] = []
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
-    count = _AVERAGED + math.floor(MEMORY / float(dwell.min()))
+    count = 1 + math.floor(MEMORY / float(dwell.min()))
     count += 0 if even else count % 2
     for _ in range(count):
         omega = -omega
@@ -129,9 +128,8 @@ def _poses(state: State) -> NDArray[np.float64]:
 
 
 def _join(first: State, second: State) -> State:
-    return State(
-        **{
-            name: torch.cat([value, getattr(second, name)], -1) if torch.is_tensor(value) else None
-            for name, value in vars(first).items()
-        }
-    )
+    fields: dict[str, Any] = {
+        name: torch.cat([value, getattr(second, name)], -1) if torch.is_tensor(value) else None
+        for name, value in vars(first).items()
+    }
+    return State(**fields)

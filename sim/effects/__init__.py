@@ -35,9 +35,7 @@ def adjust_head_resistance(groups: Groups, resistance: Tensor) -> Tensor:
     return resistance
 
 
-def adjust_tail_coefficients(
-    groups: Groups, coefficients: tuple[Tensor, Tensor]
-) -> tuple[Tensor, Tensor]:
+def adjust_tail_coefficients(groups: Groups, coefficients: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
     """The tails' (ζ∥, ζ⊥), each (B,), with the effects that `groups` carries."""
     for name, size in sorted(groups.effects.items()):
         coefficients = catalogue()[name].tail_coefficients(size, groups, coefficients)

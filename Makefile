@@ -1,0 +1,66 @@
+# Everything runs in .venv, made from constraints.txt. `make` lists the targets.
+PYTHON ?= python3
+VENV := .venv
+RUN := $(VENV)/bin/python
+STAMP := $(VENV)/.installed
+SIM := $(wildcard sim/*.py sim/effects/*.py)
+
+CONFIG ?= sweep.toml
+DATA ?= data/sweep
+MODEL ?= models/model.pt
+ROBOT ?= paper-control
+PLANPATH ?= square:3
+TABLE ?=
+
+# Batches are the parallelism: one thread a process.
+export OMP_NUM_THREADS ?= 1
+export MKL_NUM_THREADS ?= 1
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint dataset train plan calibrate report bench clean
+
+help: ## list the targets
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1\t\2/' | expand -t 20
+
+setup: $(STAMP) ## make .venv and install everything, pinned
+$(STAMP): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt torch
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	touch $@
+
+demo: reports/demo.html ## the whole pipeline on the paper's robot, ends with reports/demo.html
+reports/demo.html: $(STAMP) $(SIM) $(wildcard dataset/*.py surrogate/*.py surrogate/shipped/* planner/*.py calibration/*.py) demo.toml
+	$(RUN) -m calibration demo --out $@
+
+test: $(STAMP) ## run the tests
+	$(RUN) -m pytest
+
+lint: $(STAMP) ## style and types
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+
+dataset: $(DATA)/manifest.json ## simulate CONFIG into DATA (goes on where it stopped)
+$(DATA)/manifest.json: $(STAMP) $(CONFIG)
+	$(RUN) -m dataset build --config $(CONFIG) --out $(DATA)
+
+train: $(MODEL) ## train the look-up table MODEL on DATA
+$(MODEL): $(DATA)/manifest.json
+	$(RUN) -m surrogate train $(DATA) --out $(MODEL)
+
+plan: $(STAMP) ## plan PLANPATH for ROBOT into reports/plan
+	$(RUN) -m planner plan $(PLANPATH) --robot $(ROBOT) --out reports/plan
+
+calibrate: $(STAMP) ## close the loop on TABLE=… for ROBOT into reports/calibration
+	@test -n "$(TABLE)" || { echo "error: no table; write make calibrate TABLE=runs.csv ROBOT=robot.toml" >&2; exit 2; }
+	$(RUN) -m calibration close "$(TABLE)" --robot "$(ROBOT)" --out reports/calibration
+
+report: $(DATA)/manifest.json ## picture page of DATA
+	$(RUN) -m dataset report $(DATA) --out reports/dataset.html
+
+bench: $(STAMP) ## the figures that the README claims
+	$(RUN) -m benchmarks.run
+
+clean: ## remove what the pipeline made (not .venv)
+	rm -rf data models reports

@@ -1,0 +1,86 @@
+"""Command line of the calibration.
+
+python -m calibration close TABLE.csv --robot robot.toml --out DIR    verdict.json, report.html, corrected.toml
+python -m calibration simulate --robot robot.toml --out TABLE.csv     a table to try it on
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from sim.errors import InputError, run_command
+
+
+def _close(arguments: argparse.Namespace) -> None:
+    from calibration.loop import close, verdict_record
+    from calibration.measurements import read_measurements
+    from calibration.report import write_report
+    from sim.artefact import write_text
+    from sim.robot import load_robot, robot_toml
+
+    robot = load_robot(arguments.robot)
+    data = read_measurements(arguments.table)
+    for line in data.set_aside:
+        print(f"set aside: {line}", file=sys.stderr)
+    result = close(data, robot, seed=arguments.seed, jobs=arguments.jobs)
+    out = Path(arguments.out)
+    record = verdict_record(result, table=Path(arguments.table).name)
+    write_report(result, data, out / "report.html", title=Path(arguments.table).name)
+    write_text(out / "corrected.toml", robot_toml(result.corrected))
+    write_text(out / "verdict.json", json.dumps(record, indent=1) + "\n")
+    print(result.sentence)
+    print(
+        f"error on session {result.locked}: as given {100 * result.error_uncalibrated:.2f} %, "
+        f"calibrated {100 * result.error_before:.2f} %, with effects {100 * result.error_after:.2f} %, "
+        f"noise {100 * result.noise_ceiling:.2f} %"
+    )
+    print(f"-> {out / 'verdict.json'}, {out / 'report.html'}, {out / 'corrected.toml'}")
+
+
+def _simulate(arguments: argparse.Namespace) -> None:
+    from dataclasses import replace
+
+    from calibration.synthetic import make_table
+    from sim.artefact import whole_file
+    from sim.robot import load_robot
+
+    robot = load_robot(arguments.robot)
+    effects = dict(robot.effects)
+    for entry in arguments.effect:
+        name, _, size = entry.partition("=")
+        try:
+            effects[name] = float(size)
+        except ValueError:
+            raise InputError(f"--effect {entry!r}; write NAME=SIZE") from None
+    table = make_table(replace(robot, effects=effects), seed=arguments.seed, jobs=arguments.jobs)
+    with whole_file(arguments.out) as part:
+        table.to_csv(part, index=False, float_format="%.6g")
+    print(f"{len(table)} runs -> {arguments.out}")
+
+
+def main(argv: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(prog="python -m calibration", description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    close = commands.add_parser("close", help="fit a table, find what the model lacks, correct the robot")
+    close.add_argument("table", help="CSV of measured runs")
+    close.add_argument("--robot", required=True, help="robot.toml or the name of a preset")
+    close.add_argument("--out", required=True, help="folder to write")
+    close.add_argument("--seed", type=int, default=0, help="of the bootstrap")
+    close.add_argument("--jobs", type=int, help="processes (default: all processors)")
+    close.set_defaults(run=_close)
+    simulate = commands.add_parser("simulate", help="make a table from the simulator")
+    simulate.add_argument("--robot", required=True, help="robot.toml or the name of a preset")
+    simulate.add_argument("--out", required=True, help="CSV to write")
+    simulate.add_argument("--effect", action="append", default=[], metavar="NAME=SIZE", help="hidden effect")
+    simulate.add_argument("--seed", type=int, default=0)
+    simulate.add_argument("--jobs", type=int, help="processes (default: all processors)")
+    simulate.set_defaults(run=_simulate)
+    arguments = parser.parse_args(argv)
+    arguments.run(arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(run_command(main))

@@ -1,0 +1,161 @@
+"""Which effect explains the residual: candidates, refits, and what survives.
+
+Every even effect of the catalogue that the table's columns can reveal is a candidate. One whose score passes the
+critical |z| (`calibration.misfit`), in the direction that its bounds allow, is refitted together with the
+coefficients in the simulator, and kept if
+
+    the residual that it leaves passes the general lack-of-fit tests (at a fifth of the level, since a
+    true effect must not be lost once in twenty times),
+    its interval excludes the null, and
+    it predicts left-out sessions better, by more than the uncertainty of that gain.
+
+Kept effects whose χ² differ by less than what one parameter gains by chance (3.84) cannot be told apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.fit import Fit, fit
+from calibration.forward import COEFFICIENTS, Parameters, Swimmer
+from calibration.misfit import TESTABLE, Misfit, check_misfit
+from sim.effects import Effect, catalogue
+
+Floats = NDArray[np.float64]
+
+_DERIVATIVE_STEP = 0.1  # in units of an effect's typical size
+_INDISTINGUISHABLE = 3.84  # χ² with one degree of freedom, 95 %
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """What was found about one effect."""
+
+    effect: Effect
+    z: float
+    survived: float
+    detectable: float  # size that |z| would find half of the time: critical |z| / signal per unit
+    refit: Fit | None
+    refit_misfit: Misfit | None
+    gain: float  # mean predictive gain per session left out, in log likelihood
+    gain_error: float
+    verdict: str  # why it was kept or not
+
+    @property
+    def kept(self) -> bool:
+        return self.verdict == "kept"
+
+
+def candidates() -> list[Effect]:
+    """Effects that a table with the ordinary columns can reveal and a mirrored simulation can serve."""
+    return [e for e in catalogue().values() if e.symmetry == "even" and e.covariate is None]
+
+
+def directions(
+    model: Swimmer, parameters: Parameters, prediction: Floats, effects: list[Effect], *, title: str
+) -> Floats:
+    """∂f/∂ε at each effect's null, (n, k, e)."""
+    if not effects:
+        return np.zeros((*prediction.shape, 0))
+    null = {e.name: e.null for e in effects}
+    sets = []
+    for effect in effects:
+        sets.append({**parameters, **null, effect.name: effect.null + _DERIVATIVE_STEP * effect.typical})
+    moved = model.predict(sets, title=title)
+    widths = np.array([_DERIVATIVE_STEP * e.typical for e in effects])
+    return np.moveaxis((moved - prediction) / widths[:, None, None], 0, -1)
+
+
+def examine(
+    model: Swimmer,
+    base: Fit,
+    misfit: Misfit,
+    effects: list[Effect],
+    along: Floats,
+    used: NDArray[np.bool_],
+    *,
+    level: float,
+    seed: int,
+) -> list[Candidate]:
+    """Refit and judge every effect, best score first."""
+    found = []
+    for j in np.argsort(-np.abs(misfit.scores.z)):
+        effect = effects[j]
+        z, survived = float(misfit.scores.z[j]), float(misfit.scores.survived[j])
+        detectable = misfit.critical_z / max(float(misfit.scores.length[j]), 1e-300)
+        guess = effect.null + z / max(float(misfit.scores.length[j]), 1e-300)
+        low, high = effect.bounds
+        reason = ""
+        if survived < TESTABLE:
+            reason = "absorbed by the coefficients: not testable with these runs"
+        elif abs(z) < misfit.critical_z:
+            reason = "score within the noise"
+        elif not low <= guess <= high and (guess < low) == (effect.null == low):
+            reason = "acts against its sign"
+        if reason:
+            found.append(Candidate(effect, z, survived, detectable, None, None, 0.0, 0.0, reason))
+            continue
+        guess = min(max(guess, low), high)
+        refit = fit(
+            model,
+            {**base.parameters, effect.name: guess},
+            (*COEFFICIENTS, effect.name),
+            used,
+            title=f"fit with {effect.title}",
+        )
+        after = check_misfit(
+            refit, model.data, used, np.zeros((*along.shape[:2], 0)), level=level, seed=seed + 1
+        )
+        gain, error = _session_gain(model, base, refit, used)
+        ends = refit.interval(effect.name)
+        if after.general_p < level / 5:
+            reason = f"leaves a residual (p = {after.general_p:.3g})"
+        elif ends[0] <= effect.null <= ends[1]:
+            reason = "its interval includes the null"
+        elif gain <= error:
+            reason = "does not predict left-out sessions better"
+        found.append(Candidate(effect, z, survived, detectable, refit, after, gain, error, reason or "kept"))
+    return found
+
+
+def explaining(found: list[Candidate]) -> list[Candidate]:
+    """Kept effects that the data cannot tell from the best of them, best first."""
+    kept = sorted((c for c in found if c.kept and c.refit), key=lambda c: _chi_square(c))
+    return [c for c in kept if _chi_square(c) - _chi_square(kept[0]) < _INDISTINGUISHABLE]
+
+
+def _chi_square(candidate: Candidate) -> float:
+    assert candidate.refit is not None
+    return candidate.refit.chi_square
+
+
+def _session_gain(model: Swimmer, base: Fit, refit: Fit, used: NDArray[np.bool_]) -> tuple[float, float]:
+    """Mean gain in log likelihood per left-out session, and its standard error (linearised refits)."""
+    data = model.data
+    gains = []
+    for session in np.unique(data.session[used]):
+        learn, out = used & (data.session != session), used & (data.session == session)
+        gains.append(0.5 * (_left_out(data.y, data.session, base, learn, out, refit)
+                            - _left_out(data.y, data.session, refit, learn, out, refit)))  # fmt: skip
+    spread = np.std(gains, ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
+    return float(np.mean(gains)), float(spread)
+
+
+def _left_out(
+    y: Floats,
+    session: NDArray[np.int64],
+    fitted: Fit,
+    learn: NDArray[np.bool_],
+    out: NDArray[np.bool_],
+    judge: Fit,
+) -> float:
+    """χ² of a left-out session for a model fitted to the others, in the noise of `judge`."""
+    white = judge.noise.whitener(session[learn])
+    residual = y - fitted.prediction
+    step = np.linalg.lstsq(white(fitted.jacobian[learn]), white(residual[learn]), rcond=None)[0]
+    left = residual[out] - fitted.jacobian[out] @ step
+    r = judge.noise.whitener(session[out])(left)
+    return float(r @ r)

@@ -1,0 +1,89 @@
+"""Forward model of the measurements: the simulator, for any coefficients and effects.
+
+Runs of equal N, l and |ω| share one simulation (a reversed motor mirrors the motion; only even effects are
+candidates here). The discretisation's error is removed by defect correction: once, at the starting
+coefficients, the conditions are simulated on half the edge length and half the step, extrapolated for a
+method of second order, and the difference in ln(output) is added to every later prediction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.measurements import Measurements
+from sim.batches import steady_columns
+from sim.errors import InputError
+from sim.robot import Robot
+
+Floats = NDArray[np.float64]
+Parameters = Mapping[str, float]
+
+COEFFICIENTS = ("C_t", "C_r", "C_yr")
+
+
+@dataclass(frozen=True)
+class Swimmer:
+    """Predicts the outputs of a table for a robot with given parameters."""
+
+    robot: Robot
+    data: Measurements
+    correction: Floats | float = 0.0  # (n, k), in the units of y
+    jobs: int | None = None
+
+    def predict(self, sets: Sequence[Parameters], *, refine: bool = False, title: str = "") -> Floats:
+        """Predictions (P, n, k) for P parameter sets, all simulated in one go."""
+        conditions, place = self.data.unique_conditions()
+        columns: dict[str, list[float]] = {}
+        for parameters in sets:
+            own: dict[str, Any] = {k: v for k, v in parameters.items() if k in COEFFICIENTS}
+            effects = {k: v for k, v in parameters.items() if k not in COEFFICIENTS}
+            for tails, length, omega in conditions:
+                run = replace(
+                    self.robot,
+                    **own,
+                    tails=int(tails),
+                    tail_length=float(length),
+                    motor_speed=float(omega),
+                    effects={**self.robot.effects, **effects},
+                )
+                for name, value in run.group_values().items():
+                    columns.setdefault(name, []).append(value)
+        length_of = {name: len(v) for name, v in columns.items()}
+        if len(set(length_of.values())) != 1:
+            raise InputError("parameter sets differ in their effects; give each set all of them")
+        found = steady_columns(
+            {k: np.array(v) for k, v in columns.items()}, refine=refine, jobs=self.jobs, title=title
+        )
+        scale = [self._scales(length) for _ in sets for length in conditions[:, 1]]
+        tables = [self._outputs(found, i, *scale[i]) for i in range(len(scale))]
+        table = np.array(tables).reshape(len(sets), len(conditions), -1)
+        if not np.isfinite(table).all():
+            raise InputError("the simulation of a run broke down; check the robot and the run's motor speed")
+        return np.asarray(table[:, place] + self.correction)
+
+    def corrected(self, parameters: Parameters, *, title: str = "") -> Swimmer:
+        """This model with its discretisation error removed at `parameters`."""
+        plain = replace(self, correction=0.0)
+        coarse = plain.predict([parameters], title=title)[0]
+        fine = plain.predict([parameters], refine=True, title=f"{title}, refined" if title else "")[0]
+        return replace(self, correction=(fine - coarse) * 4 / 3)
+
+    def _scales(self, length: float) -> tuple[float, float]:
+        robot = self.robot
+        return length, robot.viscosity * length**4 / robot.bending_stiffness
+
+    def _outputs(self, found: Mapping[str, Floats], row: int, length: float, time: float) -> list[float]:
+        values = {
+            "omega_h": math.log(abs(found["omega_h_bar"][row]) / time),
+            "omega_t": math.log(abs(found["omega_t_bar"][row]) / time),
+            "omega_yr": math.log(abs(found["omega_yr_bar"][row]) / time),
+            "R_yr": math.log(found["R_yr_over_l"][row] * length),
+            "theta": math.radians(found["theta_deg"][row]),
+        }
+        return [values[name] for name in self.data.outputs]

@@ -1,0 +1,235 @@
+"""The whole loop: split, fit, test, attribute, refit, and open the locked test once.
+
+1. One whole session is locked away before anything is looked at (`locked_session`); rows are never split.
+2. Covariance from the repeats and the sessions (`calibration.noise`).
+3. Fit of C_t, C_r, C_yr to the other sessions (`calibration.fit`), defect-corrected (`calibration.forward`).
+4. Lack of fit, kernel score and projected scores (`calibration.misfit`).
+5. Refit with each effect that passes; keep what explains (`calibration.attribute`).
+6. Verdict: "none" (no departure beyond noise), "effect" (one explains it), "ambiguous" (several do and the runs
+   cannot tell them apart), "unexplained" (there is a departure, and no effect in the catalogue explains it).
+7. Errors on the locked session: as given, calibrated, calibrated with the effect, and the noise ceiling.
+
+Not yet here: pairs of effects, generic correction, next runs, drift of covariates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.attribute import Candidate, candidates, directions, examine, explaining
+from calibration.fit import Fit, fit
+from calibration.forward import COEFFICIENTS, Swimmer
+from calibration.measurements import Measurements
+from calibration.misfit import Misfit, check_misfit
+from sim.artefact import fingerprint, provenance
+from sim.robot import Robot
+
+Floats = NDArray[np.float64]
+
+LEVEL = 0.05  # α of every claim
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a table says about a robot."""
+
+    verdict: str  # "none", "effect", "ambiguous", "unexplained"
+    effects: tuple[str, ...]
+    base: Fit  # calibrated, without effects
+    final: Fit  # the model to go on with
+    misfit: Misfit
+    candidates: tuple[Candidate, ...]
+    error_uncalibrated: float
+    error_before: float
+    error_after: float
+    error_after_interval: tuple[float, float]
+    noise_ceiling: float
+    errors_by_output: dict[str, dict[str, float]]
+    locked: str
+    used: NDArray[np.bool_]
+    uncalibrated: Floats  # (n, k) prediction of the robot as given
+    corrected: Robot
+    plan_hash: str  # of everything fixed before the data was looked at
+    set_aside: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one sentence with its certainty."""
+        p = self.misfit.p_value
+        if self.verdict == "none":
+            return f"No effect is missing that these runs can show (p = {p:.2g})."
+        if self.verdict == "effect":
+            best = next(c for c in self.candidates if c.effect.name == self.effects[0])
+            assert best.refit is not None
+            low, high = best.refit.interval(best.effect.name)
+            size = best.refit.parameters[best.effect.name]
+            return (
+                f"The residual (p = {p:.2g}) is consistent with {best.effect.title}, "
+                f"size {size:.3g} ({low:.3g} to {high:.3g}), and with no other effect of the catalogue."
+            )
+        if self.verdict == "ambiguous":
+            names = " or ".join(c.effect.title for c in self.candidates if c.effect.name in self.effects)
+            return f"The residual (p = {p:.2g}) is explained by {names}: these runs cannot tell them apart."
+        return f"There is a residual (p = {p:.2g}) that no single effect of the catalogue explains."
+
+
+def locked_session(data: Measurements) -> int:
+    """The session kept for the test: the middle one by name, so that it is interpolated to."""
+    return len(data.session_names) // 2
+
+
+def close(
+    data: Measurements,
+    robot: Robot,
+    *,
+    level: float = LEVEL,
+    seed: int = 0,
+    jobs: int | None = None,
+    progress: bool = True,
+) -> Verdict:
+    """Close the loop on a table.
+
+    Args:
+        data: measured runs.
+        robot: dimensions and materials; its coefficients are the starting point ("uncalibrated"), its N, tail
+            length and motor speed are replaced by those of the runs.
+        level: α of every claim.
+        seed: of the bootstrap; the result is deterministic given it.
+        jobs: processes.
+        progress: show bars.
+    """
+    effects = candidates()
+    fixed = {
+        "level": level,
+        "seed": seed,
+        "catalogue": [e.name for e in effects],
+        "locked": data.session_names[locked_session(data)],
+    }
+    used = data.session != locked_session(data)
+    given = {name: float(getattr(robot, name)) for name in COEFFICIENTS}
+    null = {e.name: float(robot.effects.get(e.name, e.null)) for e in effects}
+    start = {**given, **null}
+    title = "as given" if progress else ""
+    model = Swimmer(robot, data, jobs=jobs).corrected(start, title=title)
+    uncalibrated = model.predict([start])[0]
+    base = fit(model, start, COEFFICIENTS, used, title="fit" if progress else "")
+    along = directions(model, base.parameters, base.prediction, effects, title="effects" if progress else "")
+    misfit = check_misfit(base, data, used, along, level=level, seed=seed)
+    found: list[Candidate] = []
+    if misfit.p_value < level:
+        found = examine(model, base, misfit, effects, along, used, level=level, seed=seed)
+    best = explaining(found)
+    verdict = "none" if misfit.p_value >= level else ("unexplained", "effect", "ambiguous")[min(len(best), 2)]
+    final = best[0].refit if verdict == "effect" and best[0].refit else base
+    errors = {
+        name: _errors(data, prediction, ~used)
+        for name, prediction in (
+            ("uncalibrated", uncalibrated),
+            ("before", base.prediction),
+            ("after", final.prediction),
+        )
+    }
+    ceiling = float(np.sqrt(np.trace(base.noise.run) / len(base.noise.run)))
+    return Verdict(
+        verdict=verdict,
+        effects=tuple(c.effect.name for c in best),
+        base=base,
+        final=final,
+        misfit=misfit,
+        candidates=tuple(found) or _unexamined(misfit, effects),
+        error_uncalibrated=errors["uncalibrated"][0],
+        error_before=errors["before"][0],
+        error_after=errors["after"][0],
+        error_after_interval=_interval(data, final.prediction, ~used, seed),
+        noise_ceiling=ceiling,
+        errors_by_output={k: v[1] for k, v in errors.items()},
+        locked=data.session_names[locked_session(data)],
+        used=used,
+        uncalibrated=uncalibrated,
+        corrected=_corrected(robot, final.parameters),
+        plan_hash=fingerprint(fixed),
+        set_aside=data.set_aside,
+    )
+
+
+def _unexamined(misfit: Misfit, effects: list[Any]) -> tuple[Candidate, ...]:
+    scores = misfit.scores
+    return tuple(
+        Candidate(e, float(z), float(s), misfit.critical_z / max(float(n), 1e-300), None, None, 0.0, 0.0,
+                  "not needed")
+        for e, z, s, n in zip(effects, scores.z, scores.survived, scores.length, strict=True)
+    )  # fmt: skip
+
+
+def _errors(data: Measurements, prediction: Floats, rows: NDArray[np.bool_]) -> tuple[float, dict[str, float]]:
+    """Relative rms over runs and outputs (θ in rad), and per output."""
+    square = ((data.y - prediction)[rows] ** 2).mean(0)
+    each = dict(zip(data.outputs, np.sqrt(square).tolist(), strict=True))
+    return float(np.sqrt(square.mean())), each
+
+
+def _interval(
+    data: Measurements, prediction: Floats, rows: NDArray[np.bool_], seed: int
+) -> tuple[float, float]:
+    """95 % interval of the relative rms by resampling conditions."""
+    square = ((data.y - prediction)[rows] ** 2).mean(1)
+    condition = data.condition[rows]
+    kinds = np.unique(condition)
+    means = np.array([square[condition == c].mean() for c in kinds])
+    rng = np.random.default_rng(seed)
+    drawn = np.sqrt(means[rng.integers(0, len(kinds), (2000, len(kinds)))].mean(1))
+    return float(np.quantile(drawn, 0.025)), float(np.quantile(drawn, 0.975))
+
+
+def _corrected(robot: Robot, parameters: Mapping[str, float]) -> Robot:
+    own: dict[str, Any] = {name: float(parameters[name]) for name in COEFFICIENTS}
+    sizes = {k: float(v) for k, v in parameters.items() if k not in COEFFICIENTS and v != 0.0}
+    return replace(robot, **own, effects={**robot.effects, **sizes})
+
+
+def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
+    """verdict.json."""
+    final = result.final
+    parameters = {
+        name: {"value": final.parameters[name], "interval": list(final.interval(name))} for name in final.names
+    }
+    return {
+        "verdict": result.verdict,
+        "effects": list(result.effects),
+        "sentence": result.sentence,
+        "parameters": parameters,
+        "error_uncalibrated": result.error_uncalibrated,
+        "error_before": result.error_before,
+        "error_after": result.error_after,
+        "error_after_interval": list(result.error_after_interval),
+        "noise_ceiling": result.noise_ceiling,
+        "errors_by_output": result.errors_by_output,
+        "p_value": result.misfit.p_value,
+        "p_lack_of_fit": result.misfit.general_p,
+        "p_scores": result.misfit.score_p,
+        "critical_z": result.misfit.critical_z,
+        "candidates": [
+            {
+                "effect": c.effect.name,
+                "z": c.z,
+                "survived_share": c.survived,
+                "smallest_detectable": c.detectable,
+                "size": c.refit.parameters[c.effect.name] if c.refit else None,
+                "chi_square": c.refit.chi_square if c.refit else None,
+                "session_gain": [c.gain, c.gain_error],
+                "verdict": c.verdict,
+            }
+            for c in result.candidates
+        ],
+        "next_runs": [],
+        "locked_test": result.locked,
+        "fixed_before": result.plan_hash,
+        "rows_set_aside": list(result.set_aside),
+        "table": table,
+        "provenance": provenance({"table": table}),
+    }

@@ -1,0 +1,146 @@
+"""Measured tables: one run a row, units in the column names.
+
+Needed: N, l_cm, omega_rpm (head relative to tails, signed) and some of the outputs
+
+    omega_h_rpm, omega_t_rpm, omega_yr_rad_s (signed), R_yr_cm, theta_deg (of the head's centre),
+
+and more runs than one per condition, so that the noise can be told from the repeats. `session` groups runs
+made together; where it is missing, runs of one N count as one session. Rows that cannot be used are set
+aside by number and reason, never dropped in silence.
+
+Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians.
+A wrong sign is a bad row, since the motor's direction sets the sign of all of them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from sim.errors import InputError
+from sim.tables import read_table
+
+Floats = NDArray[np.float64]
+
+_RPM = 2 * math.pi / 60
+# Output -> (column, factor to SI, sign relative to the motor's; 0: a magnitude)
+OUTPUTS = {
+    "omega_h": ("omega_h_rpm", _RPM, -1),
+    "omega_t": ("omega_t_rpm", _RPM, 1),
+    "omega_yr": ("omega_yr_rad_s", 1.0, 1),
+    "R_yr": ("R_yr_cm", 0.01, 0),
+    "theta": ("theta_deg", math.pi / 180, 0),
+}
+_INPUTS = ("N", "l_cm", "omega_rpm")
+_KNOWN = {*_INPUTS, *(c for c, _, _ in OUTPUTS.values()), "run", "trial", "session", "elapsed_min"}
+_FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Usable runs of a table."""
+
+    tails: Floats  # (n,) N
+    length: Floats  # (n,) tail length [m]
+    omega: Floats  # (n,) motor speed, signed [rad/s]
+    session: NDArray[np.int64]  # (n,) 0, 1, …
+    session_names: tuple[str, ...]
+    outputs: tuple[str, ...]
+    y: Floats  # (n, k): ln |output|, θ in rad
+    condition: NDArray[np.int64]  # (n,) runs with equal N, l, ω (signed) share a number
+    set_aside: tuple[str, ...]  # "row 7: …"
+
+    def __len__(self) -> int:
+        return len(self.omega)
+
+    def unique_conditions(self) -> tuple[Floats, NDArray[np.int64]]:
+        """Distinct (N, l, |ω|) as (m, 3), and each run's place among them."""
+        table = np.stack([self.tails, self.length, np.abs(self.omega)], 1)
+        rows, place = np.unique(table.round(9), axis=0, return_inverse=True)
+        return rows, place.reshape(-1)
+
+
+def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
+    """Measurements from a CSV or a table.
+
+    Raises:
+        InputError: columns are missing or unknown, or too few runs remain.
+    """
+    table = source if isinstance(source, pd.DataFrame) else read_table(source)
+    for name in _INPUTS:
+        if name not in table:
+            raise InputError(f"the table has no column {name!r}; it needs {', '.join(_INPUTS)}")
+    unknown = [str(c) for c in table if c not in _KNOWN]
+    if unknown:
+        raise InputError(f"unknown column {unknown[0]!r}; known are {', '.join(sorted(_KNOWN))}")
+    outputs = tuple(name for name, (column, _, _) in OUTPUTS.items() if column in table)
+    if len(outputs) < 3 or "omega_yr" not in outputs:
+        raise InputError(
+            "the table needs omega_yr_rad_s and at least two more outputs to fit three coefficients"
+        )
+    numbers = table.drop(columns="session", errors="ignore").apply(pd.to_numeric, errors="coerce")
+    reasons = _reasons(table, numbers, outputs)
+    keep = np.array([not r for r in reasons])
+    aside = tuple(f"row {i + 1}: {r}" for i, r in enumerate(reasons) if r)
+    good = numbers[keep]
+    if len(good) < _FEWEST_RUNS:
+        first = f" ({aside[0]})" if aside else ""
+        raise InputError(f"{len(good)} usable runs{first}; a calibration needs at least {_FEWEST_RUNS}")
+    names = (
+        table.loc[keep, "session"].astype(str)
+        if "session" in table
+        else "N = " + good["N"].astype(int).astype(str)
+    )
+    session_names, session = np.unique(names.to_numpy(dtype=str), return_inverse=True)
+    if len(session_names) < 3:
+        raise InputError(f"{len(session_names)} session(s); one is kept for the test, so give at least 3")
+    condition = good.groupby(list(_INPUTS), sort=True).ngroup().to_numpy()
+    repeats = len(good) - len(np.unique(condition))
+    if repeats < _FEWEST_REPEATS:
+        raise InputError(f"{repeats} repeated runs; the noise is told from at least {_FEWEST_REPEATS}")
+    columns = []
+    for name in outputs:
+        column, factor, _ = OUTPUTS[name]
+        value = good[column].to_numpy(dtype=float) * factor
+        columns.append(value if name == "theta" else np.log(np.abs(value)))
+    return Measurements(
+        tails=good["N"].to_numpy(dtype=float),
+        length=good["l_cm"].to_numpy(dtype=float) * 0.01,
+        omega=good["omega_rpm"].to_numpy(dtype=float) * _RPM,
+        session=session,
+        session_names=tuple(str(n) for n in session_names),
+        outputs=outputs,
+        y=np.stack(columns, 1),
+        condition=condition,
+        set_aside=aside,
+    )
+
+
+def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...]) -> list[str]:
+    reasons = [""] * len(table)
+    used = [*_INPUTS, *(OUTPUTS[name][0] for name in outputs)]
+    sign = np.sign(numbers["omega_rpm"].to_numpy(dtype=float))
+    for column in used:
+        value = numbers[column].to_numpy(dtype=float)
+        for i in np.flatnonzero(~np.isfinite(value)):
+            reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is no finite number"
+    for i in np.flatnonzero(numbers["N"].to_numpy() % 1 != 0):
+        reasons[i] = reasons[i] or f"N = {table['N'].iloc[i]} is no whole number"
+    for column in ("N", "l_cm", "R_yr_cm", "theta_deg"):
+        if column in used:
+            for i in np.flatnonzero(numbers[column].to_numpy(dtype=float) <= 0):
+                reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is not above 0"
+    for i in np.flatnonzero(sign == 0):
+        reasons[i] = reasons[i] or "omega_rpm = 0"
+    for name in outputs:
+        column, _, expected = OUTPUTS[name]
+        if expected:
+            value = numbers[column].to_numpy(dtype=float)
+            for i in np.flatnonzero(value * sign * expected <= 0):
+                reasons[i] = reasons[i] or f"{column} = {value[i]:g} has the wrong sign for its omega_rpm"
+    return reasons

@@ -1,0 +1,120 @@
+"""The page of a closed loop: data, fit, evidence, residuals before and after, errors with their ceiling."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from calibration.loop import Verdict
+from calibration.measurements import Measurements
+from dataset.page import Page
+from sim.artefact import code_version
+
+_LABELS = {
+    "omega_h": "head spin",
+    "omega_t": "tail spin",
+    "omega_yr": "yaw rate",
+    "R_yr": "turn radius",
+    "theta": "slip angle [rad]",
+}
+
+
+def write_report(result: Verdict, data: Measurements, out: str | Path, *, title: str) -> None:
+    """Write report.html."""
+    page = Page(f"Calibration: {title}", result.sentence)
+    add_sections(page, result, data)
+    page.write(out, f"code {code_version()}; fixed before the data was looked at: {result.plan_hash}")
+
+
+def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
+    """The sections of a closed loop."""
+    page.section("Data")
+    page.text(
+        f"{len(data)} usable runs in {len(data.session_names)} sessions; session {result.locked} was locked "
+        "away for the test. Rows set aside: "
+        + ("; ".join(result.set_aside) if result.set_aside else "none")
+        + "."
+    )
+    page.section("Fit")
+    rows = []
+    for fitted, name in ((result.base, "without effects"), (result.final, "with the verdict's effects")):
+        for parameter in fitted.names:
+            low, high = fitted.interval(parameter)
+            value = fitted.parameters[parameter]
+            rows.append((f"{parameter}, {name}", f"{value:.4g}", f"{low:.4g} to {high:.4g}"))
+        if result.final is result.base:
+            break
+    page.table(("parameter", "value", "95 % interval"), rows)
+    page.section("Residuals on the runs that were fitted, before and after")
+    page.figure(draw_residuals(result, data), "residuals by output and number of tails, before and after")
+    page.section("Evidence for each effect of the catalogue")
+    page.text(
+        f"Score of each effect after what the coefficients absorb is projected out; claims need more than "
+        f"{result.misfit.critical_z:.2f}. General lack of fit: p = {result.misfit.general_p:.3g}."
+    )
+    page.table(
+        ("effect", "score z", "survived share", "smallest detectable size", "judgement"),
+        [
+            (c.effect.title, f"{c.z:+.1f}", f"{c.survived:.2f}", f"{c.detectable:.2g}", c.verdict)
+            for c in result.candidates
+        ],
+    )
+    page.section("Error on the locked session")
+    low, high = result.error_after_interval
+    page.table(
+        ("model", "relative rms", *(_LABELS[o] for o in data.outputs)),
+        [
+            (label, f"{100 * value:.2f} %", *(f"{100 * v:.1f} %" for v in each.values()))
+            for label, value, each in (
+                ("as given", result.error_uncalibrated, result.errors_by_output["uncalibrated"]),
+                ("calibrated", result.error_before, result.errors_by_output["before"]),
+                ("calibrated, with effects", result.error_after, result.errors_by_output["after"]),
+            )
+        ],
+    )
+    page.text(
+        f"95 % interval of the last: {100 * low:.2f} to {100 * high:.2f} %. "
+        f"Noise ceiling from the repeats: {100 * result.noise_ceiling:.2f} %."
+    )
+
+
+def draw_residuals(result: Verdict, data: Measurements) -> Figure:
+    """Measured minus model in per cent, against tail length, before (left) and after (right)."""
+    outputs = data.outputs
+    figure = Figure(figsize=(11, 1.9 * len(outputs)))
+    colours = {n: c for n, c in zip((2, 3, 4, 5), ("#2a7fba", "#e08a1e", "#3d9a5f", "#8a4fa3"), strict=True)}
+    rng = np.random.default_rng(0)
+    used = result.used
+    jitter = rng.uniform(-0.25, 0.25, used.sum())
+    for i, name in enumerate(outputs):
+        limit = 0.0
+        pair = []
+        for j, fitted in enumerate((result.base, result.final)):
+            axes = figure.add_subplot(len(outputs), 2, 2 * i + j + 1)
+            residual = 100 * (data.y - fitted.prediction)[used, i]
+            limit = max(limit, float(np.abs(residual).max()) * 1.1)
+            for n in np.unique(data.tails[used]):
+                some = data.tails[used] == n
+                axes.plot(
+                    100 * data.length[used][some] + jitter[some],
+                    residual[some],
+                    ".",
+                    ms=4,
+                    color=colours.get(int(n), "#555555"),
+                    label=f"N = {int(n)}",
+                )
+            axes.axhline(0, color="#1c2733", lw=0.6)
+            axes.set_ylabel(f"{_LABELS[name]} [%]", fontsize=8)
+            axes.tick_params(labelsize=8)
+            pair.append(axes)
+        for axes in pair:
+            axes.set_ylim(-limit, limit)
+    figure.axes[0].set_title("calibrated", fontsize=10)
+    figure.axes[1].set_title("calibrated, with the verdict's effects", fontsize=10)
+    figure.axes[0].legend(fontsize=7, frameon=False, ncols=4)
+    for axes in figure.axes[-2:]:
+        axes.set_xlabel("tail length [cm]", fontsize=8)
+    figure.tight_layout()
+    return figure

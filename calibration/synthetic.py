@@ -1,0 +1,72 @@
+"""Tables to test the loop on: the simulator with a hidden effect, on a finer mesh, with noise.
+
+The design is the paper's: tail counts, tail lengths, two motor levels, both directions, repeated trials, one session
+a tail count. The truth is simulated on half the edge length and half the step of the fitter's model, so
+that the fitter's discretisation cannot pass for physics. Noise is multiplicative on spins, yaw rate and
+radius, additive on θ; a session shifts all its runs together.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from sim.batches import steady_columns
+from sim.robot import Robot
+
+_RPM = 2 * math.pi / 60
+
+
+def make_table(
+    robot: Robot,
+    *,
+    seed: int,
+    tails: Sequence[int] = (2, 3, 4, 5),
+    lengths_cm: Sequence[float] = (5.0, 7.0, 9.0, 11.0),
+    motor_rpm: Sequence[float] = (100.0, 150.0),
+    trials: int = 2,
+    noise: float = 0.025,
+    session_noise: float = 0.005,
+    jobs: int | None = None,
+    title: str = "table",
+) -> pd.DataFrame:
+    """A table of runs of `robot` (its effects are the truth) in the columns of `calibration.measurements`."""
+    design = [(n, length, rpm) for n in tails for length in lengths_cm for rpm in motor_rpm]
+    runs = [
+        replace(robot, tails=n, tail_length=length / 100, motor_speed=rpm * _RPM) for n, length, rpm in design
+    ]
+    values = [run.group_values() for run in runs]
+    columns = {k: np.array([v[k] for v in values]) for k in values[0]}
+    found = steady_columns(columns, refine=True, jobs=jobs, title=title)
+    rng = np.random.default_rng(seed)
+    shift = {n: rng.normal(scale=session_noise, size=4) for n in tails}
+    rows = []
+    for i, (n, length, rpm) in enumerate(design):
+        spin = 1 / runs[i].time_scale / _RPM
+        for direction in (1, -1):
+            for trial in range(1, trials + 1):
+                factor = np.exp(rng.normal(scale=noise, size=4) + shift[n])
+                rows.append(
+                    {
+                        "N": n,
+                        "l_cm": length,
+                        "trial": trial,
+                        "session": f"N={n}",
+                        "omega_rpm": direction * rpm,
+                        "omega_h_rpm": direction * found["omega_h_bar"][i] * spin * factor[0],
+                        "omega_t_rpm": direction * found["omega_t_bar"][i] * spin * factor[1],
+                        "omega_yr_rad_s": direction
+                        * found["omega_yr_bar"][i] / runs[i].time_scale * factor[2],
+                        "R_yr_cm": found["R_yr_over_l"][i] * length * factor[3],
+                        "theta_deg": found["theta_deg"][i] + rng.normal(scale=math.degrees(noise)),
+                    }
+                )  # fmt: skip
+    table = pd.DataFrame(rows)
+    order = np.lexsort((rng.random(len(table)), table["N"]))
+    table = table.iloc[order].reset_index(drop=True)
+    table.insert(0, "run", np.arange(1, len(table) + 1))
+    return table

@@ -1,0 +1,164 @@
+"""Robots -> rows: simulate a design in parallel, chunk by chunk.
+
+Each robot runs from rest to its steady motion (`sim.steady`), and from there through flips of the motor
+with its own half-period (`sim.switching`). Rows are batched by N, resolution, |ω̄| and half-period; every
+finished batch is stored at once, so an interruption loses one batch a process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+from numpy.typing import NDArray
+
+from dataset.design import DWELL, Design
+from dataset.store import MANIFEST, part_hash, part_path, write_manifest, write_part
+from sim.artefact import code_version, fingerprint, provenance
+from sim.batches import run_batches, split
+from sim.effects import catalogue
+from sim.errors import InputError
+from sim.robot import Groups, check_columns
+from sim.steady import STEADY_COLUMNS, Resolution, steady
+from sim.switching import switch_response
+
+Columns = dict[str, NDArray[Any]]
+BACKENDS = ("loky", "dask", "ray")
+
+
+def simulate(points: dict[str, NDArray[np.float64]]) -> Columns:
+    """All columns of the schema for robots of one N, except `row`.
+
+    Args:
+        points: inputs by column name, `dwell_bar` included, each (B,).
+    """
+    values = check_columns({k: v for k, v in points.items() if k != DWELL})
+    groups = Groups.from_columns(values)
+    resolution = Resolution.fitting(float(groups.omega_bar.abs().max()))
+    motion, state = steady(groups, resolution=resolution)
+    response = switch_response(groups, points[DWELL], motion, state, resolution=resolution)
+    columns: Columns = {**values, DWELL: points[DWELL], **motion.columns()}
+    failed = motion.failed.numpy() | response.failed
+    columns |= {
+        "net_speed_bar": response.net_speed,
+        "lag_psi_rad": response.lag_psi,
+        "lag_x": response.lag_x,
+        "lag_z": response.lag_z,
+        "drift": motion.drift.numpy(),
+        "failed": failed,
+        "converged": columns["converged"] & ~failed,
+        "touching": columns["tail_gap"] < 1,
+        "edges": np.full(len(groups), resolution.edges),
+        "steps": np.full(len(groups), resolution.steps),
+    }
+    for name in STEADY_COLUMNS[:7]:
+        columns[name] = np.where(failed, np.nan, columns[name])
+    columns["N"] = values["N"].astype(int)
+    return columns
+
+
+def build(
+    design: Design,
+    folder: str | Path,
+    *,
+    jobs: int | None = None,
+    backend: str = "loky",
+    title: str = "sweep",
+) -> dict[str, Any]:
+    """Simulate a design into a folder; goes on where an interrupted build stopped.
+
+    Returns:
+        The manifest.
+
+    Raises:
+        InputError: the folder holds something else.
+    """
+    out = Path(folder)
+    effects = sorted(set(design.axes) & set(catalogue()))
+    config = {**design.config(), "rows": design.rows}
+    config_hash = fingerprint({**config, "code": code_version()})
+    _check_folder(out, config_hash)
+    points = design.points()
+    batches = split(points["N"], points["omega_bar"], then_by=points[DWELL])
+    cost = [len(b) * points["N"][b[0]] * float(points["omega_bar"][b].max()) for b in batches]
+    waiting = [i for i in np.argsort(cost)[::-1].tolist() if not part_path(out, i).exists()]
+    out.mkdir(parents=True, exist_ok=True)
+    work = partial(_simulate_part, folder=out, effects=effects, config_hash=config_hash)
+    todo = [(i, batches[i], {k: v[batches[i]] for k, v in points.items()}) for i in waiting]
+    counts = {"rows": design.rows, "parts": len(batches)}
+    with _backend(backend):
+        run_batches(work, todo, sizes=[len(t[1]) for t in todo], jobs=jobs, title=title)
+    manifest = {**provenance(config), "config_hash": config_hash, "effects": effects, **counts}
+    write_manifest(out, {**manifest, **_count_flags(out, len(batches))})
+    return {**manifest, **_count_flags(out, len(batches))}
+
+
+def _simulate_part(
+    job: tuple[int, NDArray[np.int64], dict[str, NDArray[np.float64]]],
+    *,
+    folder: Path,
+    effects: list[str],
+    config_hash: str,
+) -> None:
+    index, rows, points = job
+    columns = simulate(points)
+    columns["row"] = rows
+    write_part(folder, index, columns, effects, config_hash)
+
+
+def _check_folder(folder: Path, config_hash: str) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder} is a file; give a folder for the data set")
+    if not folder.exists():
+        return
+    ours = {MANIFEST, *(p.name for p in folder.glob("part-*.parquet"))}
+    others = sorted(p.name for p in folder.iterdir() if p.name not in ours and p.name[0] != ".")
+    if others:
+        raise InputError(f"{folder} holds other files ({others[0]}); give an empty or a new folder")
+    for path in sorted(folder.glob("part-*.parquet")):
+        if part_hash(path) != config_hash:
+            raise InputError(
+                f"{folder} holds rows of another configuration or version ({path.name}); "
+                "give another folder or remove this one"
+            )
+
+
+def _count_flags(folder: Path, parts: int) -> dict[str, int]:
+    import pyarrow.parquet as pq
+
+    names = ("converged", "failed", "touching")
+    totals = dict.fromkeys(names, 0)
+    for index in range(parts):
+        table = pq.read_table(part_path(folder, index), columns=list(names))
+        for name in names:
+            totals[name] += int(np.count_nonzero(table[name].to_numpy()))
+    return totals
+
+
+@contextmanager
+def _backend(name: str) -> Iterator[None]:
+    if name not in BACKENDS:
+        raise InputError(f"backend {name!r}; allowed are {', '.join(BACKENDS)}")
+    if name == "loky":
+        yield
+        return
+    try:
+        if name == "dask":
+            from distributed import Client
+
+            with Client(processes=True, threads_per_worker=1), joblib.parallel_config("dask"):
+                yield
+        else:
+            from ray.util.joblib import register_ray
+
+            register_ray()
+            with joblib.parallel_config("ray"):
+                yield
+    except ImportError:
+        package = "dask[distributed]" if name == "dask" else "ray"
+        raise InputError(f"backend {name!r} needs the package {package}; install it or use loky") from None

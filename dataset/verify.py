@@ -1,0 +1,59 @@
+"""Check a data set: files, schema, flags, and some rows simulated again.
+
+A row simulated alone must give what it gave in its batch, and half the step and edge length must not move it
+by more than the discretisation's stated error (1 % in spins, 3 % in the rest).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from dataset.schema import INPUTS
+from dataset.store import read, read_manifest
+from sim.batches import steady_columns
+from sim.errors import InputError
+
+_SPINS = ("omega_t_bar", "omega_h_bar")
+_REST = ("omega_yr_bar", "v_x", "R_yr_over_l")
+_SPIN_ERROR, _REST_ERROR = 0.01, 0.03
+
+
+def verify(folder: str, *, rows: int = 8) -> str:
+    """Verify a data set; returns a line that says what was checked.
+
+    Raises:
+        InputError: what is wrong with it.
+    """
+    manifest = read_manifest(folder)
+    table = read(folder)
+    if not np.array_equal(table["row"], np.arange(manifest["rows"])):
+        raise InputError(f"{folder} has {len(table)} of {manifest['rows']} rows; run the build again")
+    outputs = table[[*_SPINS, *_REST, "net_speed_bar", "lag_psi_rad"]]
+    lost = int((outputs.isna().any(axis=1) & ~table["failed"]).sum())
+    if lost:
+        raise InputError(f"{folder} has {lost} rows with empty outputs that are not flagged as failed")
+    good = table[table["converged"]]
+    sample = good.sample(min(rows, len(good)), random_state=1)
+    worst = {"alone": 0.0, "refined": 0.0}
+    names = [c.name for c in INPUTS if c.name != "dwell_bar"] + list(manifest["effects"])
+    points = {n: sample[n].to_numpy(dtype=float) for n in names}
+    for kind, refine in (("alone", False), ("refined", True)):
+        again = steady_columns(points, refine=refine, title=f"verify {kind}")
+        worst[kind] = max(
+            _worst(sample, again, _SPINS) / _SPIN_ERROR, _worst(sample, again, _REST) / _REST_ERROR
+        )
+    if worst["alone"] > 0.2 or worst["refined"] > 1:
+        raise InputError(
+            f"{folder}: rows simulated again differ by {100 * worst['alone'] * _REST_ERROR:.2f} % at the same "
+            f"and {100 * worst['refined'] * _REST_ERROR:.2f} % at a finer resolution; build it anew"
+        )
+    return (
+        f"{len(table)} rows as configured, flags consistent; {len(sample)} rows simulated again: "
+        f"largest difference {100 * worst['alone'] * _REST_ERROR:.3f} % at the same resolution, "
+        f"{100 * worst['refined'] * _REST_ERROR:.2f} % at half the edge length and step"
+    )
+
+
+def _worst(rows: pd.DataFrame, again: dict[str, np.ndarray], names: tuple[str, ...]) -> float:
+    return max(float(np.max(np.abs(again[n] / rows[n].to_numpy() - 1))) for n in names)

@@ -1,0 +1,92 @@
+"""A replayed (or measured) track against its plan: tracking error and an overlay.
+
+Error: distance of the tracked point from the declared path, weighted by time; beside it the distance from the
+raw path as given. The track is that of the head's centre with its heading, so any tracked point follows.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from planner.picture import REPLAYED, draw_tracks
+from planner.plan import distance_to
+from sim import planar
+from sim.errors import InputError
+
+_COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
+
+
+@dataclass(frozen=True)
+class TrackingError:
+    """In tail lengths l, against the declared path unless it says raw."""
+
+    rms: float
+    largest: float
+    raw_rms: float
+    raw_largest: float
+    bound: float
+    track: NDArray[np.float64]  # (K, 2) tracked point
+
+    @property
+    def line(self) -> str:
+        verdict = "within" if self.largest <= self.bound else "ABOVE"
+        return (
+            f"tracking error {self.rms:.4f} l rms, {self.largest:.4f} l at most, {verdict} the stated bound "
+            f"{self.bound:.3f} l; from the raw path {self.raw_rms:.3f} l rms, {self.raw_largest:.3f} l at most"
+        )
+
+
+def load_plan(path: str | Path) -> dict[str, Any]:
+    """The content of a plan.json."""
+    try:
+        content = json.loads(Path(path).read_text())
+        for key in ("reference", "raw_path", "bound_over_l", "predicted_poses", "point"):
+            content[key]
+    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError) as broken:
+        raise InputError(f"{path} is not a plan.json of the planner ({broken}); plan again") from None
+    return dict(content)
+
+
+def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
+    """Compare a track with its plan.
+
+    Args:
+        plan: content of plan.json.
+        track: time_bar, x_over_l, y_over_l, heading_rad of the head's centre.
+    """
+    for name in _COLUMNS:
+        if name not in track:
+            raise InputError(f"the track has no column {name!r}; it needs {', '.join(_COLUMNS)}")
+    values = {name: track[name].to_numpy(dtype=float) for name in _COLUMNS}
+    pose = np.stack([values["x_over_l"], values["y_over_l"], values["heading_rad"]], 1)
+    if not np.isfinite(pose).all():
+        raise InputError("the track has a value that is no finite number; mend the file")
+    offset = np.array([plan.get("offset_over_l", 0.0), 0.0, 0.0])
+    tracked = planar.compose(pose, offset)[:, :2]
+    declared = distance_to(np.array(plan["reference"]), tracked)
+    raw = distance_to(np.array(plan["raw_path"]), tracked)
+    weight = np.gradient(values["time_bar"])
+    weight = np.maximum(weight, 0) / max(float(np.maximum(weight, 0).sum()), 1e-300)
+    return TrackingError(
+        rms=float(np.sqrt((weight * declared**2).sum())),
+        largest=float(declared.max()),
+        raw_rms=float(np.sqrt((weight * raw**2).sum())),
+        raw_largest=float(raw.max()),
+        bound=float(plan["bound_over_l"]),
+        track=tracked,
+    )
+
+
+def draw_overlay(axes: Axes, plan: dict[str, Any], error: TrackingError, title: str) -> None:
+    """Replayed track over the declared and the raw path."""
+    draw_tracks(axes, np.array(plan["raw_path"]), np.array(plan["reference"]), error.bound)
+    axes.plot(*error.track.T, color=REPLAYED, lw=0.8, label="replayed in the simulator")
+    axes.set_title(f"{title}\n{error.rms:.3f} l rms, {error.largest:.3f} l at most", fontsize=10)

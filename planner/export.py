@@ -1,0 +1,102 @@
+"""What a plan leaves behind: plan.json, plan.csv, schedule.h for a microcontroller, plan.svg.
+
+schedule.h holds dwell times in whole milliseconds as 16-bit numbers; the motor flips after each. Rounding
+is carried forward, so the flips never drift by more than half a millisecond. A dwell that does not fit
+16 bits is split by entries of 0 ms (two flips at once: the direction stays). A dwell that rounds to 0 ms is
+refused, since the header uses it for that.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from planner.plan import Plan, plan_record
+from sim.artefact import code_version, whole_file, write_text
+from sim.errors import InputError
+
+_MOST_MS = 65_535
+
+
+def write_plan(result: Plan, folder: str | Path) -> list[Path]:
+    """Write the four files of a plan; returns their paths."""
+    out = Path(folder)
+    header = controller_header(result)
+    record = {**plan_record(result), "code_version": code_version()}
+    paths = [out / name for name in ("plan.json", "plan.csv", "schedule.h", "plan.svg")]
+    write_text(paths[0], json.dumps(record) + "\n")
+    with whole_file(paths[1]) as part:
+        dwell_table(result).to_csv(part, index=False, float_format="%.8g")
+    write_text(paths[2], header)
+    _picture(result, paths[3])
+    return paths
+
+
+def dwell_table(result: Plan) -> pd.DataFrame:
+    """One row a dwell: when it starts, its direction and length, where the robot is predicted to be."""
+    count = len(result.dwells)
+    start = np.concatenate([[0.0], np.cumsum(result.dwells)[:-1]])
+    return pd.DataFrame(
+        {
+            "start_s": start * result.robot.time_scale,
+            "direction": result.first_direction * (-1) ** np.arange(count),
+            "dwell_s": result.seconds,
+            "dwell_bar": result.dwells,
+            "x_over_l": result.poses[:-1, 0],
+            "y_over_l": result.poses[:-1, 1],
+            "heading_rad": result.poses[:-1, 2],
+        }
+    )
+
+
+def milliseconds(seconds: np.ndarray) -> list[int]:
+    """Dwells in whole ms with rounding carried forward; long ones split by zeros.
+
+    Raises:
+        InputError: a dwell rounds to nothing.
+    """
+    edges = np.round(1000 * np.cumsum(seconds)).astype(np.int64)
+    entries: list[int] = []
+    for index, whole in enumerate(np.diff(edges, prepend=0).tolist()):
+        if whole < 1:
+            raise InputError(
+                f"dwell {index + 1} is {1000 * seconds[index]:.3g} ms; the header counts whole milliseconds: "
+                "use a longer minimum dwell"
+            )
+        while whole > _MOST_MS:
+            entries += [_MOST_MS, 0]
+            whole -= _MOST_MS
+        entries.append(whole)
+    return entries
+
+
+def controller_header(result: Plan) -> str:
+    """schedule.h as text."""
+    entries = milliseconds(result.seconds)
+    lines = [", ".join(map(str, entries[i : i + 12])) for i in range(0, len(entries), 12)]
+    body = ",\n    ".join(lines)
+    return f"""/* Motor schedule for robot "{result.robot.name.replace("*/", "")}": turn in FIRST_DIRECTION for the first entry,
+ * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
+ * lengthens the dwell before it. Stop after the last entry. Look-up table {result.model}. */
+#ifndef SCHEDULE_H
+#define SCHEDULE_H
+#include <stdint.h>
+#define SCHEDULE_FIRST_DIRECTION ({result.first_direction})
+#define SCHEDULE_COUNT {len(entries)}
+#define SCHEDULE_MOTOR_RPM {result.robot.motor_speed * 30 / np.pi:.3f}
+static const uint16_t schedule_ms[SCHEDULE_COUNT] = {{
+    {body}
+}};
+#endif
+"""
+
+
+def _picture(result: Plan, path: Path) -> None:
+    from planner.picture import draw_plan
+
+    with whole_file(path) as part:
+        figure = draw_plan(result)
+        figure.savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})

@@ -1,0 +1,344 @@
+"""plan(path, robot): from a path to a frozen plan, without simulating.
+
+1. The look-up table gives the vehicle (`planner.vehicle`).
+2. Corners are rounded by the smallest radius that the pivot can follow with some room; a path that is too
+   tight is refused, with the place, the radii and the smallest scale that would do.
+3. The tractrix of the rounded path is the pivot's reference (`planner.path`).
+4. Hysteresis about the line of sight gives the dwells (`planner.schedule`).
+5. Bound, predicted error and tube are computed and stated (`planner.bound`).
+
+The shape of errors: `guaranteed` holds for the exact vehicle; `tube` is what the table's own errors add;
+`bound` is their sum, for the tracked point against the declared (rounded) path. How far the rounded path is
+from the raw one is reported beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from planner import bound as bounds
+from planner.path import CORNER, Path2D, Reference, fillet, kinks, reference
+from planner.schedule import Switches, follow, trace
+from planner.vehicle import TURN_OVER, Vehicle, vehicle_of
+from sim.errors import InputError
+from sim.robot import Robot
+from surrogate.export import identity, load
+from surrogate.lookup import Lookup
+
+Point = Literal["head_centre", "head_tip", "pivot"]
+
+ROOM = 0.7  # corners are rounded until the pivot turns at most this share of what it can
+TIGHTEST = 0.9  # share of the pivot's largest curvature above which a path is refused
+_SPACING = 0.01  # of the reference, in l
+_MOST_POINTS = 60_000
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A schedule and what is known of it. Lengths in l, times in μ0 l⁴/EI, unless named otherwise."""
+
+    robot: Robot
+    point: Point
+    offset: float  # from the head's centre forward to the tracked point
+    first_direction: int
+    dwells: NDArray[np.float64]  # (M,)
+    poses: NDArray[np.float64]  # (M + 1, 3): predicted head's centre at the flips
+    track: NDArray[np.float64]  # (K, 2): predicted tracked point, several samples a dwell
+    reference: NDArray[np.float64]  # (m, 2): declared path
+    raw: NDArray[np.float64]  # (k, 2): path as given
+    closed: bool
+    fillet_radius: float
+    corner_cut: float  # largest distance of the raw path from the declared one
+    minimum_dwell: float
+    guaranteed: float
+    tube: float
+    predicted_rms: float
+    predicted_max: float
+    closure: float | None
+    model: str  # hash of the look-up table
+    warnings: tuple[str, ...]
+
+    @property
+    def bound(self) -> float:
+        """Stated largest distance from the declared path: guaranteed error and tube [l]."""
+        return self.guaranteed + self.tube
+
+    @property
+    def duration(self) -> float:
+        return float(self.dwells.sum())
+
+    @property
+    def seconds(self) -> NDArray[np.float64]:
+        """Dwell times [s]."""
+        return self.dwells * self.robot.time_scale
+
+
+def plan(
+    path: Path2D | ArrayLike,
+    robot: Robot,
+    *,
+    lookup: Lookup | None = None,
+    point: Point = "head_centre",
+    corner: Literal["fillet", "error"] = "fillet",
+    minimum_dwell: float | None = None,
+    tolerance: float | None = None,
+    seed: int = 0,
+) -> Plan:
+    """Plan the motor's switching times for a path.
+
+    Args:
+        path: (n, 2) points or a Path2D, lengths in tail lengths l.
+        robot: the robot; its motor speed is used in both directions.
+        lookup: trained table; default the shipped one.
+        point: which point must follow the path.
+        corner: round corners, or refuse them.
+        minimum_dwell: shortest time between flips [μ0 l⁴/EI]; default the tails' turn-over time.
+        tolerance: largest acceptable bound [l]; the longest dwell that keeps it is chosen (longer is
+            faster and wider). Default: the minimum dwell.
+        seed: of the random vehicles behind the tube.
+
+    Raises:
+        InputError: bad path, path too tight, dwell too short, tolerance out of reach, robot out of domain.
+    """
+    table = lookup or load()
+    vehicle = vehicle_of(robot, table)
+    raw = path if isinstance(path, Path2D) else Path2D.of(path)
+    offset = _offset(point, robot, vehicle)
+    rod = vehicle.rod + offset
+    shortest = _minimum_dwell(minimum_dwell, vehicle)
+    declared, radius = _round_corners(raw, vehicle, rod, corner)
+    ref = reference(declared, rod, _spacing(declared))
+    curvature = _check_curvature(ref, raw, vehicle, rod, corner)
+    dwell = _choose_dwell(vehicle, rod, curvature, shortest, tolerance)
+    switches = follow(
+        ref,
+        vehicle,
+        rod=rod,
+        ahead=bounds.look_ahead(vehicle, curvature),
+        dwell=dwell,
+        offset=offset,
+    )
+    return _finish(
+        robot, vehicle, table, point, raw, ref, switches, radius, rod, curvature, dwell, offset, seed
+    )
+
+
+def _finish(
+    robot: Robot,
+    vehicle: Vehicle,
+    table: Lookup,
+    point: Point,
+    raw: Path2D,
+    ref: Reference,
+    switches: Switches,
+    radius: float,
+    rod: float,
+    curvature: float,
+    dwell: float,
+    offset: float,
+    seed: int,
+) -> Plan:
+    start = switches.poses[0]
+    track = trace(vehicle, switches.first_direction, switches.dwells, start, offset)
+    error = distance_to(ref.p, track)
+    extra = bounds.tube(vehicle, switches.first_direction, switches.dwells, start, offset, seed=seed)
+    warnings = []
+    if vehicle.tail_gap < 1.0:
+        warnings.append(
+            f"tails touch (predicted gap {vehicle.tail_gap:.2f} diameters): the model has no contact"
+        )
+    return Plan(
+        robot=robot,
+        point=point,
+        offset=offset,
+        first_direction=switches.first_direction,
+        dwells=switches.dwells,
+        poses=switches.poses,
+        track=track,
+        reference=ref.p,
+        raw=raw.polyline(),
+        closed=raw.closed,
+        fillet_radius=radius,
+        corner_cut=float(distance_to(ref.p, raw.polyline()).max()),
+        minimum_dwell=dwell,
+        guaranteed=bounds.guaranteed(vehicle, rod, curvature, dwell),
+        tube=extra,
+        predicted_rms=float(np.sqrt(np.mean(error**2))),
+        predicted_max=float(error.max()),
+        closure=float(np.linalg.norm(track[-1] - track[0])) if raw.closed else None,
+        model=identity(table),
+        warnings=tuple(warnings),
+    )
+
+
+def distance_to(polyline: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of points (M, 2) from a polyline (m, 2)."""
+    start, along = polyline[:-1], np.diff(polyline, axis=0)
+    square = np.maximum((along**2).sum(1), 1e-30)
+    result = np.empty(len(points))
+    for begin in range(0, len(points), 512):
+        away = points[begin : begin + 512, None] - start
+        share = np.clip((away * along).sum(-1) / square, 0, 1)
+        gap = away - share[..., None] * along
+        result[begin : begin + 512] = np.sqrt((gap**2).sum(-1).min(1))
+    return result
+
+
+def _offset(point: Point, robot: Robot, vehicle: Vehicle) -> float:
+    """Distance from the head's centre forward to the tracked point [l]."""
+    if point == "head_centre":
+        return 0.0
+    if point == "head_tip":
+        return robot.head_length / 2 / robot.tail_length
+    if point == "pivot":
+        return -vehicle.rod
+    raise InputError(f"point {point!r}; allowed are head_centre, head_tip, pivot")
+
+
+def _minimum_dwell(wanted: float | None, vehicle: Vehicle) -> float:
+    if wanted is None:
+        return TURN_OVER
+    if not math.isfinite(wanted) or wanted < TURN_OVER:
+        raise InputError(
+            f"minimum dwell {wanted:g} is below the tails' turn-over time; give at least {TURN_OVER:g} "
+            f"(time units), where a flip moves the robot by {_flip_size(vehicle):.3g} l"
+        )
+    return wanted
+
+
+def _flip_size(vehicle: Vehicle) -> float:
+    lag = vehicle.lag_at(1, np.array(TURN_OVER))
+    return float(np.hypot(lag[0], lag[1]))
+
+
+def _spacing(path: Path2D) -> float:
+    return max(_SPACING, path.length / _MOST_POINTS)
+
+
+def _round_corners(raw: Path2D, vehicle: Vehicle, rod: float, corner: str) -> tuple[Path2D, float]:
+    """The path with its corners rounded, and the radius."""
+    angle = np.abs(kinks(raw))
+    sharpest = int(angle.argmax())
+    if angle[sharpest] <= CORNER:
+        return raw, 0.0
+    if corner not in ("fillet", "error"):
+        raise InputError(f"corner {corner!r}; allowed are fillet, error")
+    if corner == "error":
+        x, y = raw.points[sharpest]
+        raise InputError(
+            f"corner of {math.degrees(angle[sharpest]):.0f} degrees at ({x:.3g}, {y:.3g}); "
+            "round it, or allow corner = fillet"
+        )
+    limit = ROOM / vehicle.pivot_radius
+    largest = math.hypot(rod, 1 / limit)  # a full turn at this radius is always followed
+
+    def sharp(radius: float) -> bool:
+        return _largest_curvature(_corner_probe(float(angle.max()), radius, rod), rod) > limit
+
+    low, high = 0.0, largest
+    for _ in range(30):
+        middle = (low + high) / 2
+        low, high = (middle, high) if sharp(middle) else (low, middle)
+    return fillet(raw, high), high
+
+
+def _corner_probe(angle: float, radius: float, rod: float) -> Path2D:
+    """A single corner with long edges, to measure what a radius does to the pivot's curvature."""
+    edge = 6 * max(rod, radius, 0.1) * (1 + math.tan(min(angle, 3.0) / 2))
+    after = edge * np.array([math.cos(angle), math.sin(angle)])
+    return fillet(Path2D(np.array([[-edge, 0.0], [0.0, 0.0], after])), radius)
+
+
+def _largest_curvature(path: Path2D, rod: float) -> float:
+    return float(np.abs(reference(path, rod, _spacing(path)).curvature).max())
+
+
+def _check_curvature(ref: Reference, raw: Path2D, vehicle: Vehicle, rod: float, corner: str) -> float:
+    """The reference's largest curvature; refuses one that the pivot cannot follow."""
+    curvature = np.abs(ref.curvature)
+    worst = int(curvature.argmax())
+    limit = TIGHTEST / vehicle.pivot_radius
+    if curvature[worst] <= limit:
+        return float(curvature[worst])
+    x, y = ref.p[worst]
+    raise InputError(
+        f"path too tight at ({x:.3g}, {y:.3g}) l: the pivot would turn with radius "
+        f"{1 / curvature[worst]:.3g} l, the robot can with {1 / limit:.3g} l (its circle has radius "
+        f"{vehicle.turn_radius:.3g} l); {_smallest_scale(raw, vehicle, rod, corner)}"
+    )
+
+
+def _smallest_scale(raw: Path2D, vehicle: Vehicle, rod: float, corner: str) -> str:
+    limit = TIGHTEST / vehicle.pivot_radius
+    for factor in np.geomspace(1.05, 50, 80):
+        try:
+            declared, _ = _round_corners(raw.scaled(factor), vehicle, rod, corner)
+        except InputError:
+            continue
+        if _largest_curvature(declared, rod) <= limit:
+            return f"scale the path by {factor:.2g}"
+    return "make the path smoother"
+
+
+def _choose_dwell(
+    vehicle: Vehicle, rod: float, curvature: float, shortest: float, tolerance: float | None
+) -> float:
+    """The longest minimum dwell whose bound keeps the tolerance."""
+    if tolerance is None:
+        return shortest
+    least = bounds.guaranteed(vehicle, rod, curvature, shortest)
+    if not math.isfinite(tolerance) or tolerance < least:
+        raise InputError(
+            f"tolerance {tolerance:g} l is below what the dwell {shortest:g} guarantees ({least:.3g} l); "
+            "allow more"
+        )
+    longest = float(vehicle.dwells[-1])
+    candidates = np.linspace(shortest, max(longest, shortest), 400)
+    kept = [t for t in candidates if bounds.guaranteed(vehicle, rod, curvature, t) <= tolerance]
+    return float(kept[-1])
+
+
+def plan_record(result: Plan) -> dict[str, Any]:
+    """The plan as JSON-like content; `sim.replay.load_schedule` reads it."""
+    robot, start = result.robot, result.poses[0]
+    groups = robot.group_values()
+    return {
+        "format": 1,
+        "robot": {
+            "name": robot.name,
+            "groups": groups,
+            "tail_length_m": robot.tail_length,
+            "motor_speed_rad_s": robot.motor_speed,
+            "time_scale_s": robot.time_scale,
+        },
+        "point": result.point,
+        "offset_over_l": result.offset,
+        "first_direction": result.first_direction,
+        "start": {
+            "x_over_l": float(start[0]),
+            "y_over_l": float(start[1]),
+            "heading_rad": float(start[2]),
+        },
+        "dwell_bar": result.dwells.tolist(),
+        "dwell_s": result.seconds.tolist(),
+        "predicted_poses": result.poses.tolist(),
+        "reference": result.reference.tolist(),
+        "raw_path": result.raw.tolist(),
+        "closed": result.closed,
+        "fillet_radius_over_l": result.fillet_radius,
+        "corner_cut_over_l": result.corner_cut,
+        "minimum_dwell_bar": result.minimum_dwell,
+        "guaranteed_error_over_l": result.guaranteed,
+        "tube_over_l": result.tube,
+        "bound_over_l": result.bound,
+        "predicted_rms_over_l": result.predicted_rms,
+        "predicted_max_over_l": result.predicted_max,
+        "closure_over_l": result.closure,
+        "model": result.model,
+        "warnings": list(result.warnings),
+    }

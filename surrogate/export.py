@@ -1,0 +1,93 @@
+"""Model files: everything a query needs in one file, read without running code from it.
+
+A model is a torch file of tensors and plain values (loaded with weights_only); its identity is the hash of
+its weights, which every plan made with it carries. The repository ships one, `SHIPPED`, so that planning
+works before any training.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from sim.artefact import whole_file
+from sim.errors import InputError
+from surrogate.lookup import Lookup
+from surrogate.network import Ensemble
+
+SHIPPED = Path(__file__).parent / "shipped" / "model.pt"
+_FORMAT = 1
+_NETWORKS = ("steady", "response")
+
+
+def save(lookup: Lookup, path: str | Path) -> None:
+    """Write a model file, whole or not at all."""
+    content: dict[str, Any] = {
+        "format": _FORMAT,
+        "tail_counts": lookup.tail_counts,
+        "effects": lookup.effects,
+        "domain": {name: list(ends) for name, ends in lookup.domain.items()},
+        "errors": lookup.errors,
+        "provenance": lookup.provenance,
+    }
+    for name in _NETWORKS:
+        network: Ensemble = getattr(lookup, name)
+        content[name] = {"state": network.state_dict(), "shape": _shape(network)}
+    with whole_file(path) as part:
+        torch.save(content, part)
+
+
+def load(path: str | Path = SHIPPED) -> Lookup:
+    """Read a model file.
+
+    Raises:
+        InputError: no such file, or no model of this version.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"no model {path}; train one with python -m surrogate train DATA --out {path}")
+    try:
+        content = torch.load(path, weights_only=True, map_location="cpu")
+        if content["format"] != _FORMAT:
+            raise InputError(f"{path} has format {content['format']}, this version reads {_FORMAT}: retrain")
+        networks = {name: _network(content[name]) for name in _NETWORKS}
+    except (RuntimeError, KeyError, TypeError, EOFError, pickle.UnpicklingError) as broken:
+        raise InputError(f"{path} is not a model file: {type(broken).__name__}; train a new one") from None
+    return Lookup(
+        **networks,
+        tail_counts=content["tail_counts"],
+        effects=content["effects"],
+        domain={name: (low, high) for name, (low, high) in content["domain"].items()},
+        errors=content["errors"],
+        provenance=content["provenance"],
+    )
+
+
+def identity(lookup: Lookup) -> str:
+    """Hash of the weights: tells which model made a plan."""
+    digest = hashlib.sha256()
+    for name in _NETWORKS:
+        for key, value in sorted(getattr(lookup, name).state_dict().items()):
+            digest.update(key.encode())
+            digest.update(value.numpy().tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _shape(network: Ensemble) -> dict[str, int]:
+    first, last = network.weights[0], network.weights[-1]
+    return {
+        "inputs": last.shape[1],
+        "outputs": last.shape[2],
+        "width": first.shape[2],
+        "depth": len(network.weights) - 2,
+        "members": first.shape[0],
+    }
+
+
+def _network(stored: dict[str, Any]) -> Ensemble:
+    network = Ensemble(**stored["shape"], seed=0)
+    network.load_state_dict(stored["state"])
+    return network
