@@ -2,6 +2,7 @@
 
 python -m calibration close TABLE.csv --robot robot.toml --out DIR    verdict.json, report.html, corrected.toml
 python -m calibration simulate --robot robot.toml --out TABLE.csv     a table to try it on
+python -m calibration demo --out PAGE.html                            the whole pipeline, see `make demo`
 """
 
 from __future__ import annotations
@@ -61,6 +62,12 @@ def _simulate(arguments: argparse.Namespace) -> None:
     print(f"{len(table)} runs -> {arguments.out}")
 
 
+def _demo(arguments: argparse.Namespace) -> None:
+    from calibration.demo import run_demo
+
+    run_demo(arguments.out)
+
+
 def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m calibration", description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -78,6 +85,9 @@ def main(argv: list[str] | None = None) -> None:
     simulate.add_argument("--seed", type=int, default=0)
     simulate.add_argument("--jobs", type=int, help="processes (default: all processors)")
     simulate.set_defaults(run=_simulate)
+    demo = commands.add_parser("demo", help="the whole pipeline on the paper's robots")
+    demo.add_argument("--out", default="reports/demo.html", help="page to write")
+    demo.set_defaults(run=_demo)
     arguments = parser.parse_args(argv)
     arguments.run(arguments)
 

@@ -1,0 +1,1 @@
+"""Analytic and published reference values, with their sources."""
