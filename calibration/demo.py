@@ -57,7 +57,7 @@ class Case:
 CASES = (
     Case("circle", "paper-control", "circle:1.5"),
     Case("square", "paper-control", "square:3"),
-    Case("triangle", "paper-measured", "triangle:4"),
+    Case("triangle", "paper-triangle", "triangle:4"),
 )
 # The robot behind the two tables; the fitter starts from the paper's coefficients.
 HIDDEN = {"C_t": 3.1, "C_r": 2.4, "C_yr": 4.4}

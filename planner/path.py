@@ -180,12 +180,18 @@ def kinks(path: Path2D) -> NDArray[np.float64]:
     return np.asarray((turn + math.pi) % (2 * math.pi) - math.pi)
 
 
-def fillet(path: Path2D, radius: float) -> Path2D:
-    """Corners replaced by arcs of `radius`, tangent to the edges.
+def largest_fillet(path: Path2D) -> float:
+    """The largest radius that fits all corners; infinite without corners."""
+    angle = np.abs(kinks(path))
+    reach = np.where(angle > CORNER, np.tan(angle / 2), 0.0)
+    edges = np.linalg.norm(np.diff(path.polyline(), axis=0), axis=1)
+    both = reach[: len(edges)] + np.roll(reach, -1)[: len(edges)]
+    fits = edges[both > 0] / both[both > 0]
+    return float(fits.min()) if len(fits) else math.inf
 
-    Raises:
-        InputError: an edge is too short for the arcs at its ends.
-    """
+
+def fillet(path: Path2D, radius: float) -> Path2D:
+    """Corners replaced by arcs of `radius`, tangent to the edges; at most `largest_fillet`."""
     angle = kinks(path)
     corner = np.abs(angle) > CORNER
     if radius == 0 or not corner.any():
@@ -195,14 +201,6 @@ def fillet(path: Path2D, radius: float) -> Path2D:
     reach = np.where(corner, radius * np.tan(np.abs(angle) / 2), 0.0)
     edges = np.diff(path.polyline(), axis=0)
     lengths = np.linalg.norm(edges, axis=1)
-    for i, length in enumerate(lengths):
-        j = (i + 1) % count
-        if reach[i] + reach[j] > length * (1 + 1e-12):
-            factor = (reach[i] + reach[j]) / length
-            raise InputError(
-                f"the edge from ({points[i][0]:.3g}, {points[i][1]:.3g}) is {length:.3g} l long; rounding its "
-                f"corners to radius {radius:.3g} l needs {factor * length:.3g} l: scale the path by {factor:.3g}"
-            )
     rounded: list[Points] = []
     for i in range(count):
         if not corner[i]:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from planner import bound as bounds
-from planner.path import CORNER, Path2D, Reference, fillet, kinks, reference
+from planner.path import CORNER, Path2D, Reference, fillet, kinks, largest_fillet, reference
 from planner.schedule import Switches, follow, trace
 from planner.vehicle import TURN_OVER, Vehicle, vehicle_of
 from sim.errors import InputError
@@ -221,7 +221,7 @@ def _spacing(path: Path2D) -> float:
 
 
 def _round_corners(raw: Path2D, vehicle: Vehicle, rod: float, corner: str) -> tuple[Path2D, float]:
-    """The path with its corners rounded, and the radius."""
+    """The path with its corners rounded by the smallest radius that leaves the pivot some room, and that."""
     angle = np.abs(kinks(raw))
     sharpest = int(angle.argmax())
     if angle[sharpest] <= CORNER:
@@ -235,23 +235,14 @@ def _round_corners(raw: Path2D, vehicle: Vehicle, rod: float, corner: str) -> tu
             "round it, or allow corner = fillet"
         )
     limit = ROOM / vehicle.pivot_radius
-    largest = math.hypot(rod, 1 / limit)  # a full turn at this radius is always followed
-
-    def sharp(radius: float) -> bool:
-        return _largest_curvature(_corner_probe(float(angle.max()), radius, rod), rod) > limit
-
-    low, high = 0.0, largest
-    for _ in range(30):
+    low, high = 0.0, min(largest_fillet(raw), math.hypot(rod, 1 / limit))
+    if _largest_curvature(fillet(raw, high), rod) > limit:
+        return fillet(raw, high), high
+    for _ in range(20):
         middle = (low + high) / 2
-        low, high = (middle, high) if sharp(middle) else (low, middle)
+        followed = _largest_curvature(fillet(raw, middle), rod) <= limit
+        low, high = (low, middle) if followed else (middle, high)
     return fillet(raw, high), high
-
-
-def _corner_probe(angle: float, radius: float, rod: float) -> Path2D:
-    """A single corner with long edges, to measure what a radius does to the pivot's curvature."""
-    edge = 6 * max(rod, radius, 0.1) * (1 + math.tan(min(angle, 3.0) / 2))
-    after = edge * np.array([math.cos(angle), math.sin(angle)])
-    return fillet(Path2D(np.array([[-edge, 0.0], [0.0, 0.0], after])), radius)
 
 
 def _largest_curvature(path: Path2D, rod: float) -> float:

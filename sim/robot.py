@@ -319,6 +319,9 @@ _FITTED = {"C_t": 4.0, "C_r": 2.06, "C_yr": 6.0}  # the paper's fit to its exper
 PRESETS: dict[str, Robot] = {
     # Control section: N = 2, ω̄ = ±10, C = (3.0, 2.8, 2.0).
     "paper-control": _paper("paper-control").with_motor(10.0),
-    # Its one measured point: N = 4, l = 11 cm, 143.66 rpm; also the robot of its first figure.
+    # The same robot with four tails, for the triangle of its first figure (N = 4, l = 11 cm). The motor speed
+    # there is not given; at ω̄ = 10 the tails stay apart, at its measured 143.66 rpm the model has them touch.
+    "paper-triangle": _paper("paper-triangle", tails=4).with_motor(10.0),
+    # Its one measured point: N = 4, l = 11 cm, 143.66 rpm.
     "paper-measured": _paper("paper-measured", tails=4, motor_speed=143.66 * 2 * math.pi / 60, **_FITTED),
 }

@@ -88,10 +88,10 @@ class Lookup:
 
 
 def _steady_outputs(raw: NDArray[np.float64], omega: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    log_yaw, log_sway, cotangent, logit, log_gap = np.moveaxis(raw, -1, 0)
+    log_yaw, log_sway, log_cotangent, logit, log_gap = np.moveaxis(raw, -1, 0)
     sense = np.sign(omega)
     sway = np.exp(log_sway)
-    surge = cotangent * sway
+    surge = np.exp(log_cotangent) * sway
     share = 1 / (1 + np.exp(-logit))
     values = (
         omega * (1 - share),

@@ -9,7 +9,7 @@ and log T̄ for the response to a switch. Effects that were swept enter as they 
 
 Targets are what is smooth over the whole domain and keeps signs and bounds by construction:
 
-    log ω_yr, log v_x, slip cotangent v_z/v_x, logit |ω_h|/ω, log tail gap         (steady network)
+    log ω_yr, log v_x, log v_z/v_x, logit |ω_h|/ω, log tail gap         (steady network)
     lag_ψ/ω_yr, lag_x/v_x, lag_z/v_x                                                (response network)
 
 all for a positive motor speed; a negative one mirrors them (even effects). R_yr/l, θ and v̄ follow.
@@ -31,7 +31,7 @@ from torch import Tensor, nn
 
 Columns = Mapping[str, NDArray[np.float64]]
 
-STEADY_TARGETS = ("log_yaw_rate", "log_sway", "slip_cotangent", "logit_head_share", "log_tail_gap")
+STEADY_TARGETS = ("log_yaw_rate", "log_sway", "log_slip_cotangent", "logit_head_share", "log_tail_gap")
 RESPONSE_TARGETS = ("lag_psi_over_yaw_rate", "lag_x_over_sway", "lag_z_over_sway")
 
 
@@ -56,7 +56,7 @@ def steady_targets(columns: Columns) -> NDArray[np.float64]:
         [
             np.log(columns["omega_yr_bar"]),
             np.log(columns["v_x"]),
-            columns["v_z"] / columns["v_x"],
+            np.log(columns["v_z"] / columns["v_x"]),
             np.log(share / (1 - share)),
             np.log(columns["tail_gap"]),
         ],

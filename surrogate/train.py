@@ -3,7 +3,8 @@
 Rows are split once, by a fixed hash of their number, into training (80 %), validation (10 %, early
 stopping) and held-out (10 %, never seen: the errors that are printed and stored). Loss: mean square of the
 standardised targets, Adam with a cosine step size; the weights of the best validation epoch are kept for
-every member. Rows that failed or did not converge are left out; touching tails stay in.
+every member. Rows that failed or did not converge, and the few that move backwards,
+are left out; touching tails stay in.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ _FEWEST_ROWS = 64
 class Settings:
     """How to train; the seeds make it repeatable."""
 
-    width: int = 96
+    width: int = 128
     depth: int = 3
     members: int = 4
-    epochs: int = 600
-    patience: int = 120  # epochs without a better validation loss
+    epochs: int = 1200
+    patience: int = 250  # epochs without a better validation loss
     batch: int = 512
     learning_rate: float = 4e-3
     seed: int = 1
@@ -65,7 +66,8 @@ def train(folder: str, settings: Settings | None = None, *, title: str = "train"
     chosen = settings or Settings()
     manifest = read_manifest(folder)
     rows = usable(read(folder))
-    rows = rows[(rows["v_x"] > 0) & (rows["omega_yr_bar"] > 0) & (rows["omega_h_bar"] < 0)]
+    positive = rows[["v_x", "v_z", "omega_yr_bar", "tail_gap"]].to_numpy() > 0
+    rows = rows[positive.all(1) & (rows["omega_h_bar"].to_numpy() < 0)]
     if len(rows) < _FEWEST_ROWS:
         raise InputError(f"{folder} has {len(rows)} usable rows; training needs {_FEWEST_ROWS}")
     columns = {str(name): rows[name].to_numpy(dtype=float) for name in rows}

@@ -1,0 +1,324 @@
+"""Planner: geometry, the bound as a property of random paths, refusals, files, and no simulation."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planner import Path2D, circle, plan, polygon
+from planner.bound import guaranteed, look_ahead
+from planner.export import milliseconds, write_plan
+from planner.path import fillet, read_path, reference
+from planner.plan import distance_to, plan_record
+from planner.schedule import follow, trace
+from planner.vehicle import TURN_OVER, vehicle_of
+from sim import planar
+from sim.errors import InputError, run_command
+from sim.replay import load_schedule
+from sim.robot import PRESETS
+from surrogate.export import load
+from tests.planner.vehicles import vehicle
+
+CONTROL = PRESETS["paper-control"]
+
+
+def random_smooth_path(seed: int, length: float, sharpest: float) -> Path2D:
+    """A path of given length with curvature within ±sharpest, varying over lengths of about one."""
+    rng = np.random.default_rng(seed)
+    s = np.arange(0, length, 0.02)
+    waves = rng.normal(size=(6, 1)) * np.sin(rng.uniform(0.3, 2.0, (6, 1)) * s + rng.uniform(0, 6.3, (6, 1)))
+    curvature = sharpest * np.tanh(waves.sum(0) / 2)
+    heading = np.cumsum(curvature) * 0.02
+    return Path2D.of(np.cumsum(0.02 * np.stack([np.cos(heading), np.sin(heading)], 1), 0), closed=False)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_pivot_moves_as_a_slip_free_car(seed: int) -> None:
+    """q = p − a e(φ) has no sideways velocity on any sequence of arcs."""
+    rng = np.random.default_rng(seed)
+    car = vehicle(lag=0.0)
+    pose = rng.normal(size=3)
+    for _ in range(10):
+        sense = 1 if rng.random() < 0.5 else -1
+        times = np.linspace(0, rng.uniform(0.5, 5), 2001)
+        poses = planar.compose(pose, car.motion(sense, times))
+        q = planar.compose(poses, np.array([-car.rod, 0.0, 0.0]))
+        velocity = np.diff(q[:, :2], axis=0)
+        middle = (poses[1:, 2] + poses[:-1, 2]) / 2
+        sideways = velocity[:, 1] * np.cos(middle) - velocity[:, 0] * np.sin(middle)
+        assert np.abs(sideways).max() < 1e-13
+        assert np.linalg.norm(velocity, axis=1).sum() == pytest.approx(car.twist[0, 0] * times[-1], rel=1e-6)
+        pose = poses[-1]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_bound_holds_on_random_paths(seed: int) -> None:
+    """Predicted track within the guaranteed error, for paths of many lengths and curvatures."""
+    rng = np.random.default_rng(1000 + seed)
+    car = vehicle(lag=rng.uniform(0, 1))
+    path = random_smooth_path(seed, rng.uniform(5, 40), rng.uniform(0.05, 0.9))
+    ref = reference(path, car.rod, 0.01)
+    curvature = float(np.abs(ref.curvature).max())
+    if curvature * car.pivot_radius > 0.9:
+        pytest.skip("this path is tighter than the robot can turn")
+    dwell = rng.uniform(TURN_OVER, 2.0)
+    ahead = look_ahead(car, curvature)
+    switches = follow(ref, car, rod=car.rod, ahead=ahead, dwell=dwell, offset=0.0)
+    track = trace(car, switches.first_direction, switches.dwells, switches.poses[0], 0.0, samples=12)
+    error = distance_to(ref.p, track[:-12])
+    assert error.max() <= guaranteed(car, car.rod, curvature, dwell)
+    assert switches.dwells.min() >= dwell * (1 - 1e-9)
+
+
+def test_error_does_not_grow_with_length() -> None:
+    car = vehicle()
+    worst = []
+    for length in (20.0, 200.0):
+        ref = reference(Path2D.of([[0, 0], [length, 0]]), car.rod, 0.01)
+        switches = follow(ref, car, rod=car.rod, ahead=look_ahead(car, 0.0), dwell=1.0, offset=0.0)
+        track = trace(car, switches.first_direction, switches.dwells, switches.poses[0], 0.0)
+        worst.append(np.abs(track[:, 1]).max())
+    assert worst[1] < 1.2 * worst[0]
+
+
+def test_tractrix_of_a_circle() -> None:
+    """The pivot settles on a circle of radius √(ρ² − a²)."""
+    ref = reference(circle(2.0), 0.87, 0.005)
+    assert np.linalg.norm(ref.q, axis=1) == pytest.approx(np.full(len(ref.q), math.sqrt(4 - 0.87**2)), rel=1e-3)
+    assert ref.curvature[5:-5] == pytest.approx(1 / math.sqrt(4 - 0.87**2), rel=0.05)
+
+
+def test_tractrix_of_a_kink_decays_exponentially() -> None:
+    """Behind a kink of angle α: tan(δ/2) = tan(α/2) exp(−s/a)."""
+    path = Path2D.of([[0, 0], [1, 0], [1, 3]])
+    ref = reference(path, 0.5, 0.01)
+    after = ref.p[:, 1] > 1e-9
+    s = ref.p[after, 1]
+    expected = math.pi / 2 - 2 * np.arctan(np.exp(-s / 0.5))
+    assert ref.heading[after] == pytest.approx(expected, abs=0.01)
+
+
+def test_fillet_keeps_edges_and_radius() -> None:
+    square = polygon(4, 3.0)
+    rounded = fillet(square, 0.5)
+    assert rounded.length == pytest.approx(12 - 8 * 0.5 + math.pi, rel=1e-3)
+    assert distance_to(square.polyline(), rounded.points).max() == pytest.approx(
+        0.5 * (1 - math.sqrt(0.5)), rel=1e-2
+    )
+
+
+@pytest.mark.parametrize("name", ["circle", "square", "triangle"])
+def test_paper_cases_are_planned_within_their_bound(name: str) -> None:
+    path = {"circle": circle(1.5), "square": polygon(4, 3.0), "triangle": polygon(3, 4.0)}[name]
+    robot = PRESETS["paper-triangle"] if name == "triangle" else CONTROL
+    result = plan(path, robot)
+    assert result.predicted_rms < 0.05
+    assert result.predicted_max <= result.guaranteed
+    assert result.closure is not None
+    assert result.closure < 0.15
+    assert result.dwells.min() >= TURN_OVER * (1 - 1e-9)
+    again = plan(path, robot)
+    assert np.array_equal(again.dwells, result.dwells)
+
+
+def test_planning_never_calls_the_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
+    import sim.balance
+    import sim.steady
+    import sim.stepper
+    import sim.switching
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("the planner simulated")
+
+    for module, name in ((sim.stepper, "step"), (sim.stepper, "at_rest"), (sim.balance, "newton_correction"),
+                         (sim.steady, "steady"), (sim.switching, "switch_response")):  # fmt: skip
+        monkeypatch.setattr(module, name, refuse)
+    assert len(plan(polygon(4, 3.0), CONTROL).dwells) > 50
+
+
+def test_planning_does_not_even_load_the_simulator() -> None:
+    code = (
+        "import sys; from planner import plan, circle; from sim.robot import PRESETS;"
+        "plan(circle(2.0), PRESETS['paper-control']);"
+        "print([m for m in ('sim.stepper', 'sim.balance', 'sim.steady', 'sim.replay') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_other_points_of_the_axis() -> None:
+    """The tip needs a longer rod, the pivot none; each is planned for itself."""
+    for point in ("head_tip", "pivot"):
+        result = plan(circle(2.5), CONTROL, point=point)  # type: ignore[arg-type]
+        assert result.predicted_max <= result.guaranteed
+        assert result.offset != 0
+
+
+def test_tolerance_chooses_a_longer_dwell_and_says_when_it_cannot() -> None:
+    tight = plan(circle(2.0), CONTROL)
+    loose = plan(circle(2.0), CONTROL, tolerance=2 * tight.guaranteed)
+    assert loose.minimum_dwell > tight.minimum_dwell
+    assert loose.guaranteed <= 2 * tight.guaranteed
+    assert loose.duration < tight.duration
+    with pytest.raises(InputError, match="allow more"):
+        plan(circle(2.0), CONTROL, tolerance=1e-3)
+
+
+def refused(path: Any, expected: str, **options: Any) -> None:
+    with pytest.raises(InputError, match=expected) as caught:
+        plan(path, options.pop("robot", CONTROL), **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_refusals() -> None:
+    from dataclasses import replace
+
+    refused([], "empty")
+    refused([[0, 0]], "same|two points")
+    refused([[0, 0], [0, 0]], "same")
+    refused([[0, 0], [float("nan"), 1]], "finite")
+    refused([[0, 0, 0], [1, 1, 1]], r"\(n, 2\)")
+    refused([["a", "b"]], "no number")
+    refused(circle(0.5), "too tight .* scale the path by")
+    refused(polygon(4, 0.4), "too tight .* scale the path by")
+    refused(polygon(4, 3.0), "corner of 90 degrees", corner="error")
+    refused(circle(2.0), "turn-over", minimum_dwell=0.1)
+    refused(circle(2.0), "omega_bar = 500 is outside", robot=CONTROL.with_motor(500.0))
+    refused(circle(2.0), "N = 7 is outside", robot=replace(CONTROL, tails=7))
+    refused(circle(2.0), "a_over_R = 0.5 is outside", robot=replace(CONTROL, disc_offset=0.008))
+    refused(circle(2.0), "end_over_end_drag", robot=replace(CONTROL, effects={"end_over_end_drag": 5.0}))
+
+
+def test_a_tight_circle_is_refused_with_a_scale_that_works() -> None:
+    with pytest.raises(InputError) as caught:
+        plan(circle(0.8), CONTROL)
+    factor = float(str(caught.value).rsplit(" ", 1)[1])
+    assert plan(circle(0.8 * factor), CONTROL).predicted_rms < 0.1
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("p.csv", "x,y\n", "no rows"),
+        ("p.csv", "a,b\n1,2\n", "give x and y"),
+        ("p.csv", "x,y\n1,two\n3,4\n", "no number"),
+        ("p.csv", "x,y\n1,1\n1,1\n", "same"),
+        ("p.svg", "<svg", "not SVG"),
+        ("p.svg", "<svg xmlns='http://www.w3.org/2000/svg'/>", "draw one"),
+        ("p.svg", "<svg><path d='M 0 0 C 1 1 2 2 3 3'/></svg>", "flatten"),
+    ],
+)
+def test_the_command_refuses_and_writes_nothing(
+    name: str, text: str, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from planner.__main__ import main
+
+    (tmp_path / name).write_text(text)
+    words = ["plan", str(tmp_path / name), "--robot", "paper-control", "--out", str(tmp_path / "out")]
+    assert run_command(main, words) == 2
+    error = capsys.readouterr().err
+    assert expected in error
+    assert len(error.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_svg_shapes(tmp_path: Path) -> None:
+    def of(body: str) -> Path2D:
+        (tmp_path / "a.svg").write_text(f"<svg xmlns='http://www.w3.org/2000/svg'>{body}</svg>")
+        return read_path(tmp_path / "a.svg")
+
+    assert of("<polyline points='0,0 3,0 3,-4'/>").length == pytest.approx(7)
+    triangle = of("<polygon points='0,0 3,0 3,-4'/>")
+    assert triangle.closed
+    assert triangle.length == pytest.approx(12)
+    assert of("<path d='M 0 0 h 3 v -4 Z'/>").points.tolist() == [[0, 0], [3, 0], [3, 4]]
+    assert of("<path d='M 1 1 L 4 1 l 0 -4'/>").points.tolist() == [[1, -1], [4, -1], [4, 3]]
+    ring = of("<circle cx='2' cy='1' r='3'/>")
+    assert np.linalg.norm(ring.points - [2, -1], axis=1) == pytest.approx(np.full(len(ring.points), 3.0))
+
+
+def test_files_of_a_plan(tmp_path: Path) -> None:
+    result = plan(polygon(4, 3.0), CONTROL)
+    written = write_plan(result, tmp_path / "out")
+    assert [p.name for p in written] == ["plan.json", "plan.csv", "schedule.h", "plan.svg"]
+    content = json.loads(written[0].read_text())
+    assert content["bound_over_l"] == pytest.approx(result.bound)
+    assert content["model"] == result.model
+    schedule = load_schedule(written[0])
+    assert np.array_equal(schedule.dwells, result.dwells)
+    assert schedule.first_direction == result.first_direction
+    assert schedule.robot == plan_record(result)["robot"]["groups"]
+    header = written[2].read_text()
+    numbers = [int(v) for v in header.split("{")[1].split("}")[0].replace("\n", " ").split(",")]
+    assert sum(numbers) == pytest.approx(1000 * result.seconds.sum(), abs=1)
+    assert f"SCHEDULE_COUNT {len(numbers)}" in header
+    assert "<svg" in written[3].read_text()
+
+
+def test_the_header_compiles(tmp_path: Path) -> None:
+    import shutil
+
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("no C compiler on this machine")
+    header = write_plan(plan(circle(2.0), CONTROL), tmp_path)[2]
+    (tmp_path / "main.c").write_text(
+        '#include "schedule.h"\n#include <stdio.h>\nint main(void){long s=0;'
+        'for(int i=0;i<SCHEDULE_COUNT;i++)s+=schedule_ms[i];printf("%ld",s);return 0;}\n'
+    )
+    subprocess.run(
+        [compiler, "-Wall", "-Werror", "-o", str(tmp_path / "a"), str(tmp_path / "main.c")], check=True
+    )
+    total = int(subprocess.run([str(tmp_path / "a")], capture_output=True, text=True, check=True).stdout)
+    seconds = json.loads((header.parent / "plan.json").read_text())["dwell_s"]
+    assert total == pytest.approx(1000 * sum(seconds), abs=1)
+
+
+def test_milliseconds_carry_rounding_and_split_long_dwells() -> None:
+    assert sum(milliseconds(np.full(1000, 0.0104))) == 10400
+    assert milliseconds(np.array([1.0, 140.0])) == [1000, 65535, 0, 65535, 0, 8930]
+    with pytest.raises(InputError, match="longer minimum dwell"):
+        milliseconds(np.array([1.0, 0.0001]))
+
+
+def test_unequal_turns_are_planned_for() -> None:
+    """A vehicle that turns 5 % faster to one side still keeps to a line."""
+    from dataclasses import replace
+
+    car = vehicle()
+    twist = car.twist.copy()
+    twist[1] *= [1.0, 1.05, 1.05]
+    car = replace(car, twist=twist)
+    ref = reference(Path2D.of([[0, 0], [30, 0]]), car.rod, 0.01)
+    switches = follow(ref, car, rod=car.rod, ahead=look_ahead(car, 0.0), dwell=1.0, offset=0.0)
+    track = trace(car, switches.first_direction, switches.dwells, switches.poses[0], 0.0)
+    assert np.abs(track[:, 1]).max() < guaranteed(car, car.rod, 0.0, 1.0)
+
+
+def test_the_tube_grows_with_the_table_s_errors() -> None:
+    from dataclasses import replace
+
+    from planner.bound import tube
+
+    car = vehicle()
+    dwells = np.full(60, 1.0)
+    start = np.zeros(3)
+    small = tube(car, 1, dwells, start, 0.0)
+    large = tube(
+        replace(car, relative_error={k: 3 * v for k, v in car.relative_error.items()}), 1, dwells, start, 0.0
+    )
+    assert 2 < large / small < 4
+
+
+def test_vehicle_of_the_shipped_table_matches_the_reference_robot() -> None:
+    """ω̄_yr, v_x, v_z of the control example from an independent solver."""
+    car = vehicle_of(CONTROL, load())
+    assert car.twist[0] == pytest.approx([0.0180, 0.0425, 0.0490], rel=0.02)
+    assert car.net_speed(2.0) == pytest.approx(0.0169, rel=0.02)
