@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.fit import Fit, fit
+from calibration.fit import SANE, Fit, fit
 from calibration.forward import COEFFICIENTS, Parameters, Swimmer
 from calibration.misfit import TESTABLE, Misfit, check_misfit
 from sim.effects import Effect, catalogue
@@ -57,15 +57,15 @@ def candidates() -> list[Effect]:
 def directions(
     model: Swimmer, parameters: Parameters, prediction: Floats, effects: list[Effect], *, title: str
 ) -> Floats:
-    """∂f/∂ε at each effect's null, (n, k, e)."""
+    """∂f/∂ε at `parameters`, which give every effect a size (its null, if not told), (n, k, e)."""
     if not effects:
         return np.zeros((*prediction.shape, 0))
-    null = {e.name: e.null for e in effects}
-    sets = []
-    for effect in effects:
-        sets.append({**parameters, **null, effect.name: effect.null + _DERIVATIVE_STEP * effect.typical})
-    moved = model.predict(sets, title=title)
     widths = np.array([_DERIVATIVE_STEP * e.typical for e in effects])
+    sets = [
+        {**parameters, effect.name: parameters[effect.name] + width}
+        for effect, width in zip(effects, widths.tolist(), strict=True)
+    ]
+    moved = model.predict(sets, title=title)
     return np.moveaxis((moved - prediction) / widths[:, None, None], 0, -1)
 
 
@@ -76,17 +76,18 @@ def examine(
     effects: list[Effect],
     along: Floats,
     used: NDArray[np.bool_],
+    given: Parameters,
     *,
     level: float,
     seed: int,
 ) -> list[Candidate]:
-    """Refit and judge every effect, best score first."""
+    """Refit and judge every effect, best score first; `given` is where refits start if the fit ran away."""
     found = []
     for j in np.argsort(-np.abs(misfit.scores.z)):
         effect = effects[j]
         z, survived = float(misfit.scores.z[j]), float(misfit.scores.survived[j])
         detectable = misfit.critical_z / max(float(misfit.scores.length[j]), 1e-300)
-        guess = effect.null + z / max(float(misfit.scores.length[j]), 1e-300)
+        guess = base.parameters[effect.name] + z / max(float(misfit.scores.length[j]), 1e-300)
         low, high = effect.bounds
         reason = ""
         if survived < TESTABLE:
@@ -101,14 +102,12 @@ def examine(
         guess = min(max(guess, low), high)
         refit = fit(
             model,
-            {**base.parameters, effect.name: guess},
+            {**_sane(base.parameters, given), effect.name: guess},
             (*COEFFICIENTS, effect.name),
             used,
             title=f"fit with {effect.title}",
         )
-        after = check_misfit(
-            refit, model.data, used, np.zeros((*along.shape[:2], 0)), level=level, seed=seed + 1
-        )
+        after = check_misfit(refit, model.data, used, np.zeros((*along.shape[:2], 0)), level=level, seed=seed + 1)
         gain, error = _session_gain(model, base, refit, used)
         ends = refit.interval(effect.name)
         if after.general_p < level / 5:
@@ -119,6 +118,13 @@ def examine(
             reason = "does not predict left-out sessions better"
         found.append(Candidate(effect, z, survived, detectable, refit, after, gain, error, reason or "kept"))
     return found
+
+
+def _sane(fitted: Parameters, given: Parameters) -> dict[str, float]:
+    """Fitted parameters, or the given ones where a coefficient ran to a limit for want of the effect."""
+    low, high = SANE
+    inside = all(1.5 * low < fitted[name] < high / 1.5 for name in COEFFICIENTS)
+    return dict(fitted) if inside else dict(given)
 
 
 def explaining(found: list[Candidate]) -> list[Candidate]:

@@ -62,7 +62,7 @@ CASES = (
 # The robot behind the two tables; the fitter starts from the paper's coefficients.
 HIDDEN = {"C_t": 3.1, "C_r": 2.4, "C_yr": 4.4}
 HIDDEN_EFFECT = {"end_over_end_drag": 5.0}
-_LENGTHS_CM = (7.0, 9.0, 11.0)
+_LENGTHS_CM = (6.0, 7.5, 9.0)
 
 
 def run_demo(out: str | Path) -> None:
@@ -175,8 +175,19 @@ def _write_page(
         "The planner asks the look-up table only. The schedule is then replayed, open loop, in the simulator. "
         "Errors are from the declared path; corners are rounded because the robot cannot turn on the spot."
     )
-    page.figure(_draw_plans(errors), "three planned paths with the replayed tracks")
-    header = ("path", "dwells", "minutes", "rms / l", "max / l", "stated bound / l", "rms / l, raw", "max / l, raw")
+    plans = _draw_plans(errors)
+    plans.savefig(out.parent / "demo" / "plans.png", dpi=90, bbox_inches="tight")
+    page.figure(plans, "three planned paths with the replayed tracks")
+    header = (
+        "path",
+        "dwells",
+        "minutes",
+        "rms / l",
+        "max / l",
+        "stated bound / l",
+        "rms / l, raw",
+        "max / l, raw",
+    )
     page.table(
         header,
         [

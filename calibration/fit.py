@@ -4,7 +4,7 @@ Gauss-Newton with a Jacobian by finite differences in the simulator (all perturb
 
     θ ← θ + (JᵀΣ⁻¹J)⁻¹ JᵀΣ⁻¹ (y − f(θ)),   θ = (ln C_t, ln C_r, ln C_yr, ε_1, …).
 
-Effect sizes stay within their bounds; one that ends on a bound is said to. The covariance of the parameters is
+Effect sizes stay within their bounds, coefficients within `SANE`. The covariance of the parameters is
 (JᵀΣ⁻¹J)⁻¹; intervals are 95 %.
 """
 
@@ -19,13 +19,18 @@ from numpy.typing import NDArray
 from calibration.forward import COEFFICIENTS, Parameters, Swimmer
 from calibration.noise import Noise, repeat_covariance, session_variance
 from sim.effects import catalogue
+from sim.errors import InputError
+from surrogate.export import load
 
 Floats = NDArray[np.float64]
 
 _STEP = 0.05  # finite difference in ln C
 _EFFECT_STEP = 0.1  # finite difference in units of an effect's typical size
 _MOST_STEPS = 8
+_MOST_GUESSES = 12
+_SHORT = 0.1  # a step below this in ln C (or in ε) keeps the Jacobian
 _SMALL = 0.1  # in standard deviations: a step below this ends the iteration
+SANE = (0.05, 50.0)  # coefficients stay within: beyond, they say that the model lacks something
 _LARGEST = 0.7  # change of ln C in one step
 Z95 = 1.96
 
@@ -63,13 +68,34 @@ def jacobian(
             width, moved = _STEP, value * math.exp(_STEP)
         else:
             effect = catalogue()[name]
-            width = _EFFECT_STEP * effect.typical
+            width = _EFFECT_STEP * abs(effect.typical)
             width = width if value + width <= effect.bounds[1] else -width
             moved = value + width
         sets.append({**parameters, name: moved})
         widths.append(width)
     found = model.predict(sets, title=title)
     return found[0], np.moveaxis((found[1:] - found[0]) / np.array(widths)[:, None, None], 0, -1)
+
+
+def first_guess(model: Swimmer, start: Parameters, used: NDArray[np.bool_]) -> dict[str, float]:
+    """Coefficients fitted with the look-up table; `start` itself where the table does not reach."""
+    data = model.data
+    white = Noise(repeat_covariance(data.y[used], data.condition[used]), np.zeros(data.y.shape[1]))
+    whiten = white.whitener(data.session[used])
+    parameters = dict(start)
+    lookup = load()
+    for _ in range(_MOST_GUESSES):
+        moved = [{**parameters, name: parameters[name] * math.exp(_STEP)} for name in COEFFICIENTS]
+        try:
+            found = model.predict([parameters, *moved], lookup=lookup)
+        except InputError:  # outside the table's domain, there or on the way
+            return dict(start)
+        J = whiten(np.moveaxis(found[1:] - found[0], 0, -1)[used] / _STEP)
+        step: Floats = np.asarray(np.linalg.lstsq(J, whiten((data.y - found[0])[used]), rcond=None)[0])
+        parameters = _move(parameters, COEFFICIENTS, step)
+        if np.abs(step).max() < 1e-3:
+            break
+    return parameters
 
 
 def fit(
@@ -80,12 +106,21 @@ def fit(
     *,
     title: str = "fit",
 ) -> Fit:
-    """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay."""
+    """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay.
+
+    The Jacobian is computed anew after a long step and kept after a short one.
+    """
     data = model.data
     run = repeat_covariance(data.y[used], data.condition[used])
     parameters = dict(start)
+    derivative = np.empty(0)
+    fresh = True  # the Jacobian must be computed
     for count in range(1, _MOST_STEPS + 1):
-        prediction, derivative = jacobian(model, parameters, names, title=f"{title}, step {count}")
+        label = f"{title}, step {count}" if title else ""
+        if fresh:
+            prediction, derivative = jacobian(model, parameters, names, title=label)
+        else:
+            prediction = model.predict([parameters], title=label)[0]
         residual = data.y - prediction
         # Linear fit; near the end with the session variance that its own residuals imply. Far from the
         # solution every session looks shifted, and a large τ² would hide what pulls towards it.
@@ -98,10 +133,10 @@ def fit(
             left = residual[used] - derivative[used] @ step
             noise = Noise(run, session_variance(left, data.session[used], run))
         size = float(np.max(np.abs(step) / np.sqrt(np.diag(covariance))))
-        moved = _move(parameters, names, step)
         if (size < _SMALL and count > 1) or count == _MOST_STEPS:
             break
-        parameters = moved
+        parameters = _move(parameters, names, step)
+        fresh = bool(np.abs(step).max() > _SHORT) and count + 1 < _MOST_STEPS
     r = noise.whitener(data.session[used])(residual[used])
     return Fit(parameters, names, covariance, prediction, derivative, noise, float(r @ r), count)
 
@@ -110,7 +145,8 @@ def _move(parameters: dict[str, float], names: tuple[str, ...], step: Floats) ->
     moved = dict(parameters)
     for name, change in zip(names, step.tolist(), strict=True):
         if name in COEFFICIENTS:
-            moved[name] *= math.exp(max(-_LARGEST, min(_LARGEST, change)))
+            value = moved[name] * math.exp(max(-_LARGEST, min(_LARGEST, change)))
+            moved[name] = max(SANE[0], min(SANE[1], value))
         else:
             low, high = catalogue()[name].bounds
             moved[name] = max(low, min(high, moved[name] + change))

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.attribute import Candidate, candidates, directions, examine, explaining
-from calibration.fit import Fit, fit
+from calibration.fit import Fit, first_guess, fit
 from calibration.forward import COEFFICIENTS, Swimmer
 from calibration.measurements import Measurements
 from calibration.misfit import Misfit, check_misfit
@@ -117,12 +117,13 @@ def close(
     title = "as given" if progress else ""
     model = Swimmer(robot, data, jobs=jobs).corrected(start, title=title)
     uncalibrated = model.predict([start])[0]
-    base = fit(model, start, COEFFICIENTS, used, title="fit" if progress else "")
+    guess = first_guess(model, start, used)
+    base = fit(model, guess, COEFFICIENTS, used, title="fit" if progress else "")
     along = directions(model, base.parameters, base.prediction, effects, title="effects" if progress else "")
     misfit = check_misfit(base, data, used, along, level=level, seed=seed)
     found: list[Candidate] = []
     if misfit.p_value < level:
-        found = examine(model, base, misfit, effects, along, used, level=level, seed=seed)
+        found = examine(model, base, misfit, effects, along, used, start, level=level, seed=seed)
     best = explaining(found)
     verdict = "none" if misfit.p_value >= level else ("unexplained", "effect", "ambiguous")[min(len(best), 2)]
     final = best[0].refit if verdict == "effect" and best[0].refit else base
@@ -173,9 +174,7 @@ def _errors(data: Measurements, prediction: Floats, rows: NDArray[np.bool_]) -> 
     return float(np.sqrt(square.mean())), each
 
 
-def _interval(
-    data: Measurements, prediction: Floats, rows: NDArray[np.bool_], seed: int
-) -> tuple[float, float]:
+def _interval(data: Measurements, prediction: Floats, rows: NDArray[np.bool_], seed: int) -> tuple[float, float]:
     """95 % interval of the relative rms by resampling conditions."""
     square = ((data.y - prediction)[rows] ** 2).mean(1)
     condition = data.condition[rows]

@@ -80,9 +80,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         raise InputError(f"unknown column {unknown[0]!r}; known are {', '.join(sorted(_KNOWN))}")
     outputs = tuple(name for name, (column, _, _) in OUTPUTS.items() if column in table)
     if len(outputs) < 3 or "omega_yr" not in outputs:
-        raise InputError(
-            "the table needs omega_yr_rad_s and at least two more outputs to fit three coefficients"
-        )
+        raise InputError("the table needs omega_yr_rad_s and at least two more outputs to fit three coefficients")
     numbers = table.drop(columns="session", errors="ignore").apply(pd.to_numeric, errors="coerce")
     reasons = _reasons(table, numbers, outputs)
     keep = np.array([not r for r in reasons])

@@ -69,9 +69,9 @@ class _Tester:
     def __init__(self, data: Measurements, used: NDArray[np.bool_], J: Floats, D: Floats):
         self.session, self.condition = data.session[used], data.condition[used]
         self.J, self.D = J, D
-        inputs = np.stack(
-            [data.tails, np.log(data.length), np.log(np.abs(data.omega)), np.sign(data.omega)], 1
-        )[used]
+        inputs = np.stack([data.tails, np.log(data.length), np.log(np.abs(data.omega)), np.sign(data.omega)], 1)[
+            used
+        ]
         spread = inputs.std(0)
         inputs = (inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
         distance = ((inputs[:, None] - inputs[None]) ** 2).sum(-1)

@@ -33,9 +33,7 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
     page.section("Data")
     page.text(
         f"{len(data)} usable runs in {len(data.session_names)} sessions; session {result.locked} was locked "
-        "away for the test. Rows set aside: "
-        + ("; ".join(result.set_aside) if result.set_aside else "none")
-        + "."
+        "away for the test. Rows set aside: " + ("; ".join(result.set_aside) if result.set_aside else "none") + "."
     )
     page.section("Fit")
     rows = []

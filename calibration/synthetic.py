@@ -1,7 +1,7 @@
 """Tables to test the loop on: the simulator with a hidden effect, on a finer mesh, with noise.
 
-The design is the paper's: tail counts, tail lengths, two motor levels, both directions, repeated trials, one session
-a tail count. The truth is simulated on half the edge length and half the step of the fitter's model, so
+The design is the paper's: tail counts, tail lengths, two motor levels, both directions, repeated trials, one
+session a tail count. The truth is simulated on half the edge length and half the step of the fitter's model, so
 that the fitter's discretisation cannot pass for physics. Noise is multiplicative on spins, yaw rate and
 radius, additive on θ; a session shifts all its runs together.
 """
@@ -36,9 +36,7 @@ def make_table(
 ) -> pd.DataFrame:
     """A table of runs of `robot` (its effects are the truth) in the columns of `calibration.measurements`."""
     design = [(n, length, rpm) for n in tails for length in lengths_cm for rpm in motor_rpm]
-    runs = [
-        replace(robot, tails=n, tail_length=length / 100, motor_speed=rpm * _RPM) for n, length, rpm in design
-    ]
+    runs = [replace(robot, tails=n, tail_length=length / 100, motor_speed=rpm * _RPM) for n, length, rpm in design]
     values = [run.group_values() for run in runs]
     columns = {k: np.array([v[k] for v in values]) for k in values[0]}
     found = steady_columns(columns, refine=True, jobs=jobs, title=title)

@@ -47,9 +47,7 @@ class Page:
     def table(self, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
         """A table; the first column is left-aligned."""
         head = "".join(f"<th>{html.escape(h)}</th>" for h in header)
-        body = "".join(
-            "<tr>" + "".join(f"<td>{html.escape(str(c))}</td>" for c in row) + "</tr>" for row in rows
-        )
+        body = "".join("<tr>" + "".join(f"<td>{html.escape(str(c))}</td>" for c in row) + "</tr>" for row in rows)
         self._parts.append(f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>')
 
     def figure(self, figure: Figure, description: str) -> None:

@@ -62,9 +62,7 @@ FLAGS = (
 
 def schema(effects: Iterable[str] = ()) -> pa.Schema:
     """Schema of a data set that sweeps the named effects as well."""
-    extra = tuple(
-        Column(name, _real, catalogue()[name].unit, catalogue()[name].title) for name in sorted(effects)
-    )
+    extra = tuple(Column(name, _real, catalogue()[name].unit, catalogue()[name].title) for name in sorted(effects))
     return pa.schema(
         [
             pa.field(c.name, c.type, nullable=False, metadata={"unit": c.unit, "meaning": c.meaning})

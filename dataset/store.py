@@ -56,9 +56,7 @@ def read_manifest(folder: str | Path) -> dict[str, Any]:
     """The manifest of a finished data set."""
     path = Path(folder) / MANIFEST
     if not path.is_file():
-        raise InputError(
-            f"{folder} is no finished data set (no {MANIFEST}); make it with python -m dataset build"
-        )
+        raise InputError(f"{folder} is no finished data set (no {MANIFEST}); make it with python -m dataset build")
     try:
         content = json.loads(path.read_text())
     except json.JSONDecodeError as broken:

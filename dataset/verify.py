@@ -40,9 +40,7 @@ def verify(folder: str, *, rows: int = 8) -> str:
     points = {n: sample[n].to_numpy(dtype=float) for n in names}
     for kind, refine in (("alone", False), ("refined", True)):
         again = steady_columns(points, refine=refine, title=f"verify {kind}")
-        worst[kind] = max(
-            _worst(sample, again, _SPINS) / _SPIN_ERROR, _worst(sample, again, _REST) / _REST_ERROR
-        )
+        worst[kind] = max(_worst(sample, again, _SPINS) / _SPIN_ERROR, _worst(sample, again, _REST) / _REST_ERROR)
     if worst["alone"] > 0.2 or worst["refined"] > 1:
         raise InputError(
             f"{folder}: rows simulated again differ by {100 * worst['alone'] * _REST_ERROR:.2f} % at the same "

@@ -78,7 +78,8 @@ def controller_header(result: Plan) -> str:
     entries = milliseconds(result.seconds)
     lines = [", ".join(map(str, entries[i : i + 12])) for i in range(0, len(entries), 12)]
     body = ",\n    ".join(lines)
-    return f"""/* Motor schedule for robot "{result.robot.name.replace("*/", "")}": turn in FIRST_DIRECTION for the first entry,
+    name = "".join(c for c in result.robot.name if c.isalnum() or c in " -_.")
+    return f"""/* Motor schedule for robot "{name}": turn in FIRST_DIRECTION for the first entry,
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
  * lengthens the dwell before it. Stop after the last entry. Look-up table {result.model}. */
 #ifndef SCHEDULE_H

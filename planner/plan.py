@@ -123,9 +123,7 @@ def plan(
         dwell=dwell,
         offset=offset,
     )
-    return _finish(
-        robot, vehicle, table, point, raw, ref, switches, radius, rod, curvature, dwell, offset, seed
-    )
+    return _finish(robot, vehicle, table, point, raw, ref, switches, radius, rod, curvature, dwell, offset, seed)
 
 
 def _finish(
@@ -149,9 +147,7 @@ def _finish(
     extra = bounds.tube(vehicle, switches.first_direction, switches.dwells, start, offset, seed=seed)
     warnings = []
     if vehicle.tail_gap < 1.0:
-        warnings.append(
-            f"tails touch (predicted gap {vehicle.tail_gap:.2f} diameters): the model has no contact"
-        )
+        warnings.append(f"tails touch (predicted gap {vehicle.tail_gap:.2f} diameters): the model has no contact")
     return Plan(
         robot=robot,
         point=point,

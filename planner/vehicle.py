@@ -8,8 +8,9 @@ fixed offset once the tails have turned over (`sim.switching`), so a dwell of T 
 Both directions are parameters: the look-up table gives mirror images, a calibration may give others. The
 first dwell starts from straight tails, half way between the two turned-over shapes, and gets half a lag.
 
-Between table points the lag is interpolated, from none at a flip; beyond the longest dwell of the table it is constant, since
-the tails have long turned over. Poses are of the head's centre, lengths in l, times in μ0 l⁴/EI.
+Between table points the lag is interpolated, from none at a flip; beyond the table's longest dwell it
+is constant, since the tails have long turned over. Poses are of the head's centre, lengths in l, times
+in μ0 l⁴/EI.
 """
 
 from __future__ import annotations

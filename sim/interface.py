@@ -27,9 +27,7 @@ PAPER_DEPTH_OVER_R = 0.7
 PAPER_STEEPNESS = 20.0
 
 
-def side_force_coefficient(
-    depth_over_R: float = PAPER_DEPTH_OVER_R, steepness: float = PAPER_STEEPNESS
-) -> float:
+def side_force_coefficient(depth_over_R: float = PAPER_DEPTH_OVER_R, steepness: float = PAPER_STEEPNESS) -> float:
     """Coefficient c of F_x = c μ0 R L ω_h, dimensionless.
 
     Args:

@@ -125,9 +125,7 @@ def _replay_batch(
             if i % stride == 0 or i == count:
                 _sample(samples, alive, state, torch.sign(omega), index)
         if bool(state.failed.any()):
-            raise InputError(
-                f"the simulation failed in dwell {index + 1} of the schedule; a finer step may help"
-            )
+            raise InputError(f"the simulation failed in dwell {index + 1} of the schedule; a finer step may help")
         if progress is not None:
             progress(len(alive))
     return [_track(s, rows) for s, rows in zip(schedules, samples, strict=True)]

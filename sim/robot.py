@@ -144,9 +144,7 @@ class Groups:
         counts = np.unique(values["N"])
         if len(counts) != 1:
             raise InputError(f"a batch has one N; these rows have {counts.astype(int).tolist()}: split them")
-        tensors = {
-            name: torch.tensor(array, dtype=torch.float64) for name, array in values.items() if name != "N"
-        }
+        tensors = {name: torch.tensor(array, dtype=torch.float64) for name, array in values.items() if name != "N"}
         effects = {name: tensors.pop(name) for name in list(tensors) if name in catalogue()}
         return Groups(**tensors, N=int(counts[0]), effects=effects)
 

@@ -140,9 +140,7 @@ def _replace(into: dict[str, object], lanes: Tensor, values: dict[str, object]) 
             target[..., lanes] = value
 
 
-def _run(
-    groups: Groups, resolution: Resolution, progress: Callable[[int], object] | None
-) -> tuple[Steady, State]:
+def _run(groups: Groups, resolution: Resolution, progress: Callable[[int], object] | None) -> tuple[Steady, State]:
     swimmer = assemble(groups, edges=resolution.edges)
     omega = groups.omega_bar
     dt = time_step(omega, resolution)

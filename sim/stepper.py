@@ -66,10 +66,7 @@ class State:
     def select(self, lanes: Tensor) -> State:
         """The robots at `lanes`."""
         return State(
-            **{
-                name: value[..., lanes] if torch.is_tensor(value) else value
-                for name, value in vars(self).items()
-            }
+            **{name: value[..., lanes] if torch.is_tensor(value) else value for name, value in vars(self).items()}
         )
 
 
@@ -121,9 +118,7 @@ def _first_step(swimmer: Swimmer, state: State, omega: Tensor, dt: Tensor, toler
     return _accept(state, dt, x, x_dot, pose, u, failed | failed1)
 
 
-def _accept(
-    state: State, dt: Tensor, x: Tensor, x_dot: Tensor, pose: Tensor, u: Tensor, failed: Tensor
-) -> State:
+def _accept(state: State, dt: Tensor, x: Tensor, x_dot: Tensor, pose: Tensor, u: Tensor, failed: Tensor) -> State:
     failed = failed | state.failed
     if bool(failed.any()):
         x = torch.where(failed, state.x, x)

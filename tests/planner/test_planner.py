@@ -273,9 +273,7 @@ def test_the_header_compiles(tmp_path: Path) -> None:
         '#include "schedule.h"\n#include <stdio.h>\nint main(void){long s=0;'
         'for(int i=0;i<SCHEDULE_COUNT;i++)s+=schedule_ms[i];printf("%ld",s);return 0;}\n'
     )
-    subprocess.run(
-        [compiler, "-Wall", "-Werror", "-o", str(tmp_path / "a"), str(tmp_path / "main.c")], check=True
-    )
+    subprocess.run([compiler, "-Wall", "-Werror", "-o", str(tmp_path / "a"), str(tmp_path / "main.c")], check=True)
     total = int(subprocess.run([str(tmp_path / "a")], capture_output=True, text=True, check=True).stdout)
     seconds = json.loads((header.parent / "plan.json").read_text())["dwell_s"]
     assert total == pytest.approx(1000 * sum(seconds), abs=1)

@@ -1,4 +1,4 @@
-"""Vehicles for the planner's tests: the control robot's numbers, typed, so that no model or simulator is needed."""
+"""Vehicles for the planner's tests: the control robot's numbers, without model or simulator."""
 
 from __future__ import annotations
 

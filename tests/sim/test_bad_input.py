@@ -92,9 +92,14 @@ def test_replay_refuses(text: str, expected: str, tmp_path: Path, capsys: pytest
 def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:
     target = tmp_path / "a.csv"
     target.write_text("old")
-    with pytest.raises(RuntimeError), whole_file(target) as part:
-        part.write_text("half of the n")
-        raise RuntimeError
+
+    def write_half() -> None:
+        with whole_file(target) as part:
+            part.write_text("half of the n")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        write_half()
     assert target.read_text() == "old"
     assert len(list(tmp_path.iterdir())) == 1
 

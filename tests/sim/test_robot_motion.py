@@ -183,9 +183,7 @@ def test_tail_gap_of_straight_tails() -> None:
     distance = math.sqrt(2) / CONTROL_VALUES["l_over_R"]
     expected = distance / (2 / CONTROL_VALUES["l_over_r0"])
     assert float(tail_gap(swimmer, swimmer.straight())) == pytest.approx(expected, rel=1e-12)
-    assert math.isinf(
-        float(tail_gap(assemble(control(N=1), edges=8), assemble(control(N=1), edges=8).straight()))
-    )
+    assert math.isinf(float(tail_gap(assemble(control(N=1), edges=8), assemble(control(N=1), edges=8).straight())))
 
 
 def test_net_speed_falls_with_faster_flips_as_the_tails_turn_over() -> None:

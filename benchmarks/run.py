@@ -1,0 +1,15 @@
+"""All figures that the README claims. Usage: python -m benchmarks.run"""
+
+from __future__ import annotations
+
+from benchmarks import accuracy, lookup, tracking
+
+
+def main() -> None:
+    accuracy.main()
+    lookup.main()
+    tracking.main()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,246 @@
+"""Closing the loop: right verdicts on planted truths, none on nulls, honest refusals."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import calibration.fit
+import calibration.forward
+import calibration.synthetic
+from calibration.loop import Verdict, close, locked_session, verdict_record
+from calibration.measurements import read_measurements
+from calibration.misfit import check_misfit
+from calibration.noise import Noise, repeat_covariance, session_variance
+from calibration.synthetic import make_table
+from sim.errors import InputError, run_command
+from sim.robot import PRESETS, load_robot
+from tests.calibration import toy
+
+MEASURED = Path(__file__).parents[3] / "shared" / "measured"
+START = PRESETS["paper-measured"]
+TRUTH = replace(START, C_t=3.1, C_r=2.4, C_yr=4.4)
+
+
+@pytest.fixture
+def toy_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calibration.forward, "steady_columns", toy.steady_columns)
+    monkeypatch.setattr(calibration.synthetic, "steady_columns", toy.steady_columns)
+    monkeypatch.setattr("calibration.loop.first_guess", lambda model, start, used: start)
+
+
+def toy_table(seed: int, **effects: float) -> pd.DataFrame:
+    return make_table(replace(TRUTH, effects=effects), seed=seed, lengths_cm=(5.0, 8.0, 11.0), title="")
+
+
+def closed(table: pd.DataFrame, seed: int = 0) -> Verdict:
+    return close(read_measurements(table), START, seed=seed, progress=False)
+
+
+def test_whitener_is_the_inverse_root_of_the_block_covariance() -> None:
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(3, 3))
+    noise = Noise(root @ root.T + np.eye(3), np.array([0.3, 0.0, 1.2]))
+    session = np.array([0, 0, 1, 1, 1])
+    blocks = np.kron(np.eye(5), noise.run)
+    same = (session[:, None] == session[None]).astype(float)
+    covariance = blocks + np.kron(same, np.diag(noise.session))
+    whiten = noise.whitener(session)
+    W = whiten(np.eye(15).reshape(5, 3, 15))
+    assert W @ covariance @ W.T == pytest.approx(np.eye(15), abs=1e-10)
+
+
+def test_noise_is_recovered_from_repeats_and_sessions() -> None:
+    rng = np.random.default_rng(1)
+    session = np.repeat(np.arange(200), 20)
+    condition = np.arange(4000) // 2
+    shift = rng.normal(scale=[0.02, 0.03], size=(200, 2))
+    truth = rng.normal(size=(2000, 2))[condition]
+    scatter = rng.normal(scale=[0.03, 0.05], size=(4000, 2))
+    run = repeat_covariance(truth + scatter + shift[session], condition)
+    assert np.sqrt(np.diag(run)) == pytest.approx([0.03, 0.05], rel=0.05)
+    tau = np.sqrt(session_variance(scatter + shift[session], session, run))
+    assert tau == pytest.approx([0.02, 0.03], rel=0.2)
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_no_effect_is_claimed_where_there_is_none() -> None:
+    """20 nulls; more than 5 claims would be beyond a 5 % rate by any measure (binomial tail 0.0003)."""
+    verdicts = [closed(toy_table(seed)).verdict for seed in range(20)]
+    assert sum(v != "none" for v in verdicts) <= 5
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_a_planted_effect_is_found_sized_and_removed() -> None:
+    name, size = "end_over_end_drag", 5.0
+    named, covered = 0, 0
+    for seed in range(6):
+        result = closed(toy_table(100 + seed, **{name: size}))
+        assert result.verdict != "none"
+        assert name in result.effects or result.verdict == "unexplained"
+        if result.effects == (name,):
+            named += 1
+            low, high = result.final.interval(name)
+            covered += low <= size <= high
+            assert result.error_after < 1.25 * result.noise_ceiling
+            assert result.error_after <= result.error_before
+            assert result.corrected.effects[name] == result.final.parameters[name]
+    assert named >= 5
+    assert covered >= named - 1
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_an_effect_that_the_coefficients_absorb_is_not_testable() -> None:
+    """A direction that C_t covers leaves nothing to score, however wrong the model is."""
+    table = toy_table(5, end_over_end_drag=5.0)
+    data = read_measurements(table)
+    used = data.session != locked_session(data)
+    base = closed(table).base
+    misfit = check_misfit(base, data, used, base.jacobian[..., :1], level=0.05, seed=0, draws=20)
+    assert misfit.scores.survived[0] < 1e-6
+    assert misfit.score_p == 1.0
+    assert misfit.general_p < 0.1
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_an_effect_outside_the_catalogue_is_left_unexplained() -> None:
+    table = toy_table(7)
+    odd = 0.12 * np.sin(table["l_cm"] * 1.1) * np.where(table["omega_rpm"].abs() > 120, 1, -1)
+    table["omega_yr_rad_s"] *= np.exp(odd)
+    result = closed(table)
+    assert result.verdict == "unexplained"
+    assert result.effects == ()
+    assert result.corrected.effects == {}
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_coefficients_are_recovered_with_their_intervals() -> None:
+    result = closed(toy_table(3))
+    for name in ("C_t", "C_r", "C_yr"):
+        low, high = result.base.interval(name)
+        middle = result.base.parameters[name]
+        assert low < middle < high
+        assert middle == pytest.approx(getattr(TRUTH, name), rel=0.1)
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_the_locked_session_has_no_say() -> None:
+    """Ruining the locked session changes the reported errors and nothing else."""
+    table = toy_table(5, end_over_end_drag=5.0)
+    data = read_measurements(table)
+    name = data.session_names[locked_session(data)]
+    ruined = table.copy()
+    ruined.loc[ruined["session"] == name, "omega_yr_rad_s"] *= 1.5
+    one, two = closed(table), closed(ruined)
+    assert one.final.parameters == two.final.parameters
+    assert one.misfit.p_value == two.misfit.p_value
+    assert two.error_after > 1.5 * one.error_after
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_the_result_is_deterministic() -> None:
+    table = toy_table(9, end_over_end_drag=5.0)
+    one, two = (verdict_record(closed(table, seed=4), table="t") for _ in range(2))
+    assert one == two
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_p_values_of_nulls_are_spread_evenly() -> None:
+    """The bootstrap accounts for the fit: p-values of pure noise are neither small nor large on the whole."""
+    table = toy_table(11)
+    data = read_measurements(table)
+    used = data.session != locked_session(data)
+    base = closed(table).base
+    rng = np.random.default_rng(0)
+    p = []
+    for seed in range(40):
+        noise = rng.multivariate_normal(np.zeros(len(data.outputs)), base.noise.run, size=len(data))
+        drawn = replace(data, y=base.prediction + noise)
+        p.append(check_misfit(base, drawn, used, np.zeros((*data.y.shape, 0)), level=0.05, seed=seed, draws=100))
+    kernel = np.array([m.kernel_p for m in p])
+    assert 0.3 < kernel.mean() < 0.7
+    assert (kernel < 0.1).mean() < 0.25
+
+
+def test_the_real_simulator_closes_a_table_with_a_hidden_effect(tmp_path: Path) -> None:
+    """Truth on a finer mesh and step; the fitter is not told of the effect."""
+    truth = replace(TRUTH, effects={"end_over_end_drag": 5.0})
+    table = make_table(truth, seed=21, lengths_cm=(6.0, 9.0), title="")
+    table.to_csv(tmp_path / "table.csv", index=False)
+    from calibration.__main__ import main
+
+    out = tmp_path / "out"
+    words = ["close", str(tmp_path / "table.csv"), "--robot", "paper-measured", "--out", str(out)]
+    assert run_command(main, words) == 0
+    verdict = json.loads((out / "verdict.json").read_text())
+    assert verdict["verdict"] == "effect"
+    assert verdict["effects"] == ["end_over_end_drag"]
+    low, high = verdict["parameters"]["end_over_end_drag"]["interval"]
+    assert low - 0.5 < 5.0 < high + 0.5
+    assert verdict["error_after"] < 1.25 * verdict["noise_ceiling"]
+    assert verdict["error_before"] > 1.5 * verdict["error_after"]
+    corrected = load_robot(out / "corrected.toml")
+    assert corrected.effects["end_over_end_drag"] == verdict["parameters"]["end_over_end_drag"]["value"]
+    assert "data:image/png" in (out / "report.html").read_text()
+
+
+BASE = "N,l_cm,trial,omega_rpm,omega_h_rpm,omega_yr_rad_s,R_yr_cm\n"
+
+
+@pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda t: t.drop(columns="omega_rpm"), "no column 'omega_rpm'"),
+        (lambda t: t.assign(colour=1), "unknown column 'colour'"),
+        (lambda t: t.drop(columns=["omega_yr_rad_s"]), "omega_yr_rad_s"),
+        (lambda t: t.head(10), "usable runs"),
+        (lambda t: t[t["N"] == 2], "usable runs|session"),
+        (lambda t: t.assign(session="one"), r"1 session\(s\)"),
+        (lambda t: t[t["trial"] == 1], "repeated runs|usable runs"),
+        (lambda t: t.assign(omega_h_rpm=-t["omega_h_rpm"]), "wrong sign"),
+    ],
+)
+def test_bad_tables_are_refused(
+    change: object, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import re
+
+    from calibration.__main__ import main
+
+    table = change(toy_table(1))  # type: ignore[operator]
+    table.to_csv(tmp_path / "t.csv", index=False)
+    words = ["close", str(tmp_path / "t.csv"), "--robot", "paper-measured", "--out", str(tmp_path / "out")]
+    assert run_command(main, words) == 2
+    error = capsys.readouterr().err.splitlines()
+    assert len(error) == 1
+    assert re.search(expected, error[0])
+    assert not (tmp_path / "out").exists()
+
+
+def test_bad_rows_are_named_and_set_aside(toy_model: None) -> None:
+    table = toy_table(2).astype({"omega_yr_rad_s": object})
+    table.loc[0, "omega_yr_rad_s"] = "fast"
+    table.loc[1, "theta_deg"] = np.nan
+    table.loc[2, "omega_h_rpm"] *= -1
+    data = read_measurements(table)
+    assert len(data) == len(table) - 3
+    assert [line.split(":")[0] for line in data.set_aside] == ["row 1", "row 2", "row 3"]
+    with pytest.raises(InputError, match="unknown"):
+        read_measurements(table.rename(columns={"trial": "tri al"}))
+
+
+@pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
+@pytest.mark.parametrize("name", ["run01.csv", "run02.csv"])
+def test_measured_tables_are_read_whole(name: str) -> None:
+    data = read_measurements(MEASURED / name)
+    assert len(data) == 192
+    assert data.set_aside == ()
+    assert data.session_names == ("N = 2", "N = 3", "N = 4", "N = 5")
+    spread = np.sqrt(np.diag(repeat_covariance(data.y, data.condition)))
+    assert ((spread > 0.01) & (spread < 0.05)).all()

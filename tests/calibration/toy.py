@@ -1,0 +1,52 @@
+"""A robot with rigid straight tails: the balance in closed form, for fast tests of the statistics.
+
+Tails are straight rods along the axis at radius a with a fixed thrust per tail spin; the head is that of the real
+model, effects included. Same columns as the simulator, no discretisation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from sim import drag
+from sim.effects import adjust_head_resistance
+from sim.robot import Groups, check_columns
+
+
+def steady_columns(columns: Mapping[str, Any], **_: object) -> dict[str, np.ndarray]:
+    """Stand-in for `sim.batches.steady_columns`."""
+    values = check_columns({k: np.asarray(v, float) for k, v in columns.items()})
+    rows = [_row({k: v[i : i + 1] for k, v in values.items()}) for i in range(len(values["N"]))]
+    return {k: np.array([r[k] for r in rows]) for k in rows[0]}
+
+
+def _row(columns: dict[str, np.ndarray]) -> dict[str, float]:
+    groups = Groups.from_columns(columns)
+    R = 1 / groups.l_over_R
+    head = drag.head_resistance(groups.C_t, groups.C_r, groups.C_yr, R, groups.L_over_R * R)
+    head = adjust_head_resistance(groups, head)[..., 0].numpy()
+    parallel, perp = (float(v) for v in drag.tail_coefficients(groups.l_over_r0))
+    a, n, omega = float(groups.a_over_R * R), groups.N, float(groups.omega_bar)
+    tails = np.zeros((4, 4))
+    tails[0, 0] = n * perp
+    tails[0, 2] = tails[2, 0] = -n * perp / 2
+    tails[2, 2] = n * perp / 3
+    tails[1, 1] = n * parallel
+    tails[3, 3] = 3 * n * perp * a**2
+    thrust = 0.5 * n * (perp - parallel) * a**2 / (1 + 0.05 * abs(omega))
+    tails[1, 3] = -thrust
+    push = tails[:, 3] * omega
+    u = np.linalg.solve(head + tails, -push)
+    sway, surge, yaw, spin = u[0] + u[2] * float(groups.L_over_R * R) / 2, u[1], u[2], u[3]
+    return {
+        "omega_h_bar": spin,
+        "omega_t_bar": spin + omega,
+        "omega_yr_bar": yaw,
+        "v_x": sway,
+        "v_z": surge,
+        "R_yr_over_l": float(np.hypot(sway, surge) / abs(yaw)),
+        "theta_deg": float(np.degrees(np.arctan2(abs(sway), surge))),
+    }
