@@ -33,7 +33,7 @@ from calibration.measurements import Measurements, read_measurements
 from calibration.report import draw_residuals
 from calibration.synthetic import make_table
 from dataset.page import Page
-from dataset.report import draw_sweep
+from dataset.report import draw_sweep, plain_logarithms
 from dataset.store import read
 from planner.check import TrackingError, draw_overlay, load_plan, tracking_error
 from sim.artefact import code_version, write_text
@@ -72,6 +72,7 @@ def run_demo(out: str | Path) -> None:
     folder = page_path.parent / "demo"
     folder.mkdir(parents=True, exist_ok=True)
     print("1/4 the robot at constant motor speed")
+    _command("sim", "check")
     robot, motions = _look(folder)
     print("2/4 plan circle, square and triangle without simulating, and replay them")
     errors = _plan_and_replay(folder)
@@ -247,6 +248,8 @@ def _draw_robot(robot: Robot, motions: Sequence[tuple[Steady, State]]) -> Figure
     shape.set_title("steady shape at $\\bar\\omega$ = 10", fontsize=10)
     shape.set_xlabel("z / l", fontsize=8)
     shape.tick_params(labelsize=6)
+    shape.set_yticks([-0.1, 0.1])
+    shape.set_zticks([-0.1, 0.1])
     plane = figure.add_subplot(1, 2, 2)
     for (motion, _), label, colour in zip(
         motions, ("$\\omega$ > 0", "$\\omega$ < 0"), ("#2a7fba", "#e08a1e"), strict=True
@@ -259,6 +262,7 @@ def _draw_robot(robot: Robot, motions: Sequence[tuple[Steady, State]]) -> Figure
         plane.plot(x, y, color=colour, label=label)
     plane.plot(0, 0, "o", color="#1c2733", ms=4)
     plane.annotate("", (0.45, 0), (0, 0), arrowprops={"arrowstyle": "->", "color": "#1c2733"})
+    plane.set_xlim(-2.05, 0.6)
     plane.set_aspect("equal")
     plane.set_xlabel("x / l (starting heading)")
     plane.set_ylabel("y / l")
@@ -297,6 +301,8 @@ def _draw_parity(rows: pd.DataFrame) -> Figure:
         if name != "theta_deg":
             axes.set_xscale("log")
             axes.set_yscale("log")
+            plain_logarithms(axes.xaxis)
+            plain_logarithms(axes.yaxis)
     figure.axes[0].set_ylabel("look-up table", fontsize=8)
     figure.tight_layout()
     return figure

@@ -11,7 +11,7 @@ Effect sizes stay within their bounds, coefficients within `SANE`. The covarianc
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,10 @@ _STEP = 0.05  # finite difference in ln C
 _EFFECT_STEP = 0.1  # finite difference in units of an effect's typical size
 _MOST_STEPS = 8
 _MOST_GUESSES = 12
+_FEWEST_COVERED = 24  # runs
 _SHORT = 0.1  # a step below this in ln C (or in ε) keeps the Jacobian
 _SMALL = 0.1  # in standard deviations: a step below this ends the iteration
-SANE = (0.05, 50.0)  # coefficients stay within: beyond, they say that the model lacks something
+SANE = (0.1, 20.0)  # coefficients stay within: beyond, they say that the model lacks something
 _LARGEST = 0.7  # change of ln C in one step
 Z95 = 1.96
 
@@ -78,20 +79,24 @@ def jacobian(
 
 
 def first_guess(model: Swimmer, start: Parameters, used: NDArray[np.bool_]) -> dict[str, float]:
-    """Coefficients fitted with the look-up table; `start` itself where the table does not reach."""
-    data = model.data
-    white = Noise(repeat_covariance(data.y[used], data.condition[used]), np.zeros(data.y.shape[1]))
-    whiten = white.whitener(data.session[used])
-    parameters = dict(start)
+    """Coefficients fitted with the look-up table to the runs that it covers; `start` if those are too few."""
     lookup = load()
+    covered = used & model.inside(lookup, start)
+    parameters = dict(start)
+    if covered.sum() < _FEWEST_COVERED:
+        return parameters
+    data = model.data.subset(covered)
+    part = replace(model, data=data, correction=0.0)
+    noise = Noise(repeat_covariance(data.y, data.condition), np.zeros(data.y.shape[1]))
+    whiten = noise.whitener(data.session)
     for _ in range(_MOST_GUESSES):
         moved = [{**parameters, name: parameters[name] * math.exp(_STEP)} for name in COEFFICIENTS]
         try:
-            found = model.predict([parameters, *moved], lookup=lookup)
-        except InputError:  # outside the table's domain, there or on the way
+            found = part.predict([parameters, *moved], lookup=lookup)
+        except InputError:  # a coefficient left the table's domain on the way
             return dict(start)
-        J = whiten(np.moveaxis(found[1:] - found[0], 0, -1)[used] / _STEP)
-        step: Floats = np.asarray(np.linalg.lstsq(J, whiten((data.y - found[0])[used]), rcond=None)[0])
+        J = whiten(np.moveaxis(found[1:] - found[0], 0, -1) / _STEP)
+        step: Floats = np.asarray(np.linalg.lstsq(J, whiten(data.y - found[0]), rcond=None)[0])
         parameters = _move(parameters, COEFFICIENTS, step)
         if np.abs(step).max() < 1e-3:
             break
@@ -133,9 +138,11 @@ def fit(
             left = residual[used] - derivative[used] @ step
             noise = Noise(run, session_variance(left, data.session[used], run))
         size = float(np.max(np.abs(step) / np.sqrt(np.diag(covariance))))
-        if (size < _SMALL and count > 1) or count == _MOST_STEPS:
+        moved = _move(parameters, names, step)
+        stuck = all(abs(moved[name] / parameters[name] - 1) < 1e-3 for name in names if parameters[name])
+        if ((size < _SMALL or stuck) and count > 1) or count == _MOST_STEPS:
             break
-        parameters = _move(parameters, names, step)
+        parameters = moved
         fresh = bool(np.abs(step).max() > _SHORT) and count + 1 < _MOST_STEPS
     r = noise.whitener(data.session[used])(residual[used])
     return Fit(parameters, names, covariance, prediction, derivative, noise, float(r @ r), count)

@@ -114,10 +114,10 @@ def close(
     given = {name: float(getattr(robot, name)) for name in COEFFICIENTS}
     null = {e.name: float(robot.effects.get(e.name, e.null)) for e in effects}
     start = {**given, **null}
-    title = "as given" if progress else ""
-    model = Swimmer(robot, data, jobs=jobs).corrected(start, title=title)
-    uncalibrated = model.predict([start])[0]
+    model = Swimmer(robot, data, jobs=jobs)
     guess = first_guess(model, start, used)
+    model = model.corrected(guess, title="correction" if progress else "")
+    uncalibrated = model.predict([start], title="as given" if progress else "")[0]
     base = fit(model, guess, COEFFICIENTS, used, title="fit" if progress else "")
     along = directions(model, base.parameters, base.prediction, effects, title="effects" if progress else "")
     misfit = check_misfit(base, data, used, along, level=level, seed=seed)

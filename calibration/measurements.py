@@ -15,8 +15,9 @@ A wrong sign is a bad row, since the motor's direction sets the sign of all of t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -57,6 +58,11 @@ class Measurements:
 
     def __len__(self) -> int:
         return len(self.omega)
+
+    def subset(self, rows: NDArray[np.bool_]) -> Measurements:
+        """The runs in `rows` (n,)."""
+        own: dict[str, Any] = {k: v[rows] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
+        return replace(self, **own)
 
     def unique_conditions(self) -> tuple[Floats, NDArray[np.int64]]:
         """Distinct (N, l, |ω|) as (m, 3), and each run's place among them."""

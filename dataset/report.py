@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from dataset.page import Page
 from dataset.schema import INPUTS
@@ -44,12 +46,22 @@ def draw_sweep(rows: pd.DataFrame) -> Figure:
                 )
         axes.set_xscale("log")
         axes.set_yscale(scale)
+        plain_logarithms(axes.xaxis)
+        if scale == "log":
+            plain_logarithms(axes.yaxis)
         axes.set_xlabel("motor speed $\\bar\\omega$")
         axes.set_ylabel(label)
         axes.grid(alpha=0.25, lw=0.5)
     figure.axes[0].legend(fontsize=8, frameon=False)
     figure.tight_layout()
     return figure
+
+
+def plain_logarithms(axis: Axis) -> None:
+    """Label a logarithmic axis with few plain numbers (1, 2, 5, 10, …)."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def write_report(folder: str, out: str | Path) -> None:

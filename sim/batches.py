@@ -31,16 +31,17 @@ def split(
     omega_bar: NDArray[np.float64],
     *,
     then_by: NDArray[np.float64] | None = None,
+    resolution: Resolution | None = None,
 ) -> list[NDArray[np.int64]]:
-    """Row numbers of batches with one N and one default resolution, similar in |ω̄| (and in `then_by`)."""
+    """Row numbers of batches with one N and one resolution, similar in |ω̄| (and in `then_by`)."""
     speed = np.abs(omega_bar)
     octave = np.floor(np.log2(np.maximum(speed, 1e-12)) * (1 if then_by is not None else 1e6))
     second = speed if then_by is None else then_by
     batches: list[NDArray[np.int64]] = []
-    resolution = [Resolution.fitting(s) for s in speed]
-    kinds = {(n, r) for n, r in zip(tails.tolist(), resolution, strict=True)}
+    needed = [resolution or Resolution.fitting(s) for s in speed]
+    kinds = {(n, r) for n, r in zip(tails.tolist(), needed, strict=True)}
     for n, kind in sorted(kinds, key=lambda k: (k[0], k[1].edges, k[1].steps)):
-        rows = np.array([i for i in range(len(tails)) if tails[i] == n and resolution[i] == kind])
+        rows = np.array([i for i in range(len(tails)) if tails[i] == n and needed[i] == kind])
         rows = rows[np.lexsort((second[rows], octave[rows]))]
         size = max(1, int(BATCH_NODES / (n * kind.edges)))
         parts = -(-len(rows) // size)
@@ -93,6 +94,7 @@ def _single_threaded(work: Callable[[Job], Result], job: Job) -> Result:
 def steady_columns(
     columns: Mapping[str, NDArray[np.float64]],
     *,
+    resolution: Resolution | None = None,
     refine: bool = False,
     jobs: int | None = None,
     title: str = "steady",
@@ -101,7 +103,8 @@ def steady_columns(
 
     Args:
         columns: robots by column name, see `sim.robot.check_columns`, each (M,).
-        refine: simulate on half the edge length and half the step of the default.
+        resolution: mesh and step of all rows; by default what each batch needs.
+        refine: simulate on half the edge length and half the step of that.
         jobs: processes; default all processors.
         title: of the progress bar; empty for none.
 
@@ -109,19 +112,19 @@ def steady_columns(
         The columns of `Steady.columns`, each (M,), in the order of the rows.
     """
     values = check_columns(columns)
-    batches = split(values["N"], values["omega_bar"])
+    batches = split(values["N"], values["omega_bar"], resolution=resolution)
     batches.sort(key=lambda rows: -float(np.abs(values["omega_bar"][rows]).max()))
-    work = [({name: array[rows] for name, array in values.items()}, refine) for rows in batches]
+    work = [({name: array[rows] for name, array in values.items()}, resolution, refine) for rows in batches]
     done = run_batches(_steady_batch, work, sizes=[len(b) for b in batches], jobs=jobs, title=title)
     order = np.argsort(np.concatenate(batches))
     return {name: np.concatenate([d[name] for d in done])[order] for name in done[0]}
 
 
 def _steady_batch(
-    job: tuple[dict[str, NDArray[np.float64]], bool],
+    job: tuple[dict[str, NDArray[np.float64]], Resolution | None, bool],
 ) -> dict[str, NDArray[np.float64]]:
-    columns, refine = job
-    resolution = Resolution.fitting(float(np.abs(columns["omega_bar"]).max()))
+    columns, chosen, refine = job
+    resolution = chosen or Resolution.fitting(float(np.abs(columns["omega_bar"]).max()))
     if refine:
         resolution = Resolution(2 * resolution.edges, 2 * resolution.steps)
     return steady(Groups.from_columns(columns), resolution=resolution)[0].columns()
