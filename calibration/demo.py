@@ -152,7 +152,7 @@ def _write_page(
     motions: Sequence[tuple[Steady, State]],
     rows: pd.DataFrame,
     small: Lookup,
-    errors: dict[str, tuple[dict[str, Any], TrackingError]],
+    tracks: dict[str, tuple[dict[str, Any], TrackingError]],
     loops: dict[str, tuple[Verdict, Measurements]],
     seconds: float,
 ) -> None:
@@ -176,7 +176,7 @@ def _write_page(
         "The planner asks the look-up table only. The schedule is then replayed, open loop, in the simulator. "
         "Errors are from the declared path; corners are rounded because the robot cannot turn on the spot."
     )
-    plans = _draw_plans(errors)
+    plans = _draw_plans(tracks)
     plans.savefig(out.parent / "demo" / "plans.png", dpi=90, bbox_inches="tight")
     page.figure(plans, "three planned paths with the replayed tracks")
     header = (
@@ -194,7 +194,7 @@ def _write_page(
         [
             (name, len(plan["dwell_bar"]), f"{sum(plan['dwell_s']) / 60:.1f}", f"{e.rms:.4f}", f"{e.largest:.4f}",
              f"{e.bound:.3f}", f"{e.raw_rms:.3f}", f"{e.raw_largest:.3f}")
-            for name, (plan, e) in errors.items()
+            for name, (plan, e) in tracks.items()
         ],
     )  # fmt: skip
     page.section("The sweep at a glance")
@@ -217,14 +217,16 @@ def _write_page(
         page.text(verdict.sentence, tone="good" if verdict.verdict in ("effect", "none") else "bad")
         if verdict.verdict == "effect":
             page.figure(draw_residuals(verdict, data), "residuals before and after the effect is added")
+        errors = [
+            ("coefficients as given", verdict.error_uncalibrated),
+            ("calibrated", verdict.error_before),
+            ("calibrated, with the effect", verdict.error_after),
+            ("noise of one run, from repeats", verdict.noise_ceiling),
+        ]
+        shown_errors = [e for e in errors if verdict.effects or "effect" not in e[0]]
         page.table(
             ("error on the locked session", "relative rms"),
-            [
-                ("coefficients as given", f"{100 * verdict.error_uncalibrated:.2f} %"),
-                ("calibrated", f"{100 * verdict.error_before:.2f} %"),
-                ("calibrated, with the effect", f"{100 * verdict.error_after:.2f} %"),
-                ("noise of one run, from repeats", f"{100 * verdict.noise_ceiling:.2f} %"),
-            ],
+            [(label, f"{100 * value:.2f} %") for label, value in shown_errors],
         )
     page.write(out, f"code {code_version()}, made in {seconds:.0f} s")
 
@@ -298,7 +300,7 @@ def _draw_parity(rows: pd.DataFrame) -> Figure:
         axes.set_title(f"{label}: median error {text}", fontsize=9)
         axes.set_xlabel("simulated", fontsize=8)
         axes.tick_params(labelsize=7)
-        if name != "theta_deg":
+        if name in ("omega_yr_bar", "net_speed_bar"):
             axes.set_xscale("log")
             axes.set_yscale("log")
             plain_logarithms(axes.xaxis)

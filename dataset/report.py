@@ -17,7 +17,7 @@ from dataset.store import read, read_manifest
 COLOURS = {2: "#2a7fba", 3: "#e08a1e", 4: "#3d9a5f", 5: "#8a4fa3"}
 _SHOWN = (
     ("omega_yr_bar", "yaw rate $\\bar\\omega_{yr}$", "log"),
-    ("R_yr_over_l", "turn radius $R_{yr}/l$", "log"),
+    ("R_yr_over_l", "turn radius $R_{yr}/l$", "linear"),
     ("theta_deg", "slip angle $\\theta$ [deg]", "linear"),
     ("net_speed_bar", "net speed $\\bar v$", "log"),
     ("share", "head's share $|\\omega_h|/\\omega$", "linear"),
