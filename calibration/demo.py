@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -78,6 +79,7 @@ def run_demo(out: str | Path) -> None:
     errors = _plan_and_replay(folder)
     print("3/4 a small sweep and a look-up table trained on it")
     data, model = folder / "sweep", folder / "model.pt"
+    shutil.rmtree(data, ignore_errors=True)  # an earlier demo's rows, perhaps of another version
     _command("dataset", "build", "--config", "demo.toml", "--out", str(data))
     _command("surrogate", "train", str(data), "--out", str(model), "--epochs", "300")
     print("4/4 close the loop on two measured tables")

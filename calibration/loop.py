@@ -25,7 +25,7 @@ from calibration.attribute import Candidate, candidates, directions, examine, ex
 from calibration.fit import Fit, first_guess, fit
 from calibration.forward import COEFFICIENTS, Swimmer
 from calibration.measurements import Measurements
-from calibration.misfit import Misfit, check_misfit
+from calibration.misfit import DRAWS, Misfit, check_misfit
 from sim.artefact import fingerprint, provenance
 from sim.robot import Robot
 
@@ -60,22 +60,24 @@ class Verdict:
     @property
     def sentence(self) -> str:
         """The verdict in one sentence with its certainty."""
-        p = self.misfit.p_value
+        # The bootstrap resolves no smaller p than 2/(draws + 1).
+        relation = "≤" if self.misfit.p_value <= 2.01 / (DRAWS + 1) else "="
+        p = f"p {relation} {self.misfit.p_value:.2g}"
         if self.verdict == "none":
-            return f"No effect is missing that these runs can show (p = {p:.2g})."
+            return f"No effect is missing that these runs can show ({p})."
         if self.verdict == "effect":
             best = next(c for c in self.candidates if c.effect.name == self.effects[0])
             assert best.refit is not None
             low, high = best.refit.interval(best.effect.name)
             size = best.refit.parameters[best.effect.name]
             return (
-                f"The residual (p = {p:.2g}) is consistent with {best.effect.title}, "
+                f"The residual ({p}) is consistent with {best.effect.title}, "
                 f"size {size:.3g} ({low:.3g} to {high:.3g}), and with no other effect of the catalogue."
             )
         if self.verdict == "ambiguous":
             names = " or ".join(c.effect.title for c in self.candidates if c.effect.name in self.effects)
-            return f"The residual (p = {p:.2g}) is explained by {names}: these runs cannot tell them apart."
-        return f"There is a residual (p = {p:.2g}) that no single effect of the catalogue explains."
+            return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart."
+        return f"There is a residual ({p}) that no single effect of the catalogue explains."
 
 
 def locked_session(data: Measurements) -> int:

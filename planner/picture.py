@@ -25,7 +25,7 @@ def draw_plan(result: Plan) -> Figure:
         f"predicted error {result.predicted_rms:.3f} l rms, stated bound {result.bound:.2f} l",
         fontsize=10,
     )
-    axes.legend(loc="upper right", fontsize=8, frameon=False)
+    axes.legend(loc="center", fontsize=8, frameon=False)
     return figure
 
 
