@@ -20,9 +20,8 @@ from scipy.stats import qmc
 
 from sim.effects import catalogue
 from sim.errors import InputError
-from sim.robot import GROUP_COLUMNS, OPTIONAL_COLUMNS
+from sim.robot import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS
 
-DWELL = "dwell_bar"
 _SCALES = ("linear", "log", "integer")
 _MOST_ROWS = 2**24
 

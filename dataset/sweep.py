@@ -17,13 +17,13 @@ import joblib
 import numpy as np
 from numpy.typing import NDArray
 
-from dataset.design import DWELL, Design
+from dataset.design import Design
 from dataset.store import MANIFEST, part_hash, part_path, write_manifest, write_part
 from sim.artefact import code_version, fingerprint, provenance
 from sim.batches import run_batches, split
 from sim.effects import catalogue
 from sim.errors import InputError
-from sim.robot import Groups, check_columns
+from sim.robot import DWELL, Groups, check_columns
 from sim.steady import STEADY_COLUMNS, Resolution, steady
 from sim.switching import switch_response
 
@@ -94,8 +94,9 @@ def build(
     with _backend(backend):
         run_batches(work, todo, sizes=[len(t[1]) for t in todo], jobs=jobs, title=title)
     manifest = {**provenance(config), "config_hash": config_hash, "effects": effects, **counts}
-    write_manifest(out, {**manifest, **_count_flags(out, len(batches))})
-    return {**manifest, **_count_flags(out, len(batches))}
+    manifest |= _count_flags(out, len(batches))
+    write_manifest(out, manifest)
+    return manifest
 
 
 def _simulate_part(

@@ -35,6 +35,7 @@ from sim.errors import InputError
 
 GROUP_COLUMNS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "N")
 OPTIONAL_COLUMNS = ("a_over_R",)
+DWELL = "dwell_bar"  # switching half-period, beside the robot in sweeps and look-ups
 _POSITIVE = ("C_t", "C_r", "l_over_R", "L_over_R", "a_over_R")
 _MOST_TAILS = 64
 
@@ -153,12 +154,6 @@ class Groups:
         own = {f.name: getattr(self, f.name) for f in fields(self)}
         picked: dict[str, Any] = {k: v[lanes] for k, v in own.items() if torch.is_tensor(v)}
         return replace(self, **picked, effects={name: size[lanes] for name, size in self.effects.items()})
-
-    def to(self, device: torch.device | str) -> Groups:
-        """The same robots on another device."""
-        own = {f.name: getattr(self, f.name) for f in fields(self)}
-        moved: dict[str, Any] = {k: v.to(device) for k, v in own.items() if torch.is_tensor(v)}
-        return replace(self, **moved, effects={name: size.to(device) for name, size in self.effects.items()})
 
 
 def check_columns(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from sim import planar
 from sim.errors import InputError
-from sim.robot import check_columns
+from sim.robot import DWELL, check_columns
 from surrogate.network import Ensemble, features
 
-DWELL = "dwell_bar"
 STEADY_OUTPUTS = (
     "omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "tail_gap",
 )  # fmt: skip

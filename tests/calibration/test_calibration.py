@@ -189,9 +189,6 @@ def test_the_real_simulator_closes_a_table_with_a_hidden_effect(tmp_path: Path) 
     assert "data:image/png" in (out / "report.html").read_text()
 
 
-BASE = "N,l_cm,trial,omega_rpm,omega_h_rpm,omega_yr_rad_s,R_yr_cm\n"
-
-
 @pytest.mark.usefixtures("toy_model")
 @pytest.mark.parametrize(
     ("change", "expected"),
