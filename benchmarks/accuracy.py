@@ -10,8 +10,9 @@ import torch
 
 from sim.balance import fluid_wrench
 from sim.batches import steady_columns
+from sim.resolution import Resolution
 from sim.robot import PRESETS
-from sim.steady import Resolution, steady
+from sim.steady import steady
 from sim.stepper import PHASE
 from tests.reference.cases import CONTROL, FILAMENT, MEASURED_HEAD_SHARE, STEADY_INPUTS, STEADY_POINTS
 from tests.sim.robots import single_filament
@@ -48,14 +49,14 @@ def robots() -> None:
     for name, values in zip(_OUTPUTS, truth, strict=False):
         print(f"  {name:14} {100 * np.abs(found[name] / values - 1).max():7.3f} %")
     print(f"  theta          {np.abs(found['theta_deg'] - truth[6]).max():7.3f} degrees")
-    motion, _ = steady(PRESETS["paper-control"].groups())
+    motion = steady(PRESETS["paper-control"].groups())
     control = motion.columns()
     print("\nThe paper's control example (N = 2, C = (3.0, 2.8, 2.0), motor at 10)")
     print("                 here   independent")
     for name, value in CONTROL.items():
         print(f"  {name:14} {control[name][0]:9.4f} {value:9.4f}")
-    measured, _ = steady(PRESETS["paper-measured"].groups())
-    share = float(-measured.omega_h / (measured.omega_t - measured.omega_h))
+    measured = steady(PRESETS["paper-measured"].groups())
+    share = float(measured.omega_h[0] / (measured.omega_h[0] - measured.omega_t[0]))
     print("\nThe paper's measured point (N = 4, l = 11 cm, 143.66 rpm): omega_h/omega")
     print(f"  measured {MEASURED_HEAD_SHARE:.3f}, here with the paper's fit {share:.3f}")
 

@@ -12,6 +12,7 @@ Every step is a command that a user would type; it is printed and run. Steps tha
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -25,7 +26,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import torch
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
@@ -38,11 +38,11 @@ from dataset.report import draw_sweep, plain_logarithms
 from dataset.store import read
 from planner.check import TrackingError, draw_overlay, load_plan, tracking_error
 from sim.artefact import code_version, write_text
-from sim.balance import assemble
 from sim.batches import available_jobs
+from sim.motion import Steady
 from sim.robot import PRESETS, Robot, robot_toml
-from sim.steady import Steady, steady
-from sim.stepper import State
+from sim.shapes import tails_over_a_revolution
+from sim.steady import steady
 from surrogate.evaluate import scale_of
 from surrogate.export import load
 from surrogate.lookup import Lookup
@@ -96,7 +96,7 @@ def _command(*words: str, quiet: bool = False) -> None:
     subprocess.run([sys.executable, "-m", *words], check=True, stdout=output, stderr=output)
 
 
-def _look(folder: Path) -> tuple[Robot, list[tuple[Steady, State]]]:
+def _look(folder: Path) -> tuple[Robot, list[Steady]]:
     robot = PRESETS["paper-control"]
     write_text(folder / "robot.toml", robot_toml(robot))
     groups = robot.groups()
@@ -151,7 +151,7 @@ def _close(folder: Path, name: str) -> tuple[Verdict, Measurements]:
 def _write_page(
     out: Path,
     robot: Robot,
-    motions: Sequence[tuple[Steady, State]],
+    motions: Sequence[Steady],
     rows: pd.DataFrame,
     small: Lookup,
     tracks: dict[str, tuple[dict[str, Any], TrackingError]],
@@ -168,10 +168,10 @@ def _write_page(
         "sideways by the surface, and the robot swims on a circle; a reversed motor mirrors it."
     )
     page.figure(_draw_robot(robot, motions), "tail shapes, and circles for both motor directions")
-    motion = motions[0][0]
+    motion = motions[0]
     page.text(
         f"Yaw rate {float(motion.omega_yr[0]):.4f}, turn radius {float(motion.turn_radius[0]):.3f} l, slip angle "
-        f"{float(torch.rad2deg(motion.slip_angle[0])):.1f} degrees (independent solver: 0.0490, 0.9415, 67.1)."
+        f"{math.degrees(motion.slip_angle[0]):.1f} degrees (independent solver: 0.0490, 0.9415, 67.1)."
     )
     page.section("Three paths, planned without simulating")
     page.text(
@@ -237,16 +237,14 @@ def _figure(name: str, rms: float) -> str:
     return f"{rms:.2f} deg" if name == "theta_deg" else f"{100 * rms:.2f} %"
 
 
-def _draw_robot(robot: Robot, motions: Sequence[tuple[Steady, State]]) -> Figure:
+def _draw_robot(robot: Robot, motions: Sequence[Steady]) -> Figure:
     figure = Figure(figsize=(11, 4.2))
     shape = figure.add_subplot(1, 2, 1, projection="3d")
-    swimmer = assemble(robot.groups(), edges=motions[0][1].x.shape[0])
     radius, length = robot.head_radius / robot.tail_length, robot.head_length / robot.tail_length
     angle, along = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(0, length, 2))
     shape.plot_surface(along, radius * np.cos(angle), radius * np.sin(angle), color="#c9d3dc", alpha=0.6)
-    nodes = torch.cat([swimmer.root, motions[0][1].x])[..., 0].numpy()
-    for j in range(nodes.shape[2]):
-        x, y, z = nodes[:, 0, j], nodes[:, 1, j], nodes[:, 2, j]
+    _, tails = tails_over_a_revolution(robot, 1)
+    for x, y, z in tails[0].transpose(0, 2, 1):
         shape.plot(z, x, y, color="#c8452f", lw=3)
     shape.set_box_aspect((1.6, 0.6, 0.6))
     shape.set_title("steady shape at $\\bar\\omega$ = 10", fontsize=10)
@@ -255,7 +253,7 @@ def _draw_robot(robot: Robot, motions: Sequence[tuple[Steady, State]]) -> Figure
     shape.set_yticks([-0.1, 0.1])
     shape.set_zticks([-0.1, 0.1])
     plane = figure.add_subplot(1, 2, 2)
-    for (motion, _), label, colour in zip(
+    for motion, label, colour in zip(
         motions, ("$\\omega$ > 0", "$\\omega$ < 0"), ("#2a7fba", "#e08a1e"), strict=True
     ):
         turn, sway, surge = float(motion.omega_yr[0]), float(motion.v_x[0]), float(motion.v_z[0])

@@ -86,7 +86,7 @@ def first_guess(model: Swimmer, start: Parameters, used: NDArray[np.bool_]) -> d
     if covered.sum() < _FEWEST_COVERED:
         return parameters
     data = model.data.subset(covered)
-    part = replace(model, data=data, correction=0.0)
+    part = replace(model, data=data)
     noise = Noise(repeat_covariance(data.y, data.condition), np.zeros(data.y.shape[1]))
     whiten = noise.whitener(data.session)
     for _ in range(_MOST_GUESSES):

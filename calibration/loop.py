@@ -2,7 +2,7 @@
 
 1. One whole session is locked away before anything is looked at (`locked_session`); rows are never split.
 2. Covariance from the repeats and the sessions (`calibration.noise`).
-3. Fit of C_t, C_r, C_yr to the other sessions (`calibration.fit`), defect-corrected (`calibration.forward`).
+3. Fit of C_t, C_r, C_yr to the other sessions (`calibration.fit`).
 4. Lack of fit, kernel score and projected scores (`calibration.misfit`).
 5. Refit with each effect that passes; keep what explains (`calibration.attribute`).
 6. Verdict: "none" (no departure beyond noise), "effect" (one explains it), "ambiguous" (several do and the runs
@@ -118,7 +118,6 @@ def close(
     start = {**given, **null}
     model = Swimmer(robot, data, jobs=jobs)
     guess = first_guess(model, start, used)
-    model = model.corrected(guess, title="correction" if progress else "")
     uncalibrated = model.predict([start], title="as given" if progress else "")[0]
     base = fit(model, guess, COEFFICIENTS, used, title="fit" if progress else "")
     along = directions(model, base.parameters, base.prediction, effects, title="effects" if progress else "")

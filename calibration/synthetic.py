@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from sim.batches import steady_columns
+from sim.batches import stepped_columns
 from sim.robot import Robot
 
 _RPM = 2 * math.pi / 60
@@ -39,7 +39,7 @@ def make_table(
     runs = [replace(robot, tails=n, tail_length=length / 100, motor_speed=rpm * _RPM) for n, length, rpm in design]
     values = [run.group_values() for run in runs]
     columns = {k: np.array([v[k] for v in values]) for k in values[0]}
-    found = steady_columns(columns, refine=True, jobs=jobs, title=title)
+    found = stepped_columns(columns, finer=2, jobs=jobs, title=title)
     rng = np.random.default_rng(seed)
     shift = {n: rng.normal(scale=session_noise, size=4) for n in tails}
     rows = []

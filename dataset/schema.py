@@ -48,15 +48,15 @@ OUTPUTS = (
     Column("lag_x", _real, "l", "response to a switch: offset to the new turn's side"),
     Column("lag_z", _real, "l", "response to a switch: offset forward"),
     Column("tail_gap", _real, "2 r0", "smallest distance between tails; below 1 they touch"),
-    Column("drift", _real, "1", "relative change between the last two means"),
+    Column("error", _real, "1", "estimated relative error of the steady outputs (velocities: of the speed)"),
 )
 FLAGS = (
     Column("row", _whole, "1", "row of the design"),
-    Column("converged", _flag, "1", "means of consecutive revolutions agree"),
+    Column("converged", _flag, "1", "the motion is steady and solved to tolerance"),
     Column("failed", _flag, "1", "the simulation broke down; outputs are NaN"),
     Column("touching", _flag, "1", "tails touch: outside the model's validity"),
-    Column("edges", _whole, "1", "edges a tail"),
-    Column("steps", _whole, "1", "time steps a motor revolution"),
+    Column("edges", _whole, "1", "edges a tail in the response to a switch"),
+    Column("steps", _whole, "1", "time steps a motor revolution in the response to a switch"),
 )
 
 

@@ -23,8 +23,11 @@ from sim.artefact import code_version, fingerprint, provenance
 from sim.batches import run_batches, split
 from sim.effects import catalogue
 from sim.errors import InputError
+from sim.motion import STEADY_COLUMNS
+from sim.resolution import Resolution
 from sim.robot import DWELL, Groups, check_columns
-from sim.steady import STEADY_COLUMNS, Resolution, steady
+from sim.settling import settle
+from sim.steady import steady
 from sim.switching import switch_response
 
 Columns = dict[str, NDArray[Any]]
@@ -40,16 +43,19 @@ def simulate(points: dict[str, NDArray[np.float64]]) -> Columns:
     values = check_columns({k: v for k, v in points.items() if k != DWELL})
     groups = Groups.from_columns(values)
     resolution = Resolution.fitting(float(groups.omega_bar.abs().max()))
-    motion, state = steady(groups, resolution=resolution)
-    response = switch_response(groups, points[DWELL], motion, state, resolution=resolution)
-    columns: Columns = {**values, DWELL: points[DWELL], **motion.columns()}
-    failed = motion.failed.numpy() | response.failed
+    motion = steady(groups)
+    response = switch_response(
+        groups, points[DWELL], *settle(groups, resolution=resolution), resolution=resolution
+    )
+    steady_values = motion.columns()
+    columns: Columns = {**values, DWELL: points[DWELL], **{k: steady_values[k] for k in STEADY_COLUMNS}}
+    failed = motion.failed | response.failed
     columns |= {
         "net_speed_bar": response.net_speed,
         "lag_psi_rad": response.lag_psi,
         "lag_x": response.lag_x,
         "lag_z": response.lag_z,
-        "drift": motion.drift.numpy(),
+        "error": motion.error,
         "failed": failed,
         "converged": columns["converged"] & ~failed,
         "touching": columns["tail_gap"] < 1,

@@ -23,10 +23,10 @@ from sim.tables import read_table
 
 def _steady(arguments: argparse.Namespace) -> None:
     from sim.batches import steady_columns
-    from sim.steady import STEADY_COLUMNS
+    from sim.motion import QUALITY_COLUMNS, STEADY_COLUMNS
 
     points = read_table(arguments.points)
-    replaced = [name for name in STEADY_COLUMNS if name in points]
+    replaced = [name for name in (*STEADY_COLUMNS, *QUALITY_COLUMNS) if name in points]
     if replaced:
         print(f"note: computed anew, not read: {', '.join(replaced)}", file=sys.stderr)
         points = points.drop(columns=replaced)
@@ -36,7 +36,11 @@ def _steady(arguments: argparse.Namespace) -> None:
         table.to_csv(part, index=False, float_format="%.8g")
     ended = table["converged"].to_numpy()
     touching = int(np.count_nonzero(table["tail_gap"] < 1))
-    print(f"{len(table)} rows, {int(ended.sum())} converged, tails touch in {touching} -> {arguments.out}")
+    direct = int(np.count_nonzero(table["method"] == "direct"))
+    print(
+        f"{len(table)} rows, {int(ended.sum())} converged ({direct} solved directly), "
+        f"tails touch in {touching} -> {arguments.out}"
+    )
 
 
 def _replay(arguments: argparse.Namespace) -> None:
@@ -67,8 +71,8 @@ def _check(_: argparse.Namespace) -> None:
     from sim.robot import PRESETS
     from sim.steady import steady
 
-    motion, _state = steady(PRESETS["paper-measured"].groups())
-    share = float((motion.omega_h / (motion.omega_h - motion.omega_t)).abs())
+    motion = steady(PRESETS["paper-measured"].groups())
+    share = float(motion.omega_h[0] / (motion.omega_h[0] - motion.omega_t[0]))
     print("N = 4, l = 11 cm, motor at 143.66 rpm: head's share of the motor speed, omega_h/omega")
     print("  measured in the paper       0.441")
     print(f"  this simulator, its fit     {share:.3f}")
@@ -80,7 +84,7 @@ def main(argv: list[str] | None = None) -> None:
     steady = commands.add_parser("steady", help="mean motion of robots at constant motor speed")
     steady.add_argument("points", help="CSV: C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…")
     steady.add_argument("--out", required=True, help="CSV to write: the same rows and their motion")
-    steady.add_argument("--jobs", type=int, help="processes (default: all processors)")
+    steady.add_argument("--jobs", type=int, help="threads (default: all processors)")
     steady.set_defaults(run=_steady)
     replay = commands.add_parser("replay", help="simulate a planned schedule")
     replay.add_argument("plan", help="plan.json")

@@ -10,11 +10,11 @@ A node moves in the lab with v_k = ẋ_k + G_k w, where w = (v_x, v_z, ω_yr, ω
 
     G_k = [e_x, e_z, e_y × x_k, e_z × x_k].
 
-The motor sets ω = ω_t − ω_h, so the unknown body velocity is u = (v_x, v_z, ω_yr, ω_h). At low Reynolds
-number (no inertia):
+The motor sets ω = ω_t − ω_h, so the unknown body velocity is u = (v_x, v_z, ω_yr, ω_h), and ω_t = ω + gain ω_h
+(gain 1: the motor holds its speed). At low Reynolds number (no inertia):
 
     tails, each free node:   r_k = q_k(x, ẋ, u, φ) + f_k(x) = 0           (drag + elastic force)
-    body, total wrench:      T = Gᵀ-projection of what the clamps transmit − R_h u = 0
+    body, total wrench:      T = Gᵀ-projection of what the clamps transmit − R (u, ω_t) = 0
 
 T uses the force and moment that pass through each clamp (edge 0, its bending spring, drag on node 0)
 instead of the sum of drag over the tail: where r = 0 the two are equal, and the derivative of T then
@@ -35,11 +35,13 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from sim import drag, rod
+from sim import drag, elastic
 from sim.banded import BlockBanded
-from sim.effects import adjust_head_resistance, adjust_tail_coefficients
+from sim.drag import drag_by_tangents, node_drag, node_resistance
+from sim.effects import with_effects
+from sim.elastic import EdgeStiffness, ElasticResponse, Shape, components, stacked, stacked_matrix
 from sim.robot import Groups
-from sim.rod import cross, dot, outer
+from sim.vectors import Vector, projected, turned
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,8 @@ class Swimmer:
     axial_stiffness: Tensor  # EA l²/EI, (B,)
     zeta_parallel: Tensor  # (B,)
     zeta_perp: Tensor  # (B,)
-    head_resistance: Tensor  # (4, 4, B)
+    resistance: Tensor  # (4, 5, B), see `sim.drag.Coefficients`
+    gain: Tensor  # (B,)
     head_length: Tensor  # L/l, (B,)
     tail_radius: Tensor  # r0/l, (B,)
 
@@ -63,6 +66,10 @@ class Swimmer:
     @property
     def robots(self) -> int:
         return self.root.shape[3]
+
+    def omega_t(self, u: Tensor, omega: Tensor) -> Tensor:
+        """Spin of the tails, (B,), for velocities u (4, B) and motor speeds (B,)."""
+        return omega + self.gain * u[3]
 
     def straight(self) -> Tensor:
         """Free nodes 1..n of straight tails, (n, 3, N, B)."""
@@ -88,16 +95,17 @@ def assemble(groups: Groups, *, edges: int) -> Swimmer:
     root = (ring.unsqueeze(-1) * offset).unsqueeze(0)
     root_tangent = torch.zeros_like(root)
     root_tangent[:, 2] = -1.0
-    parallel, perp = adjust_tail_coefficients(groups, drag.tail_coefficients(groups.l_over_r0))
-    head = drag.head_resistance(groups.C_t, groups.C_r, groups.C_yr, R, L)
+    base = drag.coefficients(groups.C_t, groups.C_r, groups.C_yr, R, L, groups.l_over_r0)
+    found = with_effects(groups, base)
     return Swimmer(
         n=edges,
         root=root,
         root_tangent=root_tangent,
         axial_stiffness=4 * groups.l_over_r0**2,
-        zeta_parallel=parallel,
-        zeta_perp=perp,
-        head_resistance=adjust_head_resistance(groups, head),
+        zeta_parallel=found.zeta_parallel,
+        zeta_perp=found.zeta_perp,
+        resistance=found.resistance,
+        gain=found.gain,
         head_length=L,
         tail_radius=1 / groups.l_over_r0,
     )
@@ -114,7 +122,7 @@ def _directions(nodes: Tensor, e_x: Tensor, e_y: Tensor) -> Tensor:
     G = torch.zeros(4, *nodes.shape, dtype=nodes.dtype, device=nodes.device)
     G[0] = e_x
     G[1, :, 2] = 1.0
-    G[2] = cross(e_y.expand_as(nodes), nodes)
+    G[2] = torch.linalg.cross(e_y.expand_as(nodes), nodes, dim=1)
     G[3, :, 0] = -nodes[:, 1]
     G[3, :, 1] = nodes[:, 0]
     return G
@@ -124,34 +132,44 @@ def _directions(nodes: Tensor, e_x: Tensor, e_y: Tensor) -> Tensor:
 class _Drag:
     """Drag on every node and what its derivatives need; arrays lead with nodes 0..n."""
 
-    tangent: Tensor  # unit node tangents
-    spread: Tensor  # |t_{k−1} + t_k|, (n + 1, 1, N, B)
-    along: Tensor  # t·v
-    perp: Tensor  # l_k ζ⊥
+    tangent: Vector  # unit node tangents, components (n + 1, N, B)
+    spread: Tensor  # |t_{k−1} + t_k|, (n + 1, N, B)
+    perp: Tensor  # l_k ζ⊥, (n + 1, 1, B)
     excess: Tensor  # l_k (ζ∥ − ζ⊥)
-    force: Tensor  # q
+    force: Tensor  # q, (n + 1, 3, N, B)
 
-    def resist(self, v: Tensor) -> Tensor:
-        """l_k [ζ⊥ v + (ζ∥ − ζ⊥)(t·v) t] for (..., n + 1, 3, N, B)."""
-        return self.perp * v + self.excess * dot(self.tangent, v) * self.tangent
+    def on(self, directions: Tensor) -> Tensor:
+        """Drag for velocities (4, n + 1, 3, N, B)."""
+        x, y, z = directions.unbind(2)
+        return torch.stack(node_drag(self.tangent, (x, y, z), self.perp, self.excess), 2)
+
+    def of(self, nodes: slice) -> tuple[Vector, Tensor, Tensor, Tensor]:
+        """Tangent, spread, perp and excess of some nodes."""
+        x, y, z = (t[nodes] for t in self.tangent)
+        return (x, y, z), self.spread[nodes], self.perp[nodes], self.excess[nodes]
 
 
-def _node_drag(swimmer: Swimmer, shape: rod.Stretching, velocity: Tensor) -> _Drag:
+def _node_drag(swimmer: Swimmer, shape: Shape, velocity: Tensor) -> _Drag:
     n = swimmer.n
     total = torch.cat([shape.tangent[:-1] + shape.tangent[1:], shape.tangent[-1:]])
-    spread = dot(total, total).sqrt()
-    tangent = total / spread
-    voronoi = torch.full((n + 1, 1, 1, 1), 1 / n, dtype=total.dtype, device=total.device)
+    spread = total.square().sum(1).sqrt()
+    tangent = components(total / spread.unsqueeze(1))
+    voronoi = torch.full((n + 1, 1, 1), 1 / n, dtype=total.dtype, device=total.device)
     voronoi[0] = voronoi[-1] = 0.5 / n
     perp = voronoi * swimmer.zeta_perp
     excess = voronoi * (swimmer.zeta_parallel - swimmer.zeta_perp)
-    along = dot(tangent, velocity)
-    return _Drag(tangent, spread, along, perp, excess, -(perp * velocity + excess * along * tangent))
+    return _Drag(tangent, spread, perp, excess, stacked(node_drag(tangent, components(velocity), perp, excess)))
 
 
-def _body_velocity(u: Tensor, omega: Tensor) -> Tensor:
+def _body_velocity(swimmer: Swimmer, u: Tensor, omega: Tensor) -> Tensor:
     """w = (v_x, v_z, ω_yr, ω_t), (4, B)."""
-    return torch.cat([u[:3], (u[3] + omega).unsqueeze(0)])
+    return torch.cat([u[:3], swimmer.omega_t(u, omega).unsqueeze(0)])
+
+
+def _body_load(swimmer: Swimmer, u: Tensor, omega: Tensor) -> Tensor:
+    """Wrench (4, B) about J of the fluid on head and disc."""
+    all_five = torch.cat([u, swimmer.omega_t(u, omega).unsqueeze(0)])
+    return -(swimmer.resistance * all_five).sum(1)
 
 
 def newton_correction(
@@ -170,7 +188,7 @@ def newton_correction(
         phase: φ, (B,).
         u: (v_x, v_z, ω_yr, ω_h), (4, B).
         omega: motor speed, (B,).
-        rate: ∂ẋ/∂x of the time step, 1/(γ dt), (B,); also ∂φ/∂ω_h = 1/rate.
+        rate: ∂ẋ/∂x of the time step, 1/(γ dt), (B,); also ∂φ/∂ω_h = gain/rate.
 
     Returns:
         δx (n, 3, N, B) and δu (4, B).
@@ -178,30 +196,31 @@ def newton_correction(
     n = swimmer.n
     e_x, e_y = body_axes(phase)
     nodes = torch.cat([swimmer.root, x])
-    shape = rod.geometry(nodes, swimmer.root_tangent)
-    elastic = rod.respond(shape, swimmer.axial_stiffness)
+    shape = elastic.geometry(nodes, swimmer.root_tangent)
+    response = elastic.respond(shape, swimmer.axial_stiffness)
     G = _directions(nodes, e_x, e_y)
-    w = _body_velocity(u, omega)
+    w = _body_velocity(swimmer, u, omega)
     velocity = (G * w.reshape(4, 1, 1, 1, -1)).sum(0)
     velocity[1:] += x_dot
     drag_ = _node_drag(swimmer, shape, velocity)
-    residual = drag_.force[1:] + rod.node_forces(elastic.edge_force)
+    residual = drag_.force[1:] + elastic.node_forces(response.edge_force)
 
     matrix = BlockBanded(n, (swimmer.tails, swimmer.robots), x)
-    _add_elastic(matrix, elastic.stiffness)
+    _add_elastic(matrix, response.stiffness)
     _add_drag(matrix, shape, drag_, velocity, w, e_y, rate)
 
     # Columns: how the body's velocities, and through ω_h the phase, move the drag.
-    turned = -w[0] * e_y + w[2] * cross(e_x.expand_as(nodes), nodes)  # ∂v/∂φ
+    by_phase = -w[0] * e_y + w[2] * torch.linalg.cross(e_x.expand_as(nodes), nodes, dim=1)  # ∂v/∂φ
     G_total = G.clone()
-    G_total[3] += turned / rate
-    border = -drag_.resist(G_total)
+    G_total[3] = swimmer.gain * (G[3] + by_phase / rate)
+    border = drag_.on(G_total)
 
-    foot, corner, total = _body_rows(swimmer, elastic, drag_, G, e_x, e_y, border[:, 0], rate, u)
+    by_root = _drag_by_first_edge(shape, drag_, velocity)
+    foot, corner, total = _body_rows(swimmer, response, drag_, by_root, G, e_x, e_y, border[:, 0], rate, u, omega)
     return matrix.solve_bordered(-residual, border[:, 1:], foot, corner, -total)
 
 
-def _add_elastic(matrix: BlockBanded, stiffness: rod.EdgeStiffness) -> None:
+def _add_elastic(matrix: BlockBanded, stiffness: EdgeStiffness) -> None:
     """Derivative of f_k = E_{e_k} − E_{e_{k−1}} in the node positions."""
     H, U = stiffness
     L = U.transpose(1, 2)
@@ -219,7 +238,7 @@ def _add_elastic(matrix: BlockBanded, stiffness: rod.EdgeStiffness) -> None:
 
 def _add_drag(
     matrix: BlockBanded,
-    shape: rod.Stretching,
+    shape: Shape,
     drag_: _Drag,
     velocity: Tensor,
     w: Tensor,
@@ -227,23 +246,15 @@ def _add_drag(
     rate: Tensor,
 ) -> None:
     """Derivative of q_k in the node positions: through ẋ, through Ω × x and through the tangents."""
-    t, perp, excess = drag_.tangent[1:], drag_.perp[1:], drag_.excess[1:]
-    spin = w[2] * e_y
-    spin[2] += w[3]
-    spin = spin.expand(3, *t.shape[2:])
-    block = outer(-excess * t, rate * t + cross(t, spin.expand_as(t)))
-    torch.diagonal(block, dim1=1, dim2=2).sub_((perp * rate).squeeze(1).unsqueeze(-1))
-    weighted = perp * spin  # (n, 3, N, B)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        block[:, i, j] += weighted[:, k]
-        block[:, j, i] -= weighted[:, k]
+    tangent, spread, perp, excess = drag_.of(slice(1, None))
+    resistance = node_resistance(tangent, perp, excess)
+    spin = (w[2] * e_y[0], w[2] * e_y[1], w[3])
+    block = -stacked_matrix(turned(resistance, spin)) - rate * stacked_matrix(resistance)
 
-    # q depends on t through (t·v) t; t = S/|S| with S the sum of the adjacent edge tangents.
-    along, scale = drag_.along[1:], excess / drag_.spread[1:]
-    tilt = outer(scale * t, velocity[1:] - 2 * along * t)
-    torch.diagonal(tilt, dim1=1, dim2=2).add_((scale * along).squeeze(1).unsqueeze(-1))
-    before = _through_tangent(tilt, shape.tangent[1:], shape.length)
-    after = _through_tangent(tilt[:-1], shape.tangent[2:], shape.length[1:])
+    tilt = drag_by_tangents(tangent, spread, components(velocity[1:]), excess)
+    before = stacked_matrix(projected(tilt, components(shape.tangent[1:]), 1 / shape.length))
+    inner = tuple(tuple(entry[:-1] for entry in row) for row in tilt)
+    after = stacked_matrix(projected(inner, components(shape.tangent[2:]), 1 / shape.length[1:]))  # type: ignore[arg-type]
     block -= before
     block[:-1] += after
     matrix.diagonal(0).add_(block)
@@ -251,37 +262,40 @@ def _add_drag(
     matrix.diagonal(1).sub_(after)
 
 
-def _through_tangent(tilt: Tensor, tangent: Tensor, length: Tensor) -> Tensor:
-    """tilt (I − t tᵀ)/|e|: chain rule from an edge's tangent to its vector."""
-    along = (tilt * tangent.unsqueeze(1)).sum(2)
-    return (tilt - outer(along, tangent)) / length.unsqueeze(1)
+def _drag_by_first_edge(shape: Shape, drag_: _Drag, velocity: Tensor) -> Tensor:
+    """−∂q_0/∂e_0 through the clamp's node tangent, (3, 3, N, B)."""
+    tangent, spread, _, excess = drag_.of(slice(1))
+    tilt = drag_by_tangents(tangent, spread, components(velocity[:1]), excess)
+    return stacked_matrix(projected(tilt, components(shape.tangent[1:2]), 1 / shape.length[:1]))[0]
 
 
 def _body_rows(
     swimmer: Swimmer,
-    elastic: rod.ElasticResponse,
+    response: ElasticResponse,
     drag_: _Drag,
+    by_root: Tensor,
     G: Tensor,
     e_x: Tensor,
     e_y: Tensor,
     root_border: Tensor,
     rate: Tensor,
     u: Tensor,
+    omega: Tensor,
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Rows of the body: foot C (4, 6, N, B), corner D (4, 4, B) and the wrench T (4, B)."""
     root = swimmer.root[0]
-    through = elastic.edge_force[0] + drag_.force[0]  # force that each tail puts on the disc
+    through = response.edge_force[0] + drag_.force[0]  # force that each tail puts on the disc
     force = through.sum(1)
-    moment = (torch.linalg.cross(root, through, dim=0) + elastic.clamp_moment).sum(1)
+    moment = (torch.linalg.cross(root, through, dim=0) + response.clamp_moment).sum(1)
     ex, ey = e_x.squeeze(1), e_y.squeeze(1)
-    head = (swimmer.head_resistance * u.unsqueeze(0)).sum(1)
-    total = torch.stack([(force * ex).sum(0), force[2], (moment * ey).sum(0), moment[2]]) - head
+    on_tails = torch.stack([(force * ex).sum(0), force[2], (moment * ey).sum(0), moment[2]])
+    total = on_tails + _body_load(swimmer, u, omega)
 
-    H, U = elastic.stiffness
-    by_node = torch.stack([H[0] - U[0], U[0]], 1)  # ∂(edge force)/∂x_1, ∂x_2: (3, 2, 3, N, B)
+    H, U = response.stiffness
+    by_node = torch.stack([H[0] - U[0] - by_root, U[0]], 1)  # ∂(edge force)/∂x_1, ∂x_2: (3, 2, 3, N, B)
     arm = root.reshape(3, 1, 1, *root.shape[1:])
     moment_by_node = torch.linalg.cross(arm.expand_as(by_node), by_node, dim=0)
-    moment_by_node[:, 0] += elastic.clamp_moment_by_edge
+    moment_by_node[:, 0] += response.clamp_moment_by_edge
     foot = torch.stack(
         [
             (ex.reshape(3, 1, 1, 1, -1) * by_node).sum(0),
@@ -292,9 +306,10 @@ def _body_rows(
     ).reshape(4, 6, *root.shape[1:])
 
     corner = (G[:, 0].unsqueeze(1) * root_border.unsqueeze(0)).sum((2, 3))
-    corner -= swimmer.head_resistance
-    corner[0, 3] -= (force * ey).sum(0) / rate
-    corner[2, 3] += (moment * ex).sum(0) / rate
+    corner -= swimmer.resistance[:, :4]
+    corner[:, 3] -= swimmer.gain * swimmer.resistance[:, 4]
+    corner[0, 3] -= (force * ey).sum(0) * swimmer.gain / rate
+    corner[2, 3] += (moment * ex).sum(0) * swimmer.gain / rate
     return foot, corner, total
 
 
@@ -307,9 +322,9 @@ def fluid_wrench(
     """
     e_x, e_y = body_axes(phase)
     nodes = torch.cat([swimmer.root, x])
-    shape = rod.geometry(nodes, swimmer.root_tangent)
+    shape = elastic.geometry(nodes, swimmer.root_tangent)
     G = _directions(nodes, e_x, e_y)
-    velocity = (G * _body_velocity(u, omega).reshape(4, 1, 1, 1, -1)).sum(0)
+    velocity = (G * _body_velocity(swimmer, u, omega).reshape(4, 1, 1, 1, -1)).sum(0)
     velocity[1:] += x_dot
     loads = _node_drag(swimmer, shape, velocity).force
-    return (G * loads).sum((1, 2, 3)), -(swimmer.head_resistance * u.unsqueeze(0)).sum(1)
+    return (G * loads).sum((1, 2, 3)), _body_load(swimmer, u, omega)

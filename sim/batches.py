@@ -1,25 +1,30 @@
-"""Many robots in parallel: rows are split into batches of one N and similar cost, spread over processes.
+"""Many robots in parallel: rows are split into batches of one N, spread over threads or processes.
 
-A batch steps all its robots together at the resolution that its fastest motor needs, so rows of similar
-|ω̄| go together. Each process uses one thread: batches are the parallelism, and threads inside small
-tensor operations would only fight them.
+Time stepping moves all robots of a batch together at the resolution that its fastest motor needs, so rows of
+similar |ω̄| go together. Each worker uses one thread: batches are the parallelism, and threads inside small
+operations would only fight them.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
+from sim.resolution import Resolution
 from sim.robot import Groups, check_columns
-from sim.steady import Resolution, steady
+from sim.settling import settle
+from sim.steady import steady
 
+_DIRECT_ROWS = 128  # robots solved directly between two ticks of the progress bar
 BATCH_NODES = 12_000  # nodes of all tails in a batch: fits the second-level cache, amortises overhead
 
 Job = TypeVar("Job")
@@ -61,21 +66,23 @@ def run_batches(
     sizes: Sequence[int],
     jobs: int | None = None,
     title: str = "",
+    threads: bool = False,
 ) -> list[Result]:
     """Apply `work` to every job in parallel processes, with a progress bar over rows.
 
-    Results come back in the order of the jobs; the longest jobs should come first.
+    Results come back in the order of the jobs; the longest jobs should come first. `threads`: in parallel threads
+    instead, for work in compiled loops, which do not hold the interpreter's lock.
     """
     count = min(jobs or available_jobs(), len(jobs_to_do))
     results: list[Result] = []
     with tqdm(total=sum(sizes), desc=title, unit="row", delay=1.0, disable=not title) as bar:
         if count <= 1:
-            for job, size in zip(jobs_to_do, sizes, strict=True):
-                results.append(_single_threaded(work, job))
-                bar.update(size)
-            return results
-        parallel = Parallel(n_jobs=count, return_as="generator", pre_dispatch="2*n_jobs")
-        done = parallel(delayed(_single_threaded)(work, job) for job in jobs_to_do)
+            done = (_single_threaded(work, job) for job in jobs_to_do)
+        else:
+            parallel = Parallel(
+                n_jobs=count, return_as="generator", pre_dispatch="2*n_jobs", prefer="threads" if threads else None
+            )
+            done = parallel(delayed(_single_threaded)(work, job) for job in jobs_to_do)
         for result, size in zip(done, sizes, strict=True):
             results.append(result)
             bar.update(size)
@@ -86,45 +93,81 @@ def _single_threaded(work: Callable[[Job], Result], job: Job) -> Result:
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        return work(job)
+        with threadpool_limits(1, user_api="blas"):
+            return work(job)
     finally:
         torch.set_num_threads(threads)
 
 
 def steady_columns(
-    columns: Mapping[str, NDArray[np.float64]],
-    *,
-    resolution: Resolution | None = None,
-    refine: bool = False,
-    jobs: int | None = None,
-    title: str = "steady",
-) -> dict[str, NDArray[np.float64]]:
-    """Steady motion of any robots, in parallel.
+    columns: Mapping[str, NDArray[np.float64]], *, jobs: int | None = None, title: str = "steady"
+) -> dict[str, NDArray[Any]]:
+    """Steady motion of any robots, in parallel (`sim.steady`).
 
     Args:
         columns: robots by column name, see `sim.robot.check_columns`, each (M,).
-        resolution: mesh and step of all rows; by default what each batch needs.
-        refine: simulate on half the edge length and half the step of that.
-        jobs: processes; default all processors.
+        jobs: threads; default all processors.
         title: of the progress bar; empty for none.
 
     Returns:
         The columns of `Steady.columns`, each (M,), in the order of the rows.
     """
     values = check_columns(columns)
+    order = np.argsort(values["N"], kind="stable")
+    ends = np.flatnonzero(np.diff(values["N"][order])) + 1
+    batches = [
+        part for rows in np.split(order, ends) for part in np.array_split(rows, -(-len(rows) // _DIRECT_ROWS))
+    ]
+    return _in_batches(_steady_batch, values, batches, jobs=jobs, title=title, threads=True)
+
+
+def stepped_columns(
+    columns: Mapping[str, NDArray[np.float64]],
+    *,
+    resolution: Resolution | None = None,
+    finer: int = 1,
+    jobs: int | None = None,
+    title: str = "time stepping",
+) -> dict[str, NDArray[Any]]:
+    """The same by time stepping from rest (`sim.settling`): the reference for the direct route.
+
+    Args:
+        columns: robots by column name, each (M,).
+        resolution: mesh and step of all rows; by default what each batch needs.
+        finer: divide edge length and step by this.
+        jobs: processes; default all processors.
+        title: of the progress bar; empty for none.
+    """
+    values = check_columns(columns)
     batches = split(values["N"], values["omega_bar"], resolution=resolution)
     batches.sort(key=lambda rows: -float(np.abs(values["omega_bar"][rows]).max()))
-    work = [({name: array[rows] for name, array in values.items()}, resolution, refine) for rows in batches]
-    done = run_batches(_steady_batch, work, sizes=[len(b) for b in batches], jobs=jobs, title=title)
+    work = partial(_settle_batch, chosen=resolution, finer=finer)
+    return _in_batches(work, values, batches, jobs=jobs, title=title)
+
+
+def _in_batches(
+    work: Callable[[dict[str, NDArray[np.float64]]], dict[str, NDArray[Any]]],
+    values: dict[str, NDArray[np.float64]],
+    batches: list[NDArray[np.int64]],
+    *,
+    jobs: int | None,
+    title: str,
+    threads: bool = False,
+) -> dict[str, NDArray[Any]]:
+    parts = [{name: array[rows] for name, array in values.items()} for rows in batches]
+    sizes = [len(b) for b in batches]
+    done = run_batches(work, parts, sizes=sizes, jobs=jobs, title=title, threads=threads)
     order = np.argsort(np.concatenate(batches))
     return {name: np.concatenate([d[name] for d in done])[order] for name in done[0]}
 
 
-def _steady_batch(
-    job: tuple[dict[str, NDArray[np.float64]], Resolution | None, bool],
-) -> dict[str, NDArray[np.float64]]:
-    columns, chosen, refine = job
+def _steady_batch(columns: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[Any]]:
+    return steady(Groups.from_columns(columns)).columns()
+
+
+def _settle_batch(
+    columns: dict[str, NDArray[np.float64]], *, chosen: Resolution | None, finer: int
+) -> dict[str, NDArray[Any]]:
     resolution = chosen or Resolution.fitting(float(np.abs(columns["omega_bar"]).max()))
-    if refine:
-        resolution = Resolution(2 * resolution.edges, 2 * resolution.steps)
-    return steady(Groups.from_columns(columns), resolution=resolution)[0].columns()
+    resolution = Resolution(finer * resolution.edges, finer * resolution.steps)
+    return settle(Groups.from_columns(columns), resolution=resolution)[0].columns()

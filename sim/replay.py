@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from sim import planar
 from sim.balance import assemble
 from sim.errors import InputError
+from sim.resolution import Resolution, time_step
 from sim.robot import Groups
-from sim.steady import Resolution, time_step
 from sim.stepper import YAW, State, X, Y, at_rest, step
 
 _SAMPLES = 12  # track points a dwell, at most

@@ -16,177 +16,103 @@ Natural curvature and twist are zero here: then the twist of a free-ended isotro
 whatever its shape and puts no force on the nodes (`sim.framed_rod` has the material frames, and a test
 shows that the two agree).
 
-Units: EI = 1, l = 1, so EA = 4 (l/r0)². Layout: arrays are (n, 3, N, B): node or edge, component, tail,
-robot, with the batch last so that every operation runs over contiguous lanes.
+Written node by node on component tuples (`sim.vectors`), so that compiled loops (`sim.tail`) and tensors
+(`sim.tails`) read the same lines. Units: EI = 1, l = 1, so EA = 4 (l/r0)².
 Source: Bergou et al. (2008, 2010); Jawed, Novelia, O'Reilly, *A Primer on the Kinematics of Discrete
 Elastic Rods* (2018); the paper's energies (arXiv 2103.05712, eqs. 1-3).
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any
 
-import torch
-from torch import Tensor
-
-
-class Stretching(NamedTuple):
-    """Geometry of a tail: edge lengths, tangents (root tangent first) and turning cosines."""
-
-    length: Tensor  # (n, 1, N, B)
-    tangent: Tensor  # (n + 1, 3, N, B): root tangent, then one an edge
-    cosine: Tensor  # (n, 1, N, B): between tangent k and k + 1, at node k
-
-
-class EdgeStiffness(NamedTuple):
-    """Second derivatives of the energy in the edge vectors (block tridiagonal, symmetric)."""
-
-    diagonal: Tensor  # (n, 3, 3, N, B)
-    upper: Tensor  # (n − 1, 3, 3, N, B): ∂²E/∂e_j ∂e_{j+1}
+from sim.vectors import (
+    Matrix,
+    Vector,
+    added,
+    cross,
+    crossed,
+    dot,
+    formula,
+    minus,
+    outer,
+    plus,
+    plus_identity,
+    projected,
+    times,
+)
 
 
-def dot(a: Tensor, b: Tensor) -> Tensor:
-    """Scalar product over the component axis, kept: (..., 3, N, B) -> (..., 1, N, B)."""
-    return (a * b).sum(-3, keepdim=True)
+@formula
+def bending_energy(c: Any, inverse_voronoi: Any) -> Any:
+    """g(c) of one joint, with 1/l_k."""
+    return 2 * inverse_voronoi * (1 - c) / (1 + c)
 
 
-def cross(a: Tensor, b: Tensor) -> Tensor:
-    """Vector product over the component axis (third from the end)."""
-    return torch.linalg.cross(a, b, dim=-3)
-
-
-def outer(a: Tensor, b: Tensor) -> Tensor:
-    """a ⊗ b over the component axis: (n, 3, N, B) twice -> (n, 3, 3, N, B)."""
-    return a.unsqueeze(-3) * b.unsqueeze(-4)
-
-
-def geometry(nodes: Tensor, root_tangent: Tensor) -> Stretching:
-    """Edges of tails with nodes (n + 1, 3, N, B) clamped along root_tangent (1, 3, N, B)."""
-    edge = nodes[1:] - nodes[:-1]
-    length = dot(edge, edge).sqrt()
-    tangent = torch.cat([root_tangent, edge / length])
-    return Stretching(length, tangent, dot(tangent[:-1], tangent[1:]))
-
-
-def inverse_voronoi(n: int, like: Tensor) -> Tensor:
-    """1/l_k of the bending energies at nodes 0..n−1, (n, 1, 1, 1): 2n at the clamp, n elsewhere."""
-    weight = torch.full((n, 1, 1, 1), float(n), dtype=like.dtype, device=like.device)
-    weight[0] = 2.0 * n
-    return weight
-
-
-def energy(shape: Stretching, axial_stiffness: Tensor) -> Tensor:
-    """Elastic energy of each tail, (N, B), in EI/l; `axial_stiffness` is EA l²/EI, (B,)."""
-    n = shape.length.shape[0]
-    stretch = 0.5 * axial_stiffness * (shape.length * n - 1) ** 2 / n
-    c = shape.cosine
-    bend = 2 * inverse_voronoi(n, c) * (1 - c) / (1 + c)
-    return (stretch + bend).sum((0, 1))
-
-
-class _Bending(NamedTuple):
-    first: Tensor  # g'(c_k), (n, 1, N, B)
-    second: Tensor  # g''(c_k)
-    by_next: Tensor  # ∂c_k/∂e_k, (n, 3, N, B)
-    by_previous: Tensor  # ∂c_{k+1}/∂e_k with a zero row for the last edge, (n, 3, N, B)
-
-
-def _bending(shape: Stretching) -> _Bending:
-    n = shape.length.shape[0]
-    tangent, c, length = shape.tangent, shape.cosine, shape.length
+@formula
+def bend(
+    before: Vector, after: Vector, length_before: Any, length_after: Any, inverse_voronoi: Any
+) -> tuple[Any, Any, Any, Vector, Vector]:
+    """Joint between two edges with tangents `before` and `after`: c, g', g'', ∂c/∂e_after, ∂c/∂e_before."""
+    c = dot(before, after)
     inverse = 1 / (1 + c)
-    first = -4 * inverse_voronoi(n, c) * inverse**2
-    by_next = (tangent[:-1] - c * tangent[1:]) / length
-    by_previous = torch.zeros_like(by_next)
-    torch.div(tangent[2:] - c[1:] * tangent[1:-1], length[:-1], out=by_previous[:-1])
-    return _Bending(first, -2 * first * inverse, by_next, by_previous)
+    first = -4 * inverse_voronoi * inverse * inverse
+    by_after = times(1 / length_after, minus(before, times(c, after)))
+    by_before = times(1 / length_before, minus(after, times(c, before)))
+    return c, first, -2 * first * inverse, by_after, by_before
 
 
-def _shifted(a: Tensor) -> Tensor:
-    """a_{k+1} at place k, zero at the last place."""
-    out = torch.zeros_like(a)
-    out[:-1] = a[1:]
-    return out
+@formula
+def edge_force(
+    tangent: Vector, length: Any, n: Any, axial_stiffness: Any,
+    first: Any, by_after: Vector, first_next: Any, by_before_next: Vector,
+) -> Vector:  # fmt: skip
+    """∂E/∂e_j, the force that edge j carries: stretching, the joint before it and the joint after it."""
+    bending = plus(times(first, by_after), times(first_next, by_before_next))
+    return plus(times(axial_stiffness * (length * n - 1), tangent), bending)
 
 
-def edge_forces(shape: Stretching, axial_stiffness: Tensor) -> Tensor:
-    """∂E/∂e_j, (n, 3, N, B): the internal force carried by edge j, in EI/l²."""
-    bending = _bending(shape)
-    return _edge_forces(shape, bending, _shifted(bending.first), axial_stiffness)
-
-
-def _edge_forces(shape: Stretching, bending: _Bending, first_after: Tensor, axial_stiffness: Tensor) -> Tensor:
-    n = shape.length.shape[0]
-    force = (axial_stiffness * (shape.length * n - 1)) * shape.tangent[1:]
-    force.addcmul_(bending.first, bending.by_next)
-    return force.addcmul_(first_after, bending.by_previous)
-
-
-class ElasticResponse(NamedTuple):
-    """Forces and stiffness of tails, and what the clamp transmits."""
-
-    edge_force: Tensor  # ∂E/∂e, (n, 3, N, B)
-    stiffness: EdgeStiffness
-    clamp_moment: Tensor  # moment of the bending spring at the clamp on the disc, (3, N, B)
-    clamp_moment_by_edge: Tensor  # its derivative in e_0, (3, 3, N, B)
-
-
-def respond(shape: Stretching, axial_stiffness: Tensor) -> ElasticResponse:
-    """Internal forces, their derivatives in the edges, and the clamp's moment.
-
-    Args:
-        shape: geometry of tails with n edges.
-        axial_stiffness: EA l²/EI = 4 (l/r0)², (B,).
-    """
-    n = shape.length.shape[0]
-    length, tangent, c = shape.length, shape.tangent[1:], shape.cosine
-    bending = _bending(shape)
-    first, second, by_next, by_previous = bending
-    first_after = _shifted(first)
-    force = _edge_forces(shape, bending, first_after, axial_stiffness)
-
-    # Diagonal blocks α I + t⊗(β t + q) + q⊗t + g''_k p⊗p + g''_{k+1} m⊗m.
-    turning = (first * c + first_after * _shifted(c)) / length**2
-    q = -(first * by_next + first_after * by_previous) / length
-    alpha = axial_stiffness * (n - 1 / length) - turning
+@formula
+def edge_stiffness(
+    tangent: Vector, length: Any, n: Any, axial_stiffness: Any,
+    c: Any, first: Any, second: Any, by_after: Vector,
+    c_next: Any, first_next: Any, second_next: Any, by_before_next: Vector,
+) -> Matrix:  # fmt: skip
+    """∂²E/∂e_j²: α I + t⊗(β t + q) + q⊗t + g'' p⊗p + g''_next m⊗m."""
+    turning = (first * c + first_next * c_next) / (length * length)
+    q = times(-1 / length, plus(times(first, by_after), times(first_next, by_before_next)))
     beta = axial_stiffness / length + turning
-    diagonal = outer(tangent, beta * tangent + q)
-    diagonal.addcmul_(q.unsqueeze(2), tangent.unsqueeze(1))
-    diagonal.addcmul_(by_next.unsqueeze(2), (second * by_next).unsqueeze(1))
-    diagonal.addcmul_(by_previous.unsqueeze(2), (_shifted(second) * by_previous).unsqueeze(1))
-    _add_to_trace(diagonal, alpha)
-
-    # Upper blocks g'' m⊗p + g' P_j P_{j+1}/(|e_j||e_{j+1}|).
-    here, after, inner = tangent[:-1], tangent[1:], c[1:]
-    scale = first[1:] / (length[:-1] * length[1:])
-    upper = outer(by_previous[:-1], second[1:] * by_next[1:])
-    upper.addcmul_((scale * here).unsqueeze(2), (inner * after - here).unsqueeze(1))
-    upper.addcmul_((-scale * after).unsqueeze(2), after.unsqueeze(1))
-    _add_to_trace(upper, scale)
-
-    # Clamp: energy g(t_{−1}·t_0) turns the disc with moment −g' t_{−1} × t_0.
-    root = shape.tangent[0]
-    axis = cross(root, tangent[0])
-    projected = torch.linalg.cross(
-        root.unsqueeze(1).expand(3, 3, *root.shape[1:]),
-        (_identity(root) - tangent[0].unsqueeze(1) * tangent[0].unsqueeze(0)) / length[0],
-        dim=0,
-    )
-    moment_by_edge = -(second[0] * axis.unsqueeze(1) * by_next[0].unsqueeze(0) + first[0] * projected)
-    return ElasticResponse(force, EdgeStiffness(diagonal, upper), -first[0] * axis, moment_by_edge)
+    block = added(outer(tangent, plus(times(beta, tangent), q)), outer(q, tangent))
+    block = added(block, outer(by_after, times(second, by_after)))
+    block = added(block, outer(by_before_next, times(second_next, by_before_next)))
+    return plus_identity(block, axial_stiffness * (n - 1 / length) - turning)
 
 
-def _identity(like: Tensor) -> Tensor:
-    return torch.eye(3, dtype=like.dtype, device=like.device).reshape(3, 3, 1, 1)
+@formula
+def joint_stiffness(
+    before: Vector, after: Vector, length_before: Any, length_after: Any,
+    c: Any, first: Any, second: Any, by_after: Vector, by_before: Vector,
+) -> Matrix:  # fmt: skip
+    """∂²E/∂e_before ∂e_after of the joint between them: g'' m⊗p + g' P_before P_after/(|e||e|)."""
+    scale = first / (length_before * length_after)
+    block = outer(by_before, times(second, by_after))
+    block = added(block, outer(times(scale, before), minus(times(c, after), before)))
+    block = added(block, outer(times(-scale, after), after))
+    return plus_identity(block, scale)
 
 
-def _add_to_trace(blocks: Tensor, scalar: Tensor) -> None:
-    """blocks += scalar I, blocks (n, 3, 3, N, B), scalar (n, 1, N, B)."""
-    torch.diagonal(blocks, dim1=1, dim2=2).add_(scalar.squeeze(1).unsqueeze(-1))
+@formula
+def clamp_moment(root_tangent: Vector, tangent: Vector, first: Any) -> Vector:
+    """Moment of the bending spring at the clamp on the disc: −g' t_{−1} × t_0."""
+    return times(-first, cross(root_tangent, tangent))
 
 
-def node_forces(edge_force: Tensor) -> Tensor:
-    """Elastic force on the free nodes 1..n from the edge forces, (n, 3, N, B)."""
-    force = -edge_force.clone()
-    force[:-1] += edge_force[1:]
-    return force
+@formula
+def clamp_moment_by_edge(
+    root_tangent: Vector, tangent: Vector, length: Any, first: Any, second: Any, by_after: Vector
+) -> Matrix:
+    """Derivative of the clamp's moment in edge 0."""
+    zero = 0 * length
+    cross_matrix = crossed(root_tangent, ((1 + zero, zero, zero), (zero, 1 + zero, zero), (zero, zero, 1 + zero)))
+    turned = projected(cross_matrix, tangent, -first / length)
+    return added(outer(times(-second, cross(root_tangent, tangent)), by_after), turned)

@@ -143,7 +143,7 @@ def _stage(
     settled = torch.zeros_like(omega, dtype=torch.bool)
     for _ in range(_MOST_CORRECTIONS):
         x_dot = (x - x_star) * rate
-        phase = pose_star[PHASE] + tau * (omega + u[3])
+        phase = pose_star[PHASE] + tau * swimmer.omega_t(u, omega)
         dx, du = newton_correction(swimmer, x, x_dot, phase, u, omega, rate)
         size = torch.maximum(dx.abs().amax((0, 1, 2)), du.abs().amax(0) / scale)
         # Damp what would bend a tail out of its neighbourhood in one go; keep settled lanes still.
@@ -163,5 +163,5 @@ def _pose(swimmer: Swimmer, star: Tensor, tau: Tensor, u: Tensor, omega: Tensor)
     surge = u[1]
     yaw = star[YAW] + tau * u[2]
     c, s = torch.cos(yaw), torch.sin(yaw)
-    rates = torch.stack([omega + u[3], u[2], surge * c - sway * s, surge * s + sway * c, sway, surge])
+    rates = torch.stack([swimmer.omega_t(u, omega), u[2], surge * c - sway * s, surge * s + sway * c, sway, surge])
     return star + tau * rates

@@ -34,8 +34,9 @@ from torch import Tensor
 from sim import planar
 from sim.balance import Swimmer, assemble
 from sim.effects import catalogue
+from sim.motion import Steady
+from sim.resolution import Resolution, time_step
 from sim.robot import Groups
-from sim.steady import Resolution, Steady, time_step
 from sim.stepper import YAW, State, X, Y, step
 
 MEMORY = 1.2  # time units after which a flip is forgotten: the tails turn over in about 0.7
@@ -70,7 +71,7 @@ def switch_response(
     *,
     resolution: Resolution | None = None,
 ) -> SwitchResponse:
-    """Flip the motor every `dwell` from the steady motion that `sim.steady.steady` returned.
+    """Flip the motor every `dwell` from the steady motion that `sim.settling.settle` returned.
 
     Args:
         groups: robots of one N; the sign of ω̄ is the direction before the first flip.
@@ -83,7 +84,8 @@ def switch_response(
     swimmer = assemble(groups, edges=edges)
     fine = replace(chosen, edges=edges)
     # Two copies: as it is, and half a tail spacing further round.
-    spacing = math.pi / groups.N / steady.omega_t.abs().nan_to_num(nan=1.0)
+    speed = torch.as_tensor(steady.omega_t).abs().nan_to_num(nan=1.0)
+    spacing = math.pi / groups.N / speed
     later = segment(swimmer, state.restarted(), groups.omega_bar, spacing, fine)
     both = torch.arange(len(groups)).repeat(2)
     pair = swimmer.select(both)
@@ -113,8 +115,8 @@ def _response(
     steady: Steady,
     failed: NDArray[np.bool_],
 ) -> SwitchResponse:
-    sense = torch.sign(groups.omega_bar)
-    twist = torch.stack([steady.v_z, steady.v_x * sense, steady.omega_yr * sense], -1).numpy()
+    sense = np.sign(groups.omega_bar.numpy())
+    twist = np.stack([steady.v_z, steady.v_x * sense, steady.omega_yr * sense], -1)
     lag = planar.compose(change, planar.inverse(planar.arc(twist, dwell)))
     pair = planar.compose(change, change * planar.MIRROR)
     failed = failed | ~np.isfinite(lag).all(-1)

@@ -7,14 +7,13 @@ import pkgutil
 from functools import cache
 from typing import TYPE_CHECKING
 
-from torch import Tensor
-
 from sim.effects.base import Effect
 
 if TYPE_CHECKING:
+    from sim.drag import Coefficients
     from sim.robot import Groups
 
-__all__ = ["Effect", "adjust_head_resistance", "adjust_tail_coefficients", "catalogue"]
+__all__ = ["Effect", "catalogue", "with_effects"]
 
 
 @cache
@@ -28,15 +27,8 @@ def catalogue() -> dict[str, Effect]:
     return found
 
 
-def adjust_head_resistance(groups: Groups, resistance: Tensor) -> Tensor:
-    """The head's resistance (4, 4, B) with the effects that `groups` carries."""
+def with_effects(groups: Groups, base: Coefficients) -> Coefficients:
+    """The balance's coefficients with the effects that `groups` carries."""
     for name, size in sorted(groups.effects.items()):
-        resistance = catalogue()[name].head_resistance(size, groups, resistance)
-    return resistance
-
-
-def adjust_tail_coefficients(groups: Groups, coefficients: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
-    """The tails' (ζ∥, ζ⊥), each (B,), with the effects that `groups` carries."""
-    for name, size in sorted(groups.effects.items()):
-        coefficients = catalogue()[name].tail_coefficients(size, groups, coefficients)
-    return coefficients
+        base = catalogue()[name].coefficients(size, groups, base)
+    return base

@@ -10,7 +10,7 @@ C_t stays the drag across the axis, which moves yaw rate and radius, so that ε 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import torch
@@ -19,15 +19,16 @@ from torch import Tensor
 from sim.effects.base import Effect
 
 if TYPE_CHECKING:
+    from sim.drag import Coefficients
     from sim.robot import Groups
 
 
 @dataclass(frozen=True)
 class AnisotropicHeadDrag(Effect):
-    def head_resistance(self, size: Tensor, groups: Groups, resistance: Tensor) -> Tensor:
-        extra = torch.zeros_like(resistance)
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        extra = torch.zeros_like(base.resistance)
         extra[1, 1] = size * 6 * math.pi * groups.C_t / groups.l_over_R
-        return resistance + extra
+        return replace(base, resistance=base.resistance + extra)
 
 
 EFFECT = AnisotropicHeadDrag(

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Literal
 from torch import Tensor
 
 if TYPE_CHECKING:
+    from sim.drag import Coefficients
     from sim.robot import Groups
 
 
@@ -43,12 +44,6 @@ class Effect:
     dissipative: bool
     covariate: str | None = None
 
-    def head_resistance(self, size: Tensor, groups: Groups, resistance: Tensor) -> Tensor:
-        """Drag hook: the head's resistance about J, (4, 4, B), see `sim.drag.head_resistance`."""
-        return resistance
-
-    def tail_coefficients(
-        self, size: Tensor, groups: Groups, coefficients: tuple[Tensor, Tensor]
-    ) -> tuple[Tensor, Tensor]:
-        """Drag hook: the tails' (ζ∥, ζ⊥), each (B,)."""
-        return coefficients
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        """Drag and motor: the changed coefficients of the balance."""
+        return base

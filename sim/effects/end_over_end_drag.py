@@ -11,7 +11,7 @@ Left out: the part of it that the free surface changes.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import torch
@@ -20,15 +20,16 @@ from torch import Tensor
 from sim.effects.base import Effect
 
 if TYPE_CHECKING:
+    from sim.drag import Coefficients
     from sim.robot import Groups
 
 
 @dataclass(frozen=True)
 class EndOverEndDrag(Effect):
-    def head_resistance(self, size: Tensor, groups: Groups, resistance: Tensor) -> Tensor:
-        extra = torch.zeros_like(resistance)
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        extra = torch.zeros_like(base.resistance)
         extra[2, 2] = size * 8 * math.pi / groups.l_over_R**3
-        return resistance + extra
+        return replace(base, resistance=base.resistance + extra)
 
 
 EFFECT = EndOverEndDrag(

@@ -30,7 +30,7 @@ TRUTH = replace(START, C_t=3.1, C_r=2.4, C_yr=4.4)
 @pytest.fixture
 def toy_model(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(calibration.forward, "steady_columns", toy.steady_columns)
-    monkeypatch.setattr(calibration.synthetic, "steady_columns", toy.steady_columns)
+    monkeypatch.setattr(calibration.synthetic, "stepped_columns", toy.steady_columns)
     monkeypatch.setattr("calibration.loop.first_guess", lambda model, start, used: start)
 
 

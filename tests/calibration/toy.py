@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from sim import drag
-from sim.effects import adjust_head_resistance
+from sim.effects import with_effects
 from sim.robot import Groups, check_columns
 
 
@@ -26,8 +26,8 @@ def steady_columns(columns: Mapping[str, Any], **_: object) -> dict[str, np.ndar
 def _row(columns: dict[str, np.ndarray]) -> dict[str, float]:
     groups = Groups.from_columns(columns)
     R = 1 / groups.l_over_R
-    head = drag.head_resistance(groups.C_t, groups.C_r, groups.C_yr, R, groups.L_over_R * R)
-    head = adjust_head_resistance(groups, head)[..., 0].numpy()
+    base = drag.coefficients(groups.C_t, groups.C_r, groups.C_yr, R, groups.L_over_R * R, groups.l_over_r0)
+    head = with_effects(groups, base).resistance[:, :4, 0].numpy()
     parallel, perp = (float(v) for v in drag.tail_coefficients(groups.l_over_r0))
     a, n, omega = float(groups.a_over_R * R), groups.N, float(groups.omega_bar)
     tails = np.zeros((4, 4))

@@ -120,7 +120,7 @@ def test_verify_passes_and_notices_a_changed_number(built: Path) -> None:
     index = table.schema.get_field_index("omega_yr_bar")
     wrong = table.set_column(index, table.schema.field(index), [np.asarray(table["omega_yr_bar"]) * 1.1])
     pq.write_table(wrong, part)
-    with pytest.raises(InputError, match="simulated again differ"):
+    with pytest.raises(InputError, match="solved again differ"):
         verify(str(built / "out"), rows=6)
     part.write_bytes(original)
 

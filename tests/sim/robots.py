@@ -21,8 +21,8 @@ def control(count: int = 1, **changes: object) -> Groups:
 
 def held(swimmer: Swimmer) -> Swimmer:
     """The same tails on a disc that nothing moves: the motor alone turns it."""
-    resistance = 1e12 * torch.eye(4, dtype=torch.float64).unsqueeze(-1).expand(4, 4, swimmer.robots)
-    return replace(swimmer, head_resistance=resistance)
+    resistance = 1e12 * torch.eye(4, 5, dtype=torch.float64).unsqueeze(-1).expand(4, 5, swimmer.robots)
+    return replace(swimmer, resistance=resistance)
 
 
 def single_filament(edges: int, omega_bar: float, l_over_r0: float, offset: float) -> tuple[Swimmer, Groups]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from sim import rod
+from sim import elastic
 from sim.framed_rod import FramedRod, Frames
 from tests.reference.cases import ELASTICA
 
@@ -28,7 +28,7 @@ def random_tail(seed: int, n: int = 8) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 def energy_of(x: torch.Tensor, down: torch.Tensor, stiffness: torch.Tensor) -> torch.Tensor:
-    return rod.energy(rod.geometry(torch.cat([torch.zeros_like(down), x]), down), stiffness).sum()
+    return elastic.energy(elastic.geometry(torch.cat([torch.zeros_like(down), x]), down), stiffness).sum()
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -37,8 +37,8 @@ def test_forces_and_stiffness_are_the_derivatives_of_the_energy(seed: int) -> No
     n = x.shape[0]
     stiffness = torch.tensor([4 * 34.375**2], dtype=torch.float64)
     exact = -torch.func.grad(energy_of)(x, down, stiffness)
-    response = rod.respond(rod.geometry(torch.cat([torch.zeros_like(down), x]), down), stiffness)
-    forces = rod.node_forces(response.edge_force)
+    response = elastic.respond(elastic.geometry(torch.cat([torch.zeros_like(down), x]), down), stiffness)
+    forces = elastic.node_forces(response.edge_force)
     assert torch.allclose(forces, exact, rtol=1e-10, atol=1e-8)
 
     def edge_energy(edges: torch.Tensor) -> torch.Tensor:
@@ -55,10 +55,10 @@ def test_forces_and_stiffness_are_the_derivatives_of_the_energy(seed: int) -> No
 def test_clamp_moment_balances_the_tail() -> None:
     """Turning tail and clamp together costs nothing: inner forces and clamp moment have no net moment."""
     x, down = random_tail(3)
-    response = rod.respond(
-        rod.geometry(torch.cat([torch.zeros_like(down), x]), down), torch.tensor([4000.0], dtype=torch.float64)
+    response = elastic.respond(
+        elastic.geometry(torch.cat([torch.zeros_like(down), x]), down), torch.tensor([4000.0], dtype=torch.float64)
     )
-    forces = rod.node_forces(response.edge_force)
+    forces = elastic.node_forces(response.edge_force)
     moment = torch.linalg.cross(x, forces, dim=1).sum(0) + response.clamp_moment
     assert moment.abs().max() < 1e-9 * forces.abs().max()
 
@@ -72,8 +72,8 @@ def cantilever(alpha: float, n: int) -> tuple[float, float]:
 
     def residual(flat: np.ndarray, load: float) -> np.ndarray:
         x = torch.tensor(flat).reshape(n, 3, 1, 1)
-        shape = rod.geometry(torch.cat([torch.zeros_like(down), x]), down)
-        force = rod.node_forces(rod.edge_forces(shape, stiffness))
+        shape = elastic.geometry(torch.cat([torch.zeros_like(down), x]), down)
+        force = elastic.node_forces(elastic.edge_forces(shape, stiffness))
         force[-1, 0] += load
         return force.reshape(-1).numpy()
 

@@ -38,7 +38,7 @@ def invented(folder: Path, rows: int = 512) -> Path:
         "omega_yr_bar": yaw, "v_x": sway, "v_z": surge, "R_yr_over_l": np.hypot(sway, surge) / yaw,
         "theta_deg": np.degrees(np.arctan2(sway, surge)), "net_speed_bar": surge,
         "lag_psi_rad": 0.02 * yaw, "lag_x": -0.02 * sway, "lag_z": -0.04 * sway * np.exp(-p["dwell_bar"]),
-        "tail_gap": 2 + p["l_over_R"] / p["N"], "drift": np.zeros(rows), "row": np.arange(rows),
+        "tail_gap": 2 + p["l_over_R"] / p["N"], "error": np.zeros(rows), "row": np.arange(rows),
         "converged": np.ones(rows, bool), "failed": np.zeros(rows, bool), "touching": np.zeros(rows, bool),
         "edges": np.full(rows, 16), "steps": np.full(rows, 24),
     }  # fmt: skip

@@ -1,0 +1,309 @@
+"""Direct route to the steady motion: phases, meshes, extrapolation and checks around `sim.orbit`.
+
+For each robot, in compiled loops:
+
+1. From straight tails on the coarsest mesh, with more and more phases until the means stop changing. The change
+   from one number of phases to the next is the error of the smaller one.
+2. On finer meshes from the solution before. Rods converge at second order (error c₂/n² + c₄/n⁴ + …), so the means
+   on n = 6, 8 and 12 edges are extrapolated to n → ∞. The error is put at what the term c₄ changed plus 3 % of
+   what extrapolation changed at all: over the sweep's domain that covers the true one in more than 95 % of rows.
+
+The means are means over time, ∫ u dφ/ω_t / ∫ dφ/ω_t. Each row says how it ended: solved, or why not; then time
+stepping (`sim.settling`) takes over. The extrapolated means of spins, ω_yr and the velocity of the head's centre
+come with `error`, the largest estimated relative error (velocities relative to the speed).
+Left out: whether the orbit is stable; see docs/branches.md for where it is not.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.balance import Swimmer
+from sim.compiling import compiled
+from sim.orbit import Body, newton
+from sim.robot import Groups
+
+Array = NDArray[np.float64]
+
+MESHES = (6, 8, 12)
+SOLVED, NO_START, MANY_PHASES, LOST, BACKWARDS = range(5)
+REASONS = {
+    SOLVED: "",
+    NO_START: "Newton's method did not converge from straight tails",
+    MANY_PHASES: "the shape changes too much over a revolution",
+    LOST: "Newton's method did not converge on a finer mesh",
+    BACKWARDS: "the tails stop or turn backwards during a revolution",
+}
+CORRECTION = 3e-5  # last Newton correction: convergence is quadratic, it leaves less than 1e-7
+PHASE_ERROR = 1e-4  # relative, in the means
+_DOUBT = 0.03  # share of the extrapolation that counts as error
+_SHRINKS = (
+    0.2  # assumed fall of the phase error from one number of phases to the next, where only one fall is known
+)
+_MOST_PHASES = 48
+_MOST_CORRECTIONS = 30
+
+
+class Orbits(NamedTuple):
+    """Steady motions of B robots; rows (ω_t, ω_h, ω_yr, v_x, v_z) of the head's centre."""
+
+    means: Array  # (B, 5), NaN where not solved
+    error: Array  # (B,) estimated relative error
+    phases: NDArray[np.int64]  # (B,) M
+    ended: NDArray[np.int64]  # (B,) SOLVED or why not
+    gap: Array  # (B,) smallest distance between tails over 2 r0
+
+
+def bodies(swimmer: Swimmer, groups: Groups) -> Array:
+    """Coefficients of B robots as rows of numbers for `solve_all`, (B, 29)."""
+    columns = [
+        groups.omega_bar,
+        swimmer.root[0, 0, 0],
+        swimmer.axial_stiffness,
+        swimmer.zeta_parallel,
+        swimmer.zeta_perp,
+        swimmer.gain,
+        swimmer.head_length,
+        swimmer.tail_radius,
+        *swimmer.resistance.reshape(20, -1),
+    ]
+    return np.stack([c.detach().cpu().numpy() for c in columns], 1)
+
+
+@compiled
+def _body(row: Array) -> Body:
+    return Body(row[0], row[1], row[2], row[3], row[4], row[5], row[8:28].copy().reshape(4, 5))
+
+
+@compiled
+def differentiation(phases: int) -> Array:
+    """d/dφ of the trigonometric interpolant on M equal phases, (M, M). Source: Trefethen (2000), ch. 3."""
+    matrix = np.zeros((phases, phases))
+    for i in range(phases):
+        for j in range(phases):
+            if i != j:
+                half = (i - j) * np.pi / phases
+                denominator = np.tan(half) if phases % 2 == 0 else np.sin(half)
+                matrix[i, j] = 0.5 * (-1.0) ** (i - j) / denominator
+    return matrix
+
+
+@compiled
+def resampling(phases: int, wanted: int) -> Array:
+    """Values of the trigonometric interpolant at `wanted` equal phases, (wanted, M)."""
+    matrix = np.zeros((wanted, phases))
+    for i in range(wanted):
+        for j in range(phases):
+            away = 2 * np.pi * (i / wanted - j / phases)
+            total = 1.0
+            for k in range(1, (phases + 1) // 2):
+                total += 2 * np.cos(k * away)
+            if phases % 2 == 0:
+                total += np.cos(phases // 2 * away)
+            matrix[i, j] = total / phases
+    return matrix
+
+
+@compiled
+def with_phases(a: Array, wanted: int) -> Array:
+    """A periodic array (K, M, c) at `wanted` phases."""
+    matrix = resampling(a.shape[1], wanted)
+    out = np.zeros((a.shape[0], wanted, a.shape[2]))
+    for k in range(a.shape[0]):
+        for i in range(wanted):
+            for j in range(a.shape[1]):
+                for c in range(a.shape[2]):
+                    out[k, i, c] += matrix[i, j] * a[k, j, c]
+    return out
+
+
+@compiled
+def with_edges(x: Array, offset: float, wanted: int) -> Array:
+    """Free nodes (n, M, 3) moved to a mesh of `wanted` edges: cubic interpolation in the arc length."""
+    n, phases, _ = x.shape
+    out = np.zeros((wanted, phases, 3))
+    for k in range(wanted):
+        place = (k + 1) * n / wanted
+        first = min(max(int(np.floor(place)) - 1, 0), n - 3)
+        for i in range(first, first + 4):
+            weight = 1.0
+            for j in range(first, first + 4):
+                if j != i:
+                    weight *= (place - j) / (i - j)
+            for m in range(phases):
+                for c in range(3):
+                    node = x[i - 1, m, c] if i > 0 else (offset if c == 0 else 0.0)
+                    out[k, m, c] += weight * node
+    return out
+
+
+@compiled
+def means(body: Body, u: Array, head_length: float) -> Array:
+    """(ω_t, ω_h, ω_yr, v_x, v_z) of the head's centre, means over time."""
+    total, time = np.zeros(5), 0.0
+    for p in range(u.shape[0]):
+        share = 1 / (body.omega + body.gain * u[p, 3])
+        time += share
+        total[1] += share * u[p, 3]
+        total[2] += share * u[p, 2]
+        total[3] += share * (u[p, 0] + u[p, 2] * head_length / 2)
+        total[4] += share * u[p, 1]
+    total /= time
+    total[0] = body.omega + body.gain * total[1]
+    return total
+
+
+@compiled
+def difference(a: Array, b: Array) -> float:
+    """Largest relative difference of two sets of means; velocities relative to the speed."""
+    speed = np.hypot(b[3], b[4])
+    change = np.abs(a - b)
+    rates = max(change[0] / abs(b[0]), change[1] / abs(b[1]), change[2] / abs(b[2]))
+    return max(rates, max(change[3], change[4]) / speed)
+
+
+@compiled
+def _turns_forward(body: Body, u: Array) -> bool:
+    return bool(np.all((body.omega + body.gain * u[:, 3]) * body.omega > 0))
+
+
+@compiled
+def _start(body: Body, n: int, phases: int, tails: int) -> tuple[Array, Array]:
+    """Straight tails on a robot that shares the motor's speed between head and tails."""
+    x, u = np.zeros((n, phases, 3)), np.zeros((phases // tails, 4))
+    x[:, :, 0] = body.offset
+    for k in range(n):
+        x[k, :, 2] = -(k + 1) / n
+    u[:, 3] = -0.3 * body.omega
+    return x, u
+
+
+@compiled
+def _more_phases(tails: int, phases: int) -> int:
+    """The next number of phases to try: a multiple of N, about half as many again."""
+    return tails * max(phases // tails + 1, int(np.ceil(1.4 * phases / tails)))
+
+
+@compiled
+def _enough_phases(body: Body, tails: int, head_length: float) -> tuple[int, float, Array, Array]:
+    """How the coarsest mesh ended, the error that its phases leave, x and u."""
+    n = MESHES[0]
+    phases = tails * int(np.ceil(2 / tails))
+    x, u = _start(body, n, phases, tails)
+    _, size, _ = newton(body, x, u, differentiation(phases), 1e-2, _MOST_CORRECTIONS)
+    if not size < 1e-2:
+        return NO_START, np.nan, x, u
+    phases = tails * int(np.ceil(3 / tails))
+    fall, before, change = _SHRINKS, means(body, u, head_length), np.inf
+    x, u = with_phases(x, phases), with_phases(u.reshape(1, -1, 4), phases // tails)[0]
+    _, size, _ = newton(body, x, u, differentiation(phases), CORRECTION, _MOST_CORRECTIONS)
+    if not size < CORRECTION:
+        return NO_START, np.nan, x, u
+    before = means(body, u, head_length)
+    while phases <= _MOST_PHASES:
+        wanted = _more_phases(tails, phases)
+        x_more, u_more = with_phases(x, wanted), with_phases(u.reshape(1, -1, 4), wanted // tails)[0]
+        _, size, _ = newton(body, x_more, u_more, differentiation(wanted), CORRECTION, _MOST_CORRECTIONS)
+        if not size < CORRECTION:
+            return MANY_PHASES, np.nan, x, u
+        after = means(body, u_more, head_length)
+        last, change = change, difference(before, after)
+        if change <= PHASE_ERROR:
+            return SOLVED, change, x, u
+        fall = _SHRINKS if not np.isfinite(last) else min(max(change / last, 0.05), 1.0)
+        x, u, phases, before = x_more, u_more, wanted, after
+        if change * fall <= PHASE_ERROR:
+            return SOLVED, change * fall, x, u
+    return MANY_PHASES, np.nan, x, u
+
+
+@compiled
+def solve(row: Array, tails: int) -> tuple[int, float, Array, Array, Array]:
+    """One robot: how it ended, relative error, means (5,), x (n, M, 3) and u (P, 4) on the finest mesh."""
+    body, head_length = _body(row), row[6]
+    found = np.full((3, 5), np.nan)
+    ended, phase_error, x, u = _enough_phases(body, tails, head_length)
+    if ended != SOLVED:
+        return ended, np.nan, found[0], x, u
+    found[0] = means(body, u, head_length)
+    matrix = differentiation(x.shape[1])
+    x_before, u_before, n_before = x, u, MESHES[0]
+    for i in range(1, 3):
+        n, coarse = MESHES[i], MESHES[i - 1]
+        x_next, u_next = with_edges(x, body.offset, n), u.copy()
+        if i > 1:  # extrapolate the change from mesh to mesh as 1/n²
+            more = (1 / coarse**2 - 1 / n**2) / (1 / n_before**2 - 1 / coarse**2)
+            x_next += more * (x_next - with_edges(x_before, body.offset, n))
+            u_next += more * (u - u_before)
+        _, size, _ = newton(body, x_next, u_next, matrix, CORRECTION, _MOST_CORRECTIONS)
+        if not size < CORRECTION:
+            return LOST, np.nan, found[2], x, u
+        x_before, u_before, n_before = x, u, coarse
+        x, u = x_next, u_next
+        found[i] = means(body, u, head_length)
+    if not _turns_forward(body, u):
+        return BACKWARDS, np.nan, np.full(5, np.nan), x, u
+    limit, error = extrapolate(found)
+    return SOLVED, error + phase_error, limit, x, u
+
+
+@compiled
+def extrapolate(found: Array) -> tuple[Array, float]:
+    """Limit of means on MESHES, (3, 5), with errors c₂/n² + c₄/n⁴; and its estimated relative error."""
+    a, b, c = 1.0 / MESHES[0] ** 2, 1.0 / MESHES[1] ** 2, 1.0 / MESHES[2] ** 2
+    limit = (
+        found[0] * (b * c) / ((a - b) * (a - c))
+        + found[1] * (a * c) / ((b - a) * (b - c))
+        + found[2] * (a * b) / ((c - a) * (c - b))
+    )
+    without = (found[2] * b - found[1] * c) / (b - c)
+    return limit, difference(without, limit) + _DOUBT * difference(found[2], limit)
+
+
+@compiled
+def _smallest_gap(x: Array, body: Body, tails: int, radius: float) -> float:
+    """Smallest distance between nodes of tail 0 and edges of the others at all phases, over 2 r0."""
+    x = with_phases(x, 2 * x.shape[1])
+    n, phases, _ = x.shape
+    smallest = np.inf
+    for j in range(1, tails):
+        angle = 2 * np.pi * j / tails
+        cos, sin = np.cos(angle), np.sin(angle)
+        for m in range(phases):
+            # Tail j is tail 0 a j-th part of a turn later, turned by that part.
+            other = (m + j * (phases // tails)) % phases
+            px, py, pz = cos * body.offset, sin * body.offset, 0.0
+            for k in range(n):
+                qx = cos * x[k, other, 0] - sin * x[k, other, 1]
+                qy = sin * x[k, other, 0] + cos * x[k, other, 1]
+                qz = x[k, other, 2]
+                ex, ey, ez = qx - px, qy - py, qz - pz
+                scale = 1 / (ex * ex + ey * ey + ez * ez)
+                for i in range(n):
+                    ax, ay, az = x[i, m, 0] - px, x[i, m, 1] - py, x[i, m, 2] - pz
+                    share = min(max((ax * ex + ay * ey + az * ez) * scale, 0.0), 1.0)
+                    ax, ay, az = ax - share * ex, ay - share * ey, az - share * ez
+                    smallest = min(smallest, ax * ax + ay * ay + az * az)
+                px, py, pz = qx, qy, qz
+    return np.sqrt(smallest) / (2 * radius)
+
+
+@compiled
+def solve_all(rows: Array, tails: int) -> Orbits:
+    """Steady motions of robots with N tails, one after the other; rows from `bodies`."""
+    count = rows.shape[0]
+    out = Orbits(
+        np.zeros((count, 5)),
+        np.zeros(count),
+        np.zeros(count, np.int64),
+        np.zeros(count, np.int64),
+        np.zeros(count),
+    )
+    for i in range(count):
+        ended, error, limit, x, _ = solve(rows[i], tails)
+        out.means[i], out.error[i], out.ended[i], out.phases[i] = limit, error, ended, x.shape[1]
+        out.gap[i] = _smallest_gap(x, _body(rows[i]), tails, rows[i, 7]) if ended == SOLVED else np.nan
+    return out

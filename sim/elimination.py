@@ -1,0 +1,194 @@
+"""Bordered block-pentadiagonal systems with dense blocks, for one robot, in compiled loops.
+
+    A_kk δx_k + A_{k,k±1} δx_{k±1} + A_{k,k±2} δx_{k±2} + B_k δu = −r_k,   k = 1..n
+    C_1 δx_1 + C_2 δx_2 + D δu = −T
+
+A block has m = 3 M rows: the components of one node in M lanes. Blocks at distance two couple a lane to itself
+only and are kept as M matrices of 3×3; the others fill up. Nodes are eliminated from the tip to the root, so that
+the Schur complement of the body needs the first two nodes alone:
+
+    Z_k = A_kk⁻¹ [A_{k,k−1} | A_{k,k−2} | B_k  −r_k],   rows k−1 and k−2 −= A_{k−1,k} Z_k and A_{k−2,k} Z_k.
+
+No pivoting between nodes: A is minus drag plus stiffness, whose symmetric part is definite.
+Cost: about 8 m³ multiplications a node, nearly all of them in matrix products (BLAS).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.compiling import compiled
+from sim.vectors import Matrix, cross, dot, times
+
+Array = NDArray[np.float64]
+
+_LARGE = 36  # rows from which a matrix is inverted by halves
+
+
+class System(NamedTuple):
+    """Newton's equations; c = number of body unknowns + 1, the last column being the right-hand side."""
+
+    rows: Array  # (n, m, 2 m + c): A_kk | A_{k,k−1} | B_k, −r_k
+    upper: Array  # (n, m, m): A_{k−1,k}
+    upper2: Array  # (n, M, 3, 3): A_{k−2,k}
+    lower2: Array  # (n, M, 3, 3): A_{k,k−2}
+    foot: Array  # (2, c − 1, m): C
+    corner: Array  # (c − 1, c): D | −T
+    folded: Array  # (n, m, 2 m + c): Z
+    right: Array  # (m, 2 m + c)
+    product: Array  # (m, 2 m + c)
+    inverse: Array  # (m, m)
+
+
+@compiled
+def new_system(n: int, lanes: int, unknowns: int) -> System:
+    """Room for n ≥ 2 nodes in `lanes` lanes and a body of `unknowns` velocities."""
+    m, c = 3 * lanes, unknowns + 1
+    return System(
+        np.zeros((n, m, 2 * m + c)),
+        np.zeros((n, m, m)),
+        np.zeros((n, lanes, 3, 3)),
+        np.zeros((n, lanes, 3, 3)),
+        np.zeros((2, unknowns, m)),
+        np.zeros((unknowns, c)),
+        np.zeros((n, m, 2 * m + c)),
+        np.zeros((m, 2 * m + c)),
+        np.zeros((m, 2 * m + c)),
+        np.zeros((m, m)),
+    )
+
+
+@compiled
+def clear(system: System) -> None:
+    """Set all that is summed up to zero."""
+    system.rows[:] = 0.0
+    system.upper[:] = 0.0
+    system.upper2[:] = 0.0
+    system.lower2[:] = 0.0
+    system.foot[:] = 0.0
+    system.corner[:] = 0.0
+
+
+@compiled
+def invert(a: Array, first: int, last: int) -> None:
+    """Invert the diagonal block first..last of `a` in place: Gauss-Jordan, a 3×3 pivot at a time."""
+    for k in range(first, last, 3):
+        pivot = inverse_of_three(a, k)
+        for i in range(3):
+            for j in range(3):
+                a[k + i, k + j] = 1.0 if i == j else 0.0
+        for j in range(first, last):
+            x, y, z = a[k, j], a[k + 1, j], a[k + 2, j]
+            a[k, j] = pivot[0][0] * x + pivot[0][1] * y + pivot[0][2] * z
+            a[k + 1, j] = pivot[1][0] * x + pivot[1][1] * y + pivot[1][2] * z
+            a[k + 2, j] = pivot[2][0] * x + pivot[2][1] * y + pivot[2][2] * z
+        for i in range(first, last):
+            if i < k or i > k + 2:
+                f, g, h = a[i, k], a[i, k + 1], a[i, k + 2]
+                a[i, k] = a[i, k + 1] = a[i, k + 2] = 0.0
+                for j in range(first, last):
+                    a[i, j] -= f * a[k, j] + g * a[k + 1, j] + h * a[k + 2, j]
+
+
+@compiled
+def inverse_of_three(a: Array, k: int) -> Matrix:
+    """Inverse of the 3×3 block of `a` at (k, k)."""
+    p, q, r = (a[k, k], a[k + 1, k], a[k + 2, k]), (a[k, k + 1], a[k + 1, k + 1], a[k + 2, k + 1]), (
+        a[k, k + 2], a[k + 1, k + 2], a[k + 2, k + 2],
+    )  # fmt: skip
+    first = cross(q, r)
+    scale = 1.0 / dot(p, first)
+    return (times(scale, first), times(scale, cross(r, p)), times(scale, cross(p, q)))
+
+
+@compiled
+def invert_by_halves(a: Array) -> None:
+    """Invert `a` in place; a large matrix by two halves and matrix products between them."""
+    m = a.shape[0]
+    if m < _LARGE:
+        invert(a, 0, m)
+        return
+    h = 3 * (m // 6)
+    invert(a, 0, h)
+    first = np.ascontiguousarray(a[:h, :h])  # P⁻¹
+    right = np.ascontiguousarray(a[:h, h:])
+    left = np.ascontiguousarray(a[h:, :h])
+    spread = np.dot(first, right)  # P⁻¹ Q
+    a[h:, h:] -= np.dot(left, spread)  # S = V − U P⁻¹ Q
+    invert(a, h, m)
+    schur = np.ascontiguousarray(a[h:, h:])
+    gathered = np.dot(schur, np.dot(left, first))  # S⁻¹ U P⁻¹
+    a[h:, :h] = -gathered
+    a[:h, :h] += np.dot(spread, gathered)
+    a[:h, h:] = -np.dot(spread, schur)
+
+
+@compiled
+def _gather(system: System, i: int) -> None:
+    """right = [A_{i,i−1} | A_{i,i−2} | B_i, −r_i]."""
+    row, right = system.rows[i], system.right
+    m = row.shape[0]
+    for a in range(m):
+        for j in range(m):
+            right[a, j] = row[a, m + j]
+            right[a, m + j] = 0.0
+        for j in range(2 * m, row.shape[1]):
+            right[a, j] = row[a, j]
+    for lane in range(m // 3):
+        for a in range(3):
+            for b in range(3):
+                right[3 * lane + a, m + 3 * lane + b] = system.lower2[i, lane, a, b]
+
+
+@compiled
+def _fold_two_up(system: System, i: int) -> None:
+    """Rows i − 2 −= A_{i−2,i} Z_i, whose first column block belongs to node i − 1."""
+    above, upper, folded = system.rows[i - 2], system.upper[i - 1], system.folded[i]
+    m, width = above.shape
+    for lane in range(m // 3):
+        for a in range(3):
+            row = 3 * lane + a
+            for b in range(3):
+                factor, source = system.upper2[i, lane, a, b], 3 * lane + b
+                for j in range(m):
+                    upper[row, j] -= factor * folded[source, j]
+                    above[row, j] -= factor * folded[source, m + j]
+                for j in range(2 * m, width):
+                    above[row, j] -= factor * folded[source, j]
+
+
+@compiled
+def solve(system: System, dx: Array, du: Array) -> None:
+    """Solve for dx (n, m) and du (c − 1,); what `system` holds is used up."""
+    n, m, width = system.rows.shape
+    unknowns = width - 2 * m - 1
+    for i in range(n - 1, -1, -1):
+        system.inverse[:] = system.rows[i][:, :m]
+        invert_by_halves(system.inverse)
+        _gather(system, i)
+        np.dot(system.inverse, system.right, system.folded[i])
+        if i > 0:
+            np.dot(system.upper[i], system.folded[i], system.product)
+            system.rows[i - 1] -= system.product
+        if i > 1:
+            _fold_two_up(system, i)
+    first = np.ascontiguousarray(system.folded[0][:, 2 * m :])
+    second = system.folded[1][:, 2 * m :] - np.dot(np.ascontiguousarray(system.folded[1][:, :m]), first)
+    schur = system.corner - np.dot(system.foot[0], first) - np.dot(system.foot[1], second)
+    du[:] = np.linalg.solve(np.ascontiguousarray(schur[:, :unknowns]), np.ascontiguousarray(schur[:, unknowns]))
+    for i in range(n):
+        folded = system.folded[i]
+        for a in range(m):
+            value = folded[a, width - 1]
+            for j in range(unknowns):
+                value -= folded[a, 2 * m + j] * du[j]
+            if i > 0:
+                for j in range(m):
+                    value -= folded[a, j] * dx[i - 1, j]
+            if i > 1:
+                for j in range(m):
+                    value -= folded[a, m + j] * dx[i - 2, j]
+            dx[i, a] = value

@@ -1,0 +1,305 @@
+"""Relative periodic orbit: the steady motion at constant motor speed, solved for directly.
+
+At constant ω the robot's shape and velocities repeat with the disc's phase φ (`sim.balance` has frames and
+equations). Taking φ itself as the independent variable, ẋ = ω_t dx/dφ, there is no unknown period:
+
+    r(x(φ), ω_t x'(φ), u(φ), φ) = 0 on each tail,   T(φ) = 0 on the robot,   x and u 2π-periodic.
+
+Tails are equal and evenly spaced, so on the branch where they move alike tail j is tail 0 a j-th part of a turn
+later: one tail at all phases carries the robot,
+
+    T(φ) = Σ_j (wrench of tail 0 at φ + 2πj/N) − R u,
+
+and u has period 2π/N. x is collocated at M = N P phases φ_m = π/2 + 2π m/M (so placed, the mirror image of a robot
+is solved on the mirror image of the phases), u at the P phases of one period;
+d/dφ is the derivative of the trigonometric interpolant (spectral accuracy: at low ω̄ the shape hardly depends on
+φ and M = 4 to 8 phases do). Newton's method on all phases together, solved by `sim.elimination`.
+
+Here a robot also has a gain of the motor, ω_t = ω + gain ω_h (1: a stiff motor), and drag on the disc.
+Left out: branches on which the tails move differently (time stepping finds those, `sim.settling`).
+Units: l, μ0 l⁴/EI, EI/l². Source: the paper's model (arXiv 2103.05712); for collocation Trefethen (2000), ch. 3.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim import elimination
+from sim.compiling import compiled
+from sim.drag import drag_by_tangents, node_drag, node_resistance
+from sim.elimination import System
+from sim.rod import clamp_moment, clamp_moment_by_edge
+from sim.tail import (
+    ROOT_TANGENT,
+    Geometry,
+    add_block,
+    edge_block,
+    joint_block,
+    measure,
+    new_geometry,
+    node_tangent,
+    vector,
+)
+from sim.vectors import (
+    Matrix,
+    Vector,
+    added,
+    applied,
+    cross,
+    crossed,
+    dot,
+    minus,
+    plus,
+    projected,
+    subtracted,
+    times,
+    transposed,
+    turned,
+)
+
+Array = NDArray[np.float64]
+
+_LARGEST_MOVE = 0.3  # of a node in one Newton correction, in l
+FIRST_PHASE = np.pi / 2
+E_Z = (0.0, 0.0, 1.0)
+
+
+class Body(NamedTuple):
+    """Numbers that make one robot, see `sim.balance.Swimmer`."""
+
+    omega: float
+    offset: float  # a/l
+    axial_stiffness: float
+    zeta_parallel: float
+    zeta_perp: float
+    gain: float
+    resistance: Array  # (4, 5): wrench by (v_x, v_z, ω_yr, ω_h, ω_t)
+
+
+class Motion(NamedTuple):
+    """Velocities at one phase."""
+
+    e_x: Vector
+    e_y: Vector
+    linear: Vector  # of J
+    spin: Vector  # of the disc frame
+    omega_t: float
+
+
+@compiled
+def _motion(body: Body, u: Array, m: int, phases: int) -> Motion:
+    phase = FIRST_PHASE + 2 * np.pi * m / phases
+    p = m % u.shape[0]
+    e_x, e_y = (np.cos(phase), -np.sin(phase), 0.0), (np.sin(phase), np.cos(phase), 0.0)
+    omega_t = body.omega + body.gain * u[p, 3]
+    linear = plus(times(u[p, 0], e_x), times(u[p, 1], E_Z))
+    return Motion(e_x, e_y, linear, plus(times(u[p, 2], e_y), times(omega_t, E_Z)), omega_t)
+
+
+@compiled
+def _derivative(x: Array, differentiation: Array, k: int, m: int) -> Vector:
+    total = (0.0, 0.0, 0.0)
+    for j in range(x.shape[1]):
+        total = plus(total, times(differentiation[m, j], vector(x, k, j)))
+    return total
+
+
+@compiled
+def _tail_rows(
+    body: Body, motion: Motion, x: Array, differentiation: Array, geometry: Geometry, system: System, m: int
+) -> None:
+    """Residual and drag of the nodes at phase m."""
+    n, phases, _ = x.shape
+    size, i = 3 * phases, 3 * m
+    body_column = 2 * size + 4 * (m % (system.corner.shape[0] // 4))
+    right = system.rows.shape[2] - 1
+    for k in range(n):
+        last = k == n - 1
+        row = system.rows[k]
+        position = vector(x, k, m)
+        by_phase = _derivative(x, differentiation, k, m)
+        velocity = plus(plus(motion.linear, cross(motion.spin, position)), times(motion.omega_t, by_phase))
+        tangent, spread = node_tangent(geometry, k + 1, m)
+        voronoi = 0.5 / n if last else 1.0 / n
+        perp, excess = voronoi * body.zeta_perp, voronoi * (body.zeta_parallel - body.zeta_perp)
+        residual = minus(node_drag(tangent, velocity, perp, excess), vector(geometry.force, k, m))
+        if not last:
+            residual = plus(residual, vector(geometry.force, k + 1, m))
+        row[i, right] = -residual[0]
+        row[i + 1, right] = -residual[1]
+        row[i + 2, right] = -residual[2]
+
+        # Drag through the velocity: −R (Ω× δx + ω_t δx') and the body's velocities.
+        resistance = node_resistance(tangent, perp, excess)
+        add_block(row, i, i, turned(resistance, motion.spin), -1.0)
+        for j in range(phases):
+            add_block(row, i, 3 * j, resistance, -motion.omega_t * differentiation[m, j])
+        along_x = applied(resistance, motion.e_x)
+        about_y = applied(resistance, cross(motion.e_y, position))
+        about_z = times(body.gain, applied(resistance, plus(cross(E_Z, position), by_phase)))
+        _put_border(row, i, body_column, along_x, transposed(resistance)[2], about_y, about_z)
+
+        # Drag through the node's tangent.
+        tilt = drag_by_tangents(tangent, spread, velocity, excess)
+        before = projected(tilt, vector(geometry.tangent, k + 1, m), 1 / geometry.length[k, m])
+        add_block(row, i, i, before, -1.0)
+        if k > 0:
+            add_block(row, i, size + i, before, 1.0)
+        if not last:
+            after = projected(tilt, vector(geometry.tangent, k + 2, m), 1 / geometry.length[k + 1, m])
+            add_block(row, i, i, after, 1.0)
+            add_block(system.upper[k + 1], i, i, after, -1.0)
+
+
+@compiled
+def _put_border(row: Array, i: int, column: int, a: Vector, b: Vector, c: Vector, d: Vector) -> None:
+    row[i, column], row[i + 1, column], row[i + 2, column] = -a[0], -a[1], -a[2]
+    row[i, column + 1], row[i + 1, column + 1], row[i + 2, column + 1] = -b[0], -b[1], -b[2]
+    row[i, column + 2], row[i + 1, column + 2], row[i + 2, column + 2] = -c[0], -c[1], -c[2]
+    row[i, column + 3], row[i + 1, column + 3], row[i + 2, column + 3] = -d[0], -d[1], -d[2]
+
+
+@compiled
+def _elastic_rows(body: Body, geometry: Geometry, system: System, m: int) -> None:
+    """Derivative of f_k = E_{e_k} − E_{e_{k−1}} in the node positions, at phase m."""
+    n, phases = geometry.length.shape
+    size, i = 3 * phases, 3 * m
+    for k in range(n):  # edge k ends at the node of row k
+        row = system.rows[k]
+        block = edge_block(geometry, k, m, body.axial_stiffness)
+        add_block(row, i, i, block, -1.0)
+        if k > 0:
+            above = system.rows[k - 1]
+            add_block(above, i, i, block, -1.0)
+            add_block(system.upper[k], i, i, block, 1.0)
+            add_block(row, i, size + i, block, 1.0)
+            joint = joint_block(geometry, k, m)  # between edges k − 1 and k
+            back = transposed(joint)
+            add_block(above, i, i, added(joint, back), 1.0)
+            add_block(system.upper[k], i, i, joint, -1.0)
+            add_block(row, i, size + i, back, -1.0)
+            if k > 1:
+                add_block(system.upper[k - 1], i, i, joint, -1.0)
+                add_block(above, i, size + i, back, -1.0)
+                add_block(system.upper2[k, m], 0, 0, joint, 1.0)
+                add_block(system.lower2[k, m], 0, 0, back, 1.0)
+
+
+@compiled
+def _body_rows(body: Body, motion: Motion, geometry: Geometry, system: System, m: int) -> None:
+    """What the tail puts on the disc through its clamp at phase m, about J."""
+    n = geometry.length.shape[0]
+    unknowns = system.corner.shape[0]
+    t, i = 4 * (m % (unknowns // 4)), 3 * m
+    root = (body.offset, 0.0, 0.0)
+    tangent, spread = node_tangent(geometry, 0, m)
+    first_tangent, length = vector(geometry.tangent, 1, m), geometry.length[0, m]
+    _, first, second = vector(geometry.joint, 0, m)
+    perp, excess = 0.5 / n * body.zeta_perp, 0.5 / n * (body.zeta_parallel - body.zeta_perp)
+    velocity = plus(motion.linear, cross(motion.spin, root))
+    force = plus(vector(geometry.force, 0, m), node_drag(tangent, velocity, perp, excess))
+    moment = plus(cross(root, force), clamp_moment(ROOT_TANGENT, first_tangent, first))
+    system.corner[t, unknowns] -= dot(motion.e_x, force)
+    system.corner[t + 1, unknowns] -= force[2]
+    system.corner[t + 2, unknowns] -= dot(motion.e_y, moment)
+    system.corner[t + 3, unknowns] -= moment[2]
+
+    tilt = drag_by_tangents(tangent, spread, velocity, excess)
+    by_edge = subtracted(
+        edge_block(geometry, 0, m, body.axial_stiffness), projected(tilt, first_tangent, 1 / length)
+    )
+    turn = clamp_moment_by_edge(
+        ROOT_TANGENT, first_tangent, length, first, second, vector(geometry.by_after, 0, m)
+    )
+    by_next = joint_block(geometry, 1, m)  # edge 1 moves the force of edge 0
+    _add_foot(system.foot[1], t, i, motion, by_next, crossed(root, by_next))
+    moment_by_edge = added(crossed(root, subtracted(by_edge, by_next)), turn)
+    _add_foot(system.foot[0], t, i, motion, subtracted(by_edge, by_next), moment_by_edge)
+
+    resistance = node_resistance(tangent, perp, excess)
+    directions = (motion.e_x, E_Z, cross(motion.e_y, root), times(body.gain, cross(E_Z, root)))
+    for c in range(4):
+        drag = times(-1.0, applied(resistance, directions[c]))
+        torque = cross(root, drag)
+        system.corner[t, t + c] += dot(motion.e_x, drag)
+        system.corner[t + 1, t + c] += drag[2]
+        system.corner[t + 2, t + c] += dot(motion.e_y, torque)
+        system.corner[t + 3, t + c] += torque[2]
+
+
+@compiled
+def _add_foot(foot: Array, t: int, i: int, motion: Motion, force: Matrix, moment: Matrix) -> None:
+    by_x, by_y = applied(transposed(force), motion.e_x), applied(transposed(moment), motion.e_y)
+    for b in range(3):
+        foot[t, i + b] += by_x[b]
+        foot[t + 1, i + b] += force[2][b]
+        foot[t + 2, i + b] += by_y[b]
+        foot[t + 3, i + b] += moment[2][b]
+
+
+@compiled
+def _head_rows(body: Body, u: Array, system: System) -> None:
+    unknowns = system.corner.shape[0]
+    for p in range(u.shape[0]):
+        omega_t = body.omega + body.gain * u[p, 3]
+        for a in range(4):
+            row = system.corner[4 * p + a]
+            for c in range(4):
+                row[4 * p + c] -= body.resistance[a, c]
+                row[unknowns] += body.resistance[a, c] * u[p, c]
+            row[4 * p + 3] -= body.gain * body.resistance[a, 4]
+            row[unknowns] += body.resistance[a, 4] * omega_t
+
+
+@compiled
+def linearise(body: Body, x: Array, u: Array, differentiation: Array, geometry: Geometry, system: System) -> None:
+    """Newton's equations at x (n, M, 3), u (P, 4)."""
+    elimination.clear(system)
+    measure(geometry, x, (body.offset, 0.0, 0.0), body.axial_stiffness)
+    for m in range(x.shape[1]):
+        motion = _motion(body, u, m, x.shape[1])
+        _tail_rows(body, motion, x, differentiation, geometry, system, m)
+        _elastic_rows(body, geometry, system, m)
+        _body_rows(body, motion, geometry, system, m)
+    _head_rows(body, u, system)
+
+
+@compiled
+def imbalance(system: System) -> float:
+    """Largest force on a node or wrench on the robot that `linearise` found unbalanced."""
+    column = system.rows.shape[2] - 1
+    largest = np.max(np.abs(system.corner[:, system.corner.shape[0]]))
+    return max(largest, np.max(np.abs(system.rows[:, :, column])))
+
+
+@compiled
+def newton(
+    body: Body, x: Array, u: Array, differentiation: Array, tolerance: float, most: int
+) -> tuple[int, float, float]:
+    """Improve x (n, M, 3) and u (P, 4) in place.
+
+    Returns:
+        Number of corrections, size of the last one (in l and 1 + |ω|; above `tolerance`: not converged) and the
+        imbalance before it [EI/l²].
+    """
+    n, phases, _ = x.shape
+    geometry = new_geometry(n, phases)
+    system = elimination.new_system(n, phases, u.size)
+    dx, du = np.zeros((n, 3 * phases)), np.zeros(u.size)
+    size, left = np.inf, np.inf
+    for count in range(1, most + 1):
+        linearise(body, x, u, differentiation, geometry, system)
+        left = imbalance(system)
+        elimination.solve(system, dx, du)
+        size = max(np.max(np.abs(dx)), np.max(np.abs(du)) / (1 + abs(body.omega)))
+        if not np.isfinite(size):
+            return count, np.inf, left
+        factor = min(1.0, _LARGEST_MOVE / size)
+        x += factor * dx.reshape(x.shape)
+        u += factor * du.reshape(u.shape)
+        if size < tolerance:
+            return count, size, left
+    return most, size, left
