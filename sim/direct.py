@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 from sim.balance import Swimmer
 from sim.compiling import compiled
-from sim.orbit import Body, newton
+from sim.orbit import newton
 from sim.robot import Groups
+from sim.tail import Body
 
 Array = NDArray[np.float64]
 

@@ -15,88 +15,39 @@ is solved on the mirror image of the phases), u at the P phases of one period;
 d/dφ is the derivative of the trigonometric interpolant (spectral accuracy: at low ω̄ the shape hardly depends on
 φ and M = 4 to 8 phases do). Newton's method on all phases together, solved by `sim.elimination`.
 
-Here a robot also has a gain of the motor, ω_t = ω + gain ω_h (1: a stiff motor), and drag on the disc.
 Left out: branches on which the tails move differently (time stepping finds those, `sim.settling`).
 Units: l, μ0 l⁴/EI, EI/l². Source: the paper's model (arXiv 2103.05712); for collocation Trefethen (2000), ch. 3.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from sim import elimination
 from sim.compiling import compiled
-from sim.drag import drag_by_tangents, node_drag, node_resistance
 from sim.elimination import System
-from sim.rod import clamp_moment, clamp_moment_by_edge
 from sim.tail import (
-    ROOT_TANGENT,
+    E_Z,
+    Body,
     Geometry,
+    Motion,
     add_block,
+    clamp_balance,
     edge_block,
     joint_block,
     measure,
+    motion_at,
     new_geometry,
-    node_tangent,
+    node_balance,
     vector,
 )
-from sim.vectors import (
-    Matrix,
-    Vector,
-    added,
-    applied,
-    cross,
-    crossed,
-    dot,
-    minus,
-    plus,
-    projected,
-    subtracted,
-    times,
-    transposed,
-    turned,
-)
+from sim.vectors import Matrix, Vector, added, applied, cross, dot, plus, subtracted, times, transposed, turned
 
 Array = NDArray[np.float64]
 
 _LARGEST_MOVE = 0.3  # of a node in one Newton correction, in l
 FIRST_PHASE = np.pi / 2
-E_Z = (0.0, 0.0, 1.0)
-
-
-class Body(NamedTuple):
-    """Numbers that make one robot, see `sim.balance.Swimmer`."""
-
-    omega: float
-    offset: float  # a/l
-    axial_stiffness: float
-    zeta_parallel: float
-    zeta_perp: float
-    gain: float
-    resistance: Array  # (4, 5): wrench by (v_x, v_z, ω_yr, ω_h, ω_t)
-
-
-class Motion(NamedTuple):
-    """Velocities at one phase."""
-
-    e_x: Vector
-    e_y: Vector
-    linear: Vector  # of J
-    spin: Vector  # of the disc frame
-    omega_t: float
-
-
-@compiled
-def _motion(body: Body, u: Array, m: int, phases: int) -> Motion:
-    phase = FIRST_PHASE + 2 * np.pi * m / phases
-    p = m % u.shape[0]
-    e_x, e_y = (np.cos(phase), -np.sin(phase), 0.0), (np.sin(phase), np.cos(phase), 0.0)
-    omega_t = body.omega + body.gain * u[p, 3]
-    linear = plus(times(u[p, 0], e_x), times(u[p, 1], E_Z))
-    return Motion(e_x, e_y, linear, plus(times(u[p, 2], e_y), times(omega_t, E_Z)), omega_t)
 
 
 @compiled
@@ -117,23 +68,14 @@ def _tail_rows(
     body_column = 2 * size + 4 * (m % (system.corner.shape[0] // 4))
     right = system.rows.shape[2] - 1
     for k in range(n):
-        last = k == n - 1
         row = system.rows[k]
         position = vector(x, k, m)
         by_phase = _derivative(x, differentiation, k, m)
         velocity = plus(plus(motion.linear, cross(motion.spin, position)), times(motion.omega_t, by_phase))
-        tangent, spread = node_tangent(geometry, k + 1, m)
-        voronoi = 0.5 / n if last else 1.0 / n
-        perp, excess = voronoi * body.zeta_perp, voronoi * (body.zeta_parallel - body.zeta_perp)
-        residual = minus(node_drag(tangent, velocity, perp, excess), vector(geometry.force, k, m))
-        if not last:
-            residual = plus(residual, vector(geometry.force, k + 1, m))
-        row[i, right] = -residual[0]
-        row[i + 1, right] = -residual[1]
-        row[i + 2, right] = -residual[2]
+        residual, resistance, before, after = node_balance(geometry, body, k, m, velocity)
+        row[i, right], row[i + 1, right], row[i + 2, right] = -residual[0], -residual[1], -residual[2]
 
         # Drag through the velocity: −R (Ω× δx + ω_t δx') and the body's velocities.
-        resistance = node_resistance(tangent, perp, excess)
         add_block(row, i, i, turned(resistance, motion.spin), -1.0)
         for j in range(phases):
             add_block(row, i, 3 * j, resistance, -motion.omega_t * differentiation[m, j])
@@ -143,14 +85,10 @@ def _tail_rows(
         _put_border(row, i, body_column, along_x, transposed(resistance)[2], about_y, about_z)
 
         # Drag through the node's tangent.
-        tilt = drag_by_tangents(tangent, spread, velocity, excess)
-        before = projected(tilt, vector(geometry.tangent, k + 1, m), 1 / geometry.length[k, m])
-        add_block(row, i, i, before, -1.0)
+        add_block(row, i, i, subtracted(after, before), 1.0)
         if k > 0:
             add_block(row, i, size + i, before, 1.0)
-        if not last:
-            after = projected(tilt, vector(geometry.tangent, k + 2, m), 1 / geometry.length[k + 1, m])
-            add_block(row, i, i, after, 1.0)
+        if k < n - 1:
             add_block(system.upper[k + 1], i, i, after, -1.0)
 
 
@@ -191,38 +129,19 @@ def _elastic_rows(body: Body, geometry: Geometry, system: System, m: int) -> Non
 @compiled
 def _body_rows(body: Body, motion: Motion, geometry: Geometry, system: System, m: int) -> None:
     """What the tail puts on the disc through its clamp at phase m, about J."""
-    n = geometry.length.shape[0]
     unknowns = system.corner.shape[0]
     t, i = 4 * (m % (unknowns // 4)), 3 * m
+    clamp = clamp_balance(geometry, body, m, motion)
+    system.corner[t, unknowns] -= dot(motion.e_x, clamp.force)
+    system.corner[t + 1, unknowns] -= clamp.force[2]
+    system.corner[t + 2, unknowns] -= dot(motion.e_y, clamp.moment)
+    system.corner[t + 3, unknowns] -= clamp.moment[2]
+    _add_foot(system.foot[0], t, i, motion, clamp.force_by_first, clamp.moment_by_first)
+    _add_foot(system.foot[1], t, i, motion, clamp.force_by_second, clamp.moment_by_second)
     root = (body.offset, 0.0, 0.0)
-    tangent, spread = node_tangent(geometry, 0, m)
-    first_tangent, length = vector(geometry.tangent, 1, m), geometry.length[0, m]
-    _, first, second = vector(geometry.joint, 0, m)
-    perp, excess = 0.5 / n * body.zeta_perp, 0.5 / n * (body.zeta_parallel - body.zeta_perp)
-    velocity = plus(motion.linear, cross(motion.spin, root))
-    force = plus(vector(geometry.force, 0, m), node_drag(tangent, velocity, perp, excess))
-    moment = plus(cross(root, force), clamp_moment(ROOT_TANGENT, first_tangent, first))
-    system.corner[t, unknowns] -= dot(motion.e_x, force)
-    system.corner[t + 1, unknowns] -= force[2]
-    system.corner[t + 2, unknowns] -= dot(motion.e_y, moment)
-    system.corner[t + 3, unknowns] -= moment[2]
-
-    tilt = drag_by_tangents(tangent, spread, velocity, excess)
-    by_edge = subtracted(
-        edge_block(geometry, 0, m, body.axial_stiffness), projected(tilt, first_tangent, 1 / length)
-    )
-    turn = clamp_moment_by_edge(
-        ROOT_TANGENT, first_tangent, length, first, second, vector(geometry.by_after, 0, m)
-    )
-    by_next = joint_block(geometry, 1, m)  # edge 1 moves the force of edge 0
-    _add_foot(system.foot[1], t, i, motion, by_next, crossed(root, by_next))
-    moment_by_edge = added(crossed(root, subtracted(by_edge, by_next)), turn)
-    _add_foot(system.foot[0], t, i, motion, subtracted(by_edge, by_next), moment_by_edge)
-
-    resistance = node_resistance(tangent, perp, excess)
     directions = (motion.e_x, E_Z, cross(motion.e_y, root), times(body.gain, cross(E_Z, root)))
     for c in range(4):
-        drag = times(-1.0, applied(resistance, directions[c]))
+        drag = times(-1.0, applied(clamp.resistance, directions[c]))
         torque = cross(root, drag)
         system.corner[t, t + c] += dot(motion.e_x, drag)
         system.corner[t + 1, t + c] += drag[2]
@@ -260,7 +179,7 @@ def linearise(body: Body, x: Array, u: Array, differentiation: Array, geometry: 
     elimination.clear(system)
     measure(geometry, x, (body.offset, 0.0, 0.0), body.axial_stiffness)
     for m in range(x.shape[1]):
-        motion = _motion(body, u, m, x.shape[1])
+        motion = motion_at(body, u[m % u.shape[0]], FIRST_PHASE + 2 * np.pi * m / x.shape[1])
         _tail_rows(body, motion, x, differentiation, geometry, system, m)
         _elastic_rows(body, geometry, system, m)
         _body_rows(body, motion, geometry, system, m)

@@ -1,7 +1,9 @@
-"""Tails in compiled loops: geometry, forces and stiffness of every edge and joint.
+"""Tails in compiled loops: geometry, stiffness of edges and joints, balance of nodes and clamp.
 
-The loops run the formulas of `sim.rod` over the nodes of M lanes side by side: disc phases of one tail in
-`sim.orbit`. `sim.elastic` does the same with tensors.
+The loops run the formulas of `sim.rod` and `sim.drag` over the nodes of M lanes side by side: disc phases of one
+tail in `sim.orbit`, the N tails of a robot in `sim.march`. Every lane is turned about the axis so that its clamp
+lies at (a, 0, 0): tail j of a robot at disc phase φ is a lane at phase φ + 2πj/N. `sim.elastic` and `sim.balance`
+do the same with tensors.
 
 Layout: arrays are (node, lane, component), so that the 3 M components of a node lie together.
 Units: l, μ0 l⁴/EI, EI/l².
@@ -15,13 +17,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.compiling import compiled
-from sim.rod import bend, edge_force, edge_stiffness, joint_stiffness
-from sim.vectors import Matrix, Vector, dot, minus, plus, times
+from sim.drag import drag_by_tangents, node_drag, node_resistance
+from sim.rod import bend, clamp_moment, clamp_moment_by_edge, edge_force, edge_stiffness, joint_stiffness
+from sim.vectors import Matrix, Vector, added, cross, crossed, dot, minus, plus, projected, subtracted, times
 
 Array = NDArray[np.float64]
 
 ROOT_TANGENT = (0.0, 0.0, -1.0)
 NONE = (0.0, 0.0, 0.0)
+NO_BLOCK = (NONE, NONE, NONE)
+E_Z = (0.0, 0.0, 1.0)
+
+
+class Body(NamedTuple):
+    """Numbers that make one robot, see `sim.balance.Swimmer`."""
+
+    omega: float
+    offset: float  # a/l
+    axial_stiffness: float
+    zeta_parallel: float
+    zeta_perp: float
+    gain: float
+    resistance: Array  # (4, 5): wrench by (v_x, v_z, ω_yr, ω_h, ω_t)
+
+
+class Motion(NamedTuple):
+    """Velocities of the robot as a lane at some phase sees them."""
+
+    e_x: Vector
+    e_y: Vector
+    linear: Vector  # of J
+    spin: Vector  # of the disc frame
+    omega_t: float
+
+
+@compiled
+def motion_at(body: Body, u: Array, phase: float) -> Motion:
+    """Motion for the velocities u = (v_x, v_z, ω_yr, ω_h) at a phase."""
+    e_x, e_y = (np.cos(phase), -np.sin(phase), 0.0), (np.sin(phase), np.cos(phase), 0.0)
+    omega_t = body.omega + body.gain * u[3]
+    linear = plus(times(u[0], e_x), times(u[1], E_Z))
+    return Motion(e_x, e_y, linear, plus(times(u[2], e_y), times(omega_t, E_Z)), omega_t)
 
 
 class Geometry(NamedTuple):
@@ -143,3 +179,66 @@ def node_tangent(geometry: Geometry, k: int, m: int) -> tuple[Vector, float]:
         total = plus(total, vector(geometry.tangent, k + 1, m))
     spread = np.sqrt(dot(total, total))
     return times(1 / spread, total), spread
+
+
+@compiled
+def node_balance(
+    geometry: Geometry, body: Body, k: int, m: int, velocity: Vector
+) -> tuple[Vector, Matrix, Matrix, Matrix]:
+    """Balance of the free node k + 1: drag plus elastic force, and the drag's derivatives.
+
+    Returns:
+        r, −∂q/∂v, −∂q/∂e_k through the tangents, −∂q/∂e_{k+1} (zero at the tip).
+    """
+    n = geometry.length.shape[0]
+    last = k == n - 1
+    voronoi = 0.5 / n if last else 1.0 / n
+    perp, excess = voronoi * body.zeta_perp, voronoi * (body.zeta_parallel - body.zeta_perp)
+    tangent, spread = node_tangent(geometry, k + 1, m)
+    residual = minus(node_drag(tangent, velocity, perp, excess), vector(geometry.force, k, m))
+    tilt = drag_by_tangents(tangent, spread, velocity, excess)
+    before = projected(tilt, vector(geometry.tangent, k + 1, m), 1 / geometry.length[k, m])
+    after = NO_BLOCK
+    if not last:
+        residual = plus(residual, vector(geometry.force, k + 1, m))
+        after = projected(tilt, vector(geometry.tangent, k + 2, m), 1 / geometry.length[k + 1, m])
+    return residual, node_resistance(tangent, perp, excess), before, after
+
+
+class Clamp(NamedTuple):
+    """What a tail puts on the disc, about J, and its derivatives in the first two free nodes."""
+
+    force: Vector
+    moment: Vector
+    resistance: Matrix  # of the half cell at the clamp
+    force_by_first: Matrix
+    moment_by_first: Matrix
+    force_by_second: Matrix
+    moment_by_second: Matrix
+
+
+@compiled
+def clamp_balance(geometry: Geometry, body: Body, m: int, motion: Motion) -> Clamp:
+    """Load that edge 0, its bending spring and the drag on node 0 pass to the disc; n ≥ 2 edges."""
+    root = (body.offset, 0.0, 0.0)
+    voronoi = 0.5 / geometry.length.shape[0]
+    perp, excess = voronoi * body.zeta_perp, voronoi * (body.zeta_parallel - body.zeta_perp)
+    tangent, spread = node_tangent(geometry, 0, m)
+    edge, length = vector(geometry.tangent, 1, m), geometry.length[0, m]
+    _, first, second = vector(geometry.joint, 0, m)
+    velocity = plus(motion.linear, cross(motion.spin, root))
+    force = plus(vector(geometry.force, 0, m), node_drag(tangent, velocity, perp, excess))
+    tilt = drag_by_tangents(tangent, spread, velocity, excess)
+    by_second = joint_block(geometry, 1, m)  # edge 1 moves the force of edge 0
+    by_edge = subtracted(edge_block(geometry, 0, m, body.axial_stiffness), projected(tilt, edge, 1 / length))
+    by_first = subtracted(by_edge, by_second)
+    turn = clamp_moment_by_edge(ROOT_TANGENT, edge, length, first, second, vector(geometry.by_after, 0, m))
+    return Clamp(
+        force,
+        plus(cross(root, force), clamp_moment(ROOT_TANGENT, edge, first)),
+        node_resistance(tangent, perp, excess),
+        by_first,
+        added(crossed(root, by_first), turn),
+        by_second,
+        crossed(root, by_second),
+    )

@@ -14,6 +14,7 @@ from sim.motion import DIRECT, STEPPING
 from sim.robot import PRESETS, Groups
 from sim.shapes import tails_over_a_revolution
 from sim.steady import orbits, steady
+from sim.tail import Body, new_geometry
 from tests.sim.robots import control
 
 Floats = np.ndarray
@@ -24,9 +25,9 @@ def sweep_points(count: int) -> dict[str, Floats]:
     return {name: values for name, values in points.items() if name != "dwell_bar"}
 
 
-def body_of(groups: Groups) -> tuple[orbit.Body, Floats]:
+def body_of(groups: Groups) -> tuple[Body, Floats]:
     row = direct.bodies(assemble(groups, edges=2), groups)[0]
-    return orbit.Body(*row[:6].tolist(), row[8:28].reshape(4, 5).copy()), row
+    return Body(*row[:6].tolist(), row[8:28].reshape(4, 5).copy()), row
 
 
 def test_time_stepping_from_rest_reaches_the_same_motion() -> None:
@@ -91,13 +92,13 @@ def test_newton_s_matrix_is_the_derivative_of_the_residual() -> None:
 
     def residual(z: Floats) -> Floats:
         system = elimination.new_system(n, phases, u.size)
-        geometry = orbit.new_geometry(n, phases)
+        geometry = new_geometry(n, phases)
         orbit.linearise(body, z[: x.size].reshape(x.shape), z[x.size :].reshape(u.shape), matrix, geometry, system)
         return np.concatenate([-system.rows[:, :, -1].ravel(), -system.corner[:, -1]])
 
     z = np.concatenate([x.ravel(), u.ravel()])
     system = elimination.new_system(n, phases, u.size)
-    orbit.linearise(body, x, u, matrix, orbit.new_geometry(n, phases), system)
+    orbit.linearise(body, x, u, matrix, new_geometry(n, phases), system)
     m = 3 * phases
     jacobian = np.zeros((len(z), len(z)))
     for k in range(n):
