@@ -1,8 +1,8 @@
 """Robots -> rows: simulate a design in parallel, chunk by chunk.
 
-Each robot runs from rest to its steady motion (`sim.steady`), and from there through flips of the motor
-with its own half-period (`sim.switching`). Rows are batched by N, resolution, |ω̄| and half-period; every
-finished batch is stored at once, so an interruption loses one batch a process.
+Each robot's steady motion is solved for (`sim.steady`), and from there it is stepped through flips of the motor
+with its own half-period (`sim.switching`). Rows are batched by N; every finished batch is stored at once, so an
+interruption loses one batch a worker.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from sim.errors import InputError
 from sim.motion import STEADY_COLUMNS
 from sim.resolution import Resolution
 from sim.robot import DWELL, Groups, check_columns
-from sim.settling import settle
 from sim.steady import steady
 from sim.switching import switch_response
 
 Columns = dict[str, NDArray[Any]]
+PART_ROWS = 64  # what an interruption loses, a worker
 BACKENDS = ("loky", "dask", "ray")
 
 
@@ -42,11 +42,9 @@ def simulate(points: dict[str, NDArray[np.float64]]) -> Columns:
     """
     values = check_columns({k: v for k, v in points.items() if k != DWELL})
     groups = Groups.from_columns(values)
-    resolution = Resolution.fitting(float(groups.omega_bar.abs().max()))
     motion = steady(groups)
-    response = switch_response(
-        groups, points[DWELL], *settle(groups, resolution=resolution), resolution=resolution
-    )
+    response = switch_response(groups, points[DWELL])
+    resolutions = [Resolution.fitting(speed) for speed in values["omega_bar"].tolist()]
     steady_values = motion.columns()
     columns: Columns = {**values, DWELL: points[DWELL], **{k: steady_values[k] for k in STEADY_COLUMNS}}
     failed = motion.failed | response.failed
@@ -59,8 +57,8 @@ def simulate(points: dict[str, NDArray[np.float64]]) -> Columns:
         "failed": failed,
         "converged": columns["converged"] & ~failed,
         "touching": columns["tail_gap"] < 1,
-        "edges": np.full(len(groups), resolution.edges),
-        "steps": np.full(len(groups), resolution.steps),
+        "edges": np.array([r.edges for r in resolutions]),
+        "steps": np.array([r.steps for r in resolutions]),
     }
     for name in STEADY_COLUMNS[:7]:
         columns[name] = np.where(failed, np.nan, columns[name])
@@ -90,9 +88,8 @@ def build(
     config_hash = fingerprint({**config, "code": code_version()})
     _check_folder(out, config_hash)
     points = design.points()
-    batches = split(points["N"], points["omega_bar"], then_by=points[DWELL])
-    cost = [len(b) * points["N"][b[0]] * float(points["omega_bar"][b].max()) for b in batches]
-    waiting = [i for i in np.argsort(cost)[::-1].tolist() if not part_path(out, i).exists()]
+    batches = split(points["N"], PART_ROWS)
+    waiting = [i for i in range(len(batches)) if not part_path(out, i).exists()]
     out.mkdir(parents=True, exist_ok=True)
     work = partial(_simulate_part, folder=out, effects=effects, config_hash=config_hash)
     todo = [(i, batches[i], {k: v[batches[i]] for k, v in points.items()}) for i in waiting]

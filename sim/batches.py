@@ -1,8 +1,6 @@
 """Many robots in parallel: rows are split into batches of one N, spread over threads or processes.
 
-Time stepping moves all robots of a batch together at the resolution that its fastest motor needs, so rows of
-similar |ω̄| go together. Each worker uses one thread: batches are the parallelism, and threads inside small
-operations would only fight them.
+Each worker uses one thread: batches are the parallelism; threads inside small operations would only fight them.
 """
 
 from __future__ import annotations
@@ -24,34 +22,17 @@ from sim.robot import Groups, check_columns
 from sim.settling import settle
 from sim.steady import steady
 
-_DIRECT_ROWS = 128  # robots solved directly between two ticks of the progress bar
-BATCH_NODES = 12_000  # nodes of all tails in a batch: fits the second-level cache, amortises overhead
+_DIRECT_ROWS, _STEPPED_ROWS = 128, 4  # robots between two ticks of the progress bar
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 
-def split(
-    tails: NDArray[np.float64],
-    omega_bar: NDArray[np.float64],
-    *,
-    then_by: NDArray[np.float64] | None = None,
-    resolution: Resolution | None = None,
-) -> list[NDArray[np.int64]]:
-    """Row numbers of batches with one N and one resolution, similar in |ω̄| (and in `then_by`)."""
-    speed = np.abs(omega_bar)
-    octave = np.floor(np.log2(np.maximum(speed, 1e-12)) * (1 if then_by is not None else 1e6))
-    second = speed if then_by is None else then_by
-    batches: list[NDArray[np.int64]] = []
-    needed = [resolution or Resolution.fitting(s) for s in speed]
-    kinds = {(n, r) for n, r in zip(tails.tolist(), needed, strict=True)}
-    for n, kind in sorted(kinds, key=lambda k: (k[0], k[1].edges, k[1].steps)):
-        rows = np.array([i for i in range(len(tails)) if tails[i] == n and needed[i] == kind])
-        rows = rows[np.lexsort((second[rows], octave[rows]))]
-        size = max(1, int(BATCH_NODES / (n * kind.edges)))
-        parts = -(-len(rows) // size)
-        batches.extend(np.array_split(rows, parts))
-    return batches
+def split(tails: NDArray[np.float64], rows: int) -> list[NDArray[np.int64]]:
+    """Row numbers of batches of one N with at most `rows` rows."""
+    order = np.argsort(tails, kind="stable")
+    ends = np.flatnonzero(np.diff(tails[order])) + 1
+    return [part for same in np.split(order, ends) for part in np.array_split(same, -(-len(same) // rows))]
 
 
 def available_jobs() -> int:
@@ -113,12 +94,7 @@ def steady_columns(
         The columns of `Steady.columns`, each (M,), in the order of the rows.
     """
     values = check_columns(columns)
-    order = np.argsort(values["N"], kind="stable")
-    ends = np.flatnonzero(np.diff(values["N"][order])) + 1
-    batches = [
-        part for rows in np.split(order, ends) for part in np.array_split(rows, -(-len(rows) // _DIRECT_ROWS))
-    ]
-    return _in_batches(_steady_batch, values, batches, jobs=jobs, title=title, threads=True)
+    return _in_batches(_steady_batch, values, split(values["N"], _DIRECT_ROWS), jobs=jobs, title=title)
 
 
 def stepped_columns(
@@ -133,16 +109,14 @@ def stepped_columns(
 
     Args:
         columns: robots by column name, each (M,).
-        resolution: mesh and step of all rows; by default what each batch needs.
+        resolution: mesh and step of all rows; by default what each needs.
         finer: divide edge length and step by this.
-        jobs: processes; default all processors.
+        jobs: threads; default all processors.
         title: of the progress bar; empty for none.
     """
     values = check_columns(columns)
-    batches = split(values["N"], values["omega_bar"], resolution=resolution)
-    batches.sort(key=lambda rows: -float(np.abs(values["omega_bar"][rows]).max()))
     work = partial(_settle_batch, chosen=resolution, finer=finer)
-    return _in_batches(work, values, batches, jobs=jobs, title=title)
+    return _in_batches(work, values, split(values["N"], _STEPPED_ROWS), jobs=jobs, title=title)
 
 
 def _in_batches(
@@ -152,11 +126,10 @@ def _in_batches(
     *,
     jobs: int | None,
     title: str,
-    threads: bool = False,
 ) -> dict[str, NDArray[Any]]:
     parts = [{name: array[rows] for name, array in values.items()} for rows in batches]
     sizes = [len(b) for b in batches]
-    done = run_batches(work, parts, sizes=sizes, jobs=jobs, title=title, threads=threads)
+    done = run_batches(work, parts, sizes=sizes, jobs=jobs, title=title, threads=True)
     order = np.argsort(np.concatenate(batches))
     return {name: np.concatenate([d[name] for d in done])[order] for name in done[0]}
 
@@ -170,4 +143,4 @@ def _settle_batch(
 ) -> dict[str, NDArray[Any]]:
     resolution = chosen or Resolution.fitting(float(np.abs(columns["omega_bar"]).max()))
     resolution = Resolution(finer * resolution.edges, finer * resolution.steps)
-    return settle(Groups.from_columns(columns), resolution=resolution)[0].columns()
+    return settle(Groups.from_columns(columns), resolution=resolution).columns()

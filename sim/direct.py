@@ -21,8 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.balance import Swimmer
+from sim.balance import assemble
 from sim.compiling import compiled
+from sim.contact import tail_gap
 from sim.orbit import newton
 from sim.robot import Groups
 from sim.tail import Body
@@ -58,8 +59,12 @@ class Orbits(NamedTuple):
     gap: Array  # (B,) smallest distance between tails over 2 r0
 
 
-def bodies(swimmer: Swimmer, groups: Groups) -> Array:
-    """Coefficients of B robots as rows of numbers for `solve_all`, (B, 29)."""
+HEAD_LENGTH, TAIL_RADIUS = 6, 7  # columns of `bodies` that are not in Body: L/l and r0/l
+
+
+def bodies(groups: Groups) -> Array:
+    """Robots as rows of numbers for the compiled loops, (B, 28)."""
+    swimmer = assemble(groups, edges=2)
     columns = [
         groups.omega_bar,
         swimmer.root[0, 0, 0],
@@ -75,7 +80,8 @@ def bodies(swimmer: Swimmer, groups: Groups) -> Array:
 
 
 @compiled
-def _body(row: Array) -> Body:
+def body_of(row: Array) -> Body:
+    """The robot of one row of `bodies`."""
     return Body(row[0], row[1], row[2], row[3], row[4], row[5], row[8:28].copy().reshape(4, 5))
 
 
@@ -224,7 +230,7 @@ def _enough_phases(body: Body, tails: int, head_length: float) -> tuple[int, flo
 @compiled
 def solve(row: Array, tails: int) -> tuple[int, float, Array, Array, Array]:
     """One robot: how it ended, relative error, means (5,), x (n, M, 3) and u (P, 4) on the finest mesh."""
-    body, head_length = _body(row), row[6]
+    body, head_length = body_of(row), row[HEAD_LENGTH]
     found = np.full((3, 5), np.nan)
     ended, phase_error, x, u = _enough_phases(body, tails, head_length)
     if ended != SOLVED:
@@ -266,30 +272,15 @@ def extrapolate(found: Array) -> tuple[Array, float]:
 
 @compiled
 def _smallest_gap(x: Array, body: Body, tails: int, radius: float) -> float:
-    """Smallest distance between nodes of tail 0 and edges of the others at all phases, over 2 r0."""
+    """Smallest gap between tails over a revolution; tail j is tail 0 a j-th part of a turn later."""
     x = with_phases(x, 2 * x.shape[1])
-    n, phases, _ = x.shape
-    smallest = np.inf
-    for j in range(1, tails):
-        angle = 2 * np.pi * j / tails
-        cos, sin = np.cos(angle), np.sin(angle)
-        for m in range(phases):
-            # Tail j is tail 0 a j-th part of a turn later, turned by that part.
-            other = (m + j * (phases // tails)) % phases
-            px, py, pz = cos * body.offset, sin * body.offset, 0.0
-            for k in range(n):
-                qx = cos * x[k, other, 0] - sin * x[k, other, 1]
-                qy = sin * x[k, other, 0] + cos * x[k, other, 1]
-                qz = x[k, other, 2]
-                ex, ey, ez = qx - px, qy - py, qz - pz
-                scale = 1 / (ex * ex + ey * ey + ez * ez)
-                for i in range(n):
-                    ax, ay, az = x[i, m, 0] - px, x[i, m, 1] - py, x[i, m, 2] - pz
-                    share = min(max((ax * ex + ay * ey + az * ez) * scale, 0.0), 1.0)
-                    ax, ay, az = ax - share * ex, ay - share * ey, az - share * ez
-                    smallest = min(smallest, ax * ax + ay * ay + az * az)
-                px, py, pz = qx, qy, qz
-    return np.sqrt(smallest) / (2 * radius)
+    spacing = x.shape[1] // tails
+    shape, smallest = np.empty((x.shape[0], tails, 3)), np.inf
+    for m in range(spacing):
+        for j in range(tails):
+            shape[:, j] = x[:, m + j * spacing]
+        smallest = min(smallest, tail_gap(shape, body.offset, radius))
+    return smallest
 
 
 @compiled
@@ -306,5 +297,17 @@ def solve_all(rows: Array, tails: int) -> Orbits:
     for i in range(count):
         ended, error, limit, x, _ = solve(rows[i], tails)
         out.means[i], out.error[i], out.ended[i], out.phases[i] = limit, error, ended, x.shape[1]
-        out.gap[i] = _smallest_gap(x, _body(rows[i]), tails, rows[i, 7]) if ended == SOLVED else np.nan
+        out.gap[i] = _smallest_gap(x, body_of(rows[i]), tails, rows[i, TAIL_RADIUS]) if ended == SOLVED else np.nan
     return out
+
+
+@compiled
+def on_mesh(row: Array, tails: int, edges: int) -> tuple[bool, Array, Array]:
+    """The orbit on a mesh of one's own: whether there is one, x (n, M, 3) and u (P, 4)."""
+    body = body_of(row)
+    ended, _, x, u = _enough_phases(body, tails, row[HEAD_LENGTH])
+    if ended != SOLVED:
+        return False, x, u
+    x = with_edges(x, body.offset, edges)
+    _, size, _ = newton(body, x, u, differentiation(x.shape[1]), CORRECTION, _MOST_CORRECTIONS)
+    return size < CORRECTION and _turns_forward(body, u), x, u

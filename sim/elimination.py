@@ -127,6 +127,30 @@ def invert_by_halves(a: Array) -> None:
 
 
 @compiled
+def solve_dense(a: Array, b: Array) -> None:
+    """b = a⁻¹ b in place by Gaussian elimination with row exchanges; a is used up. NaN in, NaN out."""
+    n = b.shape[0]
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[best, k]):
+                best = i
+        if best != k:
+            for j in range(k, n):
+                a[k, j], a[best, j] = a[best, j], a[k, j]
+            b[k], b[best] = b[best], b[k]
+        for i in range(k + 1, n):
+            factor = a[i, k] / a[k, k]
+            for j in range(k + 1, n):
+                a[i, j] -= factor * a[k, j]
+            b[i] -= factor * b[k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            b[k] -= a[k, j] * b[j]
+        b[k] /= a[k, k]
+
+
+@compiled
 def _gather(system: System, i: int) -> None:
     """right = [A_{i,i−1} | A_{i,i−2} | B_i, −r_i]."""
     row, right = system.rows[i], system.right
@@ -178,7 +202,8 @@ def solve(system: System, dx: Array, du: Array) -> None:
     first = np.ascontiguousarray(system.folded[0][:, 2 * m :])
     second = system.folded[1][:, 2 * m :] - np.dot(np.ascontiguousarray(system.folded[1][:, :m]), first)
     schur = system.corner - np.dot(system.foot[0], first) - np.dot(system.foot[1], second)
-    du[:] = np.linalg.solve(np.ascontiguousarray(schur[:, :unknowns]), np.ascontiguousarray(schur[:, unknowns]))
+    du[:] = schur[:, unknowns]
+    solve_dense(schur, du)
     for i in range(n):
         folded = system.folded[i]
         for a in range(m):

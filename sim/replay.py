@@ -8,9 +8,8 @@ Track of the head's centre, seen from above; lengths in l, time in μ0 l⁴/EI a
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +17,12 @@ import pandas as pd
 import torch
 from numpy.typing import NDArray
 
-from sim import planar
-from sim.balance import assemble
+from sim import direct, planar
 from sim.errors import InputError
-from sim.resolution import Resolution, time_step
+from sim.march import YAW, X, Y
+from sim.resolution import Resolution
 from sim.robot import Groups
-from sim.stepper import YAW, State, X, Y, at_rest, step
+from sim.run import Run
 
 _SAMPLES = 12  # track points a dwell, at most
 
@@ -72,10 +71,10 @@ def replay(
     resolution: Resolution | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> list[pd.DataFrame]:
-    """Simulate schedules, those of equal N side by side.
+    """Simulate schedules, one after the other.
 
     Args:
-        schedules: any robots; equal N run as one batch.
+        schedules: any robots.
         resolution: mesh and step; default `Resolution.fitting`.
         progress: called with the number of dwells done, counted over all schedules.
 
@@ -83,64 +82,35 @@ def replay(
         A track for each schedule: time_bar, time_s, x_over_l, y_over_l, heading_rad, direction,
         dwell (index of the dwell that ends at or after the sample).
     """
-    tracks: list[pd.DataFrame | None] = [None] * len(schedules)
-    for count in sorted({int(s.robot["N"]) for s in schedules}):
-        places = [i for i, s in enumerate(schedules) if int(s.robot["N"]) == count]
-        done = _replay_batch([schedules[i] for i in places], resolution, progress)
-        for place, track in zip(places, done, strict=True):
-            tracks[place] = track
-    return [track for track in tracks if track is not None]
+    return [_replay(schedule, resolution, progress) for schedule in schedules]
 
 
-def _replay_batch(
-    schedules: list[Schedule],
-    resolution: Resolution | None,
-    progress: Callable[[int], object] | None,
-) -> list[pd.DataFrame]:
-    names = sorted({name for s in schedules for name in s.robot})
-    groups = Groups.from_columns(
-        {k: np.array([s.robot.get(k, 1.0 if k == "a_over_R" else 0.0) for s in schedules]) for k in names}
-    )
-    speed = groups.omega_bar.abs()
-    chosen = resolution or Resolution.fitting(float(speed.max()))
-    swimmer = assemble(groups, edges=chosen.edges)
-    state = at_rest(swimmer)
-    direction = torch.tensor([float(s.first_direction) for s in schedules], dtype=torch.float64)
-    alive = torch.arange(len(schedules))
-    samples: list[list[tuple[float, ...]]] = [[(0.0, 0.0, 0.0, 0.0, d, 0)] for d in direction.tolist()]
-    for index in range(max(len(s.dwells) for s in schedules)):
-        keep = [k for k, i in enumerate(alive.tolist()) if index < len(schedules[i].dwells)]
-        if len(keep) < len(alive):
-            lanes = torch.tensor(keep)
-            alive, state, swimmer = alive[lanes], state.select(lanes), swimmer.select(lanes)
-        dwell = torch.tensor([schedules[i].dwells[index] for i in alive.tolist()], dtype=torch.float64)
-        omega = direction[alive] * speed[alive] * (-1.0) ** index
-        limit = time_step(omega, chosen)
-        count = max(1, math.ceil(float((dwell / limit).max()) - 1e-9))
-        stride = max(1, count // _SAMPLES)
+def _replay(
+    schedule: Schedule, resolution: Resolution | None, progress: Callable[[int], object] | None
+) -> pd.DataFrame:
+    groups = Groups.from_columns({name: np.array([value]) for name, value in schedule.robot.items()})
+    speed = abs(float(groups.omega_bar))
+    groups = replace(groups, omega_bar=torch.full_like(groups.omega_bar, schedule.first_direction * speed))
+    run = Run(direct.bodies(groups)[0], groups.N, resolution or Resolution.fitting(speed))
+    direction, time = schedule.first_direction, 0.0
+    rows: list[tuple[float, ...]] = [(0.0, 0.0, 0.0, 0.0, direction, 0)]
+    for index, dwell in enumerate(schedule.dwells.tolist()):
         if index:
-            state = state.flipped()
-        for i in range(1, count + 1):
-            state = step(swimmer, state, omega, dwell / count)
-            if i % stride == 0 or i == count:
-                _sample(samples, alive, state, torch.sign(omega), index)
-        if bool(state.failed.any()):
+            run.flip()
+            direction = -direction
+        poses = run.go(dwell)
+        if run.failed:
             raise InputError(f"the simulation failed in dwell {index + 1} of the schedule; a finer step may help")
+        count = len(poses)
+        stride = max(1, count // _SAMPLES)
+        for i in range(1, count + 1):
+            if i % stride == 0 or i == count:
+                x, y, yaw = poses[i - 1, [X, Y, YAW]].tolist()
+                rows.append((time + dwell * i / count, x, y, yaw, direction, index))
+        time += dwell
         if progress is not None:
-            progress(len(alive))
-    return [_track(s, rows) for s, rows in zip(schedules, samples, strict=True)]
-
-
-def _sample(
-    samples: list[list[tuple[float, ...]]],
-    alive: torch.Tensor,
-    state: State,
-    direction: torch.Tensor,
-    index: int,
-) -> None:
-    table = torch.stack([state.time, *state.pose[[X, Y, YAW]], direction]).T.tolist()
-    for lane, row in zip(alive.tolist(), table, strict=True):
-        samples[lane].append((*row, index))
+            progress(1)
+    return _track(schedule, rows)
 
 
 def _track(schedule: Schedule, rows: list[tuple[float, ...]]) -> pd.DataFrame:

@@ -9,9 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from torch import Tensor
-
-_LONGEST_STEP = 0.04  # time units: the tails' memory
+_LONGEST_STEP = 0.04  # time units: the tails' memory is about 0.7
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,7 @@ class Resolution:
 
     @staticmethod
     def fitting(omega_bar: float) -> Resolution:
-        """The default for motor speeds up to |omega_bar|: within 1 % of the limit up to ω̄ = 110."""
+        """The default for a motor speed: within 1 % of the limit up to ω̄ = 110."""
         speed = abs(omega_bar)
         if speed < 20:
             return Resolution(16, 24)
@@ -36,6 +34,6 @@ class Resolution:
         return Resolution(self.edges, 2 * self.steps)
 
 
-def time_step(omega: Tensor, resolution: Resolution) -> Tensor:
-    """dt for motor speeds (B,): a share of a motor revolution, but never longer than the tails' memory."""
-    return (2 * math.pi / (resolution.steps * omega.abs())).clamp(max=_LONGEST_STEP)
+def time_step(omega_bar: float, resolution: Resolution) -> float:
+    """dt for a motor speed: a share of a motor revolution, but never longer than a part of the tails' memory."""
+    return min(2 * math.pi / (resolution.steps * abs(omega_bar)), _LONGEST_STEP)

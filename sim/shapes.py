@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import direct
-from sim.balance import assemble
 from sim.errors import InputError
+from sim.march import PHASE, State
 from sim.orbit import FIRST_PHASE
 from sim.robot import Robot
 
@@ -24,8 +24,7 @@ def tails_over_a_revolution(robot: Robot, frames: int) -> tuple[Floats, Floats]:
         InputError: the robot has no steady motion on which its tails move alike.
     """
     groups = robot.groups()
-    row = direct.bodies(assemble(groups, edges=2), groups)[0]
-    ended, _, _, x, _ = direct.solve(row, groups.N)
+    ended, _, _, x, _ = direct.solve(direct.bodies(groups)[0], groups.N)
     if ended != direct.SOLVED:
         raise InputError(f"{robot.name} has no shape to draw: {direct.REASONS[ended]}")
     phases = 2 * np.pi * np.arange(frames) / frames
@@ -35,7 +34,7 @@ def tails_over_a_revolution(robot: Robot, frames: int) -> tuple[Floats, Floats]:
     tails = np.empty((frames, groups.N, len(nodes), 3))
     for j in range(groups.N):
         turn = phases + 2 * np.pi * j / groups.N  # tail j is tail 0 a j-th part of a turn later
-        shape = np.einsum("fm,kmc->fkc", _interpolation(turn - FIRST_PHASE, x.shape[1]), nodes)
+        shape = at_phases(nodes, turn)
         cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
         tails[:, j, :, 0] = cos * shape[..., 0] - sin * shape[..., 1]
         tails[:, j, :, 1] = sin * shape[..., 0] + cos * shape[..., 1]
@@ -43,12 +42,33 @@ def tails_over_a_revolution(robot: Robot, frames: int) -> tuple[Floats, Floats]:
     return phases, tails
 
 
-def _interpolation(at: Floats, phases: int) -> Floats:
-    """Values of the trigonometric interpolant on M equal phases from 0 at phases `at`, (F, M)."""
-    away = at[:, None] - 2 * np.pi * np.arange(phases) / phases
+def at_phases(periodic: Floats, at: Floats) -> Floats:
+    """A function on the orbit's phases, (K, M, c), at disc phases `at` (F,) by its interpolant, (F, K, c)."""
+    phases = periodic.shape[1]
+    away = at[:, None] - FIRST_PHASE - 2 * np.pi * np.arange(phases) / phases
     total = np.ones_like(away)
     for k in range(1, (phases + 1) // 2):
         total += 2 * np.cos(k * away)
     if phases % 2 == 0:
         total += np.cos(phases // 2 * away)
-    return np.asarray(total / phases)
+    return np.einsum("fm,kmc->fkc", total / phases, periodic)
+
+
+def state_on_orbit(row: Floats, tails: int, edges: int, phase: float) -> State | None:
+    """The state of a steadily swimming robot at a disc phase; None where there is no orbit."""
+    found, x, u = direct.on_mesh(row, tails, edges)
+    if not found:
+        return None
+    lanes = phase + 2 * np.pi * np.arange(tails) / tails
+    slope = np.einsum("ml,klc->kmc", direct.differentiation(x.shape[1]), x)
+    velocity = _in_one_period(u, phase, tails)
+    omega_t = row[0] + direct.body_of(row).gain * velocity[3]
+    pose = np.zeros(6)
+    pose[PHASE] = phase
+    shape, rate = (np.ascontiguousarray(at_phases(a, lanes).transpose(1, 0, 2)) for a in (x, slope))
+    return State(shape, rate * omega_t, pose, velocity)
+
+
+def _in_one_period(u: Floats, phase: float, tails: int) -> Floats:
+    """Velocities (P, 4) of period 2π/N at a disc phase, (4,)."""
+    return at_phases(np.tile(u, (tails, 1))[None], np.array([phase]))[0, 0]

@@ -11,7 +11,6 @@ import numpy as np
 import torch
 
 from sim import direct
-from sim.balance import assemble
 from sim.motion import DIRECT, Steady
 from sim.resolution import Resolution
 from sim.robot import Groups
@@ -29,7 +28,7 @@ def steady(groups: Groups) -> Steady:
 
 def orbits(groups: Groups) -> Steady:
     """The direct route alone; `failed` where it found no orbit."""
-    found = direct.solve_all(direct.bodies(assemble(groups, edges=2), groups), groups.N)
+    found = direct.solve_all(direct.bodies(groups), groups.N)
     means = found.means.T
     solved = found.ended == direct.SOLVED
     return Steady(
@@ -38,7 +37,7 @@ def orbits(groups: Groups) -> Steady:
         omega_yr=means[2],
         v_x=means[3],
         v_z=means[4],
-        tail_gap=found.gap if groups.N > 1 else np.full(len(groups), np.inf),
+        tail_gap=found.gap,
         error=found.error,
         converged=solved,
         failed=~solved,
@@ -49,9 +48,9 @@ def orbits(groups: Groups) -> Steady:
 
 def stepped(groups: Groups, notes: np.ndarray) -> Steady:
     """Time stepping from rest on two meshes and steps; their difference gives the error of the finer."""
-    resolution = Resolution.fitting(float(groups.omega_bar.abs().max()))
-    coarse, _ = settle(groups, resolution=resolution)
-    fine, _ = settle(groups, resolution=Resolution(2 * resolution.edges, 2 * resolution.steps))
+    needed = Resolution.fitting(float(groups.omega_bar.abs().max()))
+    coarse = settle(groups, resolution=needed)
+    fine = settle(groups, resolution=Resolution(2 * needed.edges, 2 * needed.steps))
     speed = np.hypot(fine.v_x, fine.v_z)
     relative = [np.abs(getattr(coarse, k) / getattr(fine, k) - 1) for k in ("omega_t", "omega_h", "omega_yr")]
     relative += [np.abs(getattr(coarse, k) - getattr(fine, k)) / speed for k in ("v_x", "v_z")]

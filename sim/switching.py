@@ -12,126 +12,122 @@ With equal dwells of T the robot zigzags along a line at the net speed
 
     v̄ = |p + Rot(Δψ) M p| / 2T,   g = (p, Δψ),  M the mirror image,
 
-since a reversed motor mirrors the motion. Both come from one run: from the steady state the motor flips
-until the start is forgotten (once, where T exceeds the tails' memory), and g is the mean over the last
-half-periods and over two disc phases half a tail spacing apart at the first flip (the phase at a flip matters
-for N = 2, and a planner does not know it).
+since a reversed motor mirrors the motion. Where T exceeds the tails' memory one flip from the steady motion gives
+g. Where it does not, the motor flips on until the motion repeats: the shape at a flip is the mirror image of the
+one at the flip before (the flipped periodic orbit; flips forget their start as fast as the tails turn over). g is
+the mean over two disc phases half a tail spacing apart at the first flip: the phase at a flip matters for N = 2,
+and a planner does not know it.
 
-Units: length l, time μ0 l⁴/EI.
+The steady circle is that of the same mesh and step, so that the discretisation's error, which grows with T,
+cancels in the lag. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
-from sim import planar
-from sim.balance import Swimmer, assemble
+from sim import direct, planar
 from sim.effects import catalogue
-from sim.motion import Steady
-from sim.resolution import Resolution, time_step
+from sim.march import PHASE, SURGE, SWAY, YAW
+from sim.resolution import Resolution
 from sim.robot import Groups
-from sim.stepper import YAW, State, X, Y, step
+from sim.run import Run
+from sim.settling import settle_one
+from sim.shapes import state_on_orbit
+
+Floats = NDArray[np.float64]
 
 MEMORY = 1.2  # time units after which a flip is forgotten: the tails turn over in about 0.7
 _AVERAGED = 2  # half-periods that the mean is taken over, where there are as many
+_ADAPTS = 0.5  # time units in which the direct solution goes over into that of the time steps
+_WINDOW = 0.5  # shortest averaging time of the steady circle
 
 
 @dataclass(frozen=True)
 class SwitchResponse:
     """Response of B robots to flips with half-period T̄; all (B,), dimensionless, NaN where `failed`."""
 
-    dwell: NDArray[np.float64]
-    net_speed: NDArray[np.float64]
-    lag_psi: NDArray[np.float64]  # [rad], positive in the direction of the new turn
-    lag_x: NDArray[np.float64]  # sideways, positive towards the new turn's side
-    lag_z: NDArray[np.float64]  # forward
+    dwell: Floats
+    net_speed: Floats
+    lag_psi: Floats  # [rad], positive in the direction of the new turn
+    lag_x: Floats  # sideways, positive towards the new turn's side
+    lag_z: Floats  # forward
     failed: NDArray[np.bool_]
 
 
-def segment(swimmer: Swimmer, state: State, omega: Tensor, duration: Tensor, resolution: Resolution) -> State:
-    """Advance by `duration` (B,) at constant ω, in equal steps, the same number for all robots."""
-    count = max(1, math.ceil(float((duration / time_step(omega, resolution)).max()) - 1e-9))
-    for _ in range(count):
-        state = step(swimmer, state, omega, duration / count)
-    return state
-
-
-def switch_response(
-    groups: Groups,
-    dwell: NDArray[np.float64],
-    steady: Steady,
-    state: State,
-    *,
-    resolution: Resolution | None = None,
-) -> SwitchResponse:
-    """Flip the motor every `dwell` from the steady motion that `sim.settling.settle` returned.
+def switch_response(groups: Groups, dwell: Floats, *, resolution: Resolution | None = None) -> SwitchResponse:
+    """Flip the motor every `dwell` from the steady motion.
 
     Args:
         groups: robots of one N; the sign of ω̄ is the direction before the first flip.
         dwell: half-periods T̄, (B,).
-        steady, state: means and end states of the same robots.
-        resolution: must be the one of `state`'s mesh; by default the default of this batch.
+        resolution: mesh and step; by default what each robot needs.
     """
-    chosen = resolution or Resolution.fitting(float(groups.omega_bar.abs().max()))
-    edges = state.x.shape[0]
-    swimmer = assemble(groups, edges=edges)
-    fine = replace(chosen, edges=edges)
-    # Two copies: as it is, and half a tail spacing further round.
-    speed = torch.as_tensor(steady.omega_t).abs().nan_to_num(nan=1.0)
-    spacing = math.pi / groups.N / speed
-    later = segment(swimmer, state.restarted(), groups.omega_bar, spacing, fine)
-    both = torch.arange(len(groups)).repeat(2)
-    pair = swimmer.select(both)
-    flips = _join(state.restarted(), later.restarted())
-    T = torch.as_tensor(dwell, dtype=torch.float64)[both]
-    omega = groups.omega_bar[both]
-    changes: list[NDArray[np.float64]] = []
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
-    count = 1 + math.floor(MEMORY / float(dwell.min()))
-    count += 0 if even else count % 2
-    for _ in range(count):
-        omega = -omega
-        before = _poses(flips)
-        flips = segment(pair, flips.flipped(), omega, T, fine)
-        change = planar.between(before, _poses(flips))
-        sense = torch.sign(omega).numpy()
-        changes.append(np.where(sense[:, None] > 0, change, change * planar.MIRROR))
-    used = changes[-_AVERAGED:] if even else changes[-1:]
-    mean = np.mean(used, 0).reshape(2, len(groups), 3).mean(0)
-    return _response(mean, dwell, groups, steady, flips.failed.reshape(2, -1).any(0).numpy())
+    rows = direct.bodies(groups)
+    table = np.array([_respond(row, groups.N, T, even, resolution) for row, T in zip(rows, dwell, strict=True)])
+    failed = ~np.isfinite(table).all(1)
+    table[failed] = np.nan
+    speed, psi, x, z = table.T
+    return SwitchResponse(np.asarray(dwell, dtype=float), speed, psi, x, z, failed)
 
 
-def _response(
-    change: NDArray[np.float64],
-    dwell: NDArray[np.float64],
-    groups: Groups,
-    steady: Steady,
-    failed: NDArray[np.bool_],
-) -> SwitchResponse:
-    sense = np.sign(groups.omega_bar.numpy())
-    twist = np.stack([steady.v_z, steady.v_x * sense, steady.omega_yr * sense], -1)
+def _respond(row: Floats, tails: int, dwell: float, even: bool, resolution: Resolution | None) -> Floats:
+    """(v̄, Δψ, Δx, Δz) of one robot."""
+    chosen = resolution or Resolution.fitting(row[0])
+    state = state_on_orbit(row, tails, chosen.edges, 0.0)
+    if state is None:
+        settled = settle_one(row, tails, chosen)
+        if settled.failed:
+            return np.full(4, np.nan)
+        state = settled.state
+    run = Run(row, tails, chosen, state)
+    sense = np.sign(row[0])
+    twist, turn = _steady_twist(run, tails, sense)
+    if run.failed:
+        return np.full(4, np.nan)
+    later = run.copy()
+    later.go(0.5 * turn)
+    changes = []
+    for copy in (run, later):
+        changes.append(_change(copy, dwell, even, sense))
+        if copy.failed:
+            return np.full(4, np.nan)
+    change = np.mean(changes, 0)
     lag = planar.compose(change, planar.inverse(planar.arc(twist, dwell)))
     pair = planar.compose(change, change * planar.MIRROR)
-    failed = failed | ~np.isfinite(lag).all(-1)
-    lag = np.where(failed[:, None], np.nan, lag)
-    speed = np.where(failed, np.nan, np.hypot(pair[:, 0], pair[:, 1]) / (2 * dwell))
-    return SwitchResponse(dwell, speed, lag[:, 2], lag[:, 1], lag[:, 0], failed)
+    return np.array([np.hypot(pair[0], pair[1]) / (2 * dwell), lag[2], lag[1], lag[0]])
 
 
-def _poses(state: State) -> NDArray[np.float64]:
-    return state.pose[[X, Y, YAW]].T.numpy()
+def _steady_twist(run: Run, tails: int, sense: float) -> tuple[Floats, float]:
+    """Forward, leftward and yaw rate for a positive motor, and the time in which the disc turns by a tail spacing.
+
+    Velocities repeat with the spacing of the tails: means over a whole number of them.
+    """
+    run.go(_ADAPTS)
+    before = run.state.pose.copy()
+    spacing = 2 * np.pi / tails / abs(run.omega_t)
+    time = spacing * math.ceil(_WINDOW / spacing)
+    run.go(time)
+    change = (run.state.pose - before) / time
+    turn = 2 * np.pi / tails / abs(change[PHASE])
+    return np.array([change[SURGE], sense * change[SWAY], sense * change[YAW]]), turn
 
 
-def _join(first: State, second: State) -> State:
-    fields: dict[str, Any] = {
-        name: torch.cat([value, getattr(second, name)], -1) if torch.is_tensor(value) else None
-        for name, value in vars(first).items()
-    }
-    return State(**fields)
+def _change(run: Run, dwell: float, even: bool, sense: float) -> Floats:
+    """Pose change over a dwell, seen in the direction of a positive motor."""
+    count = 1 + math.floor(MEMORY / dwell)
+    count += 0 if even else count % 2
+    changes = []
+    for _ in range(count):
+        run.flip()
+        sense = -sense
+        before = run.pose
+        run.go(dwell)
+        change = planar.between(before, run.pose)
+        changes.append(change if sense > 0 else change * planar.MIRROR)
+    return np.asarray(np.mean(changes[-_AVERAGED:] if even else changes[-1:], 0))

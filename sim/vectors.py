@@ -125,3 +125,22 @@ def crossed(a: Vector, b: Matrix) -> Matrix:
 def turned(b: Matrix, a: Vector) -> Matrix:
     """b [a×]: the rows of b under × a."""
     return (cross(b[0], a), cross(b[1], a), cross(b[2], a))
+
+
+@formula
+def product(a: Matrix, b: Matrix) -> Matrix:
+    """a b."""
+    return (
+        plus(plus(times(a[0][0], b[0]), times(a[0][1], b[1])), times(a[0][2], b[2])),
+        plus(plus(times(a[1][0], b[0]), times(a[1][1], b[1])), times(a[1][2], b[2])),
+        plus(plus(times(a[2][0], b[0]), times(a[2][1], b[1])), times(a[2][2], b[2])),
+    )
+
+
+@formula
+def inverse(a: Matrix) -> Matrix:
+    """a⁻¹."""
+    p, q, r = transposed(a)
+    first = cross(q, r)
+    scale = 1.0 / dot(p, first)
+    return (times(scale, first), times(scale, cross(r, p)), times(scale, cross(p, q)))

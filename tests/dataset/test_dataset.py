@@ -94,15 +94,17 @@ def test_another_configuration_is_not_mixed_in(built: Path) -> None:
 
 
 def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sim import stepper
-    from sim.balance import newton_correction
+    """Neither an orbit nor a time step can be solved."""
+    from sim import direct, run, switching
 
-    def broken(*args: object) -> tuple[object, object]:
-        dx, du = newton_correction(*args)  # type: ignore[arg-type]
-        dx[..., 0] = float("nan")
-        return dx, du
+    def lost(rows: np.ndarray, _: int) -> direct.Orbits:
+        count, none = len(rows), np.full(len(rows), np.nan)
+        ended = np.full(count, direct.NO_START)
+        return direct.Orbits(np.full((count, 5), np.nan), none, np.zeros(count, int), ended, none)
 
-    monkeypatch.setattr(stepper, "newton_correction", broken)
+    monkeypatch.setattr(direct, "solve_all", lost)
+    monkeypatch.setattr(switching, "state_on_orbit", lambda *_: None)
+    monkeypatch.setattr(run, "advance", lambda *_: False)
     points = {"C_t": 3.0, "C_r": 2.8, "C_yr": 2.0, "l_over_R": 6.9, "L_over_R": 3.8, "l_over_r0": 34.0,
               "omega_bar": 10.0, "N": 2.0, "dwell_bar": 1.2}  # fmt: skip
     columns = simulate({k: np.array([v]) for k, v in points.items()})

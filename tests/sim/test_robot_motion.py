@@ -11,13 +11,14 @@ import pandas as pd
 import pytest
 import torch
 
+from sim import direct
 from sim.balance import assemble, fluid_wrench
 from sim.banded import BlockBanded
 from sim.batches import steady_columns
 from sim.contact import tail_gap
 from sim.interface import side_force_coefficient
+from sim.march import TOLERANCE, advance, new_state
 from sim.replay import Schedule, replay
-from sim.resolution import Resolution
 from sim.robot import PRESETS
 from sim.settling import settle
 from sim.steady import steady
@@ -94,7 +95,7 @@ def test_total_force_and_moment_vanish_to_round_off(tails: int) -> None:
 
 
 def test_reversing_the_motor_mirrors_the_motion() -> None:
-    for solve in (steady, lambda groups: settle(groups)[0]):
+    for solve in (steady, settle):
         forward, backward = solve(control(N=3)), solve(control(N=3, omega_bar=-10.0))
         for name, sign in (("omega_t", -1), ("omega_h", -1), ("omega_yr", -1), ("v_x", -1), ("v_z", 1)):
             assert getattr(backward, name) == pytest.approx(sign * getattr(forward, name), rel=1e-7)
@@ -103,13 +104,46 @@ def test_reversing_the_motor_mirrors_the_motion() -> None:
 def test_batch_equals_one_by_one() -> None:
     rng = np.random.default_rng(0)
     changes = {"C_t": rng.uniform(2, 5, 4), "C_yr": rng.uniform(1, 6, 4), "omega_bar": rng.uniform(5, 15, 4)}
-    resolution = Resolution(12, 24)
-    for solve, close in ((steady, 1e-12), (lambda groups: settle(groups, resolution=resolution)[0], 2e-6)):
+    for solve, close in ((steady, 1e-12), (settle, 1e-12)):
         together = solve(control(4, **changes))
         for i in range(4):
             alone = solve(control(**{k: v[i] for k, v in changes.items()}))
             for name in ("omega_t", "omega_yr", "v_x", "v_z", "tail_gap"):
                 assert getattr(alone, name)[0] == pytest.approx(getattr(together, name)[i], rel=close)
+
+
+@pytest.mark.parametrize(("tails", "omega"), [(1, 8.0), (2, 40.0), (5, -15.0)])
+def test_compiled_steps_equal_steps_with_tensors(tails: int, omega: float) -> None:
+    """The same scheme on the same equations, from rest, with droop of the motor and drag on the disc."""
+    groups, steps, edges = control(N=tails, omega_bar=omega, C_yr=5.0), 40, 10
+    swimmer = assemble(groups, edges=edges)
+    swimmer = replace(swimmer, gain=swimmer.gain * 1.2)
+    swimmer.resistance[3, 4] = 0.02
+    row = direct.bodies(groups)[0]
+    body = direct.body_of(row)
+    body.resistance[3, 4] = 0.02
+    body = body._replace(gain=1.2)
+    dt = 0.15 / abs(omega)
+    state, poses = new_state(tails, edges, body.offset), np.empty((steps, 6))
+    assert advance(body, row[direct.HEAD_LENGTH], state, dt, steps, 1e-10, poses, np.empty((0, *state.x.shape)))
+    tensors = at_rest(swimmer)
+    for i in range(steps):
+        tensors = step(
+            swimmer, tensors, groups.omega_bar, torch.tensor([dt], dtype=torch.float64), tolerance=1e-10
+        )
+        assert poses[i] == pytest.approx(tensors.pose[:, 0].numpy(), rel=1e-8, abs=1e-10)
+    assert state.u == pytest.approx(tensors.u[:, 0].numpy(), rel=1e-8, abs=1e-9)
+    assert state.x[:, 0] == pytest.approx(tensors.x[:, :, 0, 0].numpy(), abs=1e-9)
+
+
+def test_a_step_that_breaks_down_is_reported() -> None:
+    row = direct.bodies(control())[0].copy()
+    row[3] = np.nan
+    state = new_state(2, 8, row[1])
+    steps = np.empty((3, 6))
+    assert not advance(
+        direct.body_of(row), row[6], state, 0.01, 3, TOLERANCE, steps, np.empty((0, *state.x.shape))
+    )
 
 
 def yaw_after(steps: int, *, edges: int = 12, time: float = 1.5) -> float:
@@ -181,19 +215,17 @@ def test_one_lane_that_breaks_down_does_not_disturb_the_others() -> None:
 
 
 def test_tail_gap_of_straight_tails() -> None:
-    swimmer = assemble(control(N=4), edges=8)
-    distance = math.sqrt(2) / CONTROL_VALUES["l_over_R"]
-    expected = distance / (2 / CONTROL_VALUES["l_over_r0"])
-    assert float(tail_gap(swimmer, swimmer.straight())) == pytest.approx(expected, rel=1e-12)
-    assert math.isinf(float(tail_gap(assemble(control(N=1), edges=8), assemble(control(N=1), edges=8).straight())))
+    offset, radius = 1 / CONTROL_VALUES["l_over_R"], 1 / CONTROL_VALUES["l_over_r0"]
+    straight = new_state(4, 8, offset).x
+    assert tail_gap(straight, offset, radius) == pytest.approx(math.sqrt(2) * offset / (2 * radius), rel=1e-12)
+    assert math.isinf(tail_gap(straight[:, :1].copy(), offset, radius))
 
 
 def test_net_speed_falls_with_faster_flips_as_the_tails_turn_over() -> None:
     dwell = np.array([0.5, 1.0, 2.0, 4.0])
     groups = control(4)
-    motion, state = settle(groups)
-    response = switch_response(groups, dwell, motion, state)
-    surge = float(motion.v_z[0])
+    response = switch_response(groups, dwell)
+    surge = steady(groups).v_z[0]
     assert not response.failed.any()
     assert (np.diff(response.net_speed) > 0).all()
     assert response.net_speed[-1] < surge
@@ -205,9 +237,7 @@ def test_net_speed_falls_with_faster_flips_as_the_tails_turn_over() -> None:
 def test_net_motion_agrees_with_a_brute_force_replay() -> None:
     """Many flips in the lab against lag and arc of one."""
     dwell, count = 1.0, 24
-    groups = control()
-    motion, state = settle(groups)
-    response = switch_response(groups, np.array([dwell]), motion, state)
+    response = switch_response(control(), np.array([dwell]))
     schedule = Schedule(CONTROL_VALUES, 1, np.full(count, dwell), (0.0, 0.0, 0.0), 1.0)
     track = replay([schedule])[0]
     flips = track.groupby("dwell").last()[["x_over_l", "y_over_l"]].to_numpy()
@@ -215,7 +245,7 @@ def test_net_motion_agrees_with_a_brute_force_replay() -> None:
     assert moved == pytest.approx(float(response.net_speed[0]), rel=0.01)
 
 
-def test_replays_side_by_side_equal_replays_alone() -> None:
+def test_replays_of_several_schedules_equal_replays_alone() -> None:
     schedules = [
         Schedule(CONTROL_VALUES, 1, np.array([0.8, 1.2, 0.9]), (1.0, 2.0, 0.5), 2.0),
         Schedule(CONTROL_VALUES, -1, np.array([1.0]), (0.0, 0.0, 0.0), 2.0),
@@ -223,6 +253,6 @@ def test_replays_side_by_side_equal_replays_alone() -> None:
     together = replay(schedules)
     for schedule, track in zip(schedules, together, strict=True):
         alone = replay([schedule])[0]
-        assert track.iloc[-1].to_numpy() == pytest.approx(alone.iloc[-1].to_numpy(), rel=2e-3, abs=2e-5)
+        assert track.equals(alone)
         assert float(track.time_bar.iloc[-1]) == pytest.approx(schedule.dwells.sum())
     assert together[0].iloc[0][["x_over_l", "y_over_l", "heading_rad"]].tolist() == [1.0, 2.0, 0.5]
