@@ -187,6 +187,23 @@ def linearise(body: Body, x: Array, u: Array, differentiation: Array, geometry: 
 
 
 @compiled
+def tail_wrench(body: Body, x: Array, u: Array) -> Array:
+    """(F_x, F_z, M_y, M_z) about J that one tail puts on the disc, mean over the phases, (4,)."""
+    phases = x.shape[1]
+    geometry = new_geometry(x.shape[0], phases)
+    measure(geometry, x, (body.offset, 0.0, 0.0), body.axial_stiffness)
+    total = np.zeros(4)
+    for m in range(phases):
+        motion = motion_at(body, u[m % u.shape[0]], FIRST_PHASE + 2 * np.pi * m / phases)
+        clamp = clamp_balance(geometry, body, m, motion)
+        total[0] += dot(motion.e_x, clamp.force) / phases
+        total[1] += clamp.force[2] / phases
+        total[2] += dot(motion.e_y, clamp.moment) / phases
+        total[3] += clamp.moment[2] / phases
+    return total
+
+
+@compiled
 def imbalance(system: System) -> float:
     """Largest force on a node or wrench on the robot that `linearise` found unbalanced."""
     column = system.rows.shape[2] - 1

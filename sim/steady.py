@@ -1,14 +1,17 @@
 """Steady motion at constant motor speed: directly where that works, by time stepping where it does not.
 
 The direct route (`sim.direct`) solves for the relative periodic orbit on which all tails move alike; it takes
-well under a millisecond a robot and gives the error of its means. Where Newton's method fails there, the robot is
-stepped in time from rest (`sim.settling`), on two meshes and steps, and the row says so.
+well under a millisecond a robot and gives the error of its means. Straight tails at rest reach that orbit wherever
+the robot turns slowly beside its disc (docs/branches.md). Where it does not (|ω_yr| > QUICK |ω_t|), the robot is
+stepped in time from rest as well, and what that reaches is the answer; where Newton's method fails in the direct
+route, stepping is the answer too. Such rows say so; their error is estimated from two meshes and steps.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from sim import direct
 from sim.motion import DIRECT, Steady
@@ -16,14 +19,25 @@ from sim.resolution import Resolution
 from sim.robot import Groups
 from sim.settling import settle
 
+QUICK = 0.5  # ω_yr/ω_t from which straight tails may reach another motion
+SAME = 0.05  # relative difference up to which a stepped motion counts as the direct one
+
 
 def steady(groups: Groups) -> Steady:
-    """Steady motion of a batch of robots of one N; ω̄ may have either sign."""
+    """Steady motion of a batch of robots of one N, as reached from rest; ω̄ may have either sign."""
     motion = orbits(groups)
-    rest = np.flatnonzero(motion.failed)
-    if len(rest):
-        motion = motion.with_rows(rest, stepped(groups.select(torch.as_tensor(rest)), motion.note[rest]))
-    return motion
+    quick = np.flatnonzero(~motion.failed & (np.abs(motion.omega_yr) > QUICK * np.abs(motion.omega_t)))
+    if len(quick):
+        reached = settle(_rows(groups, quick))
+        other = quick[_difference(motion.at(quick), reached) > SAME]
+        note = "straight tails reach another motion than the one on which they move alike"
+        motion = motion.with_rows(other, stepped(_rows(groups, other), [note] * len(other)))
+    rest = np.flatnonzero(motion.failed & (motion.method == DIRECT))
+    return motion.with_rows(rest, stepped(_rows(groups, rest), motion.note[rest].tolist()))
+
+
+def _rows(groups: Groups, rows: NDArray[np.int64]) -> Groups:
+    return groups.select(torch.as_tensor(rows))
 
 
 def orbits(groups: Groups) -> Steady:
@@ -46,14 +60,24 @@ def orbits(groups: Groups) -> Steady:
     )
 
 
-def stepped(groups: Groups, notes: np.ndarray) -> Steady:
-    """Time stepping from rest on two meshes and steps; their difference gives the error of the finer."""
+def stepped(groups: Groups, notes: list[str]) -> Steady | None:
+    """Time stepping from rest on two meshes and steps; their difference gives the error of the finer.
+
+    None without robots.
+    """
+    if not notes:
+        return None
     needed = Resolution.fitting(float(groups.omega_bar.abs().max()))
     coarse = settle(groups, resolution=needed)
     fine = settle(groups, resolution=Resolution(2 * needed.edges, 2 * needed.steps))
-    speed = np.hypot(fine.v_x, fine.v_z)
-    relative = [np.abs(getattr(coarse, k) / getattr(fine, k) - 1) for k in ("omega_t", "omega_h", "omega_yr")]
-    relative += [np.abs(getattr(coarse, k) - getattr(fine, k)) / speed for k in ("v_x", "v_z")]
-    fields = {**vars(fine), "error": np.max(relative, 0) / 3}  # of second order
-    fields["note"] = np.array([f"{a}; {b}" if b else str(a) for a, b in zip(notes, fine.note, strict=True)])
+    fields = {**vars(fine), "error": _difference(coarse, fine) / 3}  # of second order
+    fields["note"] = np.array([f"{a}; {b}" if b else a for a, b in zip(notes, fine.note.tolist(), strict=True)])
     return Steady(**fields)
+
+
+def _difference(motion: Steady, other: Steady) -> NDArray[np.float64]:
+    """Largest relative difference of the means; velocities relative to the speed."""
+    speed = np.hypot(other.v_x, other.v_z)
+    rates = [np.abs(getattr(motion, k) / getattr(other, k) - 1) for k in ("omega_t", "omega_h", "omega_yr")]
+    velocities = [np.abs(getattr(motion, k) - getattr(other, k)) / speed for k in ("v_x", "v_z")]
+    return np.asarray(np.max(rates + velocities, 0))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
+from sim import direct, orbit
 from sim.balance import Swimmer, assemble
 from sim.robot import PRESETS, Groups
 
@@ -23,6 +24,26 @@ def held(swimmer: Swimmer) -> Swimmer:
     """The same tails on a disc that nothing moves: the motor alone turns it."""
     resistance = 1e12 * torch.eye(4, 5, dtype=torch.float64).unsqueeze(-1).expand(4, 5, swimmer.robots)
     return replace(swimmer, resistance=resistance)
+
+
+def held_loads(omega_bar: float, l_over_r0: float, offset: float, *, edges: int) -> tuple[np.ndarray, np.ndarray]:
+    """Mean wrench (F_x, F_z, M_y, M_z) of the fluid on one filament whose disc is held, and its nodes (n, 3)."""
+    _, groups = single_filament(2, omega_bar, l_over_r0, offset)
+    body = direct.body_of(direct.bodies(groups)[0])
+    body.resistance[:, :4] += 1e9 * np.eye(4)
+    x, u = direct._start(body, edges, 2, 1)
+    u[:] = 0.0
+    _, size, _ = orbit.newton(body, x, u, direct.differentiation(2), 1e-9, 40)
+    assert size < 1e-9
+    return orbit.tail_wrench(body, x, u), x[:, 0]
+
+
+def extrapolated_loads(omega_bar: float, l_over_r0: float, offset: float) -> np.ndarray:
+    """The same at the default resolution: the direct route's meshes, extrapolated."""
+    values = [held_loads(omega_bar, l_over_r0, offset, edges=n)[0] for n in direct.MESHES]
+    squares = np.array([1 / n**2 for n in direct.MESHES])
+    weights = np.linalg.inv(np.vander(squares, 3, increasing=True))[0]
+    return np.asarray(weights @ np.array(values))
 
 
 def single_filament(edges: int, omega_bar: float, l_over_r0: float, offset: float) -> tuple[Swimmer, Groups]:

@@ -13,7 +13,7 @@ from sim.batches import steady_columns, stepped_columns
 from sim.motion import DIRECT, STEPPING
 from sim.robot import PRESETS, Groups
 from sim.shapes import tails_over_a_revolution
-from sim.steady import orbits, steady
+from sim.steady import QUICK, orbits, steady
 from sim.tail import Body, new_geometry
 from tests.sim.robots import control
 
@@ -195,6 +195,21 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
     assert motion.converged.all()
     assert motion.omega_yr == pytest.approx(plain.omega_yr, rel=5e-3)
     assert 0 < motion.error[0] < 0.01
+
+
+def test_a_quick_turn_is_followed_from_rest() -> None:
+    """Both robots turn fast beside their discs; straight tails take one of them to another motion."""
+    size = {"l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2, "omega_bar": 117.0}
+    groups = control(2, N=6, C_t=0.55, C_r=0.54, C_yr=[4.1, 2.5], **size)
+    alike = orbits(groups)
+    assert alike.converged.all()
+    assert (np.abs(alike.omega_yr) > QUICK * np.abs(alike.omega_t)).all()
+    motion = steady(groups)
+    assert motion.method.tolist() == [STEPPING, DIRECT]
+    assert motion.converged.all()
+    assert "another motion" in motion.note[0]
+    assert abs(motion.v_z[0] / alike.v_z[0] - 1) > 0.1
+    assert motion.v_z[1] == alike.v_z[1]
 
 
 def test_tails_over_a_revolution_hang_on_their_clamps() -> None:
