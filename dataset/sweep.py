@@ -43,7 +43,7 @@ def simulate(points: dict[str, NDArray[np.float64]]) -> Columns:
     values = check_columns({k: v for k, v in points.items() if k != DWELL})
     groups = Groups.from_columns(values)
     motion = steady(groups)
-    response = switch_response(groups, points[DWELL])
+    response = switch_response(groups, points[DWELL], motion)
     resolutions = [Resolution.fitting(speed) for speed in values["omega_bar"].tolist()]
     steady_values = motion.columns()
     columns: Columns = {**values, DWELL: points[DWELL], **{k: steady_values[k] for k in STEADY_COLUMNS}}

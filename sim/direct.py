@@ -19,28 +19,35 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from sim.balance import assemble
 from sim.compiling import compiled
 from sim.contact import tail_gap
-from sim.orbit import newton
+from sim.orbit import imbalance, newton, sensitivity
 from sim.robot import Groups
-from sim.tail import Body
+from sim.tail import HEAD_LENGTH, TAIL_RADIUS, Body, body_of
 
 Array = NDArray[np.float64]
 
 MESHES = (6, 8, 12)
-SOLVED, NO_START, MANY_PHASES, LOST, BACKWARDS = range(5)
+SOLVED, NO_START, MANY_PHASES, LOST, BACKWARDS, UNBALANCED = range(6)
 REASONS = {
     SOLVED: "",
     NO_START: "Newton's method did not converge from straight tails",
     MANY_PHASES: "the shape changes too much over a revolution",
     LOST: "Newton's method did not converge on a finer mesh",
     BACKWARDS: "the tails stop or turn backwards during a revolution",
+    UNBALANCED: "forces are left unbalanced",
 }
-CORRECTION = 3e-5  # last Newton correction: convergence is quadratic, it leaves less than 1e-7
+CORRECTION = 1e-6  # last Newton correction; convergence is quadratic, but stretching is stiff: see BALANCED
+ROUGH = 1e-5  # the same on the coarser meshes, where only the means are wanted: it leaves 1e-9 of them
 PHASE_ERROR = 1e-4  # relative, in the means
+BALANCED = 1e-5  # largest unbalanced force over the largest that an edge carries
+NO_TANGENTS = np.empty((0, 28))
+WIDTH = 1e-5  # step of the differences that are exact for linear dependence
 _DOUBT = 0.03  # share of the extrapolation that counts as error
 _SHRINKS = (
     0.2  # assumed fall of the phase error from one number of phases to the next, where only one fall is known
@@ -53,19 +60,17 @@ class Orbits(NamedTuple):
     """Steady motions of B robots; rows (ω_t, ω_h, ω_yr, v_x, v_z) of the head's centre."""
 
     means: Array  # (B, 5), NaN where not solved
+    slopes: Array  # (B, K, 5): derivatives of the means along K tangents
     error: Array  # (B,) estimated relative error
     phases: NDArray[np.int64]  # (B,) M
     ended: NDArray[np.int64]  # (B,) SOLVED or why not
     gap: Array  # (B,) smallest distance between tails over 2 r0
 
 
-HEAD_LENGTH, TAIL_RADIUS = 6, 7  # columns of `bodies` that are not in Body: L/l and r0/l
-
-
-def bodies(groups: Groups) -> Array:
-    """Robots as rows of numbers for the compiled loops, (B, 28)."""
+def numbers(groups: Groups) -> Tensor:
+    """What makes each robot, in the order of `sim.tail.body_of`, (28, B); differentiable."""
     swimmer = assemble(groups, edges=2)
-    columns = [
+    rows = [
         groups.omega_bar,
         swimmer.root[0, 0, 0],
         swimmer.axial_stiffness,
@@ -76,13 +81,12 @@ def bodies(groups: Groups) -> Array:
         swimmer.tail_radius,
         *swimmer.resistance.reshape(20, -1),
     ]
-    return np.stack([c.detach().cpu().numpy() for c in columns], 1)
+    return torch.stack(rows)
 
 
-@compiled
-def body_of(row: Array) -> Body:
-    """The robot of one row of `bodies`."""
-    return Body(row[0], row[1], row[2], row[3], row[4], row[5], row[8:28].copy().reshape(4, 5))
+def bodies(groups: Groups) -> Array:
+    """Robots as rows of numbers for the compiled loops, (B, 28)."""
+    return np.ascontiguousarray(numbers(groups).detach().cpu().numpy().T)
 
 
 @compiled
@@ -200,21 +204,21 @@ def _enough_phases(body: Body, tails: int, head_length: float) -> tuple[int, flo
     n = MESHES[0]
     phases = tails * int(np.ceil(2 / tails))
     x, u = _start(body, n, phases, tails)
-    _, size, _ = newton(body, x, u, differentiation(phases), 1e-2, _MOST_CORRECTIONS)
+    _, size = newton(body, x, u, differentiation(phases), 1e-2, _MOST_CORRECTIONS)
     if not size < 1e-2:
         return NO_START, np.nan, x, u
     phases = tails * int(np.ceil(3 / tails))
     fall, before, change = _SHRINKS, means(body, u, head_length), np.inf
     x, u = with_phases(x, phases), with_phases(u.reshape(1, -1, 4), phases // tails)[0]
-    _, size, _ = newton(body, x, u, differentiation(phases), CORRECTION, _MOST_CORRECTIONS)
-    if not size < CORRECTION:
+    _, size = newton(body, x, u, differentiation(phases), ROUGH, _MOST_CORRECTIONS)
+    if not size < ROUGH:
         return NO_START, np.nan, x, u
     before = means(body, u, head_length)
     while phases <= _MOST_PHASES:
         wanted = _more_phases(tails, phases)
         x_more, u_more = with_phases(x, wanted), with_phases(u.reshape(1, -1, 4), wanted // tails)[0]
-        _, size, _ = newton(body, x_more, u_more, differentiation(wanted), CORRECTION, _MOST_CORRECTIONS)
-        if not size < CORRECTION:
+        _, size = newton(body, x_more, u_more, differentiation(wanted), ROUGH, _MOST_CORRECTIONS)
+        if not size < ROUGH:
             return MANY_PHASES, np.nan, x, u
         after = means(body, u_more, head_length)
         last, change = change, difference(before, after)
@@ -228,46 +232,88 @@ def _enough_phases(body: Body, tails: int, head_length: float) -> tuple[int, flo
 
 
 @compiled
-def solve(row: Array, tails: int) -> tuple[int, float, Array, Array, Array]:
-    """One robot: how it ended, relative error, means (5,), x (n, M, 3) and u (P, 4) on the finest mesh."""
+def solve(row: Array, tangents: Array, tails: int) -> tuple[int, float, Array, Array, Array, Array]:
+    """One robot.
+
+    Args:
+        row: its numbers, from `bodies`.
+        tangents: directions (K, 28) in which the means are to be differentiated; their size sets the step (WIDTH).
+        tails: N.
+
+    Returns:
+        How it ended, estimated relative error, means (5,), their derivatives (K, 5), and x (n, M, 3) and
+        u (P, 4) on the finest mesh.
+    """
     body, head_length = body_of(row), row[HEAD_LENGTH]
-    found = np.full((3, 5), np.nan)
+    found, slopes = np.full((3, 5), np.nan), np.full((3, 5 * len(tangents)), np.nan)
     ended, phase_error, x, u = _enough_phases(body, tails, head_length)
-    if ended != SOLVED:
-        return ended, np.nan, found[0], x, u
-    found[0] = means(body, u, head_length)
     matrix = differentiation(x.shape[1])
     x_before, u_before, n_before = x, u, MESHES[0]
-    for i in range(1, 3):
-        n, coarse = MESHES[i], MESHES[i - 1]
-        x_next, u_next = with_edges(x, body.offset, n), u.copy()
-        if i > 1:  # extrapolate the change from mesh to mesh as 1/n²
-            more = (1 / coarse**2 - 1 / n**2) / (1 / n_before**2 - 1 / coarse**2)
-            x_next += more * (x_next - with_edges(x_before, body.offset, n))
-            u_next += more * (u - u_before)
-        _, size, _ = newton(body, x_next, u_next, matrix, CORRECTION, _MOST_CORRECTIONS)
-        if not size < CORRECTION:
-            return LOST, np.nan, found[2], x, u
-        x_before, u_before, n_before = x, u, coarse
-        x, u = x_next, u_next
+    for i in range(3):
+        if ended != SOLVED:
+            break
+        n = MESHES[i]
+        if i > 0:
+            coarse = MESHES[i - 1]
+            x_next, u_next = with_edges(x, body.offset, n), u.copy()
+            if i > 1:  # extrapolate the change from mesh to mesh as 1/n²
+                more = (1 / coarse**2 - 1 / n**2) / (1 / n_before**2 - 1 / coarse**2)
+                x_next += more * (x_next - with_edges(x_before, body.offset, n))
+                u_next += more * (u - u_before)
+            wanted = CORRECTION if i == 2 else ROUGH
+            _, size = newton(body, x_next, u_next, matrix, wanted, _MOST_CORRECTIONS)
+            x_before, u_before, n_before = x, u, coarse
+            x, u = x_next, u_next
+            if not size < wanted:
+                ended = LOST
         found[i] = means(body, u, head_length)
-    if not _turns_forward(body, u):
-        return BACKWARDS, np.nan, np.full(5, np.nan), x, u
-    limit, error = extrapolate(found)
-    return SOLVED, error + phase_error, limit, x, u
+        if len(tangents):
+            slopes[i] = _slopes(row, tangents, x, u, matrix).ravel()
+    if ended == SOLVED and not _turns_forward(body, u):
+        ended = BACKWARDS
+    if ended == SOLVED and not imbalance(body, x, u, matrix) < BALANCED:
+        ended = UNBALANCED
+    if ended != SOLVED:
+        return ended, np.nan, np.full(5, np.nan), np.full((len(tangents), 5), np.nan), x, u
+    limit = extrapolate(found)
+    without = without_last_term(found)
+    error = phase_error + difference(without, limit) + _DOUBT * difference(found[2], limit)
+    return SOLVED, error, limit, extrapolate(slopes).reshape(len(tangents), 5), x, u
 
 
 @compiled
-def extrapolate(found: Array) -> tuple[Array, float]:
-    """Limit of means on MESHES, (3, 5), with errors c₂/n² + c₄/n⁴; and its estimated relative error."""
+def _slopes(row: Array, tangents: Array, x: Array, u: Array, matrix: Array) -> Array:
+    """Derivatives of the means along `tangents` on one mesh, (K, 5)."""
+    moved = np.empty((2 * len(tangents), row.size))
+    for k in range(len(tangents)):
+        moved[2 * k] = row - WIDTH * tangents[k]
+        moved[2 * k + 1] = row + WIDTH * tangents[k]
+    by_parameter = sensitivity(body_of(row), moved, WIDTH, x, u, matrix)
+    slopes = np.empty((len(tangents), 5))
+    for k in range(len(tangents)):
+        back, forth = moved[2 * k], moved[2 * k + 1]
+        before = means(body_of(back), u - WIDTH * by_parameter[k], back[HEAD_LENGTH])
+        after = means(body_of(forth), u + WIDTH * by_parameter[k], forth[HEAD_LENGTH])
+        slopes[k] = (after - before) / (2 * WIDTH)
+    return slopes
+
+
+@compiled
+def extrapolate(found: Array) -> Array:
+    """Limit for n → ∞ of values on MESHES, (3, K), whose errors go as c₂/n² + c₄/n⁴."""
     a, b, c = 1.0 / MESHES[0] ** 2, 1.0 / MESHES[1] ** 2, 1.0 / MESHES[2] ** 2
-    limit = (
+    return (
         found[0] * (b * c) / ((a - b) * (a - c))
         + found[1] * (a * c) / ((b - a) * (b - c))
         + found[2] * (a * b) / ((c - a) * (c - b))
     )
-    without = (found[2] * b - found[1] * c) / (b - c)
-    return limit, difference(without, limit) + _DOUBT * difference(found[2], limit)
+
+
+@compiled
+def without_last_term(found: Array) -> Array:
+    """The same from the two finer meshes, with c₂/n² alone."""
+    b, c = 1.0 / MESHES[1] ** 2, 1.0 / MESHES[2] ** 2
+    return (found[2] * b - found[1] * c) / (b - c)
 
 
 @compiled
@@ -284,19 +330,17 @@ def _smallest_gap(x: Array, body: Body, tails: int, radius: float) -> float:
 
 
 @compiled
-def solve_all(rows: Array, tails: int) -> Orbits:
-    """Steady motions of robots with N tails, one after the other; rows from `bodies`."""
-    count = rows.shape[0]
+def solve_all(rows: Array, tangents: Array, tails: int) -> Orbits:
+    """Steady motions of robots with N tails: rows (B, 28) from `bodies`, tangents (B, K, 28)."""
+    count, width = tangents.shape[:2]
     out = Orbits(
-        np.zeros((count, 5)),
-        np.zeros(count),
-        np.zeros(count, np.int64),
-        np.zeros(count, np.int64),
-        np.zeros(count),
-    )
+        np.zeros((count, 5)), np.zeros((count, width, 5)), np.zeros(count),
+        np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(count),
+    )  # fmt: skip
     for i in range(count):
-        ended, error, limit, x, _ = solve(rows[i], tails)
-        out.means[i], out.error[i], out.ended[i], out.phases[i] = limit, error, ended, x.shape[1]
+        ended, error, limit, slopes, x, _ = solve(rows[i], tangents[i], tails)
+        out.means[i], out.slopes[i], out.error[i], out.ended[i] = limit, slopes, error, ended
+        out.phases[i] = x.shape[1]
         out.gap[i] = _smallest_gap(x, body_of(rows[i]), tails, rows[i, TAIL_RADIUS]) if ended == SOLVED else np.nan
     return out
 
@@ -309,5 +353,5 @@ def on_mesh(row: Array, tails: int, edges: int) -> tuple[bool, Array, Array]:
     if ended != SOLVED:
         return False, x, u
     x = with_edges(x, body.offset, edges)
-    _, size, _ = newton(body, x, u, differentiation(x.shape[1]), CORRECTION, _MOST_CORRECTIONS)
+    _, size = newton(body, x, u, differentiation(x.shape[1]), CORRECTION, _MOST_CORRECTIONS)
     return size < CORRECTION and _turns_forward(body, u), x, u

@@ -1,15 +1,16 @@
 """Bordered block-pentadiagonal systems with dense blocks, for one robot, in compiled loops.
 
-    A_kk δx_k + A_{k,k±1} δx_{k±1} + A_{k,k±2} δx_{k±2} + B_k δu = −r_k,   k = 1..n
-    C_1 δx_1 + C_2 δx_2 + D δu = −T
+    A_kk δx_k + A_{k,k±1} δx_{k±1} + A_{k,k±2} δx_{k±2} + B_k δu = s_k,   k = 1..n
+    C_1 δx_1 + C_2 δx_2 + D δu = t
 
 A block has m = 3 M rows: the components of one node in M lanes. Blocks at distance two couple a lane to itself
 only and are kept as M matrices of 3×3; the others fill up. Nodes are eliminated from the tip to the root, so that
 the Schur complement of the body needs the first two nodes alone:
 
-    Z_k = A_kk⁻¹ [A_{k,k−1} | A_{k,k−2} | B_k  −r_k],   rows k−1 and k−2 −= A_{k−1,k} Z_k and A_{k−2,k} Z_k.
+    Z_k = A_kk⁻¹ [A_{k,k−1} | A_{k,k−2} | B_k  s_k],   rows k−1 and k−2 −= A_{k−1,k} Z_k and A_{k−2,k} Z_k.
 
 No pivoting between nodes: A is minus drag plus stiffness, whose symmetric part is definite.
+There may be several right-hand sides: one for Newton's method, one a parameter for sensitivities.
 Cost: about 8 m³ multiplications a node, nearly all of them in matrix products (BLAS).
 """
 
@@ -29,14 +30,14 @@ _LARGE = 36  # rows from which a matrix is inverted by halves
 
 
 class System(NamedTuple):
-    """Newton's equations; c = number of body unknowns + 1, the last column being the right-hand side."""
+    """The equations; c = number of body unknowns + number of right-hand sides."""
 
-    rows: Array  # (n, m, 2 m + c): A_kk | A_{k,k−1} | B_k, −r_k
+    rows: Array  # (n, m, 2 m + c): A_kk | A_{k,k−1} | B_k, s_k
     upper: Array  # (n, m, m): A_{k−1,k}
     upper2: Array  # (n, M, 3, 3): A_{k−2,k}
     lower2: Array  # (n, M, 3, 3): A_{k,k−2}
-    foot: Array  # (2, c − 1, m): C
-    corner: Array  # (c − 1, c): D | −T
+    foot: Array  # (2, unknowns, m): C
+    corner: Array  # (unknowns, c): D | t
     folded: Array  # (n, m, 2 m + c): Z
     right: Array  # (m, 2 m + c)
     product: Array  # (m, 2 m + c)
@@ -44,9 +45,9 @@ class System(NamedTuple):
 
 
 @compiled
-def new_system(n: int, lanes: int, unknowns: int) -> System:
-    """Room for n ≥ 2 nodes in `lanes` lanes and a body of `unknowns` velocities."""
-    m, c = 3 * lanes, unknowns + 1
+def new_system(n: int, lanes: int, unknowns: int, sides: int) -> System:
+    """Room for n ≥ 2 nodes in `lanes` lanes, a body of `unknowns` velocities and `sides` right-hand sides."""
+    m, c = 3 * lanes, unknowns + sides
     return System(
         np.zeros((n, m, 2 * m + c)),
         np.zeros((n, m, m)),
@@ -128,8 +129,8 @@ def invert_by_halves(a: Array) -> None:
 
 @compiled
 def solve_dense(a: Array, b: Array) -> None:
-    """b = a⁻¹ b in place by Gaussian elimination with row exchanges; a is used up. NaN in, NaN out."""
-    n = b.shape[0]
+    """b = a⁻¹ b (n, K) in place by Gaussian elimination with row exchanges; a is used up. NaN in, NaN out."""
+    n, sides = b.shape
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -138,21 +139,24 @@ def solve_dense(a: Array, b: Array) -> None:
         if best != k:
             for j in range(k, n):
                 a[k, j], a[best, j] = a[best, j], a[k, j]
-            b[k], b[best] = b[best], b[k]
+            for j in range(sides):
+                b[k, j], b[best, j] = b[best, j], b[k, j]
         for i in range(k + 1, n):
             factor = a[i, k] / a[k, k]
             for j in range(k + 1, n):
                 a[i, j] -= factor * a[k, j]
-            b[i] -= factor * b[k]
+            for j in range(sides):
+                b[i, j] -= factor * b[k, j]
     for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            b[k] -= a[k, j] * b[j]
-        b[k] /= a[k, k]
+        for i in range(sides):
+            for j in range(k + 1, n):
+                b[k, i] -= a[k, j] * b[j, i]
+            b[k, i] /= a[k, k]
 
 
 @compiled
 def _gather(system: System, i: int) -> None:
-    """right = [A_{i,i−1} | A_{i,i−2} | B_i, −r_i]."""
+    """right = [A_{i,i−1} | A_{i,i−2} | B_i, s_i]."""
     row, right = system.rows[i], system.right
     m = row.shape[0]
     for a in range(m):
@@ -186,9 +190,9 @@ def _fold_two_up(system: System, i: int) -> None:
 
 @compiled
 def solve(system: System, dx: Array, du: Array) -> None:
-    """Solve for dx (n, m) and du (c − 1,); what `system` holds is used up."""
-    n, m, width = system.rows.shape
-    unknowns = width - 2 * m - 1
+    """Solve for dx (n, m, K) and du (unknowns, K), K right-hand sides; what `system` holds is used up."""
+    n, m, _ = system.rows.shape
+    unknowns, sides = du.shape
     for i in range(n - 1, -1, -1):
         system.inverse[:] = system.rows[i][:, :m]
         invert_by_halves(system.inverse)
@@ -202,18 +206,19 @@ def solve(system: System, dx: Array, du: Array) -> None:
     first = np.ascontiguousarray(system.folded[0][:, 2 * m :])
     second = system.folded[1][:, 2 * m :] - np.dot(np.ascontiguousarray(system.folded[1][:, :m]), first)
     schur = system.corner - np.dot(system.foot[0], first) - np.dot(system.foot[1], second)
-    du[:] = schur[:, unknowns]
+    du[:] = schur[:, unknowns:]
     solve_dense(schur, du)
     for i in range(n):
         folded = system.folded[i]
         for a in range(m):
-            value = folded[a, width - 1]
-            for j in range(unknowns):
-                value -= folded[a, 2 * m + j] * du[j]
-            if i > 0:
-                for j in range(m):
-                    value -= folded[a, j] * dx[i - 1, j]
-            if i > 1:
-                for j in range(m):
-                    value -= folded[a, m + j] * dx[i - 2, j]
-            dx[i, a] = value
+            for side in range(sides):
+                value = folded[a, 2 * m + unknowns + side]
+                for j in range(unknowns):
+                    value -= folded[a, 2 * m + j] * du[j, side]
+                if i > 0:
+                    for j in range(m):
+                        value -= folded[a, j] * dx[i - 1, j, side]
+                if i > 1:
+                    for j in range(m):
+                        value -= folded[a, m + j] * dx[i - 2, j, side]
+                dx[i, a, side] = value

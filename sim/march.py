@@ -243,8 +243,8 @@ def _correct(
         _linearise_tail(body, motion, u[2], u[0], x, x_dot, rate, geometry, chains, m)
         _eliminate(chains, m)
         _add_clamp(body, motion, geometry, chains, m, rate)
+    solve_dense(corner, corner[:, 4:])
     du[:] = corner[:, 4]
-    solve_dense(corner, du)
     for m in range(tails):
         for k in range(n):
             change = vector(chains.border[k], m, 4)

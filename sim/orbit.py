@@ -33,6 +33,7 @@ from sim.tail import (
     Geometry,
     Motion,
     add_block,
+    body_of,
     clamp_balance,
     edge_block,
     joint_block,
@@ -66,7 +67,7 @@ def _tail_rows(
     n, phases, _ = x.shape
     size, i = 3 * phases, 3 * m
     body_column = 2 * size + 4 * (m % (system.corner.shape[0] // 4))
-    right = system.rows.shape[2] - 1
+    right = 2 * size + system.corner.shape[0]
     for k in range(n):
         row = system.rows[k]
         position = vector(x, k, m)
@@ -204,38 +205,92 @@ def tail_wrench(body: Body, x: Array, u: Array) -> Array:
 
 
 @compiled
-def imbalance(system: System) -> float:
-    """Largest force on a node or wrench on the robot that `linearise` found unbalanced."""
-    column = system.rows.shape[2] - 1
-    largest = np.max(np.abs(system.corner[:, system.corner.shape[0]]))
-    return max(largest, np.max(np.abs(system.rows[:, :, column])))
+def residual(
+    body: Body, x: Array, u: Array, differentiation: Array, geometry: Geometry, r: Array, t: Array
+) -> None:
+    """What is unbalanced at x (n, M, 3), u (P, 4): r (n, 3 M) on the nodes, t (4 P,) on the robot."""
+    n, phases, _ = x.shape
+    measure(geometry, x, (body.offset, 0.0, 0.0), body.axial_stiffness)
+    for p in range(u.shape[0]):
+        omega_t = body.omega + body.gain * u[p, 3]
+        for a in range(4):
+            load = body.resistance[a, 4] * omega_t
+            for c in range(4):
+                load += body.resistance[a, c] * u[p, c]
+            t[4 * p + a] = -load
+    for m in range(phases):
+        p = m % u.shape[0]
+        motion = motion_at(body, u[p], FIRST_PHASE + 2 * np.pi * m / phases)
+        for k in range(n):
+            along = times(motion.omega_t, _derivative(x, differentiation, k, m))
+            velocity = plus(plus(motion.linear, cross(motion.spin, vector(x, k, m))), along)
+            force = node_balance(geometry, body, k, m, velocity)[0]
+            r[k, 3 * m], r[k, 3 * m + 1], r[k, 3 * m + 2] = force
+        clamp = clamp_balance(geometry, body, m, motion)
+        t[4 * p] += dot(motion.e_x, clamp.force)
+        t[4 * p + 1] += clamp.force[2]
+        t[4 * p + 2] += dot(motion.e_y, clamp.moment)
+        t[4 * p + 3] += clamp.moment[2]
 
 
 @compiled
 def newton(
     body: Body, x: Array, u: Array, differentiation: Array, tolerance: float, most: int
-) -> tuple[int, float, float]:
+) -> tuple[int, float]:
     """Improve x (n, M, 3) and u (P, 4) in place.
 
     Returns:
-        Number of corrections, size of the last one (in l and 1 + |ω|; above `tolerance`: not converged) and the
-        imbalance before it [EI/l²].
+        Number of corrections, and size of the last one (in l and 1 + |ω|; above `tolerance`: not converged).
     """
     n, phases, _ = x.shape
     geometry = new_geometry(n, phases)
-    system = elimination.new_system(n, phases, u.size)
-    dx, du = np.zeros((n, 3 * phases)), np.zeros(u.size)
-    size, left = np.inf, np.inf
+    system = elimination.new_system(n, phases, u.size, 1)
+    dx, du = np.zeros((n, 3 * phases, 1)), np.zeros((u.size, 1))
+    size = np.inf
     for count in range(1, most + 1):
         linearise(body, x, u, differentiation, geometry, system)
-        left = imbalance(system)
         elimination.solve(system, dx, du)
         size = max(np.max(np.abs(dx)), np.max(np.abs(du)) / (1 + abs(body.omega)))
         if not np.isfinite(size):
-            return count, np.inf, left
+            return count, np.inf
         factor = min(1.0, _LARGEST_MOVE / size)
         x += factor * dx.reshape(x.shape)
         u += factor * du.reshape(u.shape)
         if size < tolerance:
-            return count, size, left
-    return most, size, left
+            return count, size
+    return most, size
+
+
+@compiled
+def imbalance(body: Body, x: Array, u: Array, differentiation: Array) -> float:
+    """The largest unbalanced force or wrench over the largest force that an edge carries."""
+    geometry = new_geometry(x.shape[0], x.shape[1])
+    r, t = np.zeros((x.shape[0], 3 * x.shape[1])), np.zeros(u.size)
+    residual(body, x, u, differentiation, geometry, r, t)
+    return max(np.max(np.abs(r)), np.max(np.abs(t))) / np.max(np.abs(geometry.force))
+
+
+@compiled
+def sensitivity(body: Body, changed: Array, width: float, x: Array, u: Array, differentiation: Array) -> Array:
+    """How u changes with the robot, du/dp (K, P, 4), by the implicit function theorem: J dz/dp = −∂F/∂p.
+
+    Args:
+        changed: rows (2 K, 28): for each of K parameters the robot moved by −width and by +width. The balance is
+            linear in every coefficient but the offset of the clamps, so their difference is exact to rounding.
+        x, u: the solution for `body`.
+    """
+    n, phases, _ = x.shape
+    count = len(changed) // 2
+    geometry = new_geometry(n, phases)
+    system = elimination.new_system(n, phases, u.size, count)
+    linearise(body, x, u, differentiation, geometry, system)
+    r, t = np.zeros((2, n, 3 * phases)), np.zeros((2, u.size))
+    first = 6 * phases + u.size
+    for i in range(count):
+        for side in range(2):
+            residual(body_of(changed[2 * i + side]), x, u, differentiation, geometry, r[side], t[side])
+        system.rows[:, :, first + i] = (r[0] - r[1]) / (2 * width)
+        system.corner[:, u.size + i] = (t[0] - t[1]) / (2 * width)
+    dx, du = np.zeros((n, 3 * phases, count)), np.zeros((u.size, count))
+    elimination.solve(system, dx, du)
+    return du.T.copy().reshape(count, u.shape[0], 4)

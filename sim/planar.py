@@ -54,3 +54,13 @@ def arc(twist: Poses, time: ArrayLike) -> Poses:
     across = time * np.sinc(half / np.pi) * np.sin(half)
     forward, left = twist[..., 0], twist[..., 1]
     return np.stack([along * forward - across * left, across * forward + along * left, angle], -1)
+
+
+def net_speed(twist: Poses, lag: Poses, dwell: ArrayLike) -> NDArray[np.float64]:
+    """Net speed of a zigzag with equal dwells (...), each a `lag` (..., 3) and then an arc of `twist`.
+
+    The second dwell is the mirror image of the first, since a reversed motor mirrors the motion.
+    """
+    change = compose(lag, arc(twist, dwell))
+    pair = compose(change, change * MIRROR)
+    return np.hypot(pair[..., 0], pair[..., 1]) / (2 * np.asarray(dwell))

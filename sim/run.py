@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import direct
 from sim.march import TOLERANCE, YAW, State, X, Y, advance, new_state
 from sim.resolution import Resolution, time_step
+from sim.tail import HEAD_LENGTH, body_of
 
 Floats = NDArray[np.float64]
 
@@ -21,11 +21,11 @@ class Run:
 
     def __init__(self, row: Floats, tails: int, resolution: Resolution, state: State | None = None):
         """From `state`, which is changed in place, or from rest with straight tails."""
-        self.body = direct.body_of(row)
+        self.body = body_of(row)
         self.state = new_state(tails, resolution.edges, self.body.offset) if state is None else state
         self.time_step = time_step(row[0], resolution)
         self.failed = False
-        self._head_length = float(row[direct.HEAD_LENGTH])
+        self._head_length = float(row[HEAD_LENGTH])
 
     def copy(self) -> Run:
         """A run that goes its own way from here."""

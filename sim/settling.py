@@ -28,6 +28,7 @@ from sim.motion import STEPPING, Steady
 from sim.resolution import Resolution
 from sim.robot import Groups
 from sim.run import Run
+from sim.tail import TAIL_RADIUS, body_of
 
 Floats = NDArray[np.float64]
 
@@ -80,7 +81,7 @@ def settle(
     notes = np.where(failed, "Newton's method did not converge in a time step", np.where(converged, "", drifts))
     return Steady(
         omega_t=means[0],
-        omega_h=(means[0] - rows[:, 0]) / np.array([direct.body_of(row).gain for row in rows]),
+        omega_h=(means[0] - rows[:, 0]) / np.array([body_of(row).gain for row in rows]),
         omega_yr=means[1],
         v_x=means[2],
         v_z=means[3],
@@ -117,7 +118,7 @@ def settle_one(row: Floats, tails: int, resolution: Resolution) -> Settled:
     if run.failed:
         return lost
     some = shapes[:: max(1, turn // _GAP_SHAPES)]
-    gap = min(tail_gap(shape, run.body.offset, row[direct.TAIL_RADIUS]) for shape in some)
+    gap = min(tail_gap(shape, run.body.offset, row[TAIL_RADIUS]) for shape in some)
     return Settled(means, drift, converged, False, gap, run.state)
 
 

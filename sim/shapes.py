@@ -13,6 +13,7 @@ from sim.errors import InputError
 from sim.march import PHASE, State
 from sim.orbit import FIRST_PHASE
 from sim.robot import Robot
+from sim.tail import body_of
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ def tails_over_a_revolution(robot: Robot, frames: int) -> tuple[Floats, Floats]:
         InputError: the robot has no steady motion on which its tails move alike.
     """
     groups = robot.groups()
-    ended, _, _, x, _ = direct.solve(direct.bodies(groups)[0], groups.N)
+    ended, _, _, _, x, _ = direct.solve(direct.bodies(groups)[0], direct.NO_TANGENTS, groups.N)
     if ended != direct.SOLVED:
         raise InputError(f"{robot.name} has no shape to draw: {direct.REASONS[ended]}")
     phases = 2 * np.pi * np.arange(frames) / frames
@@ -62,7 +63,7 @@ def state_on_orbit(row: Floats, tails: int, edges: int, phase: float) -> State |
     lanes = phase + 2 * np.pi * np.arange(tails) / tails
     slope = np.einsum("ml,klc->kmc", direct.differentiation(x.shape[1]), x)
     velocity = _in_one_period(u, phase, tails)
-    omega_t = row[0] + direct.body_of(row).gain * velocity[3]
+    omega_t = row[0] + body_of(row).gain * velocity[3]
     pose = np.zeros(6)
     pose[PHASE] = phase
     shape, rate = (np.ascontiguousarray(at_phases(a, lanes).transpose(1, 0, 2)) for a in (x, slope))

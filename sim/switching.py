@@ -18,8 +18,9 @@ one at the flip before (the flipped periodic orbit; flips forget their start as 
 the mean over two disc phases half a tail spacing apart at the first flip: the phase at a flip matters for N = 2,
 and a planner does not know it.
 
-The steady circle is that of the same mesh and step, so that the discretisation's error, which grows with T,
-cancels in the lag. Units: l, μ0 l⁴/EI.
+The steady circle in the lag is that of the same mesh and step, so that the discretisation's error, which grows
+with T, cancels. The net speed is made of the lag and the arcs of the extrapolated steady motion.
+Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -33,11 +34,13 @@ from numpy.typing import NDArray
 from sim import direct, planar
 from sim.effects import catalogue
 from sim.march import PHASE, SURGE, SWAY, YAW
+from sim.motion import Steady
 from sim.resolution import Resolution
 from sim.robot import Groups
 from sim.run import Run
 from sim.settling import settle_one
 from sim.shapes import state_on_orbit
+from sim.steady import steady
 
 Floats = NDArray[np.float64]
 
@@ -59,48 +62,52 @@ class SwitchResponse:
     failed: NDArray[np.bool_]
 
 
-def switch_response(groups: Groups, dwell: Floats, *, resolution: Resolution | None = None) -> SwitchResponse:
+def switch_response(
+    groups: Groups, dwell: Floats, motion: Steady | None = None, *, resolution: Resolution | None = None
+) -> SwitchResponse:
     """Flip the motor every `dwell` from the steady motion.
 
     Args:
         groups: robots of one N; the sign of ω̄ is the direction before the first flip.
         dwell: half-periods T̄, (B,).
+        motion: the robots' steady motion, if it is at hand; the net speed is made of its arcs and the lags.
         resolution: mesh and step; by default what each robot needs.
     """
+    motion = steady(groups) if motion is None else motion
+    dwell = np.asarray(dwell, dtype=float)
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
     rows = direct.bodies(groups)
-    table = np.array([_respond(row, groups.N, T, even, resolution) for row, T in zip(rows, dwell, strict=True)])
-    failed = ~np.isfinite(table).all(1)
-    table[failed] = np.nan
-    speed, psi, x, z = table.T
-    return SwitchResponse(np.asarray(dwell, dtype=float), speed, psi, x, z, failed)
+    lag = np.array([_lag(row, groups.N, T, even, resolution) for row, T in zip(rows, dwell, strict=True)])
+    sense = np.sign(rows[:, 0])
+    twist = np.stack([motion.v_z, sense * motion.v_x, sense * motion.omega_yr], -1)
+    speed = planar.net_speed(twist, lag, dwell)
+    failed = ~np.isfinite(speed)
+    lag[failed] = np.nan
+    return SwitchResponse(dwell, speed, lag[:, 2], lag[:, 1], lag[:, 0], failed)
 
 
-def _respond(row: Floats, tails: int, dwell: float, even: bool, resolution: Resolution | None) -> Floats:
-    """(v̄, Δψ, Δx, Δz) of one robot."""
+def _lag(row: Floats, tails: int, dwell: float, even: bool, resolution: Resolution | None) -> Floats:
+    """(Δz, Δx, Δψ) of one robot; NaN where it breaks down."""
     chosen = resolution or Resolution.fitting(row[0])
     state = state_on_orbit(row, tails, chosen.edges, 0.0)
     if state is None:
         settled = settle_one(row, tails, chosen)
         if settled.failed:
-            return np.full(4, np.nan)
+            return np.full(3, np.nan)
         state = settled.state
     run = Run(row, tails, chosen, state)
     sense = np.sign(row[0])
     twist, turn = _steady_twist(run, tails, sense)
     if run.failed:
-        return np.full(4, np.nan)
+        return np.full(3, np.nan)
     later = run.copy()
     later.go(0.5 * turn)
     changes = []
     for copy in (run, later):
         changes.append(_change(copy, dwell, even, sense))
         if copy.failed:
-            return np.full(4, np.nan)
-    change = np.mean(changes, 0)
-    lag = planar.compose(change, planar.inverse(planar.arc(twist, dwell)))
-    pair = planar.compose(change, change * planar.MIRROR)
-    return np.array([np.hypot(pair[0], pair[1]) / (2 * dwell), lag[2], lag[1], lag[0]])
+            return np.full(3, np.nan)
+    return planar.compose(np.mean(changes, 0), planar.inverse(planar.arc(twist, dwell)))
 
 
 def _steady_twist(run: Run, tails: int, sense: float) -> tuple[Floats, float]:

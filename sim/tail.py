@@ -41,6 +41,15 @@ class Body(NamedTuple):
     resistance: Array  # (4, 5): wrench by (v_x, v_z, ω_yr, ω_h, ω_t)
 
 
+HEAD_LENGTH, TAIL_RADIUS = 6, 7  # entries of a robot's row that Body leaves out: L/l and r0/l
+
+
+@compiled
+def body_of(row: Array) -> Body:
+    """The robot of one row of `sim.direct.bodies`."""
+    return Body(row[0], row[1], row[2], row[3], row[4], row[5], row[8:28].copy().reshape(4, 5))
+
+
 class Motion(NamedTuple):
     """Velocities of the robot as a lane at some phase sees them."""
 

@@ -114,8 +114,5 @@ def _response_outputs(
     yaw, sway = np.abs(steady["omega_yr_bar"]), np.abs(steady["v_x"])
     psi, x, z = raw[..., 0] * yaw, raw[..., 1] * sway, raw[..., 2] * sway
     twist = np.stack([steady["v_z"], sway, yaw], -1)
-    dwell = values[DWELL]
-    change = planar.compose(np.stack([z, x, psi], -1), planar.arc(twist, dwell))
-    pair = planar.compose(change, change * planar.MIRROR)
-    speed = np.hypot(pair[..., 0], pair[..., 1]) / (2 * dwell)
+    speed = planar.net_speed(twist, np.stack([z, x, psi], -1), values[DWELL])
     return dict(zip(RESPONSE_OUTPUTS, (speed, psi, x, z), strict=True))

@@ -10,6 +10,7 @@ import torch
 from sim import direct, orbit
 from sim.balance import Swimmer, assemble
 from sim.robot import PRESETS, Groups
+from sim.tail import body_of
 
 CONTROL_VALUES = PRESETS["paper-control"].group_values()
 
@@ -29,11 +30,11 @@ def held(swimmer: Swimmer) -> Swimmer:
 def held_loads(omega_bar: float, l_over_r0: float, offset: float, *, edges: int) -> tuple[np.ndarray, np.ndarray]:
     """Mean wrench (F_x, F_z, M_y, M_z) of the fluid on one filament whose disc is held, and its nodes (n, 3)."""
     _, groups = single_filament(2, omega_bar, l_over_r0, offset)
-    body = direct.body_of(direct.bodies(groups)[0])
+    body = body_of(direct.bodies(groups)[0])
     body.resistance[:, :4] += 1e9 * np.eye(4)
     x, u = direct._start(body, edges, 2, 1)
     u[:] = 0.0
-    _, size, _ = orbit.newton(body, x, u, direct.differentiation(2), 1e-9, 40)
+    _, size = orbit.newton(body, x, u, direct.differentiation(2), 1e-9, 40)
     assert size < 1e-9
     return orbit.tail_wrench(body, x, u), x[:, 0]
 

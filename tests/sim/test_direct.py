@@ -51,7 +51,7 @@ def test_tensors_find_the_compiled_orbit_in_balance(tails: int) -> None:
     """At every phase, all N tails in place: no net wrench, and a Newton correction that changes nothing."""
     groups = control(N=tails, omega_bar=-40.0, C_yr=5.0)
     _, row = body_of(groups)
-    ended, _, _, x, u = direct.solve(row, tails)
+    ended, _, _, _, x, u = direct.solve(row, direct.NO_TANGENTS, tails)
     assert ended == direct.SOLVED
     n, phases, _ = x.shape
     derivative = np.einsum("ml,klc->kmc", direct.differentiation(phases), x)
@@ -91,13 +91,13 @@ def test_newton_s_matrix_is_the_derivative_of_the_residual() -> None:
     matrix = direct.differentiation(phases)
 
     def residual(z: Floats) -> Floats:
-        system = elimination.new_system(n, phases, u.size)
+        system = elimination.new_system(n, phases, u.size, 1)
         geometry = new_geometry(n, phases)
         orbit.linearise(body, z[: x.size].reshape(x.shape), z[x.size :].reshape(u.shape), matrix, geometry, system)
         return np.concatenate([-system.rows[:, :, -1].ravel(), -system.corner[:, -1]])
 
     z = np.concatenate([x.ravel(), u.ravel()])
-    system = elimination.new_system(n, phases, u.size)
+    system = elimination.new_system(n, phases, u.size, 1)
     orbit.linearise(body, x, u, matrix, new_geometry(n, phases), system)
     m = 3 * phases
     jacobian = np.zeros((len(z), len(z)))
@@ -119,10 +119,10 @@ def test_newton_s_matrix_is_the_derivative_of_the_residual() -> None:
         slope = (residual(z + step) - residual(z - step)) / 2e-6
         assert slope == pytest.approx(jacobian[:, i], rel=1e-5, abs=1e-4)
     # And the elimination solves it.
-    dx, du = np.zeros((n, m)), np.zeros(u.size)
+    dx, du = np.zeros((n, m, 1)), np.zeros((u.size, 1))
     right = -residual(z)
     elimination.solve(system, dx, du)
-    assert jacobian @ np.concatenate([dx.ravel(), du]) == pytest.approx(right, rel=1e-7, abs=1e-7)
+    assert jacobian @ np.concatenate([dx.ravel(), du.ravel()]) == pytest.approx(right, rel=1e-7, abs=1e-7)
 
 
 @pytest.mark.parametrize("size", [6, 18, 36, 48])
@@ -135,7 +135,7 @@ def test_inverse_by_halves(size: int) -> None:
 
 def test_dense_equations_need_row_exchanges() -> None:
     matrix = np.array([[0.0, 2.0, 1.0], [1.0, 1.0, 0.0], [3.0, 0.0, 1.0]])
-    right = np.array([1.0, 2.0, 3.0])
+    right = np.array([[1.0, 2.0], [2.0, 0.0], [3.0, 1.0]])
     found = right.copy()
     elimination.solve_dense(matrix.copy(), found)
     assert matrix @ found == pytest.approx(right, abs=1e-14)
@@ -159,14 +159,14 @@ def test_the_stated_error_covers_a_much_finer_mesh() -> None:
     for i in range(24):
         groups = Groups.from_columns({name: values[i : i + 1] for name, values in points.items()})
         body, row = body_of(groups)
-        ended, error, limit, x, u = direct.solve(row, groups.N)
+        ended, error, limit, _, x, u = direct.solve(row, direct.NO_TANGENTS, groups.N)
         assert ended == direct.SOLVED
         phases = 2 * x.shape[1]
         x, u = direct.with_phases(x, phases), direct.with_phases(u.reshape(1, -1, 4), phases // groups.N)[0]
         fine = []
         for n in (24, 36):
             x = direct.with_edges(x, body.offset, n)
-            _, size, _ = orbit.newton(body, x, u, direct.differentiation(phases), 1e-7, 20)
+            _, size = orbit.newton(body, x, u, direct.differentiation(phases), 1e-7, 20)
             assert size < 1e-7
             fine.append(direct.means(body, u, row[6]))
         truth = (36**2 * fine[1] - 24**2 * fine[0]) / (36**2 - 24**2)
@@ -180,8 +180,8 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
     groups = control(2, omega_bar=[10.0, 14.0])
     plain = steady(groups)
 
-    def lose_the_first(rows: Floats, tails: int) -> direct.Orbits:
-        found = solve_all(rows, tails)
+    def lose_the_first(rows: Floats, tangents: Floats, tails: int) -> direct.Orbits:
+        found = solve_all(rows, tangents, tails)
         found.ended[0] = direct.LOST
         found.means[0] = np.nan
         return found

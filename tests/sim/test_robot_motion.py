@@ -24,6 +24,7 @@ from sim.settling import settle
 from sim.steady import steady
 from sim.stepper import PHASE, YAW, at_rest, step
 from sim.switching import switch_response
+from sim.tail import HEAD_LENGTH, body_of
 from tests.reference.cases import (
     CONTROL,
     INDEPENDENT_HEAD_SHARE,
@@ -120,12 +121,12 @@ def test_compiled_steps_equal_steps_with_tensors(tails: int, omega: float) -> No
     swimmer = replace(swimmer, gain=swimmer.gain * 1.2)
     swimmer.resistance[3, 4] = 0.02
     row = direct.bodies(groups)[0]
-    body = direct.body_of(row)
+    body = body_of(row)
     body.resistance[3, 4] = 0.02
     body = body._replace(gain=1.2)
     dt = 0.15 / abs(omega)
     state, poses = new_state(tails, edges, body.offset), np.empty((steps, 6))
-    assert advance(body, row[direct.HEAD_LENGTH], state, dt, steps, 1e-10, poses, np.empty((0, *state.x.shape)))
+    assert advance(body, row[HEAD_LENGTH], state, dt, steps, 1e-10, poses, np.empty((0, *state.x.shape)))
     tensors = at_rest(swimmer)
     for i in range(steps):
         tensors = step(
@@ -141,9 +142,7 @@ def test_a_step_that_breaks_down_is_reported() -> None:
     row[3] = np.nan
     state = new_state(2, 8, row[1])
     steps = np.empty((3, 6))
-    assert not advance(
-        direct.body_of(row), row[6], state, 0.01, 3, TOLERANCE, steps, np.empty((0, *state.x.shape))
-    )
+    assert not advance(body_of(row), row[6], state, 0.01, 3, TOLERANCE, steps, np.empty((0, *state.x.shape)))
 
 
 def yaw_after(steps: int, *, edges: int = 12, time: float = 1.5) -> float:
