@@ -46,7 +46,6 @@ CORRECTION = 1e-6  # last Newton correction; convergence is quadratic, but stret
 ROUGH = 1e-5  # the same on the coarser meshes, where only the means are wanted: it leaves 1e-9 of them
 PHASE_ERROR = 1e-4  # relative, in the means
 BALANCED = 1e-5  # largest unbalanced force over the largest that an edge carries
-NO_TANGENTS = np.empty((0, 28))
 WIDTH = 1e-5  # step of the differences that are exact for linear dependence
 _DOUBT = 0.03  # share of the extrapolation that counts as error
 _SHRINKS = (
@@ -56,8 +55,18 @@ _MOST_PHASES = 48
 _MOST_CORRECTIONS = 30
 
 
+class Orbit(NamedTuple):
+    """One robot's orbit on the three MESHES: shapes x (n, M, 3) and velocities u (P, 4)."""
+
+    ended: int  # SOLVED or why not
+    error: float  # estimated relative error of the means
+    means: Array  # (5,): ω_t, ω_h, ω_yr, v_x, v_z of the head's centre; NaN where not solved
+    x: tuple[Array, Array, Array]
+    u: tuple[Array, Array, Array]
+
+
 class Orbits(NamedTuple):
-    """Steady motions of B robots; rows (ω_t, ω_h, ω_yr, v_x, v_z) of the head's centre."""
+    """Steady motions of B robots; means and slopes of (ω_t, ω_h, ω_yr, v_x, v_z) of the head's centre."""
 
     means: Array  # (B, 5), NaN where not solved
     slopes: Array  # (B, K, 5): derivatives of the means along K tangents
@@ -232,70 +241,42 @@ def _enough_phases(body: Body, tails: int, head_length: float) -> tuple[int, flo
 
 
 @compiled
-def solve(row: Array, tangents: Array, tails: int) -> tuple[int, float, Array, Array, Array, Array]:
-    """One robot.
-
-    Args:
-        row: its numbers, from `bodies`.
-        tangents: directions (K, 28) in which the means are to be differentiated; their size sets the step (WIDTH).
-        tails: N.
-
-    Returns:
-        How it ended, estimated relative error, means (5,), their derivatives (K, 5), and x (n, M, 3) and
-        u (P, 4) on the finest mesh.
-    """
+def solve(row: Array, tails: int) -> Orbit:
+    """One robot with N tails; its numbers from `bodies`."""
     body, head_length = body_of(row), row[HEAD_LENGTH]
-    found, slopes = np.full((3, 5), np.nan), np.full((3, 5 * len(tangents)), np.nan)
-    ended, phase_error, x, u = _enough_phases(body, tails, head_length)
+    ended, error, x, u = _enough_phases(body, tails, head_length)
     matrix = differentiation(x.shape[1])
-    x_before, u_before, n_before = x, u, MESHES[0]
-    for i in range(3):
-        if ended != SOLVED:
-            break
-        n = MESHES[i]
-        if i > 0:
-            coarse = MESHES[i - 1]
-            x_next, u_next = with_edges(x, body.offset, n), u.copy()
-            if i > 1:  # extrapolate the change from mesh to mesh as 1/n²
-                more = (1 / coarse**2 - 1 / n**2) / (1 / n_before**2 - 1 / coarse**2)
-                x_next += more * (x_next - with_edges(x_before, body.offset, n))
-                u_next += more * (u - u_before)
-            wanted = CORRECTION if i == 2 else ROUGH
-            _, size = newton(body, x_next, u_next, matrix, wanted, _MOST_CORRECTIONS)
-            x_before, u_before, n_before = x, u, coarse
-            x, u = x_next, u_next
-            if not size < wanted:
-                ended = LOST
-        found[i] = means(body, u, head_length)
-        if len(tangents):
-            slopes[i] = _slopes(row, tangents, x, u, matrix).ravel()
+    xs, us = (x, x, x), (u, u, u)
+    for i in (1, 2):
+        n, coarse = MESHES[i], MESHES[i - 1]
+        x, u = with_edges(xs[1], body.offset, n), us[1].copy()
+        if i == 2:  # extrapolate the change from mesh to mesh as 1/n²
+            more = (1 / coarse**2 - 1 / n**2) / (1 / MESHES[0] ** 2 - 1 / coarse**2)
+            x += more * (x - with_edges(xs[0], body.offset, n))
+            u += more * (us[1] - us[0])
+        wanted = CORRECTION if i == 2 else ROUGH
+        for _ in range(2):
+            if ended == SOLVED:
+                _, size = newton(body, x, u, matrix, wanted, _MOST_CORRECTIONS)
+                if not size < wanted:
+                    ended = LOST
+            if i == 1 or ended != SOLVED or imbalance(body, x, u, matrix) < BALANCED:
+                break
+            wanted *= 1e-3  # slow motors: all forces are small
+        xs = (xs[0], x, x) if i == 1 else (xs[0], xs[1], x)
+        us = (us[0], u, u) if i == 1 else (us[0], us[1], u)
     if ended == SOLVED and not _turns_forward(body, u):
         ended = BACKWARDS
     if ended == SOLVED and not imbalance(body, x, u, matrix) < BALANCED:
         ended = UNBALANCED
     if ended != SOLVED:
-        return ended, np.nan, np.full(5, np.nan), np.full((len(tangents), 5), np.nan), x, u
+        return Orbit(ended, np.nan, np.full(5, np.nan), xs, us)
+    found = np.empty((3, 5))
+    for i in range(3):
+        found[i] = means(body, us[i], head_length)
     limit = extrapolate(found)
-    without = without_last_term(found)
-    error = phase_error + difference(without, limit) + _DOUBT * difference(found[2], limit)
-    return SOLVED, error, limit, extrapolate(slopes).reshape(len(tangents), 5), x, u
-
-
-@compiled
-def _slopes(row: Array, tangents: Array, x: Array, u: Array, matrix: Array) -> Array:
-    """Derivatives of the means along `tangents` on one mesh, (K, 5)."""
-    moved = np.empty((2 * len(tangents), row.size))
-    for k in range(len(tangents)):
-        moved[2 * k] = row - WIDTH * tangents[k]
-        moved[2 * k + 1] = row + WIDTH * tangents[k]
-    by_parameter = sensitivity(body_of(row), moved, WIDTH, x, u, matrix)
-    slopes = np.empty((len(tangents), 5))
-    for k in range(len(tangents)):
-        back, forth = moved[2 * k], moved[2 * k + 1]
-        before = means(body_of(back), u - WIDTH * by_parameter[k], back[HEAD_LENGTH])
-        after = means(body_of(forth), u + WIDTH * by_parameter[k], forth[HEAD_LENGTH])
-        slopes[k] = (after - before) / (2 * WIDTH)
-    return slopes
+    error += difference(without_last_term(found), limit) + _DOUBT * difference(found[2], limit)
+    return Orbit(SOLVED, error, limit, xs, us)
 
 
 @compiled
@@ -317,7 +298,7 @@ def without_last_term(found: Array) -> Array:
 
 
 @compiled
-def _smallest_gap(x: Array, body: Body, tails: int, radius: float) -> float:
+def _smallest_gap(x: Array, offset: float, tails: int, radius: float) -> float:
     """Smallest gap between tails over a revolution; tail j is tail 0 a j-th part of a turn later."""
     x = with_phases(x, 2 * x.shape[1])
     spacing = x.shape[1] // tails
@@ -325,24 +306,47 @@ def _smallest_gap(x: Array, body: Body, tails: int, radius: float) -> float:
     for m in range(spacing):
         for j in range(tails):
             shape[:, j] = x[:, m + j * spacing]
-        smallest = min(smallest, tail_gap(shape, body.offset, radius))
+        smallest = min(smallest, tail_gap(shape, offset, radius))
     return smallest
 
 
-@compiled
-def solve_all(rows: Array, tangents: Array, tails: int) -> Orbits:
-    """Steady motions of robots with N tails: rows (B, 28) from `bodies`, tangents (B, K, 28)."""
-    count, width = tangents.shape[:2]
-    out = Orbits(
-        np.zeros((count, 5)), np.zeros((count, width, 5)), np.zeros(count),
-        np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(count),
-    )  # fmt: skip
-    for i in range(count):
-        ended, error, limit, slopes, x, _ = solve(rows[i], tangents[i], tails)
-        out.means[i], out.slopes[i], out.error[i], out.ended[i] = limit, slopes, error, ended
-        out.phases[i] = x.shape[1]
-        out.gap[i] = _smallest_gap(x, body_of(rows[i]), tails, rows[i, TAIL_RADIUS]) if ended == SOLVED else np.nan
-    return out
+def solve_all(rows: Array, tails: int, tangents: Array | None = None) -> Orbits:
+    """Steady motions of robots with N tails, and their derivatives.
+
+    Args:
+        rows: (B, 28), from `bodies`.
+        tails: N.
+        tangents: (B, K, 28), directions in which the means are to be differentiated (none by default); their size
+            sets the step of differences that are exact for linear dependence.
+    """
+    slopes = np.full((len(rows), 0 if tangents is None else tangents.shape[1], 5), np.nan)
+    means_, error, phases, ended, gap = [], [], [], [], []
+    for i, row in enumerate(rows):
+        orbit = solve(row, tails)
+        solved = orbit.ended == SOLVED
+        means_.append(orbit.means)
+        error.append(orbit.error)
+        phases.append(orbit.x[2].shape[1])
+        ended.append(orbit.ended)
+        gap.append(_smallest_gap(orbit.x[2], row[1], tails, row[TAIL_RADIUS]) if solved else np.nan)
+        if solved and tangents is not None:
+            slopes[i] = _slopes(row, tangents[i], orbit)
+    return Orbits(np.array(means_), slopes, np.array(error), np.array(phases), np.array(ended), np.array(gap))
+
+
+def _slopes(row: Array, tangents: Array, orbit: Orbit) -> Array:
+    """Derivatives of the extrapolated means along `tangents`, (K, 5)."""
+    moved = np.stack([row - WIDTH * tangents, row + WIDTH * tangents], 1)  # (K, 2, 28)
+    found = np.empty((3, len(tangents), 5))
+    for i, (x, u) in enumerate(zip(orbit.x, orbit.u, strict=True)):
+        changes = sensitivity(body_of(row), moved.reshape(-1, row.size), WIDTH, x, u, differentiation(x.shape[1]))
+        for k, change in enumerate(changes):
+            ends = [
+                means(body_of(robot), u + sign * WIDTH * change, robot[HEAD_LENGTH])
+                for sign, robot in zip((-1, 1), moved[k], strict=True)
+            ]
+            found[i, k] = (ends[1] - ends[0]) / (2 * WIDTH)
+    return extrapolate(found.reshape(3, -1)).reshape(-1, 5)
 
 
 @compiled

@@ -26,8 +26,6 @@ from sim.vectors import Matrix, cross, dot, times
 
 Array = NDArray[np.float64]
 
-_LARGE = 36  # rows from which a matrix is inverted by halves
-
 
 class System(NamedTuple):
     """The equations; c = number of body unknowns + number of right-hand sides."""
@@ -74,23 +72,24 @@ def clear(system: System) -> None:
 
 
 @compiled
-def invert(a: Array, first: int, last: int) -> None:
-    """Invert the diagonal block first..last of `a` in place: Gauss-Jordan, a 3×3 pivot at a time."""
-    for k in range(first, last, 3):
+def invert(a: Array) -> None:
+    """Invert `a` (m, m) in place: Gauss-Jordan, a 3×3 pivot at a time."""
+    m = a.shape[0]
+    for k in range(0, m, 3):
         pivot = inverse_of_three(a, k)
         for i in range(3):
             for j in range(3):
                 a[k + i, k + j] = 1.0 if i == j else 0.0
-        for j in range(first, last):
+        for j in range(m):
             x, y, z = a[k, j], a[k + 1, j], a[k + 2, j]
             a[k, j] = pivot[0][0] * x + pivot[0][1] * y + pivot[0][2] * z
             a[k + 1, j] = pivot[1][0] * x + pivot[1][1] * y + pivot[1][2] * z
             a[k + 2, j] = pivot[2][0] * x + pivot[2][1] * y + pivot[2][2] * z
-        for i in range(first, last):
+        for i in range(m):
             if i < k or i > k + 2:
                 f, g, h = a[i, k], a[i, k + 1], a[i, k + 2]
                 a[i, k] = a[i, k + 1] = a[i, k + 2] = 0.0
-                for j in range(first, last):
+                for j in range(m):
                     a[i, j] -= f * a[k, j] + g * a[k + 1, j] + h * a[k + 2, j]
 
 
@@ -103,28 +102,6 @@ def inverse_of_three(a: Array, k: int) -> Matrix:
     first = cross(q, r)
     scale = 1.0 / dot(p, first)
     return (times(scale, first), times(scale, cross(r, p)), times(scale, cross(p, q)))
-
-
-@compiled
-def invert_by_halves(a: Array) -> None:
-    """Invert `a` in place; a large matrix by two halves and matrix products between them."""
-    m = a.shape[0]
-    if m < _LARGE:
-        invert(a, 0, m)
-        return
-    h = 3 * (m // 6)
-    invert(a, 0, h)
-    first = np.ascontiguousarray(a[:h, :h])  # P⁻¹
-    right = np.ascontiguousarray(a[:h, h:])
-    left = np.ascontiguousarray(a[h:, :h])
-    spread = np.dot(first, right)  # P⁻¹ Q
-    a[h:, h:] -= np.dot(left, spread)  # S = V − U P⁻¹ Q
-    invert(a, h, m)
-    schur = np.ascontiguousarray(a[h:, h:])
-    gathered = np.dot(schur, np.dot(left, first))  # S⁻¹ U P⁻¹
-    a[h:, :h] = -gathered
-    a[:h, :h] += np.dot(spread, gathered)
-    a[:h, h:] = -np.dot(spread, schur)
 
 
 @compiled
@@ -195,7 +172,7 @@ def solve(system: System, dx: Array, du: Array) -> None:
     unknowns, sides = du.shape
     for i in range(n - 1, -1, -1):
         system.inverse[:] = system.rows[i][:, :m]
-        invert_by_halves(system.inverse)
+        invert(system.inverse)
         _gather(system, i)
         np.dot(system.inverse, system.right, system.folded[i])
         if i > 0:

@@ -57,7 +57,7 @@ def sensitivities(groups: Groups, parameters: Sequence[str]) -> Sensitivities:
     moved = [_tangent(groups, name) for name in names]
     scales = np.stack([scale for _, scale in moved], 1) if names else np.empty((len(groups), 0))
     tangents = np.stack([t for t, _ in moved], 1) if names else np.empty((len(groups), 0, 28))
-    found = direct.solve_all(direct.bodies(groups), tangents, groups.N)
+    found = direct.solve_all(direct.bodies(groups), groups.N, tangents)
     slopes = found.slopes / scales[:, :, None]  # (B, K, 5)
     values = dict(zip(OUTPUTS, found.means.T, strict=False))
     derivatives = {name: slopes[:, :, i] for i, name in enumerate(OUTPUTS[:5])}

@@ -25,9 +25,10 @@ def tails_over_a_revolution(robot: Robot, frames: int) -> tuple[Floats, Floats]:
         InputError: the robot has no steady motion on which its tails move alike.
     """
     groups = robot.groups()
-    ended, _, _, _, x, _ = direct.solve(direct.bodies(groups)[0], direct.NO_TANGENTS, groups.N)
-    if ended != direct.SOLVED:
-        raise InputError(f"{robot.name} has no shape to draw: {direct.REASONS[ended]}")
+    orbit = direct.solve(direct.bodies(groups)[0], groups.N)
+    if orbit.ended != direct.SOLVED:
+        raise InputError(f"{robot.name} has no shape to draw: {direct.REASONS[orbit.ended]}")
+    x = orbit.x[2]
     phases = 2 * np.pi * np.arange(frames) / frames
     root = np.zeros((1, x.shape[1], 3))
     root[:, :, 0] = float(groups.a_over_R / groups.l_over_R)

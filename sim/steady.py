@@ -42,7 +42,7 @@ def _rows(groups: Groups, rows: NDArray[np.int64]) -> Groups:
 
 def orbits(groups: Groups) -> Steady:
     """The direct route alone; `failed` where it found no orbit."""
-    found = direct.solve_all(direct.bodies(groups), np.empty((len(groups), 0, 28)), groups.N)
+    found = direct.solve_all(direct.bodies(groups), groups.N)
     means = found.means.T
     solved = found.ended == direct.SOLVED
     return Steady(

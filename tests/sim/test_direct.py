@@ -51,8 +51,9 @@ def test_tensors_find_the_compiled_orbit_in_balance(tails: int) -> None:
     """At every phase, all N tails in place: no net wrench, and a Newton correction that changes nothing."""
     groups = control(N=tails, omega_bar=-40.0, C_yr=5.0)
     _, row = body_of(groups)
-    ended, _, _, _, x, u = direct.solve(row, direct.NO_TANGENTS, tails)
-    assert ended == direct.SOLVED
+    found = direct.solve(row, tails)
+    assert found.ended == direct.SOLVED
+    x, u = found.x[2], found.u[2]
     n, phases, _ = x.shape
     derivative = np.einsum("ml,klc->kmc", direct.differentiation(phases), x)
     lanes = torch.zeros(phases // tails, dtype=torch.long)
@@ -125,11 +126,11 @@ def test_newton_s_matrix_is_the_derivative_of_the_residual() -> None:
     assert jacobian @ np.concatenate([dx.ravel(), du.ravel()]) == pytest.approx(right, rel=1e-7, abs=1e-7)
 
 
-@pytest.mark.parametrize("size", [6, 18, 36, 48])
-def test_inverse_by_halves(size: int) -> None:
+@pytest.mark.parametrize("size", [6, 18, 48])
+def test_inverse(size: int) -> None:
     matrix = np.random.default_rng(size).normal(size=(size, size)) + size * np.eye(size)
     inverse = matrix.copy()
-    elimination.invert_by_halves(inverse)
+    elimination.invert(inverse)
     assert inverse @ matrix == pytest.approx(np.eye(size), abs=1e-11)
 
 
@@ -159,8 +160,9 @@ def test_the_stated_error_covers_a_much_finer_mesh() -> None:
     for i in range(24):
         groups = Groups.from_columns({name: values[i : i + 1] for name, values in points.items()})
         body, row = body_of(groups)
-        ended, error, limit, _, x, u = direct.solve(row, direct.NO_TANGENTS, groups.N)
-        assert ended == direct.SOLVED
+        found = direct.solve(row, groups.N)
+        assert found.ended == direct.SOLVED
+        x, u = found.x[2], found.u[2]
         phases = 2 * x.shape[1]
         x, u = direct.with_phases(x, phases), direct.with_phases(u.reshape(1, -1, 4), phases // groups.N)[0]
         fine = []
@@ -170,8 +172,8 @@ def test_the_stated_error_covers_a_much_finer_mesh() -> None:
             assert size < 1e-7
             fine.append(direct.means(body, u, row[6]))
         truth = (36**2 * fine[1] - 24**2 * fine[0]) / (36**2 - 24**2)
-        assert direct.difference(limit, truth) < 2e-3
-        ratios.append(direct.difference(limit, truth) / error)
+        assert direct.difference(found.means, truth) < 2e-3
+        ratios.append(direct.difference(found.means, truth) / found.error)
     assert np.quantile(ratios, 0.9) < 1
     assert max(ratios) < 2
 
@@ -180,8 +182,8 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
     groups = control(2, omega_bar=[10.0, 14.0])
     plain = steady(groups)
 
-    def lose_the_first(rows: Floats, tangents: Floats, tails: int) -> direct.Orbits:
-        found = solve_all(rows, tangents, tails)
+    def lose_the_first(rows: Floats, tails: int) -> direct.Orbits:
+        found = solve_all(rows, tails)
         found.ended[0] = direct.LOST
         found.means[0] = np.nan
         return found
