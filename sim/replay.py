@@ -75,7 +75,7 @@ def replay(
 
     Args:
         schedules: any robots.
-        resolution: mesh and step; default `Resolution.fitting`.
+        resolution: mesh and step; default `Resolution.for_tracks`.
         progress: called with the number of dwells done, counted over all schedules.
 
     Returns:
@@ -91,7 +91,7 @@ def _replay(
     groups = Groups.from_columns({name: np.array([value]) for name, value in schedule.robot.items()})
     speed = abs(float(groups.omega_bar))
     groups = replace(groups, omega_bar=torch.full_like(groups.omega_bar, schedule.first_direction * speed))
-    run = Run(direct.bodies(groups)[0], groups.N, resolution or Resolution.fitting(speed))
+    run = Run(direct.bodies(groups)[0], groups.N, resolution or Resolution.for_tracks(speed))
     direction, time = schedule.first_direction, 0.0
     rows: list[tuple[float, ...]] = [(0.0, 0.0, 0.0, 0.0, direction, 0)]
     for index, dwell in enumerate(schedule.dwells.tolist()):
