@@ -49,9 +49,24 @@ def test_symmetry_visibility_and_dissipation(name: str) -> None:
     mirrored = {"omega_t": -1, "omega_yr": -1, "v_x": -1, "v_z": 1}
     same = all(values[o][2] == pytest.approx(s * values[o][1], rel=1e-6) for o, s in mirrored.items())
     assert same == (effect.symmetry == "even")
-    if effect.dissipative:
-        head = assemble(control(C_yr=0.0, **{name: effect.typical}), edges=6).resistance[:, :4, 0]
-        assert torch.linalg.eigvalsh((head + head.T) / 2).min() > -1e-12
+
+
+@pytest.mark.parametrize("name", [e.name for e in catalogue().values() if e.dissipative])
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_a_dissipative_effect_takes_power_and_gives_none(name: str, share: float) -> None:
+    """Power into the fluid, for any motion, with the side force (which does work on the head) left out."""
+    effect = catalogue()[name]
+    for end in effect.bounds:
+        size = effect.null + share * (end - effect.null)
+        swimmer = assemble(control(C_yr=0.0, **{name: size}), edges=6)
+        assert float(swimmer.zeta_parallel) > 0
+        assert float(swimmer.zeta_perp) > 0
+        assert float(swimmer.gain) >= 1
+        R = swimmer.resistance[..., 0]
+        on_head = torch.linalg.eigvalsh((R[:, :4] + R[:, :4].T) / 2)
+        assert on_head.min() > -1e-12
+        assert (R[:3, 4] == 0).all()
+        assert R[3, 4] >= 0  # the disc's own drag
 
 
 @pytest.mark.parametrize("name", list(catalogue()))

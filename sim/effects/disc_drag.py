@@ -1,0 +1,45 @@
+"""Drag on the disc that carries the tails.
+
+    M_z = −ε 8π μ0 R³ ω_t
+
+The paper's motor balances the tails' torque against the head's; the disc itself turns in the fluid too. A thin
+disc of radius R edgewise to nothing has ε = 32/3/(8π) = 0.42. It acts as tail spin drag does, but for the
+length of the tails. Left out: the gap between disc and head.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import torch
+from torch import Tensor
+
+from sim.effects.base import Effect
+
+if TYPE_CHECKING:
+    from sim.drag import Coefficients
+    from sim.robot import Groups
+
+
+@dataclass(frozen=True)
+class DiscDrag(Effect):
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        extra = torch.zeros_like(base.resistance)
+        extra[3, 4] = size * 8 * math.pi / groups.l_over_R**3
+        return replace(base, resistance=base.resistance + extra)
+
+
+EFFECT = DiscDrag(
+    name="disc_drag",
+    title="drag on the disc",
+    equation="M_z = −ε 8π μ0 R³ ω_t",
+    source="Happel and Brenner (1973), disc rotating about its axis: torque 32/3 μ R³ ω",
+    unit="8π μ0 R³",
+    null=0.0,
+    bounds=(0.0, 10.0),
+    typical=0.4,
+    symmetry="even",
+    dissipative=True,
+)

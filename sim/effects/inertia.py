@@ -1,0 +1,51 @@
+"""Drag that grows with speed: the first trace of inertia.
+
+    ζ∥, ζ⊥, R_head × (1 + ε s),   s = |ω| / ω_control
+
+At low Reynolds number drag is linear in velocity; Oseen's correction adds a part in proportion to Re ∝ |ω|. The
+motor speed in rad/s is ω̄ (r0/l)⁴ π E/(4 μ0), so with one material and fluid s = |ω̄| (r0/l)⁴ divided by its
+value for the paper's control example. Left out: the mass terms (centripetal loads, added mass), which are not a
+change of drag.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from torch import Tensor
+
+from sim.effects.base import Effect
+
+if TYPE_CHECKING:
+    from sim.drag import Coefficients
+    from sim.robot import Groups
+
+CONTROL_SPEED = 10.0 / 34.375**4  # |ω̄| (r0/l)⁴ of the paper's control example
+
+
+@dataclass(frozen=True)
+class Inertia(Effect):
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        speed = groups.omega_bar.abs() / groups.l_over_r0**4 / CONTROL_SPEED
+        factor = 1 + size * speed
+        return replace(
+            base,
+            zeta_parallel=base.zeta_parallel * factor,
+            zeta_perp=base.zeta_perp * factor,
+            resistance=base.resistance * factor,
+        )
+
+
+EFFECT = Inertia(
+    name="inertia",
+    title="drag growing with speed (inertia)",
+    equation="ζ∥, ζ⊥, R_head × (1 + ε |ω|/ω_control)",
+    source="Oseen (1910): drag × (1 + 3/16 Re) for a sphere",
+    unit="1",
+    null=0.0,
+    bounds=(0.0, 2.0),
+    typical=0.05,
+    symmetry="even",
+    dissipative=True,
+)

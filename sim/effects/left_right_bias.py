@@ -1,0 +1,45 @@
+"""A robot that turns better to one side.
+
+    M_y = ε μ0 R L² |ω_t|/2
+
+A head that hangs askew or a tail that is bent gives a yaw moment that does not reverse with the motor: turn
+rates to the left and to the right differ. To be fitted before anything exotic. Written as a side force ε μ0 R L
+|ω_t| at the head's centre, of which only the moment about J is kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import torch
+from torch import Tensor
+
+from sim.effects.base import Effect
+
+if TYPE_CHECKING:
+    from sim.drag import Coefficients
+    from sim.robot import Groups
+
+
+@dataclass(frozen=True)
+class LeftRightBias(Effect):
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        R, L = 1 / groups.l_over_R, groups.L_over_R / groups.l_over_R
+        extra = torch.zeros_like(base.resistance)
+        extra[2, 4] = -size * torch.sign(groups.omega_bar) * R * L**2 / 2
+        return replace(base, resistance=base.resistance + extra)
+
+
+EFFECT = LeftRightBias(
+    name="left_right_bias",
+    title="left-right bias",
+    equation="M_y = ε μ0 R L² |ω_t|/2",
+    source="symmetry: what a mirror-symmetric robot cannot have",
+    unit="μ0 R L²/2",
+    null=0.0,
+    bounds=(-2.0, 2.0),
+    typical=0.05,
+    symmetry="odd",
+    dissipative=False,
+)

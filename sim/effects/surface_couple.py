@@ -1,0 +1,45 @@
+"""Yaw couple of tails that turn under the free surface.
+
+    M_y = ε μ0 N a² l ω_t
+
+Tails sweep a drum of radius a that is nearer to the surface above than to the bottom below; like the head it is
+pushed sideways, behind J, which yaws the robot. The form is an estimate: proportional to the spin, the number and
+the length of the tails. Expected to change ω_yr by 10 to 70 %, of either sign. Left out: the side force itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import torch
+from torch import Tensor
+
+from sim.effects.base import Effect
+
+if TYPE_CHECKING:
+    from sim.drag import Coefficients
+    from sim.robot import Groups
+
+
+@dataclass(frozen=True)
+class SurfaceCouple(Effect):
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        offset = groups.a_over_R / groups.l_over_R
+        extra = torch.zeros_like(base.resistance)
+        extra[2, 4] = -size * groups.N * offset**2
+        return replace(base, resistance=base.resistance + extra)
+
+
+EFFECT = SurfaceCouple(
+    name="surface_couple",
+    title="yaw couple of the tails under the surface",
+    equation="M_y = ε μ0 N a² l ω_t",
+    source="estimate; image system of a rotlet under a stress-free plane",
+    unit="μ0 a² l",
+    null=0.0,
+    bounds=(-3.0, 3.0),
+    typical=0.1,
+    symmetry="even",
+    dissipative=False,
+)

@@ -1,0 +1,51 @@
+"""A tank not much wider than the head.
+
+    F = −6π μ0 R C_t v × 1/(1 − 2.104 x + 2.089 x³ − 0.948 x⁵),   x = d/D
+
+Walls hold the fluid back: the drag on a body of diameter d in a vessel of diameter D grows. The correction is
+that of a sphere on the axis of a tube (Faxén, Haberman). Needs the position in the tank or several tanks; in
+one tank C_t takes it up.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import torch
+from torch import Tensor
+
+from sim.effects.base import Effect
+
+if TYPE_CHECKING:
+    from sim.drag import Coefficients
+    from sim.robot import Groups
+
+
+@dataclass(frozen=True)
+class TankWall(Effect):
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        factor = 1 / (1 - 2.104 * size + 2.089 * size**3 - 0.948 * size**5)
+        extra = torch.zeros_like(base.resistance)
+        lever = groups.L_over_R / groups.l_over_R / 2
+        translation = 6 * math.pi * groups.C_t / groups.l_over_R * (factor - 1)
+        extra[0, 0], extra[1, 1] = translation, translation
+        extra[0, 2], extra[2, 0] = translation * lever, translation * lever
+        extra[2, 2] = translation * lever**2
+        return replace(base, resistance=base.resistance + extra)
+
+
+EFFECT = TankWall(
+    name="tank_wall",
+    title="wall of the tank",
+    equation="F = −6π μ0 R C_t v/(1 − 2.104 ε + 2.089 ε³ − 0.948 ε⁵)",
+    source="Faxén (1922); Haberman and Sayre (1958)",
+    unit="d/D",
+    null=0.0,
+    bounds=(0.0, 0.7),
+    typical=0.1,
+    symmetry="even",
+    dissipative=True,
+    covariate="tank_diameter_m",
+)
