@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from benchmarks import accuracy, lookup, tracking
+from benchmarks import accuracy, lookup, robustness, scaling, speed, tracking
 
 
 def main() -> None:
     accuracy.main()
+    speed.main()
+    scaling.main()
+    robustness.main()
     lookup.main()
     tracking.main()
 
