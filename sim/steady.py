@@ -2,7 +2,7 @@
 
 The direct route (`sim.direct`) solves for the relative periodic orbit on which all tails move alike; it takes
 well under a millisecond a robot and gives the error of its means. Straight tails at rest reach that orbit wherever
-the robot turns slowly beside its disc (docs/branches.md). Where it does not (|ω_yr| > QUICK |ω_t|), the robot is
+the robot turns slowly beside its disc (docs/branches.md). Where it may not (|ω_yr| > QUICK |ω_t|), the robot is
 stepped in time from rest as well, and what that reaches is the answer; where Newton's method fails in the direct
 route, stepping is the answer too. Such rows say so; their error is estimated from two meshes and steps.
 """
@@ -19,8 +19,8 @@ from sim.resolution import Resolution
 from sim.robot import Groups
 from sim.settling import settle
 
-QUICK = 0.5  # ω_yr/ω_t from which straight tails may reach another motion
-SAME = 0.05  # relative difference up to which a stepped motion counts as the direct one
+QUICK = 0.4  # ω_yr/ω_t from which straight tails may reach another motion
+SAME = 0.02  # relative difference up to which a stepped motion counts as the direct one
 
 
 def steady(groups: Groups) -> Steady:
@@ -28,7 +28,8 @@ def steady(groups: Groups) -> Steady:
     motion = orbits(groups)
     quick = np.flatnonzero(~motion.failed & (np.abs(motion.omega_yr) > QUICK * np.abs(motion.omega_t)))
     if len(quick):
-        reached = settle(_rows(groups, quick))
+        fastest = float(groups.omega_bar[torch.as_tensor(quick)].abs().max())
+        reached = settle(_rows(groups, quick), resolution=Resolution.for_tracks(fastest))
         other = quick[_difference(motion.at(quick), reached) > SAME]
         note = "straight tails reach another motion than the one on which they move alike"
         motion = motion.with_rows(other, stepped(_rows(groups, other), [note] * len(other)))
@@ -67,7 +68,8 @@ def stepped(groups: Groups, notes: list[str]) -> Steady | None:
     """
     if not notes:
         return None
-    needed = Resolution.fitting(float(groups.omega_bar.abs().max()))
+    fastest = float(groups.omega_bar.abs().max())
+    needed = Resolution.fitting(fastest)
     coarse = settle(groups, resolution=needed)
     fine = settle(groups, resolution=Resolution(2 * needed.edges, 2 * needed.steps))
     fields = {**vars(fine), "error": _difference(coarse, fine) / 3}  # of second order
