@@ -13,7 +13,7 @@ A node moves in the lab with v_k = ẋ_k + G_k w, where w = (v_x, v_z, ω_yr, ω
 The motor sets ω = ω_t − ω_h, so the unknown body velocity is u = (v_x, v_z, ω_yr, ω_h), and ω_t = ω + gain ω_h
 (gain 1: the motor holds its speed). At low Reynolds number (no inertia):
 
-    tails, each free node:   r_k = q_k(x, ẋ, u, φ) + f_k(x) = 0           (drag + elastic force)
+    tails, each free node:   r_k = q_k(x, ẋ, u, φ) + f_k(x) + l_k b(φ) = 0   (drag + elastic force + load)
     body, total wrench:      T = Gᵀ-projection of what the clamps transmit − R (u, ω_t) = 0
 
 T uses the force and moment that pass through each clamp (edge 0, its bending spring, drag on node 0)
@@ -56,6 +56,7 @@ class Swimmer:
     zeta_perp: Tensor  # (B,)
     resistance: Tensor  # (4, 5, B), see `sim.drag.Coefficients`
     gain: Tensor  # (B,)
+    tail_load: Tensor  # (3, B)
     head_length: Tensor  # L/l, (B,)
     tail_radius: Tensor  # r0/l, (B,)
 
@@ -106,6 +107,7 @@ def assemble(groups: Groups, *, edges: int) -> Swimmer:
         zeta_perp=found.zeta_perp,
         resistance=found.resistance,
         gain=found.gain,
+        tail_load=found.tail_load,
         head_length=L,
         tail_radius=1 / groups.l_over_r0,
     )
@@ -166,6 +168,15 @@ def _body_velocity(swimmer: Swimmer, u: Tensor, omega: Tensor) -> Tensor:
     return torch.cat([u[:3], swimmer.omega_t(u, omega).unsqueeze(0)])
 
 
+def _node_load(swimmer: Swimmer, e_x: Tensor, e_y: Tensor) -> Tensor:
+    """Force of the load on every node, (n + 1, 3, N, B)."""
+    load = swimmer.tail_load[0] * e_x + swimmer.tail_load[1] * e_y
+    load[2] = load[2] + swimmer.tail_load[2]
+    voronoi = torch.full((swimmer.n + 1, 1, 1, 1), 1 / swimmer.n, dtype=load.dtype, device=load.device)
+    voronoi[0] = voronoi[-1] = 0.5 / swimmer.n
+    return voronoi * load.expand(3, *swimmer.root.shape[2:])
+
+
 def _body_load(swimmer: Swimmer, u: Tensor, omega: Tensor) -> Tensor:
     """Wrench (4, B) about J of the fluid on head and disc."""
     all_five = torch.cat([u, swimmer.omega_t(u, omega).unsqueeze(0)])
@@ -203,7 +214,8 @@ def newton_correction(
     velocity = (G * w.reshape(4, 1, 1, 1, -1)).sum(0)
     velocity[1:] += x_dot
     drag_ = _node_drag(swimmer, shape, velocity)
-    residual = drag_.force[1:] + elastic.node_forces(response.edge_force)
+    load = _node_load(swimmer, e_x, e_y)
+    residual = drag_.force[1:] + elastic.node_forces(response.edge_force) + load[1:]
 
     matrix = BlockBanded(n, (swimmer.tails, swimmer.robots), x)
     _add_elastic(matrix, response.stiffness)
@@ -216,7 +228,9 @@ def newton_correction(
     border = drag_.on(G_total)
 
     by_root = _drag_by_first_edge(shape, drag_, velocity)
-    foot, corner, total = _body_rows(swimmer, response, drag_, by_root, G, e_x, e_y, border[:, 0], rate, u, omega)
+    foot, corner, total = _body_rows(
+        swimmer, response, drag_, load[0], by_root, G, e_x, e_y, border[:, 0], rate, u, omega
+    )
     return matrix.solve_bordered(-residual, border[:, 1:], foot, corner, -total)
 
 
@@ -273,6 +287,7 @@ def _body_rows(
     swimmer: Swimmer,
     response: ElasticResponse,
     drag_: _Drag,
+    load: Tensor,
     by_root: Tensor,
     G: Tensor,
     e_x: Tensor,
@@ -284,7 +299,7 @@ def _body_rows(
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Rows of the body: foot C (4, 6, N, B), corner D (4, 4, B) and the wrench T (4, B)."""
     root = swimmer.root[0]
-    through = response.edge_force[0] + drag_.force[0]  # force that each tail puts on the disc
+    through = response.edge_force[0] + drag_.force[0] + load  # force that each tail puts on the disc
     force = through.sum(1)
     moment = (torch.linalg.cross(root, through, dim=0) + response.clamp_moment).sum(1)
     ex, ey = e_x.squeeze(1), e_y.squeeze(1)

@@ -77,7 +77,7 @@ class Orbits(NamedTuple):
 
 
 def numbers(groups: Groups) -> Tensor:
-    """What makes each robot, in the order of `sim.tail.body_of`, (28, B); differentiable."""
+    """What makes each robot, in the order of `sim.tail.body_of`, (31, B); differentiable."""
     swimmer = assemble(groups, edges=2)
     rows = [
         groups.omega_bar,
@@ -89,12 +89,13 @@ def numbers(groups: Groups) -> Tensor:
         swimmer.head_length,
         swimmer.tail_radius,
         *swimmer.resistance.reshape(20, -1),
+        *swimmer.tail_load,
     ]
     return torch.stack(rows)
 
 
 def bodies(groups: Groups) -> Array:
-    """Robots as rows of numbers for the compiled loops, (B, 28)."""
+    """Robots as rows of numbers for the compiled loops, (B, 31)."""
     return np.ascontiguousarray(numbers(groups).detach().cpu().numpy().T)
 
 
@@ -314,9 +315,9 @@ def solve_all(rows: Array, tails: int, tangents: Array | None = None) -> Orbits:
     """Steady motions of robots with N tails, and their derivatives.
 
     Args:
-        rows: (B, 28), from `bodies`.
+        rows: (B, 31), from `bodies`.
         tails: N.
-        tangents: (B, K, 28), directions in which the means are to be differentiated (none by default); their size
+        tangents: (B, K, 31), directions in which the means are to be differentiated (none by default); their size
             sets the step of differences that are exact for linear dependence.
     """
     slopes = np.full((len(rows), 0 if tangents is None else tangents.shape[1], 5), np.nan)
@@ -336,7 +337,7 @@ def solve_all(rows: Array, tails: int, tangents: Array | None = None) -> Orbits:
 
 def _slopes(row: Array, tangents: Array, orbit: Orbit) -> Array:
     """Derivatives of the extrapolated means along `tangents`, (K, 5)."""
-    moved = np.stack([row - WIDTH * tangents, row + WIDTH * tangents], 1)  # (K, 2, 28)
+    moved = np.stack([row - WIDTH * tangents, row + WIDTH * tangents], 1)  # (K, 2, 31)
     found = np.empty((3, len(tangents), 5))
     for i, (x, u) in enumerate(zip(orbit.x, orbit.u, strict=True)):
         changes = sensitivity(body_of(row), moved.reshape(-1, row.size), WIDTH, x, u, differentiation(x.shape[1]))

@@ -31,12 +31,13 @@ from sim.vectors import Matrix, Vector, dot, formula, minus, outer, plus, plus_i
 
 @dataclass(frozen=True)
 class Coefficients:
-    """All that drag and motor put into the balance of B robots (dimensionless); what most effects change."""
+    """All that drag, motor and loads put into the balance of B robots (dimensionless); what effects change."""
 
     zeta_parallel: Tensor  # ζ∥ of the tails, (B,)
     zeta_perp: Tensor  # ζ⊥, (B,)
     resistance: Tensor  # R of head and disc about J, (4, 5, B)
     gain: Tensor  # of the motor: ω_t = ω + gain ω_h, (B,); 1 where it holds its speed
+    tail_load: Tensor  # force per length on the tails, body frame (x, y up, z forward) [EI/l³], (3, B)
 
 
 SMALLEST_SLENDERNESS = math.exp(0.5)  # ln(l/r0) = 1/2: ζ∥ diverges
@@ -71,7 +72,8 @@ def coefficients(
             torch.stack([none, none, none, spin, none]),
         ]
     )
-    return Coefficients(*tail_coefficients(l_over_r0), resistance, torch.ones_like(translation))
+    no_load = torch.zeros_like(torch.stack([translation] * 3))
+    return Coefficients(*tail_coefficients(l_over_r0), resistance, torch.ones_like(translation), no_load)
 
 
 @formula

@@ -134,7 +134,7 @@ def _linearise_tail(
             edge_next, joint_next = NO_BLOCK, NO_BLOCK
         position = vector(x, k, m)
         velocity = plus(plus(motion.linear, cross(motion.spin, position)), vector(x_dot, k, m))
-        residual, resistance, before, after = node_balance(geometry, body, k, m, velocity)
+        residual, resistance, before, after = node_balance(geometry, body, motion, k, m, velocity)
 
         own = subtracted(added(joint_next, transposed(joint_next)), added(edge, edge_next))
         own = subtracted(added(own, subtracted(after, before)), turned(resistance, motion.spin))

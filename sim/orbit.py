@@ -73,7 +73,7 @@ def _tail_rows(
         position = vector(x, k, m)
         by_phase = _derivative(x, differentiation, k, m)
         velocity = plus(plus(motion.linear, cross(motion.spin, position)), times(motion.omega_t, by_phase))
-        residual, resistance, before, after = node_balance(geometry, body, k, m, velocity)
+        residual, resistance, before, after = node_balance(geometry, body, motion, k, m, velocity)
         row[i, right], row[i + 1, right], row[i + 2, right] = -residual[0], -residual[1], -residual[2]
 
         # Drag through the velocity: −R (Ω× δx + ω_t δx') and the body's velocities.
@@ -224,7 +224,7 @@ def residual(
         for k in range(n):
             along = times(motion.omega_t, _derivative(x, differentiation, k, m))
             velocity = plus(plus(motion.linear, cross(motion.spin, vector(x, k, m))), along)
-            force = node_balance(geometry, body, k, m, velocity)[0]
+            force = node_balance(geometry, body, motion, k, m, velocity)[0]
             r[k, 3 * m], r[k, 3 * m + 1], r[k, 3 * m + 2] = force
         clamp = clamp_balance(geometry, body, m, motion)
         t[4 * p] += dot(motion.e_x, clamp.force)
@@ -275,7 +275,7 @@ def sensitivity(body: Body, changed: Array, width: float, x: Array, u: Array, di
     """How u changes with the robot, du/dp (K, P, 4), by the implicit function theorem: J dz/dp = −∂F/∂p.
 
     Args:
-        changed: rows (2 K, 28): for each of K parameters the robot moved by −width and by +width. The balance is
+        changed: rows (2 K, 31): for each of K parameters the robot moved by −width and by +width. The balance is
             linear in every coefficient but the offset of the clamps, so their difference is exact to rounding.
         x, u: the solution for `body`.
     """

@@ -4,7 +4,7 @@ The orbit z(p) of `sim.orbit` satisfies F(z, p) = 0, so dz/dp = −(∂F/∂z)�
 method has anyway: one more right-hand side a parameter instead of two more solutions. Derivatives are extrapolated
 in the mesh like the means themselves.
 
-Parameters reach F through a robot's 28 numbers (`sim.direct.bodies`); how they do is differentiated automatically,
+Parameters reach F through a robot's 31 numbers (`sim.direct.bodies`); how they do is differentiated automatically,
 so an effect that changes drag or motor needs nothing of its own here.
 """
 
@@ -22,6 +22,7 @@ from sim import direct
 from sim.effects import catalogue
 from sim.errors import InputError
 from sim.robot import Groups
+from sim.tail import NUMBERS
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ def sensitivities(groups: Groups, parameters: Sequence[str]) -> Sensitivities:
             raise InputError(f"no parameter {name!r} to differentiate in; there are {allowed}")
     moved = [_tangent(groups, name) for name in names]
     scales = np.stack([scale for _, scale in moved], 1) if names else np.empty((len(groups), 0))
-    tangents = np.stack([t for t, _ in moved], 1) if names else np.empty((len(groups), 0, 28))
+    tangents = np.stack([t for t, _ in moved], 1) if names else np.empty((len(groups), 0, NUMBERS))
     found = direct.solve_all(direct.bodies(groups), groups.N, tangents)
     slopes = found.slopes / scales[:, :, None]  # (B, K, 5)
     values = dict(zip(OUTPUTS, found.means.T, strict=False))
@@ -74,7 +75,7 @@ def sensitivities(groups: Groups, parameters: Sequence[str]) -> Sensitivities:
 
 
 def _tangent(groups: Groups, name: str) -> tuple[Floats, Floats]:
-    """How the robots' numbers change with a parameter in units of its own size: (B, 28), and that size (B,)."""
+    """How the robots' numbers change with a parameter in units of its own size: (B, 31), and that size (B,)."""
     if name in INPUTS:
         value = getattr(groups, name)
         size = value.abs()

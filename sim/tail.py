@@ -39,15 +39,18 @@ class Body(NamedTuple):
     zeta_perp: float
     gain: float
     resistance: Array  # (4, 5): wrench by (v_x, v_z, ω_yr, ω_h, ω_t)
+    load: Vector  # on the tails, force per length in the body frame [EI/l³]
 
 
 HEAD_LENGTH, TAIL_RADIUS = 6, 7  # entries of a robot's row that Body leaves out: L/l and r0/l
+NUMBERS = 31  # entries of a row
 
 
 @compiled
 def body_of(row: Array) -> Body:
     """The robot of one row of `sim.direct.bodies`."""
-    return Body(row[0], row[1], row[2], row[3], row[4], row[5], row[8:28].copy().reshape(4, 5))
+    resistance, load = row[8:28].copy().reshape(4, 5), (row[28], row[29], row[30])
+    return Body(row[0], row[1], row[2], row[3], row[4], row[5], resistance, load)
 
 
 class Motion(NamedTuple):
@@ -58,6 +61,7 @@ class Motion(NamedTuple):
     linear: Vector  # of J
     spin: Vector  # of the disc frame
     omega_t: float
+    load: Vector  # on the tails, force per length
 
 
 @compiled
@@ -66,7 +70,8 @@ def motion_at(body: Body, u: Array, phase: float) -> Motion:
     e_x, e_y = (np.cos(phase), -np.sin(phase), 0.0), (np.sin(phase), np.cos(phase), 0.0)
     omega_t = body.omega + body.gain * u[3]
     linear = plus(times(u[0], e_x), times(u[1], E_Z))
-    return Motion(e_x, e_y, linear, plus(times(u[2], e_y), times(omega_t, E_Z)), omega_t)
+    load = plus(plus(times(body.load[0], e_x), times(body.load[1], e_y)), times(body.load[2], E_Z))
+    return Motion(e_x, e_y, linear, plus(times(u[2], e_y), times(omega_t, E_Z)), omega_t, load)
 
 
 class Geometry(NamedTuple):
@@ -192,9 +197,9 @@ def node_tangent(geometry: Geometry, k: int, m: int) -> tuple[Vector, float]:
 
 @compiled
 def node_balance(
-    geometry: Geometry, body: Body, k: int, m: int, velocity: Vector
+    geometry: Geometry, body: Body, motion: Motion, k: int, m: int, velocity: Vector
 ) -> tuple[Vector, Matrix, Matrix, Matrix]:
-    """Balance of the free node k + 1: drag plus elastic force, and the drag's derivatives.
+    """Balance of the free node k + 1: drag, elastic force and load, and the drag's derivatives.
 
     Returns:
         r, −∂q/∂v, −∂q/∂e_k through the tangents, −∂q/∂e_{k+1} (zero at the tip).
@@ -205,6 +210,7 @@ def node_balance(
     perp, excess = voronoi * body.zeta_perp, voronoi * (body.zeta_parallel - body.zeta_perp)
     tangent, spread = node_tangent(geometry, k + 1, m)
     residual = minus(node_drag(tangent, velocity, perp, excess), vector(geometry.force, k, m))
+    residual = plus(residual, times(voronoi, motion.load))
     tilt = drag_by_tangents(tangent, spread, velocity, excess)
     before = projected(tilt, vector(geometry.tangent, k + 1, m), 1 / geometry.length[k, m])
     after = NO_BLOCK
@@ -237,6 +243,7 @@ def clamp_balance(geometry: Geometry, body: Body, m: int, motion: Motion) -> Cla
     _, first, second = vector(geometry.joint, 0, m)
     velocity = plus(motion.linear, cross(motion.spin, root))
     force = plus(vector(geometry.force, 0, m), node_drag(tangent, velocity, perp, excess))
+    force = plus(force, times(voronoi, motion.load))
     tilt = drag_by_tangents(tangent, spread, velocity, excess)
     by_second = joint_block(geometry, 1, m)  # edge 1 moves the force of edge 0
     by_edge = subtracted(edge_block(geometry, 0, m, body.axial_stiffness), projected(tilt, edge, 1 / length))

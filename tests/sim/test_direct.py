@@ -15,6 +15,7 @@ from sim.robot import PRESETS, Groups
 from sim.shapes import tails_over_a_revolution
 from sim.steady import QUICK, orbits, steady
 from sim.tail import Body, new_geometry
+from sim.tail import body_of as body_of_row
 from tests.sim.robots import control
 
 Floats = np.ndarray
@@ -27,7 +28,7 @@ def sweep_points(count: int) -> dict[str, Floats]:
 
 def body_of(groups: Groups) -> tuple[Body, Floats]:
     row = direct.bodies(groups)[0]
-    return Body(*row[:6].tolist(), row[8:28].reshape(4, 5).copy()), row
+    return body_of_row(row), row
 
 
 def test_time_stepping_from_rest_reaches_the_same_motion() -> None:
@@ -84,7 +85,7 @@ def test_newton_s_matrix_is_the_derivative_of_the_residual() -> None:
     groups = control(N=tails, omega_bar=12.0, C_yr=6.0)
     body, _ = body_of(groups)
     body.resistance[:] += 0.3 * np.random.default_rng(0).normal(size=(4, 5))
-    body = body._replace(gain=1.3)
+    body = body._replace(gain=1.3, load=(0.2, -0.5, 0.1))
     rng = np.random.default_rng(1)
     x, u = direct._start(body, n, phases, tails)
     x += 0.02 * rng.normal(size=x.shape)

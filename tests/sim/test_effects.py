@@ -33,7 +33,7 @@ def test_declaration(name: str) -> None:
 def test_null_is_exactly_the_base_model(name: str) -> None:
     null = catalogue()[name].null
     with_null, base = (assemble(g, edges=6) for g in (control(**{name: null}), control()))
-    for field in ("resistance", "gain", "zeta_parallel", "zeta_perp"):
+    for field in ("resistance", "gain", "tail_load", "zeta_parallel", "zeta_perp"):
         assert torch.equal(getattr(with_null, field), getattr(base, field))
 
 

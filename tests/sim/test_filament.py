@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 import torch
 
-from sim import drag
+from sim import direct, drag, orbit
 from sim.balance import Swimmer, fluid_wrench
 from sim.robot import PRESETS
 from sim.stepper import PHASE, State, at_rest, step
+from sim.tail import body_of
 from tests.reference.cases import BEAM_K4, FILAMENT, FILAMENT_TIP, LINEAR_FILAMENT
 from tests.sim.robots import extrapolated_loads, held_loads, single_filament
 
@@ -53,6 +54,25 @@ def test_force_and_moment_match_the_boundary_value_solution(omega: float) -> Non
 def test_the_filament_s_tip() -> None:
     _, x = held_loads(8.0 * ROBOT.time_scale, ROBOT.tail_length / ROBOT.tail_radius, 0.016 / 0.11, edges=32)
     assert np.abs(x[-1]) == pytest.approx(np.abs(FILAMENT_TIP), abs=2e-4)
+
+
+def test_a_slow_tail_sags_like_a_cantilever_at_every_phase() -> None:
+    """q l⁴/(8 EI), downwards in the body frame, while the tail turns with the disc."""
+    _, groups = single_filament(2, 1e-5, ROBOT.tail_length / ROBOT.tail_radius, 0.1)
+    body = body_of(direct.bodies(groups)[0])
+    body.resistance[:, :4] += 1e9 * np.eye(4)
+    body = body._replace(load=(0.0, -0.08, 0.0))
+    x, u = direct._start(body, 32, 6, 1)
+    u[:] = 0.0
+    _, size = orbit.newton(body, x, u, direct.differentiation(6), 1e-9, 40)
+    assert size < 1e-9
+    for m in range(6):
+        phase = orbit.FIRST_PHASE + 2 * np.pi * m / 6
+        tip = x[-1, m] - np.array([body.offset, 0.0, -1.0])
+        down = -(np.sin(phase) * tip[0] + np.cos(phase) * tip[1])
+        across = np.cos(phase) * tip[0] - np.sin(phase) * tip[1]
+        assert down == pytest.approx(0.01, rel=2e-3)
+        assert abs(across) < 1e-6
 
 
 def test_time_stepping_reaches_the_same_loads() -> None:

@@ -115,15 +115,16 @@ def test_batch_equals_one_by_one() -> None:
 
 @pytest.mark.parametrize(("tails", "omega"), [(1, 8.0), (2, 40.0), (5, -15.0)])
 def test_compiled_steps_equal_steps_with_tensors(tails: int, omega: float) -> None:
-    """The same scheme on the same equations, from rest, with droop of the motor and drag on the disc."""
+    """The same scheme on the same equations, from rest, with motor droop, drag on the disc and loads."""
     groups, steps, edges = control(N=tails, omega_bar=omega, C_yr=5.0), 40, 10
     swimmer = assemble(groups, edges=edges)
-    swimmer = replace(swimmer, gain=swimmer.gain * 1.2)
+    load = torch.tensor([[0.3], [-0.6], [0.2]], dtype=torch.float64)
+    swimmer = replace(swimmer, gain=swimmer.gain * 1.2, tail_load=load)
     swimmer.resistance[3, 4] = 0.02
     row = direct.bodies(groups)[0]
     body = body_of(row)
     body.resistance[3, 4] = 0.02
-    body = body._replace(gain=1.2)
+    body = body._replace(gain=1.2, load=(0.3, -0.6, 0.2))
     dt = 0.15 / abs(omega)
     state, poses = new_state(tails, edges, body.offset), np.empty((steps, 6))
     assert advance(body, row[HEAD_LENGTH], state, dt, steps, 1e-10, poses, np.empty((0, *state.x.shape)))

@@ -1,0 +1,46 @@
+"""Tails that are heavier (or lighter) than the fluid and sag.
+
+    b = −8 ε EI/l³ s e_y,   s = (l/r0)² (l/R) over its value for the paper's control example
+
+A load q per length bends a cantilever by q l⁴/(8 EI) at its tip: for the control example this is ε l. With
+q = Δρ g π r0² it goes as l³/r0², so with one material, fluid and head s carries it to other tails. The load stays
+upright while the tails turn, so they no longer keep a fixed shape on the disc. Vinyl polysiloxane in glycerol: 5
+to 14 % of l. Left out: the moment that tips the robot's axis, which the surface carries.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from torch import Tensor
+
+from sim.effects.base import Effect
+
+if TYPE_CHECKING:
+    from sim.drag import Coefficients
+    from sim.robot import Groups
+
+CONTROL = 34.375**2 * 6.875  # (l/r0)² (l/R) of the paper's control example
+
+
+@dataclass(frozen=True)
+class TailSag(Effect):
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        load = base.tail_load.clone()
+        load[1] = load[1] - 8 * size * groups.l_over_r0**2 * groups.l_over_R / CONTROL
+        return replace(base, tail_load=load)
+
+
+EFFECT = TailSag(
+    name="tail_sag",
+    title="sag of the tails",
+    equation="b = −8 ε (EI/l³) s e_y",
+    source="cantilever under its own weight: tip deflection q l⁴/(8 EI)",
+    unit="l, at the control example",
+    null=0.0,
+    bounds=(-0.4, 0.4),
+    typical=0.1,
+    symmetry="even",
+    dissipative=False,
+)
