@@ -40,9 +40,6 @@ class Coefficients:
     tail_load: Tensor  # force per length on the tails, body frame (x, y up, z forward) [EI/l³], (3, B)
 
 
-SMALLEST_SLENDERNESS = math.exp(0.5)  # ln(l/r0) = 1/2: ζ∥ diverges
-
-
 def tail_coefficients(l_over_r0: Tensor) -> tuple[Tensor, Tensor]:
     """Drag coefficients per length (ζ∥, ζ⊥) in units of μ0; same shape as `l_over_r0`."""
     log_slenderness = torch.log(l_over_r0)

@@ -52,7 +52,7 @@ from sim.vectors import (
 
 Array = NDArray[np.float64]
 
-PHASE, YAW, X, Y, SWAY, SURGE = range(6)  # entries of State.pose, as in `sim.stepper`
+PHASE, YAW, X, Y, SWAY, SURGE = range(6)  # entries of State.pose, here and in `sim.stepper`
 TOLERANCE = 2e-4  # on the last correction; Newton converges quadratically
 _GAMMA = 1 - 1 / np.sqrt(2)
 _MOST_CORRECTIONS = 15

@@ -1,4 +1,6 @@
-"""Implicit time steps of the whole robot in the disc frame.
+"""Implicit time steps of many robots at once in the disc frame, with tensors on any device.
+
+The reference for `sim.march`, which takes the same steps of one robot in compiled loops.
 
 Every stage solves the balance r(x, ẋ, u, φ) = 0, T = 0 (`sim.balance`) with
 
@@ -24,14 +26,13 @@ V.1 for BDF2.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
 from sim.balance import Swimmer, newton_correction
-
-PHASE, YAW, X, Y, SWAY, SURGE = range(6)  # rows of State.pose
+from sim.march import PHASE, YAW
 
 _GAMMA = 1 - 1 / math.sqrt(2)
 # On the last correction. Newton converges quadratically: corrections of 1e-4 were seen to leave about 1e-7 l.
@@ -52,21 +53,6 @@ class State:
     x_before: Tensor | None = None  # previous step of this segment, if any
     pose_before: Tensor | None = None
     u_before: Tensor | None = None
-
-    def flipped(self) -> State:
-        """Start of the next segment, with the mirrored body velocity as the first guess."""
-        sign = self.u.new_tensor([-1.0, 1.0, -1.0, -1.0]).unsqueeze(1)
-        return replace(self.restarted(), u=self.u * sign, x_dot=torch.zeros_like(self.x_dot))
-
-    def restarted(self) -> State:
-        """The same state without memory of the step before: start of a segment or of another step."""
-        return replace(self, x_before=None, pose_before=None, u_before=None)
-
-    def select(self, lanes: Tensor) -> State:
-        """The robots at `lanes`."""
-        return State(
-            **{name: value[..., lanes] if torch.is_tensor(value) else value for name, value in vars(self).items()}
-        )
 
 
 def at_rest(swimmer: Swimmer, phase: float = 0.0) -> State:
