@@ -6,7 +6,8 @@ Each worker uses one thread: batches are the parallelism; threads inside small o
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from typing import Any, TypeVar
 
@@ -55,29 +56,41 @@ def run_batches(
     instead, for work in compiled loops, which do not hold the interpreter's lock.
     """
     count = min(jobs or available_jobs(), len(jobs_to_do))
+    here = threads or count <= 1  # thread counts belong to the process: set once, not by each worker
+    task = work if here else partial(_single_threaded, work)
     results: list[Result] = []
-    with tqdm(total=sum(sizes), desc=title, unit="row", delay=1.0, disable=not title) as bar:
+    with (
+        one_thread() if here else nullcontext(),
+        tqdm(total=sum(sizes), desc=title, unit="row", delay=1.0, disable=not title) as bar,
+    ):
         if count <= 1:
-            done = (_single_threaded(work, job) for job in jobs_to_do)
+            done = map(task, jobs_to_do)
         else:
             parallel = Parallel(
                 n_jobs=count, return_as="generator", pre_dispatch="2*n_jobs", prefer="threads" if threads else None
             )
-            done = parallel(delayed(_single_threaded)(work, job) for job in jobs_to_do)
+            done = parallel(delayed(task)(job) for job in jobs_to_do)
         for result, size in zip(done, sizes, strict=True):
             results.append(result)
             bar.update(size)
     return results
 
 
-def _single_threaded(work: Callable[[Job], Result], job: Job) -> Result:
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Tensor and matrix operations of this process on one thread each."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
         with threadpool_limits(1, user_api="blas"):
-            return work(job)
+            yield
     finally:
         torch.set_num_threads(threads)
+
+
+def _single_threaded(work: Callable[[Job], Result], job: Job) -> Result:
+    with one_thread():
+        return work(job)
 
 
 def steady_columns(

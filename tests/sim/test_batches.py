@@ -1,0 +1,34 @@
+"""Batches: every row once, in order, and the process left as it was."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from sim.batches import run_batches, split
+
+
+def test_batches_hold_every_row_once_and_one_n_each() -> None:
+    tails = np.array([2.0, 5.0, 2.0, 3.0, 2.0, 5.0, 2.0])
+    batches = split(tails, 2)
+    assert sorted(np.concatenate(batches).tolist()) == list(range(7))
+    assert all(len(b) <= 2 and len(set(tails[b])) == 1 for b in batches)
+
+
+def blas_threads() -> set[int]:
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+def test_threads_at_work_leave_the_number_of_threads_alone() -> None:
+    """Workers that overlap and end in the order in which they began."""
+    with threadpool_limits(2, user_api="blas"):
+
+        def work(pause: float) -> set[int]:
+            time.sleep(pause)
+            return blas_threads()
+
+        seen = run_batches(work, [0.1, 0.2, 0.2, 0.2], sizes=[1] * 4, jobs=2, threads=True)
+        assert seen == [{1}] * 4
+        assert blas_threads() == {2}
