@@ -28,7 +28,7 @@ from sim.compiling import compiled
 from sim.contact import tail_gap
 from sim.orbit import imbalance, newton, sensitivity
 from sim.robot import Groups
-from sim.tail import HEAD_LENGTH, TAIL_RADIUS, Body, body_of
+from sim.tail import HEAD_LENGTH, TAIL_RADIUS, Body, body_of, straight
 
 Array = NDArray[np.float64]
 
@@ -48,9 +48,7 @@ PHASE_ERROR = 1e-4  # relative, in the means
 BALANCED = 1e-5  # largest unbalanced force over the largest that an edge carries
 WIDTH = 1e-5  # step of the differences that are exact for linear dependence
 _DOUBT = 0.03  # share of the extrapolation that counts as error
-_SHRINKS = (
-    0.2  # assumed fall of the phase error from one number of phases to the next, where only one fall is known
-)
+_SHRINKS = 0.2  # assumed fall of the phase error with the next number of phases, where only one is known
 _MOST_PHASES = 48
 _MOST_CORRECTIONS = 30
 
@@ -71,7 +69,6 @@ class Orbits(NamedTuple):
     means: Array  # (B, 5), NaN where not solved
     slopes: Array  # (B, K, 5): derivatives of the means along K tangents
     error: Array  # (B,) estimated relative error
-    phases: NDArray[np.int64]  # (B,) M
     ended: NDArray[np.int64]  # (B,) SOLVED or why not
     gap: Array  # (B,) smallest distance between tails over 2 r0
 
@@ -113,12 +110,12 @@ def differentiation(phases: int) -> Array:
 
 
 @compiled
-def resampling(phases: int, wanted: int) -> Array:
-    """Values of the trigonometric interpolant at `wanted` equal phases, (wanted, M)."""
-    matrix = np.zeros((wanted, phases))
-    for i in range(wanted):
+def interpolation(phases: int, at: Array) -> Array:
+    """Values of the trigonometric interpolant on M equal phases from 0 at phases `at` (F,), (F, M)."""
+    matrix = np.zeros((len(at), phases))
+    for i in range(len(at)):
         for j in range(phases):
-            away = 2 * np.pi * (i / wanted - j / phases)
+            away = at[i] - 2 * np.pi * j / phases
             total = 1.0
             for k in range(1, (phases + 1) // 2):
                 total += 2 * np.cos(k * away)
@@ -131,7 +128,7 @@ def resampling(phases: int, wanted: int) -> Array:
 @compiled
 def with_phases(a: Array, wanted: int) -> Array:
     """A periodic array (K, M, c) at `wanted` phases."""
-    matrix = resampling(a.shape[1], wanted)
+    matrix = interpolation(a.shape[1], 2 * np.pi * np.arange(wanted) / wanted)
     out = np.zeros((a.shape[0], wanted, a.shape[2]))
     for k in range(a.shape[0]):
         for i in range(wanted):
@@ -194,12 +191,9 @@ def _turns_forward(body: Body, u: Array) -> bool:
 @compiled
 def _start(body: Body, n: int, phases: int, tails: int) -> tuple[Array, Array]:
     """Straight tails on a robot that shares the motor's speed between head and tails."""
-    x, u = np.zeros((n, phases, 3)), np.zeros((phases // tails, 4))
-    x[:, :, 0] = body.offset
-    for k in range(n):
-        x[k, :, 2] = -(k + 1) / n
+    u = np.zeros((phases // tails, 4))
     u[:, 3] = -0.3 * body.omega
-    return x, u
+    return straight(n, phases, body.offset), u
 
 
 @compiled
@@ -218,12 +212,11 @@ def _enough_phases(body: Body, tails: int, head_length: float) -> tuple[int, flo
     if not size < 1e-2:
         return NO_START, np.nan, x, u
     phases = tails * int(np.ceil(3 / tails))
-    fall, before, change = _SHRINKS, means(body, u, head_length), np.inf
     x, u = with_phases(x, phases), with_phases(u.reshape(1, -1, 4), phases // tails)[0]
     _, size = newton(body, x, u, differentiation(phases), ROUGH, _MOST_CORRECTIONS)
     if not size < ROUGH:
         return NO_START, np.nan, x, u
-    before = means(body, u, head_length)
+    before, change = means(body, u, head_length), np.inf
     while phases <= _MOST_PHASES:
         wanted = _more_phases(tails, phases)
         x_more, u_more = with_phases(x, wanted), with_phases(u.reshape(1, -1, 4), wanted // tails)[0]
@@ -256,20 +249,22 @@ def solve(row: Array, tails: int) -> Orbit:
             x += more * (x - with_edges(xs[0], body.offset, n))
             u += more * (us[1] - us[0])
         wanted = CORRECTION if i == 2 else ROUGH
+        balanced = ended != SOLVED
         for _ in range(2):
-            if ended == SOLVED:
-                _, size = newton(body, x, u, matrix, wanted, _MOST_CORRECTIONS)
-                if not size < wanted:
-                    ended = LOST
-            if i == 1 or ended != SOLVED or imbalance(body, x, u, matrix) < BALANCED:
+            if balanced:
                 break
+            _, size = newton(body, x, u, matrix, wanted, _MOST_CORRECTIONS)
+            if not size < wanted:
+                ended = LOST
+                break
+            balanced = i == 1 or imbalance(body, x, u, matrix) < BALANCED
             wanted *= 1e-3  # slow motors: all forces are small
+        if ended == SOLVED and not balanced:
+            ended = UNBALANCED
         xs = (xs[0], x, x) if i == 1 else (xs[0], xs[1], x)
         us = (us[0], u, u) if i == 1 else (us[0], us[1], u)
     if ended == SOLVED and not _turns_forward(body, u):
         ended = BACKWARDS
-    if ended == SOLVED and not imbalance(body, x, u, matrix) < BALANCED:
-        ended = UNBALANCED
     if ended != SOLVED:
         return Orbit(ended, np.nan, np.full(5, np.nan), xs, us)
     found = np.empty((3, 5))
@@ -321,18 +316,17 @@ def solve_all(rows: Array, tails: int, tangents: Array | None = None) -> Orbits:
             sets the step of differences that are exact for linear dependence.
     """
     slopes = np.full((len(rows), 0 if tangents is None else tangents.shape[1], 5), np.nan)
-    means_, error, phases, ended, gap = [], [], [], [], []
+    means_, error, ended, gap = [], [], [], []
     for i, row in enumerate(rows):
         orbit = solve(row, tails)
         solved = orbit.ended == SOLVED
         means_.append(orbit.means)
         error.append(orbit.error)
-        phases.append(orbit.x[2].shape[1])
         ended.append(orbit.ended)
         gap.append(_smallest_gap(orbit.x[2], row[1], tails, row[TAIL_RADIUS]) if solved else np.nan)
         if solved and tangents is not None:
             slopes[i] = _slopes(row, tangents[i], orbit)
-    return Orbits(np.array(means_), slopes, np.array(error), np.array(phases), np.array(ended), np.array(gap))
+    return Orbits(np.array(means_), slopes, np.array(error), np.array(ended), np.array(gap))
 
 
 def _slopes(row: Array, tangents: Array, orbit: Orbit) -> Array:

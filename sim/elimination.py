@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.compiling import compiled
-from sim.vectors import Matrix, cross, dot, times
+from sim.vectors import Matrix, inverse
 
 Array = NDArray[np.float64]
 
@@ -72,11 +72,21 @@ def clear(system: System) -> None:
 
 
 @compiled
+def matrix_at(a: Array, row: int, column: int) -> Matrix:
+    """The 3×3 block of `a` at (row, column)."""
+    return (
+        (a[row, column], a[row, column + 1], a[row, column + 2]),
+        (a[row + 1, column], a[row + 1, column + 1], a[row + 1, column + 2]),
+        (a[row + 2, column], a[row + 2, column + 1], a[row + 2, column + 2]),
+    )
+
+
+@compiled
 def invert(a: Array) -> None:
     """Invert `a` (m, m) in place: Gauss-Jordan, a 3×3 pivot at a time."""
     m = a.shape[0]
     for k in range(0, m, 3):
-        pivot = inverse_of_three(a, k)
+        pivot = inverse(matrix_at(a, k, k))
         for i in range(3):
             for j in range(3):
                 a[k + i, k + j] = 1.0 if i == j else 0.0
@@ -91,17 +101,6 @@ def invert(a: Array) -> None:
                 a[i, k] = a[i, k + 1] = a[i, k + 2] = 0.0
                 for j in range(m):
                     a[i, j] -= f * a[k, j] + g * a[k + 1, j] + h * a[k + 2, j]
-
-
-@compiled
-def inverse_of_three(a: Array, k: int) -> Matrix:
-    """Inverse of the 3×3 block of `a` at (k, k)."""
-    p, q, r = (a[k, k], a[k + 1, k], a[k + 2, k]), (a[k, k + 1], a[k + 1, k + 1], a[k + 2, k + 1]), (
-        a[k, k + 2], a[k + 1, k + 2], a[k + 2, k + 2],
-    )  # fmt: skip
-    first = cross(q, r)
-    scale = 1.0 / dot(p, first)
-    return (times(scale, first), times(scale, cross(r, p)), times(scale, cross(p, q)))
 
 
 @compiled

@@ -17,13 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.compiling import compiled
-from sim.elimination import solve_dense
+from sim.elimination import matrix_at, solve_dense
 from sim.tail import (
     E_Z,
     NO_BLOCK,
     Body,
     Geometry,
     Motion,
+    add_head,
     clamp_balance,
     edge_block,
     joint_block,
@@ -32,7 +33,9 @@ from sim.tail import (
     new_geometry,
     node_balance,
     put,
+    straight,
     vector,
+    wrench_of,
 )
 from sim.vectors import (
     Matrix,
@@ -83,10 +86,7 @@ class _Chains(NamedTuple):
 @compiled
 def new_state(tails: int, edges: int, offset: float) -> State:
     """Straight tails at rest."""
-    x = np.zeros((edges, tails, 3))
-    x[:, :, 0] = offset
-    for k in range(edges):
-        x[k, :, 2] = -(k + 1) / edges
+    x = straight(edges, tails, offset)
     return State(x, np.zeros_like(x), np.zeros(6), np.zeros(4))
 
 
@@ -105,8 +105,7 @@ def _new_chains(n: int, tails: int) -> _Chains:
 
 @compiled
 def _block(a: Array, k: int, m: int) -> Matrix:
-    b = a[k, m]
-    return ((b[0, 0], b[0, 1], b[0, 2]), (b[1, 0], b[1, 1], b[1, 2]), (b[2, 0], b[2, 1], b[2, 2]))
+    return matrix_at(a[k, m], 0, 0)
 
 
 @compiled
@@ -167,10 +166,8 @@ def _eliminate(chains: _Chains, m: int) -> None:
     for k in range(n - 1, -1, -1):
         inverted = inverse(_block(chains.own, k, m))
         upper, upper2 = _block(chains.upper, k, m), _block(chains.upper2, k, m)
-        lower, lower2 = (
-            product(inverted, _block(chains.lower, k, m)),
-            product(inverted, _block(chains.lower2, k, m)),
-        )
+        lower = product(inverted, _block(chains.lower, k, m))
+        lower2 = product(inverted, _block(chains.lower2, k, m))
         if k > 0:
             _put_block(chains.lower, k, m, lower)
             own = subtracted(_block(chains.own, k - 1, m), product(upper, lower))
@@ -213,10 +210,9 @@ def _add_clamp(body: Body, motion: Motion, geometry: Geometry, chains: _Chains, 
             force, moment = plus(force, drag), plus(moment, cross(root, drag))
         else:
             force, moment = plus(force, clamp.force), plus(moment, clamp.moment)
-        corner[0, c] -= dot(motion.e_x, force)
-        corner[1, c] -= force[2]
-        corner[2, c] -= dot(motion.e_y, moment)
-        corner[3, c] -= moment[2]
+        wrench = wrench_of(motion, force, moment)
+        for a in range(4):
+            corner[a, c] -= wrench[a]
     # The body axes turn with the phase: ∂e_x/∂φ = −e_y, ∂e_y/∂φ = e_x.
     corner[0, 3] -= dot(motion.e_y, clamp.force) * body.gain / rate
     corner[2, 3] += dot(motion.e_x, clamp.moment) * body.gain / rate
@@ -231,13 +227,8 @@ def _correct(
     n, tails, _ = x.shape
     measure(geometry, x, (body.offset, 0.0, 0.0), body.axial_stiffness)
     corner = chains.corner
-    omega_t = body.omega + body.gain * u[3]
-    for a in range(4):
-        corner[a, 4] = body.resistance[a, 4] * omega_t
-        for c in range(4):
-            corner[a, c] = -body.resistance[a, c]
-            corner[a, 4] += body.resistance[a, c] * u[c]
-        corner[a, 3] -= body.gain * body.resistance[a, 4]
+    corner[:] = 0.0
+    add_head(body, u, corner, 0)
     for m in range(tails):
         motion = motion_at(body, u, phase + 2 * np.pi * m / tails)
         _linearise_tail(body, motion, u[2], u[0], x, x_dot, rate, geometry, chains, m)

@@ -33,6 +33,7 @@ from sim.tail import (
     Geometry,
     Motion,
     add_block,
+    add_head,
     body_of,
     clamp_balance,
     edge_block,
@@ -42,8 +43,9 @@ from sim.tail import (
     new_geometry,
     node_balance,
     vector,
+    wrench_of,
 )
-from sim.vectors import Matrix, Vector, added, applied, cross, dot, plus, subtracted, times, transposed, turned
+from sim.vectors import Matrix, Vector, added, applied, cross, plus, subtracted, times, transposed, turned
 
 Array = NDArray[np.float64]
 
@@ -133,21 +135,18 @@ def _body_rows(body: Body, motion: Motion, geometry: Geometry, system: System, m
     unknowns = system.corner.shape[0]
     t, i = 4 * (m % (unknowns // 4)), 3 * m
     clamp = clamp_balance(geometry, body, m, motion)
-    system.corner[t, unknowns] -= dot(motion.e_x, clamp.force)
-    system.corner[t + 1, unknowns] -= clamp.force[2]
-    system.corner[t + 2, unknowns] -= dot(motion.e_y, clamp.moment)
-    system.corner[t + 3, unknowns] -= clamp.moment[2]
+    wrench = wrench_of(motion, clamp.force, clamp.moment)
+    for a in range(4):
+        system.corner[t + a, unknowns] -= wrench[a]
     _add_foot(system.foot[0], t, i, motion, clamp.force_by_first, clamp.moment_by_first)
     _add_foot(system.foot[1], t, i, motion, clamp.force_by_second, clamp.moment_by_second)
     root = (body.offset, 0.0, 0.0)
     directions = (motion.e_x, E_Z, cross(motion.e_y, root), times(body.gain, cross(E_Z, root)))
     for c in range(4):
-        drag = times(-1.0, applied(clamp.resistance, directions[c]))
-        torque = cross(root, drag)
-        system.corner[t, t + c] += dot(motion.e_x, drag)
-        system.corner[t + 1, t + c] += drag[2]
-        system.corner[t + 2, t + c] += dot(motion.e_y, torque)
-        system.corner[t + 3, t + c] += torque[2]
+        drag = applied(clamp.resistance, directions[c])
+        by_velocity = wrench_of(motion, drag, cross(root, drag))
+        for a in range(4):
+            system.corner[t + a, t + c] -= by_velocity[a]
 
 
 @compiled
@@ -161,20 +160,6 @@ def _add_foot(foot: Array, t: int, i: int, motion: Motion, force: Matrix, moment
 
 
 @compiled
-def _head_rows(body: Body, u: Array, system: System) -> None:
-    unknowns = system.corner.shape[0]
-    for p in range(u.shape[0]):
-        omega_t = body.omega + body.gain * u[p, 3]
-        for a in range(4):
-            row = system.corner[4 * p + a]
-            for c in range(4):
-                row[4 * p + c] -= body.resistance[a, c]
-                row[unknowns] += body.resistance[a, c] * u[p, c]
-            row[4 * p + 3] -= body.gain * body.resistance[a, 4]
-            row[unknowns] += body.resistance[a, 4] * omega_t
-
-
-@compiled
 def linearise(body: Body, x: Array, u: Array, differentiation: Array, geometry: Geometry, system: System) -> None:
     """Newton's equations at x (n, M, 3), u (P, 4)."""
     elimination.clear(system)
@@ -184,7 +169,8 @@ def linearise(body: Body, x: Array, u: Array, differentiation: Array, geometry: 
         _tail_rows(body, motion, x, differentiation, geometry, system, m)
         _elastic_rows(body, geometry, system, m)
         _body_rows(body, motion, geometry, system, m)
-    _head_rows(body, u, system)
+    for p in range(u.shape[0]):
+        add_head(body, u[p], system.corner, 4 * p)
 
 
 @compiled
@@ -197,10 +183,7 @@ def tail_wrench(body: Body, x: Array, u: Array) -> Array:
     for m in range(phases):
         motion = motion_at(body, u[m % u.shape[0]], FIRST_PHASE + 2 * np.pi * m / phases)
         clamp = clamp_balance(geometry, body, m, motion)
-        total[0] += dot(motion.e_x, clamp.force) / phases
-        total[1] += clamp.force[2] / phases
-        total[2] += dot(motion.e_y, clamp.moment) / phases
-        total[3] += clamp.moment[2] / phases
+        total += np.array(wrench_of(motion, clamp.force, clamp.moment)) / phases
     return total
 
 
@@ -227,10 +210,9 @@ def residual(
             force = node_balance(geometry, body, motion, k, m, velocity)[0]
             r[k, 3 * m], r[k, 3 * m + 1], r[k, 3 * m + 2] = force
         clamp = clamp_balance(geometry, body, m, motion)
-        t[4 * p] += dot(motion.e_x, clamp.force)
-        t[4 * p + 1] += clamp.force[2]
-        t[4 * p + 2] += dot(motion.e_y, clamp.moment)
-        t[4 * p + 3] += clamp.moment[2]
+        wrench = wrench_of(motion, clamp.force, clamp.moment)
+        for a in range(4):
+            t[4 * p + a] += wrench[a]
 
 
 @compiled

@@ -13,7 +13,6 @@ rest, whether or not the tails move alike on it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,18 +52,12 @@ class Settled:
     state: State
 
 
-def settle(
-    groups: Groups,
-    *,
-    resolution: Resolution | None = None,
-    progress: Callable[[int], object] | None = None,
-) -> Steady:
+def settle(groups: Groups, *, resolution: Resolution | None = None) -> Steady:
     """Step robots of one N from rest until their motion is steady.
 
     Args:
         groups: the robots; ω̄ may have either sign.
         resolution: mesh and step; by default what each robot needs.
-        progress: called with the number of rows that have just ended.
     """
     rows = direct.bodies(groups)
     ended = []
@@ -72,8 +65,6 @@ def settle(
         chosen = resolution or Resolution.fitting(row[0])
         found = settle_one(row, groups.N, chosen)
         ended.append(settle_one(row, groups.N, chosen.refined()) if found.failed else found)
-        if progress is not None:
-            progress(1)
     means = np.array([e.means for e in ended]).T
     failed = np.array([e.failed for e in ended])
     converged = np.array([e.converged for e in ended])

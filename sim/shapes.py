@@ -46,14 +46,7 @@ def tails_over_a_revolution(robot: Robot, frames: int) -> tuple[Floats, Floats]:
 
 def at_phases(periodic: Floats, at: Floats) -> Floats:
     """A function on the orbit's phases, (K, M, c), at disc phases `at` (F,) by its interpolant, (F, K, c)."""
-    phases = periodic.shape[1]
-    away = at[:, None] - FIRST_PHASE - 2 * np.pi * np.arange(phases) / phases
-    total = np.ones_like(away)
-    for k in range(1, (phases + 1) // 2):
-        total += 2 * np.cos(k * away)
-    if phases % 2 == 0:
-        total += np.cos(phases // 2 * away)
-    return np.einsum("fm,kmc->fkc", total / phases, periodic)
+    return np.einsum("fm,kmc->fkc", direct.interpolation(periodic.shape[1], at - FIRST_PHASE), periodic)
 
 
 def state_on_orbit(row: Floats, tails: int, edges: int, phase: float) -> State | None:

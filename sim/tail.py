@@ -99,6 +99,16 @@ def new_geometry(n: int, lanes: int) -> Geometry:
 
 
 @compiled
+def straight(n: int, lanes: int, offset: float) -> Array:
+    """Free nodes (n, M, 3) of straight tails."""
+    x = np.zeros((n, lanes, 3))
+    x[:, :, 0] = offset
+    for k in range(n):
+        x[k, :, 2] = -(k + 1) / n
+    return x
+
+
+@compiled
 def vector(a: Array, k: int, m: int) -> Vector:
     """a[k, m] as components."""
     return (a[k, m, 0], a[k, m, 1], a[k, m, 2])
@@ -258,3 +268,23 @@ def clamp_balance(geometry: Geometry, body: Body, m: int, motion: Motion) -> Cla
         by_second,
         crossed(root, by_second),
     )
+
+
+@compiled
+def wrench_of(motion: Motion, force: Vector, moment: Vector) -> tuple[float, float, float, float]:
+    """(F_x, F_z, M_y, M_z) in the body frame of a force and a moment in a lane's."""
+    return dot(motion.e_x, force), force[2], dot(motion.e_y, moment), moment[2]
+
+
+@compiled
+def add_head(body: Body, u: Array, corner: Array, first: int) -> None:
+    """Head and disc in the body's equations `first` to first + 3: derivative in u (4,), and right-hand side."""
+    right = corner.shape[0]
+    omega_t = body.omega + body.gain * u[3]
+    for a in range(4):
+        row = corner[first + a]
+        for c in range(4):
+            row[first + c] -= body.resistance[a, c]
+            row[right] += body.resistance[a, c] * u[c]
+        row[first + 3] -= body.gain * body.resistance[a, 4]
+        row[right] += body.resistance[a, 4] * omega_t

@@ -100,9 +100,7 @@ def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> No
     def lost(rows: np.ndarray, *_: object) -> direct.Orbits:
         count, none = len(rows), np.full(len(rows), np.nan)
         ended = np.full(count, direct.NO_START)
-        return direct.Orbits(
-            np.full((count, 5), np.nan), np.empty((count, 0, 5)), none, np.zeros(count, int), ended, none
-        )
+        return direct.Orbits(np.full((count, 5), np.nan), np.empty((count, 0, 5)), none, ended, none)
 
     monkeypatch.setattr(direct, "solve_all", lost)
     monkeypatch.setattr(switching, "state_on_orbit", lambda *_: None)

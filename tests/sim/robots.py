@@ -42,9 +42,7 @@ def held_loads(omega_bar: float, l_over_r0: float, offset: float, *, edges: int)
 def extrapolated_loads(omega_bar: float, l_over_r0: float, offset: float) -> np.ndarray:
     """The same at the default resolution: the direct route's meshes, extrapolated."""
     values = [held_loads(omega_bar, l_over_r0, offset, edges=n)[0] for n in direct.MESHES]
-    squares = np.array([1 / n**2 for n in direct.MESHES])
-    weights = np.linalg.inv(np.vander(squares, 3, increasing=True))[0]
-    return np.asarray(weights @ np.array(values))
+    return direct.extrapolate(np.array(values))
 
 
 def single_filament(edges: int, omega_bar: float, l_over_r0: float, offset: float) -> tuple[Swimmer, Groups]:

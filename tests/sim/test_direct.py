@@ -151,7 +151,7 @@ def test_phases_are_resampled_and_differentiated_exactly(phases: int) -> None:
     for k in range(1, (phases - 1) // 2 + 1):
         values = np.cos(k * at + 0.3)
         assert direct.differentiation(phases) @ values == pytest.approx(-k * np.sin(k * at + 0.3), abs=1e-12)
-        assert direct.resampling(phases, 12) @ values == pytest.approx(np.cos(k * finer + 0.3), abs=1e-12)
+        assert direct.interpolation(phases, finer) @ values == pytest.approx(np.cos(k * finer + 0.3), abs=1e-12)
 
 
 def test_the_stated_error_covers_a_much_finer_mesh() -> None:
