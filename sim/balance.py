@@ -72,6 +72,12 @@ class Swimmer:
         """Spin of the tails, (B,), for velocities u (4, B) and motor speeds (B,)."""
         return omega + self.gain * u[3]
 
+    def voronoi(self) -> Tensor:
+        """Lengths l_k that belong to nodes 0..n, (n + 1, 1, 1)."""
+        lengths = torch.full((self.n + 1, 1, 1), 1 / self.n, dtype=self.root.dtype, device=self.root.device)
+        lengths[0] = lengths[-1] = 0.5 / self.n
+        return lengths
+
     def straight(self) -> Tensor:
         """Free nodes 1..n of straight tails, (n, 3, N, B)."""
         arc = torch.arange(1, self.n + 1, dtype=self.root.dtype, device=self.root.device) / self.n
@@ -152,12 +158,10 @@ class _Drag:
 
 
 def _node_drag(swimmer: Swimmer, shape: Shape, velocity: Tensor) -> _Drag:
-    n = swimmer.n
     total = torch.cat([shape.tangent[:-1] + shape.tangent[1:], shape.tangent[-1:]])
     spread = total.square().sum(1).sqrt()
     tangent = components(total / spread.unsqueeze(1))
-    voronoi = torch.full((n + 1, 1, 1), 1 / n, dtype=total.dtype, device=total.device)
-    voronoi[0] = voronoi[-1] = 0.5 / n
+    voronoi = swimmer.voronoi()
     perp = voronoi * swimmer.zeta_perp
     excess = voronoi * (swimmer.zeta_parallel - swimmer.zeta_perp)
     return _Drag(tangent, spread, perp, excess, stacked(node_drag(tangent, components(velocity), perp, excess)))
@@ -172,9 +176,7 @@ def _node_load(swimmer: Swimmer, e_x: Tensor, e_y: Tensor) -> Tensor:
     """Force of the load on every node, (n + 1, 3, N, B)."""
     load = swimmer.tail_load[0] * e_x + swimmer.tail_load[1] * e_y
     load[2] = load[2] + swimmer.tail_load[2]
-    voronoi = torch.full((swimmer.n + 1, 1, 1, 1), 1 / swimmer.n, dtype=load.dtype, device=load.device)
-    voronoi[0] = voronoi[-1] = 0.5 / swimmer.n
-    return voronoi * load.expand(3, *swimmer.root.shape[2:])
+    return swimmer.voronoi().unsqueeze(1) * load.expand(3, *swimmer.root.shape[2:])
 
 
 def _body_load(swimmer: Swimmer, u: Tensor, omega: Tensor) -> Tensor:

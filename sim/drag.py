@@ -20,7 +20,8 @@ Source: Du, Miller, Jawed (arXiv 2103.05712), hydrodynamic model; Gray and Hanco
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
@@ -38,6 +39,22 @@ class Coefficients:
     resistance: Tensor  # R of head and disc about J, (4, 5, B)
     gain: Tensor  # of the motor: ω_t = ω + gain ω_h, (B,); 1 where it holds its speed
     tail_load: Tensor  # force per length on the tails, body frame (x, y up, z forward) [EI/l³], (3, B)
+
+    def scaled(self, factor: Tensor) -> Coefficients:
+        """With all drag `factor` times as large, (B,)."""
+        return replace(
+            self,
+            zeta_parallel=self.zeta_parallel * factor,
+            zeta_perp=self.zeta_perp * factor,
+            resistance=self.resistance * factor,
+        )
+
+    def with_resistance(self, entries: Mapping[tuple[int, int], Tensor]) -> Coefficients:
+        """With `entries` (row, column) added to the resistance of head and disc, each (B,)."""
+        extra = torch.zeros_like(self.resistance)
+        for place, value in entries.items():
+            extra[place] = value
+        return replace(self, resistance=self.resistance + extra)
 
 
 def tail_coefficients(l_over_r0: Tensor) -> tuple[Tensor, Tensor]:

@@ -67,10 +67,8 @@ class Steady:
         """The rows at `rows`."""
         return Steady(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
-    def with_rows(self, rows: NDArray[np.int64], other: Steady | None) -> Steady:
-        """This motion with `rows` taken from `other`; itself where there are none."""
-        if other is None:
-            return self
+    def with_rows(self, rows: NDArray[np.int64], other: Steady) -> Steady:
+        """This motion with `rows` taken from `other`."""
         changed = {}
         for field in fields(self):
             values = getattr(self, field.name)

@@ -32,9 +32,16 @@ def steady(groups: Groups) -> Steady:
         reached = settle(_rows(groups, quick), resolution=Resolution.for_tracks(fastest))
         other = quick[_difference(motion.at(quick), reached) > SAME]
         note = "straight tails reach another motion than the one on which they move alike"
-        motion = motion.with_rows(other, stepped(_rows(groups, other), [note] * len(other)))
-    rest = np.flatnonzero(motion.failed & (motion.method == DIRECT))
-    return motion.with_rows(rest, stepped(_rows(groups, rest), motion.note[rest].tolist()))
+        motion = _with_stepped(motion, groups, other, np.full(len(groups), note))
+    lost = np.flatnonzero(motion.failed & (motion.method == DIRECT))
+    return _with_stepped(motion, groups, lost, motion.note)
+
+
+def _with_stepped(motion: Steady, groups: Groups, rows: NDArray[np.int64], notes: NDArray[np.str_]) -> Steady:
+    """This motion with `rows` stepped instead; notes (B,) say why."""
+    if not len(rows):
+        return motion
+    return motion.with_rows(rows, stepped(_rows(groups, rows), notes[rows].tolist()))
 
 
 def _rows(groups: Groups, rows: NDArray[np.int64]) -> Groups:
@@ -61,15 +68,9 @@ def orbits(groups: Groups) -> Steady:
     )
 
 
-def stepped(groups: Groups, notes: list[str]) -> Steady | None:
-    """Time stepping from rest on two meshes and steps; their difference gives the error of the finer.
-
-    None without robots.
-    """
-    if not notes:
-        return None
-    fastest = float(groups.omega_bar.abs().max())
-    needed = Resolution.fitting(fastest)
+def stepped(groups: Groups, notes: list[str]) -> Steady:
+    """Time stepping from rest on two meshes and steps; their difference gives the error of the finer."""
+    needed = Resolution.fitting(float(groups.omega_bar.abs().max()))
     coarse = settle(groups, resolution=needed)
     fine = settle(groups, resolution=Resolution(2 * needed.edges, 2 * needed.steps))
     fields = {**vars(fine), "error": _difference(coarse, fine) / 3}  # of second order

@@ -10,10 +10,9 @@ C_t stays the drag across the axis, which moves yaw rate and radius, so that ε 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import torch
 from torch import Tensor
 
 from sim.effects.base import Effect
@@ -26,9 +25,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class AnisotropicHeadDrag(Effect):
     def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        extra = torch.zeros_like(base.resistance)
-        extra[1, 1] = size * 6 * math.pi * groups.C_t / groups.l_over_R
-        return replace(base, resistance=base.resistance + extra)
+        return base.with_resistance({(1, 1): size * 6 * math.pi * groups.C_t / groups.l_over_R})
 
 
 EFFECT = AnisotropicHeadDrag(

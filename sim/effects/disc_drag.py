@@ -10,10 +10,9 @@ length of the tails. Left out: the gap between disc and head.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import torch
 from torch import Tensor
 
 from sim.effects.base import Effect
@@ -26,9 +25,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class DiscDrag(Effect):
     def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        extra = torch.zeros_like(base.resistance)
-        extra[3, 4] = size * 8 * math.pi / groups.l_over_R**3
-        return replace(base, resistance=base.resistance + extra)
+        return base.with_resistance({(3, 4): size * 8 * math.pi / groups.l_over_R**3})
 
 
 EFFECT = DiscDrag(

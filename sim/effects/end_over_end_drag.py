@@ -11,10 +11,9 @@ Left out: the part of it that the free surface changes.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import torch
 from torch import Tensor
 
 from sim.effects.base import Effect
@@ -27,9 +26,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class EndOverEndDrag(Effect):
     def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        extra = torch.zeros_like(base.resistance)
-        extra[2, 2] = size * 8 * math.pi / groups.l_over_R**3
-        return replace(base, resistance=base.resistance + extra)
+        return base.with_resistance({(2, 2): size * 8 * math.pi / groups.l_over_R**3})
 
 
 EFFECT = EndOverEndDrag(

@@ -10,7 +10,7 @@ change of drag.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from torch import Tensor
@@ -28,13 +28,7 @@ CONTROL_SPEED = 10.0 / 34.375**4  # |ω̄| (r0/l)⁴ of the paper's control exam
 class Inertia(Effect):
     def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
         speed = groups.omega_bar.abs() / groups.l_over_r0**4 / CONTROL_SPEED
-        factor = 1 + size * speed
-        return replace(
-            base,
-            zeta_parallel=base.zeta_parallel * factor,
-            zeta_perp=base.zeta_perp * factor,
-            resistance=base.resistance * factor,
-        )
+        return base.scaled(1 + size * speed)
 
 
 EFFECT = Inertia(

@@ -9,7 +9,7 @@ rates to the left and to the right differ. To be fitted before anything exotic. 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import torch
@@ -26,9 +26,7 @@ if TYPE_CHECKING:
 class LeftRightBias(Effect):
     def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
         R, L = 1 / groups.l_over_R, groups.L_over_R / groups.l_over_R
-        extra = torch.zeros_like(base.resistance)
-        extra[2, 4] = -size * torch.sign(groups.omega_bar) * R * L**2 / 2
-        return replace(base, resistance=base.resistance + extra)
+        return base.with_resistance({(2, 4): -size * torch.sign(groups.omega_bar) * R * L**2 / 2})
 
 
 EFFECT = LeftRightBias(

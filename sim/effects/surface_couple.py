@@ -9,10 +9,9 @@ the length of the tails. Expected to change ω_yr by 10 to 70 %, of either sign.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import torch
 from torch import Tensor
 
 from sim.effects.base import Effect
@@ -26,9 +25,7 @@ if TYPE_CHECKING:
 class SurfaceCouple(Effect):
     def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
         offset = groups.a_over_R / groups.l_over_R
-        extra = torch.zeros_like(base.resistance)
-        extra[2, 4] = -size * groups.N * offset**2
-        return replace(base, resistance=base.resistance + extra)
+        return base.with_resistance({(2, 4): -size * groups.N * offset**2})
 
 
 EFFECT = SurfaceCouple(

@@ -10,10 +10,9 @@ one tank C_t takes it up.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import torch
 from torch import Tensor
 
 from sim.effects.base import Effect
@@ -27,13 +26,12 @@ if TYPE_CHECKING:
 class TankWall(Effect):
     def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
         factor = 1 / (1 - 2.104 * size + 2.089 * size**3 - 0.948 * size**5)
-        extra = torch.zeros_like(base.resistance)
         lever = groups.L_over_R / groups.l_over_R / 2
-        translation = 6 * math.pi * groups.C_t / groups.l_over_R * (factor - 1)
-        extra[0, 0], extra[1, 1] = translation, translation
-        extra[0, 2], extra[2, 0] = translation * lever, translation * lever
-        extra[2, 2] = translation * lever**2
-        return replace(base, resistance=base.resistance + extra)
+        more = 6 * math.pi * groups.C_t / groups.l_over_R * (factor - 1)
+        coupled = more * lever
+        return base.with_resistance(
+            {(0, 0): more, (1, 1): more, (0, 2): coupled, (2, 0): coupled, (2, 2): coupled * lever}
+        )
 
 
 EFFECT = TankWall(

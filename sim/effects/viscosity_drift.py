@@ -8,7 +8,7 @@ viscosity for all runs it is only another unit of time.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import torch
@@ -24,13 +24,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class ViscosityDrift(Effect):
     def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        factor = torch.exp(-size)
-        return replace(
-            base,
-            zeta_parallel=base.zeta_parallel * factor,
-            zeta_perp=base.zeta_perp * factor,
-            resistance=base.resistance * factor,
-        )
+        return base.scaled(torch.exp(-size))
 
 
 EFFECT = ViscosityDrift(

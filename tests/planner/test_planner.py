@@ -130,6 +130,8 @@ def test_paper_cases_are_planned_within_their_bound(name: str) -> None:
 
 def test_planning_never_calls_the_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     import sim.balance
+    import sim.direct
+    import sim.run
     import sim.steady
     import sim.stepper
     import sim.switching
@@ -138,16 +140,18 @@ def test_planning_never_calls_the_simulator(monkeypatch: pytest.MonkeyPatch) -> 
         raise AssertionError("the planner simulated")
 
     for module, name in ((sim.stepper, "step"), (sim.stepper, "at_rest"), (sim.balance, "newton_correction"),
-                         (sim.steady, "steady"), (sim.switching, "switch_response")):  # fmt: skip
+                         (sim.steady, "steady"), (sim.switching, "switch_response"),
+                         (sim.direct, "solve_all"), (sim.run, "advance")):  # fmt: skip
         monkeypatch.setattr(module, name, refuse)
     assert len(plan(polygon(4, 3.0), CONTROL).dwells) > 50
 
 
 def test_planning_does_not_even_load_the_simulator() -> None:
+    simulator = ("sim.stepper", "sim.balance", "sim.steady", "sim.replay", "sim.direct", "sim.march", "numba")
     code = (
         "import sys; from planner import plan, circle; from sim.robot import PRESETS;"
         "plan(circle(2.0), PRESETS['paper-control']);"
-        "print([m for m in ('sim.stepper', 'sim.balance', 'sim.steady', 'sim.replay') if m in sys.modules])"
+        f"print([m for m in {simulator} if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
