@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
+from sim.errors import InputError
 from sim.resolution import Resolution
 from sim.robot import Groups, check_columns
 from sim.settling import settle
@@ -55,6 +56,8 @@ def run_batches(
     Results come back in the order of the jobs; the longest jobs should come first. `threads`: in parallel threads
     instead, for work in compiled loops, which do not hold the interpreter's lock.
     """
+    if jobs is not None and jobs < 1:
+        raise InputError(f"jobs = {jobs}; give at least 1, or nothing for all processors")
     count = min(jobs or available_jobs(), len(jobs_to_do))
     here = threads or count <= 1  # thread counts belong to the process: set once, not by each worker
     task = work if here else partial(_single_threaded, work)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import time
 
 import numpy as np
+import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from sim.batches import run_batches, split
+from sim.errors import InputError
 
 
 def test_batches_hold_every_row_once_and_one_n_each() -> None:
@@ -15,6 +17,12 @@ def test_batches_hold_every_row_once_and_one_n_each() -> None:
     batches = split(tails, 2)
     assert sorted(np.concatenate(batches).tolist()) == list(range(7))
     assert all(len(b) <= 2 and len(set(tails[b])) == 1 for b in batches)
+
+
+@pytest.mark.parametrize("jobs", [0, -3])
+def test_fewer_than_one_job_is_refused(jobs: int) -> None:
+    with pytest.raises(InputError, match=f"jobs = {jobs}; give at least 1"):
+        run_batches(len, [[1]], sizes=[1], jobs=jobs)
 
 
 def blas_threads() -> set[int]:
