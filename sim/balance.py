@@ -54,9 +54,10 @@ class Swimmer:
     axial_stiffness: Tensor  # EA l²/EI, (B,)
     zeta_parallel: Tensor  # (B,)
     zeta_perp: Tensor  # (B,)
-    resistance: Tensor  # (4, 5, B), see `sim.drag.Coefficients`
+    resistance: Tensor  # (4, 5, B), see `sim.coefficients`
     gain: Tensor  # (B,)
     tail_load: Tensor  # (3, B)
+    beyond: Tensor  # (9, B), `sim.coefficients.BEYOND`: carried along, not balanced here
     head_length: Tensor  # L/l, (B,)
     tail_radius: Tensor  # r0/l, (B,)
 
@@ -114,6 +115,7 @@ def assemble(groups: Groups, *, edges: int) -> Swimmer:
         resistance=found.resistance,
         gain=found.gain,
         tail_load=found.tail_load,
+        beyond=found.beyond(),
         head_length=L,
         tail_radius=1 / groups.l_over_r0,
     )

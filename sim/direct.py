@@ -28,7 +28,7 @@ from sim.compiling import compiled
 from sim.contact import tail_gap
 from sim.orbit import imbalance, newton, sensitivity
 from sim.robot import Groups
-from sim.tail import HEAD_LENGTH, TAIL_RADIUS, Body, body_of, straight
+from sim.tail import HEAD_LENGTH, TAIL_RADIUS, Body, body_of, straight, without_beyond
 
 Array = NDArray[np.float64]
 
@@ -49,6 +49,7 @@ BALANCED = 1e-5  # largest unbalanced force over the largest that an edge carrie
 WIDTH = 1e-5  # step of the differences that are exact for linear dependence
 _DOUBT = 0.03  # share of the extrapolation that counts as error
 _SHRINKS = 0.2  # assumed fall of the phase error with the next number of phases, where only one is known
+FEW, MANY = 3, 12  # phases to begin with; a derivative may depend on the phase where the motion hardly does
 _MOST_PHASES = 48
 _MOST_CORRECTIONS = 30
 
@@ -74,7 +75,7 @@ class Orbits(NamedTuple):
 
 
 def numbers(groups: Groups) -> Tensor:
-    """What makes each robot, in the order of `sim.tail.body_of`, (31, B); differentiable."""
+    """What makes each robot, in the order of `sim.tail.body_of`, (41, B); differentiable."""
     swimmer = assemble(groups, edges=2)
     rows = [
         groups.omega_bar,
@@ -87,12 +88,14 @@ def numbers(groups: Groups) -> Tensor:
         swimmer.tail_radius,
         *swimmer.resistance.reshape(20, -1),
         *swimmer.tail_load,
+        1 / groups.l_over_R,
+        *swimmer.beyond,
     ]
     return torch.stack(rows)
 
 
 def bodies(groups: Groups) -> Array:
-    """Robots as rows of numbers for the compiled loops, (B, 31)."""
+    """Robots as rows of numbers for the compiled loops, (B, 41)."""
     return np.ascontiguousarray(numbers(groups).detach().cpu().numpy().T)
 
 
@@ -203,15 +206,15 @@ def _more_phases(tails: int, phases: int) -> int:
 
 
 @compiled
-def _enough_phases(body: Body, tails: int, head_length: float) -> tuple[int, float, Array, Array]:
-    """How the coarsest mesh ended, the error that its phases leave, x and u."""
+def _enough_phases(body: Body, tails: int, head_length: float, least: int) -> tuple[int, float, Array, Array]:
+    """How the coarsest mesh ended, the error that its phases leave, x and u; with `least` phases or more."""
     n = MESHES[0]
     phases = tails * int(np.ceil(2 / tails))
     x, u = _start(body, n, phases, tails)
-    _, size = newton(body, x, u, differentiation(phases), 1e-2, _MOST_CORRECTIONS)
+    _, size = newton(without_beyond(body), x, u, differentiation(phases), 1e-2, _MOST_CORRECTIONS)
     if not size < 1e-2:
         return NO_START, np.nan, x, u
-    phases = tails * int(np.ceil(3 / tails))
+    phases = tails * int(np.ceil(least / tails))
     x, u = with_phases(x, phases), with_phases(u.reshape(1, -1, 4), phases // tails)[0]
     _, size = newton(body, x, u, differentiation(phases), ROUGH, _MOST_CORRECTIONS)
     if not size < ROUGH:
@@ -235,10 +238,10 @@ def _enough_phases(body: Body, tails: int, head_length: float) -> tuple[int, flo
 
 
 @compiled
-def solve(row: Array, tails: int) -> Orbit:
-    """One robot with N tails; its numbers from `bodies`."""
+def solve(row: Array, tails: int, least: int) -> Orbit:
+    """One robot with N tails; its numbers from `bodies`; on `least` phases or more."""
     body, head_length = body_of(row), row[HEAD_LENGTH]
-    ended, error, x, u = _enough_phases(body, tails, head_length)
+    ended, error, x, u = _enough_phases(body, tails, head_length, least)
     matrix = differentiation(x.shape[1])
     xs, us = (x, x, x), (u, u, u)
     for i in (1, 2):
@@ -306,19 +309,20 @@ def _smallest_gap(x: Array, offset: float, tails: int, radius: float) -> float:
     return smallest
 
 
-def solve_all(rows: Array, tails: int, tangents: Array | None = None) -> Orbits:
+def solve_all(rows: Array, tails: int, tangents: Array | None = None, *, phases: int = FEW) -> Orbits:
     """Steady motions of robots with N tails, and their derivatives.
 
     Args:
-        rows: (B, 31), from `bodies`.
+        rows: (B, 41), from `bodies`.
         tails: N.
-        tangents: (B, K, 31), directions in which the means are to be differentiated (none by default); their size
+        tangents: (B, K, 41), directions in which the means are to be differentiated (none by default); their size
             sets the step of differences that are exact for linear dependence.
+        phases: to begin with.
     """
     slopes = np.full((len(rows), 0 if tangents is None else tangents.shape[1], 5), np.nan)
     means_, error, ended, gap = [], [], [], []
     for i, row in enumerate(rows):
-        orbit = solve(row, tails)
+        orbit = solve(row, tails, phases)
         solved = orbit.ended == SOLVED
         means_.append(orbit.means)
         error.append(orbit.error)
@@ -331,7 +335,7 @@ def solve_all(rows: Array, tails: int, tangents: Array | None = None) -> Orbits:
 
 def _slopes(row: Array, tangents: Array, orbit: Orbit) -> Array:
     """Derivatives of the extrapolated means along `tangents`, (K, 5)."""
-    moved = np.stack([row - WIDTH * tangents, row + WIDTH * tangents], 1)  # (K, 2, 31)
+    moved = np.stack([row - WIDTH * tangents, row + WIDTH * tangents], 1)  # (K, 2, 41)
     found = np.empty((3, len(tangents), 5))
     for i, (x, u) in enumerate(zip(orbit.x, orbit.u, strict=True)):
         changes = sensitivity(body_of(row), moved.reshape(-1, row.size), WIDTH, x, u, differentiation(x.shape[1]))
@@ -348,7 +352,7 @@ def _slopes(row: Array, tangents: Array, orbit: Orbit) -> Array:
 def on_mesh(row: Array, tails: int, edges: int) -> tuple[bool, Array, Array]:
     """The orbit on a mesh of one's own: whether there is one, x (n, M, 3) and u (P, 4)."""
     body = body_of(row)
-    ended, _, x, u = _enough_phases(body, tails, row[HEAD_LENGTH])
+    ended, _, x, u = _enough_phases(body, tails, row[HEAD_LENGTH], FEW)
     if ended != SOLVED:
         return False, x, u
     x = with_edges(x, body.offset, edges)

@@ -20,41 +20,13 @@ Source: Du, Miller, Jawed (arXiv 2103.05712), hydrodynamic model; Gray and Hanco
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
 from torch import Tensor
 
+from sim.coefficients import Coefficients
 from sim.vectors import Matrix, Vector, dot, formula, minus, outer, plus, plus_identity, times
-
-
-@dataclass(frozen=True)
-class Coefficients:
-    """All that drag, motor and loads put into the balance of B robots (dimensionless); what effects change."""
-
-    zeta_parallel: Tensor  # ζ∥ of the tails, (B,)
-    zeta_perp: Tensor  # ζ⊥, (B,)
-    resistance: Tensor  # R of head and disc about J, (4, 5, B)
-    gain: Tensor  # of the motor: ω_t = ω + gain ω_h, (B,); 1 where it holds its speed
-    tail_load: Tensor  # force per length on the tails, body frame (x, y up, z forward) [EI/l³], (3, B)
-
-    def scaled(self, factor: Tensor) -> Coefficients:
-        """With all drag `factor` times as large, (B,)."""
-        return replace(
-            self,
-            zeta_parallel=self.zeta_parallel * factor,
-            zeta_perp=self.zeta_perp * factor,
-            resistance=self.resistance * factor,
-        )
-
-    def with_resistance(self, entries: Mapping[tuple[int, int], Tensor]) -> Coefficients:
-        """With `entries` (row, column) added to the resistance of head and disc, each (B,)."""
-        extra = torch.zeros_like(self.resistance)
-        for place, value in entries.items():
-            extra[place] = value
-        return replace(self, resistance=self.resistance + extra)
 
 
 def tail_coefficients(l_over_r0: Tensor) -> tuple[Tensor, Tensor]:
@@ -86,8 +58,7 @@ def coefficients(
             torch.stack([none, none, none, spin, none]),
         ]
     )
-    no_load = torch.zeros_like(torch.stack([translation] * 3))
-    return Coefficients(*tail_coefficients(l_over_r0), resistance, torch.ones_like(translation), no_load)
+    return Coefficients.plain(*tail_coefficients(l_over_r0), resistance)
 
 
 @formula

@@ -9,9 +9,9 @@ the Schur complement of the body needs the first two nodes alone:
 
     Z_k = A_kk⁻¹ [A_{k,k−1} | A_{k,k−2} | B_k  s_k],   rows k−1 and k−2 −= A_{k−1,k} Z_k and A_{k−2,k} Z_k.
 
-No pivoting between nodes: A is minus drag plus stiffness, whose symmetric part is definite.
-There may be several right-hand sides: one for Newton's method, one a parameter for sensitivities.
-Cost: about 8 m³ multiplications a node, nearly all of them in matrix products (BLAS).
+No pivoting between nodes: A is minus drag plus stiffness, whose symmetric part is definite. There may be several
+right-hand sides: one for Newton's method, one a parameter for sensitivities. `again` solves for one more with what
+`solve` leaves behind. Cost: about 8 m³ multiplications a node, nearly all of them in matrix products (BLAS).
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ class System(NamedTuple):
     folded: Array  # (n, m, 2 m + c): Z
     right: Array  # (m, 2 m + c)
     product: Array  # (m, 2 m + c)
-    inverse: Array  # (m, m)
+    inverse: Array  # (n, m, m)
+    schur: Array  # (unknowns, unknowns)
 
 
 @compiled
@@ -56,7 +57,8 @@ def new_system(n: int, lanes: int, unknowns: int, sides: int) -> System:
         np.zeros((n, m, 2 * m + c)),
         np.zeros((m, 2 * m + c)),
         np.zeros((m, 2 * m + c)),
-        np.zeros((m, m)),
+        np.zeros((n, m, m)),
+        np.zeros((unknowns, unknowns)),
     )
 
 
@@ -166,14 +168,14 @@ def _fold_two_up(system: System, i: int) -> None:
 
 @compiled
 def solve(system: System, dx: Array, du: Array) -> None:
-    """Solve for dx (n, m, K) and du (unknowns, K), K right-hand sides; what `system` holds is used up."""
+    """Solve for dx (n, m, K) and du (unknowns, K), K right-hand sides; the equations turn into their factors."""
     n, m, _ = system.rows.shape
-    unknowns, sides = du.shape
+    unknowns, _sides = du.shape
     for i in range(n - 1, -1, -1):
-        system.inverse[:] = system.rows[i][:, :m]
-        invert(system.inverse)
+        system.inverse[i] = system.rows[i][:, :m]
+        invert(system.inverse[i])
         _gather(system, i)
-        np.dot(system.inverse, system.right, system.folded[i])
+        np.dot(system.inverse[i], system.right, system.folded[i])
         if i > 0:
             np.dot(system.upper[i], system.folded[i], system.product)
             system.rows[i - 1] -= system.product
@@ -183,12 +185,23 @@ def solve(system: System, dx: Array, du: Array) -> None:
     second = system.folded[1][:, 2 * m :] - np.dot(np.ascontiguousarray(system.folded[1][:, :m]), first)
     schur = system.corner - np.dot(system.foot[0], first) - np.dot(system.foot[1], second)
     du[:] = schur[:, unknowns:]
+    system.schur[:] = schur[:, :unknowns]
     solve_dense(schur, du)
+    for i in range(n):
+        dx[i] = system.folded[i][:, 2 * m + unknowns :]
+    _back(system, dx, du)
+
+
+@compiled
+def _back(system: System, dx: Array, du: Array) -> None:
+    """From the root to the tip: dx comes in as A⁻¹ s of each node without its neighbours."""
+    n, m, sides = dx.shape
+    unknowns = du.shape[0]
     for i in range(n):
         folded = system.folded[i]
         for a in range(m):
             for side in range(sides):
-                value = folded[a, 2 * m + unknowns + side]
+                value = dx[i, a, side]
                 for j in range(unknowns):
                     value -= folded[a, 2 * m + j] * du[j, side]
                 if i > 0:
@@ -198,3 +211,25 @@ def solve(system: System, dx: Array, du: Array) -> None:
                     for j in range(m):
                         value -= folded[a, m + j] * dx[i - 2, j, side]
                 dx[i, a, side] = value
+
+
+@compiled
+def again(system: System, s: Array, t: Array) -> None:
+    """Solve with the factors that `solve` left, in place: s (n, m) becomes dx, t (unknowns,) becomes du."""
+    n, m = s.shape
+    lanes = m // 3
+    for i in range(n - 1, -1, -1):
+        s[i] = np.dot(system.inverse[i], s[i])
+        if i > 0:
+            s[i - 1] -= np.dot(system.upper[i], s[i])
+        if i > 1:
+            for lane in range(lanes):
+                for a in range(3):
+                    for b in range(3):
+                        s[i - 2, 3 * lane + a] -= system.upper2[i, lane, a, b] * s[i, 3 * lane + b]
+    second = s[1] - np.dot(np.ascontiguousarray(system.folded[1][:, :m]), s[0])
+    t -= np.dot(system.foot[0], s[0]) + np.dot(system.foot[1], second)
+    right = t.copy().reshape(-1, 1)
+    solve_dense(system.schur.copy(), right)
+    t[:] = right[:, 0]
+    _back(system, s.reshape(n, m, 1), right)

@@ -27,8 +27,11 @@ from numpy.typing import NDArray
 from sim import elimination
 from sim.compiling import compiled
 from sim.elimination import System
+from sim.instant import still, unbalanced
+from sim.krylov import LEFT, MOST_STEPS, NUDGE, combine, extend, new_krylov, start
 from sim.tail import (
     E_Z,
+    NONE,
     Body,
     Geometry,
     Motion,
@@ -40,8 +43,10 @@ from sim.tail import (
     joint_block,
     measure,
     motion_at,
+    move,
     new_geometry,
     node_balance,
+    put,
     vector,
     wrench_of,
 )
@@ -134,7 +139,7 @@ def _body_rows(body: Body, motion: Motion, geometry: Geometry, system: System, m
     """What the tail puts on the disc through its clamp at phase m, about J."""
     unknowns = system.corner.shape[0]
     t, i = 4 * (m % (unknowns // 4)), 3 * m
-    clamp = clamp_balance(geometry, body, m, motion)
+    clamp = clamp_balance(geometry, body, m, motion, NONE, NONE)
     wrench = wrench_of(motion, clamp.force, clamp.moment)
     for a in range(4):
         system.corner[t + a, unknowns] -= wrench[a]
@@ -161,7 +166,7 @@ def _add_foot(foot: Array, t: int, i: int, motion: Motion, force: Matrix, moment
 
 @compiled
 def linearise(body: Body, x: Array, u: Array, differentiation: Array, geometry: Geometry, system: System) -> None:
-    """Newton's equations at x (n, M, 3), u (P, 4)."""
+    """Newton's equations at x (n, M, 3), u (P, 4), of the robot without what lies beyond (`sim.instant`)."""
     elimination.clear(system)
     measure(geometry, x, (body.offset, 0.0, 0.0), body.axial_stiffness)
     for m in range(x.shape[1]):
@@ -174,16 +179,32 @@ def linearise(body: Body, x: Array, u: Array, differentiation: Array, geometry: 
 
 
 @compiled
-def tail_wrench(body: Body, x: Array, u: Array) -> Array:
-    """(F_x, F_z, M_y, M_z) about J that one tail puts on the disc, mean over the phases, (4,)."""
-    phases = x.shape[1]
-    geometry = new_geometry(x.shape[0], phases)
-    measure(geometry, x, (body.offset, 0.0, 0.0), body.axial_stiffness)
-    total = np.zeros(4)
+def _rates(body: Body, x: Array, u: Array, differentiation: Array) -> Array:
+    """Velocities of the free nodes in the disc frame, (n, M, 3)."""
+    n, phases, _ = x.shape
+    x_dot = np.empty_like(x)
     for m in range(phases):
-        motion = motion_at(body, u[m % u.shape[0]], FIRST_PHASE + 2 * np.pi * m / phases)
-        clamp = clamp_balance(geometry, body, m, motion)
-        total += np.array(wrench_of(motion, clamp.force, clamp.moment)) / phases
+        omega_t = body.omega + body.gain * u[m % u.shape[0], 3]
+        for k in range(n):
+            put(x_dot, k, m, times(omega_t, _derivative(x, differentiation, k, m)))
+    return x_dot
+
+
+@compiled
+def tail_wrench(body: Body, x: Array, u: Array, differentiation: Array) -> Array:
+    """(F_x, F_z, M_y, M_z) about J that the tails of one robot put on the disc, mean over the phases, (4,)."""
+    n, phases, _ = x.shape
+    geometry = new_geometry(n, phases)
+    r, t = np.zeros((n, 3 * phases)), np.zeros(u.size)
+    residual(body, x, u, differentiation, geometry, r, t)
+    total = np.zeros(4)
+    for p in range(u.shape[0]):
+        omega_t = body.omega + body.gain * u[p, 3]
+        for a in range(4):
+            on_head = body.resistance[a, 4] * omega_t
+            for c in range(4):
+                on_head += body.resistance[a, c] * u[p, c]
+            total[a] += (t[4 * p + a] + on_head) / u.shape[0]
     return total
 
 
@@ -193,26 +214,83 @@ def residual(
 ) -> None:
     """What is unbalanced at x (n, M, 3), u (P, 4): r (n, 3 M) on the nodes, t (4 P,) on the robot."""
     n, phases, _ = x.shape
+    instants = u.shape[0]
     measure(geometry, x, (body.offset, 0.0, 0.0), body.axial_stiffness)
-    for p in range(u.shape[0]):
-        omega_t = body.omega + body.gain * u[p, 3]
-        for a in range(4):
-            load = body.resistance[a, 4] * omega_t
-            for c in range(4):
-                load += body.resistance[a, c] * u[p, c]
-            t[4 * p + a] = -load
-    for m in range(phases):
-        p = m % u.shape[0]
-        motion = motion_at(body, u[p], FIRST_PHASE + 2 * np.pi * m / phases)
-        for k in range(n):
-            along = times(motion.omega_t, _derivative(x, differentiation, k, m))
-            velocity = plus(plus(motion.linear, cross(motion.spin, vector(x, k, m))), along)
-            force = node_balance(geometry, body, motion, k, m, velocity)[0]
-            r[k, 3 * m], r[k, 3 * m + 1], r[k, 3 * m + 2] = force
-        clamp = clamp_balance(geometry, body, m, motion)
-        wrench = wrench_of(motion, clamp.force, clamp.moment)
-        for a in range(4):
-            t[4 * p + a] += wrench[a]
+    x_dot, around = _rates(body, x, u, differentiation), still(n, phases)
+    on_nodes = r.reshape(x.shape)
+    for p in range(instants):
+        phase = FIRST_PHASE + 2 * np.pi * p / phases
+        unbalanced(
+            body, geometry, x, x_dot, u[p], phase, p, phases // instants, around, on_nodes, t[4 * p : 4 * p + 4]
+        )
+
+
+@compiled
+def _times_inverse(
+    body: Body, x: Array, u: Array, differentiation: Array, geometry: Geometry, system: System,
+    dx: Array, du: Array, right: Array, left: float,
+) -> None:  # fmt: skip
+    """Solve F'(x, u) z = right for z = (dx, du) by GMRES; the factors in `system`, of the matrix that leaves out
+    what lies beyond (`sim.instant`), are the preconditioner.
+
+    Args:
+        right: (size,), nodes first; used up.
+        dx, du: (n, 3 M) and (4 P,), filled.
+        left: share of `right` that may be left.
+    """
+    nodes, size = dx.size, dx.size + du.size
+    scale = 1 + abs(body.omega)
+    krylov = new_krylov(size, MOST_STEPS)
+    sides = np.zeros((2, size))
+    elimination.again(system, right[:nodes].reshape(dx.shape), right[nodes:])
+    right[nodes:] /= scale
+    count = 0
+    if start(krylov, right) > 0:
+        for i in range(MOST_STEPS):
+            direction = krylov.basis[i]
+            step_x = direction[:nodes].reshape(x.shape)
+            step_u = (direction[nodes:] * scale).reshape(u.shape)
+            nudge = NUDGE / max(np.max(np.abs(direction)), 1e-12)
+            for side in range(2):
+                sign = 2 * side - 1.0
+                residual(
+                    body, x + sign * nudge * step_x, u + sign * nudge * step_u, differentiation, geometry,
+                    sides[side, :nodes].reshape(dx.shape), sides[side, nodes:],
+                )  # fmt: skip
+            image = (sides[1] - sides[0]) / (2 * nudge)
+            elimination.again(system, image[:nodes].reshape(dx.shape), image[nodes:])
+            image[nodes:] /= scale
+            count = i + 1
+            if extend(krylov, i, image) < left:
+                break
+    z = combine(krylov, count)
+    dx[:] = z[:nodes].reshape(dx.shape)
+    du[:] = z[nodes:] * scale
+
+
+@compiled
+def _corrected(
+    body: Body,
+    x: Array,
+    u: Array,
+    differentiation: Array,
+    geometry: Geometry,
+    system: System,
+    dx: Array,
+    du: Array,
+) -> None:
+    """One Newton correction dx (n, 3 M, 1), du (4 P, 1)."""
+    linearise(body, x, u, differentiation, geometry, system)
+    elimination.solve(system, dx, du)
+    if not body.beyond.none:
+        right = np.empty(dx.size + du.size)
+        residual(
+            body, x, u, differentiation, geometry, right[: dx.size].reshape(dx.shape[:2]), right[dx.size :]
+        )  # fmt: skip
+        right *= -1.0
+        column, rates = np.empty(dx.shape[:2]), np.empty(len(du))
+        _times_inverse(body, x, u, differentiation, geometry, system, column, rates, right, LEFT)
+        dx[:, :, 0], du[:, 0] = column, rates
 
 
 @compiled
@@ -230,13 +308,12 @@ def newton(
     dx, du = np.zeros((n, 3 * phases, 1)), np.zeros((u.size, 1))
     size = np.inf
     for count in range(1, most + 1):
-        linearise(body, x, u, differentiation, geometry, system)
-        elimination.solve(system, dx, du)
+        _corrected(body, x, u, differentiation, geometry, system, dx, du)
         size = max(np.max(np.abs(dx)), np.max(np.abs(du)) / (1 + abs(body.omega)))
         if not np.isfinite(size):
             return count, np.inf
         factor = min(1.0, _LARGEST_MOVE / size)
-        x += factor * dx.reshape(x.shape)
+        move(body, x, dx.reshape(x.shape), factor)
         u += factor * du.reshape(u.shape)
         if size < tolerance:
             return count, size
@@ -257,7 +334,7 @@ def sensitivity(body: Body, changed: Array, width: float, x: Array, u: Array, di
     """How u changes with the robot, du/dp (K, P, 4), by the implicit function theorem: J dz/dp = −∂F/∂p.
 
     Args:
-        changed: rows (2 K, 31): for each of K parameters the robot moved by −width and by +width. The balance is
+        changed: rows (2 K, 41): for each of K parameters the robot moved by −width and by +width. The balance is
             linear in every coefficient but the offset of the clamps, so their difference is exact to rounding.
         x, u: the solution for `body`.
     """
@@ -274,5 +351,14 @@ def sensitivity(body: Body, changed: Array, width: float, x: Array, u: Array, di
         system.rows[:, :, first + i] = (r[0] - r[1]) / (2 * width)
         system.corner[:, u.size + i] = (t[0] - t[1]) / (2 * width)
     dx, du = np.zeros((n, 3 * phases, count)), np.zeros((u.size, count))
+    rights = np.empty((count, r[0].size + u.size))
+    for i in range(count):
+        rights[i, : r[0].size] = system.rows[:, :, first + i].copy().reshape(-1)
+        rights[i, r[0].size :] = system.corner[:, u.size + i]
     elimination.solve(system, dx, du)
+    if not body.beyond.none:
+        for i in range(count):
+            column, rates = np.empty((n, 3 * phases)), np.empty(u.size)
+            _times_inverse(body, x, u, differentiation, geometry, system, column, rates, rights[i], 1e-6)
+            dx[:, :, i], du[:, i] = column, rates
     return du.T.copy().reshape(count, u.shape[0], 4)

@@ -1,7 +1,7 @@
 """Replay of any switching schedule: the robot's track in the lab, simulated.
 
 A schedule is the motor's first direction and the dwell times between flips. The robot starts from rest
-with straight tails at the schedule's start pose; each dwell is an integer number of equal steps.
+with straight tails at the schedule's start pose; dwells end where a step ends.
 Track of the head's centre, seen from above; lengths in l, time in μ0 l⁴/EI and seconds.
 """
 
@@ -98,7 +98,7 @@ def _replay(
         if index:
             run.flip()
             direction = -direction
-        poses = run.go(dwell)
+        times, poses = run.go(dwell)
         if run.failed:
             raise InputError(f"the simulation failed in dwell {index + 1} of the schedule; a finer step may help")
         count = len(poses)
@@ -106,7 +106,7 @@ def _replay(
         for i in range(1, count + 1):
             if i % stride == 0 or i == count:
                 x, y, yaw = poses[i - 1, [X, Y, YAW]].tolist()
-                rows.append((time + dwell * i / count, x, y, yaw, direction, index))
+                rows.append((time + times[i - 1], x, y, yaw, direction, index))
         time += dwell
         if progress is not None:
             progress(1)

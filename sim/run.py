@@ -13,6 +13,7 @@ from sim.tail import HEAD_LENGTH, body_of
 
 Floats = NDArray[np.float64]
 
+_GRADES = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2)  # of a step, twice each, after a jump of the motor's speed
 _REVERSED = np.array([-1.0, 1.0, -1.0, -1.0])  # of (v_x, v_z, ω_yr, ω_h), by a flip
 
 
@@ -25,6 +26,7 @@ class Run:
         self.state = new_state(tails, resolution.edges, self.body.offset) if state is None else state
         self.time_step = time_step(row[0], resolution)
         self.failed = False
+        self._jumped = state is None
         self._head_length = float(row[HEAD_LENGTH])
 
     def copy(self) -> Run:
@@ -34,9 +36,26 @@ class Run:
         other.state = State(*(array.copy() for array in self.state))
         return other
 
-    def go(self, duration: float) -> Floats:
-        """Advance at constant speed in equal steps; the poses after each, (count, 6)."""
-        return self.steps(max(1, math.ceil(duration / self.time_step - 1e-9)), duration)[0]
+    def go(self, duration: float) -> tuple[Floats, Floats]:
+        """Advance at constant speed: times since now (count,) and the poses then, (count, 6).
+
+        Steps are equal, but for some short ones where the motor's speed has jumped: there every mode of the tails
+        starts anew, and equal steps would converge at first order only.
+        """
+        parts = []
+        if self._jumped:
+            share = min(self.time_step, duration / 2 / (2 * sum(_GRADES)))
+            parts = [(2, 2 * share * grade) for grade in _GRADES]
+        left = duration - sum(part for _, part in parts)
+        parts.append((max(1, math.ceil(left / self.time_step - 1e-9)), left))
+        times, poses, now = [], [], 0.0
+        for count, part in parts:
+            times.append(now + part * np.arange(1, count + 1) / count)
+            poses.append(self.steps(count, part)[0])
+            now += part
+        self._jumped = False
+        times[-1][-1] = duration
+        return np.concatenate(times), np.concatenate(poses)
 
     def steps(self, count: int, duration: float, *, shapes: int = 0) -> tuple[Floats, Floats]:
         """Advance in `count` equal steps: poses (count, 6) and the last `shapes` shapes (K, n, N, 3)."""
@@ -50,6 +69,7 @@ class Run:
         self.body = self.body._replace(omega=-self.body.omega)
         self.state.u[:] *= _REVERSED
         self.state.x_dot[:] = 0.0
+        self._jumped = True
 
     @property
     def pose(self) -> Floats:

@@ -4,7 +4,7 @@ The orbit z(p) of `sim.orbit` satisfies F(z, p) = 0, so dz/dp = −(∂F/∂z)�
 method has anyway: one more right-hand side a parameter instead of two more solutions. Derivatives are extrapolated
 in the mesh like the means themselves.
 
-Parameters reach F through a robot's 31 numbers (`sim.direct.bodies`); how they do is differentiated automatically,
+Parameters reach F through a robot's numbers (`sim.direct.bodies`); how they do is differentiated automatically,
 so an effect that changes drag or motor needs nothing of its own here.
 """
 
@@ -58,7 +58,7 @@ def sensitivities(groups: Groups, parameters: Sequence[str]) -> Sensitivities:
     moved = [_tangent(groups, name) for name in names]
     scales = np.stack([scale for _, scale in moved], 1) if names else np.empty((len(groups), 0))
     tangents = np.stack([t for t, _ in moved], 1) if names else np.empty((len(groups), 0, NUMBERS))
-    found = direct.solve_all(direct.bodies(groups), groups.N, tangents)
+    found = direct.solve_all(direct.bodies(groups), groups.N, tangents, phases=direct.MANY)
     slopes = found.slopes / scales[:, :, None]  # (B, K, 5)
     values = dict(zip(OUTPUTS, found.means.T, strict=False))
     derivatives = {name: slopes[:, :, i] for i, name in enumerate(OUTPUTS[:5])}
@@ -75,7 +75,7 @@ def sensitivities(groups: Groups, parameters: Sequence[str]) -> Sensitivities:
 
 
 def _tangent(groups: Groups, name: str) -> tuple[Floats, Floats]:
-    """How the robots' numbers change with a parameter in units of its own size: (B, 31), and that size (B,)."""
+    """How the robots' numbers change with a parameter in units of its own size: (B, 41), and that size (B,)."""
     if name in INPUTS:
         value = getattr(groups, name)
         size = value.abs()

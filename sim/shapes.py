@@ -25,7 +25,7 @@ def tails_over_a_revolution(robot: Robot, frames: int) -> tuple[Floats, Floats]:
         InputError: the robot has no steady motion on which its tails move alike.
     """
     groups = robot.groups()
-    orbit = direct.solve(direct.bodies(groups)[0], groups.N)
+    orbit = direct.solve(direct.bodies(groups)[0], groups.N, direct.FEW)
     if orbit.ended != direct.SOLVED:
         raise InputError(f"{robot.name} has no shape to draw: {direct.REASONS[orbit.ended]}")
     x = orbit.x[2]

@@ -48,9 +48,9 @@ def _rows(groups: Groups, rows: NDArray[np.int64]) -> Groups:
     return groups.select(torch.as_tensor(rows))
 
 
-def orbits(groups: Groups) -> Steady:
-    """The direct route alone; `failed` where it found no orbit."""
-    found = direct.solve_all(direct.bodies(groups), groups.N)
+def orbits(groups: Groups, *, phases: int = direct.FEW) -> Steady:
+    """The direct route alone, on `phases` phases to begin with; `failed` where it found no orbit."""
+    found = direct.solve_all(direct.bodies(groups), groups.N, phases=phases)
     means = found.means.T
     solved = found.ended == direct.SOLVED
     return Steady(

@@ -32,6 +32,8 @@ import torch
 from torch import Tensor
 
 from sim.balance import Swimmer, newton_correction
+from sim.coefficients import BEYOND
+from sim.errors import InputError
 from sim.march import PHASE, YAW
 
 _GAMMA = 1 - 1 / math.sqrt(2)
@@ -56,7 +58,14 @@ class State:
 
 
 def at_rest(swimmer: Swimmer, phase: float = 0.0) -> State:
-    """Straight tails parallel to the axis, at time 0, heading along X."""
+    """Straight tails parallel to the axis, at time 0, heading along X.
+
+    Raises:
+        InputError: the robots have something of what `sim.coefficients` calls BEYOND, which is not balanced here.
+    """
+    if bool(swimmer.beyond.any()):
+        present = [name for name, sizes in zip(BEYOND, swimmer.beyond, strict=True) if bool(sizes.any())]
+        raise InputError(f"tensor steps leave out {', '.join(present)}; sim.run has them")
     x = swimmer.straight()
     pose = x.new_zeros(6, swimmer.robots)
     pose[PHASE] = phase

@@ -29,6 +29,24 @@ NO_BLOCK = (NONE, NONE, NONE)
 E_Z = (0.0, 0.0, 1.0)
 
 
+class Beyond(NamedTuple):
+    """What reaches further than one node of a straight, untwisted, elastic tail, see `sim.coefficients`."""
+
+    none: bool  # all of it is zero
+    head_radius: float
+    head_length: float
+    tail_radius: float
+    curvature_out: float
+    curvature_across: float
+    natural_twist: float
+    spin_drag: float
+    bending_viscosity: float
+    tail_flow: float
+    head_flow: float
+    surface_flow: float
+    contact_line: float
+
+
 class Body(NamedTuple):
     """Numbers that make one robot, see `sim.balance.Swimmer`."""
 
@@ -40,17 +58,36 @@ class Body(NamedTuple):
     gain: float
     resistance: Array  # (4, 5): wrench by (v_x, v_z, ω_yr, ω_h, ω_t)
     load: Vector  # on the tails, force per length in the body frame [EI/l³]
+    beyond: Beyond
 
 
-HEAD_LENGTH, TAIL_RADIUS = 6, 7  # entries of a robot's row that Body leaves out: L/l and r0/l
-NUMBERS = 31  # entries of a row
+HEAD_LENGTH, TAIL_RADIUS = 6, 7  # entries of a robot's row: L/l and r0/l
+NUMBERS = 41  # entries of a row
 
 
 @compiled
 def body_of(row: Array) -> Body:
     """The robot of one row of `sim.direct.bodies`."""
     resistance, load = row[8:28].copy().reshape(4, 5), (row[28], row[29], row[30])
-    return Body(row[0], row[1], row[2], row[3], row[4], row[5], resistance, load)
+    none = not np.any(row[32:41])
+    beyond = Beyond(
+        none, row[31], row[6], row[7],
+        row[32], row[33], row[34], row[35], row[36], row[37], row[38], row[39], row[40],
+    )  # fmt: skip
+    return Body(row[0], row[1], row[2], row[3], row[4], row[5], resistance, load, beyond)
+
+
+@compiled
+def without_beyond(body: Body) -> Body:
+    """The same robot with local drag and straight, untwisted, elastic tails."""
+    part = body.beyond
+    none = Beyond(
+        True, part.head_radius, part.head_length, part.tail_radius, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    )
+    return Body(
+        body.omega, body.offset, body.axial_stiffness, body.zeta_parallel, body.zeta_perp, body.gain,
+        body.resistance, body.load, none,
+    )  # fmt: skip
 
 
 class Motion(NamedTuple):
@@ -115,6 +152,12 @@ def vector(a: Array, k: int, m: int) -> Vector:
 
 
 @compiled
+def entry(a: Array, i: int) -> Vector:
+    """a[i] as components."""
+    return (a[i, 0], a[i, 1], a[i, 2])
+
+
+@compiled
 def put(a: Array, k: int, m: int, v: Vector) -> None:
     """a[k, m] = v."""
     a[k, m, 0] = v[0]
@@ -134,6 +177,32 @@ def add_block(a: Array, row: int, column: int, block: Matrix, sign: float) -> No
     a[row + 2, column] += sign * block[2][0]
     a[row + 2, column + 1] += sign * block[2][1]
     a[row + 2, column + 2] += sign * block[2][2]
+
+
+@compiled
+def move(body: Body, x: Array, dx: Array, factor: float) -> None:
+    """Move free nodes (n, M, 3) by a Newton correction.
+
+    Added to positions, a correction stretches the edges that it turns, in second order, and stretching is stiff:
+    large forces for the next correction to undo. Where they are flows as well (beyond), it cannot: there edges
+    turn, and stretch by the correction's first order alone.
+    """
+    if body.beyond.none:
+        x += factor * dx
+        return
+    n, lanes, _ = x.shape
+    offset = body.offset
+    for m in range(lanes):
+        below, below_dx, moved = (offset, 0.0, 0.0), NONE, (offset, 0.0, 0.0)
+        for k in range(n):
+            here, here_dx = vector(x, k, m), vector(dx, k, m)
+            edge, change = minus(here, below), times(factor, minus(here_dx, below_dx))
+            length = np.sqrt(dot(edge, edge))
+            turned = plus(edge, change)
+            wanted = length + dot(edge, change) / length
+            moved = plus(moved, times(wanted / np.sqrt(dot(turned, turned)), turned))
+            put(x, k, m, moved)
+            below, below_dx = here, here_dx
 
 
 @compiled
@@ -243,15 +312,20 @@ class Clamp(NamedTuple):
 
 
 @compiled
-def clamp_balance(geometry: Geometry, body: Body, m: int, motion: Motion) -> Clamp:
-    """Load that edge 0, its bending spring and the drag on node 0 pass to the disc; n ≥ 2 edges."""
+def clamp_balance(geometry: Geometry, body: Body, m: int, motion: Motion, flow: Vector, moment: Vector) -> Clamp:
+    """Load that edge 0, its bending spring and the drag on node 0 pass to the disc; n ≥ 2 edges.
+
+    Args:
+        flow: velocity of the fluid at the clamp.
+        moment: what the clamp passes on beside the bending of an elastic, straight tail.
+    """
     root = (body.offset, 0.0, 0.0)
     voronoi = 0.5 / geometry.length.shape[0]
     perp, excess = voronoi * body.zeta_perp, voronoi * (body.zeta_parallel - body.zeta_perp)
     tangent, spread = node_tangent(geometry, 0, m)
     edge, length = vector(geometry.tangent, 1, m), geometry.length[0, m]
     _, first, second = vector(geometry.joint, 0, m)
-    velocity = plus(motion.linear, cross(motion.spin, root))
+    velocity = minus(plus(motion.linear, cross(motion.spin, root)), flow)
     force = plus(vector(geometry.force, 0, m), node_drag(tangent, velocity, perp, excess))
     force = plus(force, times(voronoi, motion.load))
     tilt = drag_by_tangents(tangent, spread, velocity, excess)
@@ -261,7 +335,7 @@ def clamp_balance(geometry: Geometry, body: Body, m: int, motion: Motion) -> Cla
     turn = clamp_moment_by_edge(ROOT_TANGENT, edge, length, first, second, vector(geometry.by_after, 0, m))
     return Clamp(
         force,
-        plus(cross(root, force), clamp_moment(ROOT_TANGENT, edge, first)),
+        plus(plus(cross(root, force), clamp_moment(ROOT_TANGENT, edge, first)), moment),
         node_resistance(tangent, perp, excess),
         by_first,
         added(crossed(root, by_first), turn),

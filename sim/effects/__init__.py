@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from sim.effects.base import Effect
 
 if TYPE_CHECKING:
-    from sim.drag import Coefficients
+    from sim.coefficients import Coefficients
     from sim.robot import Groups
 
 __all__ = ["Effect", "catalogue", "with_effects"]

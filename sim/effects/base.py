@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Literal
 from torch import Tensor
 
 if TYPE_CHECKING:
-    from sim.drag import Coefficients
+    from sim.coefficients import Coefficients
     from sim.robot import Groups
 
 

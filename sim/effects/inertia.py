@@ -18,7 +18,7 @@ from torch import Tensor
 from sim.effects.base import Effect
 
 if TYPE_CHECKING:
-    from sim.drag import Coefficients
+    from sim.coefficients import Coefficients
     from sim.robot import Groups
 
 CONTROL_SPEED = 10.0 / 34.375**4  # |ω̄| (r0/l)⁴ of the paper's control example

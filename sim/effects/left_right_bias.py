@@ -18,7 +18,7 @@ from torch import Tensor
 from sim.effects.base import Effect
 
 if TYPE_CHECKING:
-    from sim.drag import Coefficients
+    from sim.coefficients import Coefficients
     from sim.robot import Groups
 
 

@@ -17,7 +17,7 @@ from torch import Tensor
 from sim.effects.base import Effect
 
 if TYPE_CHECKING:
-    from sim.drag import Coefficients
+    from sim.coefficients import Coefficients
     from sim.robot import Groups
 
 CONTROL_RATE = 10.0 / 34.375**4 * 34.375 / 6.875  # |ω̄| (r0/l)⁴ a/r0 of the paper's control example

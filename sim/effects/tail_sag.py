@@ -18,7 +18,7 @@ from torch import Tensor
 from sim.effects.base import Effect
 
 if TYPE_CHECKING:
-    from sim.drag import Coefficients
+    from sim.coefficients import Coefficients
     from sim.robot import Groups
 
 CONTROL = 34.375**2 * 6.875  # (l/r0)² (l/R) of the paper's control example

@@ -52,7 +52,7 @@ def test_tensors_find_the_compiled_orbit_in_balance(tails: int) -> None:
     """At every phase, all N tails in place: no net wrench, and a Newton correction that changes nothing."""
     groups = control(N=tails, omega_bar=-40.0, C_yr=5.0)
     _, row = body_of(groups)
-    found = direct.solve(row, tails)
+    found = direct.solve(row, tails, direct.FEW)
     assert found.ended == direct.SOLVED
     x, u = found.x[2], found.u[2]
     n, phases, _ = x.shape
@@ -161,7 +161,7 @@ def test_the_stated_error_covers_a_much_finer_mesh() -> None:
     for i in range(24):
         groups = Groups.from_columns({name: values[i : i + 1] for name, values in points.items()})
         body, row = body_of(groups)
-        found = direct.solve(row, groups.N)
+        found = direct.solve(row, groups.N, direct.FEW)
         assert found.ended == direct.SOLVED
         x, u = found.x[2], found.u[2]
         phases = 2 * x.shape[1]
@@ -183,8 +183,8 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
     groups = control(2, omega_bar=[10.0, 14.0])
     plain = steady(groups)
 
-    def lose_the_first(rows: Floats, tails: int) -> direct.Orbits:
-        found = solve_all(rows, tails)
+    def lose_the_first(rows: Floats, tails: int, *, phases: int) -> direct.Orbits:
+        found = solve_all(rows, tails, phases=phases)
         found.ended[0] = direct.LOST
         found.means[0] = np.nan
         return found

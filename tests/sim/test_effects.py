@@ -9,6 +9,7 @@ import torch
 from sim.balance import assemble
 from sim.effects import catalogue
 from sim.steady import steady
+from sim.switching import switch_response
 from tests.sim.robots import control
 
 OUTPUTS = ("omega_t", "omega_yr", "v_x", "v_z")
@@ -33,7 +34,7 @@ def test_declaration(name: str) -> None:
 def test_null_is_exactly_the_base_model(name: str) -> None:
     null = catalogue()[name].null
     with_null, base = (assemble(g, edges=6) for g in (control(**{name: null}), control()))
-    for field in ("resistance", "gain", "tail_load", "zeta_parallel", "zeta_perp"):
+    for field in ("resistance", "gain", "tail_load", "zeta_parallel", "zeta_perp", "beyond"):
         assert torch.equal(getattr(with_null, field), getattr(base, field))
 
 
@@ -45,6 +46,9 @@ def test_symmetry_visibility_and_dissipation(name: str) -> None:
     motion = steady(groups)
     values = {o: getattr(motion, o) for o in OUTPUTS}
     change = max(abs(values[o][1] / values[o][0] - 1) for o in OUTPUTS)
+    if change < 1e-3:  # what steady swimming hardly shows, switching must
+        response = switch_response(groups.select(torch.tensor([0, 1])), np.full(2, 0.5))
+        change = abs(response.net_speed[1] / response.net_speed[0] - 1)
     assert change > 1e-3
     mirrored = {"omega_t": -1, "omega_yr": -1, "v_x": -1, "v_z": 1}
     same = all(values[o][2] == pytest.approx(s * values[o][1], rel=1e-6) for o, s in mirrored.items())
@@ -62,6 +66,7 @@ def test_a_dissipative_effect_takes_power_and_gives_none(name: str, share: float
         assert float(swimmer.zeta_parallel) > 0
         assert float(swimmer.zeta_perp) > 0
         assert float(swimmer.gain) >= 1
+        assert (swimmer.beyond >= 0).all()  # torque, bending viscosity and friction: see tests/sim/test_beyond.py
         R = swimmer.resistance[..., 0]
         on_head = torch.linalg.eigvalsh((R[:, :4] + R[:, :4].T) / 2)
         assert on_head.min() > -1e-12

@@ -19,6 +19,7 @@ from sim.contact import tail_gap
 from sim.interface import side_force_coefficient
 from sim.march import TOLERANCE, advance, new_state
 from sim.replay import Schedule, replay
+from sim.resolution import Resolution
 from sim.robot import PRESETS
 from sim.settling import settle
 from sim.steady import steady
@@ -234,19 +235,26 @@ def test_net_speed_falls_with_faster_flips_as_the_tails_turn_over() -> None:
     assert response.lag_z[2:] == pytest.approx(np.full(2, response.lag_z[1]), rel=0.05)
 
 
-@pytest.mark.parametrize(("dwell", "close"), [(0.35, 0.02), (1.0, 0.01), (2.5, 0.01)])
-def test_net_motion_agrees_with_a_brute_force_replay(dwell: float, close: float) -> None:
-    """Many flips in the lab against lag and arc of one; shorter and longer dwells than the tails' memory.
-
-    The replay has half the step: a flip leaves an error of first order in it, 1.5 % at the shortest dwell.
-    """
+@pytest.mark.parametrize("dwell", [0.35, 1.0, 2.5])
+def test_net_motion_agrees_with_a_brute_force_replay(dwell: float) -> None:
+    """Many flips in the lab against lag and arc of one; shorter and longer dwells than the tails' memory."""
     count = 24
     response = switch_response(control(N=3), np.array([dwell]))
     schedule = Schedule({**CONTROL_VALUES, "N": 3.0}, 1, np.full(count, dwell), (0.0, 0.0, 0.0), 1.0)
     track = replay([schedule])[0]
     flips = track.groupby("dwell").last()[["x_over_l", "y_over_l"]].to_numpy()
     moved = np.linalg.norm(flips[-1] - flips[3]) / (dwell * (count - 4))
-    assert moved == pytest.approx(float(response.net_speed[0]), rel=close)
+    assert moved == pytest.approx(float(response.net_speed[0]), rel=8e-3)
+
+
+@pytest.mark.parametrize("dwell", [0.35, 1.0])
+def test_a_flip_leaves_little_error_of_the_step(dwell: float) -> None:
+    """Every mode of the tails starts anew at a flip; equal steps were 1.6 and 0.5 % off."""
+    default, fine = (
+        switch_response(control(N=4), np.array([dwell]), resolution=Resolution(16, steps)).net_speed[0]
+        for steps in (24, 24 * 16)
+    )
+    assert default == pytest.approx(fine, rel=4e-3)
 
 
 def test_replays_of_several_schedules_equal_replays_alone() -> None:

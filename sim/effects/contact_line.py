@@ -1,0 +1,44 @@
+"""Friction of the contact line on the head, which does not depend on speed.
+
+    F = −ε F_0 s v/√(v² + v_s²),   F_0 s one and the same force in newton for one material, fluid and head
+
+The edge of the wetted surface is pinned and creeps. In units of EI/l² a constant force goes as l²/r0⁴; s = (l/r0)⁴
+(R/l)² over its value for the control example. F_0 = 0.1 EI/l², about its thrust. Left out: the moment against
+yaw about the head's centre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from torch import Tensor
+
+from sim.effects.base import Effect
+
+if TYPE_CHECKING:
+    from sim.coefficients import Coefficients
+    from sim.robot import Groups
+
+CONTROL = 34.375**4 / 6.875**2  # (l/r0)⁴ (R/l)² of the paper's control example
+
+
+@dataclass(frozen=True)
+class ContactLine(Effect):
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        scale = groups.l_over_r0**4 / groups.l_over_R**2 / CONTROL
+        return base.plus(contact_line=0.1 * size * scale)
+
+
+EFFECT = ContactLine(
+    name="contact_line",
+    title="friction of the contact line",
+    equation="F = −ε F_0 s v/√(v² + v_s²)",
+    source="pinned contact lines: Joanny and de Gennes (1984)",
+    unit="0.1 EI/l² of the control example",
+    null=0.0,
+    bounds=(0.0, 1.0),
+    typical=0.05,
+    symmetry="even",
+    dissipative=True,
+)

@@ -1,0 +1,40 @@
+"""Tails swim in the flow of the head, and the head in theirs.
+
+    v → v − ε (Stokeslets of the head's drag, rotlet of its spin) at the tails, and of the tails at the head
+
+The head is points along its axis that share its drag, spread over R. ε = 1 is the full sum. Matters for short
+tails.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from torch import Tensor
+
+from sim.effects.base import Effect
+
+if TYPE_CHECKING:
+    from sim.coefficients import Coefficients
+    from sim.robot import Groups
+
+
+@dataclass(frozen=True)
+class HeadFlow(Effect):
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        return base.plus(head_flow=size)
+
+
+EFFECT = HeadFlow(
+    name="head_flow",
+    title="flow between head and tails",
+    equation="v → v − ε Σ (G f + rotlet)",
+    source="Stokeslet sums: Pozrikidis (1992); regularised: Cortez, Fauci, Medovikov (2005)",
+    unit="1",
+    null=0.0,
+    bounds=(0.0, 1.1),
+    typical=1.0,
+    symmetry="even",
+    dissipative=False,
+)

@@ -1,0 +1,40 @@
+"""Tails that are curved by nature, away from the axis.
+
+    κ⁰ = (ε/l, 0):  each tail alone, unloaded, is an arc that opens outward (ε > 0) or closes (ε < 0)
+
+Unlike `natural_curvature` it leaves left and right turns mirror images of each other. Left out: tails that
+differ from each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from torch import Tensor
+
+from sim.effects.base import Effect
+
+if TYPE_CHECKING:
+    from sim.coefficients import Coefficients
+    from sim.robot import Groups
+
+
+@dataclass(frozen=True)
+class NaturalSplay(Effect):
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        return base.plus(curvature_out=size)
+
+
+EFFECT = NaturalSplay(
+    name="natural_splay",
+    title="natural curvature of the tails, away from the axis",
+    equation="κ⁰ = ε/l in the plane of the axis",
+    source="discrete elastic rods: Bergou et al. (2008), ½ EI |κ − κ⁰|²",
+    unit="1/l",
+    null=0.0,
+    bounds=(-1.0, 1.0),
+    typical=0.1,
+    symmetry="even",
+    dissipative=False,
+)

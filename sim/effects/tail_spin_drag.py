@@ -1,0 +1,41 @@
+"""Drag on the tails' spin about their own tangents.
+
+    torque per length = −ε 4π μ0 r0² (Ω·t) t
+
+A tail that is clamped to the disc turns about itself as often as about the axis; resistive force theory leaves
+that out. It twists the tails and brakes the disc: on the single filament the moment grows by a third.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from torch import Tensor
+
+from sim.effects.base import Effect
+
+if TYPE_CHECKING:
+    from sim.coefficients import Coefficients
+    from sim.robot import Groups
+
+
+@dataclass(frozen=True)
+class TailSpinDrag(Effect):
+    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+        return base.plus(spin_drag=size * 4 * math.pi / groups.l_over_r0**2)
+
+
+EFFECT = TailSpinDrag(
+    name="tail_spin_drag",
+    title="drag on the tails' own spin",
+    equation="torque per length = −ε 4π μ0 r0² (Ω·t) t",
+    source="long cylinder turning about its axis, e.g. Lamb (1932), art. 333",
+    unit="4π μ0 r0²",
+    null=0.0,
+    bounds=(0.0, 3.0),
+    typical=1.0,
+    symmetry="even",
+    dissipative=True,
+)
