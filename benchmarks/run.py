@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks import accuracy, lookup, robustness, scaling, speed, tracking
+from benchmarks import accuracy, device, lookup, physics, robustness, scaling, speed, tracking
 
 
 def main() -> None:
@@ -12,6 +12,8 @@ def main() -> None:
     robustness.main()
     lookup.main()
     tracking.main()
+    device.main()
+    physics.main()
 
 
 if __name__ == "__main__":

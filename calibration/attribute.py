@@ -51,7 +51,7 @@ class Candidate:
 
 def candidates() -> list[Effect]:
     """Effects that a table with the ordinary columns can reveal and a mirrored simulation can serve."""
-    return [e for e in catalogue().values() if e.symmetry == "even" and e.covariate is None]
+    return [e for e in catalogue().values() if e.symmetry == "even" and e.covariate is None and not e.beside]
 
 
 def directions(

@@ -7,13 +7,13 @@ one parametrised test read that list, so adding an effect is adding its file. An
 1. has one size ε per robot, whose `null` makes the model *exactly* the base model;
 2. declares its equation, source, unit of ε, bounds, its symmetry under ω → −ω ("even": left and right
    turns stay mirror images; "odd": they do not), whether it only dissipates, the covariate that a table
-   must have to reveal it (None: the ordinary columns do), and a `typical` size for tests and
-   scores;
-3. overrides the hooks that it needs, and no others. All hooks get the size and the robots, broadcast over
-   the batch (B,), and return the changed quantity; they must be pure and differentiable in the size.
+   must have to reveal it (None: the ordinary columns do), the effect that it needs beside it to be seen, if
+   any, and a `typical` size for tests and scores;
+3. says in `coefficients` how it changes those of the base model. The hook gets the size and the robots, broadcast
+   over the batch (B,); it must be pure and differentiable in the size.
 
-Hooks are applied in the order of the names. What an effect cannot say through a hook is a new hook, here,
-with its call in `sim.balance` or wherever the quantity is made.
+Hooks are applied in the order of the names. What an effect cannot say through `sim.coefficients` is a new entry
+there, with its part in `sim.instant`.
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ class Effect:
     symmetry: Literal["even", "odd"]
     dissipative: bool
     covariate: str | None = None
+    beside: str = ""  # the effect without which this one shows nothing
 
     def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
         """Drag and motor: the changed coefficients of the balance."""

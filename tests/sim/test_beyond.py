@@ -10,7 +10,6 @@ import torch
 from scipy.integrate import quad_vec, solve_bvp
 
 from sim import direct, flow, orbit
-from sim.coefficients import BEYOND
 from sim.effects import catalogue
 from sim.errors import InputError
 from sim.framed_rod import FramedRod, Frames
@@ -32,7 +31,9 @@ OF_BEYOND = (
 )  # fmt: skip
 
 
-def kirchhoff_loads(omega_bar: float, spin_drag: float, across: float, out: float) -> np.ndarray:
+def kirchhoff_loads(
+    omega_bar: float, spin_drag: float, across: float, out: float, natural_twist: float
+) -> np.ndarray:
     """Wrench of one filament on its held disc: Kirchhoff's rod as a boundary-value problem (arc length in l).
 
     r' = t (1 + F·t/EA),  frame' = κ × frame,  F' = −f,  M' = −r' × F − m,  M = (κ − κ⁰) + ⅔ twist;
@@ -51,7 +52,7 @@ def kirchhoff_loads(omega_bar: float, spin_drag: float, across: float, out: floa
             velocity = np.cross(spin, r, axis=0)
             f = -(parallel - perp) * (t * velocity).sum(0) * t - perp * velocity
             m = -roll * (spin * t).sum(0) * t
-            twist = 1.5 * (M * t).sum(0)
+            twist = natural_twist + 1.5 * (M * t).sum(0)
             turn = ((M * d).sum(0) - across) * d + ((M * other).sum(0) + out) * other + twist * t
             along = t * (1 + (F * t).sum(0) * 0.25 / SLENDERNESS**2)
             turned = [np.cross(turn, t, axis=0), np.cross(turn, d, axis=0)]
@@ -78,14 +79,16 @@ def kirchhoff_loads(omega_bar: float, spin_drag: float, across: float, out: floa
         ({"natural_curvature": 0.5}, 0.0, 0.5, 0.0),
         ({"natural_splay": -0.5}, 0.0, 0.0, -0.5),
         ({"tail_spin_drag": 1.0, "natural_curvature": -0.6, "natural_splay": 0.3}, 1.0, -0.6, 0.3),
+        ({"natural_splay": 0.5, "natural_twist": 2.0}, 0.0, 0.0, 0.5),
     ],
 )
 def test_thrust_and_moment_of_framed_filaments(
     effects: dict[str, float], spin: float, across: float, out: float
 ) -> None:
     omega_bar = 8.0 * ROBOT.time_scale
+    twist = effects.get("natural_twist", 0.0)
     found = extrapolated_loads(omega_bar, SLENDERNESS, OFFSET, **effects)
-    assert found[[1, 3]] == pytest.approx(kirchhoff_loads(omega_bar, spin, across, out), rel=1e-3)
+    assert found[[1, 3]] == pytest.approx(kirchhoff_loads(omega_bar, spin, across, out, twist), rel=1e-3)
 
 
 def test_spin_drag_grows_the_moment_by_a_third() -> None:
@@ -99,8 +102,7 @@ def lane(
     effects: dict[str, float], x: np.ndarray, x_dot: np.ndarray, natural_twist: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Edge forces (n, 3) and further clamp moment (3,) of one tail whose disc stands still."""
-    row = direct.bodies(control(N=1, **effects))[0]
-    row[32 + BEYOND.index("natural_twist")] = natural_twist
+    row = direct.bodies(control(1, N=1, natural_twist=natural_twist, **effects))[0]
     body = body_of(row)
     n = len(x)
     geometry, moments = new_geometry(n, 1), np.zeros((1, 3))

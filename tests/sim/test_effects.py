@@ -42,7 +42,8 @@ def test_null_is_exactly_the_base_model(name: str) -> None:
 def test_symmetry_visibility_and_dissipation(name: str) -> None:
     effect = catalogue()[name]
     sizes = [effect.null, effect.typical, effect.typical]
-    groups = control(3, omega_bar=[10.0, 10.0, -10.0], **{name: sizes})
+    beside = {effect.beside: catalogue()[effect.beside].typical} if effect.beside else {}
+    groups = control(3, omega_bar=[10.0, 10.0, -10.0], **{**beside, name: sizes})
     motion = steady(groups)
     values = {o: getattr(motion, o) for o in OUTPUTS}
     change = max(abs(values[o][1] / values[o][0] - 1) for o in OUTPUTS)
