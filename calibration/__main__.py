@@ -19,6 +19,7 @@ def _close(arguments: argparse.Namespace) -> None:
     from calibration.loop import close, verdict_record
     from calibration.measurements import read_measurements
     from calibration.report import write_report
+    from calibration.swimmer import Swimmer, corrected_robot
     from sim.artefact import write_text
     from sim.robot import load_robot, robot_toml
 
@@ -26,11 +27,11 @@ def _close(arguments: argparse.Namespace) -> None:
     data = read_measurements(arguments.table)
     for line in data.set_aside:
         print(f"set aside: {line}", file=sys.stderr)
-    result = close(data, robot, seed=arguments.seed, jobs=arguments.jobs)
+    result = close(Swimmer(robot, data, arguments.jobs), seed=arguments.seed)
     out = Path(arguments.out)
     record = verdict_record(result, table=Path(arguments.table).name)
     write_report(result, data, out / "report.html", title=Path(arguments.table).name)
-    write_text(out / "corrected.toml", robot_toml(result.corrected))
+    write_text(out / "corrected.toml", robot_toml(corrected_robot(robot, result.final.parameters)))
     write_text(out / "verdict.json", json.dumps(record, indent=1) + "\n")
     print(result.sentence)
     print(

@@ -1,8 +1,7 @@
 """Which effect explains the residual: candidates, refits, and what survives.
 
-Every even effect of the catalogue that the table's columns can reveal is a candidate. One whose score passes the
-critical |z| (`calibration.misfit`), in the direction that its bounds allow, is refitted together with the
-coefficients in the simulator, and kept if
+Every effect that the runs can test is a candidate. One whose score passes the critical |z| (`calibration.misfit`),
+in the direction that its bounds allow, is refitted together with the coefficients in the model, and kept if
 
     the residual that it leaves passes the general lack-of-fit tests (at a fifth of the level, since a
     true effect must not be lost once in twenty times),
@@ -19,12 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.fit import SANE, Fit, fit
-from calibration.forward import COEFFICIENTS, Parameters, Swimmer
+from calibration.fit import Fit, fit
 from calibration.misfit import TESTABLE, Misfit, check_misfit
-from sim.effects import Effect, catalogue
-
-Floats = NDArray[np.float64]
+from calibration.model import Floats, Model, Parameter, Parameters
 
 _DERIVATIVE_STEP = 0.1  # in units of an effect's typical size
 _INDISTINGUISHABLE = 3.84  # χ² with one degree of freedom, 95 %
@@ -34,7 +30,7 @@ _INDISTINGUISHABLE = 3.84  # χ² with one degree of freedom, 95 %
 class Candidate:
     """What was found about one effect."""
 
-    effect: Effect
+    effect: Parameter
     z: float
     survived: float
     detectable: float  # size that |z| would find half of the time: critical |z| / signal per unit
@@ -49,15 +45,10 @@ class Candidate:
         return self.verdict == "kept"
 
 
-def candidates() -> list[Effect]:
-    """Effects that a table with the ordinary columns can reveal and a mirrored simulation can serve."""
-    return [e for e in catalogue().values() if e.symmetry == "even" and e.covariate is None and not e.beside]
-
-
 def directions(
-    model: Swimmer, parameters: Parameters, prediction: Floats, effects: list[Effect], *, title: str
+    model: Model, parameters: Parameters, prediction: Floats, effects: tuple[Parameter, ...], *, title: str
 ) -> Floats:
-    """∂f/∂ε at `parameters`, which give every effect a size (its null, if not told), (n, k, e)."""
+    """∂f/∂ε at `parameters`, (n, k, e)."""
     if not effects:
         return np.zeros((*prediction.shape, 0))
     widths = np.array([_DERIVATIVE_STEP * e.typical for e in effects])
@@ -70,10 +61,10 @@ def directions(
 
 
 def examine(
-    model: Swimmer,
+    model: Model,
     base: Fit,
     misfit: Misfit,
-    effects: list[Effect],
+    effects: tuple[Parameter, ...],
     along: Floats,
     used: NDArray[np.bool_],
     given: Parameters,
@@ -94,7 +85,7 @@ def examine(
             reason = "absorbed by the coefficients: not testable with these runs"
         elif abs(z) < misfit.critical_z:
             reason = "score within the noise"
-        elif not low <= guess <= high and (guess < low) == (effect.null == low):
+        elif not low <= guess <= high and (guess < low) == (effect.start == low):
             reason = "acts against its sign"
         if reason:
             found.append(Candidate(effect, z, survived, detectable, None, None, 0.0, 0.0, reason))
@@ -102,17 +93,17 @@ def examine(
         guess = min(max(guess, low), high)
         refit = fit(
             model,
-            {**_sane(base.parameters, given), effect.name: guess},
-            (*COEFFICIENTS, effect.name),
+            {**_sane(model, base.parameters, given), effect.name: guess},
+            (*base.names, effect.name),
             used,
             title=f"fit with {effect.title}",
         )
-        after = check_misfit(refit, model.data, used, np.zeros((*along.shape[:2], 0)), level=level, seed=seed + 1)
+        after = check_misfit(refit, model.runs, used, np.zeros((*along.shape[:2], 0)), level=level, seed=seed + 1)
         gain, error = _session_gain(model, base, refit, used)
         ends = refit.interval(effect.name)
         if after.general_p < level / 5:
             reason = f"leaves a residual (p = {after.general_p:.3g})"
-        elif ends[0] <= effect.null <= ends[1]:
+        elif ends[0] <= effect.start <= ends[1]:
             reason = "its interval includes the null"
         elif gain <= error:
             reason = "does not predict left-out sessions better"
@@ -120,10 +111,9 @@ def examine(
     return found
 
 
-def _sane(fitted: Parameters, given: Parameters) -> dict[str, float]:
+def _sane(model: Model, fitted: Parameters, given: Parameters) -> dict[str, float]:
     """Fitted parameters, or the given ones where a coefficient ran to a limit for want of the effect."""
-    low, high = SANE
-    inside = all(1.5 * low < fitted[name] < high / 1.5 for name in COEFFICIENTS)
+    inside = all(1.5 * p.bounds[0] < fitted[p.name] < p.bounds[1] / 1.5 for p in model.coefficients)
     return dict(fitted) if inside else dict(given)
 
 
@@ -138,9 +128,9 @@ def _chi_square(candidate: Candidate) -> float:
     return candidate.refit.chi_square
 
 
-def _session_gain(model: Swimmer, base: Fit, refit: Fit, used: NDArray[np.bool_]) -> tuple[float, float]:
+def _session_gain(model: Model, base: Fit, refit: Fit, used: NDArray[np.bool_]) -> tuple[float, float]:
     """Mean gain in log likelihood per left-out session, and its standard error (linearised refits)."""
-    data = model.data
+    data = model.runs
     gains = []
     for session in np.unique(data.session[used]):
         learn, out = used & (data.session != session), used & (data.session == session)

@@ -32,6 +32,7 @@ from tqdm import tqdm
 from calibration.loop import Verdict, close, verdict_record
 from calibration.measurements import Measurements, read_measurements
 from calibration.report import draw_residuals
+from calibration.swimmer import Swimmer, corrected_robot
 from calibration.synthetic import make_table
 from dataset.page import Page
 from dataset.report import draw_sweep, plain_logarithms
@@ -140,10 +141,10 @@ def _close(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     place.mkdir(exist_ok=True)
     table.to_csv(place / "table.csv", index=False, float_format="%.6g")
     data = read_measurements(place / "table.csv")
-    verdict = close(data, start)
+    verdict = close(Swimmer(start, data))
     record = verdict_record(verdict, table="table.csv")
     write_text(place / "verdict.json", json.dumps(record, indent=1) + "\n")
-    write_text(place / "corrected.toml", robot_toml(verdict.corrected))
+    write_text(place / "corrected.toml", robot_toml(corrected_robot(start, verdict.final.parameters)))
     print(f"  {name}: {verdict.sentence}")
     return verdict, data
 

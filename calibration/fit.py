@@ -1,37 +1,27 @@
-"""Generalised least squares of the forward model: coefficients on a log scale, effects on their own.
+"""Generalised least squares of a forward model, each parameter on its own scale.
 
-Gauss-Newton with a Jacobian by finite differences in the simulator (all perturbed models in one batch):
+Gauss-Newton with a Jacobian by finite differences in the model (all perturbed models in one batch):
 
-    θ ← θ + (JᵀΣ⁻¹J)⁻¹ JᵀΣ⁻¹ (y − f(θ)),   θ = (ln C_t, ln C_r, ln C_yr, ε_1, …).
+    θ ← θ + (JᵀΣ⁻¹J)⁻¹ JᵀΣ⁻¹ (y − f(θ)),   θ = (ln C_1, …, ε_1, …).
 
-Effect sizes stay within their bounds, coefficients within `SANE`. The covariance of the parameters is
-(JᵀΣ⁻¹J)⁻¹; intervals are 95 %.
+Parameters stay within their bounds. The covariance of the parameters is (JᵀΣ⁻¹J)⁻¹; intervals are 95 %.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.forward import COEFFICIENTS, Parameters, Swimmer
+from calibration.model import Floats, Model, Parameter, Parameters, moved, parameter
 from calibration.noise import Noise, repeat_covariance, session_variance
-from sim.effects import catalogue
-from sim.errors import InputError
-from surrogate.export import load
 
-Floats = NDArray[np.float64]
-
-_STEP = 0.05  # finite difference in ln C
-_EFFECT_STEP = 0.1  # finite difference in units of an effect's typical size
+_LOG_STEP, _STEP = 0.05, 0.1  # finite difference: in ln C, in units of a typical size
 _MOST_STEPS = 8
-_MOST_GUESSES = 12
-_FEWEST_COVERED = 24  # runs
 _SHORT = 0.1  # a step below this in ln C (or in ε) keeps the Jacobian
 _SMALL = 0.1  # in standard deviations: a step below this ends the iteration
-SANE = (0.1, 20.0)  # coefficients stay within: beyond, they say that the model lacks something
 _LARGEST = 0.7  # change of ln C in one step
 Z95 = 1.96
 
@@ -41,7 +31,7 @@ class Fit:
     """A fitted model; arrays over all runs of the table, used or not."""
 
     parameters: dict[str, float]
-    names: tuple[str, ...]  # fitted, in the order of the covariance
+    fitted: tuple[Parameter, ...]  # in the order of the covariance
     covariance: Floats  # (p, p) of (ln C, ε)
     prediction: Floats  # (n, k)
     jacobian: Floats  # (n, k, p)
@@ -49,62 +39,38 @@ class Fit:
     chi_square: float  # rᵀ Σ⁻¹ r over the fitted runs
     steps: int
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self.fitted)
+
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval of a parameter."""
         value = self.parameters[name]
-        half = Z95 * math.sqrt(self.covariance[self.names.index(name), self.names.index(name)])
-        if name in COEFFICIENTS:
+        place = self.names.index(name)
+        half = Z95 * math.sqrt(self.covariance[place, place])
+        if self.fitted[place].logarithmic:
             return value * math.exp(-half), value * math.exp(half)
         return value - half, value + half
 
 
 def jacobian(
-    model: Swimmer, parameters: Parameters, names: tuple[str, ...], *, title: str = ""
+    model: Model, parameters: Parameters, names: tuple[str, ...], *, title: str = ""
 ) -> tuple[Floats, Floats]:
-    """Prediction (n, k) and its derivative (n, k, p) in ln C and ε at `parameters`."""
+    """Prediction (n, k) and its derivative (n, k, p) on the parameters' own scales at `parameters`."""
     sets, widths = [dict(parameters)], []
     for name in names:
-        value = parameters[name]
-        if name in COEFFICIENTS:
-            width, moved = _STEP, value * math.exp(_STEP)
-        else:
-            effect = catalogue()[name]
-            width = _EFFECT_STEP * abs(effect.typical)
-            width = width if value + width <= effect.bounds[1] else -width
-            moved = value + width
-        sets.append({**parameters, name: moved})
+        one = parameter(model, name)
+        width = _LOG_STEP if one.logarithmic else _STEP * abs(one.typical)
+        if moved(one, parameters[name], 2 * width) == one.bounds[1]:  # downwards where the bound is near
+            width = -width
+        sets.append({**parameters, name: moved(one, parameters[name], width)})
         widths.append(width)
     found = model.predict(sets, title=title)
     return found[0], np.moveaxis((found[1:] - found[0]) / np.array(widths)[:, None, None], 0, -1)
 
 
-def first_guess(model: Swimmer, start: Parameters, used: NDArray[np.bool_]) -> dict[str, float]:
-    """Coefficients fitted with the look-up table to the runs that it covers; `start` if those are too few."""
-    lookup = load()
-    covered = used & model.inside(lookup, start)
-    parameters = dict(start)
-    if covered.sum() < _FEWEST_COVERED:
-        return parameters
-    data = model.data.subset(covered)
-    part = replace(model, data=data)
-    noise = Noise(repeat_covariance(data.y, data.condition), np.zeros(data.y.shape[1]))
-    whiten = noise.whitener(data.session)
-    for _ in range(_MOST_GUESSES):
-        moved = [{**parameters, name: parameters[name] * math.exp(_STEP)} for name in COEFFICIENTS]
-        try:
-            found = part.predict([parameters, *moved], lookup=lookup)
-        except InputError:  # a coefficient left the table's domain on the way
-            return dict(start)
-        J = whiten(np.moveaxis(found[1:] - found[0], 0, -1) / _STEP)
-        step: Floats = np.asarray(np.linalg.lstsq(J, whiten(data.y - found[0]), rcond=None)[0])
-        parameters = _move(parameters, COEFFICIENTS, step)
-        if np.abs(step).max() < 1e-3:
-            break
-    return parameters
-
-
 def fit(
-    model: Swimmer,
+    model: Model,
     start: Parameters,
     names: tuple[str, ...],
     used: NDArray[np.bool_],
@@ -115,7 +81,7 @@ def fit(
 
     The Jacobian is computed anew after a long step and kept after a short one.
     """
-    data = model.data
+    data = model.runs
     run = repeat_covariance(data.y[used], data.condition[used])
     parameters = dict(start)
     derivative = np.empty(0)
@@ -138,23 +104,22 @@ def fit(
             left = residual[used] - derivative[used] @ step
             noise = Noise(run, session_variance(left, data.session[used], run))
         size = float(np.max(np.abs(step) / np.sqrt(np.diag(covariance))))
-        moved = _move(parameters, names, step)
-        stuck = all(abs(moved[name] / parameters[name] - 1) < 1e-3 for name in names if parameters[name])
+        new = _move(model, parameters, names, step)
+        stuck = all(abs(new[name] / parameters[name] - 1) < 1e-3 for name in names if parameters[name])
         if ((size < _SMALL or stuck) and count > 1) or count == _MOST_STEPS:
             break
-        parameters = moved
+        parameters = new
         fresh = bool(np.abs(step).max() > _SHORT) and count + 1 < _MOST_STEPS
     r = noise.whitener(data.session[used])(residual[used])
-    return Fit(parameters, names, covariance, prediction, derivative, noise, float(r @ r), count)
+    fitted = tuple(parameter(model, name) for name in names)
+    return Fit(parameters, fitted, covariance, prediction, derivative, noise, float(r @ r), count)
 
 
-def _move(parameters: dict[str, float], names: tuple[str, ...], step: Floats) -> dict[str, float]:
-    moved = dict(parameters)
+def _move(model: Model, parameters: dict[str, float], names: tuple[str, ...], step: Floats) -> dict[str, float]:
+    new = dict(parameters)
     for name, change in zip(names, step.tolist(), strict=True):
-        if name in COEFFICIENTS:
-            value = moved[name] * math.exp(max(-_LARGEST, min(_LARGEST, change)))
-            moved[name] = max(SANE[0], min(SANE[1], value))
-        else:
-            low, high = catalogue()[name].bounds
-            moved[name] = max(low, min(high, moved[name] + change))
-    return moved
+        one = parameter(model, name)
+        if one.logarithmic:
+            change = max(-_LARGEST, min(_LARGEST, change))
+        new[name] = moved(one, new[name], change)
+    return new

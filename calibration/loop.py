@@ -2,41 +2,36 @@
 
 1. One whole session is locked away before anything is looked at (`locked_session`); rows are never split.
 2. Covariance from the repeats and the sessions (`calibration.noise`).
-3. Fit of C_t, C_r, C_yr to the other sessions (`calibration.fit`).
+3. Fit of the coefficients to the other sessions (`calibration.fit`).
 4. Lack of fit, kernel score and projected scores (`calibration.misfit`).
 5. Refit with each effect that passes; keep what explains (`calibration.attribute`).
 6. Verdict: "none" (no departure beyond noise), "effect" (one explains it), "ambiguous" (several do and the runs
    cannot tell them apart), "unexplained" (there is a departure, and no effect in the catalogue explains it).
 7. Errors on the locked session: as given, calibrated, calibrated with the effect, and the noise ceiling.
 
-Not yet here: pairs of effects, generic correction, next runs, drift of covariates.
+Not yet here: pairs of effects, generic correction, next runs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.attribute import Candidate, candidates, directions, examine, explaining
-from calibration.fit import Fit, first_guess, fit
-from calibration.forward import COEFFICIENTS, Swimmer
-from calibration.measurements import Measurements
+from calibration.attribute import Candidate, directions, examine, explaining
+from calibration.fit import Fit, fit
 from calibration.misfit import DRAWS, Misfit, check_misfit
+from calibration.model import Floats, Model, Parameter, Runs, start_values
 from sim.artefact import fingerprint, provenance
-from sim.robot import Robot
-
-Floats = NDArray[np.float64]
 
 LEVEL = 0.05  # α of every claim
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a table says about a robot."""
+    """What runs say about a model."""
 
     verdict: str  # "none", "effect", "ambiguous", "unexplained"
     effects: tuple[str, ...]
@@ -52,8 +47,8 @@ class Verdict:
     errors_by_output: dict[str, dict[str, float]]
     locked: str
     used: NDArray[np.bool_]
-    uncalibrated: Floats  # (n, k) prediction of the robot as given
-    corrected: Robot
+    uncalibrated: Floats  # (n, k) prediction of the model as given
+    untestable: dict[str, str]  # effects that these runs cannot test: what is missing
     plan_hash: str  # of everything fixed before the data was looked at
     set_aside: tuple[str, ...]
 
@@ -80,32 +75,21 @@ class Verdict:
         return f"There is a residual ({p}) that no single effect of the catalogue explains."
 
 
-def locked_session(data: Measurements) -> int:
+def locked_session(data: Runs) -> int:
     """The session kept for the test: the middle one by name, so that it is interpolated to."""
     return len(data.session_names) // 2
 
 
-def close(
-    data: Measurements,
-    robot: Robot,
-    *,
-    level: float = LEVEL,
-    seed: int = 0,
-    jobs: int | None = None,
-    progress: bool = True,
-) -> Verdict:
-    """Close the loop on a table.
+def close(model: Model, *, level: float = LEVEL, seed: int = 0, progress: bool = True) -> Verdict:
+    """Close the loop on a model's runs.
 
     Args:
-        data: measured runs.
-        robot: dimensions and materials; its coefficients are the starting point ("uncalibrated"), its N, tail
-            length and motor speed are replaced by those of the runs.
+        model: its parameters' starts are the model "as given" (uncalibrated).
         level: α of every claim.
         seed: of the bootstrap; the result is deterministic given it.
-        jobs: processes.
         progress: show bars.
     """
-    effects = candidates()
+    data, effects = model.runs, model.effects
     fixed = {
         "level": level,
         "seed": seed,
@@ -113,13 +97,11 @@ def close(
         "locked": data.session_names[locked_session(data)],
     }
     used = data.session != locked_session(data)
-    given = {name: float(getattr(robot, name)) for name in COEFFICIENTS}
-    null = {e.name: float(robot.effects.get(e.name, e.null)) for e in effects}
-    start = {**given, **null}
-    model = Swimmer(robot, data, jobs=jobs)
-    guess = first_guess(model, start, used)
+    start = start_values(model)
+    coefficients = tuple(p.name for p in model.coefficients)
+    guess = model.guess(dict(start), used)
     uncalibrated = model.predict([start], title="as given" if progress else "")[0]
-    base = fit(model, guess, COEFFICIENTS, used, title="fit" if progress else "")
+    base = fit(model, guess, coefficients, used, title="fit" if progress else "")
     along = directions(model, base.parameters, base.prediction, effects, title="effects" if progress else "")
     misfit = check_misfit(base, data, used, along, level=level, seed=seed)
     found: list[Candidate] = []
@@ -153,13 +135,13 @@ def close(
         locked=data.session_names[locked_session(data)],
         used=used,
         uncalibrated=uncalibrated,
-        corrected=_corrected(robot, final.parameters),
+        untestable=dict(model.untestable),
         plan_hash=fingerprint(fixed),
         set_aside=data.set_aside,
     )
 
 
-def _unexamined(misfit: Misfit, effects: list[Any]) -> tuple[Candidate, ...]:
+def _unexamined(misfit: Misfit, effects: tuple[Parameter, ...]) -> tuple[Candidate, ...]:
     scores = misfit.scores
     return tuple(
         Candidate(e, float(z), float(s), misfit.critical_z / max(float(n), 1e-300), None, None, 0.0, 0.0,
@@ -168,14 +150,14 @@ def _unexamined(misfit: Misfit, effects: list[Any]) -> tuple[Candidate, ...]:
     )  # fmt: skip
 
 
-def _errors(data: Measurements, prediction: Floats, rows: NDArray[np.bool_]) -> tuple[float, dict[str, float]]:
+def _errors(data: Runs, prediction: Floats, rows: NDArray[np.bool_]) -> tuple[float, dict[str, float]]:
     """Relative rms over runs and outputs (θ in rad), and per output."""
     square = ((data.y - prediction)[rows] ** 2).mean(0)
     each = dict(zip(data.outputs, np.sqrt(square).tolist(), strict=True))
     return float(np.sqrt(square.mean())), each
 
 
-def _interval(data: Measurements, prediction: Floats, rows: NDArray[np.bool_], seed: int) -> tuple[float, float]:
+def _interval(data: Runs, prediction: Floats, rows: NDArray[np.bool_], seed: int) -> tuple[float, float]:
     """95 % interval of the relative rms by resampling conditions."""
     square = ((data.y - prediction)[rows] ** 2).mean(1)
     condition = data.condition[rows]
@@ -184,12 +166,6 @@ def _interval(data: Measurements, prediction: Floats, rows: NDArray[np.bool_], s
     rng = np.random.default_rng(seed)
     drawn = np.sqrt(means[rng.integers(0, len(kinds), (2000, len(kinds)))].mean(1))
     return float(np.quantile(drawn, 0.025)), float(np.quantile(drawn, 0.975))
-
-
-def _corrected(robot: Robot, parameters: Mapping[str, float]) -> Robot:
-    own: dict[str, Any] = {name: float(parameters[name]) for name in COEFFICIENTS}
-    sizes = {k: float(v) for k, v in parameters.items() if k not in COEFFICIENTS and v != 0.0}
-    return replace(robot, **own, effects={**robot.effects, **sizes})
 
 
 def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
@@ -226,6 +202,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
             }
             for c in result.candidates
         ],
+        "untestable": result.untestable,
         "next_runs": [],
         "locked_test": result.locked,
         "fixed_before": result.plan_hash,

@@ -5,8 +5,9 @@ Needed: N, l_cm, omega_rpm (head relative to tails, signed) and some of the outp
     omega_h_rpm, omega_t_rpm, omega_yr_rad_s (signed), R_yr_cm, theta_deg (of the head's centre),
 
 and more runs than one per condition, so that the noise can be told from the repeats. `session` groups runs
-made together; where it is missing, runs of one N count as one session. Rows that cannot be used are set
-aside by number and reason, never dropped in silence.
+made together; where it is missing, runs of one N count as one session. elapsed_min, temperature_C and
+tank_diameter_cm open effects to test that need them. Rows that cannot be used are set aside by number and reason,
+never dropped in silence.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians.
 A wrong sign is a bad row, since the motor's direction sets the sign of all of them.
@@ -15,14 +16,14 @@ A wrong sign is a bad row, since the motor's direction sets the sign of all of t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from calibration.model import Runs
 from sim.errors import InputError
 from sim.tables import read_table
 
@@ -38,37 +39,20 @@ OUTPUTS = {
     "theta": ("theta_deg", math.pi / 180, 0),
 }
 _INPUTS = ("N", "l_cm", "omega_rpm")
-_KNOWN = {*_INPUTS, *(c for c, _, _ in OUTPUTS.values()), "run", "trial", "session", "elapsed_min"}
+_NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm")
+_KNOWN = {*_INPUTS, *(c for c, _, _ in OUTPUTS.values()), "run", "trial", "session", *_NOTED}
 _FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
 
 
 @dataclass(frozen=True)
-class Measurements:
-    """Usable runs of a table."""
+class Measurements(Runs):
+    """Usable runs of a table of swimming robots."""
 
     tails: Floats  # (n,) N
     length: Floats  # (n,) tail length [m]
     omega: Floats  # (n,) motor speed, signed [rad/s]
-    session: NDArray[np.int64]  # (n,) 0, 1, …
-    session_names: tuple[str, ...]
-    outputs: tuple[str, ...]
-    y: Floats  # (n, k): ln |output|, θ in rad
-    condition: NDArray[np.int64]  # (n,) runs with equal N, l, ω (signed) share a number
-    set_aside: tuple[str, ...]  # "row 7: …"
-
-    def __len__(self) -> int:
-        return len(self.omega)
-
-    def subset(self, rows: NDArray[np.bool_]) -> Measurements:
-        """The runs in `rows` (n,)."""
-        own: dict[str, Any] = {k: v[rows] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
-        return replace(self, **own)
-
-    def unique_conditions(self) -> tuple[Floats, NDArray[np.int64]]:
-        """Distinct (N, l, |ω|) as (m, 3), and each run's place among them."""
-        table = np.stack([self.tails, self.length, np.abs(self.omega)], 1)
-        rows, place = np.unique(table.round(9), axis=0, return_inverse=True)
-        return rows, place.reshape(-1)
+    noted: Floats  # (n, c) what was noted and differs between the runs, by `noted_names`
+    noted_names: tuple[str, ...]  # elapsed_h, temperature_K (above the mean), tank_diameter
 
 
 def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
@@ -112,17 +96,41 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         column, factor, _ = OUTPUTS[name]
         value = good[column].to_numpy(dtype=float) * factor
         columns.append(value if name == "theta" else np.log(np.abs(value)))
+    tails, length, omega = (
+        good[c].to_numpy(dtype=float) * f for c, f in zip(_INPUTS, (1, 0.01, _RPM), strict=True)
+    )
+    noted = _noted(good)
+    inputs = [tails, np.log(length), np.log(np.abs(omega)), np.sign(omega), *noted.values()]
     return Measurements(
-        tails=good["N"].to_numpy(dtype=float),
-        length=good["l_cm"].to_numpy(dtype=float) * 0.01,
-        omega=good["omega_rpm"].to_numpy(dtype=float) * _RPM,
-        session=session,
-        session_names=tuple(str(n) for n in session_names),
         outputs=outputs,
         y=np.stack(columns, 1),
         condition=condition,
+        session=session,
+        session_names=tuple(str(n) for n in session_names),
+        inputs=np.stack(inputs, 1),
+        input_names=("N", "ln l", "ln |omega|", "direction", *noted),
         set_aside=aside,
+        tails=tails,
+        length=length,
+        omega=omega,
+        noted=np.stack(list(noted.values()), 1) if noted else np.empty((len(good), 0)),
+        noted_names=tuple(noted),
     )
+
+
+def _noted(good: pd.DataFrame) -> dict[str, Floats]:
+    """What was noted of every run and differs between runs."""
+    found = {}
+    for column, (name, scale) in {
+        "elapsed_min": ("elapsed_h", 1 / 60),
+        "temperature_C": ("temperature_K", 1.0),
+        "tank_diameter_cm": ("tank_diameter", 0.01),
+    }.items():
+        if column in good:
+            value = good[column].to_numpy(dtype=float) * scale
+            if np.isfinite(value).all() and np.ptp(value) > 0:
+                found[name] = value - value.mean() if name == "temperature_K" else value
+    return found
 
 
 def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...]) -> list[str]:

@@ -5,7 +5,7 @@ With W = Σ^−½ and Q = orth(W ∂f/∂C), what the coefficients absorb is pro
     r = (I − QQᵀ) W (y − f),   d_j = (I − QQᵀ) W ∂f/∂ε_j,   z_j = d̂_jᵀ r.
 
 Three statistics: the χ² of the condition means (lack of fit against pure error), a kernel score rᵀ K r that looks
-for smooth structure over the inputs (N, ln l, ln |ω|, direction), and max |z_j| over the catalogue. Their null
+for smooth structure over the runs' inputs, and max |z_j| over the catalogue. Their null
 distribution comes from data drawn with the fitted noise (repeats and sessions), each draw going through the
 same steps: S and τ² estimated anew, coefficients refitted (linearised). So the p-values account for the
 fit, for the noise being estimated, and for correlated candidates.
@@ -21,10 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.fit import Fit
-from calibration.measurements import Measurements
+from calibration.model import Floats, Runs
 from calibration.noise import Noise, repeat_covariance, session_variance
-
-Floats = NDArray[np.float64]
 
 DRAWS = 600
 TESTABLE = 0.1  # survived share of an effect's signal below which the coefficients absorb it
@@ -66,12 +64,10 @@ class Misfit:
 class _Tester:
     """Fixed design of the runs used; statistics of any residual."""
 
-    def __init__(self, data: Measurements, used: NDArray[np.bool_], J: Floats, D: Floats):
+    def __init__(self, data: Runs, used: NDArray[np.bool_], J: Floats, D: Floats):
         self.session, self.condition = data.session[used], data.condition[used]
         self.J, self.D = J, D
-        inputs = np.stack([data.tails, np.log(data.length), np.log(np.abs(data.omega)), np.sign(data.omega)], 1)[
-            used
-        ]
+        inputs = data.inputs[used]
         spread = inputs.std(0)
         inputs = (inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
         distance = ((inputs[:, None] - inputs[None]) ** 2).sum(-1)
@@ -105,7 +101,7 @@ class _Tester:
 
 def check_misfit(
     fitted: Fit,
-    data: Measurements,
+    data: Runs,
     used: NDArray[np.bool_],
     directions: Floats,
     *,

@@ -59,6 +59,10 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
             for c in result.candidates
         ],
     )
+    if result.untestable:
+        page.text(
+            "Not tested, for want of data: " + "; ".join(f"{t} ({why})" for t, why in result.untestable.items())
+        )
     page.section("Error on the locked session")
     low, high = result.error_after_interval
     page.table(

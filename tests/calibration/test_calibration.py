@@ -11,12 +11,13 @@ import pandas as pd
 import pytest
 
 import calibration.fit
-import calibration.forward
+import calibration.swimmer
 import calibration.synthetic
 from calibration.loop import Verdict, close, locked_session, verdict_record
 from calibration.measurements import read_measurements
 from calibration.misfit import check_misfit
 from calibration.noise import Noise, repeat_covariance, session_variance
+from calibration.swimmer import Swimmer, corrected_robot
 from calibration.synthetic import make_table
 from sim.errors import InputError, run_command
 from sim.robot import PRESETS, load_robot
@@ -29,9 +30,9 @@ TRUTH = replace(START, C_t=3.1, C_r=2.4, C_yr=4.4)
 
 @pytest.fixture
 def toy_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(calibration.forward, "steady_columns", toy.steady_columns)
+    monkeypatch.setattr(calibration.swimmer, "steady_columns", toy.steady_columns)
     monkeypatch.setattr(calibration.synthetic, "stepped_columns", toy.steady_columns)
-    monkeypatch.setattr("calibration.loop.first_guess", lambda model, start, used: start)
+    monkeypatch.setattr(Swimmer, "guess", lambda model, start, used: start)
 
 
 def toy_table(seed: int, **effects: float) -> pd.DataFrame:
@@ -39,7 +40,7 @@ def toy_table(seed: int, **effects: float) -> pd.DataFrame:
 
 
 def closed(table: pd.DataFrame, seed: int = 0) -> Verdict:
-    return close(read_measurements(table), START, seed=seed, progress=False)
+    return close(Swimmer(START, read_measurements(table)), seed=seed, progress=False)
 
 
 def test_whitener_is_the_inverse_root_of_the_block_covariance() -> None:
@@ -89,7 +90,7 @@ def test_a_planted_effect_is_found_sized_and_removed() -> None:
             covered += low <= size <= high
             assert result.error_after < 1.25 * result.noise_ceiling
             assert result.error_after <= result.error_before
-            assert result.corrected.effects[name] == result.final.parameters[name]
+            assert corrected_robot(START, result.final.parameters).effects[name] == result.final.parameters[name]
     assert named >= 5
     assert covered >= named - 1
 
@@ -115,7 +116,7 @@ def test_an_effect_outside_the_catalogue_is_left_unexplained() -> None:
     result = closed(table)
     assert result.verdict == "unexplained"
     assert result.effects == ()
-    assert result.corrected.effects == {}
+    assert corrected_robot(START, result.final.parameters).effects == {}
 
 
 @pytest.mark.usefixtures("toy_model")

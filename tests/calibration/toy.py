@@ -27,7 +27,9 @@ def _row(columns: dict[str, np.ndarray]) -> dict[str, float]:
     groups = Groups.from_columns(columns)
     R = 1 / groups.l_over_R
     base = drag.coefficients(groups.C_t, groups.C_r, groups.C_yr, R, groups.L_over_R * R, groups.l_over_r0)
-    head = with_effects(groups, base).resistance[:, :4, 0].numpy()
+    resistance = with_effects(groups, base).resistance[..., 0].numpy()
+    head = resistance[:, :4].copy()
+    head[:, 3] += resistance[:, 4]
     parallel, perp = (float(v) for v in drag.tail_coefficients(groups.l_over_r0))
     a, n, omega = float(groups.a_over_R * R), groups.N, float(groups.omega_bar)
     tails = np.zeros((4, 4))
@@ -37,8 +39,8 @@ def _row(columns: dict[str, np.ndarray]) -> dict[str, float]:
     tails[1, 1] = n * parallel
     tails[3, 3] = 3 * n * perp * a**2
     thrust = 0.5 * n * (perp - parallel) * a**2 / (1 + 0.05 * abs(omega))
-    tails[1, 3] = -thrust
-    push = tails[:, 3] * omega
+    tails[1, 3] = -thrust * np.sign(omega)
+    push = (tails[:, 3] + resistance[:, 4]) * omega
     u = np.linalg.solve(head + tails, -push)
     sway, surge, yaw, spin = u[0] + u[2] * float(groups.L_over_R * R) / 2, u[1], u[2], u[3]
     return {

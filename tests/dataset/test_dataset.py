@@ -97,7 +97,7 @@ def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> No
     """Neither an orbit nor a time step can be solved."""
     from sim import direct, run, switching
 
-    def lost(rows: np.ndarray, *_: object) -> direct.Orbits:
+    def lost(rows: np.ndarray, *_: object, **__: object) -> direct.Orbits:
         count, none = len(rows), np.full(len(rows), np.nan)
         ended = np.full(count, direct.NO_START)
         return direct.Orbits(np.full((count, 5), np.nan), np.empty((count, 0, 5)), none, ended, none)

@@ -1,0 +1,87 @@
+"""What may be missing from the swimmer's model of a run: effects of the simulator, driven by what was noted of the
+run.
+
+An influence of size ε turns a run's robot into another: an effect of `sim.effects` gets the size null + ε s, where
+s is 1, or a column of the table (hours since the first run, kelvin above the mean). Some act on the observation
+alone: the motor's true speed, the point of the axis that was tracked, a current in the lab. A table without the
+column cannot test the influence that needs it, and says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from calibration.model import Parameter
+from sim.effects import Effect, catalogue
+
+SLIP, TRACKED_POINT = "motor_slip", "tracked_point"
+
+
+@dataclass(frozen=True)
+class Influence:
+    """One way in which a run may differ from the model."""
+
+    parameter: Parameter
+    effect: str | None  # of `sim.effects`; None: acts on the observation
+    needs: str | None  # column of the table that drives it
+    odd: bool  # tells left turns from right turns
+
+    @property
+    def name(self) -> str:
+        return self.parameter.name
+
+
+_DRIVEN = {
+    # name, effect, column, title, unit, bounds, typical
+    "viscosity_with_time": (
+        "viscosity_drift", "elapsed_h", "viscosity drifting with time", "1/h", (-0.3, 0.3), 0.02,
+    ),
+    "viscosity_with_temperature": (
+        "viscosity_drift", "temperature_K", "viscosity falling with temperature", "1/K", (-0.3, 0.3), 0.086,
+    ),
+    "wall_of_the_tank": (
+        "tank_wall", "head_over_tank", "wall of the tank", "of the correction for a sphere", (0.0, 2.0), 1.0,
+    ),
+}  # fmt: skip
+
+
+def influences() -> dict[str, Influence]:
+    """Everything that may be missing, by name."""
+    found = {}
+    for effect in catalogue().values():
+        if effect.covariate is None and not effect.beside:
+            found[effect.name] = _plain(effect)
+    for name, (effect_name, column, title, unit, bounds, typical) in _DRIVEN.items():
+        parameter = Parameter(name, title, 0.0, bounds, typical, unit=unit)
+        found[name] = Influence(parameter, effect_name, column, False)
+    slip = Parameter(SLIP, "slip of the motor", 0.0, (-0.3, 0.3), 0.02, unit="share of its speed")
+    point = Parameter(
+        TRACKED_POINT, "tracked point off the head's centre", 0.0, (-2.0, 2.0), 0.1, unit="L, forward"
+    )
+    found[SLIP] = Influence(slip, None, None, False)
+    found[TRACKED_POINT] = Influence(point, None, None, False)
+    return dict(sorted(found.items()))
+
+
+def _plain(effect: Effect) -> Influence:
+    parameter = Parameter(
+        effect.name, effect.title, effect.null, effect.bounds, effect.typical - effect.null, unit=effect.unit
+    )
+    return Influence(parameter, effect.name, None, effect.symmetry == "odd")
+
+
+def reason_untestable(influence: Influence, columns: Mapping[str, object], both_directions: bool) -> str:
+    """Why a table cannot test an influence; empty if it can."""
+    if influence.needs is not None and influence.needs not in columns:
+        return f"needs {_COLUMNS[influence.needs]}"
+    if influence.odd and not both_directions:
+        return "needs runs in both directions of the motor"
+    return ""
+
+
+_COLUMNS = {
+    "elapsed_h": "elapsed_min, differing between the runs",
+    "temperature_K": "temperature_C, differing between the runs",
+    "head_over_tank": "tank_diameter_cm, differing between the runs",
+}

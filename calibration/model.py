@@ -1,0 +1,98 @@
+"""What the engine that closes the loop knows of its subject: runs, parameters, and a forward model.
+
+Nothing here or in fit, noise, misfit, attribute and loop is about robots. The swimmer (`calibration.swimmer`) is
+one model; a sphere that settles in a vessel is another (`calibration/examples/spheres.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Parameters = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Something to fit: a coefficient that the model always has, or the size of an effect that it may lack."""
+
+    name: str
+    title: str
+    start: float  # the value as given; for an effect its null
+    bounds: tuple[float, float]
+    typical: float  # a size that matters; sets the step of differences
+    logarithmic: bool = False  # fitted as its logarithm
+    unit: str = "1"
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Measured runs, ready to be compared: n runs of k outputs."""
+
+    outputs: tuple[str, ...]
+    y: Floats  # (n, k), on a scale on which errors are relative
+    condition: NDArray[np.int64]  # (n,) repeats share a number
+    session: NDArray[np.int64]  # (n,) 0, 1, …: runs made together
+    session_names: tuple[str, ...]
+    inputs: Floats  # (n, q) what was set or noted, on scales on which structure is smooth
+    input_names: tuple[str, ...]
+    set_aside: tuple[str, ...]  # "row 7: …"
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+    def subset(self, rows: NDArray[np.bool_]) -> Any:
+        """The runs in `rows` (n,)."""
+        own: dict[str, Any] = {k: v[rows] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
+        return replace(self, **own)
+
+
+class Model(Protocol):
+    """A forward model of some runs."""
+
+    @property
+    def runs(self) -> Runs: ...
+
+    @property
+    def coefficients(self) -> tuple[Parameter, ...]:
+        """Always fitted."""
+        ...
+
+    @property
+    def effects(self) -> tuple[Parameter, ...]:
+        """What the model may lack and these runs can test."""
+        ...
+
+    @property
+    def untestable(self) -> Mapping[str, str]:
+        """Effects that these runs cannot test: title -> what is missing."""
+        ...
+
+    def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
+        """Predictions (P, n, k) for P parameter sets, each with every coefficient and effect."""
+        ...
+
+    def guess(self, start: dict[str, float], used: NDArray[np.bool_]) -> dict[str, float]:
+        """A better start for the coefficients, from the runs in `used` (n,), if there is a cheap one."""
+        ...
+
+
+def start_values(model: Model) -> dict[str, float]:
+    """Every parameter as given: effects at their null."""
+    return {p.name: p.start for p in (*model.coefficients, *model.effects)}
+
+
+def parameter(model: Model, name: str) -> Parameter:
+    """The coefficient or effect called `name`."""
+    return next(p for p in (*model.coefficients, *model.effects) if p.name == name)
+
+
+def moved(one: Parameter, value: float, by: float) -> float:
+    """`value` changed by `by`, on the parameter's own scale, within its bounds."""
+    new = value * float(np.exp(by)) if one.logarithmic else value + by
+    return max(one.bounds[0], min(one.bounds[1], new))
