@@ -8,7 +8,9 @@ in the direction that its bounds allow, is refitted together with the coefficien
     its interval excludes the null, and
     it predicts left-out sessions better, by more than the uncertainty of that gain.
 
-Kept effects whose χ² differ by less than what one parameter gains by chance (3.84) cannot be told apart.
+Kept effects whose χ² differ by less than what one parameter gains by chance (3.84) cannot be told apart. Where
+none alone is kept, each of the best few is taken as given and a second one is looked for in the same way
+(`pairs`).
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from calibration.misfit import TESTABLE, Misfit, check_misfit
 from calibration.model import Floats, Model, Parameter, Parameters
 
 _DERIVATIVE_STEP = 0.1  # in units of an effect's typical size
+_FIRST = 3  # single effects beside which a second one is looked for
 _INDISTINGUISHABLE = 3.84  # χ² with one degree of freedom, 95 %
 
 
@@ -31,12 +34,13 @@ class Candidate:
     """What was found about one effect."""
 
     effect: Parameter
+    beside: tuple[Parameter, ...]  # effects that were taken as given
     z: float
     survived: float
     detectable: float  # size that |z| would find half of the time: critical |z| / signal per unit
     refit: Fit | None
     refit_misfit: Misfit | None
-    gain: float  # mean predictive gain per session left out, in log likelihood
+    gain: float  # predictive gain summed over left-out sessions, in log likelihood
     gain_error: float
     verdict: str  # why it was kept or not
 
@@ -71,8 +75,14 @@ def examine(
     *,
     level: float,
     seed: int,
+    beside: tuple[Parameter, ...] = (),
 ) -> list[Candidate]:
-    """Refit and judge every effect, best score first; `given` is where refits start if the fit ran away."""
+    """Refit and judge every effect, best score first; `given` is where refits start if the fit ran away.
+
+    Args:
+        base: the fit without them; it has `beside`.
+        along: ∂f/∂ε of `effects` there, (n, k, e).
+    """
     found = []
     for j in np.argsort(-np.abs(misfit.scores.z)):
         effect = effects[j]
@@ -88,7 +98,7 @@ def examine(
         elif not low <= guess <= high and (guess < low) == (effect.start == low):
             reason = "acts against its sign"
         if reason:
-            found.append(Candidate(effect, z, survived, detectable, None, None, 0.0, 0.0, reason))
+            found.append(Candidate(effect, beside, z, survived, detectable, None, None, 0.0, 0.0, reason))
             continue
         guess = min(max(guess, low), high)
         refit = fit(
@@ -107,8 +117,47 @@ def examine(
             reason = "its interval includes the null"
         elif gain <= error:
             reason = "does not predict left-out sessions better"
-        found.append(Candidate(effect, z, survived, detectable, refit, after, gain, error, reason or "kept"))
+        found.append(
+            Candidate(effect, beside, z, survived, detectable, refit, after, gain, error, reason or "kept")
+        )
     return found
+
+
+def pairs(
+    model: Model,
+    found: list[Candidate],
+    used: NDArray[np.bool_],
+    given: Parameters,
+    *,
+    level: float,
+    seed: int,
+) -> list[Candidate]:
+    """Second effects beside the best refits of single ones."""
+    refitted = [c for c in found if c.refit is not None]
+    second: list[Candidate] = []
+    for first in sorted(refitted, key=_chi_square)[:_FIRST]:
+        assert first.refit is not None
+        others = tuple(e for e in model.effects if e.name != first.effect.name)
+        along = directions(model, first.refit.parameters, first.refit.prediction, others, title="second effects")
+        misfit = check_misfit(first.refit, model.runs, used, along, level=level, seed=seed + 2)
+        second += examine(
+            model,
+            first.refit,
+            misfit,
+            others,
+            along,
+            used,
+            given,
+            level=level,
+            seed=seed + 2,
+            beside=(first.effect,),
+        )
+    unique: dict[frozenset[str], Candidate] = {}
+    for candidate in second:
+        names = frozenset((candidate.effect.name, *(e.name for e in candidate.beside)))
+        if candidate.kept and names not in unique:
+            unique[names] = candidate
+    return list(unique.values())
 
 
 def _sane(model: Model, fitted: Parameters, given: Parameters) -> dict[str, float]:
@@ -129,15 +178,18 @@ def _chi_square(candidate: Candidate) -> float:
 
 
 def _session_gain(model: Model, base: Fit, refit: Fit, used: NDArray[np.bool_]) -> tuple[float, float]:
-    """Mean gain in log likelihood per left-out session, and its standard error (linearised refits)."""
+    """Gain in log likelihood summed over left-out sessions, and its standard error (linearised refits).
+
+    With whitened residuals r of the refit and r + d of the base, a session gains ½|d|² + d·r: noise makes |d| of it.
+    """
     data = model.runs
-    gains = []
+    gain, variance = 0.0, 0.0
     for session in np.unique(data.session[used]):
         learn, out = used & (data.session != session), used & (data.session == session)
-        gains.append(0.5 * (_left_out(data.y, data.session, base, learn, out, refit)
-                            - _left_out(data.y, data.session, refit, learn, out, refit)))  # fmt: skip
-    spread = np.std(gains, ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
-    return float(np.mean(gains)), float(spread)
+        left = [_left_out(data.y, data.session, fitted, learn, out, refit) for fitted in (base, refit)]
+        gain += 0.5 * float(left[0] @ left[0] - left[1] @ left[1])
+        variance += float(((left[0] - left[1]) ** 2).sum())
+    return gain, float(np.sqrt(variance))
 
 
 def _left_out(
@@ -147,11 +199,10 @@ def _left_out(
     learn: NDArray[np.bool_],
     out: NDArray[np.bool_],
     judge: Fit,
-) -> float:
-    """χ² of a left-out session for a model fitted to the others, in the noise of `judge`."""
+) -> Floats:
+    """Whitened residuals of a left-out session for a model fitted to the others, in the noise of `judge`."""
     white = judge.noise.whitener(session[learn])
     residual = y - fitted.prediction
     step = np.linalg.lstsq(white(fitted.jacobian[learn]), white(residual[learn]), rcond=None)[0]
     left = residual[out] - fitted.jacobian[out] @ step
-    r = judge.noise.whitener(session[out])(left)
-    return float(r @ r)
+    return np.asarray(judge.noise.whitener(session[out])(left))

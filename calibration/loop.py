@@ -7,9 +7,9 @@
 5. Refit with each effect that passes; keep what explains (`calibration.attribute`).
 6. Verdict: "none" (no departure beyond noise), "effect" (one explains it), "ambiguous" (several do and the runs
    cannot tell them apart), "unexplained" (there is a departure, and no effect in the catalogue explains it).
-7. Errors on the locked session: as given, calibrated, calibrated with the effect, and the noise ceiling.
-
-Not yet here: pairs of effects, generic correction, next runs.
+7. Where no single effect explains it, pairs; where several do, the runs that would tell them apart.
+8. Errors on the locked session: as given, calibrated, with the effect, with a generic correction of the calibrated
+   model (`calibration.generic`), and the noise ceiling.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.attribute import Candidate, directions, examine, explaining
+from calibration.attribute import Candidate, directions, examine, explaining, pairs
+from calibration.discriminate import NextRun, next_runs
 from calibration.fit import Fit, fit
+from calibration.generic import Generic, correct
 from calibration.misfit import DRAWS, Misfit, check_misfit
 from calibration.model import Floats, Model, Parameter, Runs, start_values
 from sim.artefact import fingerprint, provenance
@@ -35,11 +37,15 @@ class Verdict:
 
     verdict: str  # "none", "effect", "ambiguous", "unexplained"
     effects: tuple[str, ...]
+    explaining: tuple[Candidate, ...]  # what explains the residual, best first; more than one: not told apart
     base: Fit  # calibrated, without effects
     final: Fit  # the model to go on with
     misfit: Misfit
     candidates: tuple[Candidate, ...]
+    generic: Generic  # correction of the calibrated model
+    next_runs: tuple[NextRun, ...]  # where two effects cannot be told apart
     error_uncalibrated: float
+    error_generic: float
     error_before: float
     error_after: float
     error_after_interval: tuple[float, float]
@@ -61,18 +67,21 @@ class Verdict:
         if self.verdict == "none":
             return f"No effect is missing that these runs can show ({p})."
         if self.verdict == "effect":
-            best = next(c for c in self.candidates if c.effect.name == self.effects[0])
+            best = self.explaining[0]
             assert best.refit is not None
-            low, high = best.refit.interval(best.effect.name)
-            size = best.refit.parameters[best.effect.name]
-            return (
-                f"The residual ({p}) is consistent with {best.effect.title}, "
-                f"size {size:.3g} ({low:.3g} to {high:.3g}), and with no other effect of the catalogue."
-            )
+            sizes = []
+            for effect in (*best.beside, best.effect):
+                low, high = best.refit.interval(effect.name)
+                sizes.append(
+                    f"{effect.title}, size {best.refit.parameters[effect.name]:.3g} ({low:.3g} to {high:.3g})"
+                )
+            other = "other effect" if len(sizes) == 1 else "single effect or other pair"
+            said = " and ".join(sizes)
+            return f"The residual ({p}) is consistent with {said}, and with no {other} of the catalogue."
         if self.verdict == "ambiguous":
-            names = " or ".join(c.effect.title for c in self.candidates if c.effect.name in self.effects)
+            names = " or ".join(" and ".join(e.title for e in (*c.beside, c.effect)) for c in self.explaining)
             return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart."
-        return f"There is a residual ({p}) that no single effect of the catalogue explains."
+        return f"There is a residual ({p}) that no effect and no pair of effects of the catalogue explains."
 
 
 def locked_session(data: Runs) -> int:
@@ -108,26 +117,37 @@ def close(model: Model, *, level: float = LEVEL, seed: int = 0, progress: bool =
     if misfit.p_value < level:
         found = examine(model, base, misfit, effects, along, used, start, level=level, seed=seed)
     best = explaining(found)
+    if misfit.p_value < level and not best:
+        best = explaining(pairs(model, found, used, start, level=level, seed=seed))
     verdict = "none" if misfit.p_value >= level else ("unexplained", "effect", "ambiguous")[min(len(best), 2)]
-    final = best[0].refit if verdict == "effect" and best[0].refit else base
+    final = best[0].refit if best and best[0].refit else base
+    generic = correct(data, base.prediction, used)
+    ahead: list[NextRun] = []
+    if len(best) > 1 and best[0].refit and best[1].refit:
+        ahead = next_runs(model, best[0].refit, best[1].refit, seed=seed)
     errors = {
         name: _errors(data, prediction, ~used)
         for name, prediction in (
             ("uncalibrated", uncalibrated),
             ("before", base.prediction),
             ("after", final.prediction),
+            ("generic", base.prediction + generic.correction),
         )
     }
     ceiling = float(np.sqrt(np.trace(base.noise.run) / len(base.noise.run)))
     return Verdict(
         verdict=verdict,
-        effects=tuple(c.effect.name for c in best),
+        effects=tuple(dict.fromkeys(e.name for c in best for e in (*c.beside, c.effect))),
+        explaining=tuple(best),
         base=base,
         final=final,
         misfit=misfit,
         candidates=tuple(found) or _unexamined(misfit, effects),
         error_uncalibrated=errors["uncalibrated"][0],
         error_before=errors["before"][0],
+        error_generic=errors["generic"][0],
+        generic=generic,
+        next_runs=tuple(ahead),
         error_after=errors["after"][0],
         error_after_interval=_interval(data, final.prediction, ~used, seed),
         noise_ceiling=ceiling,
@@ -144,7 +164,7 @@ def close(model: Model, *, level: float = LEVEL, seed: int = 0, progress: bool =
 def _unexamined(misfit: Misfit, effects: tuple[Parameter, ...]) -> tuple[Candidate, ...]:
     scores = misfit.scores
     return tuple(
-        Candidate(e, float(z), float(s), misfit.critical_z / max(float(n), 1e-300), None, None, 0.0, 0.0,
+        Candidate(e, (), float(z), float(s), misfit.critical_z / max(float(n), 1e-300), None, None, 0.0, 0.0,
                   "not needed")
         for e, z, s, n in zip(effects, scores.z, scores.survived, scores.length, strict=True)
     )  # fmt: skip
@@ -182,6 +202,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "error_uncalibrated": result.error_uncalibrated,
         "error_before": result.error_before,
         "error_after": result.error_after,
+        "error_generic": result.error_generic,
         "error_after_interval": list(result.error_after_interval),
         "noise_ceiling": result.noise_ceiling,
         "errors_by_output": result.errors_by_output,
@@ -203,7 +224,8 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
             for c in result.candidates
         ],
         "untestable": result.untestable,
-        "next_runs": [],
+        "generic_features": list(result.generic.features),
+        "next_runs": [run.record() for run in result.next_runs],
         "locked_test": result.locked,
         "fixed_before": result.plan_hash,
         "rows_set_aside": list(result.set_aside),

@@ -77,6 +77,10 @@ class Model(Protocol):
         """Predictions (P, n, k) for P parameter sets, each with every coefficient and effect."""
         ...
 
+    def possible(self) -> tuple[Model, list[dict[str, Any]]]:
+        """A model of runs that could be made next, and their settings."""
+        ...
+
     def guess(self, start: dict[str, float], used: NDArray[np.bool_]) -> dict[str, float]:
         """A better start for the coefficients, from the runs in `used` (n,), if there is a cheap one."""
         ...

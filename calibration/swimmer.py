@@ -121,6 +121,27 @@ class Swimmer:
                 break
         return parameters
 
+    def possible(self) -> tuple[Swimmer, list[dict[str, Any]]]:
+        """Tail counts (one more), tail lengths and motor speeds of the table's range, and slower ones."""
+        runs = self.runs
+        lengths = np.linspace(runs.length.min(), runs.length.max(), 6)
+        speeds = np.abs(runs.omega).max() * np.array([0.4, 0.7, 1.0])
+        tails = np.arange(runs.tails.min(), runs.tails.max() + 2)
+        grid = np.array([(n, a, w) for n in tails for a in lengths for w in (*speeds, *-speeds)])
+        count = len(grid)
+        noted = np.tile(runs.noted.mean(0), (count, 1))
+        settings = [
+            {"N": int(n), "l_cm": round(100 * length, 1), "omega_rpm": round(omega * 30 / math.pi, 1)}
+            for n, length, omega in grid.tolist()
+        ]
+        own = replace(
+            runs, y=np.zeros((count, len(runs.outputs))),
+            condition=np.arange(count), session=np.zeros(count, int),
+            session_names=("next",), inputs=np.zeros((count, runs.inputs.shape[1])), set_aside=(),
+            tails=grid[:, 0], length=grid[:, 1], omega=grid[:, 2], noted=noted,
+        )  # fmt: skip
+        return Swimmer(self.robot, own, self.jobs), settings
+
     def _inside(self, lookup: Lookup, parameters: Parameters) -> NDArray[np.bool_]:
         """Which runs (n,) the look-up table covers at `parameters`."""
         conditions, place = self._conditions(parameters)

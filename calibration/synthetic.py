@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from sim.batches import stepped_columns
+from sim.effects import catalogue
 from sim.robot import Robot
 
 _RPM = 2 * math.pi / 60
@@ -39,13 +40,18 @@ def make_table(
     runs = [replace(robot, tails=n, tail_length=length / 100, motor_speed=rpm * _RPM) for n, length, rpm in design]
     values = [run.group_values() for run in runs]
     columns = {k: np.array([v[k] for v in values]) for k in values[0]}
-    found = stepped_columns(columns, finer=2, jobs=jobs, title=title)
+    odd = any(catalogue()[name].symmetry == "odd" for name in robot.effects)
+    directions = (1, -1) if odd else (1,)  # else a reversed motor mirrors the motion
+    both = {k: np.concatenate([d * v if k == "omega_bar" else v for d in directions]) for k, v in columns.items()}
+    found = stepped_columns(both, finer=2, jobs=jobs, title=title)
     rng = np.random.default_rng(seed)
     shift = {n: rng.normal(scale=session_noise, size=4) for n in tails}
     rows = []
     for i, (n, length, rpm) in enumerate(design):
         spin = 1 / runs[i].time_scale / _RPM
         for direction in (1, -1):
+            at = i + len(design) if odd and direction < 0 else i
+            sense = 1 if odd else direction
             for trial in range(1, trials + 1):
                 factor = np.exp(rng.normal(scale=noise, size=4) + shift[n])
                 rows.append(
@@ -55,14 +61,13 @@ def make_table(
                         "trial": trial,
                         "session": f"N={n}",
                         "omega_rpm": direction * rpm,
-                        "omega_h_rpm": direction * found["omega_h_bar"][i] * spin * factor[0],
-                        "omega_t_rpm": direction * found["omega_t_bar"][i] * spin * factor[1],
-                        "omega_yr_rad_s": direction
-                        * found["omega_yr_bar"][i] / runs[i].time_scale * factor[2],
-                        "R_yr_cm": found["R_yr_over_l"][i] * length * factor[3],
-                        "theta_deg": found["theta_deg"][i] + rng.normal(scale=math.degrees(noise)),
+                        "omega_h_rpm": sense * found["omega_h_bar"][at] * spin * factor[0],
+                        "omega_t_rpm": sense * found["omega_t_bar"][at] * spin * factor[1],
+                        "omega_yr_rad_s": sense * found["omega_yr_bar"][at] / runs[i].time_scale * factor[2],
+                        "R_yr_cm": found["R_yr_over_l"][at] * length * factor[3],
+                        "theta_deg": found["theta_deg"][at] + rng.normal(scale=math.degrees(noise)),
                     }
-                )  # fmt: skip
+                )
     table = pd.DataFrame(rows)
     order = np.lexsort((rng.random(len(table)), table["N"]))
     table = table.iloc[order].reset_index(drop=True)

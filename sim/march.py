@@ -84,9 +84,9 @@ def new_state(tails: int, edges: int, offset: float) -> State:
 @compiled
 def _linearise_tail(
     body: Body, motion: Motion, w_yaw: float, sway: float, x: Array, x_dot: Array, rate: float,
-    geometry: Geometry, chains: Chains, m: int,
+    geometry: Geometry, chains: Chains, m: int, s: Array,
 ) -> None:  # fmt: skip
-    """Blocks of tail m."""
+    """Blocks of tail m, and what its nodes lack to balance in s (n, N, 3)."""
     n = x.shape[0]
     edge, joint = edge_block(geometry, 0, m, body.axial_stiffness), NO_BLOCK  # of node k
     edge_next, joint_next, after_below = NO_BLOCK, NO_BLOCK, NO_BLOCK
@@ -98,7 +98,8 @@ def _linearise_tail(
             edge_next, joint_next = NO_BLOCK, NO_BLOCK
         position = vector(x, k, m)
         velocity = plus(plus(motion.linear, cross(motion.spin, position)), vector(x_dot, k, m))
-        _, resistance, before, after = node_balance(geometry, body, motion, k, m, velocity)
+        residual, resistance, before, after = node_balance(geometry, body, motion, k, m, velocity)
+        put(s, k, m, times(-1.0, residual))
 
         own = subtracted(added(joint_next, transposed(joint_next)), added(edge, edge_next))
         own = subtracted(added(own, subtracted(after, before)), turned(resistance, motion.spin))
@@ -124,14 +125,19 @@ def _linearise_tail(
 
 
 @compiled
-def _add_clamp(body: Body, motion: Motion, geometry: Geometry, chains: Chains, m: int, rate: float) -> None:
-    """The body's equations: what tail m puts on the disc, with its nodes eliminated."""
+def _add_clamp(
+    body: Body, motion: Motion, geometry: Geometry, chains: Chains, m: int, rate: float, t: Array
+) -> None:
+    """The body's equations: what tail m puts on the disc, with its nodes eliminated; right-hand side in t (4,)."""
     clamp = clamp_balance(geometry, body, m, motion, NONE, NONE)
     corner, foot = chains.corner, chains.foot
     _put_foot(foot[0], m, motion, clamp.force_by_first, clamp.moment_by_first)
     _put_foot(foot[1], m, motion, clamp.force_by_second, clamp.moment_by_second)
     lower = block(chains.lower, 1, m)
     root = (body.offset, 0.0, 0.0)
+    load = wrench_of(motion, clamp.force, clamp.moment)
+    for a in range(4):
+        t[a] -= load[a]
     directions = (motion.e_x, E_Z, cross(motion.e_y, root), times(body.gain, cross(E_Z, root)))
     for c in range(4):
         first = vector(chains.border[0], m, c)
@@ -156,18 +162,20 @@ def _put_foot(foot: Array, m: int, motion: Motion, force: Matrix, moment: Matrix
 
 @compiled
 def _factor(
-    body: Body, x: Array, x_dot: Array, phase: float, u: Array, rate: float, geometry: Geometry, chains: Chains
-) -> None:
-    """Newton's equations without what lies beyond, eliminated."""
+    body: Body, x: Array, x_dot: Array, phase: float, u: Array, rate: float, geometry: Geometry, chains: Chains,
+    s: Array, t: Array,
+) -> None:  # fmt: skip
+    """Newton's equations without what lies beyond, eliminated; right-hand sides in s (n, N, 3) and t (4,)."""
     tails = x.shape[1]
     measure(geometry, x, (body.offset, 0.0, 0.0), body.axial_stiffness)
     chains.corner[:] = 0.0
     add_head(body, u, chains.corner, 0)
+    t[:] = chains.corner[:, 4]
     for m in range(tails):
         motion = motion_at(body, u, phase + 2 * np.pi * m / tails)
-        _linearise_tail(body, motion, u[2], u[0], x, x_dot, rate, geometry, chains, m)
+        _linearise_tail(body, motion, u[2], u[0], x, x_dot, rate, geometry, chains, m, s)
         eliminate(chains, m)
-        _add_clamp(body, motion, geometry, chains, m, rate)
+        _add_clamp(body, motion, geometry, chains, m, rate, t)
 
 
 @compiled
@@ -228,12 +236,14 @@ def _stage(
     for _ in range(_MOST_CORRECTIONS):
         x_dot[:] = (x - x_star) * rate
         phase = phase_star + tau * (body.omega + body.gain * u[3])
-        _factor(body, x, x_dot, phase, u, rate, geometry, chains)
-        _residual(body, x, x_star, phase_star, u, rate, geometry, around, dx, du)
-        dx *= -1.0
-        du *= -1.0
-        solve(chains, dx, du)
-        if not body.beyond.none:
+        _factor(body, x, x_dot, phase, u, rate, geometry, chains, dx, du)
+        if body.beyond.none:
+            solve(chains, dx, du)
+        else:
+            _residual(body, x, x_star, phase_star, u, rate, geometry, around, dx, du)
+            dx *= -1.0
+            du *= -1.0
+            solve(chains, dx, du)
             _with_beyond(body, x, x_star, phase_star, u, rate, geometry, around, chains, dx, du)
         size = max(np.max(np.abs(dx)), np.max(np.abs(du)) / scale)
         if not np.isfinite(size):

@@ -1,0 +1,1 @@
+"""Models other than the swimmer: the engine that closes the loop knows no robots."""

@@ -1,0 +1,83 @@
+"""Generic correction: what is left, as a small regression on the runs' inputs, for when no effect explains it.
+
+Features are the inputs, their squares and their products, standardised. They are taken up one at a time as long as
+they predict left-out sessions better (each output has its own weights); none may be taken. It is a description,
+not an explanation, and holds between the runs that it was made from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.model import Floats, Runs
+from calibration.noise import repeat_covariance
+
+_MOST = 6
+_GAIN = 0.02  # share of the left-out error that a feature must save
+
+
+@dataclass(frozen=True)
+class Generic:
+    """A correction to the prediction."""
+
+    features: tuple[str, ...]  # taken up, in order
+    correction: Floats  # (n, k), for all runs
+
+
+def correct(runs: Runs, prediction: Floats, used: NDArray[np.bool_]) -> Generic:
+    """Learn the residual of `prediction` (n, k) from the runs in `used` (n,)."""
+    names, table = _features(runs, used)
+    scale = np.sqrt(np.diag(repeat_covariance(runs.y[used], runs.condition[used])))
+    residual = (runs.y - prediction) / scale
+    chosen: list[int] = []
+    error = _left_out(table[:, chosen], residual, runs.session, used)
+    while len(chosen) < _MOST:
+        rest = [i for i in range(len(names)) if i not in chosen]
+        if not rest:
+            break
+        tried = [_left_out(table[:, [*chosen, i]], residual, runs.session, used) for i in rest]
+        best = int(np.argmin(tried))
+        if tried[best] > (1 - _GAIN) * error:
+            break
+        chosen.append(rest[best])
+        error = tried[best]
+    weights = _weights(table[used][:, chosen], residual[used])
+    correction = _with_constant(table[:, chosen]) @ weights * scale if chosen else np.zeros_like(residual)
+    return Generic(tuple(names[i] for i in chosen), correction)
+
+
+def _features(runs: Runs, used: NDArray[np.bool_]) -> tuple[list[str], Floats]:
+    """Inputs that differ, their squares and products, standardised on the used runs, (n, f)."""
+    spread = runs.inputs[used].std(0)
+    own = np.flatnonzero(spread > 1e-9)
+    inputs = (runs.inputs[:, own] - runs.inputs[used][:, own].mean(0)) / spread[own]
+    names, columns = [runs.input_names[i] for i in own], list(inputs.T)
+    for i in range(len(own)):
+        for j in range(i, len(own)):
+            product = inputs[:, i] * inputs[:, j]
+            if product[used].std() > 1e-9:
+                names.append(f"{names[i]} × {names[j]}" if i != j else f"({names[i]})²")
+                columns.append((product - product[used].mean()) / product[used].std())
+    return names, np.stack(columns, 1)
+
+
+def _with_constant(table: Floats) -> Floats:
+    return np.column_stack([np.ones(len(table)), table])
+
+
+def _weights(table: Floats, residual: Floats) -> Floats:
+    return np.asarray(np.linalg.lstsq(_with_constant(table), residual, rcond=None)[0])
+
+
+def _left_out(table: Floats, residual: Floats, session: NDArray[np.int64], used: NDArray[np.bool_]) -> float:
+    """Mean square left on sessions that the weights have not seen; without features, of the residual."""
+    if not table.shape[1]:
+        return float((residual[used] ** 2).mean())
+    left = []
+    for own in np.unique(session[used]):
+        learn, out = used & (session != own), used & (session == own)
+        left.append(residual[out] - _with_constant(table[out]) @ _weights(table[learn], residual[learn]))
+    return float((np.concatenate(left) ** 2).mean())
