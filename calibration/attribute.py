@@ -180,7 +180,7 @@ def _chi_square(candidate: Candidate) -> float:
 def _session_gain(model: Model, base: Fit, refit: Fit, used: NDArray[np.bool_]) -> tuple[float, float]:
     """Gain in log likelihood summed over left-out sessions, and its standard error (linearised refits).
 
-    With whitened residuals r of the refit and r + d of the base, a session gains ½|d|² + d·r: noise makes |d| of it.
+    With whitened residuals r of the refit and r + d of the base, a session gains ½|d|² + d·r, |d| of it by noise.
     """
     data = model.runs
     gain, variance = 0.0, 0.0
