@@ -213,9 +213,8 @@ def summary(results: list[tuple[str, str, float]], group: Callable[[str], str]) 
         wrong = counts["wrong"] + sum(v for k, v in counts.items() if k.startswith("claimed"))
         said = ", ".join(f"{k} {v}" for k, v in counts.most_common())
         r, w = wilson(right, len(own)), wilson(wrong, len(own))
-        lines.append(
-            f"| {label} | {len(own)} | {said} | {_per_cent(right / len(own), r)} | {_per_cent(wrong / len(own), w)} |"
-        )
+        shares = f"{_per_cent(right / len(own), r)} | {_per_cent(wrong / len(own), w)}"
+        lines.append(f"| {label} | {len(own)} | {said} | {shares} |")
     return "\n".join(lines)
 
 
