@@ -2,6 +2,7 @@
 
 python -m calibration close TABLE.csv --robot robot.toml --out DIR    verdict.json, report.html, corrected.toml
 python -m calibration simulate --robot robot.toml --out TABLE.csv     a table to try it on
+python -m calibration tracks TRACKS.csv RUNS.csv --out TABLE.csv      camera tracks to a table of runs
 python -m calibration demo --out PAGE.html                            the whole pipeline, see `make demo`
 """
 
@@ -63,6 +64,18 @@ def _simulate(arguments: argparse.Namespace) -> None:
     print(f"{len(table)} runs -> {arguments.out}")
 
 
+def _tracks(arguments: argparse.Namespace) -> None:
+    from calibration.tracks import measure_tracks
+    from sim.artefact import whole_file
+
+    table, aside = measure_tracks(arguments.tracks, arguments.runs)
+    for line in aside:
+        print(f"set aside: {line}", file=sys.stderr)
+    with whole_file(arguments.out) as part:
+        table.to_csv(part, index=False, float_format="%.6g")
+    print(f"{len(table)} runs -> {arguments.out}")
+
+
 def _demo(arguments: argparse.Namespace) -> None:
     from calibration.demo import run_demo
 
@@ -86,6 +99,11 @@ def main(argv: list[str] | None = None) -> None:
     simulate.add_argument("--seed", type=int, default=0)
     simulate.add_argument("--jobs", type=int, help="processes (default: all processors)")
     simulate.set_defaults(run=_simulate)
+    tracks = commands.add_parser("tracks", help="turn camera tracks into a table of runs")
+    tracks.add_argument("tracks", help="CSV: run, time_s, x_cm, y_cm, heading_deg")
+    tracks.add_argument("runs", help="CSV: run, N, l_cm, omega_rpm and what else was noted")
+    tracks.add_argument("--out", required=True, help="CSV to write")
+    tracks.set_defaults(run=_tracks)
     demo = commands.add_parser("demo", help="the whole pipeline on the paper's robots")
     demo.add_argument("--out", default="reports/demo.html", help="page to write")
     demo.set_defaults(run=_demo)

@@ -2,7 +2,7 @@
 
 Needed: N, l_cm, omega_rpm (head relative to tails, signed) and some of the outputs
 
-    omega_h_rpm, omega_t_rpm, omega_yr_rad_s (signed), R_yr_cm, theta_deg (of the head's centre),
+    omega_h_rpm, omega_t_rpm, omega_yr_rad_s (signed), R_yr_cm, theta_deg, v_cm_s (of the head's centre),
 
 and more runs than one per condition, so that the noise can be told from the repeats. `session` groups runs
 made together; where it is missing, runs of one N count as one session. elapsed_min, temperature_C and
@@ -37,10 +37,12 @@ OUTPUTS = {
     "omega_yr": ("omega_yr_rad_s", 1.0, 1),
     "R_yr": ("R_yr_cm", 0.01, 0),
     "theta": ("theta_deg", math.pi / 180, 0),
+    "v": ("v_cm_s", 0.01, 0),
 }
+_ERRORS = ("omega_yr_error", "R_yr_error", "theta_error", "v_error")  # of `calibration.tracks`; repeats tell more
 _INPUTS = ("N", "l_cm", "omega_rpm")
 _NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm")
-_KNOWN = {*_INPUTS, *(c for c, _, _ in OUTPUTS.values()), "run", "trial", "session", *_NOTED}
+_KNOWN = {*_INPUTS, *(c for c, _, _ in OUTPUTS.values()), "run", "trial", "session", *_NOTED, *_ERRORS}
 _FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
 
 
@@ -143,7 +145,7 @@ def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...
             reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is no finite number"
     for i in np.flatnonzero(numbers["N"].to_numpy() % 1 != 0):
         reasons[i] = reasons[i] or f"N = {table['N'].iloc[i]} is no whole number"
-    for column in ("N", "l_cm", "R_yr_cm", "theta_deg"):
+    for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s"):
         if column in used:
             for i in np.flatnonzero(numbers[column].to_numpy(dtype=float) <= 0):
                 reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is not above 0"

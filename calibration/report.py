@@ -18,6 +18,7 @@ _LABELS = {
     "omega_yr": "yaw rate",
     "R_yr": "turn radius",
     "theta": "slip angle [rad]",
+    "v": "speed",
 }
 
 

@@ -202,6 +202,7 @@ class Swimmer:
             "omega_yr": math.log(abs(yaw) / robot.time_scale),
             "R_yr": math.log(math.hypot(sway, surge) / abs(yaw) * robot.tail_length),
             "theta": math.atan2(abs(sway), surge),
+            "v": math.log(math.hypot(sway, surge) * robot.tail_length / robot.time_scale),
         }
         return [values[name] for name in self.runs.outputs]
 

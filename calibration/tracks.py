@@ -1,0 +1,161 @@
+"""Raw tracks from a camera to measured outputs: circle, yaw rate, slip angle and speed of every run, with errors.
+
+A run at constant motor speed is a circle with a heading that turns at the same rate,
+
+    x = c_x + R cos α,  y = c_y + R sin α,  heading = h0 + ω_yr t,   α = α0 + ω_yr t,
+
+fitted to all samples of a run at once (least squares; positions and heading weighted by their own scatter). The
+slip angle is that between the heading and the circle's tangent, the speed R |ω_yr|. Samples of a camera are not
+independent: the robot wobbles with its disc. Standard errors are therefore widened by the residuals' correlation
+time. A run that turns by less than LEAST_TURN is fitted by a straight line, and gives a speed and a slip angle
+alone.
+
+The tracked point must be the head's centre (or `tracked_point` will be found). Times in s, lengths in cm, angles
+in degrees, counter-clockwise, seen from above.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import least_squares
+
+from calibration.model import Floats
+from sim.errors import InputError
+from sim.tables import read_table
+
+COLUMNS = ("run", "time_s", "x_cm", "y_cm", "heading_deg")
+LEAST_TURN = math.radians(20)  # of a run, for a circle to be fitted
+_FEWEST = 12  # samples of a run
+
+
+@dataclass(frozen=True)
+class TrackedRun:
+    """What a run's track gives; NaN where it gives nothing; errors are standard errors."""
+
+    omega_yr_rad_s: float
+    omega_yr_error: float
+    R_yr_cm: float
+    R_yr_error: float
+    theta_deg: float
+    theta_error: float
+    v_cm_s: float
+    v_error: float
+
+
+def measure_tracks(
+    tracks: str | Path | pd.DataFrame, runs: str | Path | pd.DataFrame
+) -> tuple[pd.DataFrame, list[str]]:
+    """A table for `calibration.measurements` out of tracks and what was set in each run.
+
+    Args:
+        tracks: run, time_s, x_cm, y_cm, heading_deg, a row a sample.
+        runs: run, N, l_cm, omega_rpm and what else was noted, a row a run.
+
+    Returns:
+        The runs with omega_yr_rad_s, R_yr_cm, theta_deg, v_cm_s and their errors; what was set aside, and why.
+
+    Raises:
+        InputError: a column is missing.
+    """
+    samples = tracks if isinstance(tracks, pd.DataFrame) else read_table(tracks)
+    table = runs if isinstance(runs, pd.DataFrame) else read_table(runs)
+    for name in COLUMNS:
+        if name not in samples:
+            raise InputError(f"the tracks have no column {name!r}; they need {', '.join(COLUMNS)}")
+    if "run" not in table:
+        raise InputError("the runs have no column 'run' that says which track is theirs")
+    aside, found = [], []
+    for run in table["run"]:
+        own = samples[samples["run"] == run][list(COLUMNS[1:])].apply(pd.to_numeric, errors="coerce")
+        bad = int((~np.isfinite(own.to_numpy())).any(axis=1).sum())
+        if bad:
+            aside.append(f"run {run}: {bad} samples with something that is no number")
+        own = own[np.isfinite(own.to_numpy()).all(axis=1)].sort_values("time_s")
+        if len(own) < _FEWEST:
+            aside.append(f"run {run}: {len(own)} samples; a track needs at least {_FEWEST}")
+            found.append(TrackedRun(*[math.nan] * 8))
+            continue
+        found.append(measure_track(*(own[c].to_numpy(dtype=float) for c in COLUMNS[1:])))
+    columns = pd.DataFrame([asdict(p) for p in found], index=table.index)
+    known = [c for c in ("omega_yr_rad_s", "R_yr_cm", "theta_deg", "v_cm_s") if columns[c].notna().any()]
+    errors = [c for c in ("omega_yr_error", "R_yr_error", "theta_error", "v_error") if columns[c].notna().any()]
+    return pd.concat([table, columns[[*known, *errors]]], axis=1), aside
+
+
+def measure_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> TrackedRun:
+    """Circle or line through one track; arrays (m,)."""
+    time = time - time.mean()
+    heading = np.unwrap(np.radians(heading_deg))
+    rate, middle = np.polyfit(time, heading, 1)
+    if abs(rate) * np.ptp(time) < LEAST_TURN:
+        return _line(time, x, y, heading)
+    scatter_h = max(float(np.std(heading - rate * time - middle)), 1e-9)
+    # On the circle the position is linear in (c_x, c_y, R cos α0, R sin α0) for a given rate.
+    turn = np.exp(1j * rate * time)
+    design = np.stack([np.ones_like(turn), turn], 1)
+    centre, arm = np.linalg.lstsq(design, x + 1j * y, rcond=None)[0]
+    scatter = max(float(np.abs(x + 1j * y - centre - arm * turn).std() / math.sqrt(2)), 1e-9)
+    start = [centre.real, centre.imag, abs(arm), np.angle(arm), rate, middle]
+
+    def residual(p: Floats) -> Floats:
+        angle = p[3] + p[4] * time
+        own = [(x - p[0] - p[2] * np.cos(angle)) / scatter, (y - p[1] - p[2] * np.sin(angle)) / scatter]
+        return np.concatenate([*own, (heading - p[5] - p[4] * time) / scatter_h])
+
+    fitted = least_squares(residual, start, x_scale=np.maximum(np.abs(start), 1e-3))
+    covariance = _covariance(np.asarray(fitted.jac), fitted.fun, 3)
+    radius, angle, rate, middle = fitted.x[2:]
+    tangent = angle + math.copysign(math.pi / 2, rate)
+    slip = abs(math.remainder(middle - tangent, 2 * math.pi))
+    slip_error = math.sqrt(covariance[3, 3] + covariance[5, 5] - 2 * covariance[3, 5])
+    speed_error = math.sqrt(
+        rate**2 * covariance[2, 2] + radius**2 * covariance[4, 4] + 2 * abs(rate) * radius * covariance[2, 4]
+        * math.copysign(1, rate)
+    )  # fmt: skip
+    return TrackedRun(
+        float(rate), math.sqrt(covariance[4, 4]), float(radius), math.sqrt(covariance[2, 2]), math.degrees(slip),
+        math.degrees(slip_error), float(abs(rate) * radius), speed_error,
+    )  # fmt: skip
+
+
+def _line(time: Floats, x: Floats, y: Floats, heading: Floats) -> TrackedRun:
+    design = np.stack([np.ones_like(time), time], 1)
+    fits, variances = [], []
+    for values in (x, y, heading):
+        own = np.linalg.lstsq(design, values, rcond=None)[0]
+        fits.append(own)
+        variances.append(_covariance(design, values - design @ own, 1))
+    v_x, v_y = fits[0][1], fits[1][1]
+    speed = math.hypot(v_x, v_y)
+    error = math.sqrt((v_x**2 * variances[0][1, 1] + v_y**2 * variances[1][1, 1]) / speed**2)
+    slip = abs(math.remainder(fits[2][0] - math.atan2(v_y, v_x), 2 * math.pi))
+    slip_error = math.sqrt(variances[2][0, 0] + (error / speed) ** 2)
+    none = math.nan
+    return TrackedRun(none, none, none, none, math.degrees(slip), math.degrees(slip_error), speed, error)
+
+
+def _covariance(J: Floats, residual: Floats, parts: int) -> Floats:
+    """Covariance of a least-squares fit to `parts` series in time, each with its own scatter and correlation."""
+    inverse = np.linalg.pinv(J.T @ J)
+    middle = np.zeros_like(inverse)
+    for rows, own in zip(np.split(J, parts), np.split(residual, parts), strict=True):
+        variance = float(own @ own) / max(len(own) - J.shape[1] / parts, 1)
+        middle += variance * _correlation_time(own) * rows.T @ rows
+    return np.asarray(inverse @ middle @ inverse)
+
+
+def _correlation_time(residual: Floats) -> float:
+    """Integrated autocorrelation time in samples, at least 1 (summed up to its first zero)."""
+    centred = residual - residual.mean()
+    power = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
+    correlation = np.fft.irfft(power)[: len(centred)]
+    if correlation[0] <= 0:
+        return 1.0
+    correlation = correlation / correlation[0]
+    end = int(np.argmax(correlation <= 0)) or len(correlation)
+    return float(max(1.0, 1 + 2 * correlation[1:end].sum()))
