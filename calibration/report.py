@@ -53,6 +53,7 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
         f"Score of each effect after what the coefficients absorb is projected out; claims need more than "
         f"{result.misfit.critical_z:.2f}. General lack of fit: p = {result.misfit.general_p:.3g}."
     )
+    page.figure(draw_evidence(result), "score of each effect against what a claim needs")
     page.table(
         ("effect", "score z", "survived share", "smallest detectable size", "judgement"),
         [
@@ -74,13 +75,51 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
                 ("as given", result.error_uncalibrated, result.errors_by_output["uncalibrated"]),
                 ("calibrated", result.error_before, result.errors_by_output["before"]),
                 ("calibrated, with effects", result.error_after, result.errors_by_output["after"]),
+                ("calibrated, generic correction", result.error_generic, result.errors_by_output["generic"]),
             )
         ],
     )
+    features = ", ".join(result.generic.features) or "no feature"
     page.text(
-        f"95 % interval of the last: {100 * low:.2f} to {100 * high:.2f} %. "
-        f"Noise ceiling from the repeats: {100 * result.noise_ceiling:.2f} %."
+        f"95 % interval with effects: {100 * low:.2f} to {100 * high:.2f} %. "
+        f"Noise ceiling from the repeats: {100 * result.noise_ceiling:.2f} %. "
+        f"Generic correction: {features} (it describes, and explains nothing)."
     )
+    if result.next_runs:
+        page.section("Runs to make next")
+        page.text(
+            "They would tell the first two explanations apart; the last column is how often, by drawing them."
+        )
+        settings = list(result.next_runs[0].settings)
+        page.table(
+            (*settings, "repeats", "separation", "decides"),
+            [
+                (*map(str, r.settings.values()), str(r.repeats), f"{r.separation:.1f}", f"{100 * r.decides:.0f} %")
+                for r in result.next_runs
+            ],
+        )
+
+
+def draw_evidence(result: Verdict) -> Figure:
+    """Score of every effect as a bar, with the critical score; what explains the residual is filled in green."""
+    named = {name for c in result.explaining for name in (c.effect.name, *(e.name for e in c.beside))}
+    ranked = sorted(result.candidates, key=lambda c: abs(c.z))
+    figure = Figure(figsize=(9, 0.8 + 0.24 * len(ranked)))
+    axes = figure.add_subplot()
+    for place, candidate in enumerate(ranked):
+        tested = candidate.refit is not None
+        colour = "#3d9a5f" if candidate.effect.name in named else "#e08a1e" if tested else "#b8c2cc"
+        axes.barh(place, candidate.z, color=colour, height=0.7)
+    for edge in (-result.misfit.critical_z, result.misfit.critical_z):
+        axes.axvline(edge, color="#1c2733", lw=0.8, ls="--")
+    axes.set_yticks(range(len(ranked)), [c.effect.title for c in ranked], fontsize=7)
+    axes.set_xscale("symlog", linthresh=2 * result.misfit.critical_z)
+    axes.tick_params(axis="x", labelsize=8)
+    axes.set_xlabel(
+        "score z (dashed: what a claim needs; green: explains; orange: refitted and rejected)", fontsize=8
+    )
+    figure.tight_layout()
+    return figure
 
 
 def draw_residuals(result: Verdict, data: Measurements) -> Figure:
