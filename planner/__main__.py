@@ -19,7 +19,7 @@ def _plan(arguments: argparse.Namespace) -> None:
     from planner.path import circle, polygon, read_path
     from planner.plan import plan
     from sim.robot import load_robot
-    from surrogate.export import load
+    from surrogate.export import load_table
 
     robot = load_robot(arguments.robot)
     unit = _UNITS[arguments.unit]
@@ -40,7 +40,7 @@ def _plan(arguments: argparse.Namespace) -> None:
     result = plan(
         path.scaled(scale),
         robot,
-        lookup=load(arguments.model),
+        lookup=load_table(arguments.model),
         point=arguments.point,
         corner=arguments.corner,
         minimum_dwell=arguments.min_dwell,

@@ -29,6 +29,7 @@ from sim.errors import InputError
 from sim.robot import Robot
 from surrogate.export import identity, load
 from surrogate.lookup import Lookup
+from surrogate.single import SingleRobot
 
 Point = Literal["head_centre", "head_tip", "pivot"]
 
@@ -82,7 +83,7 @@ def plan(
     path: Path2D | ArrayLike,
     robot: Robot,
     *,
-    lookup: Lookup | None = None,
+    lookup: Lookup | SingleRobot | None = None,
     point: Point = "head_centre",
     corner: Literal["fillet", "error"] = "fillet",
     minimum_dwell: float | None = None,
@@ -94,7 +95,7 @@ def plan(
     Args:
         path: (n, 2) points or a Path2D, lengths in tail lengths l.
         robot: the robot; its motor speed is used in both directions.
-        lookup: trained table; default the shipped one.
+        lookup: trained table, or the table of this one robot; default the shipped one.
         point: which point must follow the path.
         corner: round corners, or refuse them.
         minimum_dwell: shortest time between flips [μ0 l⁴/EI]; default the tails' turn-over time.
@@ -129,7 +130,7 @@ def plan(
 def _finish(
     robot: Robot,
     vehicle: Vehicle,
-    table: Lookup,
+    table: Lookup | SingleRobot,
     point: Point,
     raw: Path2D,
     ref: Reference,

@@ -25,6 +25,7 @@ from sim import planar
 from sim.errors import InputError
 from sim.robot import Robot
 from surrogate.lookup import Lookup
+from surrogate.single import SingleRobot
 
 TURN_OVER = 0.7  # time units that the tails need after a flip
 FROM_REST = 0.5  # share of a lag that straight tails pay: they are half way
@@ -93,7 +94,7 @@ class Vehicle:
         return replace(self, twist=twist, lag=lag)
 
 
-def vehicle_of(robot: Robot, lookup: Lookup) -> Vehicle:
+def vehicle_of(robot: Robot, lookup: Lookup | SingleRobot) -> Vehicle:
     """The vehicle that the look-up table predicts for a robot.
 
     Raises:

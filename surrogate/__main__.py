@@ -3,6 +3,7 @@
 python -m surrogate train DIR --out MODEL            learn a data set
 python -m surrogate query POINTS.csv --out OUT.csv   predict rows, without simulating
 python -m surrogate errors [--model MODEL]           the stored held-out errors
+python -m surrogate robot ROBOT.toml --out T.json    the table of one robot with its effects, for the planner
 """
 
 from __future__ import annotations
@@ -57,6 +58,17 @@ def _errors(arguments: argparse.Namespace) -> None:
     print(error_table(lookup))
 
 
+def _robot(arguments: argparse.Namespace) -> None:
+    from sim.robot import load_robot
+    from surrogate.single import save_single
+    from surrogate.tabulate import tabulate
+
+    table = tabulate(load_robot(arguments.robot))
+    save_single(table, arguments.out)
+    worst = max(error["rms"] for error in table.errors.values())
+    print(f"{len(table.dwells)} dwells, largest error {100 * worst:.2f} % -> {arguments.out}")
+
+
 def main(argv: list[str] | None = None) -> None:
     from surrogate.export import SHIPPED
 
@@ -75,6 +87,10 @@ def main(argv: list[str] | None = None) -> None:
     errors = commands.add_parser("errors", help="print the stored held-out errors")
     errors.add_argument("--model", default=SHIPPED, help="model file (default: the shipped one)")
     errors.set_defaults(run=_errors)
+    robot = commands.add_parser("robot", help="simulate the table of one robot")
+    robot.add_argument("robot", help="robot.toml or the name of a preset")
+    robot.add_argument("--out", required=True, help="JSON to write")
+    robot.set_defaults(run=_robot)
     arguments = parser.parse_args(argv)
     arguments.run(arguments)
 

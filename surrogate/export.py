@@ -18,6 +18,7 @@ from sim.artefact import whole_file
 from sim.errors import InputError
 from surrogate.lookup import Lookup
 from surrogate.network import Ensemble
+from surrogate.single import SingleRobot, load_single
 
 SHIPPED = Path(__file__).parent / "shipped" / "model.pt"
 _FORMAT = 1
@@ -66,8 +67,15 @@ def load(path: str | Path = SHIPPED) -> Lookup:
     )
 
 
-def identity(lookup: Lookup) -> str:
-    """Hash of the weights: tells which model made a plan."""
+def load_table(path: str | Path = SHIPPED) -> Lookup | SingleRobot:
+    """A model file, or the table of one robot (.json)."""
+    return load_single(path) if Path(path).suffix == ".json" else load(path)
+
+
+def identity(lookup: Lookup | SingleRobot) -> str:
+    """Hash of the weights or numbers: tells which table made a plan."""
+    if isinstance(lookup, SingleRobot):
+        return lookup.identity
     digest = hashlib.sha256()
     for name in _NETWORKS:
         for key, value in sorted(getattr(lookup, name).state_dict().items()):

@@ -21,8 +21,10 @@ from calibration.measurements import read_measurements
 from calibration.misfit import check_misfit
 from calibration.model import Runs, start_values
 from calibration.noise import Noise, repeat_covariance, session_variance
+from calibration.steer import draw_steered, gap_closed, steer
 from calibration.swimmer import Swimmer, corrected_robot
 from calibration.synthetic import make_table
+from planner.path import polygon
 from sim.errors import InputError, run_command
 from sim.robot import PRESETS, load_robot
 from tests.calibration import toy
@@ -356,3 +358,18 @@ def test_what_came_out_of_the_measured_tables(name: str, effect: str, size: floa
     assert result.effects == (effect,)
     assert result.final.parameters[effect] == pytest.approx(size, rel=0.05)
     assert result.error_after < 1.15 * result.noise_ceiling
+
+
+def test_the_right_model_brings_the_robot_back_on_its_path() -> None:
+    """A robot with end-over-end drag: planned without it, nearly with it, and with the truth."""
+    truth = replace(PRESETS["paper-control"], effects={"end_over_end_drag": 5.0})
+    models = {
+        "without": replace(truth, effects={}),
+        "nearly": replace(truth, effects={"end_over_end_drag": 4.9}),
+        "truth": truth,
+    }
+    found = steer(models, truth, polygon(4, 2.5))
+    rms = [one.error.rms for one in found.values()]
+    assert rms[0] > 5 * rms[2]
+    assert gap_closed(*rms) > 0.8
+    assert len(draw_steered(found).axes) == 3

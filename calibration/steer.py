@@ -1,0 +1,73 @@
+"""What a corrected model is worth on the path: plan with different models, run every schedule on the true robot.
+
+Each model is tabulated (`surrogate.tabulate`) and plans the same path; the schedule then steers the truth,
+simulated. With a wrong yaw rate the robot leaves the path a little with every dwell, open loop, so errors of a few
+percent in the model are errors of the path's size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from planner.check import TrackingError, tracking_error
+from planner.path import Path2D
+from planner.plan import plan, plan_record
+from sim.replay import Schedule, replay
+from sim.robot import Robot
+from surrogate.tabulate import tabulate
+
+
+@dataclass(frozen=True)
+class Steered:
+    """One model's plan and how the truth followed it; lengths in l."""
+
+    plan: dict[str, Any]  # plan.json
+    error: TrackingError
+    track: NDArray[np.float64]  # (K, 2)
+
+
+def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, Steered]:
+    """Plan `path` with every model and run the schedules on `truth`.
+
+    Args:
+        models: by label; the same robot but for coefficients and effects.
+    """
+    found = {}
+    for label, model in models.items():
+        content = plan_record(plan(path, model, lookup=tabulate(model)))
+        start = tuple(float(content["start"][k]) for k in ("x_over_l", "y_over_l", "heading_rad"))
+        schedule = Schedule(
+            truth.group_values(), int(content["first_direction"]), np.asarray(content["dwell_bar"], dtype=float),
+            start, truth.time_scale,  # type: ignore[arg-type]
+        )  # fmt: skip
+        track = replay([schedule])[0]
+        found[label] = Steered(content, tracking_error(content, track), track[["x_over_l", "y_over_l"]].to_numpy())
+    return found
+
+
+def gap_closed(before: float, after: float, best: float) -> float:
+    """Share of the avoidable error that the correction takes away."""
+    return (before - after) / (before - best)
+
+
+def draw_steered(found: Mapping[str, Steered]) -> Figure:
+    """The tracks side by side, each with the path that its plan declares."""
+    figure = Figure(figsize=(3.7 * len(found), 3.9))
+    for i, (label, one) in enumerate(found.items()):
+        axes = figure.add_subplot(1, len(found), i + 1)
+        reference, raw = np.array(one.plan["reference"]), np.array(one.plan["raw_path"])
+        axes.plot(*raw.T, color="#b8c2cc", lw=1)
+        axes.plot(*reference.T, color="#1c2733", lw=1)
+        axes.plot(*one.track.T, color="#c8452f", lw=1.3)
+        axes.set_aspect("equal")
+        axes.set_title(f"{label}: {one.error.rms:.3f} l rms", fontsize=9)
+        axes.tick_params(labelsize=7)
+        axes.set_xlabel("x / l", fontsize=8)
+    figure.tight_layout()
+    return figure

@@ -1,0 +1,91 @@
+"""A table of one robot: its response to a switch at some dwell times, simulated, for the planner.
+
+The shipped look-up table covers a domain of robots without effects. A robot that calibration has corrected may lie
+outside; a few dozen simulated switches of that robot alone (`surrogate.tabulate`, seconds) serve the planner as
+well. Between dwell times lags are interpolated (monotone cubic in ln T̄); planning itself still simulates nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from sim import planar
+from sim.artefact import write_text
+from sim.errors import InputError
+from sim.robot import DWELL
+
+LAGS = ("lag_z", "lag_x", "lag_psi_rad")
+
+
+@dataclass(frozen=True)
+class SingleRobot:
+    """Steady motion and lags of one robot; what the planner asks of a `surrogate.lookup.Lookup`."""
+
+    robot: dict[str, float]  # dimensionless groups, effects among them
+    steady: dict[str, float]  # columns of `sim steady`, positive motor
+    dwells: list[float]
+    lags: list[list[float]]  # (K, 3): Δz, Δx, Δψ
+    errors: dict[str, dict[str, float]]  # output -> {"rms"}, from dwells between those of the table
+    provenance: dict[str, Any]
+
+    @property
+    def domain(self) -> dict[str, tuple[float, float]]:
+        """Range of every input: one value, but for the dwell."""
+        own = {name: (value, value) for name, value in self.robot.items()}
+        return {**own, DWELL: (self.dwells[0], self.dwells[-1])}
+
+    @property
+    def identity(self) -> str:
+        """Hash of the numbers."""
+        return hashlib.sha256(json.dumps([self.robot, self.steady, self.lags]).encode()).hexdigest()[:16]
+
+    def query(self, columns: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        """Outputs (M,) of this robot; `dwell_bar` asks for the response as well.
+
+        Raises:
+            InputError: another robot, or a dwell outside the table.
+        """
+        count = len(next(iter(columns.values())))
+        for name, values in columns.items():
+            low, high = self.domain.get(name, (0.0, 0.0))
+            slack = 1e-9 * max(abs(low), abs(high), 1.0)
+            for value in values[(values < low - slack) | (values > high + slack)][:1]:
+                allowed = f"{low:g} to {high:g}" if high > low else f"{low:g} only"
+                raise InputError(
+                    f"{name} = {value:g} is outside this robot's table ({allowed}); make its own table"
+                )
+        found = {name: np.full(count, value) for name, value in self.steady.items()}
+        if DWELL in columns:
+            lag = PchipInterpolator(np.log(self.dwells), np.array(self.lags))(np.log(columns[DWELL]))
+            found |= dict(zip(LAGS, lag.T, strict=True))
+            twist = np.stack([found["v_z"], found["v_x"], found["omega_yr_bar"]], -1)
+            found["net_speed_bar"] = planar.net_speed(twist, lag, np.asarray(columns[DWELL], dtype=float))
+        return found
+
+
+def save_single(table: SingleRobot, path: str | Path) -> None:
+    """Write a table of one robot as JSON."""
+    write_text(path, json.dumps(asdict(table), indent=1) + "\n")
+
+
+def load_single(path: str | Path) -> SingleRobot:
+    """Read a table of one robot.
+
+    Raises:
+        InputError: the file is none.
+    """
+    try:
+        return SingleRobot(**json.loads(Path(path).read_text()))
+    except (json.JSONDecodeError, TypeError) as broken:
+        raise InputError(
+            f"{path} is no table of a robot: {broken}; make one with python -m surrogate robot"
+        ) from None
