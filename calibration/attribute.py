@@ -76,6 +76,7 @@ def examine(
     level: float,
     seed: int,
     beside: tuple[Parameter, ...] = (),
+    progress: bool = True,
 ) -> list[Candidate]:
     """Refit and judge every effect, best score first; `given` is where refits start if the fit ran away.
 
@@ -106,7 +107,7 @@ def examine(
             {**_sane(model, base.parameters, given), effect.name: guess},
             (*base.names, effect.name),
             used,
-            title=f"fit with {effect.title}",
+            title=f"fit with {effect.title}" if progress else "",
         )
         after = check_misfit(refit, model.runs, used, np.zeros((*along.shape[:2], 0)), level=level, seed=seed + 1)
         gain, error = _session_gain(model, base, refit, used)
@@ -131,14 +132,16 @@ def pairs(
     *,
     level: float,
     seed: int,
+    progress: bool = True,
 ) -> list[Candidate]:
     """Second effects beside the best refits of single ones."""
     refitted = [c for c in found if c.refit is not None]
     second: list[Candidate] = []
     for first in sorted(refitted, key=_chi_square)[:_FIRST]:
         assert first.refit is not None
+        title = "second effects" if progress else ""
         others = tuple(e for e in model.effects if e.name != first.effect.name)
-        along = directions(model, first.refit.parameters, first.refit.prediction, others, title="second effects")
+        along = directions(model, first.refit.parameters, first.refit.prediction, others, title=title)
         misfit = check_misfit(first.refit, model.runs, used, along, level=level, seed=seed + 2)
         second += examine(
             model,

@@ -115,10 +115,12 @@ def close(model: Model, *, level: float = LEVEL, seed: int = 0, progress: bool =
     misfit = check_misfit(base, data, used, along, level=level, seed=seed)
     found: list[Candidate] = []
     if misfit.p_value < level:
-        found = examine(model, base, misfit, effects, along, used, start, level=level, seed=seed)
+        found = examine(
+            model, base, misfit, effects, along, used, start, level=level, seed=seed, progress=progress
+        )
     best = explaining(found)
     if misfit.p_value < level and not best:
-        best = explaining(pairs(model, found, used, start, level=level, seed=seed))
+        best = explaining(pairs(model, found, used, start, level=level, seed=seed, progress=progress))
     verdict = "none" if misfit.p_value >= level else ("unexplained", "effect", "ambiguous")[min(len(best), 2)]
     final = best[0].refit if best and best[0].refit else base
     generic = correct(data, base.prediction, used)
