@@ -19,6 +19,7 @@ from sim.errors import InputError, run_command
 def _close(arguments: argparse.Namespace) -> None:
     from calibration.loop import close, verdict_record
     from calibration.measurements import read_measurements
+    from calibration.protocols import PROTOCOLS
     from calibration.report import write_report
     from calibration.swimmer import Swimmer, corrected_robot
     from sim.artefact import write_text
@@ -28,11 +29,12 @@ def _close(arguments: argparse.Namespace) -> None:
     data = read_measurements(arguments.table)
     for line in data.set_aside:
         print(f"set aside: {line}", file=sys.stderr)
-    result = close(Swimmer(robot, data, arguments.jobs), seed=arguments.seed)
+    data, locked = PROTOCOLS[arguments.protocol](data)
+    result = close(Swimmer(robot, data, arguments.jobs), locked=locked, seed=arguments.seed)
     out = Path(arguments.out)
     record = verdict_record(result, table=Path(arguments.table).name)
     write_report(result, data, out / "report.html", title=Path(arguments.table).name)
-    write_text(out / "corrected.toml", robot_toml(corrected_robot(robot, result.final.parameters)))
+    write_text(out / "corrected.toml", robot_toml(corrected_robot(robot, result.delivered)))
     write_text(out / "verdict.json", json.dumps(record, indent=1) + "\n")
     print(result.sentence)
     print(
@@ -89,6 +91,9 @@ def main(argv: list[str] | None = None) -> None:
     close.add_argument("table", help="CSV of measured runs")
     close.add_argument("--robot", required=True, help="robot.toml or the name of a preset")
     close.add_argument("--out", required=True, help="folder to write")
+    close.add_argument(
+        "--protocol", choices=("session", "paper"), default="session", help="what is fitted and tested"
+    )
     close.add_argument("--seed", type=int, default=0, help="of the bootstrap")
     close.add_argument("--jobs", type=int, help="processes (default: all processors)")
     close.set_defaults(run=_close)

@@ -3,13 +3,13 @@
 Every effect that the runs can test is a candidate. One whose score passes the critical |z| (`calibration.misfit`),
 in the direction that its bounds allow, is refitted together with the coefficients in the model, and kept if
 
-    the residual that it leaves passes the general lack-of-fit tests (at a fifth of the level, since a
-    true effect must not be lost once in twenty times),
+    the residual that it leaves passes the general tests and the scores of all other effects (at half of the
+    level, since a true effect must not be lost too often),
     its interval excludes the null, and
     it predicts left-out sessions better, by more than the uncertainty of that gain.
 
-Kept effects whose χ² differ by less than what one parameter gains by chance (3.84) cannot be told apart. Where
-none alone is kept, each of the best few is taken as given and a second one is looked for in the same way
+Kept effects whose deviances differ by less than what one parameter gains by chance (3.84) cannot be told apart.
+Where none alone is kept, each of the best few is taken as given and a second one is looked for in the same way
 (`pairs`).
 """
 
@@ -24,7 +24,7 @@ from calibration.fit import Fit, fit
 from calibration.misfit import TESTABLE, Misfit, check_misfit
 from calibration.model import Floats, Model, Parameter, Parameters
 
-_DERIVATIVE_STEP = 0.1  # in units of an effect's typical size
+_DRAWS = 400  # for a remainder, which is judged at a coarser level
 _FIRST = 3  # single effects beside which a second one is looked for
 _INDISTINGUISHABLE = 3.84  # χ² with one degree of freedom, 95 %
 
@@ -47,21 +47,6 @@ class Candidate:
     @property
     def kept(self) -> bool:
         return self.verdict == "kept"
-
-
-def directions(
-    model: Model, parameters: Parameters, prediction: Floats, effects: tuple[Parameter, ...], *, title: str
-) -> Floats:
-    """∂f/∂ε at `parameters`, (n, k, e)."""
-    if not effects:
-        return np.zeros((*prediction.shape, 0))
-    widths = np.array([_DERIVATIVE_STEP * e.typical for e in effects])
-    sets = [
-        {**parameters, effect.name: parameters[effect.name] + width}
-        for effect, width in zip(effects, widths.tolist(), strict=True)
-    ]
-    moved = model.predict(sets, title=title)
-    return np.moveaxis((moved - prediction) / widths[:, None, None], 0, -1)
 
 
 def examine(
@@ -109,11 +94,13 @@ def examine(
             used,
             title=f"fit with {effect.title}" if progress else "",
         )
-        after = check_misfit(refit, model.runs, used, np.zeros((*along.shape[:2], 0)), level=level, seed=seed + 1)
+        after = check_misfit(
+            refit, model.runs, used, np.delete(along, j, -1), level=level, seed=seed + 1, draws=_DRAWS
+        )
         gain, error = _session_gain(model, base, refit, used)
         ends = refit.interval(effect.name)
-        if after.general_p < level / 5:
-            reason = f"leaves a residual (p = {after.general_p:.3g})"
+        if after.p_value < level / 2:
+            reason = f"leaves a residual (p = {after.p_value:.3g})"
         elif ends[0] <= effect.start <= ends[1]:
             reason = "its interval includes the null"
         elif gain <= error:
@@ -137,11 +124,11 @@ def pairs(
     """Second effects beside the best refits of single ones."""
     refitted = [c for c in found if c.refit is not None]
     second: list[Candidate] = []
-    for first in sorted(refitted, key=_chi_square)[:_FIRST]:
+    for first in sorted(refitted, key=_deviance)[:_FIRST]:
         assert first.refit is not None
         title = "second effects" if progress else ""
         others = tuple(e for e in model.effects if e.name != first.effect.name)
-        along = directions(model, first.refit.parameters, first.refit.prediction, others, title=title)
+        along = model.derivatives(first.refit.parameters, [e.name for e in others], title=title)[1]
         misfit = check_misfit(first.refit, model.runs, used, along, level=level, seed=seed + 2)
         second += examine(
             model,
@@ -171,13 +158,13 @@ def _sane(model: Model, fitted: Parameters, given: Parameters) -> dict[str, floa
 
 def explaining(found: list[Candidate]) -> list[Candidate]:
     """Kept effects that the data cannot tell from the best of them, best first."""
-    kept = sorted((c for c in found if c.kept and c.refit), key=lambda c: _chi_square(c))
-    return [c for c in kept if _chi_square(c) - _chi_square(kept[0]) < _INDISTINGUISHABLE]
+    kept = sorted((c for c in found if c.kept and c.refit), key=lambda c: _deviance(c))
+    return [c for c in kept if _deviance(c) - _deviance(kept[0]) < _INDISTINGUISHABLE]
 
 
-def _chi_square(candidate: Candidate) -> float:
+def _deviance(candidate: Candidate) -> float:
     assert candidate.refit is not None
-    return candidate.refit.chi_square
+    return candidate.refit.deviance
 
 
 def _session_gain(model: Model, base: Fit, refit: Fit, used: NDArray[np.bool_]) -> tuple[float, float]:

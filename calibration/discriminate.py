@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from calibration.fit import Fit, jacobian
+from calibration.fit import Fit
 from calibration.model import Floats, Model
 
 _DRAWS = 4000
@@ -47,7 +47,7 @@ class NextRun:
 def next_runs(model: Model, first: Fit, second: Fit, *, count: int = 3, seed: int = 0) -> list[NextRun]:
     """The best experiments to tell two fits apart, best first."""
     possible, settings = model.possible()
-    sides = [jacobian(possible, fit.parameters, fit.names) for fit in (first, second)]
+    sides = [possible.derivatives(fit.parameters, fit.names) for fit in (first, second)]
     noise = (first.noise.run + second.noise.run) / 2
     difference = sides[0][0] - sides[1][0]
     rivals = list(zip((first, second), sides, strict=True))

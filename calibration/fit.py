@@ -1,10 +1,13 @@
 """Generalised least squares of a forward model, each parameter on its own scale.
 
-Gauss-Newton with a Jacobian by finite differences in the model (all perturbed models in one batch):
+Gauss-Newton with the model's own derivatives:
 
     θ ← θ + (JᵀΣ⁻¹J)⁻¹ JᵀΣ⁻¹ (y − f(θ)),   θ = (ln C_1, …, ε_1, …).
 
-Parameters stay within their bounds. The covariance of the parameters is (JᵀΣ⁻¹J)⁻¹; intervals are 95 %.
+Parameters stay within their bounds. The covariance of the parameters is V = (JᵀΣ⁻¹J)⁻¹; intervals are 95 %, by
+Student's t with the degrees of freedom that the scatter ρ of a few sessions leaves (Satterthwaite 1946),
+
+    ν = 2 V² / (V′² Var ρ),   Var ρ ≈ 2 (ρ + 1/n)² / (k (s − 1)),   n runs in each of s sessions.
 """
 
 from __future__ import annotations
@@ -14,16 +17,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from calibration.model import Floats, Model, Parameter, Parameters, moved, parameter
-from calibration.noise import Noise, repeat_covariance, session_variance
+from calibration.noise import Noise, Sums, inverse_root, least_squares, repeat_covariance, sums
 
-_LOG_STEP, _STEP = 0.05, 0.1  # finite difference: in ln C, in units of a typical size
 _MOST_STEPS = 8
 _SHORT = 0.1  # a step below this in ln C (or in ε) keeps the Jacobian
 _SMALL = 0.1  # in standard deviations: a step below this ends the iteration
 _LARGEST = 0.7  # change of ln C in one step
-Z95 = 1.96
+_PASSES = 3  # of the scatter of the sessions
 
 
 @dataclass(frozen=True)
@@ -33,10 +36,11 @@ class Fit:
     parameters: dict[str, float]
     fitted: tuple[Parameter, ...]  # in the order of the covariance
     covariance: Floats  # (p, p) of (ln C, ε)
+    freedom: Floats  # (p,) degrees of freedom of the intervals
     prediction: Floats  # (n, k)
     jacobian: Floats  # (n, k, p)
     noise: Noise
-    chi_square: float  # rᵀ Σ⁻¹ r over the fitted runs
+    deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
     steps: int
 
     @property
@@ -47,26 +51,10 @@ class Fit:
         """95 % interval of a parameter."""
         value = self.parameters[name]
         place = self.names.index(name)
-        half = Z95 * math.sqrt(self.covariance[place, place])
+        half = float(student.ppf(0.975, self.freedom[place])) * math.sqrt(self.covariance[place, place])
         if self.fitted[place].logarithmic:
             return value * math.exp(-half), value * math.exp(half)
         return value - half, value + half
-
-
-def jacobian(
-    model: Model, parameters: Parameters, names: tuple[str, ...], *, title: str = ""
-) -> tuple[Floats, Floats]:
-    """Prediction (n, k) and its derivative (n, k, p) on the parameters' own scales at `parameters`."""
-    sets, widths = [dict(parameters)], []
-    for name in names:
-        one = parameter(model, name)
-        width = _LOG_STEP if one.logarithmic else _STEP * abs(one.typical)
-        if moved(one, parameters[name], 2 * width) == one.bounds[1]:  # downwards where the bound is near
-            width = -width
-        sets.append({**parameters, name: moved(one, parameters[name], width)})
-        widths.append(width)
-    found = model.predict(sets, title=title)
-    return found[0], np.moveaxis((found[1:] - found[0]) / np.array(widths)[:, None, None], 0, -1)
 
 
 def fit(
@@ -83,26 +71,23 @@ def fit(
     """
     data = model.runs
     run = repeat_covariance(data.y[used], data.condition[used])
+    root = inverse_root(run)
     parameters = dict(start)
     derivative = np.empty(0)
     fresh = True  # the Jacobian must be computed
     for count in range(1, _MOST_STEPS + 1):
         label = f"{title}, step {count}" if title else ""
         if fresh:
-            prediction, derivative = jacobian(model, parameters, names, title=label)
+            prediction, derivative = model.derivatives(parameters, names, title=label)
         else:
             prediction = model.predict([parameters], title=label)[0]
         residual = data.y - prediction
-        # Linear fit; near the end with the session variance that its own residuals imply. Far from the
-        # solution every session looks shifted, and a large τ² would hide what pulls towards it.
-        noise = Noise(run, np.zeros(len(run)))
-        for _ in range(1 if count == 1 else 3):
-            white = noise.whitener(data.session[used])
-            J, r = white(derivative[used]), white(residual[used])
-            covariance: Floats = np.asarray(np.linalg.pinv(J.T @ J), dtype=np.float64)
-            step = covariance @ (J.T @ r)
-            left = residual[used] - derivative[used] @ step
-            noise = Noise(run, session_variance(left, data.session[used], run))
+        # Near the end with the scatter of sessions that the fit's own residuals imply. Far from the solution
+        # every session looks shifted, and a large ρ would hide what pulls towards it.
+        table = np.concatenate([derivative, residual[..., None]], -1)[used]
+        products = sums(root @ table, data.session[used], len(run))
+        linear = least_squares(products, passes=0 if count == 1 else _PASSES)
+        covariance, step = linear.covariance, linear.step
         size = float(np.max(np.abs(step) / np.sqrt(np.diag(covariance))))
         new = _move(model, parameters, names, step)
         stuck = all(abs(new[name] / parameters[name] - 1) < 1e-3 for name in names if parameters[name])
@@ -110,9 +95,24 @@ def fit(
             break
         parameters = new
         fresh = bool(np.abs(step).max() > _SHORT) and count + 1 < _MOST_STEPS
-    r = noise.whitener(data.session[used])(residual[used])
+    noise = Noise(run, float(linear.share))
+    spread = len(run) * np.log1p(linear.share * products.sizes).sum()
+    deviance = float(products.at(linear.share)[-1, -1] + spread)
     fitted = tuple(parameter(model, name) for name in names)
-    return Fit(parameters, fitted, covariance, prediction, derivative, noise, float(r @ r), count)
+    freedom = _freedom(products, float(linear.share), len(names))
+    return Fit(parameters, fitted, covariance, freedom, prediction, derivative, noise, deviance, count)
+
+
+def _freedom(products: Sums, share: float, count: int) -> Floats:
+    """Degrees of freedom of the parameters' variances, (p,)."""
+    step = 0.01 * share + 1e-3 / products.sizes.mean()
+    inverse = [
+        np.linalg.pinv(products.at(np.array(s))[:count, :count], hermitian=True) for s in (share, share + step)
+    ]
+    V, moved = (np.maximum(np.diag(i), 1e-300) for i in inverse)
+    sessions = len(products.sizes)
+    spread = 2 * (share + 1 / products.sizes.mean()) ** 2 / (products.outputs * max(sessions - 1, 1))
+    return np.asarray(np.clip(2 * V**2 / np.maximum(((moved - V) / step) ** 2 * spread, 1e-12 * V**2), 1.0, 1e6))
 
 
 def _move(model: Model, parameters: dict[str, float], names: tuple[str, ...], step: Floats) -> dict[str, float]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.features import features
 from calibration.model import Floats, Runs
 from calibration.noise import repeat_covariance
 
@@ -29,7 +30,7 @@ class Generic:
 
 def correct(runs: Runs, prediction: Floats, used: NDArray[np.bool_]) -> Generic:
     """Learn the residual of `prediction` (n, k) from the runs in `used` (n,)."""
-    names, table = _features(runs, used)
+    names, table = features(runs, used)
     scale = np.sqrt(np.diag(repeat_covariance(runs.y[used], runs.condition[used])))
     residual = (runs.y - prediction) / scale
     chosen: list[int] = []
@@ -47,21 +48,6 @@ def correct(runs: Runs, prediction: Floats, used: NDArray[np.bool_]) -> Generic:
     weights = _weights(table[used][:, chosen], residual[used])
     correction = _with_constant(table[:, chosen]) @ weights * scale if chosen else np.zeros_like(residual)
     return Generic(tuple(names[i] for i in chosen), correction)
-
-
-def _features(runs: Runs, used: NDArray[np.bool_]) -> tuple[list[str], Floats]:
-    """Inputs that differ, their squares and products, standardised on the used runs, (n, f)."""
-    spread = runs.inputs[used].std(0)
-    own = np.flatnonzero(spread > 1e-9)
-    inputs = (runs.inputs[:, own] - runs.inputs[used][:, own].mean(0)) / spread[own]
-    names, columns = [runs.input_names[i] for i in own], list(inputs.T)
-    for i in range(len(own)):
-        for j in range(i, len(own)):
-            product = inputs[:, i] * inputs[:, j]
-            if product[used].std() > 1e-9:
-                names.append(f"{names[i]} × {names[j]}" if i != j else f"({names[i]})²")
-                columns.append((product - product[used].mean()) / product[used].std())
-    return names, np.stack(columns, 1)
 
 
 def _with_constant(table: Floats) -> Floats:

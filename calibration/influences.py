@@ -9,13 +9,14 @@ column cannot test the influence that needs it, and says so.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from calibration.model import Parameter
 from sim.effects import Effect, catalogue
 
 SLIP, TRACKED_POINT = "motor_slip", "tracked_point"
+CURRENT = ("current_along_x", "current_along_y")
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,9 @@ def influences() -> dict[str, Influence]:
     point = Parameter(
         TRACKED_POINT, "tracked point off the head's centre", 0.0, (-2.0, 2.0), 0.1, unit="L, forward"
     )
+    for name, axis in zip(CURRENT, "xy", strict=True):
+        current = Parameter(name, f"current in the tank along {axis}", 0.0, (-0.05, 0.05), 0.001, unit="m/s")
+        found[name] = Influence(current, None, f"heading_{axis}", False)
     found[SLIP] = Influence(slip, None, None, False)
     found[TRACKED_POINT] = Influence(point, None, None, False)
     return dict(sorted(found.items()))
@@ -71,8 +75,12 @@ def _plain(effect: Effect) -> Influence:
     return Influence(parameter, effect.name, None, effect.symmetry == "odd")
 
 
-def reason_untestable(influence: Influence, columns: Mapping[str, object], both_directions: bool) -> str:
+def reason_untestable(
+    influence: Influence, columns: Mapping[str, object], both_directions: bool, outputs: Sequence[str]
+) -> str:
     """Why a table cannot test an influence; empty if it can."""
+    if influence.name in CURRENT and "v" not in outputs:
+        return "needs v_cm_s"
     if influence.needs is not None and influence.needs not in columns:
         return f"needs {_COLUMNS[influence.needs]}"
     if influence.odd and not both_directions:
@@ -83,5 +91,7 @@ def reason_untestable(influence: Influence, columns: Mapping[str, object], both_
 _COLUMNS = {
     "elapsed_h": "elapsed_min, differing between the runs",
     "temperature_K": "temperature_C, differing between the runs",
+    "heading_x": "heading_deg, differing between the runs",
+    "heading_y": "heading_deg, differing between the runs",
     "head_over_tank": "tank_diameter_cm, differing between the runs",
 }

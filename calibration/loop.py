@@ -1,6 +1,7 @@
 """The whole loop: split, fit, test, attribute, refit, and open the locked test once.
 
-1. One whole session is locked away before anything is looked at (`locked_session`); rows are never split.
+1. Whole sessions are locked away before anything is looked at (`calibration.protocols`; by default the middle
+   one); rows are never split.
 2. Covariance from the repeats and the sessions (`calibration.noise`).
 3. Fit of the coefficients to the other sessions (`calibration.fit`).
 4. Lack of fit, kernel score and projected scores (`calibration.misfit`).
@@ -8,8 +9,10 @@
 6. Verdict: "none" (no departure beyond noise), "effect" (one explains it), "ambiguous" (several do and the runs
    cannot tell them apart), "unexplained" (there is a departure, and no effect in the catalogue explains it).
 7. Where no single effect explains it, pairs; where several do, the runs that would tell them apart.
-8. Errors on the locked session: as given, calibrated, with the effect, with a generic correction of the calibrated
-   model (`calibration.generic`), and the noise ceiling.
+8. Errors on the locked runs: as given, calibrated, with the effect, with a generic correction of the calibrated
+   model (`calibration.generic`), and the noise ceiling; and whether they agree with the final model
+   (`calibration.locked`).
+9. For use, the model is fitted once more to all runs, the locked ones included.
 """
 
 from __future__ import annotations
@@ -20,12 +23,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.attribute import Candidate, directions, examine, explaining, pairs
+from calibration.attribute import Candidate, examine, explaining, pairs
 from calibration.discriminate import NextRun, next_runs
 from calibration.fit import Fit, fit
 from calibration.generic import Generic, correct
+from calibration.locked import error_interval, errors, fitted_to_all, locked_p_value
 from calibration.misfit import DRAWS, Misfit, check_misfit
-from calibration.model import Floats, Model, Parameter, Runs, start_values
+from calibration.model import Floats, Model, Parameter, start_values
+from calibration.protocols import middle_session
 from sim.artefact import fingerprint, provenance
 
 LEVEL = 0.05  # α of every claim
@@ -50,8 +55,10 @@ class Verdict:
     error_after: float
     error_after_interval: tuple[float, float]
     noise_ceiling: float
+    locked_p: float  # agreement of the locked runs with the final model
+    delivered: dict[str, float]  # parameters of the final model fitted to all runs
     errors_by_output: dict[str, dict[str, float]]
-    locked: str
+    locked: str  # names of the sessions
     used: NDArray[np.bool_]
     uncalibrated: Floats  # (n, k) prediction of the model as given
     untestable: dict[str, str]  # effects that these runs cannot test: what is missing
@@ -84,34 +91,38 @@ class Verdict:
         return f"There is a residual ({p}) that no effect and no pair of effects of the catalogue explains."
 
 
-def locked_session(data: Runs) -> int:
-    """The session kept for the test: the middle one by name, so that it is interpolated to."""
-    return len(data.session_names) // 2
-
-
-def close(model: Model, *, level: float = LEVEL, seed: int = 0, progress: bool = True) -> Verdict:
+def close(
+    model: Model,
+    *,
+    locked: NDArray[np.bool_] | None = None,
+    level: float = LEVEL,
+    seed: int = 0,
+    progress: bool = True,
+) -> Verdict:
     """Close the loop on a model's runs.
 
     Args:
         model: its parameters' starts are the model "as given" (uncalibrated).
+        locked: (n,) runs kept for the test, whole sessions; default `protocols.middle_session`.
         level: α of every claim.
         seed: of the bootstrap; the result is deterministic given it.
         progress: show bars.
     """
     data, effects = model.runs, model.effects
+    used = ~(middle_session(data) if locked is None else locked)
+    test = ", ".join(data.session_names[s] for s in np.unique(data.session[~used]))
     fixed = {
         "level": level,
         "seed": seed,
         "catalogue": [e.name for e in effects],
-        "locked": data.session_names[locked_session(data)],
+        "locked": test,
     }
-    used = data.session != locked_session(data)
     start = start_values(model)
     coefficients = tuple(p.name for p in model.coefficients)
     guess = model.guess(dict(start), used)
     uncalibrated = model.predict([start], title="as given" if progress else "")[0]
     base = fit(model, guess, coefficients, used, title="fit" if progress else "")
-    along = directions(model, base.parameters, base.prediction, effects, title="effects" if progress else "")
+    along = model.derivatives(base.parameters, [e.name for e in effects], title="effects" if progress else "")[1]
     misfit = check_misfit(base, data, used, along, level=level, seed=seed)
     found: list[Candidate] = []
     if misfit.p_value < level:
@@ -127,8 +138,8 @@ def close(model: Model, *, level: float = LEVEL, seed: int = 0, progress: bool =
     ahead: list[NextRun] = []
     if len(best) > 1 and best[0].refit and best[1].refit:
         ahead = next_runs(model, best[0].refit, best[1].refit, seed=seed)
-    errors = {
-        name: _errors(data, prediction, ~used)
+    error = {
+        name: errors(data, prediction, ~used)
         for name, prediction in (
             ("uncalibrated", uncalibrated),
             ("before", base.prediction),
@@ -145,16 +156,18 @@ def close(model: Model, *, level: float = LEVEL, seed: int = 0, progress: bool =
         final=final,
         misfit=misfit,
         candidates=tuple(found) or _unexamined(misfit, effects),
-        error_uncalibrated=errors["uncalibrated"][0],
-        error_before=errors["before"][0],
-        error_generic=errors["generic"][0],
+        error_uncalibrated=error["uncalibrated"][0],
+        error_before=error["before"][0],
+        error_generic=error["generic"][0],
         generic=generic,
         next_runs=tuple(ahead),
-        error_after=errors["after"][0],
-        error_after_interval=_interval(data, final.prediction, ~used, seed),
+        error_after=error["after"][0],
+        error_after_interval=error_interval(data, final.prediction, ~used, seed),
         noise_ceiling=ceiling,
-        errors_by_output={k: v[1] for k, v in errors.items()},
-        locked=data.session_names[locked_session(data)],
+        errors_by_output={k: v[1] for k, v in error.items()},
+        locked_p=locked_p_value(final, data, ~used, seed=seed + 3),
+        delivered=fitted_to_all(model, final),
+        locked=test,
         used=used,
         uncalibrated=uncalibrated,
         untestable=dict(model.untestable),
@@ -172,29 +185,16 @@ def _unexamined(misfit: Misfit, effects: tuple[Parameter, ...]) -> tuple[Candida
     )  # fmt: skip
 
 
-def _errors(data: Runs, prediction: Floats, rows: NDArray[np.bool_]) -> tuple[float, dict[str, float]]:
-    """Relative rms over runs and outputs (θ in rad), and per output."""
-    square = ((data.y - prediction)[rows] ** 2).mean(0)
-    each = dict(zip(data.outputs, np.sqrt(square).tolist(), strict=True))
-    return float(np.sqrt(square.mean())), each
-
-
-def _interval(data: Runs, prediction: Floats, rows: NDArray[np.bool_], seed: int) -> tuple[float, float]:
-    """95 % interval of the relative rms by resampling conditions."""
-    square = ((data.y - prediction)[rows] ** 2).mean(1)
-    condition = data.condition[rows]
-    kinds = np.unique(condition)
-    means = np.array([square[condition == c].mean() for c in kinds])
-    rng = np.random.default_rng(seed)
-    drawn = np.sqrt(means[rng.integers(0, len(kinds), (2000, len(kinds)))].mean(1))
-    return float(np.quantile(drawn, 0.025)), float(np.quantile(drawn, 0.975))
-
-
 def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
     """verdict.json."""
     final = result.final
     parameters = {
-        name: {"value": final.parameters[name], "interval": list(final.interval(name))} for name in final.names
+        name: {
+            "value": final.parameters[name],
+            "interval": list(final.interval(name)),
+            "value_all_runs": result.delivered[name],
+        }
+        for name in final.names
     }
     return {
         "verdict": result.verdict,
@@ -209,8 +209,8 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "noise_ceiling": result.noise_ceiling,
         "errors_by_output": result.errors_by_output,
         "p_value": result.misfit.p_value,
-        "p_lack_of_fit": result.misfit.general_p,
-        "p_scores": result.misfit.score_p,
+        "p_general": result.misfit.general_p,
+        "p_of_each_test": result.misfit.p,
         "critical_z": result.misfit.critical_z,
         "candidates": [
             {
@@ -219,7 +219,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
                 "survived_share": c.survived,
                 "smallest_detectable": c.detectable,
                 "size": c.refit.parameters[c.effect.name] if c.refit else None,
-                "chi_square": c.refit.chi_square if c.refit else None,
+                "deviance": c.refit.deviance if c.refit else None,
                 "session_gain": [c.gain, c.gain_error],
                 "verdict": c.verdict,
             }
@@ -229,6 +229,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "generic_features": list(result.generic.features),
         "next_runs": [run.record() for run in result.next_runs],
         "locked_test": result.locked,
+        "locked_p_value": result.locked_p,
         "fixed_before": result.plan_hash,
         "rows_set_aside": list(result.set_aside),
         "table": table,

@@ -5,9 +5,9 @@ Needed: N, l_cm, omega_rpm (head relative to tails, signed) and some of the outp
     omega_h_rpm, omega_t_rpm, omega_yr_rad_s (signed), R_yr_cm, theta_deg, v_cm_s (of the head's centre),
 
 and more runs than one per condition, so that the noise can be told from the repeats. `session` groups runs
-made together; where it is missing, runs of one N count as one session. elapsed_min, temperature_C and
-tank_diameter_cm open effects to test that need them. Rows that cannot be used are set aside by number and reason,
-never dropped in silence.
+made together; where it is missing, runs of one N count as one session. elapsed_min, temperature_C,
+tank_diameter_cm and heading_deg (direction of the path in the lab, where a run is a part of a circle) open effects
+to test that need them. Rows that cannot be used are set aside by number and reason, never dropped in silence.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians.
 A wrong sign is a bad row, since the motor's direction sets the sign of all of them.
@@ -41,7 +41,7 @@ OUTPUTS = {
 }
 _ERRORS = ("omega_yr_error", "R_yr_error", "theta_error", "v_error")  # of `calibration.tracks`; repeats tell more
 _INPUTS = ("N", "l_cm", "omega_rpm")
-_NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm")
+_NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm", "heading_deg")
 _KNOWN = {*_INPUTS, *(c for c, _, _ in OUTPUTS.values()), "run", "trial", "session", *_NOTED, *_ERRORS}
 _FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
 
@@ -54,7 +54,7 @@ class Measurements(Runs):
     length: Floats  # (n,) tail length [m]
     omega: Floats  # (n,) motor speed, signed [rad/s]
     noted: Floats  # (n, c) what was noted and differs between the runs, by `noted_names`
-    noted_names: tuple[str, ...]  # elapsed_h, temperature_K (above the mean), tank_diameter
+    noted_names: tuple[str, ...]  # elapsed_h, temperature_K (above the mean), tank_diameter, heading_x, heading_y
 
 
 def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
@@ -132,6 +132,10 @@ def _noted(good: pd.DataFrame) -> dict[str, Floats]:
             value = good[column].to_numpy(dtype=float) * scale
             if np.isfinite(value).all() and np.ptp(value) > 0:
                 found[name] = value - value.mean() if name == "temperature_K" else value
+    if "heading_deg" in good:
+        value = np.radians(good["heading_deg"].to_numpy(dtype=float))
+        if np.isfinite(value).all() and np.ptp(value) > 0:
+            found["heading_x"], found["heading_y"] = np.cos(value), np.sin(value)
     return found
 
 

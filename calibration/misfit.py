@@ -1,14 +1,21 @@
-"""Is the residual more than noise? Lack of fit and projected scores, by one parametric bootstrap.
+"""Is the residual more than noise? General tests and projected scores, by one parametric bootstrap.
 
 With W = Σ^−½ and Q = orth(W ∂f/∂C), what the coefficients absorb is projected out:
 
     r = (I − QQᵀ) W (y − f),   d_j = (I − QQᵀ) W ∂f/∂ε_j,   z_j = d̂_jᵀ r.
 
-Three statistics: the χ² of the condition means (lack of fit against pure error), a kernel score rᵀ K r that looks
-for smooth structure over the runs' inputs, and max |z_j| over the catalogue. Their null
-distribution comes from data drawn with the fitted noise (repeats and sessions), each draw going through the
-same steps: S and τ² estimated anew, coefficients refitted (linearised). So the p-values account for the
-fit, for the noise being estimated, and for correlated candidates.
+Four statistics:
+
+    lack     χ² of the condition means: lack of fit against pure error;
+    kernel   rᵀ K r: smooth structure over the runs' inputs;
+    shape    max |z| over directions in which one output follows an input, a square or a product of two;
+    score    max |z_j| over the catalogue; the scatter of the sessions is estimated with effect j in the model,
+             since without it a shift of all runs looks like scatter.
+
+Their null distribution comes from data drawn with the fitted noise (repeats and sessions), each draw going through
+the same steps: S and ρ estimated anew, coefficients refitted (linearised). So the p-values account for the fit,
+for the noise being estimated, and for correlated candidates. Several statistics together are judged by the least
+of their p-values, whose null distribution the same draws give (Westfall and Young 1993).
 
 Source: score tests after projection, Rao (1948); kernel score, e.g. Liu, Lin, Ghosh (2007).
 """
@@ -19,25 +26,30 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import rankdata
 
+from calibration.features import features
 from calibration.fit import Fit
 from calibration.model import Floats, Runs
-from calibration.noise import Noise, repeat_covariance, session_variance
+from calibration.noise import Sums, inverse_root, least_squares, repeat_covariance, sums
 
-DRAWS = 600
+DRAWS = 1000
 TESTABLE = 0.1  # survived share of an effect's signal below which the coefficients absorb it
-_FIT_PASSES = 2
+GENERAL = ("lack", "kernel", "shape")
+_PASSES = 3
+_AT_ONCE = 50  # draws
 
 
 @dataclass(frozen=True)
 class Scores:
-    """Statistics of one residual."""
+    """Statistics of residuals; ... for batches of them."""
 
-    lack: float  # χ² of condition means
-    kernel: float
-    z: Floats  # (e,) projected score of each effect
-    survived: Floats  # (e,) |d_j| / |W ∂f/∂ε_j|
-    length: Floats  # (e,) |d_j|: signal per unit of the effect, in standard deviations
+    general: Floats  # (..., 3) GENERAL
+    z: Floats  # (..., e) projected score of each effect
+    survived: Floats  # (..., e) |d_j| / |W ∂f/∂ε_j|
+    length: Floats  # (..., e) |d_j|: signal per unit of the effect, in standard deviations
+    shapes: Floats  # (..., k, f) z of each output along each feature
+    share: Floats  # (...) ρ
 
 
 @dataclass(frozen=True)
@@ -45,20 +57,11 @@ class Misfit:
     """Observed statistics and their p-values."""
 
     scores: Scores
-    lack_p: float
-    kernel_p: float
-    score_p: float  # of max |z|
-    critical_z: float  # quantile of max |z| at the level
-
-    @property
-    def general_p(self) -> float:
-        """Lack of fit by either general test (Bonferroni)."""
-        return min(1.0, 2 * min(self.lack_p, self.kernel_p))
-
-    @property
-    def p_value(self) -> float:
-        """Any departure: general tests and scores together (Bonferroni)."""
-        return min(1.0, 2 * min(self.general_p, self.score_p))
+    p: dict[str, float]  # of each statistic
+    general_p: float  # of the general tests together
+    p_value: float  # any departure: general tests and scores together
+    critical_z: float  # quantile of max |z_j| at the level
+    features: tuple[str, ...]
 
 
 class _Tester:
@@ -72,31 +75,62 @@ class _Tester:
         inputs = (inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
         distance = ((inputs[:, None] - inputs[None]) ** 2).sum(-1)
         self.K = np.exp(-distance / 2)
+        self.names, self.F = features(data, used)
+        self.F = self.F[used]
+        kinds, place = np.unique(self.condition, return_inverse=True)
+        same = np.arange(len(kinds))[:, None] == place.reshape(-1)
+        self.means = same / np.sqrt(same.sum(1))[:, None]  # (c, n)
+        sessions = np.unique(self.session, return_inverse=True)[1].reshape(-1)
+        self.sessions = (np.arange(sessions.max() + 1)[:, None] == sessions).astype(float)  # (s, n)
 
-    def scores(self, residual: Floats) -> tuple[Scores, Noise]:
-        """Statistics of a residual (n, k) after a linear refit with its own noise."""
-        run = repeat_covariance(residual, self.condition)
-        noise = Noise(run, np.zeros(len(run)))
-        for _ in range(_FIT_PASSES + 1):
-            white = noise.whitener(self.session)
-            J, r = white(self.J), white(residual)
-            Q = np.linalg.qr(J)[0]
-            step = np.linalg.lstsq(J, r, rcond=None)[0]
-            left = residual - self.J @ step
-            fitted = noise
-            noise = Noise(run, session_variance(left, self.session, run))
-        r = r - Q @ (Q.T @ r)
-        whole = white(self.D) if self.D.shape[-1] else np.zeros((len(r), 0))
-        projected = whole - Q @ (Q.T @ whole)
-        size = np.linalg.norm(projected, axis=0)
-        z = projected.T @ r / np.maximum(size, 1e-300)
-        table = r.reshape(len(residual), -1)
-        means = np.stack([np.bincount(self.condition, c) for c in table.T], 1)
-        count = np.bincount(self.condition).astype(float)
-        lack = float((means[count > 0] ** 2 / count[count > 0, None]).sum())
-        kernel = float(np.einsum("na,nm,ma->", table, self.K, table))
-        survived = size / np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
-        return Scores(lack, kernel, z, survived, size), fitted
+    def scores(self, residual: Floats) -> Scores:
+        """Statistics of residuals (B, n, k) after a linear refit, each in its own noise."""
+        p, e = self.J.shape[-1], self.D.shape[-1]
+        root = inverse_root(repeat_covariance(residual, self.condition))  # (B, k, k)
+        table = np.broadcast_to(np.concatenate([self.J, self.D], -1), (*residual.shape, p + e))
+        table = np.concatenate([table, residual[..., None]], -1)
+        columns = np.asarray(np.einsum("bij,bnjm->bnim", root, table, optimize=True))
+        products = sums(columns, self.session, residual.shape[-1])
+        base = least_squares(products.take(np.r_[np.arange(p), p + e][None]), passes=_PASSES)
+        share, step = base.share[:, 0], base.step[:, 0]
+        left = self._shrunk(columns[..., -1] - np.einsum("bnkp,bp->bnk", columns[..., :p], step), share)
+        lack = ((self.means @ left) ** 2).sum((-1, -2))
+        kernel = np.einsum("bnk,nm,bmk->b", left, self.K, left, optimize=True)
+        shapes = self._shapes(columns[..., :p], base.covariance[:, 0], left, root, share)
+        largest = np.abs(shapes).max((-1, -2)) if shapes.size else np.zeros(len(share))
+        return Scores(np.stack([lack, kernel, largest], -1), *self._effects(products, p, e), shapes, share)
+
+    def _effects(self, products: Sums, p: int, e: int) -> tuple[Floats, Floats, Floats]:
+        """z, survived share and length of every effect, each with the scatter of sessions that it leaves."""
+        own = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
+        part = products.take(own)
+        whole = part.at(least_squares(part, passes=_PASSES).share)  # (B, e, p + 2, p + 2)
+        inverse = np.linalg.pinv(whole[..., :p, :p], rcond=1e-12, hermitian=True)
+        weights = np.einsum("bepq,beq->bep", inverse, whole[..., :p, p])
+        score = whole[..., p, p + 1] - np.einsum("bep,bep->be", weights, whole[..., :p, p + 1])
+        square = whole[..., p, p] - np.einsum("bep,bep->be", weights, whole[..., :p, p])
+        length = np.sqrt(np.maximum(square, 1e-300))
+        survived = length / np.sqrt(np.maximum(whole[..., p, p], 1e-300))
+        return np.where(survived > 1e-6, score / length, 0.0), survived, length
+
+    def _shapes(self, J: Floats, covariance: Floats, left: Floats, root: Floats, share: Floats) -> Floats:
+        """z of every output along every feature, (B, k, f)."""
+        count, k = len(left), left.shape[-1]
+        shape = np.broadcast_to(self.F, (count, *self.F.shape))
+        shape = self._shrunk(shape, share)
+        J = self._shrunk(J.reshape(count, len(self.session), -1), share).reshape(J.shape)
+        score = np.einsum("bnf,bnk,bka->baf", shape, left, root, optimize=True)
+        absorbed = np.einsum("bnf,bnkp,bka->bafp", shape, J, root, optimize=True)
+        whole = (root**2).sum(1)[:, :, None] * (shape**2).sum(1)[:, None]
+        rest = whole - np.einsum("bafp,bpq,bafq->baf", absorbed, covariance, absorbed, optimize=True)
+        seen = rest > TESTABLE**2 * whole
+        return np.asarray(np.where(seen, score / np.sqrt(np.where(seen, rest, 1.0)), 0.0)).reshape(count, k, -1)
+
+    def _shrunk(self, table: Floats, share: Floats) -> Floats:
+        """Runs (B, n, c) that are white in S made white in Σ."""
+        size = self.sessions.sum(1)
+        weight = (1 / np.sqrt(1 + share[:, None] * size) - 1) / size  # (B, s)
+        return np.asarray(table + self.sessions.T @ (weight[..., None] * (self.sessions @ table)))
 
 
 def check_misfit(
@@ -118,29 +152,43 @@ def check_misfit(
         seed: of the bootstrap.
     """
     tester = _Tester(data, used, fitted.jacobian[used], directions[used])
-    observed, noise = tester.scores((data.y - fitted.prediction)[used])
-    testable = observed.survived >= TESTABLE
+    residual = (data.y - fitted.prediction)[used]
+    observed = tester.scores(residual[None])
+    testable = observed.survived[0] >= TESTABLE
     rng = np.random.default_rng(seed)
-    root = np.linalg.cholesky(noise.run)
-    shifts = np.sqrt(noise.session)
-    sessions = np.unique(tester.session, return_inverse=True)[1].reshape(-1)
-    lack, kernel, largest = np.empty(draws), np.empty(draws), np.zeros(draws)
-    for i in range(draws):
-        drawn = rng.normal(size=(len(sessions), len(root))) @ root.T
-        drawn += (rng.normal(size=(sessions.max() + 1, len(root))) * shifts)[sessions]
-        null, _ = tester.scores(drawn)
-        lack[i], kernel[i] = null.lack, null.kernel
-        if testable.any():
-            largest[i] = np.abs(null.z[testable]).max()
-    top = float(np.abs(observed.z[testable]).max()) if testable.any() else 0.0
+    root = np.linalg.cholesky(repeat_covariance(residual, data.condition[used]))
+    scatter = float(np.sqrt(observed.share[0]))
+    found = []
+    for start in range(0, draws, _AT_ONCE):
+        count = min(_AT_ONCE, draws - start)
+        drawn = rng.normal(size=(count, *residual.shape))
+        drawn += scatter * tester.sessions.T @ rng.normal(size=(count, len(tester.sessions), residual.shape[-1]))
+        null = tester.scores(drawn @ root.T)
+        found.append(np.column_stack([null.general, _largest(null.z, testable)]))
+    null_table = np.concatenate(found)
+    own = np.append(observed.general[0], _largest(observed.z, testable))
+    columns = range(len(GENERAL) + 1)
+    one = Scores(*(getattr(observed, name)[0] for name in Scores.__dataclass_fields__))
     return Misfit(
-        scores=observed,
-        lack_p=_p_value(lack, observed.lack),
-        kernel_p=_p_value(kernel, observed.kernel),
-        score_p=_p_value(largest, top) if testable.any() else 1.0,
-        critical_z=float(np.quantile(largest, 1 - level)),
+        scores=one,
+        p={
+            name: _p_value(null_table[:, [i]], own[[i]])
+            for i, name in zip(columns, (*GENERAL, "score"), strict=True)
+        },
+        general_p=_p_value(null_table[:, :-1], own[:-1]),
+        p_value=_p_value(null_table, own) if testable.any() else _p_value(null_table[:, :-1], own[:-1]),
+        critical_z=float(np.quantile(null_table[:, -1], 1 - level)),
+        features=tester.names,
     )
 
 
-def _p_value(null: Floats, observed: float) -> float:
-    return float((1 + np.count_nonzero(null >= observed)) / (1 + len(null)))
+def _largest(z: Floats, testable: NDArray[np.bool_]) -> Floats:
+    return np.abs(z[:, testable]).max(1) if testable.any() else np.zeros(len(z))
+
+
+def _p_value(null: Floats, observed: Floats) -> float:
+    """How often the least p-value of the statistics (D, q) is as small as that of `observed` (q,)."""
+    table = np.vstack([observed, null])
+    p = np.stack([rankdata(-column, method="max") for column in table.T], 1) / len(table)
+    least = p.min(1)
+    return float(np.count_nonzero(least <= least[0]) / len(table))

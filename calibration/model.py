@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Parameters = Mapping[str, float]
 
+_LOG_STEP, _STEP = 0.01, 0.02  # differences: in ln C, in units of a typical size
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -77,6 +79,12 @@ class Model(Protocol):
         """Predictions (P, n, k) for P parameter sets, each with every coefficient and effect."""
         ...
 
+    def derivatives(
+        self, parameters: Parameters, names: Sequence[str], *, title: str = ""
+    ) -> tuple[Floats, Floats]:
+        """Prediction (n, k) and its derivatives (n, k, p) on the scales of the parameters `names`."""
+        ...
+
     def possible(self) -> tuple[Model, list[dict[str, Any]]]:
         """A model of runs that could be made next, and their settings."""
         ...
@@ -100,3 +108,19 @@ def moved(one: Parameter, value: float, by: float) -> float:
     """`value` changed by `by`, on the parameter's own scale, within its bounds."""
     new = value * float(np.exp(by)) if one.logarithmic else value + by
     return max(one.bounds[0], min(one.bounds[1], new))
+
+
+def by_differences(
+    model: Model, parameters: Parameters, names: Sequence[str], *, title: str = ""
+) -> tuple[Floats, Floats]:
+    """`Model.derivatives` by differences, for models that know no better: all perturbed models in one go."""
+    sets, widths = [dict(parameters)], []
+    for name in names:
+        one = parameter(model, name)
+        width = _LOG_STEP if one.logarithmic else _STEP * abs(one.typical)
+        if moved(one, parameters[name], 2 * width) == one.bounds[1]:  # downwards where the bound is near
+            width = -width
+        sets.append({**parameters, name: moved(one, parameters[name], width)})
+        widths.append(width)
+    found = model.predict(sets, title=title)
+    return found[0], np.moveaxis((found[1:] - found[0]) / np.array(widths)[:, None, None], 0, -1)

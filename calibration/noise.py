@@ -1,15 +1,15 @@
-"""Noise of a table: scatter of the repeats, and of the sessions.
+"""Noise of a table: scatter of the repeats, and of the sessions; generalised least squares in that noise.
 
 Runs under the same condition give the covariance S (k, k) of one run's outputs, jointly: R_yr and θ are not
-independent of the spins and the yaw rate. A session may shift all its runs together; its variance τ² per
-output is what the sessions' mean residuals scatter beyond S/n. Repeats within a session do not average that
-shift away, so the covariance of a session's n runs is
+independent of the spins and the yaw rate. A session may shift all its runs together, by a share ρ of that
+variance. Repeats within a session do not average that shift away, so the covariance of a session's n runs is
 
-    Σ = I_n ⊗ S + 1 1ᵀ ⊗ diag(τ²).
+    Σ = (I_n + ρ 1 1ᵀ) ⊗ S.
 
-τ² comes from the residuals of the fitted model, so an effect that the model lacks inflates it. It is
-therefore held below `SESSION_SHARE` of a run's variance: sessions are taken to scatter no more than single
-runs do, and a larger shift of a whole session counts as something that the model must explain.
+One ρ for all outputs: three sessions of five outputs leave it a dozen degrees of freedom, where one for each
+output would have two. It comes from the residuals of the fitted model, so an effect that the model lacks inflates
+it. It is therefore held below `SESSION_SHARE`: sessions are taken to scatter no more than single runs do, and a
+larger shift of a whole session counts as something that the model must explain.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-SESSION_SHARE = 1.0  # largest τ² in units of the variance of one run
+SESSION_SHARE = 1.0  # largest ρ
 
 Floats = NDArray[np.float64]
 Labels = NDArray[np.int64]
@@ -27,53 +27,108 @@ Labels = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Noise:
-    """S (k, k) of a run and τ² (k,) of a session."""
+    """S (k, k) of a run and ρ of a session."""
 
     run: Floats
-    session: Floats
+    share: float
 
-    def whitener(self, session: Labels) -> _Whitener:
-        return _Whitener(self, session)
+    def whitener(self, session: Labels) -> Whitener:
+        return Whitener(self, session)
 
 
-class _Whitener:
+class Whitener:
     """Σ^−½ for the runs of `session`; applies to residuals (n, k, ...) and flattens them."""
 
     def __init__(self, noise: Noise, session: Labels):
-        chol = np.linalg.cholesky(noise.run)
-        self._inverse = np.linalg.inv(chol)
-        block = self._inverse @ np.diag(noise.session) @ self._inverse.T
-        self._values, self._vectors = np.linalg.eigh(block)
-        self._values = np.maximum(self._values, 0)
+        self._inverse = inverse_root(noise.run)
+        self._share = noise.share
         self._groups = [np.flatnonzero(session == s) for s in np.unique(session)]
 
     def __call__(self, table: Floats) -> Floats:
         """Whiten (n, k, ...) to (n k, ...)."""
-        white = np.einsum("ab,nb...->na...", self._vectors.T @ self._inverse, table)
+        white = np.einsum("ab,nb...->na...", self._inverse, table)
         for rows in self._groups:
-            mean = white[rows].mean(0)
-            shrink = 1 / np.sqrt(1 + len(rows) * self._values) - 1
-            white[rows] += shrink.reshape(-1, *[1] * (white.ndim - 2)) * mean
+            white[rows] += (1 / np.sqrt(1 + len(rows) * self._share) - 1) * white[rows].mean(0)
         return np.asarray(white.reshape(-1, *table.shape[2:]))
 
 
+@dataclass(frozen=True)
+class Sums:
+    """Products of columns in the noise of any ρ: within sessions, and of the means of each; ... for batches."""
+
+    within: Floats  # (..., m, m)
+    between: Floats  # (..., s, m, m)
+    sizes: Floats  # (s,) runs of a session
+    outputs: int
+
+    def at(self, share: Floats) -> Floats:
+        """Columnᵀ Σ⁻¹ column, (..., m, m), for ρ (...)."""
+        weight = 1 / (1 + share[..., None] * self.sizes)
+        return np.asarray(self.within + np.einsum("...s,...sij->...ij", weight, self.between))
+
+    def take(self, columns: NDArray[np.int64]) -> Sums:
+        """The same for choices of columns (c, q), (..., c, q, q)."""
+        rows, cols = columns[:, :, None], columns[:, None, :]
+        between = np.swapaxes(self.between[..., rows, cols], -4, -3)
+        return Sums(self.within[..., rows, cols], between, self.sizes, self.outputs)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Generalised least squares of the last column by the others; ... for batches."""
+
+    step: Floats  # (..., p)
+    covariance: Floats  # (..., p, p)
+    share: Floats  # (...) ρ
+
+
+def inverse_root(run: Floats) -> Floats:
+    """L⁻¹ of S = L Lᵀ, (..., k, k)."""
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(run)))
+
+
+def sums(columns: Floats, session: Labels, outputs: int) -> Sums:
+    """Products of columns (..., n, k, m) that are white in S."""
+    *batch, n, k, m = columns.shape
+    flat = columns.reshape(*batch, n * k, m)
+    whole = np.swapaxes(flat, -1, -2) @ flat
+    kinds, place, count = np.unique(session, return_inverse=True, return_counts=True)
+    picks = (np.arange(len(kinds))[:, None] == place.reshape(-1)) / np.sqrt(count)[:, None]  # (s, n)
+    means = np.einsum("sn,...nkm->...skm", picks, columns)
+    between = np.swapaxes(means, -1, -2) @ means
+    return Sums(whole - between.sum(-3), between, count.astype(float), outputs)
+
+
+def least_squares(products: Sums, *, passes: int) -> Linear:
+    """Fit the last of the columns, with the ρ that its own residuals imply after `passes` passes (none: 0).
+
+    The means of the sessions scatter by Σ_s n_s |m_s|² = (k − h/s) Σ_s (1 + ρ n_s), where h is what the fit takes
+    of their k s degrees of freedom.
+    """
+    count = len(products.sizes)
+    p = products.within.shape[-1] - 1
+    share = np.zeros(products.within.shape[:-2])
+    for again in range(passes + 1):
+        whole = products.at(share)
+        scale = np.sqrt(np.maximum(np.diagonal(whole, axis1=-2, axis2=-1)[..., :p], 1e-300))
+        own = whole[..., :p, :p] / scale[..., :, None] / scale[..., None, :]
+        covariance = np.linalg.pinv(own, rcond=1e-12, hermitian=True) / scale[..., :, None] / scale[..., None, :]
+        step = np.einsum("...ij,...j->...i", covariance, whole[..., :p, p])
+        if again == passes:
+            break
+        left = np.concatenate([-step, np.ones((*share.shape, 1))], -1)
+        between = np.einsum("...i,...sij,...j->...", left, products.between, left)
+        means = whole[..., :p, :p] - products.within[..., :p, :p]
+        freedom = products.outputs - np.einsum("...ij,...ji->...", covariance, means) / count
+        excess = between / np.maximum(freedom, 0.1 * products.outputs) - count
+        share = np.clip(excess / products.sizes.sum(), 0.0, SESSION_SHARE)
+    return Linear(step, covariance, share)
+
+
 def repeat_covariance(y: Floats, condition: Labels) -> Floats:
-    """S from the scatter about the mean of each condition, pooled."""
-    centred, freedom = centre_on_conditions(y, condition)
-    return np.asarray(centred.T @ centred / freedom)
-
-
-def centre_on_conditions(y: Floats, condition: Labels) -> tuple[Floats, int]:
-    """Residuals from the condition means, and their degrees of freedom."""
+    """S (..., k, k) from the scatter of (..., n, k) about the mean of each condition, pooled."""
     places = np.unique(condition, return_inverse=True)[1].reshape(-1)
     count = np.bincount(places)
-    mean = np.stack([np.bincount(places, y[:, i]) / count for i in range(y.shape[1])], 1)
-    return y - mean[places], len(y) - len(count)
-
-
-def session_variance(residual: Floats, session: Labels, run: Floats) -> Floats:
-    """τ² per output from the mean residuals of the sessions (moment estimate, within its limits)."""
-    groups = [residual[session == s] for s in np.unique(session)]
-    means = np.array([g.mean(0) for g in groups])
-    within = np.mean([np.diag(run) / len(g) for g in groups], 0)
-    return np.clip((means**2).mean(0) - within, 0.0, SESSION_SHARE * np.diag(run))
+    picks = (np.arange(len(count))[:, None] == places) / count[:, None]
+    centred = y - (picks @ y)[..., places, :]
+    return np.asarray(np.swapaxes(centred, -1, -2) @ centred / (len(places) - len(count)))

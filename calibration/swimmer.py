@@ -8,31 +8,53 @@ far below any measurement. Outputs are compared as ln |output|, θ in radians.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.influences import SLIP, TRACKED_POINT, Influence, influences, reason_untestable
+from calibration.influences import CURRENT, SLIP, TRACKED_POINT, Influence, influences, reason_untestable
 from calibration.measurements import Measurements
-from calibration.model import Floats, Parameter, Parameters
+from calibration.model import Floats, Parameter, Parameters, by_differences
 from calibration.noise import Noise, repeat_covariance
-from sim.batches import steady_columns
+from calibration.observation import Observation
+from sim.batches import sensitivity_columns, steady_columns
+from sim.direct import FEW, MANY
 from sim.effects import catalogue
 from sim.errors import InputError
 from sim.robot import Robot
+from sim.sensitivity import Sensitivities
 from surrogate.export import load
 from surrogate.lookup import Lookup
 
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
 SANE = (0.1, 20.0)  # coefficients stay within: beyond, they say that the model lacks something
 
-_STEP = 0.05  # finite difference in ln C
+_STEP = 0.05  # finite difference in ln C, by the look-up table
 _MOST_GUESSES = 12
 _FEWEST_COVERED = 24  # runs
+
+
+class _Run(NamedTuple):
+    """One run as the simulator and the camera have it."""
+
+    robot: Robot
+    sign: float  # direction of the motor
+    point: float  # tracked, head lengths ahead of the head's centre
+    current: float  # of the fluid along the path [m/s]
+
+
+class Solver(NamedTuple):
+    """Where motions and their derivatives come from: like `sim.batches.steady_columns`, `sensitivity_columns`."""
+
+    steady: Callable[..., Mapping[str, Floats]]
+    slopes: Callable[..., Sensitivities]
+
+
+DIRECT = Solver(steady_columns, sensitivity_columns)
 
 
 @dataclass(frozen=True)
@@ -42,6 +64,7 @@ class Swimmer:
     robot: Robot
     runs: Measurements
     jobs: int | None = None
+    solver: Solver = DIRECT
 
     @property
     def coefficients(self) -> tuple[Parameter, ...]:
@@ -65,8 +88,7 @@ class Swimmer:
 
     def _reason(self, influence: Influence) -> str:
         both = len(np.unique(np.sign(self.runs.omega))) == 2
-        columns = {name.replace("tank_diameter", "head_over_tank"): True for name in self.runs.noted_names}
-        return reason_untestable(influence, columns, both)
+        return reason_untestable(influence, self._drivers, both, self.runs.outputs)
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "", lookup: Lookup | None = None) -> Floats:
         """Predictions (P, n, k) for P parameter sets, all simulated in one go.
@@ -74,28 +96,51 @@ class Swimmer:
         With `lookup` the look-up table answers instead of the simulator: good for a first guess, and no
         more, since its error would pass for physics.
         """
-        columns: dict[str, list[float]] = {}
-        robots: list[tuple[Robot, float]] = []
-        places = []
-        for parameters in sets:
-            conditions, place = self._conditions(parameters)
-            places.append(place + len(robots))
-            for condition in conditions:
-                robot, sign = self._robot(parameters, condition)
-                values = {**self._nulls(sets), **robot.group_values()}
-                values["omega_bar"] *= sign
-                robots.append((robot, parameters.get(TRACKED_POINT, 0.0)))
-                for name, value in values.items():
-                    columns.setdefault(name, []).append(value)
-        arrays = {name: np.array(values) for name, values in columns.items()}
+        parts = [self._conditions(parameters) for parameters in sets]
+        runs = [run for own, _ in parts for run in own]
+        columns = self._columns(runs, sets)
         if lookup is not None:
-            found = lookup.query(arrays)
+            found: Mapping[str, Floats] = lookup.query(columns)
         else:
-            found = steady_columns(arrays, jobs=self.jobs, title=title)
-        table = np.array([self._outputs(found, i, robot, point) for i, (robot, point) in enumerate(robots)])
+            found = self.solver.steady(columns, jobs=self.jobs, title=title)
+        table = self._observation(runs).see(found)
         if not np.isfinite(table).all():
             raise InputError("the simulation of a run broke down; check the robot and the run's motor speed")
-        return np.array([table[place] for place in places])
+        ends = np.cumsum([len(own) for own, _ in parts])
+        return np.array([table[end - len(own) + place] for end, (own, place) in zip(ends, parts, strict=True)])
+
+    def derivatives(
+        self, parameters: Parameters, names: Sequence[str], *, title: str = ""
+    ) -> tuple[Floats, Floats]:
+        """Prediction (n, k) and derivatives (n, k, p), by the simulator's own sensitivities.
+
+        By differences where a run has no direct solution.
+        """
+        influences = {name: self._influences.get(name) for name in names}
+        odd = any(i is not None and i.odd for i in influences.values())
+        runs, place = self._conditions(parameters, signed=odd)
+        columns = self._columns(runs, [parameters])
+        moves = {name: _moves(name, influence) for name, influence in influences.items()}
+        wanted = tuple(dict.fromkeys(move for move in moves.values() if move))
+        # What is at work shows in the motion and so in the phases that it asks for; at its null it does not.
+        phases = FEW if any(i.effect for i in self._at_work(parameters)) else MANY
+        found = self.solver.slopes(columns, wanted, phases=phases, jobs=self.jobs, title=title)
+        view = self._observation(runs)
+        J = np.empty((len(self.runs), len(self.runs.outputs), len(names)))
+        for j, (name, influence) in enumerate(influences.items()):
+            at = wanted.index(moves[name]) if moves[name] else None
+            motion = {} if at is None else {key: table[:, at] for key, table in found.derivatives.items()}
+            slope = view.slopes(
+                found.values, motion, point=float(name == TRACKED_POINT), current=float(name in CURRENT)
+            )
+            if name == SLIP:
+                slope = slope * (-columns["omega_bar"] / (1 - parameters[SLIP]))[:, None]
+            scale = self._drivers[influence.needs] if influence and influence.needs else np.ones(len(self.runs))
+            J[..., j] = slope[place] * (scale if influence else parameters[name] * scale)[:, None]
+        seen = view.see(found.values)[place]
+        if not (np.isfinite(J).all() and np.isfinite(seen).all()):
+            return by_differences(self, parameters, names, title=title)
+        return seen, J
 
     def guess(self, start: dict[str, float], used: NDArray[np.bool_]) -> dict[str, float]:
         """Coefficients fitted with the look-up table to the runs that it covers; `start` if those are too few."""
@@ -105,8 +150,8 @@ class Swimmer:
         if covered.sum() < _FEWEST_COVERED:
             return parameters
         data = self.runs.subset(covered)
-        part = Swimmer(self.robot, data, self.jobs)
-        whiten = Noise(repeat_covariance(data.y, data.condition), np.zeros(data.y.shape[1])).whitener(data.session)
+        part = replace(self, runs=data)
+        whiten = Noise(repeat_covariance(data.y, data.condition), 0.0).whitener(data.session)
         for _ in range(_MOST_GUESSES):
             moved = [{**parameters, name: parameters[name] * math.exp(_STEP)} for name in COEFFICIENTS]
             try:
@@ -140,14 +185,14 @@ class Swimmer:
             session_names=("next",), inputs=np.zeros((count, runs.inputs.shape[1])), set_aside=(),
             tails=grid[:, 0], length=grid[:, 1], omega=grid[:, 2], noted=noted,
         )  # fmt: skip
-        return Swimmer(self.robot, own, self.jobs), settings
+        return replace(self, runs=own), settings
 
     def _inside(self, lookup: Lookup, parameters: Parameters) -> NDArray[np.bool_]:
         """Which runs (n,) the look-up table covers at `parameters`."""
-        conditions, place = self._conditions(parameters)
-        good = np.ones(len(conditions), dtype=bool)
-        for i, condition in enumerate(conditions):
-            for name, value in self._robot(parameters, condition)[0].group_values().items():
+        runs, place = self._conditions(parameters)
+        good = np.ones(len(runs), dtype=bool)
+        for i, run in enumerate(runs):
+            for name, value in run.robot.group_values().items():
                 low, high = lookup.domain.get(name, (0.0, 0.0))
                 good[i] &= low * (1 - 1e-9) <= abs(value) <= high * (1 + 1e-9)
         return np.asarray(good[place])
@@ -157,54 +202,71 @@ class Swimmer:
         found = [i for name, i in self._influences.items() if name in parameters]
         return [i for i in found if parameters[i.name] != i.parameter.start]
 
-    def _conditions(self, parameters: Parameters) -> tuple[Floats, NDArray[np.intp]]:
-        """Distinct (N, l, ω, noted) as rows, as far as it matters at `parameters`, and each run's place."""
+    @cached_property
+    def _drivers(self) -> dict[str, Floats]:
+        """What drives influences, of every run (n,)."""
+        found = dict(zip(self.runs.noted_names, self.runs.noted.T, strict=True))
+        if "tank_diameter" in found:
+            found["head_over_tank"] = 2 * self.robot.head_radius / found["tank_diameter"]
+        return found
+
+    def _conditions(self, parameters: Parameters, *, signed: bool = False) -> tuple[list[_Run], NDArray[np.intp]]:
+        """Runs that differ, as far as it matters at `parameters`, and each run's place among them.
+
+        The motor's direction matters where something odd is at work, or if `signed`.
+        """
         runs, work = self.runs, self._at_work(parameters)
-        omega = runs.omega if any(i.odd for i in work) else np.abs(runs.omega)
-        noted = runs.noted if any(i.needs for i in work) else 0 * runs.noted
-        table = np.column_stack([runs.tails, runs.length, omega, noted])
-        rows, place = np.unique(table.round(9), axis=0, return_inverse=True)
-        return rows, place.reshape(-1)
+        signed |= any(i.odd for i in work) or any(catalogue()[e].symmetry == "odd" for e in self.robot.effects)
+        omega = runs.omega if signed else np.abs(runs.omega)
+        drivers = [self._drivers[need] for need in dict.fromkeys(i.needs for i in work if i.needs)]
+        table = np.column_stack([runs.tails, runs.length, omega, *drivers]).round(9)
+        _, first, place = np.unique(table, axis=0, return_index=True, return_inverse=True)
+        return [self._run(parameters, int(row), float(omega[row])) for row in first], place.reshape(-1)
 
-    def _robot(self, parameters: Parameters, condition: Floats) -> tuple[Robot, float]:
-        """The robot of a run, and the direction of its motor."""
-        tails, length, omega = condition[:3].tolist()
-        noted = dict(zip(self.runs.noted_names, condition[3:].tolist(), strict=True))
-        if noted.get("tank_diameter"):
-            noted["head_over_tank"] = 2 * self.robot.head_radius / noted["tank_diameter"]
-        effects = dict(self.robot.effects)
+    def _run(self, parameters: Parameters, row: int, omega: float) -> _Run:
+        effects, current = dict(self.robot.effects), 0.0
         for influence in self._at_work(parameters):
+            by = parameters[influence.name] - influence.parameter.start
+            before = influence.parameter.start
+            if influence.needs is not None:
+                by *= float(self._drivers[influence.needs][row])
+                before = self.robot.effects.get(influence.effect or "", before)
             if influence.effect is not None:
-                null = catalogue()[influence.effect].null
-                share = 1.0 if influence.needs is None else noted[influence.needs]
-                size, start = parameters[influence.name], influence.parameter.start
-                before = effects.get(influence.effect, null) if influence.needs else null
-                effects[influence.effect] = before + (size - (start if influence.needs else null)) * share
+                effects[influence.effect] = before + by
+            elif influence.name in CURRENT:
+                current += by
         own: dict[str, Any] = {name: float(parameters[name]) for name in COEFFICIENTS}
-        speed = abs(omega) * (1 - parameters.get(SLIP, 0.0))
         robot = replace(
-            self.robot, **own, tails=int(tails), tail_length=length, motor_speed=speed, effects=effects
-        )
-        return robot, math.copysign(1.0, omega)
+            self.robot, **own, tails=int(self.runs.tails[row]), tail_length=float(self.runs.length[row]),
+            motor_speed=abs(omega) * (1 - parameters.get(SLIP, 0.0)), effects=effects,
+        )  # fmt: skip
+        return _Run(robot, math.copysign(1.0, omega), parameters.get(TRACKED_POINT, 0.0), current)
 
-    def _nulls(self, sets: Sequence[Parameters]) -> dict[str, float]:
-        """Every effect that any of the sets has at work, at its null."""
+    def _columns(self, runs: list[_Run], sets: Sequence[Parameters]) -> dict[str, Floats]:
+        """Runs as columns for the simulator, with every effect that any of the sets has at work."""
         names = {i.effect for parameters in sets for i in self._at_work(parameters) if i.effect}
-        return {name: catalogue()[name].null for name in sorted(names)}
+        nulls = {name: catalogue()[name].null for name in sorted(names)}
+        rows = [{**nulls, **run.robot.group_values()} for run in runs]
+        columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        columns["omega_bar"] = columns["omega_bar"] * np.array([run.sign for run in runs])
+        return columns
 
-    def _outputs(self, found: Mapping[str, Floats], row: int, robot: Robot, point: float) -> list[float]:
-        yaw, surge = found["omega_yr_bar"][row], found["v_z"][row]
-        ahead = point * robot.head_length / robot.tail_length
-        sway = found["v_x"][row] + yaw * ahead
-        values = {
-            "omega_h": math.log(abs(found["omega_h_bar"][row]) / robot.time_scale),
-            "omega_t": math.log(abs(found["omega_t_bar"][row]) / robot.time_scale),
-            "omega_yr": math.log(abs(yaw) / robot.time_scale),
-            "R_yr": math.log(math.hypot(sway, surge) / abs(yaw) * robot.tail_length),
-            "theta": math.atan2(abs(sway), surge),
-            "v": math.log(math.hypot(sway, surge) * robot.tail_length / robot.time_scale),
-        }
-        return [values[name] for name in self.runs.outputs]
+    def _observation(self, runs: list[_Run]) -> Observation:
+        return Observation(
+            self.runs.outputs,
+            time=np.array([run.robot.time_scale for run in runs]),
+            length=np.array([run.robot.tail_length for run in runs]),
+            ahead=np.array([run.robot.head_length / run.robot.tail_length for run in runs]),
+            point=np.array([run.point for run in runs]),
+            current=np.array([run.current for run in runs]),
+        )
+
+
+def _moves(name: str, influence: Influence | None) -> str | None:
+    """The simulator's parameter that a parameter of the calibration moves, if it is not the observation's."""
+    if influence is None:
+        return name
+    return "omega_bar" if name == SLIP else influence.effect
 
 
 def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:

@@ -18,13 +18,15 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
+from sim.direct import MANY
 from sim.errors import InputError
 from sim.resolution import Resolution
 from sim.robot import Groups, check_columns
+from sim.sensitivity import Sensitivities, sensitivities
 from sim.settling import settle
 from sim.steady import steady
 
-_DIRECT_ROWS, _STEPPED_ROWS = 128, 4  # robots between two ticks of the progress bar
+_DIRECT_ROWS, _SLOPE_ROWS, _STEPPED_ROWS = 128, 16, 4  # robots between two ticks of the progress bar
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -113,6 +115,36 @@ def steady_columns(
     return _in_batches(_steady_batch, values, split(values["N"], _DIRECT_ROWS), jobs=jobs, title=title)
 
 
+def sensitivity_columns(
+    columns: Mapping[str, NDArray[np.float64]],
+    parameters: Sequence[str],
+    *,
+    phases: int = MANY,
+    jobs: int | None = None,
+    title: str = "sensitivities",
+) -> Sensitivities:
+    """Steady motion of any robots and its derivatives, in parallel (`sim.sensitivity`).
+
+    Args:
+        columns: robots by column name, each (M,).
+        parameters: names out of `sim.sensitivity.INPUTS` and `sim.effects.catalogue()`, K of them.
+        phases: to begin with, see `sim.sensitivity`.
+        jobs: threads; default all processors.
+        title: of the progress bar; empty for none.
+    """
+    values = check_columns(columns)
+    batches = split(values["N"], _SLOPE_ROWS)
+    parts = [Groups.from_columns({name: array[rows] for name, array in values.items()}) for rows in batches]
+    work = partial(_slopes_batch, parameters=tuple(parameters), phases=phases)
+    done = run_batches(work, parts, sizes=[len(b) for b in batches], jobs=jobs, title=title, threads=True)
+    order = np.argsort(np.concatenate(batches))
+    return Sensitivities(
+        tuple(parameters),
+        {name: np.concatenate([d.values[name] for d in done])[order] for name in done[0].values},
+        {name: np.concatenate([d.derivatives[name] for d in done])[order] for name in done[0].derivatives},
+    )
+
+
 def stepped_columns(
     columns: Mapping[str, NDArray[np.float64]],
     *,
@@ -148,6 +180,10 @@ def _in_batches(
     done = run_batches(work, parts, sizes=sizes, jobs=jobs, title=title, threads=True)
     order = np.argsort(np.concatenate(batches))
     return {name: np.concatenate([d[name] for d in done])[order] for name in done[0]}
+
+
+def _slopes_batch(groups: Groups, *, parameters: tuple[str, ...], phases: int) -> Sensitivities:
+    return sensitivities(groups, parameters, phases=phases)
 
 
 def _steady_batch(columns: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[Any]]:

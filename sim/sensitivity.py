@@ -10,6 +10,7 @@ so an effect that changes drag or motor needs nothing of its own here.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -29,6 +30,8 @@ Floats = NDArray[np.float64]
 INPUTS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "a_over_R")
 OUTPUTS = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_rad")
 
+_FORWARD = threading.Lock()  # torch keeps one level of forward differentiation for all threads
+
 
 @dataclass(frozen=True)
 class Sensitivities:
@@ -39,13 +42,14 @@ class Sensitivities:
     derivatives: dict[str, Floats]  # OUTPUTS -> (B, K), per unit of the parameter
 
 
-def sensitivities(groups: Groups, parameters: Sequence[str]) -> Sensitivities:
+def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = direct.MANY) -> Sensitivities:
     """Steady motion and its derivatives.
 
     Args:
         groups: robots of one N.
         parameters: names out of INPUTS and `sim.effects.catalogue()`; an effect that the robots do not carry is
             differentiated at its null.
+        phases: to begin with; an effect at its null may act in phases that the motion does not need.
 
     Raises:
         InputError: an unknown parameter.
@@ -58,7 +62,7 @@ def sensitivities(groups: Groups, parameters: Sequence[str]) -> Sensitivities:
     moved = [_tangent(groups, name) for name in names]
     scales = np.stack([scale for _, scale in moved], 1) if names else np.empty((len(groups), 0))
     tangents = np.stack([t for t, _ in moved], 1) if names else np.empty((len(groups), 0, NUMBERS))
-    found = direct.solve_all(direct.bodies(groups), groups.N, tangents, phases=direct.MANY)
+    found = direct.solve_all(direct.bodies(groups), groups.N, tangents, phases=phases)
     slopes = found.slopes / scales[:, :, None]  # (B, K, 5)
     values = dict(zip(OUTPUTS, found.means.T, strict=False))
     derivatives = {name: slopes[:, :, i] for i, name in enumerate(OUTPUTS[:5])}
@@ -90,5 +94,6 @@ def _tangent(groups: Groups, name: str) -> tuple[Floats, Floats]:
         def numbers(changed: Tensor) -> Tensor:
             return direct.numbers(replace(groups, effects={**groups.effects, name: changed}))
 
-    tangent: Tensor = torch.func.jvp(numbers, (value,), (size,))[1]
+    with _FORWARD:
+        tangent: Tensor = torch.func.jvp(numbers, (value,), (size,))[1]
     return tangent.T.numpy(), size.numpy()

@@ -22,7 +22,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from calibration.loop import Verdict, close
-from calibration.model import Floats, Parameter, Parameters, Runs
+from calibration.model import Floats, Parameter, Parameters, Runs, by_differences
 from sim.errors import InputError, run_command
 
 GRAVITY, FLUID, BEAD = 9.81, 1260.0, 2200.0  # m/s², kg/m³ of glycerol and Teflon
@@ -56,6 +56,12 @@ class Spheres:
         stokes = stokes * (1 - parameters["wall"] * (2.104 * x - 2.089 * x**3 + 0.948 * x**5))
         slope = parameters["inertia"] * 3 / 16 * FLUID * d / viscosity  # of 1 + slope v
         return np.asarray(2 * stokes / (1 + np.sqrt(1 + 4 * slope * stokes)))
+
+    def derivatives(
+        self, parameters: Parameters, names: Sequence[str], *, title: str = ""
+    ) -> tuple[Floats, Floats]:
+        """Prediction and derivatives, by differences."""
+        return by_differences(self, parameters, names)
 
     def possible(self) -> tuple[Spheres, list[dict[str, Any]]]:
         """Beads of other diameters."""

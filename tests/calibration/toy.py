@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from calibration.swimmer import Solver
 from sim import drag
-from sim.effects import with_effects
+from sim.effects import catalogue, with_effects
 from sim.robot import Groups, check_columns
+from sim.sensitivity import Sensitivities
 
 
 def steady_columns(columns: Mapping[str, Any], **_: object) -> dict[str, np.ndarray]:
@@ -21,6 +23,25 @@ def steady_columns(columns: Mapping[str, Any], **_: object) -> dict[str, np.ndar
     values = check_columns({k: np.asarray(v, float) for k, v in columns.items()})
     rows = [_row({k: v[i : i + 1] for k, v in values.items()}) for i in range(len(values["N"]))]
     return {k: np.array([r[k] for r in rows]) for k in rows[0]}
+
+
+def slopes(columns: Mapping[str, Any], parameters: tuple[str, ...], **_: object) -> Sensitivities:
+    """Stand-in for `sim.batches.sensitivity_columns`, by differences."""
+    values = steady_columns(columns)
+    values = {k: np.radians(v) if k == "theta_deg" else v for k, v in values.items()}
+    found: dict[str, list[np.ndarray]] = {k: [] for k in values}
+    for name in parameters:
+        null = catalogue()[name].null if name in catalogue() else 0.0
+        at = np.asarray(columns.get(name, np.full(len(values["v_x"]), null)), float)
+        width = 1e-5 * np.abs(at)
+        if name in catalogue():  # towards the inside
+            width = (
+                1e-5 * abs(catalogue()[name].typical - null) * np.where(at < catalogue()[name].bounds[1], 1, -1)
+            )
+        ends = [steady_columns({**columns, name: at + sign * width}) for sign in (0, 1)]
+        for key in found:
+            found[key].append((ends[1][key] - ends[0][key]) / width)
+    return Sensitivities(parameters, values, {k: np.stack(v, 1) for k, v in found.items() if v})
 
 
 def _row(columns: dict[str, np.ndarray]) -> dict[str, float]:
@@ -52,3 +73,6 @@ def _row(columns: dict[str, np.ndarray]) -> dict[str, float]:
         "R_yr_over_l": float(np.hypot(sway, surge) / abs(yaw)),
         "theta_deg": float(np.degrees(np.arctan2(abs(sway), surge))),
     }
+
+
+SOLVER = Solver(steady_columns, slopes)

@@ -1,0 +1,65 @@
+"""The locked runs: errors of a model on them, whether they agree with it, and the last fit, to all runs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.fit import Fit
+from calibration.model import Floats, Model, Runs, moved
+from calibration.noise import inverse_root, least_squares, sums
+
+_DRAWS = 2000
+
+
+def errors(data: Runs, prediction: Floats, rows: NDArray[np.bool_]) -> tuple[float, dict[str, float]]:
+    """Relative rms over runs and outputs (θ in rad), and per output."""
+    square = ((data.y - prediction)[rows] ** 2).mean(0)
+    each = dict(zip(data.outputs, np.sqrt(square).tolist(), strict=True))
+    return float(np.sqrt(square.mean())), each
+
+
+def error_interval(data: Runs, prediction: Floats, rows: NDArray[np.bool_], seed: int) -> tuple[float, float]:
+    """95 % interval of the relative rms by resampling conditions."""
+    square = ((data.y - prediction)[rows] ** 2).mean(1)
+    condition = data.condition[rows]
+    kinds = np.unique(condition)
+    means = np.array([square[condition == c].mean() for c in kinds])
+    rng = np.random.default_rng(seed)
+    drawn = np.sqrt(means[rng.integers(0, len(kinds), (2000, len(kinds)))].mean(1))
+    return float(np.quantile(drawn, 0.025)), float(np.quantile(drawn, 0.975))
+
+
+def locked_p_value(fitted: Fit, data: Runs, rows: NDArray[np.bool_], *, seed: int) -> float:
+    """How often noise alone leaves the model as far from the locked runs `rows` (n,).
+
+    The statistic is the sum of squares, white in S, of what is left; its null distribution is drawn from runs,
+    sessions, the error of the fitted parameters, and S as uncertain as the repeats leave it.
+    """
+    root = inverse_root(fitted.noise.run)
+    residual = (data.y - fitted.prediction)[rows] @ root.T
+    J = root @ fitted.jacobian[rows]
+    rng = np.random.default_rng(seed)
+    sessions = np.unique(data.session[rows], return_inverse=True)[1].reshape(-1)
+    n, k = residual.shape
+    freedom = max(int((~rows).sum()) - len(np.unique(data.condition[~rows])), k + 1)
+    spread = np.linalg.cholesky(fitted.covariance + 1e-15 * np.diag(np.diag(fitted.covariance)))
+    count = 0
+    for _ in range(_DRAWS):
+        drawn = rng.normal(size=(n, k))
+        drawn += np.sqrt(fitted.noise.share) * rng.normal(size=(sessions.max() + 1, k))[sessions]
+        drawn += J @ (spread @ rng.normal(size=len(spread)))
+        repeats = rng.normal(size=(freedom, k))
+        drawn = drawn @ inverse_root(repeats.T @ repeats / freedom).T
+        count += float((drawn**2).sum()) >= float((residual**2).sum())
+    return (1 + count) / (1 + _DRAWS)
+
+
+def fitted_to_all(model: Model, fitted: Fit) -> dict[str, float]:
+    """Parameters of a fitted model after one more step, to all runs; a linear one, since they are near."""
+    data = model.runs
+    table = np.concatenate([fitted.jacobian, (data.y - fitted.prediction)[..., None]], -1)
+    products = sums(inverse_root(fitted.noise.run) @ table, data.session, len(fitted.noise.run))
+    step = least_squares(products, passes=3).step
+    changes = zip(fitted.fitted, step.tolist(), strict=True)
+    return {**fitted.parameters, **{p.name: moved(p, fitted.parameters[p.name], by) for p, by in changes}}

@@ -1,0 +1,71 @@
+"""What a camera sees of a steady motion: the outputs of a table and their derivatives.
+
+    v = v_head + ω_yr × (p L ahead),   R = |v|/|ω_yr|,   θ = ∠(v, axis),   |v + U| along the path,
+
+with the tracked point p head lengths L ahead of the head's centre, and a current U of the fluid in the lab.
+Outputs are ln |output|, θ in radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.model import Floats
+
+
+@dataclass(frozen=True)
+class Observation:
+    """How m runs are seen."""
+
+    outputs: tuple[str, ...]
+    time: Floats  # (m,) time scale [s]
+    length: Floats  # (m,) tail length [m]
+    ahead: Floats  # (m,) L/l
+    point: Floats  # (m,) p
+    current: Floats  # (m,) U along the path [m/s]
+
+    def see(self, motion: Mapping[str, Floats]) -> Floats:
+        """Outputs (m, k) of motions (m,) in the simulator's units."""
+        yaw, surge = motion["omega_yr_bar"], motion["v_z"]
+        sway = motion["v_x"] + yaw * self.point * self.ahead
+        speed = np.hypot(sway, surge)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = {
+                "omega_h": np.log(np.abs(motion["omega_h_bar"]) / self.time),
+                "omega_t": np.log(np.abs(motion["omega_t_bar"]) / self.time),
+                "omega_yr": np.log(np.abs(yaw) / self.time),
+                "R_yr": np.log(speed / np.abs(yaw) * self.length),
+                "theta": np.arctan2(np.abs(sway), surge),
+                "v": np.log(speed * self.length / self.time + self.current),
+            }
+        return np.stack([values[name] for name in self.outputs], 1)
+
+    def slopes(
+        self,
+        motion: Mapping[str, Floats],
+        change: Mapping[str, Floats],
+        *,
+        point: float = 0.0,
+        current: float = 0.0,
+    ) -> Floats:
+        """Derivatives (m, k) along a change of the motion, of the tracked point and of the current."""
+        none = np.zeros(len(self.time))
+        yaw, surge = motion["omega_yr_bar"], motion["v_z"]
+        sway = motion["v_x"] + yaw * self.point * self.ahead
+        turn, rise = change.get("omega_yr_bar", none), change.get("v_z", none)
+        side = change.get("v_x", none) + (turn * self.point + yaw * point) * self.ahead
+        speed = np.hypot(sway, surge)
+        faster = (sway * side + surge * rise) / speed
+        seen = speed * self.length / self.time + self.current
+        values = {
+            "omega_h": change.get("omega_h_bar", none) / motion["omega_h_bar"],
+            "omega_t": change.get("omega_t_bar", none) / motion["omega_t_bar"],
+            "omega_yr": turn / yaw,
+            "R_yr": faster / speed - turn / yaw,
+            "theta": np.sign(sway) * (surge * side - sway * rise) / speed**2,
+            "v": (faster * self.length / self.time + current) / seen,
+        }
+        return np.stack([values[name] for name in self.outputs], 1)
