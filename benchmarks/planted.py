@@ -62,6 +62,9 @@ class Linear:
         table = np.concatenate([self.J, self.D], -1)
         return self.predict([parameters])[0], table[..., [order.index(n) for n in names]]
 
+    def check(self, prediction: Floats) -> None:
+        """Nothing to check."""
+
     def possible(self) -> tuple[Linear, list[dict[str, Any]]]:
         """The same runs again."""
         return self, [{"run": i} for i in range(len(self.runs))]
@@ -82,7 +85,7 @@ class Case:
 
 
 def design() -> Measurements:
-    """The paper's runs, without values."""
+    """The paper's runs, with noise for values."""
     rows = [
         {
             "N": n, "l_cm": length, "omega_rpm": sign * rpm, "trial": trial, "session": f"N = {n}",
@@ -96,7 +99,9 @@ def design() -> Measurements:
         for trial in (1, 2)
     ]  # fmt: skip
     table = pd.DataFrame(rows)
-    table["elapsed_min"] = 2.0 * np.random.default_rng(0).permutation(len(table))
+    rng = np.random.default_rng(0)
+    table.iloc[:, 5:] *= np.exp(rng.normal(scale=NOISE, size=(len(table), 5)))
+    table["elapsed_min"] = 2.0 * rng.permutation(len(table))
     return read_measurements(table)
 
 

@@ -140,7 +140,7 @@ def _steer(verdict: Verdict) -> dict[str, Steered]:
     truth = replace(start, **HIDDEN, effects=HIDDEN_EFFECT)  # type: ignore[arg-type]
     models = {
         "calibrated": corrected_robot(start, verdict.base.parameters),
-        "corrected": corrected_robot(start, verdict.final.parameters),
+        "corrected": corrected_robot(start, verdict.delivered),
         "truth known": truth,
     }
     found = steer(models, truth, polygon(4, 3.0))
@@ -162,7 +162,7 @@ def _close(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     verdict = close(Swimmer(start, data))
     record = verdict_record(verdict, table="table.csv")
     write_text(place / "verdict.json", json.dumps(record, indent=1) + "\n")
-    write_text(place / "corrected.toml", robot_toml(corrected_robot(start, verdict.final.parameters)))
+    write_text(place / "corrected.toml", robot_toml(corrected_robot(start, verdict.delivered)))
     print(f"  {name}: {verdict.sentence}")
     return verdict, data
 

@@ -42,7 +42,7 @@ def locked_p_value(fitted: Fit, data: Runs, rows: NDArray[np.bool_], *, seed: in
     rng = np.random.default_rng(seed)
     sessions = np.unique(data.session[rows], return_inverse=True)[1].reshape(-1)
     n, k = residual.shape
-    freedom = max(int((~rows).sum()) - len(np.unique(data.condition[~rows])), k + 1)
+    freedom = max(len(data) - n - len(np.unique(data.condition[~rows])), k + 1)
     spread = np.linalg.cholesky(fitted.covariance + 1e-15 * np.diag(np.diag(fitted.covariance)))
     count = 0
     for _ in range(_DRAWS):
@@ -55,11 +55,11 @@ def locked_p_value(fitted: Fit, data: Runs, rows: NDArray[np.bool_], *, seed: in
     return (1 + count) / (1 + _DRAWS)
 
 
-def fitted_to_all(model: Model, fitted: Fit) -> dict[str, float]:
-    """Parameters of a fitted model after one more step, to all runs; a linear one, since they are near."""
+def fitted_to_all(model: Model, fitted: Fit, rows: NDArray[np.bool_]) -> dict[str, float]:
+    """Parameters of a fitted model after one more step, to all runs in `rows`; linear, since they are near."""
     data = model.runs
     table = np.concatenate([fitted.jacobian, (data.y - fitted.prediction)[..., None]], -1)
-    products = sums(inverse_root(fitted.noise.run) @ table, data.session, len(fitted.noise.run))
+    products = sums(inverse_root(fitted.noise.run) @ table[rows], data.session[rows], len(fitted.noise.run))
     step = least_squares(products, passes=3).step
     changes = zip(fitted.fitted, step.tolist(), strict=True)
     return {**fitted.parameters, **{p.name: moved(p, fitted.parameters[p.name], by) for p, by in changes}}

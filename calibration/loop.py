@@ -2,6 +2,7 @@
 
 1. Whole sessions are locked away before anything is looked at (`calibration.protocols`; by default the middle
    one); rows are never split.
+   Runs with gross errors are set aside (`calibration.gross`).
 2. Covariance from the repeats and the sessions (`calibration.noise`).
 3. Fit of the coefficients to the other sessions (`calibration.fit`).
 4. Lack of fit, kernel score and projected scores (`calibration.misfit`).
@@ -27,6 +28,7 @@ from calibration.attribute import Candidate, examine, explaining, pairs
 from calibration.discriminate import NextRun, next_runs
 from calibration.fit import Fit, fit
 from calibration.generic import Generic, correct
+from calibration.gross import gross_errors
 from calibration.locked import error_interval, errors, fitted_to_all, locked_p_value
 from calibration.misfit import DRAWS, Misfit, check_misfit
 from calibration.model import Floats, Model, Parameter, start_values
@@ -64,6 +66,7 @@ class Verdict:
     untestable: dict[str, str]  # effects that these runs cannot test: what is missing
     plan_hash: str  # of everything fixed before the data was looked at
     set_aside: tuple[str, ...]
+    limits: tuple[str, ...]
 
     @property
     def sentence(self) -> str:
@@ -109,18 +112,21 @@ def close(
         progress: show bars.
     """
     data, effects = model.runs, model.effects
-    used = ~(middle_session(data) if locked is None else locked)
-    test = ", ".join(data.session_names[s] for s in np.unique(data.session[~used]))
+    locked = middle_session(data) if locked is None else locked
+    names = ", ".join(data.session_names[s] for s in np.unique(data.session[locked]))
     fixed = {
         "level": level,
         "seed": seed,
         "catalogue": [e.name for e in effects],
-        "locked": test,
+        "locked": names,
     }
     start = start_values(model)
     coefficients = tuple(p.name for p in model.coefficients)
-    guess = model.guess(dict(start), used)
     uncalibrated = model.predict([start], title="as given" if progress else "")[0]
+    model.check(uncalibrated)
+    gross, reasons = gross_errors(data, uncalibrated)
+    used, test = ~locked & ~gross, locked & ~gross
+    guess = model.guess(dict(start), used)
     base = fit(model, guess, coefficients, used, title="fit" if progress else "")
     along = model.derivatives(base.parameters, [e.name for e in effects], title="effects" if progress else "")[1]
     misfit = check_misfit(base, data, used, along, level=level, seed=seed)
@@ -139,7 +145,7 @@ def close(
     if len(best) > 1 and best[0].refit and best[1].refit:
         ahead = next_runs(model, best[0].refit, best[1].refit, seed=seed)
     error = {
-        name: errors(data, prediction, ~used)
+        name: errors(data, prediction, test)
         for name, prediction in (
             ("uncalibrated", uncalibrated),
             ("before", base.prediction),
@@ -162,17 +168,18 @@ def close(
         generic=generic,
         next_runs=tuple(ahead),
         error_after=error["after"][0],
-        error_after_interval=error_interval(data, final.prediction, ~used, seed),
+        error_after_interval=error_interval(data, final.prediction, test, seed),
         noise_ceiling=ceiling,
         errors_by_output={k: v[1] for k, v in error.items()},
-        locked_p=locked_p_value(final, data, ~used, seed=seed + 3),
-        delivered=fitted_to_all(model, final),
-        locked=test,
+        locked_p=locked_p_value(final, data, test, seed=seed + 3),
+        delivered=fitted_to_all(model, final, ~gross),
+        locked=names,
         used=used,
         uncalibrated=uncalibrated,
         untestable=dict(model.untestable),
         plan_hash=fingerprint(fixed),
-        set_aside=data.set_aside,
+        set_aside=(*data.set_aside, *reasons),
+        limits=data.limits,
     )
 
 
@@ -232,6 +239,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "locked_p_value": result.locked_p,
         "fixed_before": result.plan_hash,
         "rows_set_aside": list(result.set_aside),
+        "limits": list(result.limits),
         "table": table,
         "provenance": provenance({"table": table}),
     }

@@ -24,6 +24,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from calibration.model import Runs
+from calibration.noise import repeat_covariance
 from sim.errors import InputError
 from sim.tables import read_table
 
@@ -44,6 +45,7 @@ _INPUTS = ("N", "l_cm", "omega_rpm")
 _NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm", "heading_deg")
 _KNOWN = {*_INPUTS, *(c for c, _, _ in OUTPUTS.values()), "run", "trial", "session", *_NOTED, *_ERRORS}
 _FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
+_OWN = 1e-3  # share of an output's scatter that must be its own
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         column, factor, _ = OUTPUTS[name]
         value = good[column].to_numpy(dtype=float) * factor
         columns.append(value if name == "theta" else np.log(np.abs(value)))
+    y, outputs, follows = _independent(np.stack(columns, 1), outputs, condition)
     tails, length, omega = (
         good[c].to_numpy(dtype=float) * f for c, f in zip(_INPUTS, (1, 0.01, _RPM), strict=True)
     )
@@ -105,19 +108,60 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
     inputs = [tails, np.log(length), np.log(np.abs(omega)), np.sign(omega), *noted.values()]
     return Measurements(
         outputs=outputs,
-        y=np.stack(columns, 1),
+        y=y,
         condition=condition,
         session=session,
         session_names=tuple(str(n) for n in session_names),
         inputs=np.stack(inputs, 1),
         input_names=("N", "ln l", "ln |omega|", "direction", *noted),
-        set_aside=aside,
+        rows=np.flatnonzero(keep) + 1,
+        set_aside=(*aside, *follows),
+        limits=_limits(tails, length, omega),
         tails=tails,
         length=length,
         omega=omega,
         noted=np.stack(list(noted.values()), 1) if noted else np.empty((len(good), 0)),
         noted_names=tuple(noted),
     )
+
+
+def _independent(
+    y: Floats, outputs: tuple[str, ...], condition: NDArray[np.int64]
+) -> tuple[Floats, tuple[str, ...], tuple[str, ...]]:
+    """Outputs that were measured: repeats differ, and not just as other outputs do.
+
+    Raises:
+        InputError: an output is the same in all repeats.
+    """
+    run = repeat_covariance(y, condition)
+    kept: list[int] = []
+    follows = []
+    for i, name in enumerate(outputs):
+        column = OUTPUTS[name][0]
+        if not run[i, i] > 1e-12:
+            raise InputError(
+                f"{column} does not differ between repeats; give measured values, unrounded, or leave it out"
+            )
+        own = run[np.ix_(kept, kept)]
+        left = run[i, i] - run[i, kept] @ np.linalg.solve(own, run[kept, i]) if kept else run[i, i]
+        if left < _OWN * run[i, i]:
+            others = ", ".join(OUTPUTS[outputs[j]][0] for j in kept)
+            follows.append(f"column {column}: follows from {others}, so it is not counted twice")
+        else:
+            kept.append(i)
+    return y[:, kept], tuple(outputs[i] for i in kept), tuple(follows)
+
+
+def _limits(tails: Floats, length: Floats, omega: Floats) -> tuple[str, ...]:
+    """What was the same in all runs."""
+    found = []
+    if np.ptp(tails) == 0:
+        found.append(f"all runs have N = {tails[0]:.0f}: what depends on the number of tails cannot be seen")
+    if np.ptp(length) == 0:
+        found.append("all runs have one tail length: what depends on it cannot be seen")
+    if np.ptp(np.abs(omega)) < 0.01 * np.abs(omega).max():
+        found.append("all runs have one motor speed: what depends on it cannot be seen")
+    return tuple(found)
 
 
 def _noted(good: pd.DataFrame) -> dict[str, Floats]:

@@ -43,7 +43,9 @@ class Runs:
     session_names: tuple[str, ...]
     inputs: Floats  # (n, q) what was set or noted, on scales on which structure is smooth
     input_names: tuple[str, ...]
+    rows: NDArray[np.int64]  # (n,) numbers in the table, from 1
     set_aside: tuple[str, ...]  # "row 7: …"
+    limits: tuple[str, ...]  # what these runs cannot show, in words
 
     def __len__(self) -> int:
         return len(self.y)
@@ -83,6 +85,14 @@ class Model(Protocol):
         self, parameters: Parameters, names: Sequence[str], *, title: str = ""
     ) -> tuple[Floats, Floats]:
         """Prediction (n, k) and its derivatives (n, k, p) on the scales of the parameters `names`."""
+        ...
+
+    def check(self, prediction: Floats) -> None:
+        """Refuse runs that cannot be what they claim, given the prediction (n, k) of the model as given.
+
+        Raises:
+            InputError: a column is off by a factor that no robot explains.
+        """
         ...
 
     def possible(self) -> tuple[Model, list[dict[str, Any]]]:

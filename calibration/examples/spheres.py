@@ -63,13 +63,17 @@ class Spheres:
         """Prediction and derivatives, by differences."""
         return by_differences(self, parameters, names)
 
+    def check(self, prediction: Floats) -> None:
+        """Any speed is possible: the viscosity is not known beforehand."""
+
     def possible(self) -> tuple[Spheres, list[dict[str, Any]]]:
         """Beads of other diameters."""
         diameter = np.linspace(1.0, 12.0, 23) / 1000
         count = len(diameter)
         runs = replace(
             self.runs, y=np.zeros((count, 1)), condition=np.arange(count), session=np.zeros(count, int),
-            session_names=("next",), inputs=np.log(diameter)[:, None], set_aside=(),
+            session_names=("next",), inputs=np.log(diameter)[:, None], rows=np.arange(count),
+            set_aside=(), limits=(),
         )  # fmt: skip
         return replace(self, runs=runs, diameter=diameter), [
             {"d_mm": round(1000 * d, 2)} for d in diameter.tolist()
@@ -109,7 +113,9 @@ def read_spheres(source: str | Path, name: str) -> Spheres:
         session_names=tuple(f"round {n}" for n in rounds),
         inputs=np.log(diameter)[:, None],
         input_names=("ln d",),
+        rows=np.flatnonzero(~bad) + 1,
         set_aside=aside,
+        limits=(),
     )
     return Spheres(runs, diameter)
 

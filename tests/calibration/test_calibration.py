@@ -21,7 +21,7 @@ from calibration.measurements import read_measurements
 from calibration.misfit import check_misfit
 from calibration.model import Runs, start_values
 from calibration.noise import Noise, inverse_root, least_squares, repeat_covariance, sums
-from calibration.protocols import middle_session
+from calibration.protocols import PROTOCOLS, middle_session
 from calibration.steer import draw_steered, gap_closed, steer
 from calibration.swimmer import Swimmer, corrected_robot
 from calibration.synthetic import make_table
@@ -234,6 +234,10 @@ def test_the_real_simulator_closes_a_table_with_a_hidden_effect(tmp_path: Path) 
         (lambda t: t.assign(session="one"), r"1 session\(s\)"),
         (lambda t: t[t["trial"] == 1], "repeated runs|usable runs"),
         (lambda t: t.assign(omega_h_rpm=-t["omega_h_rpm"]), "wrong sign"),
+        (lambda t: t.assign(omega_yr_rad_s=0.05 * np.sign(t["omega_rpm"])), "does not differ between repeats"),
+        (lambda t: t.assign(R_yr_cm=1000 * t["R_yr_cm"]), "check its unit"),
+        (lambda t: t.head(3), "3 usable runs"),
+        (lambda t: t.assign(R_yr_cm="far"), "0 usable runs"),
     ],
 )
 def test_bad_tables_are_refused(
@@ -331,7 +335,8 @@ def spheres(wall: float, inertia: float, seed: int, diameters: np.ndarray) -> Sp
     runs = Runs(
         outputs=("v",), y=np.zeros((5 * count, 1)), condition=np.tile(np.arange(count), 5),
         session=np.repeat(np.arange(5), count), session_names=tuple("abcde"),
-        inputs=np.log(diameter)[:, None], input_names=("ln d",), set_aside=(),
+        inputs=np.log(diameter)[:, None], input_names=("ln d",), rows=np.arange(5 * count),
+        set_aside=(), limits=(),
     )  # fmt: skip
     truth = Spheres(runs, diameter)
     speed = truth.predict([{"viscosity": 1.3, "wall": wall, "inertia": inertia}])[0]
@@ -399,3 +404,92 @@ def test_the_right_model_brings_the_robot_back_on_its_path() -> None:
     assert rms[0] > 5 * rms[2]
     assert gap_closed(*rms) > 0.8
     assert len(draw_steered(found).axes) == 3
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_a_slipped_decimal_point_is_named_and_set_aside() -> None:
+    """The run, not its repeat; and the verdict is that of the table without it."""
+    table = toy_table(12)
+    table.loc[17, "omega_yr_rad_s"] *= 10
+    result = closed(table)
+    assert [line.split(" is ")[0] for line in result.set_aside] == ["row 18: omega_yr"]
+    assert not result.used[17]
+    without = closed(table.drop(index=17))
+    assert result.verdict == without.verdict
+    assert result.noise_ceiling == pytest.approx(without.noise_ceiling, rel=0.05)
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_noise_and_missing_effects_are_no_gross_errors() -> None:
+    assert closed(toy_table(13, end_over_end_drag=5.0)).set_aside == ()
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_an_output_that_follows_from_others_is_counted_once() -> None:
+    table = toy_table(14)
+    table["v_cm_s"] = table["R_yr_cm"] * table["omega_yr_rad_s"].abs()
+    data = read_measurements(table)
+    assert "v" not in data.outputs
+    assert any("v_cm_s: follows from" in line for line in data.set_aside)
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_runs_of_one_robot_give_a_weaker_conclusion_that_is_stated() -> None:
+    table = toy_table(15)
+    table = pd.concat([table[table["N"] == 3]] * 2, ignore_index=True)
+    table["session"] = np.repeat(["a", "b", "c", "d"], len(table) // 4)
+    noise = np.random.default_rng(0).normal(scale=0.02, size=len(table))
+    table["omega_yr_rad_s"] *= np.exp(noise)
+    result = closed(table)
+    assert any("N = 3" in line for line in result.limits)
+    assert verdict_record(result, table="t")["limits"] == list(result.limits)
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five() -> None:
+    data, locked = PROTOCOLS["paper"](read_measurements(toy_table(16, end_over_end_drag=5.0)))
+    assert data.outputs == ("omega_h", "omega_yr")
+    assert set(data.tails[locked]) == {2.0, 5.0}
+    result = close(Swimmer(START, data, solver=toy.SOLVER), locked=locked, progress=False)
+    assert result.locked == "N=2, N=5"
+    assert "end_over_end_drag" in result.effects
+    assert result.error_after < 0.5 * result.error_before
+    with pytest.raises(InputError, match="N = 2, 3, 4 and 5"):
+        PROTOCOLS["paper"](read_measurements(toy_table(16).query("N != 5")))
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_the_locked_session_is_judged_and_used_in_the_end() -> None:
+    """p is even for a good model and nothing for a bad one; the last fit has all runs."""
+    table = toy_table(17)
+    good = [closed(toy_table(seed)).locked_p for seed in range(17, 25)]
+    assert 0.2 < np.mean(good) < 0.8
+    name = closed(table).locked
+    ruined = table.copy()
+    ruined.loc[ruined["session"] == name, "omega_yr_rad_s"] *= 1.5
+    result = closed(ruined)
+    assert result.locked_p < 0.01
+    assert result.delivered["C_yr"] != pytest.approx(result.final.parameters["C_yr"], rel=0.02)
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_a_table_may_be_parquet(tmp_path: Path) -> None:
+    table = toy_table(18)
+    table.to_parquet(tmp_path / "table.parquet")
+    assert read_measurements(tmp_path / "table.parquet").y == pytest.approx(read_measurements(table).y)
+    (tmp_path / "broken.parquet").write_text("no table")
+    with pytest.raises(InputError, match="no Parquet table"):
+        read_measurements(tmp_path / "broken.parquet")
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_twice_the_heavy_tails_do_not_make_an_effect() -> None:
+    """Student noise with three degrees of freedom on the toy."""
+    rng = np.random.default_rng(5)
+    claimed = 0
+    for seed in range(8):
+        table = toy_table(40 + seed)
+        for column in ("omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm"):
+            table[column] *= np.exp(0.02 * rng.standard_t(3, len(table)))
+        claimed += closed(table).verdict != "none"
+    assert claimed <= 2

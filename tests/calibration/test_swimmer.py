@@ -1,0 +1,111 @@
+"""The swimmer as a model: derivatives, observation, what it refuses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from calibration.loop import close
+from calibration.measurements import read_measurements
+from calibration.model import by_differences, start_values
+from calibration.swimmer import Swimmer
+from calibration.synthetic import make_table
+from sim.errors import InputError
+from sim.robot import PRESETS
+from tests.calibration import toy
+
+START = PRESETS["paper-measured"]
+
+
+@pytest.fixture(scope="module")
+def table() -> pd.DataFrame:
+    """A table with everything that can be noted and measured; values by the toy."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("calibration.synthetic.stepped_columns", toy.steady_columns)
+        found = make_table(START, seed=3, tails=(2, 3, 5), lengths_cm=(6.0, 9.0), title="")
+    rng = np.random.default_rng(0)
+    found["v_cm_s"] = 2.0 * np.exp(rng.normal(scale=0.03, size=len(found)))
+    found["elapsed_min"] = 3.0 * np.arange(len(found))
+    found["temperature_C"] = 20 + rng.normal(size=len(found))
+    found["tank_diameter_cm"] = rng.choice([40.0, 60.0], len(found))
+    found["heading_deg"] = rng.uniform(0, 360, len(found))
+    return found
+
+
+def test_derivatives_are_those_of_the_prediction(table: pd.DataFrame) -> None:
+    """The simulator's sensitivities, through drivers and camera, against differences of predictions."""
+    rows = table.iloc[::6]
+    rows = pd.concat([rows] * 3, ignore_index=True)  # enough repeats to be read
+    noise = np.random.default_rng(1).normal(scale=0.01, size=(len(rows), 6))
+    columns = ["omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm", "theta_deg", "v_cm_s"]
+    rows[columns] *= np.exp(noise)
+    model = Swimmer(START, read_measurements(rows))
+    assert model.untestable == {}
+    names = [p.name for p in (*model.coefficients, *model.effects)]
+    at = {**start_values(model), "motor_slip": 0.03, "tracked_point": 0.2, "current_along_x": 0.002}
+    ours, J = model.derivatives(at, names)
+    theirs, differences = by_differences(model, at, names)
+    assert ours == pytest.approx(theirs, abs=5e-4)  # more phases than the prediction needs
+    scale = np.abs(differences).max((0, 1))
+    assert (scale > 0).all()
+    off = np.abs(J - differences).max((0, 1)) / scale
+    assert dict(zip(names, off, strict=True)) == {name: pytest.approx(0, abs=0.06) for name in names}
+
+
+def test_an_odd_effect_of_the_robot_itself_tells_left_from_right(table: pd.DataFrame) -> None:
+    """Even where the runs are in one direction, so that it cannot be fitted."""
+    left = read_measurements(table[table["omega_rpm"] < 0].drop(columns=["elapsed_min", "temperature_C"]))
+    plain, biased = (
+        Swimmer(replace(START, effects=effects), left, solver=toy.SOLVER)
+        for effects in ({}, {"left_right_bias": 0.3})
+    )
+    assert "left_right_bias" not in {e.name for e in biased.effects}
+    left_turns = [m.predict([start_values(m)])[0] for m in (plain, biased)]
+    mirrored = read_measurements(
+        table[table["omega_rpm"] < 0].assign(
+            **{c: lambda t, c=c: -t[c] for c in ("omega_rpm", "omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s")}
+        )
+    )
+    right = Swimmer(biased.robot, mirrored, solver=toy.SOLVER)
+    right_turns = right.predict([start_values(right)])[0]
+    yaw = left.outputs.index("omega_yr")
+    assert np.abs(left_turns[1] - left_turns[0])[:, yaw].min() > 1e-4
+    assert np.abs(left_turns[1] - right_turns)[:, yaw].min() > 1e-4
+
+
+def test_a_current_shows_in_the_speed_along_its_heading(table: pd.DataFrame) -> None:
+    model = Swimmer(START, read_measurements(table), solver=toy.SOLVER)
+    at = start_values(model)
+    still, moving = model.predict([at, {**at, "current_along_x": 0.001}])
+    speed = model.runs.outputs.index("v")
+    gained = np.exp(moving[:, speed]) - np.exp(still[:, speed])
+    assert gained == pytest.approx(0.001 * np.cos(np.radians(table["heading_deg"])))
+    assert np.delete(moving - still, speed, 1) == pytest.approx(0)
+    without = Swimmer(START, read_measurements(table.drop(columns="heading_deg")), solver=toy.SOLVER)
+    assert "current in the tank along x" in without.untestable
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "expected"),
+    [
+        ("l_cm", 10.0, "l_cm = 90 is 56"),
+        ("l_cm", 0.01, "head radii"),
+        ("omega_rpm", 1000.0, "ω̄"),
+        ("omega_rpm", np.pi / 30, "add up to 9"),
+        ("R_yr_cm", 1000.0, "R_yr_cm is .* times what"),
+        ("theta_deg", np.pi / 180, "theta_deg is 0.0175 times"),
+        ("omega_yr_rad_s", 1e-3, "omega_yr_rad_s is 0.001"),
+    ],
+)
+def test_wrong_units_are_refused(table: pd.DataFrame, column: str, factor: float, expected: str) -> None:
+    rows = table.assign(**{column: table[column] * factor}).drop(columns="v_cm_s")
+    with pytest.raises(InputError, match=expected):
+        close(Swimmer(START, read_measurements(rows), solver=toy.SOLVER), progress=False)
+
+
+def test_right_units_are_taken(table: pd.DataFrame) -> None:
+    model = Swimmer(START, read_measurements(table.drop(columns="v_cm_s")), solver=toy.SOLVER)
+    model.check(model.predict([start_values(model)])[0])
