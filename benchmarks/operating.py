@@ -153,8 +153,9 @@ def main(count: str = "500", repeats: str = "6") -> None:
     named = [r.held_out for r in results if r.judgement == "exact"]
 
     one_each = {c.label: c for c in cases(model, 1) if c.label.endswith("λ = 8") and c.sizes}
-    planted = [(c, list(range(REAL_SEEDS))) for c in one_each.values()]
-    planted += [(nulls(model, 1)[0], list(range(100, 100 + REAL_NULLS)))]
+    own = [REAL_SEEDS * i for i in range(len(one_each) + 1)]  # every table has its own noise
+    planted = [(c, list(range(i, i + REAL_SEEDS))) for c, i in zip(one_each.values(), own, strict=False)]
+    planted += [(nulls(model, 1)[0], list(range(own[-1], own[-1] + REAL_NULLS)))]
     real = parallel(delayed(run_real)(c, seeds) for c, seeds in planted)
     stand = parallel(delayed(run_linear)(model, c, seed) for c, seeds in planted for seed in seeds)
     through = [o for group in real for o in group]

@@ -8,7 +8,7 @@ in the direction that its bounds allow, is refitted together with the coefficien
     its interval excludes the null, and
     it predicts left-out sessions better, by more than the uncertainty of that gain.
 
-Kept effects whose deviances differ by less than what one parameter gains by chance (3.84) cannot be told apart.
+Kept effects whose deviances differ by less than what one parameter gains by chance (6.63) cannot be told apart.
 Where none alone is kept, each of the best few is taken as given and a second one is looked for in the same way
 (`pairs`).
 """
@@ -26,7 +26,7 @@ from calibration.model import Floats, Model, Parameter, Parameters
 
 _DRAWS = 400  # for a remainder, which is judged at a coarser level
 _FIRST = 3  # single effects beside which a second one is looked for
-_INDISTINGUISHABLE = 3.84  # χ² with one degree of freedom, 95 %
+_INDISTINGUISHABLE = 6.63  # χ² with one degree of freedom, 99 %
 
 
 @dataclass(frozen=True)

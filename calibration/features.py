@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from calibration.model import Floats, Runs
 
+_CUBIC = 0.2  # share of a cube that lower powers must leave
+
 
 def features(runs: Runs, used: NDArray[np.bool_]) -> tuple[tuple[str, ...], Floats]:
     """Names, and the inputs that differ, their squares, products and cubes for all runs, (n, f).
@@ -26,8 +28,8 @@ def features(runs: Runs, used: NDArray[np.bool_]) -> tuple[tuple[str, ...], Floa
     for i, column in zip(own, inputs.T, strict=True):
         lower = np.stack([np.ones_like(column), column, column**2], 1)
         weights = np.linalg.lstsq(lower[used], column[used] ** 3, rcond=None)[0]
-        cube = column**3 - lower @ weights  # beyond lower powers; nothing for two or three levels
-        if cube[used].std() > 1e-6:
+        cube = column**3 - lower @ weights  # beyond lower powers; little for two or three levels
+        if cube[used].std() > _CUBIC * (column[used] ** 3).std():
             names.append(f"({runs.input_names[i]})³")
             columns.append(cube / cube[used].std())
     return tuple(names), np.stack(columns, 1) if columns else np.empty((len(runs), 0))

@@ -4,7 +4,8 @@ Gauss-Newton with the model's own derivatives:
 
     θ ← θ + (JᵀΣ⁻¹J)⁻¹ JᵀΣ⁻¹ (y − f(θ)),   θ = (ln C_1, …, ε_1, …).
 
-Parameters stay within their bounds. The covariance of the parameters is V = (JᵀΣ⁻¹J)⁻¹; intervals are 95 %, by
+Parameters stay within their bounds. The covariance of the parameters is V = (JᵀΣ⁻¹J)⁻¹, more for an
+estimated S (`_inflation`); intervals are 95 %, by
 Student's t with the degrees of freedom that the scatter ρ of a few sessions leaves (Satterthwaite 1946),
 
     ν = 2 V² / (V′² Var ρ),   Var ρ ≈ 2 (ρ + 1/n)² / (k (s − 1)),   n runs in each of s sessions.
@@ -36,6 +37,7 @@ class Fit:
     parameters: dict[str, float]
     fitted: tuple[Parameter, ...]  # in the order of the covariance
     covariance: Floats  # (p, p) of (ln C, ε)
+    inflation: float  # in the covariance, for S being estimated
     freedom: Floats  # (p,) degrees of freedom of the intervals
     prediction: Floats  # (n, k)
     jacobian: Floats  # (n, k, p)
@@ -100,7 +102,30 @@ def fit(
     deviance = float(products.at(linear.share)[-1, -1] + spread)
     fitted = tuple(parameter(model, name) for name in names)
     freedom = _freedom(products, float(linear.share), len(names))
-    return Fit(parameters, fitted, covariance, freedom, prediction, derivative, noise, deviance, count)
+    inflation = _inflation(data.condition[used], len(run))
+    return Fit(
+        parameters,
+        fitted,
+        inflation * covariance,
+        inflation,
+        freedom,
+        prediction,
+        derivative,
+        noise,
+        deviance,
+        count,
+    )
+
+
+def _inflation(condition: NDArray[np.int64], outputs: int) -> float:
+    """By how much the variance grows because S is known from ν repeats of k outputs only.
+
+    ν/(ν − k − 1), since 1/S is overestimated, times 1 + (k − 1)/(ν − k), since its weights are not the best ones.
+    """
+    repeats = len(condition) - len(np.unique(condition))
+    if repeats <= outputs + 1:
+        return 2.0 * repeats
+    return repeats / (repeats - outputs - 1) * (1 + (outputs - 1) / (repeats - outputs))
 
 
 def _freedom(products: Sums, share: float, count: int) -> Floats:

@@ -32,10 +32,11 @@ from calibration.gross import gross_errors
 from calibration.locked import error_interval, errors, fitted_to_all, locked_p_value
 from calibration.misfit import DRAWS, Misfit, check_misfit
 from calibration.model import Floats, Model, Parameter, start_values
+from calibration.profile import profile_intervals
 from calibration.protocols import middle_session
 from sim.artefact import fingerprint, provenance
 
-LEVEL = 0.05  # α of every claim
+LEVEL = 0.04  # α of every claim: noise is estimated, and false claims shall stay below one in twenty
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ class Verdict:
     explaining: tuple[Candidate, ...]  # what explains the residual, best first; more than one: not told apart
     base: Fit  # calibrated, without effects
     final: Fit  # the model to go on with
+    base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
+    final_intervals: dict[str, tuple[float, float]]
     misfit: Misfit
     candidates: tuple[Candidate, ...]
     generic: Generic  # correction of the calibrated model
@@ -81,7 +84,7 @@ class Verdict:
             assert best.refit is not None
             sizes = []
             for effect in (*best.beside, best.effect):
-                low, high = best.refit.interval(effect.name)
+                low, high = self.final_intervals[effect.name]
                 sizes.append(
                     f"{effect.title}, size {best.refit.parameters[effect.name]:.3g} ({low:.3g} to {high:.3g})"
                 )
@@ -140,6 +143,9 @@ def close(
         best = explaining(pairs(model, found, used, start, level=level, seed=seed, progress=progress))
     verdict = "none" if misfit.p_value >= level else ("unexplained", "effect", "ambiguous")[min(len(best), 2)]
     final = best[0].refit if best and best[0].refit else base
+    title = "intervals" if progress else ""
+    base_intervals = profile_intervals(model, base, used, title=title)
+    final_intervals = base_intervals if final is base else profile_intervals(model, final, used, title=title)
     generic = correct(data, base.prediction, used)
     ahead: list[NextRun] = []
     if len(best) > 1 and best[0].refit and best[1].refit:
@@ -160,6 +166,8 @@ def close(
         explaining=tuple(best),
         base=base,
         final=final,
+        base_intervals=base_intervals,
+        final_intervals=final_intervals,
         misfit=misfit,
         candidates=tuple(found) or _unexamined(misfit, effects),
         error_uncalibrated=error["uncalibrated"][0],
@@ -198,7 +206,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
     parameters = {
         name: {
             "value": final.parameters[name],
-            "interval": list(final.interval(name)),
+            "interval": list(result.final_intervals[name]),
             "value_all_runs": result.delivered[name],
         }
         for name in final.names

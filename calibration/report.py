@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from calibration.loop import Verdict
+from calibration.loop import LEVEL, Verdict
 from calibration.measurements import Measurements
+from calibration.profile import least_determined
 from dataset.page import Page
 from sim.artefact import code_version
 
@@ -20,6 +22,7 @@ _LABELS = {
     "theta": "slip angle [rad]",
     "v": "speed",
 }
+_TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes", "score": "effects"}
 
 
 def write_report(result: Verdict, data: Measurements, out: str | Path, *, title: str) -> None:
@@ -31,27 +34,79 @@ def write_report(result: Verdict, data: Measurements, out: str | Path, *, title:
 
 def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
     """The sections of a closed loop."""
-    page.section("Data")
-    page.text(
-        f"{len(data)} usable runs in {len(data.session_names)} sessions; session {result.locked} was locked "
-        "away for the test. Rows set aside: " + ("; ".join(result.set_aside) if result.set_aside else "none") + "."
-    )
-    page.section("Fit")
-    rows = []
-    for fitted, name in ((result.base, "without effects"), (result.final, "with the verdict's effects")):
-        for parameter in fitted.names:
-            low, high = fitted.interval(parameter)
-            value = fitted.parameters[parameter]
-            rows.append((f"{parameter}, {name}", f"{value:.4g}", f"{low:.4g} to {high:.4g}"))
-        if result.final is result.base:
-            break
-    page.table(("parameter", "value", "95 % interval"), rows)
+    _add_data(page, result, data)
+    _add_fit(page, result)
     page.section("Residuals on the runs that were fitted, before and after")
     page.figure(draw_residuals(result, data), "residuals by output and number of tails, before and after")
-    page.section("Evidence for each effect of the catalogue")
     page.text(
-        f"Score of each effect after what the coefficients absorb is projected out; claims need more than "
-        f"{result.misfit.critical_z:.2f}. General lack of fit: p = {result.misfit.general_p:.3g}."
+        "Where the residual lives: each output along each input, square and product, in standard deviations, "
+        "after what the fit absorbs."
+    )
+    page.figure(draw_map(result, data), "map of the residual over the runs' inputs, before and after")
+    _add_evidence(page, result)
+    _add_test(page, result, data)
+    if result.next_runs:
+        page.section("Runs to make next")
+        page.text(
+            "They would tell the first two explanations apart; the last column is how often, by drawing them."
+        )
+        settings = list(result.next_runs[0].settings)
+        page.table(
+            (*settings, "repeats", "separation", "decides"),
+            [
+                (*map(str, r.settings.values()), str(r.repeats), f"{r.separation:.1f}", f"{100 * r.decides:.0f} %")
+                for r in result.next_runs
+            ],
+        )
+
+
+def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
+    page.section("Data")
+    page.text(
+        f"{len(data)} usable runs in {len(data.session_names)} sessions; locked away for the test: "
+        f"{result.locked}. Set aside: " + ("; ".join(result.set_aside) if result.set_aside else "nothing") + "."
+    )
+    scatter = np.sqrt(np.diag(result.base.noise.run))
+    noise = ", ".join(f"{_LABELS[o]} {100 * s:.1f} %" for o, s in zip(data.outputs, scatter, strict=True))
+    page.text(
+        f"Scatter of one run, from the repeats: {noise}. A session shifts all its runs by "
+        f"{100 * math.sqrt(result.final.noise.share):.0f} % of that."
+    )
+    for limit in result.limits:
+        page.text(f"A weaker conclusion: {limit}.", tone="bad")
+
+
+def _add_fit(page: Page, result: Verdict) -> None:
+    page.section("Fit")
+    rows = []
+    for fitted, intervals, name in (
+        (result.base, result.base_intervals, "without effects"),
+        (result.final, result.final_intervals, "with the verdict's effects"),
+    ):
+        for parameter in fitted.names:
+            low, high = intervals[parameter]
+            rows.append(
+                (f"{parameter}, {name}", f"{fitted.parameters[parameter]:.4g}", f"{low:.4g} to {high:.4g}")
+            )
+        if result.final is result.base:
+            break
+    page.table(("parameter", "value", "95 % interval, by profile deviance"), rows)
+    combination, error = least_determined(result.final)
+    page.text(
+        f"These runs say least about {combination}: {100 * error:.1f} %. corrected.toml has the model fitted once "
+        "more to all runs, the locked ones included: "
+        + ", ".join(f"{name} {result.delivered[name]:.4g}" for name in result.final.names)
+        + "."
+    )
+
+
+def _add_evidence(page: Page, result: Verdict) -> None:
+    page.section("Evidence for each effect of the catalogue")
+    each = ", ".join(f"{_TESTS[name]} {p:.3g}" for name, p in result.misfit.p.items())
+    page.text(
+        f"Is there more than noise? p = {result.misfit.p_value:.3g} by all tests together ({each}). Below: score "
+        "of each effect after what the coefficients absorb is projected out; claims need more than "
+        f"{result.misfit.critical_z:.2f}."
     )
     page.figure(draw_evidence(result), "score of each effect against what a claim needs")
     page.table(
@@ -65,7 +120,10 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
         page.text(
             "Not tested, for want of data: " + "; ".join(f"{t} ({why})" for t, why in result.untestable.items())
         )
-    page.section("Error on the locked session")
+
+
+def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
+    page.section("Error on the locked runs")
     low, high = result.error_after_interval
     page.table(
         ("model", "relative rms", *(_LABELS[o] for o in data.outputs)),
@@ -80,24 +138,43 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
         ],
     )
     features = ", ".join(result.generic.features) or "no feature"
+    agrees = "agree with the final model" if result.locked_p >= LEVEL else "do not agree with the final model"
     page.text(
         f"95 % interval with effects: {100 * low:.2f} to {100 * high:.2f} %. "
-        f"Noise ceiling from the repeats: {100 * result.noise_ceiling:.2f} %. "
-        f"Generic correction: {features} (it describes, and explains nothing)."
+        f"Noise of one run from the repeats: {100 * result.noise_ceiling:.2f} %. The locked runs {agrees} "
+        f"(p = {result.locked_p:.2g}). Generic correction: {features} (it describes, and explains nothing).",
+        tone="good" if result.locked_p >= LEVEL else "bad",
     )
-    if result.next_runs:
-        page.section("Runs to make next")
-        page.text(
-            "They would tell the first two explanations apart; the last column is how often, by drawing them."
+
+
+def draw_map(result: Verdict, data: Measurements) -> Figure:
+    """z of every output along every feature of the inputs, before and after."""
+    maps = [("calibrated", result.misfit)]
+    if result.explaining and result.explaining[0].refit_misfit is not None:
+        maps.append(("with the verdict's effects", result.explaining[0].refit_misfit))
+    names = result.misfit.features
+    height = 0.32 * len(data.outputs) + 0.5
+    figure = Figure(figsize=(11, len(maps) * height + 1.6))
+    limit = max(4.0, float(np.abs(result.misfit.scores.shapes).max(initial=0.0)))
+    for place, (label, misfit) in enumerate(maps):
+        axes = figure.add_subplot(len(maps), 1, place + 1)
+        z = misfit.scores.shapes
+        axes.imshow(
+            np.arcsinh(z / 2),
+            cmap="RdBu_r",
+            vmin=-np.arcsinh(limit / 2),
+            vmax=np.arcsinh(limit / 2),
+            aspect="auto",
         )
-        settings = list(result.next_runs[0].settings)
-        page.table(
-            (*settings, "repeats", "separation", "decides"),
-            [
-                (*map(str, r.settings.values()), str(r.repeats), f"{r.separation:.1f}", f"{100 * r.decides:.0f} %")
-                for r in result.next_runs
-            ],
-        )
+        for i, j in np.argwhere(np.abs(z) > 3):
+            colour = "white" if abs(z[i, j]) > 0.4 * limit else "#1c2733"
+            axes.text(j, i, f"{z[i, j]:+.0f}", ha="center", va="center", fontsize=7, color=colour)
+        axes.set_yticks(range(len(data.outputs)), [_LABELS[o].split(" [")[0] for o in data.outputs], fontsize=8)
+        last = place == len(maps) - 1
+        axes.set_xticks(range(len(names)), names if last else [""] * len(names), rotation=90, fontsize=7)
+        axes.set_title(f"{label} (numbers where |z| > 3)", fontsize=9)
+    figure.tight_layout()
+    return figure
 
 
 def draw_evidence(result: Verdict) -> Figure:

@@ -37,6 +37,7 @@ SANE = (0.1, 20.0)  # coefficients stay within: beyond, they say that the model 
 
 _STEP = 0.05  # finite difference in ln C, by the look-up table
 _MOST_GUESSES = 12
+_STARTS = (1.0, 0.6, 1.6)  # times the coefficients as given
 _FEWEST_COVERED = 24  # runs
 
 
@@ -166,28 +167,40 @@ class Swimmer:
         return seen, J
 
     def guess(self, start: dict[str, float], used: NDArray[np.bool_]) -> dict[str, float]:
-        """Coefficients fitted with the look-up table to the runs that it covers; `start` if those are too few."""
+        """Coefficients fitted with the look-up table to the runs that it covers; `start` if those are too few.
+
+        From several starts; the one that ends nearest to the runs counts.
+        """
         lookup = load()
         covered = used & self._inside(lookup, start)
-        parameters = dict(start)
         if covered.sum() < _FEWEST_COVERED:
-            return parameters
-        data = self.runs.subset(covered)
-        part = replace(self, runs=data)
+            return dict(start)
+        part = replace(self, runs=self.runs.subset(covered))
+        found = [
+            part._fit_lookup(lookup, {**start, **{n: factor * start[n] for n in COEFFICIENTS}})
+            for factor in _STARTS
+        ]
+        return min(found, key=lambda pair: pair[1])[0]
+
+    def _fit_lookup(self, lookup: Lookup, start: dict[str, float]) -> tuple[dict[str, float], float]:
+        """Coefficients from one start, and the sum of squares that they leave; infinite off the table."""
+        data, parameters, left = self.runs, dict(start), math.inf
         whiten = Noise(repeat_covariance(data.y, data.condition), 0.0).whitener(data.session)
         for _ in range(_MOST_GUESSES):
             moved = [{**parameters, name: parameters[name] * math.exp(_STEP)} for name in COEFFICIENTS]
             try:
-                found = part.predict([parameters, *moved], lookup=lookup)
+                found = self.predict([parameters, *moved], lookup=lookup)
             except InputError:  # a coefficient left the table's domain on the way
-                return dict(start)
+                return start, math.inf
             J = whiten(np.moveaxis(found[1:] - found[0], 0, -1) / _STEP)
-            step: Floats = np.asarray(np.linalg.lstsq(J, whiten(data.y - found[0]), rcond=None)[0])
-            for name, change in zip(COEFFICIENTS, np.clip(step, -0.7, 0.7).tolist(), strict=True):
-                parameters[name] = min(max(parameters[name] * math.exp(change), SANE[0]), SANE[1])
+            residual = whiten(data.y - found[0])
+            left = float(residual @ residual)
+            step: Floats = np.asarray(np.linalg.lstsq(J, residual, rcond=None)[0])
             if np.abs(step).max() < 1e-3:
                 break
-        return parameters
+            for name, change in zip(COEFFICIENTS, np.clip(step, -0.7, 0.7).tolist(), strict=True):
+                parameters[name] = min(max(parameters[name] * math.exp(change), SANE[0]), SANE[1])
+        return parameters, left
 
     def check(self, prediction: Floats) -> None:
         """Refuse a table whose units cannot be those that its columns name."""

@@ -10,7 +10,7 @@ from pyarrow import ArrowException
 from sim.errors import InputError
 
 
-def read_table(path: str | Path) -> pd.DataFrame:
+def read_table(path: str | Path, *, comment: str | None = None) -> pd.DataFrame:
     """A table: Parquet if the name ends so, otherwise CSV with a header.
 
     Raises:
@@ -18,7 +18,7 @@ def read_table(path: str | Path) -> pd.DataFrame:
     """
     parquet = Path(path).suffix.lower() in (".parquet", ".pq")
     try:
-        table = pd.read_parquet(path) if parquet else pd.read_csv(path)
+        table = pd.read_parquet(path) if parquet else pd.read_csv(path, comment=comment)
     except (pd.errors.EmptyDataError, pd.errors.ParserError, UnicodeDecodeError, ArrowException) as broken:
         reason = str(broken).splitlines()[0]
         kind = "Parquet" if parquet else "CSV"

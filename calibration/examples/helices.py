@@ -1,0 +1,126 @@
+"""A rigid helix that turns in a viscous fluid: where resistive force theory fails, and what it leaves out.
+
+A helix of radius R, pitch λ, axial length L and wire radius a turns about its axis at Ω, or moves along it at U.
+With the pitch angle ψ, tan ψ = 2πR/λ, and the contour length L/cos ψ,
+
+    thrust/(μΩR²) = (ζ⊥ − ζ∥) sin ψ cos ψ × length/R,
+    torque/(μΩR³) = (ζ⊥ cos²ψ + ζ∥ sin²ψ) × length/R,    drag/(μUR) = (ζ⊥ sin²ψ + ζ∥ cos²ψ) × length/R,
+
+with ζ∥ = 2π/(ln(2λ/a) − ½), ζ⊥ = 4π/(ln(2λ/a) + ½) after Gray and Hancock, or 2π/ln q, 4π/(ln q + ½) with
+q = 0.18 λ/(a cos ψ) after Lighthill. What these leave out is the flow that one part of the wire makes at another:
+the Stokeslets of `sim.flow`, spread over √e a, which is slender-body theory (Keller and Rubinow 1976).
+
+A table has lambda_over_R, thrust_over_etaOmR2, torque_over_etaOmR3 and drag_over_etaUR, a row a helix; Rodenborn
+et al. (2013) measured such.
+
+Usage: python -m calibration.examples.helices TABLE.csv
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from calibration.model import Floats
+from sim.compiling import compiled
+from sim.errors import InputError, run_command
+from sim.flow import stokeslets
+from sim.tables import read_table
+
+RADIUS, LENGTH, WIRE = 6.3, 130.0, 0.397  # mm, of Rodenborn et al. (2013)
+COLUMNS = ("thrust_over_etaOmR2", "torque_over_etaOmR3", "drag_over_etaUR")
+PIECES = 480
+
+
+def resistive(pitch: Floats, *, lighthill: bool = False) -> Floats:
+    """Thrust, torque, drag of helices of pitch λ/R (m,), (m, 3), by resistive force theory."""
+    angle = np.arctan(2 * np.pi / pitch)
+    wire, length = WIRE / RADIUS, LENGTH / RADIUS / np.cos(angle)
+    if lighthill:
+        log = np.log(0.18 * pitch / (wire * np.cos(angle)))
+        parallel, perp = 2 * np.pi / log, 4 * np.pi / (log + 0.5)
+    else:
+        log = np.log(2 * pitch / wire)
+        parallel, perp = 2 * np.pi / (log - 0.5), 4 * np.pi / (log + 0.5)
+    s, c = np.sin(angle), np.cos(angle)
+    forces = [(perp - parallel) * s * c, perp * c**2 + parallel * s**2, perp * s**2 + parallel * c**2]
+    return np.stack(forces, 1) * length[:, None]
+
+
+def with_flow(pitch: Floats, *, pieces: int = PIECES) -> Floats:
+    """The same with the flow of every piece of the wire at every other."""
+    return np.array([_forces(float(p), pieces) for p in pitch])
+
+
+def _forces(pitch: float, pieces: int) -> Floats:
+    along = np.linspace(0.0, LENGTH / RADIUS, pieces + 1)
+    nodes = _helix(along, pitch)
+    middles = _helix((along[1:] + along[:-1]) / 2, pitch)
+    spread = np.sqrt(np.e) * WIRE / RADIUS
+    matrix = _mobility(nodes, middles, spread)
+    spin = np.stack([-middles[:, 1], middles[:, 0], np.zeros(pieces)], 1)
+    push = np.zeros_like(spin)
+    push[:, 2] = 1.0
+    turning, moving = (np.linalg.solve(matrix, v.reshape(-1)).reshape(-1, 3) for v in (spin, push))
+    torque = (middles[:, 0] * turning[:, 1] - middles[:, 1] * turning[:, 0]).sum()
+    return np.array([abs(turning[:, 2].sum()), torque, moving[:, 2].sum()])
+
+
+def _helix(along: Floats, pitch: float) -> Floats:
+    phase = 2 * np.pi * along / pitch
+    return np.stack([np.cos(phase), np.sin(phase), along], 1)
+
+
+@compiled
+def _mobility(nodes: Floats, at: Floats, spread: float) -> Floats:
+    """Velocity at the middles of pieces per force on each, (3 m, 3 m)."""
+    m = len(at)
+    matrix = np.empty((3 * m, 3 * m))
+    for j in range(m):
+        start, end = (nodes[j, 0], nodes[j, 1], nodes[j, 2]), (nodes[j + 1, 0], nodes[j + 1, 1], nodes[j + 1, 2])
+        for i in range(m):
+            place = (at[i, 0], at[i, 1], at[i, 2])
+            x = stokeslets(place, start, end, (1.0, 0.0, 0.0), spread)
+            y = stokeslets(place, start, end, (0.0, 1.0, 0.0), spread)
+            z = stokeslets(place, start, end, (0.0, 0.0, 1.0), spread)
+            for c in range(3):
+                matrix[3 * i + c, 3 * j], matrix[3 * i + c, 3 * j + 1], matrix[3 * i + c, 3 * j + 2] = (
+                    x[c],
+                    y[c],
+                    z[c],
+                )
+    return matrix
+
+
+def read_helices(source: str | Path) -> tuple[Floats, Floats]:
+    """Pitch λ/R (m,) and measured thrust, torque, drag (m, 3).
+
+    Raises:
+        InputError: a column is missing.
+    """
+    table = read_table(source, comment="#")
+    for column in ("lambda_over_R", *COLUMNS):
+        if column not in table:
+            raise InputError(f"the table has no column {column!r}")
+    return table["lambda_over_R"].to_numpy(dtype=float), table[list(COLUMNS)].to_numpy(dtype=float)
+
+
+def main(table: str) -> None:
+    pitch, measured = read_helices(table)
+    print("  model minus measurement [%]    thrust: each λ/R, rms      torque: rms      drag: rms")
+    for label, found in (
+        ("resistive, Gray and Hancock", resistive(pitch)),
+        ("resistive, Lighthill", resistive(pitch, lighthill=True)),
+        ("with the flow of every piece", with_flow(pitch)),
+    ):
+        off = 100 * (found / measured - 1)
+        rms = np.sqrt((off**2).mean(0))
+        each = " ".join(f"{o:+6.1f}" for o in off[:, 0])
+        print(f"  {label:30s} {each}  {rms[0]:6.1f}  {rms[1]:12.1f}  {rms[2]:12.1f}")
+    print("  λ/R: " + " ".join(f"{p:.2f}" for p in pitch))
+
+
+if __name__ == "__main__":
+    sys.exit(run_command(lambda _: main(*sys.argv[1:])))

@@ -1,0 +1,84 @@
+"""How well the runs determine what was fitted: profile intervals, and the combinations they say least about.
+
+The deviance along one parameter, with the others refitted, need not be a parabola. At the ends of the interval
+that the covariance gives, the model is run again; the ends move to where the deviance, taken as a parabola on
+either side, has risen by t², with t the quantile of `Fit.interval`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from calibration.fit import Fit
+from calibration.model import Model, moved
+from calibration.noise import inverse_root, sums
+
+_LEAST = 0.05  # of the expected rise: below, the deviance is flat and the end stays where it is
+
+
+def profile_intervals(
+    model: Model, fitted: Fit, used: NDArray[np.bool_], *, title: str = ""
+) -> dict[str, tuple[float, float]]:
+    """95 % intervals of every fitted parameter, by their profile deviances."""
+    data, count = model.runs, len(fitted.names)
+    root = inverse_root(fitted.noise.run)
+    sets, ends = [], []
+    for i, one in enumerate(fitted.fitted):
+        half = float(student.ppf(0.975, fitted.freedom[i])) * math.sqrt(fitted.covariance[i, i])
+        for side in (-1, 1):
+            end = moved(one, fitted.parameters[one.name], side * half)
+            own = (
+                math.log(end / fitted.parameters[one.name])
+                if one.logarithmic
+                else end - fitted.parameters[one.name]
+            )
+            along = fitted.covariance[i] / fitted.covariance[i, i] * own  # where the others go with it
+            step = zip(fitted.fitted, along.tolist(), strict=True)
+            sets.append(
+                {**fitted.parameters, **{p.name: moved(p, fitted.parameters[p.name], by) for p, by in step}}
+            )
+            ends.append((i, own))
+    found = model.predict(sets, title=title)
+    here = _deviance(fitted, root, data.y - fitted.prediction, data.session, used, list(range(count)))
+    intervals: dict[str, list[float]] = {name: [] for name in fitted.names}
+    for (i, own), prediction in zip(ends, found, strict=True):
+        others = [j for j in range(count) if j != i]
+        rise = _deviance(fitted, root, data.y - prediction, data.session, used, others) - here
+        expected = own**2 / (fitted.covariance[i, i] / fitted.inflation)
+        scale = math.sqrt(expected / rise) if rise > _LEAST * expected > 0 else 1.0
+        one = fitted.fitted[i]
+        intervals[one.name].append(moved(one, fitted.parameters[one.name], own * scale))
+    return {name: (low, high) for name, (low, high) in intervals.items()}
+
+
+def _deviance(
+    fitted: Fit,
+    root: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    session: NDArray[np.int64],
+    used: NDArray[np.bool_],
+    others: list[int],
+) -> float:
+    """rᵀ Σ⁻¹ r with the parameters `others` refitted (linearised), in the noise of the fit."""
+    table = np.concatenate([fitted.jacobian[..., others], residual[..., None]], -1)[used]
+    whole = sums(root @ table, session[used], len(root)).at(np.array(fitted.noise.share))
+    p = len(others)
+    absorbed = whole[:p, p] @ np.linalg.pinv(whole[:p, :p], hermitian=True) @ whole[:p, p] if p else 0.0
+    return float(whole[p, p] - absorbed)
+
+
+def least_determined(fitted: Fit) -> tuple[str, float]:
+    """The combination of logarithmic parameters that the runs say least about, and its standard error (of ln)."""
+    own = [i for i, p in enumerate(fitted.fitted) if p.logarithmic]
+    values, vectors = np.linalg.eigh(fitted.covariance[np.ix_(own, own)])
+    vector = vectors[:, -1] * np.sign(vectors[np.argmax(np.abs(vectors[:, -1])), -1])
+    parts = [
+        f"{fitted.fitted[i].name}^{power:.2f}"
+        for i, power in zip(own, vector.tolist(), strict=True)
+        if abs(power) > 0.1
+    ]
+    return " ".join(parts), float(np.sqrt(values[-1]))
