@@ -40,7 +40,9 @@ OUTPUTS = {
     "theta": ("theta_deg", math.pi / 180, 0),
     "v": ("v_cm_s", 0.01, 0),
 }
-_ERRORS = ("omega_yr_error", "R_yr_error", "theta_error", "v_error")  # of `calibration.tracks`; repeats tell more
+_ERRORS = (  # of `calibration.tracks`; repeats tell more
+    "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
+)  # fmt: skip
 _INPUTS = ("N", "l_cm", "omega_rpm")
 _NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm", "heading_deg")
 _KNOWN = {*_INPUTS, *(c for c, _, _ in OUTPUTS.values()), "run", "trial", "session", *_NOTED, *_ERRORS}

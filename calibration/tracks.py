@@ -4,11 +4,12 @@ A run at constant motor speed is a circle with a heading that turns at the same 
 
     x = c_x + R cos α,  y = c_y + R sin α,  heading = h0 + ω_yr t,   α = α0 + ω_yr t,
 
-fitted to all samples of a run at once (least squares; positions and heading weighted by their own scatter). The
-slip angle is that between the heading and the circle's tangent, the speed R |ω_yr|. Samples of a camera are not
-independent: the robot wobbles with its disc. Standard errors are therefore widened by the residuals' correlation
-time. A run that turns by less than LEAST_TURN is fitted by a straight line, and gives a speed and a slip angle
-alone.
+fitted to all samples of a run at once (least squares; positions and heading weighted by their own scatter). A run
+of a whole turn and more also shows whether the circle drifts, c → c + U t, as in a current of the fluid; its
+radius and speed are then those relative to the fluid. The slip angle is that between the heading and the circle's
+tangent, the speed R |ω_yr|. Samples of a camera are not independent: the robot wobbles with its disc. Standard
+errors are therefore widened by the residuals' correlation time. A run that turns by less than LEAST_TURN is fitted
+by a straight line, and gives a speed and a slip angle alone.
 
 The tracked point must be the head's centre (or `tracked_point` will be found). Times in s, lengths in cm, angles
 in degrees, counter-clockwise, seen from above.
@@ -45,6 +46,9 @@ class TrackedRun:
     theta_error: float
     v_cm_s: float
     v_error: float
+    drift_x_cm_s: float  # of the circle
+    drift_y_cm_s: float
+    drift_error: float
 
 
 def measure_tracks(
@@ -78,13 +82,12 @@ def measure_tracks(
         own = own[np.isfinite(own.to_numpy()).all(axis=1)].sort_values("time_s")
         if len(own) < _FEWEST:
             aside.append(f"run {run}: {len(own)} samples; a track needs at least {_FEWEST}")
-            found.append(TrackedRun(*[math.nan] * 8))
+            found.append(TrackedRun(*[math.nan] * 11))
             continue
         found.append(measure_track(*(own[c].to_numpy(dtype=float) for c in COLUMNS[1:])))
     columns = pd.DataFrame([asdict(p) for p in found], index=table.index)
-    known = [c for c in ("omega_yr_rad_s", "R_yr_cm", "theta_deg", "v_cm_s") if columns[c].notna().any()]
-    errors = [c for c in ("omega_yr_error", "R_yr_error", "theta_error", "v_error") if columns[c].notna().any()]
-    return pd.concat([table, columns[[*known, *errors]]], axis=1), aside
+    known = [c for c in columns if columns[c].notna().any()]
+    return pd.concat([table, columns[known]], axis=1), aside
 
 
 def measure_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> TrackedRun:
@@ -96,20 +99,27 @@ def measure_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> Tr
         return _line(time, x, y, heading)
     scatter_h = max(float(np.std(heading - rate * time - middle)), 1e-9)
     # On the circle the position is linear in (c_x, c_y, R cos α0, R sin α0) for a given rate.
+    drifts = abs(rate) * np.ptp(time) >= 2 * math.pi
     turn = np.exp(1j * rate * time)
-    design = np.stack([np.ones_like(turn), turn], 1)
-    centre, arm = np.linalg.lstsq(design, x + 1j * y, rcond=None)[0]
-    scatter = max(float(np.abs(x + 1j * y - centre - arm * turn).std() / math.sqrt(2)), 1e-9)
+    design = np.stack([np.ones_like(turn), turn, *([time] if drifts else [])], 1)
+    found = np.linalg.lstsq(design, x + 1j * y, rcond=None)[0]
+    centre, arm, *drift = found
+    scatter = max(float(np.abs(x + 1j * y - design @ found).std() / math.sqrt(2)), 1e-9)
     start = [centre.real, centre.imag, abs(arm), np.angle(arm), rate, middle]
+    start += [part for u in drift for part in (u.real, u.imag)]
 
     def residual(p: Floats) -> Floats:
         angle = p[3] + p[4] * time
-        own = [(x - p[0] - p[2] * np.cos(angle)) / scatter, (y - p[1] - p[2] * np.sin(angle)) / scatter]
-        return np.concatenate([*own, (heading - p[5] - p[4] * time) / scatter_h])
+        u, w = (p[6], p[7]) if drifts else (0.0, 0.0)
+        along = (x - p[0] - u * time - p[2] * np.cos(angle)) / scatter
+        across = (y - p[1] - w * time - p[2] * np.sin(angle)) / scatter
+        return np.concatenate([along, across, (heading - p[5] - p[4] * time) / scatter_h])
 
     fitted = least_squares(residual, start, x_scale=np.maximum(np.abs(start), 1e-3))
     covariance = _covariance(np.asarray(fitted.jac), fitted.fun, 3)
-    radius, angle, rate, middle = fitted.x[2:]
+    radius, angle, rate, middle, *drift = fitted.x[2:]
+    drift_x, drift_y = drift if drifts else (math.nan, math.nan)
+    drift_error = math.sqrt((covariance[6, 6] + covariance[7, 7]) / 2) if drifts else math.nan
     tangent = angle + math.copysign(math.pi / 2, rate)
     slip = abs(math.remainder(middle - tangent, 2 * math.pi))
     slip_error = math.sqrt(covariance[3, 3] + covariance[5, 5] - 2 * covariance[3, 5])
@@ -120,6 +130,7 @@ def measure_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> Tr
     return TrackedRun(
         float(rate), math.sqrt(covariance[4, 4]), float(radius), math.sqrt(covariance[2, 2]), math.degrees(slip),
         math.degrees(slip_error), float(abs(rate) * radius), speed_error,
+        float(drift_x), float(drift_y), drift_error,
     )  # fmt: skip
 
 
@@ -136,7 +147,9 @@ def _line(time: Floats, x: Floats, y: Floats, heading: Floats) -> TrackedRun:
     slip = abs(math.remainder(fits[2][0] - math.atan2(v_y, v_x), 2 * math.pi))
     slip_error = math.sqrt(variances[2][0, 0] + (error / speed) ** 2)
     none = math.nan
-    return TrackedRun(none, none, none, none, math.degrees(slip), math.degrees(slip_error), speed, error)
+    return TrackedRun(
+        none, none, none, none, math.degrees(slip), math.degrees(slip_error), speed, error, none, none, none
+    )
 
 
 def _covariance(J: Floats, residual: Floats, parts: int) -> Floats:

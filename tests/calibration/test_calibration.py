@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import calibration.fit
 import calibration.swimmer
 import calibration.synthetic
 from calibration.discriminate import next_runs
+from calibration.examples.helices import read_helices, resistive, with_flow
 from calibration.examples.spheres import Spheres, median_error, read_spheres
 from calibration.fit import fit
 from calibration.loop import Verdict, close, verdict_record
@@ -21,6 +23,7 @@ from calibration.measurements import read_measurements
 from calibration.misfit import check_misfit
 from calibration.model import Runs, start_values
 from calibration.noise import Noise, inverse_root, least_squares, repeat_covariance, sums
+from calibration.profile import least_determined, profile_intervals
 from calibration.protocols import PROTOCOLS, middle_session
 from calibration.steer import draw_steered, gap_closed, steer
 from calibration.swimmer import Swimmer, corrected_robot
@@ -493,3 +496,57 @@ def test_twice_the_heavy_tails_do_not_make_an_effect() -> None:
             table[column] *= np.exp(0.02 * rng.standard_t(3, len(table)))
         claimed += closed(table).verdict != "none"
     assert claimed <= 2
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_profile_intervals_are_those_of_the_covariance_where_the_model_is_linear() -> None:
+    """And lean to one side where it is not."""
+    result = closed(toy_table(19, end_over_end_drag=5.0))
+    for name, (low, high) in result.final_intervals.items():
+        wald = result.final.interval(name)
+        assert low < result.final.parameters[name] < high
+        assert (low, high) == pytest.approx(wald, abs=0.35 * (wald[1] - wald[0]))
+    combination, error = least_determined(result.base)
+    assert "C_" in combination
+    assert 0 < error < 1.0
+
+
+def test_a_profile_interval_sees_that_the_model_bends() -> None:
+    """Falling spheres: ln v against inertia is concave, so the upper side of its interval is the longer one."""
+    model = spheres(0.0, 1.0, 5, np.array([3.0, 5.0, 7.0, 9.0]) / 1000)
+    every = np.ones(20, bool)
+    fitted = fit(model, start_values(model), ("viscosity", "inertia"), every)
+    low, high = profile_intervals(model, fitted, every)["inertia"]
+    middle = fitted.parameters["inertia"]
+    assert high - middle > middle - low
+    # The deviance at the ends, by brute force over the viscosity, has risen alike on both sides.
+    white = Noise(fitted.noise.run, fitted.noise.share).whitener(model.runs.session)
+
+    def deviance(inertia: float) -> float:
+        grid = [{"viscosity": v, "wall": 0.0, "inertia": inertia} for v in np.linspace(0.8, 1.8, 2001)]
+        residual = model.runs.y - model.predict(grid)
+        return float(min((white(r) ** 2).sum() for r in residual))
+
+    rises = [deviance(end) - deviance(middle) for end in (low, high)]
+    assert rises[0] == pytest.approx(rises[1], rel=0.25)
+
+
+def test_a_helix_with_the_flow_of_its_parts() -> None:
+    """Converged in the number of pieces; a straight wire drags as Tirado and Garcia de la Torre (1979) say."""
+    pitch = np.array([2.226, 9.811])
+    assert with_flow(pitch, pieces=240) == pytest.approx(with_flow(pitch, pieces=480), rel=0.01)
+    wire = with_flow(np.array([1e3]))[0]
+    slenderness = 130.0 / (2 * 0.397)
+    assert wire[2] == pytest.approx(2 * math.pi * 130.0 / 6.3 / (math.log(slenderness) - 0.207), rel=0.01)
+    assert resistive(np.array([1e3]))[0, 0] == pytest.approx(0, abs=0.5)
+
+
+@pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
+def test_resistive_force_theory_fails_for_a_helix_and_flow_explains_it() -> None:
+    """Rodenborn et al. (2013): thrust three times too large at the shortest pitch; 6 % with the flow."""
+    pitch, measured = read_helices(MEASURED / "published" / "rodenborn_fig2.csv")
+    thrust = resistive(pitch)[:, 0] / measured[:, 0]
+    assert thrust[0] == pytest.approx(3.0, abs=0.1)
+    assert thrust[-1] < 0.8
+    off = with_flow(pitch) / measured - 1
+    assert np.sqrt((off**2).mean(0)).max() < 0.07

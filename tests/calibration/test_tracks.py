@@ -43,6 +43,17 @@ def test_a_circle_gives_rate_radius_angle_and_speed(rate: float) -> None:
     assert found["v_cm_s"] == pytest.approx(abs(rate) * RADIUS, rel=5e-3)
 
 
+def test_a_current_drifts_the_circle_and_leaves_its_radius() -> None:
+    still = track(2)
+    moved = still.assign(x_cm=still["x_cm"] + 0.05 * still["time_s"], y_cm=still["y_cm"] - 0.02 * still["time_s"])
+    found = measured(moved)
+    assert found["drift_x_cm_s"] == pytest.approx(0.05, abs=4 * found["drift_error"])
+    assert found["drift_y_cm_s"] == pytest.approx(-0.02, abs=4 * found["drift_error"])
+    assert found["drift_error"] < 0.005
+    assert found["R_yr_cm"] == pytest.approx(measured(still)["R_yr_cm"], rel=1e-3)
+    assert np.isnan(measured(track(2, seconds=30.0))["drift_x_cm_s"])  # two thirds of a turn
+
+
 def test_errors_are_as_large_as_the_scatter_of_repeated_tracks() -> None:
     many = pd.DataFrame([measured(track(seed)) for seed in range(60)])
     for value, error in (
