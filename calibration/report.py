@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from calibration.loop import LEVEL, Verdict
+from calibration.loop import Verdict
 from calibration.measurements import Measurements
 from calibration.profile import least_determined
 from dataset.page import Page
@@ -22,6 +22,7 @@ _LABELS = {
     "theta": "slip angle [rad]",
     "v": "speed",
 }
+_DISAGREES = 0.01  # p of the locked runs below which the report says so
 _TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes", "score": "effects"}
 
 
@@ -138,12 +139,13 @@ def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
         ],
     )
     features = ", ".join(result.generic.features) or "no feature"
-    agrees = "agree with the final model" if result.locked_p >= LEVEL else "do not agree with the final model"
+    agree = result.locked_p >= _DISAGREES
     page.text(
         f"95 % interval with effects: {100 * low:.2f} to {100 * high:.2f} %. "
-        f"Noise of one run from the repeats: {100 * result.noise_ceiling:.2f} %. The locked runs {agrees} "
-        f"(p = {result.locked_p:.2g}). Generic correction: {features} (it describes, and explains nothing).",
-        tone="good" if result.locked_p >= LEVEL else "bad",
+        f"Noise of one run from the repeats: {100 * result.noise_ceiling:.2f} %. The locked runs "
+        f"{'agree' if agree else 'do not agree'} with the final model (p = {result.locked_p:.2g}). "
+        f"Generic correction: {features} (it describes, and explains nothing).",
+        tone="good" if agree else "bad",
     )
 
 
