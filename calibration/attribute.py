@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from calibration.fit import Fit, fit
 from calibration.misfit import TESTABLE, Misfit, check_misfit
@@ -70,7 +71,9 @@ def examine(
         along: ∂f/∂ε of `effects` there, (n, k, e).
     """
     found = []
-    for j in np.argsort(-np.abs(misfit.scores.z)):
+    order = np.argsort(-np.abs(misfit.scores.z)).tolist()
+    title = " ".join(("effects", *(f"beside {e.title}" for e in beside)))
+    for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not progress):
         effect = effects[j]
         z, survived = float(misfit.scores.z[j]), float(misfit.scores.survived[j])
         detectable = misfit.critical_z / max(float(misfit.scores.length[j]), 1e-300)
@@ -92,7 +95,7 @@ def examine(
             {**_sane(model, base.parameters, given), effect.name: guess},
             (*base.names, effect.name),
             used,
-            title=f"fit with {effect.title}" if progress else "",
+            title="",
         )
         after = check_misfit(
             refit, model.runs, used, np.delete(along, j, -1), level=level, seed=seed + 1, draws=_DRAWS
@@ -141,6 +144,7 @@ def pairs(
             level=level,
             seed=seed + 2,
             beside=(first.effect,),
+            progress=progress,
         )
     unique: dict[frozenset[str], Candidate] = {}
     for candidate in second:

@@ -37,6 +37,7 @@ from calibration.protocols import middle_session
 from sim.artefact import fingerprint, provenance
 
 LEVEL = 0.04  # α of every claim: noise is estimated, and false claims shall stay below one in twenty
+_NEAR = 0.5  # share of the residual that an effect must take away to be worth a word where none explains
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,21 @@ class Verdict:
         if self.verdict == "ambiguous":
             names = " or ".join(" and ".join(e.title for e in (*c.beside, c.effect)) for c in self.explaining)
             return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart."
-        return f"There is a residual ({p}) that no effect and no pair of effects of the catalogue explains."
+        none = "no effect and no pair of effects of the catalogue explains"
+        return f"There is a residual ({p}) that {none}{self._nearest}."
+
+    @property
+    def _nearest(self) -> str:
+        """Which single effect takes most of the residual away, if one was refitted and takes much."""
+        refits = [(c.refit.deviance, c.effect.title) for c in self.candidates if c.refit is not None]
+        if not refits:
+            return ""
+        deviance, title = min(refits)
+        expected = int(self.used.sum()) * self.base.prediction.shape[1]
+        share = (self.base.deviance - deviance) / max(self.base.deviance - expected, 1e-9)
+        if share < _NEAR:
+            return ""
+        return f"; the nearest, {title}, takes {100 * min(share, 1.0):.0f} % of it away and leaves more than noise"
 
 
 def close(
@@ -131,7 +146,9 @@ def close(
     used, test = ~locked & ~gross, locked & ~gross
     guess = model.guess(dict(start), used)
     base = fit(model, guess, coefficients, used, title="fit" if progress else "")
-    along = model.derivatives(base.parameters, [e.name for e in effects], title="effects" if progress else "")[1]
+    along = model.derivatives(base.parameters, [e.name for e in effects], title="derivatives" if progress else "")[
+        1
+    ]
     misfit = check_misfit(base, data, used, along, level=level, seed=seed)
     found: list[Candidate] = []
     if misfit.p_value < level:

@@ -152,6 +152,16 @@ def test_an_effect_outside_the_catalogue_is_left_unexplained() -> None:
     assert result.verdict == "unexplained"
     assert result.effects == ()
     assert corrected_robot(START, result.final.parameters).effects == {}
+    assert "no effect and no pair" in result.sentence
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_what_comes_nearest_is_said_where_nothing_explains() -> None:
+    table = toy_table(7, end_over_end_drag=5.0)
+    table["omega_h_rpm"] *= np.exp(0.04 * np.sin(3.0 * table["l_cm"]) * np.sign(table["omega_rpm"]))
+    result = closed(table)
+    assert result.verdict == "unexplained"
+    assert "the nearest, head's end-over-end drag, takes" in result.sentence
 
 
 @pytest.mark.usefixtures("toy_model")

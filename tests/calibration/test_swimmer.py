@@ -15,6 +15,7 @@ from calibration.swimmer import Swimmer
 from calibration.synthetic import make_table
 from sim.errors import InputError
 from sim.robot import PRESETS
+from surrogate.export import load
 from tests.calibration import toy
 
 START = PRESETS["paper-measured"]
@@ -111,3 +112,16 @@ def test_wrong_units_are_refused(table: pd.DataFrame, column: str, factor: float
 def test_right_units_are_taken(table: pd.DataFrame) -> None:
     model = Swimmer(START, read_measurements(table.drop(columns="v_cm_s")), solver=toy.SOLVER)
     model.check(model.predict([start_values(model)])[0])
+
+
+def test_the_first_guess_is_found_from_any_start(table: pd.DataFrame) -> None:
+    """Runs made with the look-up table itself, coefficients far from those as given."""
+    truth = replace(START, C_t=3.4, C_r=1.5, C_yr=4.5)
+    data = read_measurements(table.drop(columns="v_cm_s"))
+    rng = np.random.default_rng(4)
+    exact = Swimmer(truth, data).predict([start_values(Swimmer(truth, data))], lookup=load())[0]
+    runs = replace(data, y=exact + rng.normal(scale=0.003, size=exact.shape))
+    for start in (START, replace(START, C_t=1.2, C_r=3.0, C_yr=2.0), replace(START, C_t=5.0, C_r=1.2, C_yr=6.0)):
+        model = Swimmer(start, runs)
+        guess = model.guess(start_values(model), np.ones(len(runs), bool))
+        assert [guess[n] for n in ("C_t", "C_r", "C_yr")] == pytest.approx([3.4, 1.5, 4.5], rel=0.05)
