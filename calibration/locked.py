@@ -1,4 +1,4 @@
-"""The locked runs: errors of a model on them, whether they agree with it, and the last fit, to all runs."""
+"""The locked runs: which they are, errors on them, whether they agree with a model; the last fit, to all runs."""
 
 from __future__ import annotations
 
@@ -10,6 +10,11 @@ from calibration.model import Floats, Model, Runs, moved
 from calibration.noise import inverse_root, least_squares, sums
 
 _DRAWS = 2000
+
+
+def middle_session(data: Runs) -> NDArray[np.bool_]:
+    """The runs (n,) of the middle session by name, so that it is interpolated to."""
+    return np.asarray(data.session == len(data.session_names) // 2)
 
 
 def errors(data: Runs, prediction: Floats, rows: NDArray[np.bool_]) -> tuple[float, dict[str, float]]:

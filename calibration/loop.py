@@ -1,7 +1,6 @@
 """The whole loop: split, fit, test, attribute, refit, and open the locked test once.
 
-1. Whole sessions are locked away before anything is looked at (`calibration.protocols`; by default the middle
-   one); rows are never split.
+1. Whole sessions are locked away before anything is looked at (by default the middle one); rows are never split.
    Runs with gross errors are set aside (`calibration.gross`).
 2. Covariance from the repeats and the sessions (`calibration.noise`).
 3. Fit of the coefficients to the other sessions (`calibration.fit`).
@@ -29,11 +28,10 @@ from calibration.discriminate import NextRun, next_runs
 from calibration.fit import Fit, fit
 from calibration.generic import Generic, correct
 from calibration.gross import gross_errors
-from calibration.locked import error_interval, errors, fitted_to_all, locked_p_value
+from calibration.locked import error_interval, errors, fitted_to_all, locked_p_value, middle_session
 from calibration.misfit import DRAWS, Misfit, check_misfit
 from calibration.model import Floats, Model, Parameter, start_values
 from calibration.profile import profile_intervals
-from calibration.protocols import middle_session
 from sim.artefact import fingerprint, provenance
 
 LEVEL = 0.04  # α of every claim: noise is estimated, and false claims shall stay below one in twenty
@@ -124,7 +122,7 @@ def close(
 
     Args:
         model: its parameters' starts are the model "as given" (uncalibrated).
-        locked: (n,) runs kept for the test, whole sessions; default `protocols.middle_session`.
+        locked: (n,) runs kept for the test, whole sessions; default `locked.middle_session`.
         level: α of every claim.
         seed: of the bootstrap; the result is deterministic given it.
         progress: show bars.

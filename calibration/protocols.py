@@ -13,16 +13,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.locked import middle_session
 from calibration.measurements import Measurements
-from calibration.model import Runs
 from sim.errors import InputError
 
 Rows = NDArray[np.bool_]
-
-
-def middle_session(data: Runs) -> Rows:
-    """The middle session by name, (n,)."""
-    return np.asarray(data.session == len(data.session_names) // 2)
 
 
 def _session(data: Measurements) -> tuple[Measurements, Rows]:

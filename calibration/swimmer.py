@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.influences import CURRENT, SLIP, TRACKED_POINT, Influence, influences, reason_untestable
-from calibration.measurements import OUTPUTS, Measurements
+from calibration.measurements import Measurements
 from calibration.model import Floats, Parameter, Parameters, by_differences
 from calibration.noise import Noise, repeat_covariance
 from calibration.observation import Observation
+from calibration.plausible import check_inputs, check_outputs
 from sim.batches import sensitivity_columns, steady_columns
 from sim.direct import FEW, MANY
 from sim.effects import catalogue
@@ -31,8 +32,6 @@ from surrogate.export import load
 from surrogate.lookup import Lookup
 
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
-_OFF, _SLIPS = 20.0, 3.0  # factors that no robot explains: of an output, of the spins' sum
-_SHORTEST, _LONGEST, _FASTEST = 0.5, 50, 1000  # tails in head radii, ω̄
 SANE = (0.1, 20.0)  # coefficients stay within: beyond, they say that the model lacks something
 
 _STEP = 0.05  # finite difference in ln C, by the look-up table
@@ -70,25 +69,8 @@ class Swimmer:
     solver: Solver = DIRECT
 
     def __post_init__(self) -> None:
-        """Refuse lengths and speeds that no swimmer of this kind has, before anything is simulated.
-
-        Raises:
-            InputError: l_cm or omega_rpm must be in another unit.
-        """
-        longest, shortest = (float(f(self.runs.length)) for f in (np.max, np.min))
-        for length in (longest, shortest):
-            if not _SHORTEST < length / self.robot.head_radius < _LONGEST:
-                raise InputError(
-                    f"l_cm = {100 * length:.3g} is {length / self.robot.head_radius:.3g} head radii "
-                    f"({_SHORTEST} to {_LONGEST} are possible); check its unit and head_radius in robot.toml"
-                )
-        fastest = float(np.abs(self.runs.omega).max())
-        speed = fastest * replace(self.robot, tail_length=longest, motor_speed=fastest).time_scale
-        if not speed < _FASTEST:
-            raise InputError(
-                f"omega_rpm = {fastest * 30 / math.pi:.4g} with l_cm = {100 * longest:.3g} gives ω̄ = {speed:.3g} "
-                f"(below {_FASTEST} is possible); check the units of both, and robot.toml"
-            )
+        """Refuse lengths and speeds that no swimmer of this kind has, before anything is simulated."""
+        check_inputs(self.robot, self.runs)
 
     @property
     def coefficients(self) -> tuple[Parameter, ...]:
@@ -204,23 +186,7 @@ class Swimmer:
 
     def check(self, prediction: Floats) -> None:
         """Refuse a table whose units cannot be those that its columns name."""
-        names = {name: column for name, (column, _, _) in OUTPUTS.items()}
-        y = {name: self.runs.y[:, i] for i, name in enumerate(self.runs.outputs)}
-        if "omega_h" in y and "omega_t" in y:
-            share = float(np.median((np.exp(y["omega_h"]) + np.exp(y["omega_t"])) / np.abs(self.runs.omega)))
-            if not 1 / _SLIPS < share < _SLIPS:
-                raise InputError(
-                    f"omega_h_rpm and omega_t_rpm add up to {share:.3g} times omega_rpm; the motor turns the head "
-                    "against the tails, so all three must be in rpm"
-                )
-        for i, name in enumerate(self.runs.outputs):
-            theirs, ours = np.median(self.runs.y[:, i]), np.median(prediction[:, i])
-            factor = float(theirs / ours if name == "theta" else math.exp(theirs - ours))
-            if not 1 / _OFF < factor < _OFF:
-                raise InputError(
-                    f"{names[name]} is {factor:.3g} times what the robot as given does; "
-                    "check its unit, those of l_cm and omega_rpm, and robot.toml"
-                )
+        check_outputs(self.runs, prediction)
 
     def possible(self) -> tuple[Swimmer, list[dict[str, Any]]]:
         """Tail counts (one more), tail lengths and motor speeds of the table's range, and slower ones."""

@@ -18,13 +18,14 @@ from calibration.discriminate import next_runs
 from calibration.examples.helices import read_helices, resistive, with_flow
 from calibration.examples.spheres import Spheres, median_error, read_spheres
 from calibration.fit import fit
+from calibration.locked import middle_session
 from calibration.loop import Verdict, close, verdict_record
 from calibration.measurements import read_measurements
 from calibration.misfit import check_misfit
 from calibration.model import Runs, start_values
 from calibration.noise import Noise, inverse_root, least_squares, repeat_covariance, sums
 from calibration.profile import least_determined, profile_intervals
-from calibration.protocols import PROTOCOLS, middle_session
+from calibration.protocols import PROTOCOLS
 from calibration.steer import draw_steered, gap_closed, steer
 from calibration.swimmer import Swimmer, corrected_robot
 from calibration.synthetic import make_table
