@@ -29,7 +29,7 @@ HIDDEN = (
     ("tail_interaction", 1.0), ("disc_drag", 1.0), ("end_over_end_drag", 3.0), ("natural_splay", 0.2),
     ("motor_droop", 0.15), ("head_flow", 1.0),
 )  # fmt: skip
-LENGTHS = (5.0, 7.0, 9.0, 11.0, 13.0, 15.0)  # cm
+LENGTHS = (5.0, 6.0, 7.0, 8.5, 10.0, 11.0)  # cm; longer tails in each other's flow take long to settle
 
 
 def main(robots: str = "10") -> None:
