@@ -75,8 +75,11 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
     if unknown:
         raise InputError(f"unknown column {unknown[0]!r}; known are {', '.join(sorted(_KNOWN))}")
     outputs = tuple(name for name, (column, _, _) in OUTPUTS.items() if column in table)
-    if len(outputs) < 3 or "omega_yr" not in outputs:
-        raise InputError("the table needs omega_yr_rad_s and at least two more outputs to fit three coefficients")
+    if len(outputs) < 2 or not {"omega_yr", "R_yr", "theta", "v"} & set(outputs):
+        raise InputError(
+            "the table needs at least two outputs, one of them omega_yr_rad_s, R_yr_cm, theta_deg or v_cm_s: "
+            "the spins alone do not tell the coefficients apart"
+        )
     numbers = table.drop(columns="session", errors="ignore").apply(pd.to_numeric, errors="coerce")
     reasons = _reasons(table, numbers, outputs)
     keep = np.array([not r for r in reasons])

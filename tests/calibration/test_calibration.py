@@ -242,7 +242,8 @@ def test_the_real_simulator_closes_a_table_with_a_hidden_effect(tmp_path: Path) 
     [
         (lambda t: t.drop(columns="omega_rpm"), "no column 'omega_rpm'"),
         (lambda t: t.assign(colour=1), "unknown column 'colour'"),
-        (lambda t: t.drop(columns=["omega_yr_rad_s"]), "omega_yr_rad_s"),
+        (lambda t: t.drop(columns=["omega_yr_rad_s", "R_yr_cm", "theta_deg"]), "at least two outputs"),
+        (lambda t: t.drop(columns=["omega_h_rpm", "omega_t_rpm", "R_yr_cm", "theta_deg"]), "at least two outputs"),
         (lambda t: t.head(10), "usable runs"),
         (lambda t: t[t["N"] == 2], "usable runs|session"),
         (lambda t: t.assign(session="one"), r"1 session\(s\)"),
