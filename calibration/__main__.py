@@ -38,10 +38,14 @@ def _close(arguments: argparse.Namespace) -> None:
     write_text(out / "verdict.json", json.dumps(record, indent=1) + "\n")
     print(result.sentence)
     print(
-        f"error on session {result.locked}: as given {100 * result.error_uncalibrated:.2f} %, "
+        f"error on the locked runs ({result.locked}): as given {100 * result.error_uncalibrated:.2f} %, "
         f"calibrated {100 * result.error_before:.2f} %, with effects {100 * result.error_after:.2f} %, "
         f"noise {100 * result.noise_ceiling:.2f} %"
     )
+    for limit in result.limits:
+        print(f"a weaker conclusion: {limit}")
+    if result.set_aside:
+        print(f"set aside: {len(result.set_aside)}, first {result.set_aside[0]}")
     print(f"-> {out / 'verdict.json'}, {out / 'report.html'}, {out / 'corrected.toml'}")
 
 

@@ -3,10 +3,14 @@
 Every effect that the runs can test is a candidate. One whose score passes the critical |z| (`calibration.misfit`),
 in the direction that its bounds allow, is refitted together with the coefficients in the model, and kept if
 
+    the fit arrives at a minimum,
     the residual that it leaves passes the general tests and the scores of all other effects (at half of the
     level, since a true effect must not be lost too often),
     its interval excludes the null, and
     it predicts left-out sessions better, by more than the uncertainty of that gain.
+
+Scores are local: where a coefficient ran to an end of its range for want of an effect, they say nothing, and every
+effect is refitted, from the model as given.
 
 Kept effects whose deviances differ by less than what one parameter gains by chance (6.63) cannot be told apart.
 Where none alone is kept, each of the best few is taken as given and a second one is looked for in the same way
@@ -64,13 +68,14 @@ def examine(
     beside: tuple[Parameter, ...] = (),
     progress: bool = True,
 ) -> list[Candidate]:
-    """Refit and judge every effect, best score first; `given` is where refits start if the fit ran away.
+    """Refit and judge every effect, best score first; `given` is where refits start if a coefficient ran away.
 
     Args:
         base: the fit without them; it has `beside`.
         along: ∂f/∂ε of `effects` there, (n, k, e).
     """
     found = []
+    local = inside(model, base.parameters)
     order = np.argsort(-np.abs(misfit.scores.z)).tolist()
     title = " ".join(("effects", *(f"beside {e.title}" for e in beside)))
     for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not progress):
@@ -80,7 +85,9 @@ def examine(
         guess = base.parameters[effect.name] + z / max(float(misfit.scores.length[j]), 1e-300)
         low, high = effect.bounds
         reason = ""
-        if survived < TESTABLE:
+        if not local:
+            guess = effect.start
+        elif survived < TESTABLE:
             reason = "absorbed by the coefficients: not testable with these runs"
         elif abs(z) < misfit.critical_z:
             reason = "score within the noise"
@@ -92,7 +99,7 @@ def examine(
         guess = min(max(guess, low), high)
         refit = fit(
             model,
-            {**_sane(model, base.parameters, given), effect.name: guess},
+            {**(base.parameters if local else given), effect.name: guess},
             (*base.names, effect.name),
             used,
             title="",
@@ -102,7 +109,9 @@ def examine(
         )
         gain, error = _session_gain(model, base, refit, used)
         ends = refit.interval(effect.name)
-        if after.p_value < level / 2:
+        if not refit.arrived:
+            reason = "its fit does not arrive at a minimum"
+        elif after.p_value < level / 2:
             reason = f"leaves a residual (p = {after.p_value:.3g})"
         elif ends[0] <= effect.start <= ends[1]:
             reason = "its interval includes the null"
@@ -154,10 +163,9 @@ def pairs(
     return list(unique.values())
 
 
-def _sane(model: Model, fitted: Parameters, given: Parameters) -> dict[str, float]:
-    """Fitted parameters, or the given ones where a coefficient ran to a limit for want of the effect."""
-    inside = all(1.5 * p.bounds[0] < fitted[p.name] < p.bounds[1] / 1.5 for p in model.coefficients)
-    return dict(fitted) if inside else dict(given)
+def inside(model: Model, fitted: Parameters) -> bool:
+    """Whether no coefficient ran to an end of its range."""
+    return all(1.5 * p.bounds[0] < fitted[p.name] < p.bounds[1] / 1.5 for p in model.coefficients)
 
 
 def explaining(found: list[Candidate]) -> list[Candidate]:

@@ -1,12 +1,13 @@
 """Generalised least squares of a forward model, each parameter on its own scale.
 
-Gauss-Newton with the model's own derivatives:
+Steps of Levenberg (1944) with the model's own derivatives:
 
-    θ ← θ + (JᵀΣ⁻¹J)⁻¹ JᵀΣ⁻¹ (y − f(θ)),   θ = (ln C_1, …, ε_1, …).
+    θ ← θ + (A + λ D⁻²)⁻¹ JᵀΣ⁻¹ (y − f(θ)),   A = JᵀΣ⁻¹J,   θ = (ln C_1, …, ε_1, …),
 
-Parameters stay within their bounds. The covariance of the parameters is V = (JᵀΣ⁻¹J)⁻¹, more for an
-estimated S (`_inflation`); intervals are 95 %, by
-Student's t with the degrees of freedom that the scatter ρ of a few sessions leaves (Satterthwaite 1946),
+D is 1 for ln C and a typical size for ε; λ = 0 unless the step is long or misses. A parameter at a bound from
+which the step would lead out stays there. The covariance of the parameters is V = A⁻¹, more for an estimated S
+(`_inflation`); intervals are 95 %, by Student's t with the degrees of freedom that the scatter ρ of a few sessions
+leaves (Satterthwaite 1946),
 
     ν = 2 V² / (V′² Var ρ),   Var ρ ≈ 2 (ρ + 1/n)² / (k (s − 1)),   n runs in each of s sessions.
 """
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +25,13 @@ from scipy.stats import t as student
 from calibration.model import Floats, Model, Parameter, Parameters, moved, parameter
 from calibration.noise import Noise, Sums, inverse_root, least_squares, repeat_covariance, sums
 
-_MOST_STEPS = 8
-_SHORT = 0.1  # a step below this in ln C (or in ε) keeps the Jacobian
-_SMALL = 0.1  # in standard deviations: a step below this ends the iteration
+_MOST_STEPS = 25
+_SHORT = 0.1  # a step below this, in ln C or ε, keeps the Jacobian
+_SMALL = 0.01  # a step that promises less than this in rᵀ Σ⁻¹ r ends the iteration
 _LARGEST = 0.7  # change of ln C in one step
 _PASSES = 3  # of the scatter of the sessions
+_DAMPING = (0.0, *(10.0**e for e in range(-3, 9)))  # λ
+_UNSETTLED = 1.0  # what one more step may promise of a fit that has arrived
 
 
 @dataclass(frozen=True)
@@ -44,10 +48,16 @@ class Fit:
     noise: Noise
     deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
     steps: int
+    arrived: bool  # at a minimum, or as far as the bounds let it
 
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.fitted)
+
+    @property
+    def at_bounds(self) -> tuple[str, ...]:
+        """Parameters at an end of their range."""
+        return tuple(p.name for p in self.fitted if self.parameters[p.name] in p.bounds)
 
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval of a parameter."""
@@ -67,54 +77,130 @@ def fit(
     *,
     title: str = "fit",
 ) -> Fit:
-    """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay.
-
-    The Jacobian is computed anew after a long step and kept after a short one.
-    """
+    """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay."""
     data = model.runs
     run = repeat_covariance(data.y[used], data.condition[used])
-    root = inverse_root(run)
-    parameters = dict(start)
-    derivative = np.empty(0)
-    fresh = True  # the Jacobian must be computed
-    for count in range(1, _MOST_STEPS + 1):
-        label = f"{title}, step {count}" if title else ""
-        if fresh:
-            prediction, derivative = model.derivatives(parameters, names, title=label)
-        else:
-            prediction = model.predict([parameters], title=label)[0]
-        residual = data.y - prediction
-        # Near the end with the scatter of sessions that the fit's own residuals imply. Far from the solution
-        # every session looks shifted, and a large ρ would hide what pulls towards it.
-        table = np.concatenate([derivative, residual[..., None]], -1)[used]
-        products = sums(root @ table, data.session[used], len(run))
-        linear = least_squares(products, passes=0 if count == 1 else _PASSES)
-        covariance, step = linear.covariance, linear.step
-        size = float(np.max(np.abs(step) / np.sqrt(np.diag(covariance))))
-        new = _move(model, parameters, names, step)
-        stuck = all(abs(new[name] / parameters[name] - 1) < 1e-3 for name in names if parameters[name])
-        if ((size < _SMALL or stuck) and count > 1) or count == _MOST_STEPS:
-            break
-        parameters = new
-        fresh = bool(np.abs(step).max() > _SHORT) and count + 1 < _MOST_STEPS
-    noise = Noise(run, float(linear.share))
-    spread = len(run) * np.log1p(linear.share * products.sizes).sum()
-    deviance = float(products.at(linear.share)[-1, -1] + spread)
+    point, count = _descend(_Task(model, names, used, inverse_root(run), title), dict(start))
+    linear = least_squares(point.products, passes=_PASSES)
+    share = float(linear.share)
+    whole = point.products.at(linear.share)
     fitted = tuple(parameter(model, name) for name in names)
-    freedom = _freedom(products, float(linear.share), len(names))
     inflation = _inflation(data.condition[used], len(run))
     return Fit(
-        parameters,
-        fitted,
-        inflation * covariance,
-        inflation,
-        freedom,
-        prediction,
-        derivative,
-        noise,
-        deviance,
-        count,
+        parameters=point.parameters,
+        fitted=fitted,
+        covariance=inflation * linear.covariance,
+        inflation=inflation,
+        freedom=_freedom(point.products, share, len(names)),
+        prediction=point.prediction,
+        jacobian=point.derivative,
+        noise=Noise(run, share),
+        deviance=float(whole[-1, -1] + len(run) * np.log1p(share * point.products.sizes).sum()),
+        steps=count,
+        arrived=_step(fitted, point.parameters, whole, 0).promise < _UNSETTLED,
     )
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A model where the search is."""
+
+    parameters: dict[str, float]
+    prediction: Floats  # (n, k)
+    derivative: Floats  # (n, k, p), here or a short step away
+    products: Sums  # of the derivatives and the residual
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What is fitted to what."""
+
+    model: Model
+    names: tuple[str, ...]
+    used: NDArray[np.bool_]
+    root: Floats
+    title: str
+
+    def at(self, parameters: dict[str, float], derivative: Floats | None, count: int) -> _Point:
+        """The model at `parameters`; its derivatives are computed if none are given."""
+        title = f"{self.title}, step {count}" if self.title else ""
+        if derivative is None:
+            prediction, derivative = self.model.derivatives(parameters, self.names, title=title)
+        else:
+            prediction = self.model.predict([parameters], title=title)[0]
+        data = self.model.runs
+        table = np.concatenate([derivative, (data.y - prediction)[..., None]], -1)[self.used]
+        products = sums(self.root @ table, data.session[self.used], len(self.root))
+        return _Point(parameters, prediction, derivative, products)
+
+
+class _Step(NamedTuple):
+    parameters: dict[str, float]  # after it
+    size: float  # largest change, of ln C or ε
+    promise: float  # what it takes off rᵀ Σ⁻¹ r if the model is linear
+    damping: int  # place of its λ in _DAMPING
+
+
+def _descend(task: _Task, start: dict[str, float]) -> tuple[_Point, int]:
+    """The least rᵀ Σ⁻¹ r from `start`, and in how many steps."""
+    fitted = tuple(parameter(task.model, name) for name in task.names)
+    point = task.at(start, None, 1)
+    least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
+    for count in range(1, _MOST_STEPS + 1):
+        # Near the end with the scatter of sessions that the fit's own residuals imply. Far from the solution
+        # every session looks shifted, and a large ρ would hide what pulls towards it.
+        share = least_squares(point.products, passes=0 if count == 1 else _PASSES).share
+        step = _step(fitted, point.parameters, point.products.at(share), least)
+        if step.promise < _SMALL and count > 1:
+            break
+        tried = task.at(step.parameters, None if step.size > _SHORT else point.derivative, count + 1)
+        if tried.products.at(share)[-1, -1] < point.products.at(share)[-1, -1] + _SMALL:
+            point, least, kept = tried, max(least - 2, 0), step.size <= _SHORT
+        elif kept:
+            point, kept = task.at(point.parameters, None, count + 1), False
+        else:
+            least = max(step.damping + 1, 2)
+            if least >= len(_DAMPING):
+                break
+    return point, count
+
+
+def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: Floats, least: int) -> _Step:
+    """A step from `parameters`.
+
+    Args:
+        whole: (p + 1, p + 1) products of the derivatives and the residual.
+        least: place of the least λ allowed.
+    """
+    for place in range(least, len(_DAMPING)):
+        change = _damped(fitted, parameters, whole, _DAMPING[place])
+        if all(abs(c) <= _LARGEST for c, one in zip(change, fitted, strict=True) if one.logarithmic):
+            break
+    changes = zip(fitted, change.tolist(), strict=True)
+    new = {**parameters, **{one.name: moved(one, parameters[one.name], by) for one, by in changes}}
+    promise = 2 * change @ whole[:-1, -1] - change @ whole[:-1, :-1] @ change
+    return _Step(new, float(np.abs(change).max()), float(promise), place)
+
+
+def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: Floats, damping: float) -> Floats:
+    """Change (p,) of the parameters; none of those that a bound holds."""
+    at_low = np.array([parameters[one.name] <= one.bounds[0] for one in fitted])
+    at_high = np.array([parameters[one.name] >= one.bounds[1] for one in fitted])
+    typical = np.array([1.0 if one.logarithmic else abs(one.typical) for one in fitted])
+    change = np.zeros(len(fitted))
+    free = np.arange(len(fitted))
+    while len(free):
+        own = whole[np.ix_(free, free)] + np.diag(damping / typical[free] ** 2)
+        scale = np.sqrt(np.maximum(np.diag(own), 1e-300))
+        inverse = np.linalg.pinv(own / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        change[:] = 0.0
+        change[free] = inverse @ (whole[free, -1] / scale) / scale
+        outward = (at_low & (change < 0)) | (at_high & (change > 0))
+        if not outward.any():
+            break
+        free = free[~outward[free]]
+        change[outward] = 0.0
+    return change
 
 
 def _inflation(condition: NDArray[np.int64], outputs: int) -> float:
@@ -134,17 +220,7 @@ def _freedom(products: Sums, share: float, count: int) -> Floats:
     inverse = [
         np.linalg.pinv(products.at(np.array(s))[:count, :count], hermitian=True) for s in (share, share + step)
     ]
-    V, moved = (np.maximum(np.diag(i), 1e-300) for i in inverse)
+    V, moved = (np.maximum(np.diag(i), 1e-100) for i in inverse)
     sessions = len(products.sizes)
     spread = 2 * (share + 1 / products.sizes.mean()) ** 2 / (products.outputs * max(sessions - 1, 1))
     return np.asarray(np.clip(2 * V**2 / np.maximum(((moved - V) / step) ** 2 * spread, 1e-12 * V**2), 1.0, 1e6))
-
-
-def _move(model: Model, parameters: dict[str, float], names: tuple[str, ...], step: Floats) -> dict[str, float]:
-    new = dict(parameters)
-    for name, change in zip(names, step.tolist(), strict=True):
-        one = parameter(model, name)
-        if one.logarithmic:
-            change = max(-_LARGEST, min(_LARGEST, change))
-        new[name] = moved(one, new[name], change)
-    return new

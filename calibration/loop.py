@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.attribute import Candidate, examine, explaining, pairs
+from calibration.attribute import Candidate, examine, explaining, inside, pairs
 from calibration.discriminate import NextRun, next_runs
 from calibration.fit import Fit, fit
 from calibration.generic import Generic, correct
@@ -202,8 +202,21 @@ def close(
         untestable=dict(model.untestable),
         plan_hash=fingerprint(fixed),
         set_aside=(*data.set_aside, *reasons),
-        limits=data.limits,
+        limits=(*data.limits, *_unfinished(model, base, final)),
     )
+
+
+def _unfinished(model: Model, base: Fit, final: Fit) -> tuple[str, ...]:
+    """What keeps a fit from being the best one, in words."""
+    found = [f"{name} is at the end of its range: these runs do not determine it" for name in final.at_bounds]
+    if not inside(model, base.parameters):
+        found.append(
+            "without effects the coefficients run to the end of their range, so every effect was refitted from "
+            "the model as given, and effects are told apart less surely"
+        )
+    if not final.arrived:
+        found.append("the fit did not arrive at a minimum: its coefficients are not to be trusted")
+    return tuple(found)
 
 
 def _unexamined(misfit: Misfit, effects: tuple[Parameter, ...]) -> tuple[Candidate, ...]:

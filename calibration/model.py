@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 Parameters = Mapping[str, float]
 
 _LOG_STEP, _STEP = 0.01, 0.02  # differences: in ln C, in units of a typical size
+_LARGEST = 100.0  # change of ln C that is a number
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def parameter(model: Model, name: str) -> Parameter:
 
 def moved(one: Parameter, value: float, by: float) -> float:
     """`value` changed by `by`, on the parameter's own scale, within its bounds."""
-    new = value * float(np.exp(by)) if one.logarithmic else value + by
+    new = value * float(np.exp(min(by, _LARGEST))) if one.logarithmic else value + by
     return max(one.bounds[0], min(one.bounds[1], new))
 
 

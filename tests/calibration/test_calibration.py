@@ -245,8 +245,6 @@ def test_the_real_simulator_closes_a_table_with_a_hidden_effect(tmp_path: Path) 
         (lambda t: t.drop(columns=["omega_yr_rad_s", "R_yr_cm", "theta_deg"]), "at least two outputs"),
         (lambda t: t.drop(columns=["omega_h_rpm", "omega_t_rpm", "R_yr_cm", "theta_deg"]), "at least two outputs"),
         (lambda t: t.head(10), "usable runs"),
-        (lambda t: t[t["N"] == 2], "usable runs|session"),
-        (lambda t: t.assign(session="one"), r"1 session\(s\)"),
         (lambda t: t[t["trial"] == 1], "repeated runs|usable runs"),
         (lambda t: t.assign(omega_h_rpm=-t["omega_h_rpm"]), "wrong sign"),
         (lambda t: t.assign(omega_yr_rad_s=0.05 * np.sign(t["omega_rpm"])), "does not differ between repeats"),
@@ -270,6 +268,63 @@ def test_bad_tables_are_refused(
     assert len(error) == 1
     assert re.search(expected, error[0])
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize("names", [("one",), ("one", "two")])
+def test_few_sessions_give_a_weaker_conclusion(names: tuple[str, ...]) -> None:
+    table = toy_table(5, end_over_end_drag=5.0)
+    table["session"] = [names[i % len(names)] for i in range(len(table))]
+    data = read_measurements(table)
+    locked = middle_session(data)
+    assert len(data.session_names) == 4
+    assert 0.15 < locked.mean() < 0.35
+    within = table["session"].to_numpy()
+    for condition in np.unique(data.condition):
+        for name in names:  # repeats of a session stay together
+            assert len(set(locked[(data.condition == condition) & (within == name)])) <= 1
+    result = closed(table)
+    assert result.effects == ("end_over_end_drag",)
+    assert any(("one session" if len(names) == 1 else "2 sessions") in limit for limit in result.limits)
+    assert "block" in result.locked
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
+    table = pd.concat([t[t["N"] == 3] for t in (toy_table(5), toy_table(6))])
+    result = closed(table)
+    assert result.verdict == "none"
+    assert [("N = 3" in limit, "one session" in limit) for limit in result.limits] == [
+        (True, False),
+        (False, True),
+    ]
+
+
+@pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize(
+    "kept", [("omega_h_rpm", "omega_yr_rad_s"), ("R_yr_cm", "theta_deg"), ("omega_t_rpm", "omega_yr_rad_s")]
+)
+def test_any_two_outputs_are_enough(kept: tuple[str, str]) -> None:
+    table = toy_table(5, end_over_end_drag=5.0)
+    outputs = [
+        c for c in ("omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm", "theta_deg") if c not in kept
+    ]
+    result = closed(table.drop(columns=outputs))
+    assert result.verdict in {"effect", "ambiguous"}
+    assert "end_over_end_drag" in result.effects
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_fits_arrive_along_a_valley() -> None:
+    """The spin of the tails and the radius tell the rigid robot's coefficients apart along a bent valley only."""
+    table = toy_table(6).drop(columns=["omega_h_rpm", "omega_yr_rad_s", "theta_deg"])
+    model = toy_swimmer(table)
+    names, every = tuple(p.name for p in model.coefficients), np.ones(len(table), bool)
+    here = fit(model, start_values(model), names, every)
+    there = fit(toy_swimmer(table, TRUTH), start_values(toy_swimmer(table, TRUTH)), names, every)
+    assert here.arrived
+    assert there.arrived
+    assert here.deviance == pytest.approx(there.deviance, abs=0.5)
 
 
 def test_bad_rows_are_named_and_set_aside(toy_model: None) -> None:
