@@ -1,7 +1,7 @@
 """Planted truths for the operating characteristics: the paper's design of runs, a linear stand-in, and cases.
 
 The stand-in is the simulator's prediction and its derivatives in coefficients and effects at one robot; a table
-costs a second with it. Noise 2.5 % on every output, session scatter 0.5 %, on four sessions, one of them locked.
+costs a second with it. Noise 2.5 % on every output, session scatter 0.5 %; in the paper's design four sessions.
 λ is the size of an effect in standard deviations of its score, after what the coefficients absorb.
 
     nulls           nothing missing; Gaussian noise, and heavy tails (Student, 3 degrees of freedom)
@@ -15,12 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from calibration.locked import middle_session
 from calibration.measurements import Measurements, read_measurements
 from calibration.misfit import TESTABLE
 from calibration.model import Floats, Parameter, Parameters, Runs, start_values
@@ -84,16 +85,27 @@ class Case:
     heavy: bool = False
 
 
-def design() -> Measurements:
-    """The paper's runs, with noise for values."""
+class Design(NamedTuple):
+    """Which runs are made."""
+
+    lengths_cm: tuple[float, ...] = (5.0, 7.0, 9.0, 11.0, 13.0, 15.0)
+    sessions: int = 4  # 4: each N; 2: each trial; 1
+
+
+PAPER = Design()
+
+
+def design(which: Design) -> Measurements:
+    """Runs as the paper's, with noise for values."""
     rows = [
         {
-            "N": n, "l_cm": length, "omega_rpm": sign * rpm, "trial": trial, "session": f"N = {n}",
+            "N": n, "l_cm": length, "omega_rpm": sign * rpm, "trial": trial,
+            "session": {1: "one", 2: f"day {trial}"}.get(which.sessions, f"N = {n}"),
             "omega_h_rpm": -float(sign), "omega_t_rpm": float(sign), "omega_yr_rad_s": float(sign),
             "R_yr_cm": 1.0, "theta_deg": 1.0,
         }
         for n in (2, 3, 4, 5)
-        for length in (5.0, 7.0, 9.0, 11.0, 13.0, 15.0)
+        for length in which.lengths_cm
         for rpm in (110.0, 150.0)
         for sign in (1, -1)
         for trial in (1, 2)
@@ -105,9 +117,9 @@ def design() -> Measurements:
     return read_measurements(table)
 
 
-def stand_in() -> Linear:
+def stand_in(which: Design = PAPER) -> Linear:
     """Derivatives of the simulator at ROBOT."""
-    model = Swimmer(ROBOT, design())
+    model = Swimmer(ROBOT, design(which))
     names = [p.name for p in (*model.coefficients, *model.effects)]
     prediction, table = model.derivatives(start_values(model), names)
     count = len(model.coefficients)
@@ -130,8 +142,9 @@ class Signals:
 
     def __init__(self, model: Linear):
         k = model.prediction.shape[1]
-        self.used = model.runs.session != len(model.runs.session_names) // 2
-        self.white = Noise(NOISE**2 * np.eye(k), (SESSION / NOISE) ** 2).whitener(model.runs.session[self.used])
+        self.used = ~middle_session(model.runs)
+        white = Noise(NOISE**2 * np.eye(k), (SESSION / NOISE) ** 2)
+        self.white = white.whitener(model.runs.session[self.used])
         self.absorbed = np.linalg.qr(self.white(model.J[self.used]))[0]
         self.effects = self.rest(model.D)
 

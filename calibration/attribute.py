@@ -28,6 +28,7 @@ from tqdm import tqdm
 from calibration.fit import Fit, fit
 from calibration.misfit import TESTABLE, Misfit, check_misfit
 from calibration.model import Floats, Model, Parameter, Parameters
+from calibration.sessions import groups
 
 _DRAWS = 400  # for a remainder, which is judged at a coarser level
 _FIRST = 3  # single effects beside which a second one is looked for
@@ -186,8 +187,9 @@ def _session_gain(model: Model, base: Fit, refit: Fit, used: NDArray[np.bool_]) 
     """
     data = model.runs
     gain, variance = 0.0, 0.0
-    for session in np.unique(data.session[used]):
-        learn, out = used & (data.session != session), used & (data.session == session)
+    group = groups(data)[0]
+    for one in np.unique(group[used]):
+        learn, out = used & (group != one), used & (group == one)
         left = [_left_out(data.y, data.session, fitted, learn, out, refit) for fitted in (base, refit)]
         gain += 0.5 * float(left[0] @ left[0] - left[1] @ left[1])
         variance += float(((left[0] - left[1]) ** 2).sum())

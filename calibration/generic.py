@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from calibration.features import features
 from calibration.model import Floats, Runs
 from calibration.noise import repeat_covariance
+from calibration.sessions import groups
 
 _MOST = 6
 _GAIN = 0.02  # share of the left-out error that a feature must save
@@ -33,13 +34,14 @@ def correct(runs: Runs, prediction: Floats, used: NDArray[np.bool_]) -> Generic:
     names, table = features(runs, used)
     scale = np.sqrt(np.diag(repeat_covariance(runs.y[used], runs.condition[used])))
     residual = (runs.y - prediction) / scale
+    group = groups(runs)[0]
     chosen: list[int] = []
-    error = _left_out(table[:, chosen], residual, runs.session, used)
+    error = _left_out(table[:, chosen], residual, group, used)
     while len(chosen) < _MOST:
         rest = [i for i in range(len(names)) if i not in chosen]
         if not rest:
             break
-        tried = [_left_out(table[:, [*chosen, i]], residual, runs.session, used) for i in rest]
+        tried = [_left_out(table[:, [*chosen, i]], residual, group, used) for i in rest]
         best = int(np.argmin(tried))
         if tried[best] > (1 - _GAIN) * error:
             break
@@ -58,12 +60,12 @@ def _weights(table: Floats, residual: Floats) -> Floats:
     return np.asarray(np.linalg.lstsq(_with_constant(table), residual, rcond=None)[0])
 
 
-def _left_out(table: Floats, residual: Floats, session: NDArray[np.int64], used: NDArray[np.bool_]) -> float:
-    """Mean square left on sessions that the weights have not seen; without features, of the residual."""
+def _left_out(table: Floats, residual: Floats, group: NDArray[np.int64], used: NDArray[np.bool_]) -> float:
+    """Mean square left on groups of runs that the weights have not seen; without features, of the residual."""
     if not table.shape[1]:
         return float((residual[used] ** 2).mean())
     left = []
-    for own in np.unique(session[used]):
-        learn, out = used & (session != own), used & (session == own)
+    for own in np.unique(group[used]):
+        learn, out = used & (group != own), used & (group == own)
         left.append(residual[out] - _with_constant(table[out]) @ _weights(table[learn], residual[learn]))
     return float((np.concatenate(left) ** 2).mean())

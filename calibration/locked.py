@@ -8,13 +8,15 @@ from numpy.typing import NDArray
 from calibration.fit import Fit
 from calibration.model import Floats, Model, Runs, moved
 from calibration.noise import inverse_root, least_squares, sums
+from calibration.sessions import groups
 
 _DRAWS = 2000
 
 
 def middle_session(data: Runs) -> NDArray[np.bool_]:
-    """The runs (n,) of the middle session by name, so that it is interpolated to."""
-    return np.asarray(data.session == len(data.session_names) // 2)
+    """The runs (n,) of the middle session by name, so that it is interpolated to; a block where there are few."""
+    group, names = groups(data)
+    return np.asarray(group == len(names) // 2)
 
 
 def errors(data: Runs, prediction: Floats, rows: NDArray[np.bool_]) -> tuple[float, dict[str, float]]:

@@ -32,6 +32,7 @@ from calibration.locked import error_interval, errors, fitted_to_all, locked_p_v
 from calibration.misfit import DRAWS, Misfit, check_misfit
 from calibration.model import Floats, Model, Parameter, start_values
 from calibration.profile import profile_intervals
+from calibration.sessions import groups, limits
 from sim.artefact import fingerprint, provenance
 
 LEVEL = 0.04  # α of every claim: noise is estimated, and false claims shall stay below one in twenty
@@ -129,7 +130,8 @@ def close(
     """
     data, effects = model.runs, model.effects
     locked = middle_session(data) if locked is None else locked
-    names = ", ".join(data.session_names[s] for s in np.unique(data.session[locked]))
+    group, group_names = groups(data)
+    names = ", ".join(group_names[g] for g in np.unique(group[locked]))
     fixed = {
         "level": level,
         "seed": seed,
@@ -202,7 +204,7 @@ def close(
         untestable=dict(model.untestable),
         plan_hash=fingerprint(fixed),
         set_aside=(*data.set_aside, *reasons),
-        limits=(*data.limits, *_unfinished(model, base, final)),
+        limits=(*data.limits, *limits(data), *_unfinished(model, base, final)),
     )
 
 

@@ -5,10 +5,9 @@ Needed: N, l_cm, omega_rpm (head relative to tails, signed) and some of the outp
     omega_h_rpm, omega_t_rpm, omega_yr_rad_s (signed), R_yr_cm, theta_deg, v_cm_s (of the head's centre),
 
 and more runs than one per condition, so that the noise can be told from the repeats. `session` groups runs
-made together; where it is missing, runs of one N count as one session; fewer than three are split into blocks
-(`calibration.sessions`). elapsed_min, temperature_C, tank_diameter_cm and heading_deg (direction of the path in
-the lab, where a run is a part of a circle) open effects to test that need them. Rows that cannot be used are set
-aside by number and reason, never dropped in silence.
+made together; where it is missing, runs of one N count as one session. elapsed_min, temperature_C,
+tank_diameter_cm and heading_deg (direction of the path in the lab, where a run is a part of a circle) open effects
+to test that need them. Rows that cannot be used are set aside by number and reason, never dropped in silence.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians.
 A wrong sign is a bad row, since the motor's direction sets the sign of all of them.
@@ -26,7 +25,6 @@ from numpy.typing import NDArray
 
 from calibration.model import Runs
 from calibration.noise import repeat_covariance
-from calibration.sessions import groups
 from sim.errors import InputError
 from sim.tables import read_table
 
@@ -96,7 +94,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         else "N = " + good["N"].astype(int).astype(str)
     )
     condition = good.groupby(list(_INPUTS), sort=True).ngroup().to_numpy()
-    session, session_names, few = groups(names.to_numpy(dtype=str), condition)
+    session_names, session = np.unique(names.to_numpy(dtype=str), return_inverse=True)
     repeats = len(good) - len(np.unique(condition))
     if repeats < _FEWEST_REPEATS:
         raise InputError(f"{repeats} repeated runs; the noise is told from at least {_FEWEST_REPEATS}")
@@ -116,12 +114,12 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         y=y,
         condition=condition,
         session=session,
-        session_names=session_names,
+        session_names=tuple(str(n) for n in session_names),
         inputs=np.stack(inputs, 1),
         input_names=("N", "ln l", "ln |omega|", "direction", *noted),
         rows=np.flatnonzero(keep) + 1,
         set_aside=(*aside, *follows),
-        limits=(*_limits(tails, length, omega), *few),
+        limits=_limits(tails, length, omega),
         tails=tails,
         length=length,
         omega=omega,

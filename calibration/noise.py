@@ -9,7 +9,8 @@ variance. Repeats within a session do not average that shift away, so the covari
 One ρ for all outputs: three sessions of five outputs leave it a dozen degrees of freedom, where one for each
 output would have two. It comes from the residuals of the fitted model, so an effect that the model lacks inflates
 it. It is therefore held below `SESSION_SHARE`: sessions are taken to scatter no more than single runs do, and a
-larger shift of a whole session counts as something that the model must explain.
+larger shift of a whole session counts as something that the model must explain. A single session tells nothing of
+it; there ρ is that limit, and what shifts all runs alike has next to no weight.
 """
 
 from __future__ import annotations
@@ -116,6 +117,9 @@ def least_squares(products: Sums, *, passes: int) -> Linear:
         step = np.einsum("...ij,...j->...i", covariance, whole[..., :p, p])
         if again == passes:
             break
+        if count == 1:
+            share = np.full_like(share, SESSION_SHARE)
+            continue
         left = np.concatenate([-step, np.ones((*share.shape, 1))], -1)
         between = np.einsum("...i,...sij,...j->...", left, products.between, left)
         means = whole[..., :p, :p] - products.within[..., :p, :p]

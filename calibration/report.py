@@ -64,13 +64,13 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
 def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
     page.section("Data")
     page.text(
-        f"{len(data)} usable runs in {len(data.session_names)} groups; locked away for the test: "
+        f"{len(data)} usable runs in {len(data.session_names)} session(s); locked away for the test: "
         f"{result.locked}. Set aside: " + ("; ".join(result.set_aside) if result.set_aside else "nothing") + "."
     )
     scatter = np.sqrt(np.diag(result.base.noise.run))
     noise = ", ".join(f"{_LABELS[o]} {100 * s:.1f} %" for o, s in zip(data.outputs, scatter, strict=True))
     page.text(
-        f"Scatter of one run, from the repeats: {noise}. A group shifts all its runs by "
+        f"Scatter of one run, from the repeats: {noise}. A session shifts all its runs by "
         f"{100 * math.sqrt(result.final.noise.share):.0f} % of that."
     )
     for limit in result.limits:
