@@ -7,7 +7,8 @@ Needed: N, l_cm, omega_rpm (head relative to tails, signed) and some of the outp
 and more runs than one per condition, so that the noise can be told from the repeats. `session` groups runs
 made together; where it is missing, runs of one N count as one session. elapsed_min, temperature_C,
 tank_diameter_cm and heading_deg (direction of the path in the lab, where a run is a part of a circle) open effects
-to test that need them. Rows that cannot be used are set aside by number and reason, never dropped in silence.
+to test that need them. Rows that cannot be used are set aside by number and reason, never dropped in silence; so
+are columns of other names, unless they look like a known one misspelt.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians.
 A wrong sign is a bad row, since the motor's direction sets the sign of all of them.
@@ -15,6 +16,7 @@ A wrong sign is a bad row, since the motor's direction sets the sign of all of t
 
 from __future__ import annotations
 
+import difflib
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,15 +67,17 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
     """Measurements from a CSV or a table.
 
     Raises:
-        InputError: columns are missing or unknown, or too few runs remain.
+        InputError: columns are missing or misspelt, or too few runs remain.
     """
     table = source if isinstance(source, pd.DataFrame) else read_table(source)
     for name in _INPUTS:
         if name not in table:
             raise InputError(f"the table has no column {name!r}; it needs {', '.join(_INPUTS)}")
     unknown = [str(c) for c in table if c not in _KNOWN]
-    if unknown:
-        raise InputError(f"unknown column {unknown[0]!r}; known are {', '.join(sorted(_KNOWN))}")
+    for name in unknown:
+        near = difflib.get_close_matches(name, _KNOWN, n=1)
+        if near:
+            raise InputError(f"unknown column {name!r}: is it {near[0]!r}? rename or drop it")
     outputs = tuple(name for name, (column, _, _) in OUTPUTS.items() if column in table)
     if len(outputs) < 2 or not {"omega_yr", "R_yr", "theta", "v"} & set(outputs):
         raise InputError(
@@ -118,7 +122,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         inputs=np.stack(inputs, 1),
         input_names=("N", "ln l", "ln |omega|", "direction", *noted),
         rows=np.flatnonzero(keep) + 1,
-        set_aside=(*aside, *follows),
+        set_aside=(*aside, *follows, *(f"column {name}: not known, left out" for name in unknown)),
         limits=_limits(tails, length, omega),
         tails=tails,
         length=length,

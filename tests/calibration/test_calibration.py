@@ -241,7 +241,7 @@ def test_the_real_simulator_closes_a_table_with_a_hidden_effect(tmp_path: Path) 
     ("change", "expected"),
     [
         (lambda t: t.drop(columns="omega_rpm"), "no column 'omega_rpm'"),
-        (lambda t: t.assign(colour=1), "unknown column 'colour'"),
+        (lambda t: t.assign(omega_h_rad_s=1), "unknown column 'omega_h_rad_s': is it '"),
         (lambda t: t.drop(columns=["omega_yr_rad_s", "R_yr_cm", "theta_deg"]), "at least two outputs"),
         (lambda t: t.drop(columns=["omega_h_rpm", "omega_t_rpm", "R_yr_cm", "theta_deg"]), "at least two outputs"),
         (lambda t: t.head(10), "usable runs"),
@@ -344,6 +344,7 @@ def test_bad_rows_are_named_and_set_aside(toy_model: None) -> None:
     data = read_measurements(table)
     assert len(data) == len(table) - 3
     assert [line.split(":")[0] for line in data.set_aside] == ["row 1", "row 2", "row 3"]
+    assert read_measurements(table.assign(colour="red")).set_aside[-1] == "column colour: not known, left out"
     with pytest.raises(InputError, match="unknown"):
         read_measurements(table.rename(columns={"trial": "tri al"}))
 
