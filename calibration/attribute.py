@@ -113,7 +113,7 @@ def examine(
         if not refit.arrived:
             reason = "its fit does not arrive at a minimum"
         elif after.p_value < level / 2:
-            reason = f"leaves a residual (p = {after.p_value:.3g})"
+            reason = f"leaves a residual (p = {after.p_value:.2g})"
         elif ends[0] <= effect.start <= ends[1]:
             reason = "its interval includes the null"
         elif gain <= error:

@@ -69,10 +69,11 @@ def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
     )
     scatter = np.sqrt(np.diag(result.base.noise.run))
     noise = ", ".join(f"{_LABELS[o]} {100 * s:.1f} %" for o, s in zip(data.outputs, scatter, strict=True))
-    page.text(
-        f"Scatter of one run, from the repeats: {noise}. A session shifts all its runs by "
-        f"{100 * math.sqrt(result.final.noise.share):.0f} % of that."
-    )
+    share = f"{100 * math.sqrt(result.final.noise.share):.0f} % of that"
+    shift = f"A session shifts all its runs by {share}."
+    if len(data.session_names) == 1:
+        shift = f"What the session shifts all its runs by cannot be told from it; {share} is allowed for."
+    page.text(f"Scatter of one run, from the repeats: {noise}. {shift}")
     for limit in result.limits:
         page.text(f"A weaker conclusion: {limit}.", tone="bad")
 
@@ -103,9 +104,9 @@ def _add_fit(page: Page, result: Verdict) -> None:
 
 def _add_evidence(page: Page, result: Verdict) -> None:
     page.section("Evidence for each effect of the catalogue")
-    each = ", ".join(f"{_TESTS[name]} {p:.3g}" for name, p in result.misfit.p.items())
+    each = ", ".join(f"{_TESTS[name]} {p:.2g}" for name, p in result.misfit.p.items())
     page.text(
-        f"Is there more than noise? p = {result.misfit.p_value:.3g} by all tests together ({each}). Below: score "
+        f"Is there more than noise? p = {result.misfit.p_value:.2g} by all tests together ({each}). Below: score "
         "of each effect after what the coefficients absorb is projected out; claims need more than "
         f"{result.misfit.critical_z:.2f}."
     )
