@@ -21,8 +21,12 @@ from sim.sensitivity import Sensitivities
 def steady_columns(columns: Mapping[str, Any], **_: object) -> dict[str, np.ndarray]:
     """Stand-in for `sim.batches.steady_columns`."""
     values = check_columns({k: np.asarray(v, float) for k, v in columns.items()})
-    rows = [_row({k: v[i : i + 1] for k, v in values.items()}) for i in range(len(values["N"]))]
-    return {k: np.array([r[k] for r in rows]) for k in rows[0]}
+    found: dict[str, np.ndarray] = {}
+    for tails in np.unique(values["N"]):
+        rows = values["N"] == tails
+        for name, value in _robots({k: v[rows] for k, v in values.items()}).items():
+            found.setdefault(name, np.empty(len(rows)))[rows] = value
+    return found
 
 
 def slopes(columns: Mapping[str, Any], parameters: tuple[str, ...], **_: object) -> Sensitivities:
@@ -44,34 +48,35 @@ def slopes(columns: Mapping[str, Any], parameters: tuple[str, ...], **_: object)
     return Sensitivities(parameters, values, {k: np.stack(v, 1) for k, v in found.items() if v})
 
 
-def _row(columns: dict[str, np.ndarray]) -> dict[str, float]:
+def _robots(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Robots of one number of tails, (B,) each."""
     groups = Groups.from_columns(columns)
     R = 1 / groups.l_over_R
     base = drag.coefficients(groups.C_t, groups.C_r, groups.C_yr, R, groups.L_over_R * R, groups.l_over_r0)
-    resistance = with_effects(groups, base).resistance[..., 0].numpy()
-    head = resistance[:, :4].copy()
-    head[:, 3] += resistance[:, 4]
-    parallel, perp = (float(v) for v in drag.tail_coefficients(groups.l_over_r0))
-    a, n, omega = float(groups.a_over_R * R), groups.N, float(groups.omega_bar)
-    tails = np.zeros((4, 4))
-    tails[0, 0] = n * perp
-    tails[0, 2] = tails[2, 0] = -n * perp / 2
-    tails[2, 2] = n * perp / 3
-    tails[1, 1] = n * parallel
-    tails[3, 3] = 3 * n * perp * a**2
-    thrust = 0.5 * n * (perp - parallel) * a**2 / (1 + 0.05 * abs(omega))
-    tails[1, 3] = -thrust * np.sign(omega)
-    push = (tails[:, 3] + resistance[:, 4]) * omega
-    u = np.linalg.solve(head + tails, -push)
-    sway, surge, yaw, spin = u[0] + u[2] * float(groups.L_over_R * R) / 2, u[1], u[2], u[3]
+    resistance = np.moveaxis(with_effects(groups, base).resistance.numpy(), -1, 0)  # (B, 4, 5)
+    head = resistance[:, :, :4].copy()
+    head[:, :, 3] += resistance[:, :, 4]
+    parallel, perp = (v.numpy() for v in drag.tail_coefficients(groups.l_over_r0))
+    a, n, omega = (groups.a_over_R * R).numpy(), groups.N, groups.omega_bar.numpy()
+    tails = np.zeros_like(head)
+    tails[:, 0, 0] = n * perp
+    tails[:, 0, 2] = tails[:, 2, 0] = -n * perp / 2
+    tails[:, 2, 2] = n * perp / 3
+    tails[:, 1, 1] = n * parallel
+    tails[:, 3, 3] = 3 * n * perp * a**2
+    thrust = 0.5 * n * (perp - parallel) * a**2 / (1 + 0.05 * np.abs(omega))
+    tails[:, 1, 3] = -thrust * np.sign(omega)
+    push = (tails[:, :, 3] + resistance[:, :, 4]) * omega[:, None]
+    u = np.linalg.solve(head + tails, -push[..., None])[..., 0]
+    sway, surge, yaw, spin = u[:, 0] + u[:, 2] * (groups.L_over_R * R).numpy() / 2, u[:, 1], u[:, 2], u[:, 3]
     return {
         "omega_h_bar": spin,
         "omega_t_bar": spin + omega,
         "omega_yr_bar": yaw,
         "v_x": sway,
         "v_z": surge,
-        "R_yr_over_l": float(np.hypot(sway, surge) / abs(yaw)),
-        "theta_deg": float(np.degrees(np.arctan2(abs(sway), surge))),
+        "R_yr_over_l": np.hypot(sway, surge) / np.abs(yaw),
+        "theta_deg": np.degrees(np.arctan2(np.abs(sway), surge)),
     }
 
 
