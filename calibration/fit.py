@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from calibration.model import Floats, Model, Parameter, Parameters, moved, parameter
+from calibration.model import Floats, Model, Parameter, Parameters, parameter, stepped
 from calibration.noise import Noise, Sums, inverse_root, least_squares, repeat_covariance, sums
 
 _MOST_STEPS = 25
@@ -47,7 +47,6 @@ class Fit:
     jacobian: Floats  # (n, k, p)
     noise: Noise
     deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
-    steps: int
     arrived: bool  # at a minimum, or as far as the bounds let it
 
     @property
@@ -59,11 +58,15 @@ class Fit:
         """Parameters at an end of their range."""
         return tuple(p.name for p in self.fitted if self.parameters[p.name] in p.bounds)
 
+    def half_width(self, place: int) -> float:
+        """Of the 95 % interval of a parameter, on its own scale."""
+        return float(student.ppf(0.975, self.freedom[place])) * math.sqrt(self.covariance[place, place])
+
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval of a parameter."""
         value = self.parameters[name]
         place = self.names.index(name)
-        half = float(student.ppf(0.975, self.freedom[place])) * math.sqrt(self.covariance[place, place])
+        half = self.half_width(place)
         if self.fitted[place].logarithmic:
             return value * math.exp(-half), value * math.exp(half)
         return value - half, value + half
@@ -80,7 +83,7 @@ def fit(
     """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay."""
     data = model.runs
     run = repeat_covariance(data.y[used], data.condition[used])
-    point, count = _descend(_Task(model, names, used, inverse_root(run), title), dict(start))
+    point = _descend(_Task(model, names, used, inverse_root(run), title), dict(start))
     linear = least_squares(point.products, passes=_PASSES)
     share = float(linear.share)
     whole = point.products.at(linear.share)
@@ -96,7 +99,6 @@ def fit(
         jacobian=point.derivative,
         noise=Noise(run, share),
         deviance=float(whole[-1, -1] + len(run) * np.log1p(share * point.products.sizes).sum()),
-        steps=count,
         arrived=_step(fitted, point.parameters, whole, 0).promise < _UNSETTLED,
     )
 
@@ -141,8 +143,8 @@ class _Step(NamedTuple):
     damping: int  # place of its λ in _DAMPING
 
 
-def _descend(task: _Task, start: dict[str, float]) -> tuple[_Point, int]:
-    """The least rᵀ Σ⁻¹ r from `start`, and in how many steps."""
+def _descend(task: _Task, start: dict[str, float]) -> _Point:
+    """The least rᵀ Σ⁻¹ r from `start`."""
     fitted = tuple(parameter(task.model, name) for name in task.names)
     point = task.at(start, None, 1)
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
@@ -162,7 +164,7 @@ def _descend(task: _Task, start: dict[str, float]) -> tuple[_Point, int]:
             least = max(step.damping + 1, 2)
             if least >= len(_DAMPING):
                 break
-    return point, count
+    return point
 
 
 def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: Floats, least: int) -> _Step:
@@ -176,8 +178,7 @@ def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: Fl
         change = _damped(fitted, parameters, whole, _DAMPING[place])
         if all(abs(c) <= _LARGEST for c, one in zip(change, fitted, strict=True) if one.logarithmic):
             break
-    changes = zip(fitted, change.tolist(), strict=True)
-    new = {**parameters, **{one.name: moved(one, parameters[one.name], by) for one, by in changes}}
+    new = stepped(fitted, parameters, change)
     promise = 2 * change @ whole[:-1, -1] - change @ whole[:-1, :-1] @ change
     return _Step(new, float(np.abs(change).max()), float(promise), place)
 
@@ -220,7 +221,7 @@ def _freedom(products: Sums, share: float, count: int) -> Floats:
     inverse = [
         np.linalg.pinv(products.at(np.array(s))[:count, :count], hermitian=True) for s in (share, share + step)
     ]
-    V, moved = (np.maximum(np.diag(i), 1e-100) for i in inverse)
+    V, near = (np.maximum(np.diag(i), 1e-100) for i in inverse)
     sessions = len(products.sizes)
     spread = 2 * (share + 1 / products.sizes.mean()) ** 2 / (products.outputs * max(sessions - 1, 1))
-    return np.asarray(np.clip(2 * V**2 / np.maximum(((moved - V) / step) ** 2 * spread, 1e-12 * V**2), 1.0, 1e6))
+    return np.asarray(np.clip(2 * V**2 / np.maximum(((near - V) / step) ** 2 * spread, 1e-12 * V**2), 1.0, 1e6))

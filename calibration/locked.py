@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.fit import Fit
-from calibration.model import Floats, Model, Runs, moved
+from calibration.model import Floats, Model, Runs, stepped
 from calibration.noise import inverse_root, least_squares, sums
 from calibration.sessions import groups
 
@@ -68,5 +68,4 @@ def fitted_to_all(model: Model, fitted: Fit, rows: NDArray[np.bool_]) -> dict[st
     table = np.concatenate([fitted.jacobian, (data.y - fitted.prediction)[..., None]], -1)
     products = sums(inverse_root(fitted.noise.run) @ table[rows], data.session[rows], len(fitted.noise.run))
     step = least_squares(products, passes=3).step
-    changes = zip(fitted.fitted, step.tolist(), strict=True)
-    return {**fitted.parameters, **{p.name: moved(p, fitted.parameters[p.name], by) for p, by in changes}}
+    return stepped(fitted.fitted, fitted.parameters, step)

@@ -32,7 +32,7 @@ from calibration.locked import error_interval, errors, fitted_to_all, locked_p_v
 from calibration.misfit import DRAWS, Misfit, check_misfit
 from calibration.model import Floats, Model, Parameter, start_values
 from calibration.profile import profile_intervals
-from calibration.sessions import groups, limits
+from calibration.sessions import divided, groups, limits
 from sim.artefact import fingerprint, provenance
 
 LEVEL = 0.04  # α of every claim: noise is estimated, and false claims shall stay below one in twenty
@@ -130,7 +130,7 @@ def close(
     """
     data, effects = model.runs, model.effects
     locked = middle_session(data) if locked is None else locked
-    group, group_names = groups(data)
+    group, group_names = groups(data) if divided(data, locked) else (data.session, data.session_names)
     names = ", ".join(group_names[g] for g in np.unique(group[locked]))
     fixed = {
         "level": level,
@@ -146,9 +146,8 @@ def close(
     used, test = ~locked & ~gross, locked & ~gross
     guess = model.guess(dict(start), used)
     base = fit(model, guess, coefficients, used, title="fit" if progress else "")
-    along = model.derivatives(base.parameters, [e.name for e in effects], title="derivatives" if progress else "")[
-        1
-    ]
+    title = "derivatives" if progress else ""
+    along = model.derivatives(base.parameters, [e.name for e in effects], title=title)[1]
     misfit = check_misfit(base, data, used, along, level=level, seed=seed)
     found: list[Candidate] = []
     if misfit.p_value < level:
@@ -204,7 +203,7 @@ def close(
         untestable=dict(model.untestable),
         plan_hash=fingerprint(fixed),
         set_aside=(*data.set_aside, *reasons),
-        limits=(*data.limits, *limits(data), *_unfinished(model, base, final)),
+        limits=(*data.limits, *limits(data, locked), *_unfinished(model, base, final)),
     )
 
 

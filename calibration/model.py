@@ -121,6 +121,12 @@ def moved(one: Parameter, value: float, by: float) -> float:
     return max(one.bounds[0], min(one.bounds[1], new))
 
 
+def stepped(fitted: Sequence[Parameter], parameters: Parameters, step: Floats) -> dict[str, float]:
+    """`parameters` with those of `fitted` (p,) changed by `step` (p,), see `moved`."""
+    changes = zip(fitted, step.tolist(), strict=True)
+    return {**parameters, **{one.name: moved(one, parameters[one.name], by) for one, by in changes}}
+
+
 def by_differences(
     model: Model, parameters: Parameters, names: Sequence[str], *, title: str = ""
 ) -> tuple[Floats, Floats]:

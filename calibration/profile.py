@@ -11,10 +11,9 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from calibration.fit import Fit
-from calibration.model import Model, moved
+from calibration.model import Model, moved, stepped
 from calibration.noise import inverse_root, sums
 
 _LEAST = 0.05  # of the expected rise: below, the deviance is flat and the end stays where it is
@@ -28,7 +27,7 @@ def profile_intervals(
     root = inverse_root(fitted.noise.run)
     sets, ends = [], []
     for i, one in enumerate(fitted.fitted):
-        half = float(student.ppf(0.975, fitted.freedom[i])) * math.sqrt(fitted.covariance[i, i])
+        half = fitted.half_width(i)
         for side in (-1, 1):
             end = moved(one, fitted.parameters[one.name], side * half)
             own = (
@@ -37,10 +36,7 @@ def profile_intervals(
                 else end - fitted.parameters[one.name]
             )
             along = fitted.covariance[i] / fitted.covariance[i, i] * own  # where the others go with it
-            step = zip(fitted.fitted, along.tolist(), strict=True)
-            sets.append(
-                {**fitted.parameters, **{p.name: moved(p, fitted.parameters[p.name], by) for p, by in step}}
-            )
+            sets.append(stepped(fitted.fitted, fitted.parameters, along))
             ends.append((i, own))
     found = model.predict(sets, title=title)
     here = _deviance(fitted, root, data.y - fitted.prediction, data.session, used, list(range(count)))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from calibration.locked import middle_session
 from calibration.measurements import Measurements
+from calibration.sessions import divided
 from sim.errors import InputError
 
 Rows = NDArray[np.bool_]
@@ -31,7 +32,7 @@ def _paper(data: Measurements) -> tuple[Measurements, Rows]:
         raise InputError("the paper's protocol needs omega_h_rpm, omega_yr_rad_s and runs with N = 2, 3, 4 and 5")
     y = data.y[:, [data.outputs.index(n) for n in outputs]]
     locked = ~np.isin(data.tails, (3, 4))
-    if set(data.session[locked]) & set(data.session[~locked]):
+    if divided(data, locked):
         raise InputError(
             "a session has runs with N = 3 or 4 and with N = 2 or 5; the paper's protocol would split it"
         )

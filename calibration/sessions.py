@@ -33,10 +33,15 @@ def groups(data: Runs) -> tuple[Labels, tuple[str, ...]]:
     return block, tuple(names)
 
 
-def limits(data: Runs) -> tuple[str, ...]:
-    """What is weaker with fewer than three sessions, in words."""
+def divided(data: Runs, locked: NDArray[np.bool_]) -> bool:
+    """Whether some runs of a session are `locked` (n,) and others are not."""
+    return bool(set(data.session[locked]) & set(data.session[~locked]))
+
+
+def limits(data: Runs, locked: NDArray[np.bool_]) -> tuple[str, ...]:
+    """What is weaker where the `locked` runs (n,) are no sessions of their own, in words."""
     count = len(data.session_names)
-    if count >= _FEWEST:
+    if count >= _FEWEST or not divided(data, locked):
         return ()
     found = (
         f"{count} session{'s' * (count > 1)} only: the locked runs are a quarter of the conditions, no session of "

@@ -38,17 +38,17 @@ _FEWEST = 12  # samples of a run
 class TrackedRun:
     """What a run's track gives; NaN where it gives nothing; errors are standard errors."""
 
-    omega_yr_rad_s: float
-    omega_yr_error: float
-    R_yr_cm: float
-    R_yr_error: float
-    theta_deg: float
-    theta_error: float
-    v_cm_s: float
-    v_error: float
-    drift_x_cm_s: float  # of the circle
-    drift_y_cm_s: float
-    drift_error: float
+    omega_yr_rad_s: float = math.nan
+    omega_yr_error: float = math.nan
+    R_yr_cm: float = math.nan
+    R_yr_error: float = math.nan
+    theta_deg: float = math.nan
+    theta_error: float = math.nan
+    v_cm_s: float = math.nan
+    v_error: float = math.nan
+    drift_x_cm_s: float = math.nan  # of the circle
+    drift_y_cm_s: float = math.nan
+    drift_error: float = math.nan
 
 
 def measure_tracks(
@@ -82,7 +82,7 @@ def measure_tracks(
         own = own[np.isfinite(own.to_numpy()).all(axis=1)].sort_values("time_s")
         if len(own) < _FEWEST:
             aside.append(f"run {run}: {len(own)} samples; a track needs at least {_FEWEST}")
-            found.append(TrackedRun(*[math.nan] * 11))
+            found.append(TrackedRun())
             continue
         found.append(measure_track(*(own[c].to_numpy(dtype=float) for c in COLUMNS[1:])))
     columns = pd.DataFrame([asdict(p) for p in found], index=table.index)
@@ -118,8 +118,7 @@ def measure_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> Tr
     fitted = least_squares(residual, start, x_scale=np.maximum(np.abs(start), 1e-3))
     covariance = _covariance(np.asarray(fitted.jac), fitted.fun, 3)
     radius, angle, rate, middle, *drift = fitted.x[2:]
-    drift_x, drift_y = drift if drifts else (math.nan, math.nan)
-    drift_error = math.sqrt((covariance[6, 6] + covariance[7, 7]) / 2) if drifts else math.nan
+    drifted = [*map(float, drift), math.sqrt((covariance[6, 6] + covariance[7, 7]) / 2)] if drifts else []
     tangent = angle + math.copysign(math.pi / 2, rate)
     slip = abs(math.remainder(middle - tangent, 2 * math.pi))
     slip_error = math.sqrt(covariance[3, 3] + covariance[5, 5] - 2 * covariance[3, 5])
@@ -130,7 +129,7 @@ def measure_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> Tr
     return TrackedRun(
         float(rate), math.sqrt(covariance[4, 4]), float(radius), math.sqrt(covariance[2, 2]), math.degrees(slip),
         math.degrees(slip_error), float(abs(rate) * radius), speed_error,
-        float(drift_x), float(drift_y), drift_error,
+        *drifted,
     )  # fmt: skip
 
 
@@ -146,9 +145,8 @@ def _line(time: Floats, x: Floats, y: Floats, heading: Floats) -> TrackedRun:
     error = math.sqrt((v_x**2 * variances[0][1, 1] + v_y**2 * variances[1][1, 1]) / speed**2)
     slip = abs(math.remainder(fits[2][0] - math.atan2(v_y, v_x), 2 * math.pi))
     slip_error = math.sqrt(variances[2][0, 0] + (error / speed) ** 2)
-    none = math.nan
     return TrackedRun(
-        none, none, none, none, math.degrees(slip), math.degrees(slip_error), speed, error, none, none, none
+        theta_deg=math.degrees(slip), theta_error=math.degrees(slip_error), v_cm_s=speed, v_error=error
     )
 
 

@@ -289,6 +289,17 @@ def test_few_sessions_give_a_weaker_conclusion(names: tuple[str, ...]) -> None:
 
 
 @pytest.mark.usefixtures("toy_model")
+def test_two_sessions_kept_whole_are_not_called_blocks() -> None:
+    """The paper's protocol locks N = 2 and 5; where these are a session, none is divided."""
+    table = toy_table(5)
+    table["session"] = np.where(table["N"].isin((3, 4)), "inner", "outer")
+    data, locked = PROTOCOLS["paper"](read_measurements(table))
+    result = close(Swimmer(START, data, solver=toy.SOLVER), locked=locked, progress=False)
+    assert result.locked == "outer"
+    assert not any("sessions only" in limit for limit in result.limits)
+
+
+@pytest.mark.usefixtures("toy_model")
 def test_what_shifts_all_runs_of_a_single_session_is_no_evidence() -> None:
     shifted = toy_table(5).assign(session="one")
     shifted["R_yr_cm"] *= 1.03
