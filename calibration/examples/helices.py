@@ -18,6 +18,7 @@ Usage: python -m calibration.examples.helices TABLE.csv
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -123,4 +124,7 @@ def main(table: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(run_command(lambda _: main(*sys.argv[1:])))
+    parser = argparse.ArgumentParser(prog="python -m calibration.examples.helices")
+    parser.add_argument("table", help="CSV of helices: " + ", ".join(("lambda_over_R", *COLUMNS)))
+    arguments = parser.parse_args()
+    sys.exit(run_command(lambda _: main(arguments.table)))

@@ -11,6 +11,7 @@ Usage: python -m calibration.examples.spheres TABLE.csv [SET]
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -147,4 +148,8 @@ def main(table: str, name: str = "KW2023") -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(run_command(lambda _: main(*sys.argv[1:])))
+    parser = argparse.ArgumentParser(prog="python -m calibration.examples.spheres")
+    parser.add_argument("table", help="CSV of falls")
+    parser.add_argument("name", nargs="?", default="KW2023", help="whose falls (default: %(default)s)")
+    arguments = parser.parse_args()
+    sys.exit(run_command(lambda _: main(arguments.table, arguments.name)))

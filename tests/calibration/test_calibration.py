@@ -337,11 +337,12 @@ def test_any_two_outputs_are_enough(kept: tuple[str, str]) -> None:
 @pytest.mark.usefixtures("toy_model")
 def test_fits_arrive_along_a_valley() -> None:
     """The spin of the tails and the radius tell the rigid robot's coefficients apart along a bent valley only."""
-    table = toy_table(6).drop(columns=["omega_h_rpm", "omega_yr_rad_s", "theta_deg"])
-    model = toy_swimmer(table)
-    names, every = tuple(p.name for p in model.coefficients), np.ones(len(table), bool)
-    here = fit(model, start_values(model), names, every)
-    there = fit(toy_swimmer(table, TRUTH), start_values(toy_swimmer(table, TRUTH)), names, every)
+    hidden = "end_over_end_drag"
+    table = toy_table(6, **{hidden: 5.0}).drop(columns=["omega_h_rpm", "omega_yr_rad_s", "theta_deg"])
+    model, true_model = toy_swimmer(table), toy_swimmer(table, TRUTH)
+    names, every = (*(p.name for p in model.coefficients), hidden), np.ones(len(table), bool)
+    here = fit(model, {**start_values(model), hidden: 5.0}, names, every)
+    there = fit(true_model, {**start_values(true_model), hidden: 5.0}, names, every)
     assert here.arrived
     assert there.arrived
     assert here.deviance == pytest.approx(there.deviance, abs=0.5)
