@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.batches import steady_columns
-from sim.robot import PRESETS
-from sim.steady import steady
+from sim.model.presets import PRESETS
+from sim.motion.batches import steady_columns
+from sim.motion.steady import steady
 from tests.reference.cases import CONTROL, FILAMENT, MEASURED_HEAD_SHARE, STEADY_INPUTS, STEADY_POINTS
 from tests.sim.robots import extrapolated_loads
 

@@ -22,7 +22,7 @@ from calibration.steer import gap_closed, steer
 from calibration.swimmer import Swimmer, corrected_robot
 from calibration.synthetic import make_table
 from planner.path import polygon
-from sim.robot import PRESETS
+from sim.model.presets import PRESETS
 
 HIDDEN = (
     ("end_over_end_drag", 5.0), ("tail_spin_drag", 1.0), ("surface_couple", 0.4), ("anisotropic_head_drag", 0.5),

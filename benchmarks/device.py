@@ -1,6 +1,6 @@
 """Tensor time steps on the processor and, where there is one, on a CUDA device: cost by batch size.
 
-The same code runs on both (`sim.balance`, `sim.stepper`); on the processor the compiled loops of `sim.march` are
+The same code runs on both (`sim.reference`); on the processor the compiled loops of `sim.solve.march` are
 the ones that everything else uses, and stand beside it.
 
 Usage: python -m benchmarks.device
@@ -15,9 +15,10 @@ import numpy as np
 import torch
 
 from benchmarks.scaling import step_time
-from sim.balance import assemble
-from sim.robot import PRESETS, Groups
-from sim.stepper import State, at_rest, step
+from sim.model.groups import Groups
+from sim.model.presets import PRESETS
+from sim.reference.balance import tensor_robots
+from sim.reference.stepper import TensorState, at_rest, step
 
 BATCHES = (1, 16, 256, 4096)
 EDGES = 16
@@ -32,18 +33,18 @@ def robots(count: int, device: str) -> Groups:
     return replace(groups, **moved)
 
 
-def robot_step(count: int, device: str) -> tuple[float, State]:
+def robot_step(count: int, device: str) -> tuple[float, TensorState]:
     """Seconds of one robot's time step in a batch, and where the batch is after 2 × 20 steps."""
     groups = robots(count, device)
-    swimmer = assemble(groups, edges=EDGES)
+    batch = tensor_robots(groups, edges=EDGES)
     dt = torch.full_like(groups.omega_bar, 0.02)
-    state = at_rest(swimmer)
+    state = at_rest(batch)
     for _round in range(2):  # the first is for warming up
         if device == "cuda":
             torch.cuda.synchronize()
         begin = time.perf_counter()
         for _ in range(_STEPS):
-            state = step(swimmer, state, groups.omega_bar, dt)
+            state = step(batch, state, groups.omega_bar, dt)
         if device == "cuda":
             torch.cuda.synchronize()
         spent = time.perf_counter() - begin

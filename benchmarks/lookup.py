@@ -10,7 +10,7 @@ import time
 import torch
 
 from dataset.design import load_design
-from sim.batches import steady_columns
+from sim.motion.batches import steady_columns
 from surrogate.evaluate import error_table
 from surrogate.export import load
 

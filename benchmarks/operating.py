@@ -24,7 +24,7 @@ from benchmarks.planted import ROBOT, Case, Design, Linear, cases, nulls, scatte
 from calibration.loop import Verdict, close
 from calibration.model import Floats, Model, start_values
 from calibration.swimmer import DIRECT, Swimmer
-from sim.batches import available_jobs, stepped_columns
+from sim.motion.batches import available_jobs, stepped_columns
 
 PAGE = Path("docs/operating.md")
 REAL_NULLS, REAL_SEEDS = 20, 2

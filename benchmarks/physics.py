@@ -16,10 +16,12 @@ import torch
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
-from sim.linear_theory import linear_motion
-from sim.robot import PRESETS, Groups, Robot
-from sim.shapes import tails_over_a_revolution
-from sim.steady import steady
+from sim.model.groups import Groups
+from sim.model.presets import PRESETS
+from sim.model.robot import Robot
+from sim.motion.shapes import tails_over_a_revolution
+from sim.motion.steady import steady
+from sim.reference.linear_theory import linear_motion
 
 COLOURS = {2: "#2a7fba", 3: "#3a9d5d", 4: "#e08a1e", 5: "#c8452f"}
 SPEEDS = np.geomspace(0.5, 110.0, 60)

@@ -3,7 +3,7 @@
 At low Reynolds number velocities follow from positions: elastic force on a free node is balanced by its drag,
 v_k = R_k⁻¹ f_k, what the clamps transmit by head and disc; so ẋ_k = v_k − G_k w with the body's velocities from
 four linear equations. State: nodes of all tails in the disc frame, disc phase, heading, ∫h_x, ∫v_z. The formulas
-are those of `sim.rod` and `sim.drag`; frames as in `sim.balance`.
+are those of `sim.mechanics`; frames as in `sim.mechanics.balance`.
 """
 
 from __future__ import annotations
@@ -11,25 +11,24 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from sim import direct, rod
-from sim.drag import node_resistance
-from sim.robot import Groups
-from sim.tail import HEAD_LENGTH, Body, body_of
-from sim.vectors import Vector
-
-Floats = NDArray[np.float64]
+from sim.arrays import Floats
+from sim.linear.vectors import Vector
+from sim.mechanics import rod
+from sim.mechanics.balance import motor_gain
+from sim.mechanics.drag import node_resistance
+from sim.model.body import Body
+from sim.model.groups import Groups
+from sim.solve.assembly import bodies
 
 
 class PlainSwimmer:
     """One robot with N tails of n edges."""
 
     def __init__(self, groups: Groups, edges: int):
-        row = direct.bodies(groups)[0]
-        self.body: Body = body_of(row)
-        self.head_length, self.tails, self.n = float(row[HEAD_LENGTH]), groups.N, edges
+        self.body: Body = bodies(groups)[0]
+        self.tails, self.n = groups.N, edges
         angle = 2 * np.pi * np.arange(groups.N) / groups.N
         self.root = self.body.offset * np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1)  # (N, 3)
         self.voronoi = np.full(edges + 1, 1 / edges)
@@ -51,15 +50,15 @@ class PlainSwimmer:
         drag = np.einsum("nij,anj->ani", resistance[0], root)
         on_disc = np.stack([(force @ e_x).sum(), force[:, 2].sum(), (moment @ e_y).sum(), moment[:, 2].sum()])
         matrix = np.einsum("ani,bni->ab", root, drag)
-        gain = np.array([1.0, 1.0, 1.0, self.body.gain])
+        gain = np.array([1.0, 1.0, 1.0, motor_gain(self.body)])
         head = self.body.resistance[:, :4] + 0.0
-        head[:, 3] += self.body.gain * self.body.resistance[:, 4]
+        head[:, 3] += motor_gain(self.body) * self.body.resistance[:, 4]
         motor = self.body.omega * (matrix[:, 3] + self.body.resistance[:, 4])
         u = np.linalg.solve(matrix * gain + head, on_disc - motor)
         w = u * gain + np.array([0.0, 0.0, 0.0, self.body.omega])
         carried = np.einsum("aknj,a->knj", self._directions(x, e_x, e_y, e_z), w)
         own = np.linalg.solve(resistance[1:], elastic[..., None])[..., 0]
-        sway = u[0] + u[2] * self.head_length / 2
+        sway = u[0] + u[2] * self.body.head_length / 2
         return np.concatenate([(own - carried).ravel(), [w[3], u[2], sway, u[1]]])
 
     @staticmethod

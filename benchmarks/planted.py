@@ -27,7 +27,7 @@ from calibration.misfit import TESTABLE
 from calibration.model import Floats, Parameter, Parameters, Runs, start_values
 from calibration.noise import Noise
 from calibration.swimmer import Swimmer
-from sim.robot import PRESETS
+from sim.model.presets import PRESETS
 
 ROBOT = replace(PRESETS["paper-measured"], C_t=2.6, C_r=2.0, C_yr=3.2)
 NOISE, SESSION = 0.025, 0.005

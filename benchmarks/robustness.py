@@ -17,8 +17,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from dataset.design import load_design
-from sim.batches import steady_columns
-from sim.robot import GROUP_COLUMNS
+from sim.model.groups import GROUP_COLUMNS
+from sim.motion.batches import steady_columns
 
 
 def robots(rows: int, *, seed: int = 0) -> dict[str, np.ndarray]:

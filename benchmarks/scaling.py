@@ -7,15 +7,21 @@ Usage: python -m benchmarks.scaling
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.speed import sweep, timed
-from sim import direct, elimination, orbit
-from sim.batches import available_jobs, steady_columns
-from sim.march import TOLERANCE, advance, new_state
-from sim.robot import PRESETS, Groups
-from sim.tail import HEAD_LENGTH, body_of, new_geometry
+from sim.model.body import Body
+from sim.model.presets import PRESETS
+from sim.motion.batches import available_jobs, steady_columns
+from sim.solve.assembly import bodies
+from sim.solve.march import TOLERANCE, advance, new_state
+from sim.solve.newton import new_workspace, newton
+from sim.solve.orbit import FIRST_PHASE, straight_start
+from sim.solve.rates import on_orbit
+from sim.solve.refinement import MESHES
 
 BATCHES = (1, 16, 256, 4096, 16384)
 EDGES = (6, 12, 24, 48, 96)
@@ -23,20 +29,18 @@ TAILS = (2, 3, 4, 6, 8)
 STEPS = 200
 
 
-def control(tails: int) -> np.ndarray:
-    """The paper's control robot with N tails, as a row for the compiled loops."""
-    values = {**PRESETS["paper-control"].group_values(), "N": float(tails)}
-    return np.asarray(direct.bodies(Groups.from_columns({k: np.array([v]) for k, v in values.items()}))[0])
+def control(tails: int) -> Body:
+    """The paper's control robot with N tails, for the compiled loops."""
+    return bodies(replace(PRESETS["paper-control"], tails=tails).groups())[0]
 
 
 def step_time(tails: int, edges: int) -> float:
     """Seconds for a time step of a steadily turning robot."""
-    row = control(tails)
-    body, none = body_of(row), np.empty((0, edges, tails, 3))
+    body, none = control(tails), np.empty((0, edges, tails, 3))
     state, poses = new_state(tails, edges, body.offset), np.empty((STEPS, 6))
 
     def run() -> None:
-        assert advance(body, row[HEAD_LENGTH], state, 0.02, STEPS, TOLERANCE, poses, none)
+        assert advance(body, state, 0.02, STEPS, TOLERANCE, poses, none)
 
     run()
     return timed(run, repeats=5)[0] / STEPS
@@ -44,22 +48,27 @@ def step_time(tails: int, edges: int) -> float:
 
 def correction_time(tails: int, phases: int, edges: int) -> float:
     """Seconds for one Newton correction of the orbit on one mesh."""
-    body = body_of(control(tails))
-    x, u = direct._start(body, edges, phases, tails)
-    matrix = direct.differentiation(phases)
+    body, rates = control(tails), on_orbit(phases, FIRST_PHASE)
+    x, u = straight_start(body, edges, phases, tails)
+    work = new_workspace(rates, x, u)
+    count = newton(body, rates, x.copy(), u.copy(), work, 0.0)[0]  # as many as there may be
 
     def run() -> None:
-        orbit.newton(body, x.copy(), u.copy(), matrix, 0.0, 10)
+        newton(body, rates, x.copy(), u.copy(), work, 0.0)
 
-    run()
-    return timed(run, repeats=5)[0] / 10
+    return timed(run, repeats=5)[0] / count
 
 
 def memory(tails: int, phases: int) -> int:
     """Bytes that the direct route works in for one robot, on its finest mesh."""
-    n = direct.MESHES[-1]
-    system = elimination.new_system(n, phases, 4 * phases // tails, 1)
-    return sum(a.nbytes for a in (*system, *new_geometry(n, phases)))
+    x, u = straight_start(control(tails), MESHES[-1], phases, tails)
+    work = new_workspace(on_orbit(phases, FIRST_PHASE), x, u)
+    return _size(work)
+
+
+def _size(part: object) -> int:
+    """Bytes of all arrays in nested tuples."""
+    return part.nbytes if isinstance(part, np.ndarray) else sum(map(_size, part))  # type: ignore[call-overload]
 
 
 def table(title: str, sizes: tuple[int, ...], times: list[float], unit: float, name: str) -> None:

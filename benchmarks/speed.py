@@ -18,12 +18,12 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.plain import settle_plainly
 from dataset.design import load_design
-from sim import direct
-from sim.batches import available_jobs, steady_columns
-from sim.march import TOLERANCE, advance, new_state
-from sim.robot import PRESETS, Groups
-from sim.steady import steady
-from sim.tail import HEAD_LENGTH, body_of
+from sim.model.groups import Groups
+from sim.model.presets import PRESETS
+from sim.motion.batches import available_jobs, steady_columns
+from sim.motion.steady import steady
+from sim.solve.assembly import bodies
+from sim.solve.march import TOLERANCE, advance, new_state
 from tests.reference.cases import FILAMENT
 from tests.sim.robots import single_filament
 
@@ -76,15 +76,14 @@ def filament() -> None:
     bar = OMEGA * robot.time_scale
     offset = 0.016 / robot.tail_length
     _, groups = single_filament(2, bar, robot.tail_length / robot.tail_radius, offset)
-    row = direct.bodies(groups)[0]
-    body = body_of(row)
+    body = bodies(groups)[0]
     body.resistance[:, :4] += 1e9 * np.eye(4)  # the disc is held
     count = int(np.ceil(SECONDS / robot.time_scale / STEP))
 
     def march() -> np.ndarray:
         state = new_state(1, EDGES, body.offset)
         poses, none = np.empty((count, 6)), np.empty((0, EDGES, 1, 3))
-        assert advance(body, row[HEAD_LENGTH], state, STEP, count, TOLERANCE, poses, none)
+        assert advance(body, state, STEP, count, TOLERANCE, poses, none)
         return np.asarray(1e9 * state.u)  # what holds the disc is what the fluid does
 
     spent, wrench = timed(march, repeats=20)

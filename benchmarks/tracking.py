@@ -14,8 +14,8 @@ from tqdm import tqdm
 from planner import circle, plan, polygon
 from planner.check import tracking_error
 from planner.plan import plan_record
-from sim.replay import Schedule, replay
-from sim.robot import PRESETS
+from sim.model.presets import PRESETS
+from sim.motion.replay import Schedule, replay
 from surrogate.export import load
 
 CASES = (

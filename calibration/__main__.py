@@ -13,7 +13,7 @@ import json
 import sys
 from pathlib import Path
 
-from sim.errors import InputError, run_command
+from sim.io.errors import InputError, run_command
 
 
 def _close(arguments: argparse.Namespace) -> None:
@@ -22,8 +22,8 @@ def _close(arguments: argparse.Namespace) -> None:
     from calibration.protocols import PROTOCOLS
     from calibration.report import write_report
     from calibration.swimmer import Swimmer, corrected_robot
-    from sim.artefact import write_text
-    from sim.robot import load_robot, robot_toml
+    from sim.inputs import load_robot, robot_toml
+    from sim.io.files import write_text
 
     robot = load_robot(arguments.robot)
     data = read_measurements(arguments.table)
@@ -53,8 +53,8 @@ def _simulate(arguments: argparse.Namespace) -> None:
     from dataclasses import replace
 
     from calibration.synthetic import make_table
-    from sim.artefact import whole_file
-    from sim.robot import load_robot
+    from sim.inputs import load_robot
+    from sim.io.files import whole_file
 
     robot = load_robot(arguments.robot)
     effects = dict(robot.effects)
@@ -72,7 +72,7 @@ def _simulate(arguments: argparse.Namespace) -> None:
 
 def _tracks(arguments: argparse.Namespace) -> None:
     from calibration.tracks import measure_tracks
-    from sim.artefact import whole_file
+    from sim.io.files import whole_file
 
     table, aside = measure_tracks(arguments.tracks, arguments.runs)
     for line in aside:

@@ -35,17 +35,20 @@ from calibration.report import draw_residuals
 from calibration.steer import Steered, draw_steered, gap_closed, steer
 from calibration.swimmer import Swimmer, corrected_robot
 from calibration.synthetic import make_table
-from dataset.page import Page
 from dataset.report import draw_sweep, plain_logarithms
 from dataset.store import read
 from planner.check import TrackingError, draw_overlay, load_plan, tracking_error
 from planner.path import polygon
-from sim.artefact import code_version, write_text
-from sim.batches import available_jobs
-from sim.motion import Steady
-from sim.robot import PRESETS, Robot, robot_toml
-from sim.shapes import tails_over_a_revolution
-from sim.steady import steady
+from sim.inputs import robot_toml
+from sim.io.files import write_text
+from sim.io.pages import Page
+from sim.io.provenance import code_version
+from sim.model.presets import PRESETS
+from sim.model.robot import Robot
+from sim.motion.batches import available_jobs
+from sim.motion.shapes import tails_over_a_revolution
+from sim.motion.steady import steady
+from sim.motion.steady_motion import Steady
 from surrogate.evaluate import scale_of
 from surrogate.export import load
 from surrogate.lookup import Lookup

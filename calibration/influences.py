@@ -33,29 +33,15 @@ class Influence:
         return self.parameter.name
 
 
-_DRIVEN = {
-    # name, effect, column, title, unit, bounds, typical
-    "viscosity_with_time": (
-        "viscosity_drift", "elapsed_h", "viscosity drifting with time", "1/h", (-0.3, 0.3), 0.02,
-    ),
-    "viscosity_with_temperature": (
-        "viscosity_drift", "temperature_K", "viscosity falling with temperature", "1/K", (-0.3, 0.3), 0.086,
-    ),
-    "wall_of_the_tank": (
-        "tank_wall", "head_over_tank", "wall of the tank", "of the correction for a sphere", (0.0, 2.0), 1.0,
-    ),
-}  # fmt: skip
-
-
 def influences() -> dict[str, Influence]:
     """Everything that may be missing, by name."""
     found = {}
     for effect in catalogue().values():
-        if effect.covariate is None and not effect.beside:
+        if not effect.drivers and not effect.beside:
             found[effect.name] = _plain(effect)
-    for name, (effect_name, column, title, unit, bounds, typical) in _DRIVEN.items():
-        parameter = Parameter(name, title, 0.0, bounds, typical, unit=unit)
-        found[name] = Influence(parameter, effect_name, column, False)
+        for driver in effect.drivers:
+            parameter = Parameter(driver.name, driver.title, 0.0, driver.bounds, driver.typical, unit=driver.unit)
+            found[driver.name] = Influence(parameter, effect.name, driver.column, effect.symmetry == "odd")
     slip = Parameter(SLIP, "slip of the motor", 0.0, (-0.3, 0.3), 0.02, unit="share of its speed")
     point = Parameter(
         TRACKED_POINT, "tracked point off the head's centre", 0.0, (-2.0, 2.0), 0.1, unit="L, forward"

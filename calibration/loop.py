@@ -33,7 +33,7 @@ from calibration.misfit import DRAWS, Misfit, check_misfit
 from calibration.model import Floats, Model, Parameter, start_values
 from calibration.profile import profile_intervals
 from calibration.sessions import divided, groups, limits
-from sim.artefact import fingerprint, provenance
+from sim.io.provenance import fingerprint, provenance
 
 LEVEL = 0.04  # α of every claim: noise is estimated, and false claims shall stay below one in twenty
 _NEAR = 0.5  # share of the residual that an effect must take away to be worth a word where none explains

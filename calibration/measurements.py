@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 
 from calibration.model import Runs
 from calibration.noise import repeat_covariance
-from sim.errors import InputError
-from sim.tables import read_table
+from sim.io.errors import InputError
+from sim.io.tables import read_table
 
 Floats = NDArray[np.float64]
 

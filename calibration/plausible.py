@@ -12,8 +12,8 @@ import numpy as np
 
 from calibration.measurements import OUTPUTS, Measurements
 from calibration.model import Floats
-from sim.errors import InputError
-from sim.robot import Robot
+from sim.io.errors import InputError
+from sim.model.robot import Robot
 
 SHORTEST, LONGEST, FASTEST = 0.5, 50, 1000  # tails in head radii, ω̄
 OFF, SLIPS = 20.0, 3.0  # factors: of an output, of the spins' sum

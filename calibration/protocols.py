@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from calibration.locked import middle_session
 from calibration.measurements import Measurements
 from calibration.sessions import divided
-from sim.errors import InputError
+from sim.io.errors import InputError
 
 Rows = NDArray[np.bool_]
 

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from calibration.loop import Verdict
 from calibration.measurements import Measurements
 from calibration.profile import least_determined
-from dataset.page import Page
-from sim.artefact import code_version
+from sim.io.pages import Page
+from sim.io.provenance import code_version
 
 _LABELS = {
     "omega_h": "head spin",

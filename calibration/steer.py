@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from planner.check import TrackingError, tracking_error
 from planner.path import Path2D
 from planner.plan import plan, plan_record
-from sim.replay import Schedule, replay
-from sim.robot import Robot
+from sim.model.robot import Robot
+from sim.motion.replay import Schedule, replay
 from surrogate.tabulate import tabulate
 
 

@@ -22,12 +22,12 @@ from calibration.model import Floats, Parameter, Parameters, by_differences
 from calibration.noise import Noise, repeat_covariance
 from calibration.observation import Observation
 from calibration.plausible import check_inputs, check_outputs
-from sim.batches import sensitivity_columns, steady_columns
-from sim.direct import FEW, MANY
 from sim.effects import catalogue
-from sim.errors import InputError
-from sim.robot import Robot
-from sim.sensitivity import Sensitivities
+from sim.io.errors import InputError
+from sim.model.robot import Robot
+from sim.motion.batches import sensitivity_columns, steady_columns
+from sim.motion.sensitivity import Sensitivities
+from sim.solve.refinement import FEW, MANY
 from surrogate.export import load
 from surrogate.lookup import Lookup
 

@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from sim.batches import stepped_columns
 from sim.effects import catalogue
-from sim.robot import Robot
+from sim.model.robot import Robot
+from sim.motion.batches import stepped_columns
 
 _RPM = 2 * math.pi / 60
 

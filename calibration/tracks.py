@@ -26,8 +26,8 @@ import pandas as pd
 from scipy.optimize import least_squares
 
 from calibration.model import Floats
-from sim.errors import InputError
-from sim.tables import read_table
+from sim.io.errors import InputError
+from sim.io.tables import read_table
 
 COLUMNS = ("run", "time_s", "x_cm", "y_cm", "heading_deg")
 LEAST_TURN = math.radians(20)  # of a run, for a circle to be fitted

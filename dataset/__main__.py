@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from sim.errors import run_command
+from sim.io.errors import run_command
 
 
 def _build(arguments: argparse.Namespace) -> None:

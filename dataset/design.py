@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from sim.effects import catalogue
-from sim.errors import InputError
-from sim.robot import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS
+from sim.io.errors import InputError
+from sim.model.groups import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS
 
 _SCALES = ("linear", "log", "integer")
 _MOST_ROWS = 2**24

@@ -10,9 +10,9 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from dataset.page import Page
 from dataset.schema import INPUTS
 from dataset.store import read, read_manifest
+from sim.io.pages import Page
 
 COLOURS = {2: "#2a7fba", 3: "#e08a1e", 4: "#3d9a5f", 5: "#8a4fa3"}
 _SHOWN = (

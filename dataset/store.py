@@ -20,8 +20,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from dataset.schema import schema
-from sim.artefact import whole_file, write_text
-from sim.errors import InputError
+from sim.io.errors import InputError
+from sim.io.files import whole_file, write_text
 
 MANIFEST = "manifest.json"
 

@@ -19,15 +19,16 @@ from numpy.typing import NDArray
 
 from dataset.design import Design
 from dataset.store import MANIFEST, part_hash, part_path, write_manifest, write_part
-from sim.artefact import code_version, fingerprint, provenance
-from sim.batches import run_batches, split
 from sim.effects import catalogue
-from sim.errors import InputError
-from sim.motion import STEADY_COLUMNS
-from sim.resolution import Resolution
-from sim.robot import DWELL, Groups, check_columns
-from sim.steady import steady
-from sim.switching import switch_response
+from sim.inputs import check_columns
+from sim.io.errors import InputError
+from sim.io.provenance import code_version, fingerprint, provenance
+from sim.model.groups import DWELL, Groups
+from sim.motion.batches import run_batches, split
+from sim.motion.resolution import Resolution
+from sim.motion.steady import steady
+from sim.motion.steady_motion import STEADY_COLUMNS
+from sim.motion.switching import switch_response
 
 Columns = dict[str, NDArray[Any]]
 PART_ROWS = 64  # what an interruption loses, a worker

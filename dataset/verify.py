@@ -11,8 +11,8 @@ import pandas as pd
 
 from dataset.schema import INPUTS
 from dataset.store import read, read_manifest
-from sim.batches import steady_columns, stepped_columns
-from sim.errors import InputError
+from sim.io.errors import InputError
+from sim.motion.batches import steady_columns, stepped_columns
 
 _SPINS = ("omega_t_bar", "omega_h_bar")
 _REST = ("omega_yr_bar", "v_x", "R_yr_over_l")

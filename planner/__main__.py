@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from sim.errors import InputError, run_command
+from sim.io.errors import InputError, run_command
 
 _UNITS = {"l": None, "m": 1.0, "cm": 0.01, "mm": 0.001}
 
@@ -18,7 +18,7 @@ def _plan(arguments: argparse.Namespace) -> None:
     from planner.export import write_plan
     from planner.path import circle, polygon, read_path
     from planner.plan import plan
-    from sim.robot import load_robot
+    from sim.inputs import load_robot
     from surrogate.export import load_table
 
     robot = load_robot(arguments.robot)
@@ -61,8 +61,8 @@ def _plan(arguments: argparse.Namespace) -> None:
 
 def _check(arguments: argparse.Namespace) -> None:
     from planner.check import draw_overlay, load_plan, tracking_error
-    from sim.artefact import whole_file
-    from sim.tables import read_table
+    from sim.io.files import whole_file
+    from sim.io.tables import read_table
 
     content = load_plan(arguments.plan)
     error = tracking_error(content, read_table(arguments.track))

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from planner.picture import REPLAYED, draw_tracks
 from planner.plan import distance_to
-from sim import planar
-from sim.errors import InputError
+from sim.io.errors import InputError
+from sim.mechanics import planar
 
 _COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
 

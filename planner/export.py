@@ -15,8 +15,9 @@ import numpy as np
 import pandas as pd
 
 from planner.plan import Plan, plan_record
-from sim.artefact import code_version, whole_file, write_text
-from sim.errors import InputError
+from sim.io.errors import InputError
+from sim.io.files import whole_file, write_text
+from sim.io.provenance import code_version
 
 _MOST_MS = 65_535
 

@@ -23,8 +23,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.errors import InputError
-from sim.tables import read_table
+from sim.io.errors import InputError
+from sim.io.tables import read_table
 
 Points = NDArray[np.float64]
 

@@ -25,8 +25,8 @@ from planner import bound as bounds
 from planner.path import CORNER, Path2D, Reference, fillet, kinks, largest_fillet, reference
 from planner.schedule import Switches, follow, trace
 from planner.vehicle import TURN_OVER, Vehicle, vehicle_of
-from sim.errors import InputError
-from sim.robot import Robot
+from sim.io.errors import InputError
+from sim.model.robot import Robot
 from surrogate.export import identity, load
 from surrogate.lookup import Lookup
 from surrogate.single import SingleRobot

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from planner.path import Reference
 from planner.vehicle import FROM_REST, Vehicle
-from sim import planar
-from sim.errors import InputError
+from sim.io.errors import InputError
+from sim.mechanics import planar
 
 Floats = NDArray[np.float64]
 

@@ -21,9 +21,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import planar
-from sim.errors import InputError
-from sim.robot import Robot
+from sim.io.errors import InputError
+from sim.mechanics import planar
+from sim.model.robot import Robot
 from surrogate.lookup import Lookup
 from surrogate.single import SingleRobot
 

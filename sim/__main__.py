@@ -16,14 +16,14 @@ import numpy as np
 import pandas as pd
 from tqdm import tqdm
 
-from sim.artefact import whole_file, write_text
-from sim.errors import InputError, run_command
-from sim.tables import read_table
+from sim.io.errors import InputError, run_command
+from sim.io.files import whole_file, write_text
+from sim.io.tables import read_table
 
 
 def _steady(arguments: argparse.Namespace) -> None:
-    from sim.batches import steady_columns
-    from sim.motion import QUALITY_COLUMNS, STEADY_COLUMNS
+    from sim.motion.batches import steady_columns
+    from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS
 
     points = read_table(arguments.points)
     replaced = [name for name in (*STEADY_COLUMNS, *QUALITY_COLUMNS) if name in points]
@@ -44,7 +44,7 @@ def _steady(arguments: argparse.Namespace) -> None:
 
 
 def _replay(arguments: argparse.Namespace) -> None:
-    from sim.replay import load_schedule, replay
+    from sim.motion.replay import load_schedule, replay
 
     schedule = load_schedule(arguments.plan)
     with tqdm(total=len(schedule.dwells), desc="replay", unit="dwell", delay=1.0) as bar:
@@ -59,7 +59,8 @@ def _replay(arguments: argparse.Namespace) -> None:
 
 
 def _robot(arguments: argparse.Namespace) -> None:
-    from sim.robot import PRESETS, robot_toml
+    from sim.inputs import robot_toml
+    from sim.model.presets import PRESETS
 
     if arguments.preset not in PRESETS:
         raise InputError(f"no preset {arguments.preset!r}; there are {', '.join(PRESETS)}")
@@ -68,8 +69,8 @@ def _robot(arguments: argparse.Namespace) -> None:
 
 
 def _check(_: argparse.Namespace) -> None:
-    from sim.robot import PRESETS
-    from sim.steady import steady
+    from sim.model.presets import PRESETS
+    from sim.motion.steady import steady
 
     motion = steady(PRESETS["paper-measured"].groups())
     share = float(motion.omega_h[0] / (motion.omega_h[0] - motion.omega_t[0]))

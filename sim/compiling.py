@@ -1,8 +1,9 @@
 """Compiled loops: machine code by numba, kept on disk between runs.
 
 numba's own cache looks at the file of the loop alone, and would go on using old machine code after a formula in
-another file has changed. So the cache lies in a folder named by a digest of everything in this package: changed
-physics is always compiled anew. The folders of the last few versions stay.
+another file has changed. So the cache lies in a folder named by a digest of all files that compiled loops are made
+of: changed physics is always compiled anew. The folders of the last few versions stay. They lie beside this file,
+or in the user's cache folder where this one cannot be written.
 
 Sums may be reordered and multiplications fused (last digits can differ between machines); NaN and infinity keep
 their meaning.
@@ -10,7 +11,9 @@ their meaning.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 from shutil import rmtree
@@ -21,9 +24,15 @@ from numba import config, njit
 F = TypeVar("F", bound=Callable[..., Any])
 
 _HERE = Path(__file__).parent
-_DIGEST = sha256(b"".join(path.read_bytes() for path in sorted(_HERE.glob("*.py")))).hexdigest()[:12]
-CACHE = _HERE / "__pycache__" / f"compiled-{_DIGEST}"
+_SOURCES = ("arrays.py", "compiling.py", "linear/*.py", "mechanics/*.py", "model/body.py", "solve/*.py")
 _KEPT = 3  # folders of other versions
+_LEVEL = 1  # of optimisation: as fast as level 3 here, in less than half the compile time
+
+
+def digest_of(root: Path) -> str:
+    """Twelve characters that name the sources of the compiled loops under `root`."""
+    files = sorted(path for pattern in _SOURCES for path in root.glob(pattern))
+    return sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:12]
 
 
 def prune(folder: Path, kept: int) -> None:
@@ -33,18 +42,40 @@ def prune(folder: Path, kept: int) -> None:
         rmtree(old, ignore_errors=True)
 
 
+def _cache_folder() -> Path:
+    """Where this version's loops are kept."""
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    place = _HERE / "__pycache__" if os.access(_HERE, os.W_OK) else home / "softflagella"
+    return place / f"compiled-{digest_of(_HERE)}"
+
+
+CACHE = _cache_folder()
 if not CACHE.exists():
     prune(CACHE.parent, _KEPT)
 
 
 def compiled(function: F) -> F:
     """Compile a function of numbers and arrays on its first call, without holding the interpreter's lock."""
-    before = config.CACHE_DIR  # type: ignore[attr-defined]
-    config.CACHE_DIR = str(CACHE)  # type: ignore[attr-defined]
-    try:
-        loop = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"})(
-            function
-        )
-    finally:
-        config.CACHE_DIR = before  # type: ignore[attr-defined]
+    with _setting("CACHE_DIR", str(CACHE)):
+        loop: Any = njit(
+            cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"}
+        )(function)
+    compile_loop, level = loop.compile, type(config.OPT)(_LEVEL)  # type: ignore[attr-defined]
+
+    def compile_quickly(signature: Any) -> Any:
+        with _setting("OPT", level):
+            return compile_loop(signature)
+
+    loop.compile = compile_quickly
     return cast(F, loop)
+
+
+@contextmanager
+def _setting(name: str, value: object) -> Iterator[None]:
+    """A setting of numba for as long as the block lasts."""
+    before = getattr(config, name)
+    setattr(config, name, value)
+    try:
+        yield
+    finally:
+        setattr(config, name, before)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from sim.errors import InputError, run_command
+from sim.io.errors import InputError, run_command
 
 
 def _train(arguments: argparse.Namespace) -> None:
@@ -37,8 +37,8 @@ def _train(arguments: argparse.Namespace) -> None:
 def _query(arguments: argparse.Namespace) -> None:
     import pandas as pd
 
-    from sim.artefact import whole_file
-    from sim.tables import read_table
+    from sim.io.files import whole_file
+    from sim.io.tables import read_table
     from surrogate.export import load
 
     points = read_table(arguments.points)
@@ -59,7 +59,7 @@ def _errors(arguments: argparse.Namespace) -> None:
 
 
 def _robot(arguments: argparse.Namespace) -> None:
-    from sim.robot import load_robot
+    from sim.inputs import load_robot
     from surrogate.single import save_single
     from surrogate.tabulate import tabulate
 

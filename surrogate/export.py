@@ -14,8 +14,8 @@ from typing import Any
 
 import torch
 
-from sim.artefact import whole_file
-from sim.errors import InputError
+from sim.io.errors import InputError
+from sim.io.files import whole_file
 from surrogate.lookup import Lookup
 from surrogate.network import Ensemble
 from surrogate.single import SingleRobot, load_single

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import planar
-from sim.errors import InputError
-from sim.robot import DWELL, check_columns
+from sim.inputs import check_columns
+from sim.io.errors import InputError
+from sim.mechanics import planar
+from sim.model.groups import DWELL
 from surrogate.network import Ensemble, features
 
 STEADY_OUTPUTS = (

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from sim import planar
-from sim.artefact import write_text
-from sim.errors import InputError
-from sim.robot import DWELL
+from sim.io.errors import InputError
+from sim.io.files import write_text
+from sim.mechanics import planar
+from sim.model.groups import DWELL
 
 LAGS = ("lag_z", "lag_x", "lag_psi_rad")
 

@@ -9,12 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.artefact import provenance
 from sim.effects import catalogue
-from sim.errors import InputError
-from sim.robot import DWELL, Groups, Robot
-from sim.steady import steady
-from sim.switching import switch_response
+from sim.io.errors import InputError
+from sim.io.provenance import provenance
+from sim.model.groups import DWELL, Groups
+from sim.model.robot import Robot
+from sim.motion.steady import steady
+from sim.motion.switching import switch_response
 from surrogate.lookup import STEADY_OUTPUTS
 from surrogate.single import LAGS, SingleRobot
 

@@ -22,8 +22,8 @@ from tqdm import tqdm
 
 from dataset.schema import INPUTS
 from dataset.store import read, read_manifest, usable
-from sim.artefact import provenance
-from sim.errors import InputError
+from sim.io.errors import InputError
+from sim.io.provenance import provenance
 from surrogate.evaluate import held_out_errors
 from surrogate.lookup import Lookup
 from surrogate.network import Ensemble, features, response_targets, steady_targets

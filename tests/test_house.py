@@ -44,7 +44,7 @@ def test_files_stay_readable() -> None:
     [
         ("import sim", ("torch", "pandas")),
         ("import dataset", ("torch", "matplotlib")),
-        ("import planner", ("matplotlib", "sim.stepper", "sim.march", "numba", "calibration")),
+        ("import planner", ("matplotlib", "sim.solve.newton", "numba", "calibration")),
     ],
 )
 def test_importing_loads_only_what_is_used(statement: str, absent: tuple[str, ...]) -> None:

@@ -26,9 +26,9 @@ import numpy as np
 
 from calibration.model import Floats
 from sim.compiling import compiled
-from sim.errors import InputError, run_command
-from sim.flow import stokeslets
-from sim.tables import read_table
+from sim.io.errors import InputError, run_command
+from sim.io.tables import read_table
+from sim.mechanics.stokeslets import stokeslets
 
 RADIUS, LENGTH, WIRE = 6.3, 130.0, 0.397  # mm, of Rodenborn et al. (2013)
 COLUMNS = ("thrust_over_etaOmR2", "torque_over_etaOmR3", "drag_over_etaUR")

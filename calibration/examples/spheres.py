@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from calibration.loop import Verdict, close
 from calibration.model import Floats, Parameter, Parameters, Runs, by_differences
-from sim.errors import InputError, run_command
+from sim.io.errors import InputError, run_command
 
 GRAVITY, FLUID, BEAD = 9.81, 1260.0, 2200.0  # m/s², kg/m³ of glycerol and Teflon
 

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import importlib
+import math
 import pkgutil
+from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING
 
-from sim.effects.base import Effect
+from sim.io.errors import InputError
+from sim.model.effect import Effect
 
-if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
-
-__all__ = ["Effect", "catalogue", "with_effects"]
+__all__ = ["Effect", "catalogue", "check_effects", "check_size", "effect_named"]
 
 
 @cache
 def catalogue() -> dict[str, Effect]:
     """Every effect in this folder, by name, in alphabetical order."""
-    names = sorted(module.name for module in pkgutil.iter_modules(__path__) if module.name != "base")
+    names = sorted(module.name for module in pkgutil.iter_modules(__path__))
     found = {name: importlib.import_module(f"{__name__}.{name}").EFFECT for name in names}
     for name, effect in found.items():
         if effect.name != name:
@@ -27,8 +25,27 @@ def catalogue() -> dict[str, Effect]:
     return found
 
 
-def with_effects(groups: Groups, base: Coefficients) -> Coefficients:
-    """The balance's coefficients with the effects that `groups` carries."""
-    for name, size in sorted(groups.effects.items()):
-        base = catalogue()[name].coefficients(size, groups, base)
-    return base
+def effect_named(name: str) -> Effect:
+    """One effect.
+
+    Raises:
+        InputError: there is none of that name.
+    """
+    if name not in catalogue():
+        raise InputError(f"unknown effect {name!r}; known are {', '.join(catalogue())}")
+    return catalogue()[name]
+
+
+def check_effects(effects: Mapping[str, float]) -> None:
+    """Reject unknown effects, and sizes that are no numbers or outside their bounds."""
+    for name, size in effects.items():
+        check_size(name, size)
+
+
+def check_size(name: str, size: float) -> None:
+    """Reject an unknown effect, or a size that is no number or outside its bounds."""
+    low, high = effect_named(name).bounds
+    if not isinstance(size, int | float) or not math.isfinite(size):
+        raise InputError(f"{name} = {size}; it must be a finite number")
+    if not low <= size <= high:
+        raise InputError(f"{name} = {size:g}; its size must lie from {low:g} to {high:g}")

@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING
 
 from torch import Tensor
 
-from sim.effects.base import Effect
+from sim.model.effect import Effect
 
 if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
+    from sim.model.body import Body
+    from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class AnisotropicHeadDrag(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        return base.with_resistance({(1, 1): size * 6 * math.pi * groups.C_t / groups.l_over_R})
+    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
+        return body.with_resistance({(1, 1): size * 6 * math.pi * groups.C_t / groups.l_over_R})
 
 
 EFFECT = AnisotropicHeadDrag(

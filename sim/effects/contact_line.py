@@ -14,20 +14,18 @@ from typing import TYPE_CHECKING
 
 from torch import Tensor
 
-from sim.effects.base import Effect
+from sim.model.effect import Effect
+from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
-
-CONTROL = 34.375**4 / 6.875**2  # (l/r0)⁴ (R/l)² of the paper's control example
+    from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class ContactLine(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        scale = groups.l_over_r0**4 / groups.l_over_R**2 / CONTROL
-        return base.plus(contact_line=0.1 * size * scale)
+    def number(self, size: Tensor, groups: Groups) -> Tensor:
+        scale = (groups.l_over_r0 / CONTROL.l_over_r0) ** 4 / (groups.l_over_R / CONTROL.l_over_R) ** 2
+        return 0.1 * size * scale
 
 
 EFFECT = ContactLine(
@@ -41,4 +39,6 @@ EFFECT = ContactLine(
     typical=0.05,
     symmetry="even",
     dissipative=True,
+    similar=False,  # its creep speed is a speed of its own
+    reach="nonlocal",
 )

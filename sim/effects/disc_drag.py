@@ -3,8 +3,8 @@
     M_z = −ε 8π μ0 R³ ω_t
 
 The paper's motor balances the tails' torque against the head's; the disc itself turns in the fluid too. A thin
-disc of radius R edgewise to nothing has ε = 32/3/(8π) = 0.42. It acts as tail spin drag does, but for the
-length of the tails. Left out: the gap between disc and head.
+disc of radius R that turns about its axis, far from everything, has ε = 32/3/(8π) = 0.42. It acts like the drag on
+the tails' own spin, except that it does not depend on the tails' length. Left out: the gap between disc and head.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING
 
 from torch import Tensor
 
-from sim.effects.base import Effect
+from sim.model.effect import Effect
 
 if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
+    from sim.model.body import Body
+    from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class DiscDrag(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        return base.with_resistance({(3, 4): size * 8 * math.pi / groups.l_over_R**3})
+    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
+        return body.with_resistance({(3, 4): size * 8 * math.pi / groups.l_over_R**3})
 
 
 EFFECT = DiscDrag(

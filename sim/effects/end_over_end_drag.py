@@ -16,17 +16,17 @@ from typing import TYPE_CHECKING
 
 from torch import Tensor
 
-from sim.effects.base import Effect
+from sim.model.effect import Effect
 
 if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
+    from sim.model.body import Body
+    from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class EndOverEndDrag(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        return base.with_resistance({(2, 2): size * 8 * math.pi / groups.l_over_R**3})
+    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
+        return body.with_resistance({(2, 2): size * 8 * math.pi / groups.l_over_R**3})
 
 
 EFFECT = EndOverEndDrag(

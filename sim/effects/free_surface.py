@@ -10,25 +10,9 @@ and ε not exactly 1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from sim.model.effect import Effect
 
-from torch import Tensor
-
-from sim.effects.base import Effect
-
-if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
-
-
-@dataclass(frozen=True)
-class FreeSurface(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        return base.plus(surface_flow=size)
-
-
-EFFECT = FreeSurface(
+EFFECT = Effect(
     name="free_surface",
     title="images of the tails in the free surface",
     equation="v_k → v_k − ε Σ G(x_k − y*_j) f*_j",
@@ -39,4 +23,5 @@ EFFECT = FreeSurface(
     typical=1.0,
     symmetry="even",
     dissipative=False,
+    reach="nonlocal",
 )

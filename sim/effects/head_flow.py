@@ -8,25 +8,9 @@ tails.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from sim.model.effect import Effect
 
-from torch import Tensor
-
-from sim.effects.base import Effect
-
-if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
-
-
-@dataclass(frozen=True)
-class HeadFlow(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        return base.plus(head_flow=size)
-
-
-EFFECT = HeadFlow(
+EFFECT = Effect(
     name="head_flow",
     title="flow between head and tails",
     equation="v → v − ε Σ (G f + rotlet)",
@@ -37,4 +21,5 @@ EFFECT = HeadFlow(
     typical=1.0,
     symmetry="even",
     dissipative=False,
+    reach="nonlocal",
 )

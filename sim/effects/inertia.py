@@ -15,20 +15,20 @@ from typing import TYPE_CHECKING
 
 from torch import Tensor
 
-from sim.effects.base import Effect
+from sim.model.effect import Effect, Factors
+from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
+    from sim.model.groups import Groups
 
-CONTROL_SPEED = 10.0 / 34.375**4  # |ω̄| (r0/l)⁴ of the paper's control example
+_CONTROL_SPEED = CONTROL.omega_bar / CONTROL.l_over_r0**4
 
 
 @dataclass(frozen=True)
 class Inertia(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        speed = groups.omega_bar.abs() / groups.l_over_r0**4 / CONTROL_SPEED
-        return base.scaled(1 + size * speed)
+    def scales(self, size: Tensor, groups: Groups) -> Factors:
+        speed = groups.omega_bar.abs() / groups.l_over_r0**4 / _CONTROL_SPEED
+        return Factors(drag=1 + size * speed)
 
 
 EFFECT = Inertia(
@@ -42,4 +42,5 @@ EFFECT = Inertia(
     typical=0.05,
     symmetry="even",
     dissipative=True,
+    similar=False,  # the control example's speed is a speed of its own
 )

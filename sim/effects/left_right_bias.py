@@ -15,18 +15,18 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from sim.effects.base import Effect
+from sim.model.effect import Effect
 
 if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
+    from sim.model.body import Body
+    from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class LeftRightBias(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
         R, L = 1 / groups.l_over_R, groups.L_over_R / groups.l_over_R
-        return base.with_resistance({(2, 4): -size * torch.sign(groups.omega_bar) * R * L**2 / 2})
+        return body.with_resistance({(2, 4): -size * torch.sign(groups.omega_bar) * R * L**2 / 2})
 
 
 EFFECT = LeftRightBias(

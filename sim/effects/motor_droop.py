@@ -1,32 +1,30 @@
 """A motor that slows down under load.
 
-    ω_t − ω_h = ω − ε T/(μ0 l³),   T = 8π C_r μ0 R³ |ω_h| the torque that the motor carries
+    ω_t − ω_h = ω − ε T/(μ0 l³),   T = 8π C_r μ R³ |ω_h| the torque that the motor carries
 
 The paper's motor holds its commanded speed. A direct-current motor on a fixed voltage loses speed in proportion to
-torque; then |ω_h| + |ω_t| falls short of the commanded |ω|. In the balance this is a gain: ω_t = ω + gain ω_h with
-gain = 1 + ε 8π C_r (R/l)³. Left out: slip of a drive, which is a part of the speed and not of the torque.
+its torque; then |ω_h| + |ω_t| is less than the commanded |ω|. The torque is that of the head, with all that scales
+its drag. Left out: slip of a drive, which is a part of the speed and not of the torque.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from torch import Tensor
 
-from sim.effects.base import Effect
+from sim.model.effect import Effect
 
 if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
+    from sim.model.body import Body
+    from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class MotorDroop(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        torque = 8 * math.pi * groups.C_r / groups.l_over_R**3  # per ω_h
-        return replace(base, gain=base.gain + size * torque)
+    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
+        return body.plus(droop=size)
 
 
 EFFECT = MotorDroop(
@@ -40,4 +38,5 @@ EFFECT = MotorDroop(
     typical=0.5,
     symmetry="even",
     dissipative=True,
+    similar=False,  # the motor's loss of speed per torque is its own
 )

@@ -9,25 +9,9 @@ aside. Left out: tails that differ from each other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from sim.model.effect import Effect
 
-from torch import Tensor
-
-from sim.effects.base import Effect
-
-if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
-
-
-@dataclass(frozen=True)
-class NaturalCurvature(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        return base.plus(curvature_across=size)
-
-
-EFFECT = NaturalCurvature(
+EFFECT = Effect(
     name="natural_curvature",
     title="natural curvature of the tails, along the circle of the clamps",
     equation="κ⁰ = ε/l across the plane of the axis",
@@ -38,4 +22,5 @@ EFFECT = NaturalCurvature(
     typical=0.1,
     symmetry="odd",
     dissipative=False,
+    reach="nonlocal",
 )

@@ -8,25 +8,9 @@ differ from each other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from sim.model.effect import Effect
 
-from torch import Tensor
-
-from sim.effects.base import Effect
-
-if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
-
-
-@dataclass(frozen=True)
-class NaturalSplay(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        return base.plus(curvature_out=size)
-
-
-EFFECT = NaturalSplay(
+EFFECT = Effect(
     name="natural_splay",
     title="natural curvature of the tails, away from the axis",
     equation="κ⁰ = ε/l in the plane of the axis",
@@ -37,4 +21,5 @@ EFFECT = NaturalSplay(
     typical=0.1,
     symmetry="even",
     dissipative=False,
+    reach="nonlocal",
 )

@@ -8,25 +8,9 @@ twist. Left out: tails that differ from each other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from sim.model.effect import Effect
 
-from torch import Tensor
-
-from sim.effects.base import Effect
-
-if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
-
-
-@dataclass(frozen=True)
-class NaturalTwist(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        return base.plus(natural_twist=size)
-
-
-EFFECT = NaturalTwist(
+EFFECT = Effect(
     name="natural_twist",
     title="natural twist of the tails",
     equation="τ⁰ = ε/l",
@@ -37,5 +21,6 @@ EFFECT = NaturalTwist(
     typical=1.0,
     symmetry="odd",
     dissipative=False,
+    reach="nonlocal",
     beside="natural_splay",
 )

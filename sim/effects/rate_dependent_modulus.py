@@ -14,19 +14,17 @@ from typing import TYPE_CHECKING
 
 from torch import Tensor
 
-from sim.effects.base import Effect
+from sim.model.effect import Effect
+from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
-
-CONTROL = 34.375  # l/r0 of the paper's control example
+    from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class RateDependentModulus(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        return base.plus(bending_viscosity=size * (CONTROL / groups.l_over_r0) ** 4)
+    def number(self, size: Tensor, groups: Groups) -> Tensor:
+        return size * (CONTROL.l_over_r0 / groups.l_over_r0) ** 4
 
 
 EFFECT = RateDependentModulus(
@@ -40,4 +38,6 @@ EFFECT = RateDependentModulus(
     typical=0.05,
     symmetry="even",
     dissipative=True,
+    similar=False,  # the rubber's time is its own
+    reach="nonlocal",
 )

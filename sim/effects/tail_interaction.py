@@ -9,25 +9,9 @@ would diverge at N ≥ 4, where the gain exceeds one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from sim.model.effect import Effect
 
-from torch import Tensor
-
-from sim.effects.base import Effect
-
-if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
-
-
-@dataclass(frozen=True)
-class TailInteraction(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        return base.plus(tail_flow=size)
-
-
-EFFECT = TailInteraction(
+EFFECT = Effect(
     name="tail_interaction",
     title="flow between the tails",
     equation="v_k → v_k − ε Σ G(x_k − y_j) f_j",
@@ -38,4 +22,5 @@ EFFECT = TailInteraction(
     typical=1.0,
     symmetry="even",
     dissipative=False,
+    reach="nonlocal",
 )

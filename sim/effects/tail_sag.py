@@ -10,26 +10,27 @@ to 14 % of l. Left out: the moment that tips the robot's axis, which the surface
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import torch
 from torch import Tensor
 
-from sim.effects.base import Effect
+from sim.model.effect import Effect
+from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
-
-CONTROL = 34.375**2 * 6.875  # (l/r0)² (l/R) of the paper's control example
+    from sim.model.body import Body
+    from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class TailSag(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        load = base.tail_load.clone()
-        load[1] = load[1] - 8 * size * groups.l_over_r0**2 * groups.l_over_R / CONTROL
-        return replace(base, tail_load=load)
+    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
+        heavier = (groups.l_over_r0 / CONTROL.l_over_r0) ** 2 * groups.l_over_R / CONTROL.l_over_R
+        down = torch.zeros_like(body.tail_load)
+        down[1] = -8 * size * heavier
+        return body.plus(tail_load=down)
 
 
 EFFECT = TailSag(

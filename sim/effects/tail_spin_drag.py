@@ -14,17 +14,16 @@ from typing import TYPE_CHECKING
 
 from torch import Tensor
 
-from sim.effects.base import Effect
+from sim.model.effect import Effect
 
 if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
+    from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class TailSpinDrag(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        return base.plus(spin_drag=size * 4 * math.pi / groups.l_over_r0**2)
+    def number(self, size: Tensor, groups: Groups) -> Tensor:
+        return size * 4 * math.pi / groups.l_over_r0**2
 
 
 EFFECT = TailSpinDrag(
@@ -38,4 +37,6 @@ EFFECT = TailSpinDrag(
     typical=1.0,
     symmetry="even",
     dissipative=True,
+    reach="nonlocal",
+    is_drag=True,
 )

@@ -15,21 +15,21 @@ from typing import TYPE_CHECKING
 
 from torch import Tensor
 
-from sim.effects.base import Effect
+from sim.model.effect import Driver, Effect
 
 if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
+    from sim.model.body import Body
+    from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class TankWall(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
+    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
         factor = 1 / (1 - 2.104 * size + 2.089 * size**3 - 0.948 * size**5)
         lever = groups.L_over_R / groups.l_over_R / 2
         more = 6 * math.pi * groups.C_t / groups.l_over_R * (factor - 1)
         coupled = more * lever
-        return base.with_resistance(
+        return body.with_resistance(
             {(0, 0): more, (1, 1): more, (0, 2): coupled, (2, 0): coupled, (2, 2): coupled * lever}
         )
 
@@ -45,5 +45,14 @@ EFFECT = TankWall(
     typical=0.1,
     symmetry="even",
     dissipative=True,
-    covariate="tank_diameter_m",
+    drivers=(
+        Driver(
+            "wall_of_the_tank",
+            "wall of the tank",
+            "head_over_tank",
+            "of the correction for a sphere",
+            (0.0, 2.0),
+            1.0,
+        ),
+    ),
 )

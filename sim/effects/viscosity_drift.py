@@ -2,8 +2,9 @@
 
     μ = μ0 exp(−β (T − T0)),   ε = β (T − T0)
 
-Glycerol loses 8.6 % of its viscosity a kelvin. Everything that drags scales with μ. Needs a thermometer: with one
-viscosity for all runs it is only another unit of time.
+Glycerol loses 8.6 % of its viscosity a kelvin. Everything that drags scales with μ, and the flow that a force
+makes with 1/μ. It shows where runs differ in temperature or in time: with one viscosity for all runs it is only
+another unit of time.
 """
 
 from __future__ import annotations
@@ -14,22 +15,21 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from sim.effects.base import Effect
+from sim.model.effect import Driver, Effect, Factors
 
 if TYPE_CHECKING:
-    from sim.coefficients import Coefficients
-    from sim.robot import Groups
+    from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class ViscosityDrift(Effect):
-    def coefficients(self, size: Tensor, groups: Groups, base: Coefficients) -> Coefficients:
-        return base.scaled(torch.exp(-size))
+    def scales(self, size: Tensor, groups: Groups) -> Factors:
+        return Factors(viscosity=torch.exp(-size))
 
 
 EFFECT = ViscosityDrift(
     name="viscosity_drift",
-    title="viscosity drifting with temperature",
+    title="drift of the viscosity",
     equation="μ = μ0 exp(−ε), ε = β (T − T0)",
     source="Cheng, Ind. Eng. Chem. Res. 47, 3285 (2008): β ≈ 0.086 /K for glycerol at 20 °C",
     unit="1",
@@ -38,5 +38,15 @@ EFFECT = ViscosityDrift(
     typical=0.086,
     symmetry="even",
     dissipative=True,
-    covariate="temperature_K",
+    drivers=(
+        Driver("viscosity_with_time", "viscosity drifting with time", "elapsed_h", "1/h", (-0.3, 0.3), 0.02),
+        Driver(
+            "viscosity_with_temperature",
+            "viscosity falling with temperature",
+            "temperature_K",
+            "1/K",
+            (-0.3, 0.3),
+            0.086,
+        ),
+    ),
 )

@@ -30,8 +30,10 @@ from calibration.steer import draw_steered, gap_closed, steer
 from calibration.swimmer import Swimmer, corrected_robot
 from calibration.synthetic import make_table
 from planner.path import polygon
-from sim.errors import InputError, run_command
-from sim.robot import PRESETS, Robot, load_robot
+from sim.inputs import load_robot
+from sim.io.errors import InputError, run_command
+from sim.model.presets import PRESETS
+from sim.model.robot import Robot
 from tests.calibration import toy
 
 MEASURED = Path(__file__).parents[3] / "shared" / "measured"

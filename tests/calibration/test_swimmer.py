@@ -13,8 +13,8 @@ from calibration.measurements import read_measurements
 from calibration.model import by_differences, start_values
 from calibration.swimmer import Swimmer
 from calibration.synthetic import make_table
-from sim.errors import InputError
-from sim.robot import PRESETS
+from sim.io.errors import InputError
+from sim.model.presets import PRESETS
 from surrogate.export import load
 from tests.calibration import toy
 

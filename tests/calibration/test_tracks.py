@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from calibration.tracks import measure_track, measure_tracks
-from sim.errors import InputError, run_command
+from sim.io.errors import InputError, run_command
 
 RATE, RADIUS, SLIP = -0.14, 10.0, 70.0
 

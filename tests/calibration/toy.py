@@ -12,14 +12,16 @@ from typing import Any
 import numpy as np
 
 from calibration.swimmer import Solver
-from sim import drag
-from sim.effects import catalogue, with_effects
-from sim.robot import Groups, check_columns
-from sim.sensitivity import Sensitivities
+from sim.effects import catalogue
+from sim.inputs import check_columns
+from sim.mechanics.drag import tail_coefficients
+from sim.model.groups import Groups
+from sim.motion.sensitivity import Sensitivities
+from sim.solve.assembly import assemble
 
 
 def steady_columns(columns: Mapping[str, Any], **_: object) -> dict[str, np.ndarray]:
-    """Stand-in for `sim.batches.steady_columns`."""
+    """Stand-in for `sim.motion.batches.steady_columns`."""
     values = check_columns({k: np.asarray(v, float) for k, v in columns.items()})
     found: dict[str, np.ndarray] = {}
     for tails in np.unique(values["N"]):
@@ -30,7 +32,7 @@ def steady_columns(columns: Mapping[str, Any], **_: object) -> dict[str, np.ndar
 
 
 def slopes(columns: Mapping[str, Any], parameters: tuple[str, ...], **_: object) -> Sensitivities:
-    """Stand-in for `sim.batches.sensitivity_columns`, by differences."""
+    """Stand-in for `sim.motion.batches.sensitivity_columns`, by differences."""
     values = steady_columns(columns)
     values = {k: np.radians(v) if k == "theta_deg" else v for k, v in values.items()}
     found: dict[str, list[np.ndarray]] = {k: [] for k in values}
@@ -52,11 +54,10 @@ def _robots(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Robots of one number of tails, (B,) each."""
     groups = Groups.from_columns(columns)
     R = 1 / groups.l_over_R
-    base = drag.coefficients(groups.C_t, groups.C_r, groups.C_yr, R, groups.L_over_R * R, groups.l_over_r0)
-    resistance = np.moveaxis(with_effects(groups, base).resistance.numpy(), -1, 0)  # (B, 4, 5)
+    resistance = np.moveaxis(assemble(groups).resistance.numpy(), -1, 0)  # (B, 4, 5)
     head = resistance[:, :, :4].copy()
     head[:, :, 3] += resistance[:, :, 4]
-    parallel, perp = (v.numpy() for v in drag.tail_coefficients(groups.l_over_r0))
+    parallel, perp = (v.numpy() for v in tail_coefficients(groups.l_over_r0))
     a, n, omega = (groups.a_over_R * R).numpy(), groups.N, groups.omega_bar.numpy()
     tails = np.zeros_like(head)
     tails[:, 0, 0] = n * perp

@@ -15,7 +15,7 @@ from dataset.schema import FLAGS, INPUTS, OUTPUTS
 from dataset.store import read, read_manifest, usable
 from dataset.sweep import build, simulate
 from dataset.verify import verify
-from sim.errors import InputError, run_command
+from sim.io.errors import InputError, run_command
 
 SMALL = """
 rows = 6
@@ -95,14 +95,15 @@ def test_another_configuration_is_not_mixed_in(built: Path) -> None:
 
 def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither an orbit nor a time step can be solved."""
-    from sim import direct, run, switching
+    from sim.motion import run, steady, switching
+    from sim.motion.orbits import Orbits
+    from sim.solve.refinement import NO_START
 
-    def lost(rows: np.ndarray, *_: object, **__: object) -> direct.Orbits:
+    def lost(rows: np.ndarray, *_: object, **__: object) -> Orbits:
         count, none = len(rows), np.full(len(rows), np.nan)
-        ended = np.full(count, direct.NO_START)
-        return direct.Orbits(np.full((count, 5), np.nan), np.empty((count, 0, 5)), none, ended, none)
+        return Orbits(np.full((count, 5), np.nan), np.empty((count, 0, 5)), none, np.full(count, NO_START), none)
 
-    monkeypatch.setattr(direct, "solve_all", lost)
+    monkeypatch.setattr(steady, "solve_orbits", lost)
     monkeypatch.setattr(switching, "state_on_orbit", lambda *_: None)
     monkeypatch.setattr(run, "advance", lambda *_: False)
     points = {"C_t": 3.0, "C_r": 2.8, "C_yr": 2.0, "l_over_R": 6.9, "L_over_R": 3.8, "l_over_r0": 34.0,

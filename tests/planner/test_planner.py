@@ -19,10 +19,10 @@ from planner.path import fillet, read_path, reference
 from planner.plan import distance_to, plan_record
 from planner.schedule import follow, trace
 from planner.vehicle import TURN_OVER, vehicle_of
-from sim import planar
-from sim.errors import InputError, run_command
-from sim.replay import load_schedule
-from sim.robot import PRESETS
+from sim.io.errors import InputError, run_command
+from sim.mechanics import planar
+from sim.model.presets import PRESETS
+from sim.motion.replay import load_schedule
 from surrogate.export import load
 from tests.planner.vehicles import vehicle
 
@@ -129,27 +129,24 @@ def test_paper_cases_are_planned_within_their_bound(name: str) -> None:
 
 
 def test_planning_never_calls_the_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
-    import sim.balance
-    import sim.direct
-    import sim.run
-    import sim.steady
-    import sim.stepper
-    import sim.switching
+    import sim.motion.orbits
+    import sim.motion.run
+    import sim.motion.steady
+    import sim.motion.switching
 
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("the planner simulated")
 
-    for module, name in ((sim.stepper, "step"), (sim.stepper, "at_rest"), (sim.balance, "newton_correction"),
-                         (sim.steady, "steady"), (sim.switching, "switch_response"),
-                         (sim.direct, "solve_all"), (sim.run, "advance")):  # fmt: skip
+    for module, name in ((sim.motion.steady, "steady"), (sim.motion.switching, "switch_response"),
+                         (sim.motion.orbits, "refined_orbit"), (sim.motion.run, "advance")):  # fmt: skip
         monkeypatch.setattr(module, name, refuse)
     assert len(plan(polygon(4, 3.0), CONTROL).dwells) > 50
 
 
 def test_planning_does_not_even_load_the_simulator() -> None:
-    simulator = ("sim.stepper", "sim.balance", "sim.steady", "sim.replay", "sim.direct", "sim.march", "numba")
+    simulator = ("sim.solve.newton", "sim.motion.steady", "sim.motion.replay", "sim.motion.run", "numba")
     code = (
-        "import sys; from planner import plan, circle; from sim.robot import PRESETS;"
+        "import sys; from planner import plan, circle; from sim.model.presets import PRESETS;"
         "plan(circle(2.0), PRESETS['paper-control']);"
         f"print([m for m in {simulator} if m in sys.modules])"
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planner.vehicle import Vehicle
-from sim import planar
+from sim.mechanics import planar
 
 ERRORS = {
     "v_x": 0.003,

@@ -12,10 +12,11 @@ import pytest
 from planner.check import tracking_error
 from planner.path import polygon
 from planner.plan import plan, plan_record
-from sim.errors import InputError
-from sim.replay import load_schedule, replay
-from sim.robot import PRESETS, Groups
-from sim.switching import switch_response
+from sim.io.errors import InputError
+from sim.model.groups import Groups
+from sim.model.presets import PRESETS
+from sim.motion.replay import load_schedule, replay
+from sim.motion.switching import switch_response
 from surrogate.export import load_table
 from surrogate.single import SingleRobot, save_single
 from surrogate.tabulate import tabulate

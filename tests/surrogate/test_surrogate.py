@@ -11,7 +11,7 @@ import pytest
 
 from dataset.design import Axis, Design
 from dataset.store import write_manifest, write_part
-from sim.errors import InputError, run_command
+from sim.io.errors import InputError, run_command
 from surrogate.__main__ import main
 from surrogate.export import SHIPPED, identity, load, save
 from surrogate.train import Settings, split, train

@@ -1,0 +1,119 @@
+"""Robots as people bring them: robot.toml, names of presets, columns of a table. Checked here, effects included.
+
+robot.toml has the tables [head], [tails], [fluid], [motor], [drag] and, if any, [effects]; units are in the key
+names.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from sim.arrays import Floats
+from sim.effects import catalogue, check_effects, check_size
+from sim.io.errors import InputError
+from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
+from sim.model.presets import PRESETS
+from sim.model.robot import Robot
+
+# Table and key in robot.toml -> field of Robot; the key says the unit.
+_TOML = {
+    ("tails", "count"): "tails",
+    ("tails", "length_m"): "tail_length",
+    ("tails", "radius_m"): "tail_radius",
+    ("tails", "youngs_modulus_Pa"): "youngs_modulus",
+    ("tails", "disc_offset_m"): "disc_offset",
+    ("head", "radius_m"): "head_radius",
+    ("head", "length_m"): "head_length",
+    ("fluid", "viscosity_Pa_s"): "viscosity",
+    ("motor", "speed_rad_s"): "motor_speed",
+    ("drag", "C_t"): "C_t",
+    ("drag", "C_r"): "C_r",
+    ("drag", "C_yr"): "C_yr",
+}
+_OPTIONAL_KEYS = {"disc_offset"}
+
+
+def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
+    """Columns of robots as float64 arrays, with a_over_R filled in; rejects what cannot be simulated.
+
+    Args:
+        columns: `sim.model.groups.GROUP_COLUMNS`, optionally a_over_R and effect sizes, each (M,).
+
+    Raises:
+        InputError: a missing or unknown column, a number that is not finite or out of its range.
+    """
+    known = {*GROUP_COLUMNS, *OPTIONAL_COLUMNS, *catalogue()}
+    unknown = sorted(set(columns) - known)
+    if unknown:
+        raise InputError(
+            f"unknown column {unknown[0]!r}; allowed are {', '.join(sorted(known))}: rename or drop it"
+        )
+    values = checked_values(columns)
+    for name in set(values) & set(catalogue()):
+        for size in (values[name].min(), values[name].max()):
+            check_size(name, float(size))
+    return values
+
+
+def load_robot(source: str | Path) -> Robot:
+    """A robot from a preset's name or a robot.toml.
+
+    Args:
+        source: path of a file, or one of `sim.model.presets.PRESETS`.
+
+    Raises:
+        InputError: the file is no robot; the line says which key and what is allowed.
+
+    Example:
+        >>> load_robot("paper-control").tails
+        2
+    """
+    if str(source) in PRESETS:
+        return PRESETS[str(source)]
+    path = Path(source)
+    if not path.is_file():
+        raise InputError(f"no robot {str(source)!r}; give a robot.toml or one of {', '.join(PRESETS)}")
+    try:
+        tables = tomllib.loads(path.read_text())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as broken:
+        raise InputError(f"{path} is not TOML: {broken}") from None
+    name = tables.pop("name", path.stem)
+    effects = tables.pop("effects", {})
+    if not isinstance(effects, dict):
+        raise InputError(f"{path}: effects = {effects!r}; write a table [effects] with lines name = size")
+    values = _values(path, tables)
+    check_effects(effects)
+    return Robot(name=str(name), effects=dict(effects), **values)  # type: ignore[arg-type]
+
+
+def _values(path: Path, tables: dict[str, Any]) -> dict[str, object]:
+    """Fields of `Robot` by name."""
+    values: dict[str, object] = {}
+    for table, content in tables.items():
+        for key, value in content.items() if isinstance(content, dict) else [("", content)]:
+            if (table, key) not in _TOML:
+                allowed = ", ".join(f"[{t}] {k}" for t, k in _TOML)
+                raise InputError(f"{path}: unknown entry [{table}] {key}; allowed are {allowed}")
+            values[_TOML[table, key]] = value
+    for (table, key), attribute in _TOML.items():
+        if attribute not in values and attribute not in _OPTIONAL_KEYS:
+            raise InputError(f"{path}: missing entry [{table}] {key}")
+        if attribute in values and not isinstance(values[attribute], int | float):
+            raise InputError(f"{path}: [{table}] {key} = {values[attribute]!r}; give a number")
+    return values
+
+
+def robot_toml(robot: Robot) -> str:
+    """The text of a robot.toml that `load_robot` reads back to the same robot."""
+    tables: dict[str, list[str]] = {}
+    for (table, key), attribute in _TOML.items():
+        value = getattr(robot, attribute)
+        if value is not None:
+            tables.setdefault(table, []).append(f"{key} = {value!r}")
+    if robot.effects:
+        tables["effects"] = [f"{name} = {float(size)!r}" for name, size in robot.effects.items()]
+    blocks = ["\n".join([f"[{table}]", *lines]) for table, lines in tables.items()]
+    return "\n\n".join([f'name = "{robot.name}"', *blocks]) + "\n"

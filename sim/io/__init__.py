@@ -1,0 +1,1 @@
+"""What comes in and goes out: errors, whole files, tables, pages, command lines."""

@@ -1,0 +1,38 @@
+"""Files that the pipeline makes: written whole or not at all.
+
+A file is written beside its place under another name and moved there when complete, so that an error or an
+interruption leaves either the old file or the new one.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sim.io.errors import InputError
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path; move it to `path` when the block succeeds, remove it otherwise."""
+    target = Path(path)
+    if target.is_dir():
+        raise InputError(f"{target} is a folder; give the name of a file")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError, PermissionError) as blocked:
+        raise InputError(f"cannot make the folder {target.parent}: {blocked.strerror}") from None
+    part = target.with_name(f".{target.name}.part{os.getpid()}")
+    try:
+        yield part
+        os.replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file whole or not at all."""
+    with whole_file(path) as part:
+        part.write_text(text)

@@ -1,0 +1,74 @@
+"""3-vectors and 3×3 blocks that are stored in arrays: read, write, add, in compiled loops."""
+
+from __future__ import annotations
+
+from sim.arrays import Floats
+from sim.compiling import compiled
+from sim.linear.vectors import Matrix, Vector
+
+
+@compiled
+def vector(a: Floats, k: int, m: int) -> Vector:
+    """a[k, m] as components."""
+    return (a[k, m, 0], a[k, m, 1], a[k, m, 2])
+
+
+@compiled
+def put(a: Floats, k: int, m: int, v: Vector) -> None:
+    """a[k, m] = v."""
+    a[k, m, 0] = v[0]
+    a[k, m, 1] = v[1]
+    a[k, m, 2] = v[2]
+
+
+@compiled
+def add(a: Floats, k: int, m: int, v: Vector) -> None:
+    """a[k, m] += v."""
+    a[k, m, 0] += v[0]
+    a[k, m, 1] += v[1]
+    a[k, m, 2] += v[2]
+
+
+@compiled
+def vector_at(a: Floats, i: int) -> Vector:
+    """a[i] as components."""
+    return (a[i, 0], a[i, 1], a[i, 2])
+
+
+@compiled
+def put_at(a: Floats, i: int, v: Vector) -> None:
+    """a[i] = v."""
+    a[i, 0], a[i, 1], a[i, 2] = v
+
+
+@compiled
+def add_at(a: Floats, i: int, v: Vector) -> None:
+    """a[i] += v."""
+    a[i, 0] += v[0]
+    a[i, 1] += v[1]
+    a[i, 2] += v[2]
+
+
+@compiled
+def block(a: Floats, k: int, m: int) -> Matrix:
+    """a[k, m] as a 3×3 matrix."""
+    return block_at(a[k, m], 0, 0)
+
+
+@compiled
+def put_block(a: Floats, k: int, m: int, b: Matrix) -> None:
+    """a[k, m] = b."""
+    c = a[k, m]
+    c[0, 0], c[0, 1], c[0, 2] = b[0]
+    c[1, 0], c[1, 1], c[1, 2] = b[1]
+    c[2, 0], c[2, 1], c[2, 2] = b[2]
+
+
+@compiled
+def block_at(a: Floats, row: int, column: int) -> Matrix:
+    """The 3×3 block of `a` at (row, column)."""
+    return (
+        (a[row, column], a[row, column + 1], a[row, column + 2]),
+        (a[row + 1, column], a[row + 1, column + 1], a[row + 1, column + 2]),
+        (a[row + 2, column], a[row + 2, column + 1], a[row + 2, column + 2]),
+    )

@@ -1,0 +1,135 @@
+"""Newton's equations of M chains of 3×3 blocks and of the body that carries them, in compiled loops.
+
+    A_m δx_m + B_m δu = s_m on every chain,   Σ_m C_m δx_m + D δu = t on the body
+
+A chain is a tail at one instant, A_m is block pentadiagonal: a node meets its first and second neighbours. δu has
+four entries. `Chains` holds the equations. Where chains meet through the body alone, `factor` and `solve` of this
+file solve them; where they meet each other in time as well, `sim.linear.coupled` does.
+
+Nodes are eliminated from the tip to the root, so that C, which sees the first two nodes of each chain alone, needs
+no more. No pivoting between nodes: A is minus drag plus stiffness, whose symmetric part is definite.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.compiling import compiled
+from sim.linear.blocks import block, put, put_block, vector
+from sim.linear.dense import solve_dense
+from sim.linear.vectors import applied, dot, inverse, minus, product, subtracted, times
+
+
+class Chains(NamedTuple):
+    """The equations of M chains of n nodes, and of the body at P instants; `factor` overwrites them."""
+
+    own: Floats  # (n, M, 3, 3): A_kk; then its inverse
+    lower: Floats  # A_{k,k−1}
+    upper: Floats  # A_{k−1,k}
+    lower2: Floats  # A_{k,k−2}
+    upper2: Floats  # A_{k−2,k}
+    border: Floats  # (n, M, 4, 3): B, columns of the body's unknowns
+    foot: Floats  # (2, M, 4, 3): C in the first two nodes, rows of the body's equations
+    corner: Floats  # (P, 4, 4): D
+
+
+@compiled
+def new_chains(n: int, chains: int, instants: int) -> Chains:
+    """Room for M chains of n ≥ 2 nodes and P instants."""
+    return Chains(
+        np.zeros((n, chains, 3, 3)),
+        np.zeros((n, chains, 3, 3)),
+        np.zeros((n, chains, 3, 3)),
+        np.zeros((n, chains, 3, 3)),
+        np.zeros((n, chains, 3, 3)),
+        np.zeros((n, chains, 4, 3)),
+        np.zeros((2, chains, 4, 3)),
+        np.zeros((instants, 4, 4)),
+    )
+
+
+@compiled
+def factor_and_solve(chains: Chains, s: Floats, t: Floats) -> None:
+    """Turn the equations into their factors; s (n, M, 3) becomes δx, t (4,) becomes δu. See `factor`, `solve`."""
+    factor(chains)
+    solve(chains, s, t)
+
+
+@compiled
+def factor(chains: Chains) -> None:
+    """Eliminate chains that share one instant: own becomes its inverse, lower and border A⁻¹ of themselves."""
+    corner = chains.corner[0]
+    for m in range(chains.own.shape[1]):
+        _eliminate(chains, m)
+        lower = block(chains.lower, 1, m)
+        for c in range(4):
+            first = vector(chains.border[0], m, c)
+            second = minus(vector(chains.border[1], m, c), applied(lower, first))
+            for a in range(4):
+                corner[a, c] -= dot(vector(chains.foot[0], m, a), first)
+                corner[a, c] -= dot(vector(chains.foot[1], m, a), second)
+
+
+@compiled
+def _eliminate(chains: Chains, m: int) -> None:
+    """Chain m from tip to root."""
+    n = chains.own.shape[0]
+    for k in range(n - 1, -1, -1):
+        inverted = inverse(block(chains.own, k, m))
+        put_block(chains.own, k, m, inverted)
+        upper, upper2 = block(chains.upper, k, m), block(chains.upper2, k, m)
+        lower = product(inverted, block(chains.lower, k, m))
+        lower2 = product(inverted, block(chains.lower2, k, m))
+        if k > 0:
+            put_block(chains.lower, k, m, lower)
+            own = subtracted(block(chains.own, k - 1, m), product(upper, lower))
+            put_block(chains.own, k - 1, m, own)
+        if k > 1:
+            put_block(chains.lower2, k, m, lower2)
+            below = subtracted(block(chains.lower, k - 1, m), product(upper, lower2))
+            put_block(chains.lower, k - 1, m, below)
+            above = subtracted(block(chains.upper, k - 1, m), product(upper2, lower))
+            put_block(chains.upper, k - 1, m, above)
+            own = subtracted(block(chains.own, k - 2, m), product(upper2, lower2))
+            put_block(chains.own, k - 2, m, own)
+        for c in range(4):
+            column = applied(inverted, vector(chains.border[k], m, c))
+            put(chains.border[k], m, c, column)
+            if k > 0:
+                first = minus(vector(chains.border[k - 1], m, c), applied(upper, column))
+                put(chains.border[k - 1], m, c, first)
+            if k > 1:
+                second = minus(vector(chains.border[k - 2], m, c), applied(upper2, column))
+                put(chains.border[k - 2], m, c, second)
+
+
+@compiled
+def solve(chains: Chains, s: Floats, t: Floats) -> None:
+    """Solve with the factors, in place: s (n, M, 3) becomes δx, t (4,) becomes δu."""
+    n, count, _ = s.shape
+    for m in range(count):
+        for k in range(n - 1, -1, -1):
+            value = applied(block(chains.own, k, m), vector(s, k, m))
+            put(s, k, m, value)
+            if k > 0:
+                put(s, k - 1, m, minus(vector(s, k - 1, m), applied(block(chains.upper, k, m), value)))
+            if k > 1:
+                put(s, k - 2, m, minus(vector(s, k - 2, m), applied(block(chains.upper2, k, m), value)))
+        first = vector(s, 0, m)
+        second = minus(vector(s, 1, m), applied(block(chains.lower, 1, m), first))
+        for a in range(4):
+            t[a] -= dot(vector(chains.foot[0], m, a), first) + dot(vector(chains.foot[1], m, a), second)
+    solve_dense(chains.corner[0].copy(), t.reshape(4, 1))
+    for m in range(count):
+        for k in range(n):
+            change = vector(s, k, m)
+            for c in range(4):
+                change = minus(change, times(t[c], vector(chains.border[k], m, c)))
+            if k > 0:
+                change = minus(change, applied(block(chains.lower, k, m), vector(s, k - 1, m)))
+            if k > 1:
+                change = minus(change, applied(block(chains.lower2, k, m), vector(s, k - 2, m)))
+            put(s, k, m, change)

@@ -1,0 +1,43 @@
+"""How close the tails come to each other.
+
+gap = min |x − y| / (2 r0) over nodes x of one tail and edges y of another: at 1 they touch. The model
+has no contact, so rows below 1 are kept and flagged. (Distances from nodes to edges; two edges that cross
+between nodes are seen to within half an edge.)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.compiling import compiled
+
+
+@compiled
+def tail_gap(x: Floats, offset: float, radius: float) -> float:
+    """Smallest distance between two tails over 2 r0; infinite for one tail.
+
+    Args:
+        x: free nodes at one instant, (n, N, 3), every tail turned so that its clamp lies at (offset, 0, 0).
+        offset, radius: a/l and r0/l.
+    """
+    n, tails, _ = x.shape
+    smallest = np.inf
+    for i in range(tails):
+        for j in range(tails):
+            if i == j:
+                continue
+            angle = 2 * np.pi * (j - i) / tails
+            cos, sin = np.cos(angle), np.sin(angle)
+            px, py, pz = cos * offset, sin * offset, 0.0
+            for k in range(n):
+                qx, qy, qz = cos * x[k, j, 0] - sin * x[k, j, 1], sin * x[k, j, 0] + cos * x[k, j, 1], x[k, j, 2]
+                ex, ey, ez = qx - px, qy - py, qz - pz
+                scale = 1 / (ex * ex + ey * ey + ez * ez)
+                for node in range(n):
+                    ax, ay, az = x[node, i, 0] - px, x[node, i, 1] - py, x[node, i, 2] - pz
+                    share = min(max((ax * ex + ay * ey + az * ez) * scale, 0.0), 1.0)
+                    ax, ay, az = ax - share * ex, ay - share * ey, az - share * ez
+                    smallest = min(smallest, ax * ax + ay * ay + az * az)
+                px, py, pz = qx, qy, qz
+    return np.sqrt(smallest) / (2 * radius)

@@ -1,0 +1,268 @@
+"""Flow of the fluid around tails and head: each feels the others, and their images in the surface above.
+
+A force f on the fluid at y moves it at x by G(x − y) f/μ, G the Stokeslet. Resistive force theory has the drag of
+a node on the fluid at rest; here it is on the fluid as the others move it,
+
+    q_k = −l_k [ζ⊥ I + (ζ∥ − ζ⊥) tt] (v_k − w_k),   w_k = Σ ∫ G(x_k − y) f/μ ds,
+
+the sum over the edges of the other tails (a node's force lies evenly on the edges beside it; the integral over a
+straight edge is exact, however near), over the head (pieces of its axis that share its drag, and rotlets for its
+spin) and over images. Where the balance holds, the force of a free node on the fluid is its elastic force and
+load, so w follows from the shape alone; only clamps and head, whose velocity is given, feel each other's answer (a
+few rounds, each smaller than the last by the length of half an edge). The head's drag is on the fluid as the tails
+move it, too. All of it is solved together with the balance, not a step later.
+
+C_t is a fitted number and above what a cylinder needs (about 1.4): with its whole drag on the fluid the head would
+move the fluid at the clamps faster than itself. So the part of the drag that moves the fluid is at most the drag
+that the head's own pieces have, which carries the fluid on the axis along. The rest has other causes.
+
+Surface: a flat plane without shear or flow through it, HEIGHT times the larger of R and a above the axis. The
+image of f at (x, 2H − y, z) is (f_x, −f_y, f_z); a spin about z turns backwards. Each tail meets its own image,
+and the images of those whose flow it meets (images of others alone would take more drag off a tail than it has).
+
+The singularities are spread over r0 (tails) and R (head), as Cortez, Fauci and Medovikov (2005) do. Left out: the
+head's spin in the tails' flow, and its finite thickness (the flow goes through it).
+Units: l, μ0 l⁴/EI, EI/l². Source: Pozrikidis (1992), ch. 2; images: Blake (1971), free surface.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats, Integers
+from sim.compiling import compiled
+from sim.linear.blocks import add_at, put, put_at, vector, vector_at
+from sim.linear.vectors import E_Z, ZERO, Vector, cross, dot, minus, plus, times
+from sim.mechanics.balance import Motion, head_drag, motion_at
+from sim.mechanics.drag import node_drag
+from sim.mechanics.geometry import Geometry, node_tangent
+from sim.mechanics.stokeslets import rotlet, stokeslets
+from sim.model.body import Body
+
+HEIGHT = 1.25  # of the surface above the axis, in the larger of R and a
+_PIECES = 4  # of the head's axis
+_ROUNDS = 3
+
+
+class Scene(NamedTuple):
+    """A robot at one instant in the body frame: places where the flow is wanted, and pieces that make it.
+
+    Places: nodes 0..n of each tail, then the middles of the head's pieces. Pieces: edges of the tails under the
+    forces of free nodes, first edges under the drag of the clamps, then the head's pieces.
+    """
+
+    place: Floats  # (K, 3)
+    of: Integers  # (K,) tail of a place, or N for the head
+    start: Floats  # (S, 3)
+    end: Floats  # (S, 3)
+    force: Floats  # (S, 3) on the fluid
+    by: Integers  # (S,) tail of a piece, or N for the head
+
+
+@compiled
+def _new_scene(n: int, tails: int) -> Scene:
+    places, pieces = (n + 1) * tails + _PIECES, (n + 1) * tails + _PIECES
+    return Scene(
+        np.zeros((places, 3)),
+        np.full(places, tails),
+        np.zeros((pieces, 3)),
+        np.zeros((pieces, 3)),
+        np.zeros((pieces, 3)),
+        np.full(pieces, tails),
+    )
+
+
+@compiled
+def has_flow(body: Body) -> bool:
+    """Whether any part of the robot feels the flow of another."""
+    terms = body.nonlocal_terms
+    return bool(terms.tail_interaction != 0 or terms.head_flow != 0 or terms.free_surface != 0)
+
+
+@compiled
+def add_flow(
+    body: Body, geometry: Geometry, x: Floats, u: Floats, phase: float, instant: int, tails: int,
+    flow: Floats, wrench: Floats,
+) -> None:  # fmt: skip
+    """The fluid's velocity around a robot at one instant.
+
+    Args:
+        x: free nodes, (n, M, 3); tail j at instant p of P is column p + j P, at phase φ + 2πj/N.
+        u: (v_x, v_z, ω_yr, ω_h), (4,).
+        phase: φ.
+        flow: (n + 1, M, 3), filled in the robot's columns, each in its own frame.
+        wrench: (4,), on the robot about J through its head; added to.
+    """
+    n, columns, _ = x.shape
+    scene, instants = _new_scene(n, tails), columns // tails
+    for j in range(tails):
+        motion = motion_at(body, u, phase + 2 * np.pi * j / tails)
+        _place_tail(scene, body, geometry, motion, x, j, instant + j * instants)
+    _place_head(scene, body, n, tails)
+    nodes, edges = (n + 1) * tails, n * tails
+    moved = np.zeros_like(scene.place)
+    everywhere = np.arange(len(scene.place))
+    _add_stokeslets(body, scene, everywhere, np.arange(edges), moved)
+    _add_rotlets(body, scene, nodes, body.resistance[3, 3] * u[3], moved)
+    _answer(scene, body, geometry, u, phase, instant, tails, moved)
+    _add_stokeslets(body, scene, everywhere, np.arange(edges, len(scene.by)), moved)
+    for j in range(tails):
+        motion = motion_at(body, u, phase + 2 * np.pi * j / tails)
+        for k in range(n + 1):
+            put(flow, k, instant + j * instants, _in_tail(motion, vector_at(moved, j * (n + 1) + k)))
+    across, along = _head_resistance(body)
+    for i in range(nodes, nodes + _PIECES):
+        wrench[0] += across * moved[i, 0] / _PIECES
+        wrench[1] += along * moved[i, 2] / _PIECES
+        wrench[2] += across * moved[i, 0] / _PIECES * body.head_length / 2
+
+
+@compiled
+def _place_tail(
+    scene: Scene, body: Body, geometry: Geometry, motion: Motion, x: Floats, j: int, column: int
+) -> None:
+    """Nodes of tail j, and its edges under the forces of its free nodes."""
+    n = x.shape[0]
+    cell = 1.0 / n
+    first_clamp = n * ((len(scene.by) - _PIECES) // (n + 1))
+    place = _in_body(motion, (body.offset, 0.0, 0.0))
+    put_at(scene.place, j * (n + 1), place)
+    scene.of[j * (n + 1) : (j + 1) * (n + 1)] = j
+    for k in range(n):
+        force = times(0.5 * cell if k == n - 1 else cell, motion.load)
+        force = minus(force, vector(geometry.force, k, column))
+        if k < n - 1:
+            force = times(0.5, plus(force, vector(geometry.force, k + 1, column)))
+        force = _in_body(motion, force)
+        i = j * n + k
+        put_at(scene.start, i, place)
+        place = _in_body(motion, vector(x, k, column))
+        put_at(scene.place, j * (n + 1) + k + 1, place)
+        put_at(scene.end, i, place)
+        scene.by[i] = j
+        add_at(scene.force, i, force)
+        if k < n - 1:
+            put_at(scene.force, i + 1, force)
+    scene.start[first_clamp + j] = scene.start[j * n]
+    scene.end[first_clamp + j] = scene.end[j * n]
+    scene.by[first_clamp + j] = j
+
+
+@compiled
+def _place_head(scene: Scene, body: Body, n: int, tails: int) -> None:
+    """The head's pieces, which follow the nodes and edges of the tails."""
+    first, piece = (n + 1) * tails, body.head_length / _PIECES
+    for i in range(_PIECES):
+        scene.place[first + i, 2] = (i + 0.5) * piece
+        scene.start[first + i, 2] = i * piece
+        scene.end[first + i, 2] = (i + 1) * piece
+
+
+@compiled
+def _answer(
+    scene: Scene, body: Body, geometry: Geometry, u: Floats, phase: float, instant: int, tails: int, moved: Floats
+) -> None:
+    """Forces of clamps and head on the fluid, which move with given velocities through a fluid that `moved`.
+
+    They feel each other's flow as well: a few rounds, each smaller than the last.
+    """
+    n, columns = geometry.length.shape
+    nodes, first_clamp, cell = (n + 1) * tails, n * tails, 1.0 / n
+    across, along = _head_resistance(body)
+    share_x, share_z = across / body.resistance[0, 0], along / body.resistance[1, 1]
+    push_x, push_z = share_x * head_drag(body, u, 0), share_z * head_drag(body, u, 1)  # if the fluid were at rest
+    given = np.arange(first_clamp, len(scene.by))
+    fixed = np.concatenate((np.arange(tails) * (n + 1), np.arange(nodes, nodes + _PIECES)))
+    answer = np.zeros_like(moved)
+    perp, excess = 0.5 * cell * body.zeta_perp, 0.5 * cell * (body.zeta_parallel - body.zeta_perp)
+    for _ in range(_ROUNDS):
+        for j in range(tails):
+            motion = motion_at(body, u, phase + 2 * np.pi * j / tails)
+            i = fixed[j]
+            tangent, _ = node_tangent(geometry, 0, instant + j * (columns // tails))
+            velocity = plus(motion.linear, cross(motion.spin, (body.offset, 0.0, 0.0)))
+            velocity = minus(velocity, _in_tail(motion, plus(vector_at(moved, i), vector_at(answer, i))))
+            drag = node_drag(tangent, velocity, perp, excess)
+            put_at(scene.force, first_clamp + j, _in_body(motion, times(-1.0, drag)))
+        for i in range(nodes, nodes + _PIECES):
+            scene.force[i, 0] = (push_x - across * (moved[i, 0] + answer[i, 0])) / _PIECES
+            scene.force[i, 2] = (push_z - along * (moved[i, 2] + answer[i, 2])) / _PIECES
+        answer[:] = 0.0
+        _add_stokeslets(body, scene, fixed, given, answer)
+
+
+@compiled
+def _in_body(motion: Motion, v: Vector) -> Vector:
+    """Components in the body frame of a vector in a tail's frame."""
+    return dot(motion.e_x, v), dot(motion.e_y, v), v[2]
+
+
+@compiled
+def _in_tail(motion: Motion, v: Vector) -> Vector:
+    """Components in a tail's frame of a vector in the body frame."""
+    return plus(plus(times(v[0], motion.e_x), times(v[1], motion.e_y)), times(v[2], E_Z))
+
+
+@compiled
+def _add_stokeslets(body: Body, scene: Scene, places: Integers, pieces: Integers, flow: Floats) -> None:
+    """Add to `flow` (K, 3) at some places what the forces of some pieces bring about."""
+    height = HEIGHT * max(body.offset, body.head_radius)
+    head = scene.of[len(scene.of) - 1]
+    for i in places:
+        at = vector_at(scene.place, i)
+        total = ZERO
+        for j in pieces:
+            spread = body.head_radius if scene.by[j] == head else body.tail_radius
+            share, mirrored = _shares(body, scene.of[i], scene.by[j], head)
+            start, end, force = vector_at(scene.start, j), vector_at(scene.end, j), vector_at(scene.force, j)
+            if share != 0:
+                total = plus(total, times(share, stokeslets(at, start, end, force, spread)))
+            if mirrored != 0:
+                start = (start[0], 2 * height - start[1], start[2])
+                end = (end[0], 2 * height - end[1], end[2])
+                image = (force[0], -force[1], force[2])
+                total = plus(total, times(mirrored, stokeslets(at, start, end, image, spread)))
+        add_at(flow, i, times(1 / body.viscosity, total))
+
+
+@compiled
+def _shares(body: Body, on: int, by: int, head: int) -> tuple[float, float]:
+    """Shares of the flow of one part that another meets: directly, and from the surface."""
+    terms = body.nonlocal_terms
+    if on == by:
+        return 0.0, 0.0 if on == head else terms.free_surface
+    share = terms.head_flow if on == head or by == head else terms.tail_interaction
+    return share, share * terms.free_surface
+
+
+@compiled
+def _head_resistance(body: Body) -> tuple[float, float]:
+    """The part of the head's drag that moves the fluid, across and along the axis.
+
+    It is at most the drag with which the head's pieces alone would go along with the flow that they make.
+    """
+    end, across, along = (0.0, 0.0, body.head_length), 0.0, 0.0
+    for i in range(_PIECES):
+        at = (0.0, 0.0, (i + 0.5) / _PIECES * body.head_length)
+        across += stokeslets(at, ZERO, end, (1.0, 0.0, 0.0), body.head_radius)[0]
+        along += stokeslets(at, ZERO, end, E_Z, body.head_radius)[2]
+    pieces = _PIECES * body.viscosity
+    return min(pieces / across, body.resistance[0, 0]), min(pieces / along, body.resistance[1, 1])
+
+
+@compiled
+def _add_rotlets(body: Body, scene: Scene, nodes: int, torque: float, flow: Floats) -> None:
+    """Add to `flow` at the tails' nodes what the head's spin brings about."""
+    terms = body.nonlocal_terms
+    height = HEIGHT * max(body.offset, body.head_radius)
+    for i in range(nodes):
+        for j in range(_PIECES):
+            middle = vector_at(scene.place, nodes + j)
+            away = minus(vector_at(scene.place, i), middle)
+            mirrored = (away[0], away[1] + 2 * middle[1] - 2 * height, away[2])
+            direct = rotlet(away, (0.0, 0.0, torque / _PIECES), body.head_radius)
+            back = rotlet(mirrored, (0.0, 0.0, -torque / _PIECES), body.head_radius)
+            total = times(terms.head_flow / body.viscosity, plus(direct, times(terms.free_surface, back)))
+            add_at(flow, i, total)

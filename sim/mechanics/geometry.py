@@ -1,0 +1,154 @@
+"""Tails as arrays in compiled loops: edges, joints, elastic forces and their derivatives.
+
+The formulas of `sim.mechanics.rod` over the nodes of M tails side by side. Every tail is turned about the axis so
+that its clamp lies at (a, 0, 0): tail j of a robot at disc phase φ is at phase φ + 2πj/N.
+
+Arrays are (node, tail, component). Units: l, μ0 l⁴/EI, EI/l².
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.compiling import compiled
+from sim.linear.blocks import put, vector
+from sim.linear.vectors import ZERO, Matrix, Vector, dot, minus, plus, times
+from sim.mechanics.rod import bend, edge_force, edge_stiffness, joint_stiffness
+
+ROOT_TANGENT = (0.0, 0.0, -1.0)
+
+
+class Geometry(NamedTuple):
+    """Edges and joints of M tails with n edges; joint k lies between edges k − 1 and k, joint 0 at the clamp."""
+
+    tangent: Floats  # (n + 1, M, 3): root tangent, then one an edge
+    length: Floats  # (n, M)
+    joint: Floats  # (n, M, 3): c, g', g''
+    by_after: Floats  # (n, M, 3) ∂c/∂e_k
+    by_before: Floats  # (n, M, 3) ∂c/∂e_{k−1}
+    force: Floats  # (n, M, 3) ∂E/∂e
+
+
+@compiled
+def new_geometry(n: int, tails: int) -> Geometry:
+    """Room for M tails of n edges."""
+    return Geometry(
+        np.zeros((n + 1, tails, 3)),
+        np.zeros((n, tails)),
+        np.zeros((n, tails, 3)),
+        np.zeros((n, tails, 3)),
+        np.zeros((n, tails, 3)),
+        np.zeros((n, tails, 3)),
+    )
+
+
+@compiled
+def straight(n: int, tails: int, offset: float) -> Floats:
+    """Free nodes (n, M, 3) of straight tails."""
+    x = np.zeros((n, tails, 3))
+    x[:, :, 0] = offset
+    for k in range(n):
+        x[k, :, 2] = -(k + 1) / n
+    return x
+
+
+@compiled
+def turned_edges(x: Floats, dx: Floats, offset: float) -> Floats:
+    """Free nodes (n, M, 3) after a correction dx that turns the edges.
+
+    Added to the positions, a correction would also stretch the edges that it turns, in second order. Here every
+    edge gets the new direction, and stretches by the first order of the correction alone.
+    """
+    n, tails, _ = x.shape
+    out = np.empty_like(x)
+    for m in range(tails):
+        below, below_dx, moved = (offset, 0.0, 0.0), ZERO, (offset, 0.0, 0.0)
+        for k in range(n):
+            here, here_dx = vector(x, k, m), vector(dx, k, m)
+            edge, change = minus(here, below), minus(here_dx, below_dx)
+            length = np.sqrt(dot(edge, edge))
+            turned = plus(edge, change)
+            wanted = length + dot(edge, change) / length
+            moved = plus(moved, times(wanted / np.sqrt(dot(turned, turned)), turned))
+            put(out, k, m, moved)
+            below, below_dx = here, here_dx
+    return out
+
+
+@compiled
+def measure(geometry: Geometry, x: Floats, offset: float, axial_stiffness: float) -> None:
+    """Fill `geometry` for free nodes x (n, M, 3) of tails clamped at (offset, 0, 0) along −e_z."""
+    n, tails, _ = x.shape
+    tangents, lengths, joints, by_afters, by_befores, forces = geometry
+    for m in range(tails):
+        put(tangents, 0, m, ROOT_TANGENT)
+        below, before, length_before = (offset, 0.0, 0.0), ROOT_TANGENT, 1.0
+        for k in range(n):
+            here = vector(x, k, m)
+            edge = minus(here, below)
+            length = np.sqrt(dot(edge, edge))
+            tangent = times(1 / length, edge)
+            c, first, second, by_after, by_before = bend(
+                before, tangent, length_before, length, inverse_voronoi(k, n)
+            )
+            put(tangents, k + 1, m, tangent)
+            lengths[k, m] = length
+            put(joints, k, m, (c, first, second))
+            put(by_afters, k, m, by_after)
+            put(by_befores, k, m, by_before)
+            below, before, length_before = here, tangent, length
+        for k in range(n):
+            first_next, by_before_next = 0.0, ZERO
+            if k < n - 1:
+                first_next, by_before_next = joints[k + 1, m, 1], vector(by_befores, k + 1, m)
+            tangent, by_after = vector(tangents, k + 1, m), vector(by_afters, k, m)
+            force = edge_force(
+                tangent, lengths[k, m], n, axial_stiffness, joints[k, m, 1], by_after, first_next, by_before_next
+            )
+            put(forces, k, m, force)
+
+
+@compiled
+def inverse_voronoi(k: int, n: int) -> float:
+    """1/l_k of the bending energy of joint k: 2n at the clamp, n elsewhere."""
+    return 2.0 * n if k == 0 else 1.0 * n
+
+
+@compiled
+def edge_block(geometry: Geometry, k: int, m: int, axial_stiffness: float) -> Matrix:
+    """∂²E/∂e_k²."""
+    n = geometry.length.shape[0]
+    c, first, second = vector(geometry.joint, k, m)
+    c_next, first_next, second_next, by_before_next = 1.0, 0.0, 0.0, ZERO
+    if k < n - 1:
+        c_next, first_next, second_next = vector(geometry.joint, k + 1, m)
+        by_before_next = vector(geometry.by_before, k + 1, m)
+    return edge_stiffness(
+        vector(geometry.tangent, k + 1, m), geometry.length[k, m], n, axial_stiffness,
+        c, first, second, vector(geometry.by_after, k, m),
+        c_next, first_next, second_next, by_before_next,
+    )  # fmt: skip
+
+
+@compiled
+def joint_block(geometry: Geometry, k: int, m: int) -> Matrix:
+    """∂²E/∂e_{k−1} ∂e_k of joint k."""
+    c, first, second = vector(geometry.joint, k, m)
+    return joint_stiffness(
+        vector(geometry.tangent, k, m), vector(geometry.tangent, k + 1, m),
+        geometry.length[k - 1, m], geometry.length[k, m],
+        c, first, second, vector(geometry.by_after, k, m), vector(geometry.by_before, k, m),
+    )  # fmt: skip
+
+
+@compiled
+def node_tangent(geometry: Geometry, k: int, m: int) -> tuple[Vector, float]:
+    """Unit tangent of node k (0: the clamp), the mean of the adjacent edges', and |S| of their sum S."""
+    total = vector(geometry.tangent, k, m)
+    if k < geometry.length.shape[0]:
+        total = plus(total, vector(geometry.tangent, k + 1, m))
+    spread = np.sqrt(dot(total, total))
+    return times(1 / spread, total), spread

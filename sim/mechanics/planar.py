@@ -1,0 +1,68 @@
+"""Planar rigid motion: poses and twists in the plane seen from above.
+
+A pose is (x, y, ψ): position, and heading ψ counter-clockwise from x. A twist is (forward, left, yaw
+rate) in the body; held for a time T it moves the body along an arc:
+
+    p(T) = ( sin Ω T/Ω   −(1 − cos Ω T)/Ω ; (1 − cos Ω T)/Ω   sin Ω T/Ω ) (v_forward, v_left),  ψ = Ω T.
+
+The robot's surge v_z is forward and its sway v_x is left (yaw takes e_z towards e_x). Arrays are (..., 3).
+Source: exponential map of SE(2), e.g. Murray, Li, Sastry (1994), ch. 2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sim.arrays import Floats
+
+Poses = Floats  # (..., 3)
+
+MIRROR = np.array([1.0, -1.0, -1.0])  # reflection about the body's axis: what a reversed motor does
+
+
+def turn(vector: Floats, angle: ArrayLike) -> Floats:
+    """Rotate plane vectors (..., 2) by angle [rad] (...)."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = vector[..., 0], vector[..., 1]
+    return np.stack([c * x - s * y, s * x + c * y], -1)
+
+
+def compose(first: Poses, then: Poses) -> Poses:
+    """Pose reached by `then`, given in the frame of `first`."""
+    first, then = np.broadcast_arrays(first, then)
+    moved = first[..., :2] + turn(then[..., :2], first[..., 2])
+    return np.concatenate([moved, first[..., 2:] + then[..., 2:]], -1)
+
+
+def inverse(pose: Poses) -> Poses:
+    """The pose that undoes `pose`."""
+    back = -turn(pose[..., :2], -pose[..., 2])
+    return np.concatenate([back, -pose[..., 2:]], -1)
+
+
+def between(start: Poses, end: Poses) -> Poses:
+    """`end` seen from `start`: compose(start, between(start, end)) = end."""
+    return compose(inverse(start), end)
+
+
+def arc(twist: Poses, time: ArrayLike) -> Poses:
+    """Pose after holding `twist` (..., 3) for `time` (...)."""
+    time = np.asarray(time, dtype=float)
+    angle = twist[..., 2] * time
+    half = angle / 2
+    # sin Ω T/Ω and (1 − cos Ω T)/Ω through sinc: exact for Ω → 0.
+    along = time * np.sinc(angle / np.pi)
+    across = time * np.sinc(half / np.pi) * np.sin(half)
+    forward, left = twist[..., 0], twist[..., 1]
+    return np.stack([along * forward - across * left, across * forward + along * left, angle], -1)
+
+
+def net_speed(twist: Poses, lag: Poses, dwell: ArrayLike) -> Floats:
+    """Net speed of a zigzag with equal dwells (...), each a `lag` (..., 3) and then an arc of `twist`.
+
+    The second dwell is the mirror image of the first, since a reversed motor mirrors the motion.
+    """
+    change = compose(lag, arc(twist, dwell))
+    pair = compose(change, change * MIRROR)
+    return np.hypot(pair[..., 0], pair[..., 1]) / (2 * np.asarray(dwell))

@@ -1,0 +1,50 @@
+"""Flow of single forces and torques in a viscous fluid (μ = 1), spread over a length to keep it finite.
+
+Source: Pozrikidis (1992), ch. 2; spread as by Cortez, Fauci and Medovikov (2005).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.linear.vectors import Vector, cross, dot, formula, minus, plus, times
+
+
+@formula
+def stokeslets(at: Vector, start: Vector, end: Vector, force: Vector, spread: float) -> Vector:
+    """Velocity at a point from a force on the fluid that lies evenly on a straight piece, spread over a length.
+
+    With σ along the piece from the foot of the perpendicular c, and R² = σ² + |c|² + spread²:
+    ∫ [(1/R + spread²/R³) f + (r·f) r/R³] dσ/8π, r = c − σ t.
+    """
+    piece = minus(end, start)
+    length = np.sqrt(dot(piece, piece))
+    t = times(1 / length, piece)
+    away = minus(at, start)
+    along = dot(away, t)
+    c = minus(away, times(along, t))
+    square = dot(c, c) + spread * spread
+    first, last = -along, length - along
+    r_first, r_last = np.sqrt(first * first + square), np.sqrt(last * last + square)
+    if first > 0:
+        log = np.log((last + r_last) / (first + r_first))
+    elif last < 0:
+        log = np.log((r_first - first) / (r_last - last))
+    else:
+        log = np.log((last + r_last) * (r_first - first) / square)
+    cubes = (last / r_last - first / r_first) / square
+    first_moment = 1 / r_first - 1 / r_last
+    second_moment = log - (last / r_last - first / r_first)
+    by_c, by_t = dot(c, force), dot(t, force)
+    total = times(log + spread * spread * cubes, force)
+    total = plus(total, times(cubes * by_c - first_moment * by_t, c))
+    total = plus(total, times(second_moment * by_t - first_moment * by_c, t))
+    return times(1 / (8 * np.pi * length), total)
+
+
+@formula
+def rotlet(away: Vector, torque: Vector, spread: float) -> Vector:
+    """Velocity at `away` from a torque on the fluid that is spread over a length."""
+    square = dot(away, away) + spread * spread
+    scale = (square + 1.5 * spread * spread) / (8 * np.pi * square * square * np.sqrt(square))
+    return times(scale, cross(torque, away))

@@ -1,0 +1,83 @@
+"""The contract of an effect: something physical that the base model leaves out.
+
+An effect is one file in `sim/effects` with one instance of `Effect` named EFFECT. The folder finds its own
+members; the simulator, sweep columns, calibration candidates, the table in the docs and the tests read that list.
+So adding an effect is adding its file. An effect
+
+1. has one size ε per robot. At its `null` the model is exactly the base model;
+2. declares its equation, source, unit of ε, bounds, a `typical` size for tests and scores, its symmetry under
+   ω → −ω ("even": left and right turns stay mirror images; "odd": they do not), whether it only dissipates,
+   whether it keeps dynamic similarity, what drives it from run to run, and the effect that it needs beside it to
+   be seen, if any;
+3. acts in one of three ways, all differentiable in ε:
+   - `adds` returns the body with terms added, which must not depend on what is there already;
+   - `scales` returns factors on drag, which multiply;
+   - a non-local effect (`reach`) has a number of its own in `Body.nonlocal_terms`, from `number`, and its formula
+     in `sim.mechanics` is called where the balance is summed up (`sim.solve.residual`).
+
+Terms are added first, then the factors multiply. So the order of the effects does not matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+from torch import Tensor
+
+if TYPE_CHECKING:
+    from sim.model.body import Body
+    from sim.model.groups import Groups
+
+
+class Factors(NamedTuple):
+    """What an effect multiplies, each (B,) or 1."""
+
+    viscosity: Tensor | float = 1.0  # everything that drags, and the flow that a force makes
+    drag: Tensor | float = 1.0  # drag of head, disc and tails
+    tail_drag: Tensor | float = 1.0  # ζ∥ and ζ⊥ of the tails alone
+
+
+@dataclass(frozen=True)
+class Driver:
+    """A noted quantity that makes an effect differ from run to run: size = null + ε × quantity."""
+
+    name: str  # of the candidate in a calibration
+    title: str
+    column: str  # of the noted quantity, see `calibration.measurements`
+    unit: str  # of ε
+    bounds: tuple[float, float]
+    typical: float
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Declaration of an effect; subclasses override one of the three ways to act. Sizes ε are dimensionless."""
+
+    name: str  # column name and identifier, e.g. "end_over_end_drag"
+    title: str  # what a person calls it
+    equation: str
+    source: str
+    unit: str
+    null: float
+    bounds: tuple[float, float]
+    typical: float
+    symmetry: Literal["even", "odd"]
+    dissipative: bool
+    similar: bool = True  # the motion at viscosity f and speed ω is that at viscosity 1 and speed f ω
+    reach: Literal["local", "nonlocal"] = "local"
+    is_drag: bool = False  # of a non-local effect: its number grows with drag
+    drivers: tuple[Driver, ...] = ()  # if any, the effect is seen through them alone
+    beside: str = ""  # the effect without which this one shows nothing
+
+    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
+        """The body with this effect's terms added."""
+        return body
+
+    def scales(self, size: Tensor, groups: Groups) -> Factors:
+        """What this effect multiplies."""
+        return Factors()
+
+    def number(self, size: Tensor, groups: Groups) -> Tensor:
+        """The number of a non-local effect in `Body.nonlocal_terms`, in the simulator's units."""
+        return size

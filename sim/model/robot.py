@@ -1,0 +1,95 @@
+"""The robot in SI units, and the only place where SI becomes dimensionless and back.
+
+Scales: length l, time μ0 l⁴/EI (2.207 s for the paper's control example), force EI/l², with EI = E π r0⁴/4. In
+these units the motion depends on the groups of `sim.model.groups` alone.
+
+`sim.inputs` reads and writes robots as files.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot and its fluid in SI units.
+
+    Lengths in m, Young's modulus in Pa, viscosity in Pa s, motor speed in rad/s (magnitude; the direction is the
+    control). Effects map names of `sim.effects` to sizes; they are checked when the robot is read or simulated.
+
+    Example:
+        >>> from softflagella import load_robot
+        >>> robot = load_robot("paper-control")
+        >>> round(robot.time_scale, 3), round(robot.omega_bar, 6)
+        (2.207, 10.0)
+    """
+
+    name: str
+    tails: int
+    tail_length: float
+    tail_radius: float
+    youngs_modulus: float
+    head_radius: float
+    head_length: float
+    viscosity: float
+    motor_speed: float
+    C_t: float
+    C_r: float
+    C_yr: float
+    disc_offset: float | None = None  # a; None: the head's radius
+    effects: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_tails(self.tails)
+        for name in ("tail_length", "tail_radius", "youngs_modulus", "head_radius", "head_length",
+                     "viscosity", "motor_speed", "C_t", "C_r"):  # fmt: skip
+            check_positive(name, getattr(self, name))
+        if self.disc_offset is not None:
+            check_positive("disc_offset", self.disc_offset)
+        check_finite("C_yr", self.C_yr)
+        check_slenderness(self.tail_length / self.tail_radius)
+
+    @property
+    def bending_stiffness(self) -> float:
+        """EI = E π r0⁴/4 [N m²]."""
+        return self.youngs_modulus * math.pi * self.tail_radius**4 / 4
+
+    @property
+    def time_scale(self) -> float:
+        """μ0 l⁴/EI [s]: one dimensionless time unit."""
+        return self.viscosity * self.tail_length**4 / self.bending_stiffness
+
+    @property
+    def omega_bar(self) -> float:
+        """Dimensionless motor speed ω̄ (magnitude)."""
+        return self.motor_speed * self.time_scale
+
+    def group_values(self) -> dict[str, float]:
+        """The dimensionless groups of this robot by column name (positive motor direction)."""
+        return {
+            "C_t": self.C_t,
+            "C_r": self.C_r,
+            "C_yr": self.C_yr,
+            "l_over_R": self.tail_length / self.head_radius,
+            "L_over_R": self.head_length / self.head_radius,
+            "l_over_r0": self.tail_length / self.tail_radius,
+            "omega_bar": self.omega_bar,
+            "N": float(self.tails),
+            "a_over_R": (self.disc_offset or self.head_radius) / self.head_radius,
+            **self.effects,
+        }
+
+    def groups(self) -> Groups:
+        """This robot as a batch of one."""
+        return Groups.from_columns({name: np.array([value]) for name, value in self.group_values().items()})
+
+    def with_motor(self, omega_bar: float) -> Robot:
+        """The same robot with the motor speed that gives `omega_bar`."""
+        return replace(self, motor_speed=abs(omega_bar) / self.time_scale)

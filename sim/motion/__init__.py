@@ -1,0 +1,1 @@
+"""What users ask for: steady motion, response to switches, replays, sensitivities; many robots at once."""

@@ -1,0 +1,72 @@
+"""Orbits of many robots: their mean motion, how it ended, the gap between their tails, and derivatives.
+
+The loops over robots are plain Python: only what a single robot needs is compiled together.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats, Integers
+from sim.model.body import Body
+from sim.solve.assembly import unpacked
+from sim.solve.derivative import orbit_slopes
+from sim.solve.orbit import mean_motion, residual_on_orbit, smallest_gap
+from sim.solve.refinement import FEW, SOLVED, Orbit, extrapolate, refined_orbit
+
+WIDTH = 1e-5  # step of the differences in a robot's numbers, on which the balance depends almost linearly
+
+
+class Orbits(NamedTuple):
+    """Steady motions of B robots; means of (ω_t, ω_h, ω_yr, v_x, v_z) of the head's centre."""
+
+    means: Floats  # (B, 5), NaN where not solved
+    slopes: Floats  # (B, K, 5): derivatives of the means along K directions
+    error: Floats  # (B,) estimated relative error
+    ended: Integers  # (B,) SOLVED or why not, see `sim.solve.refinement`
+    gap: Floats  # (B,) smallest distance between tails over 2 r0
+
+
+def solve_orbits(rows: Floats, tails: int, directions: Floats | None = None, *, phases: int = FEW) -> Orbits:
+    """Orbits of robots with N tails.
+
+    Args:
+        rows: (B, K'), the robots' numbers (`sim.solve.assembly.numbers`, transposed).
+        tails: N.
+        directions: (B, K, K'), in which the means are to be differentiated (none by default).
+        phases: to begin with.
+    """
+    count = 0 if directions is None else directions.shape[1]
+    slopes = np.full((len(rows), count, 5), np.nan)
+    found: list[Orbit] = []
+    gap = np.full(len(rows), np.nan)
+    for i, body in enumerate(unpacked(rows)):
+        orbit = refined_orbit(body, tails, phases)
+        found.append(orbit)
+        if orbit.ended == SOLVED:
+            gap[i] = smallest_gap(body, orbit.x[2], tails)
+            if directions is not None:
+                slopes[i] = _slopes(body, rows[i], directions[i], orbit)
+    return Orbits(
+        np.array([orbit.means for orbit in found]),
+        slopes,
+        np.array([orbit.error for orbit in found]),
+        np.array([orbit.ended for orbit in found]),
+        gap,
+    )
+
+
+def _slopes(body: Body, row: Floats, directions: Floats, orbit: Orbit) -> Floats:
+    """Derivatives of the extrapolated means along `directions` (K, K'), (K, 5)."""
+    moved = list(zip(unpacked(row - WIDTH * directions), unpacked(row + WIDTH * directions), strict=True))
+    found = np.empty((3, len(directions), 5))
+    for i, (x, u) in enumerate(zip(orbit.x, orbit.u, strict=True)):
+        ends = [[residual_on_orbit(robot, x, u) for robot in pair] for pair in moved]
+        r, t = (np.array([above[c] - below[c] for below, above in ends]) / (2 * WIDTH) for c in (0, 1))
+        changes = orbit_slopes(body, r, t, x, u)
+        for k, (below, above) in enumerate(moved):
+            rise = mean_motion(above, u + WIDTH * changes[k]) - mean_motion(below, u - WIDTH * changes[k])
+            found[i, k] = rise / (2 * WIDTH)
+    return extrapolate(found.reshape(3, -1)).reshape(-1, 5)

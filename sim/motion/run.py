@@ -1,0 +1,105 @@
+"""One robot in time: go on at constant motor speed, flip the motor, look where it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.mechanics.balance import tail_spin
+from sim.model.body import Body
+from sim.motion.resolution import MOST_WORK, Resolution, steps_in, time_step
+from sim.solve.march import TOLERANCE, YAW, State, X, Y, advance, new_state
+
+BROKE_DOWN = "Newton's method did not converge in a time step"
+TOO_MUCH = "it would take more time steps than a row may ask for"
+_GRADES = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2)  # of a step, twice each, after a jump of the motor's speed
+_REVERSED = np.array([-1.0, 1.0, -1.0, -1.0])  # of (v_x, v_z, ω_yr, ω_h), by a flip
+
+
+class Run:
+    """A robot stepped in time. `failed` says why it cannot go on: BROKE_DOWN, TOO_MUCH, or empty."""
+
+    def __init__(
+        self,
+        body: Body,
+        tails: int,
+        resolution: Resolution,
+        state: State | None = None,
+        *,
+        most_work: float = MOST_WORK,
+    ):
+        """From `state`, which is changed in place, or from rest with straight tails."""
+        self.body = body
+        self.state = new_state(tails, resolution.edges, body.offset) if state is None else state
+        self.time_step = time_step(body.omega, resolution)
+        self.failed = ""
+        self._jumped = state is None
+        self._work_of_a_step = resolution.work_of_a_step(body, tails)
+        self._work_left = most_work
+
+    def copy(self) -> Run:
+        """A run that goes its own way from here."""
+        other = object.__new__(Run)
+        other.__dict__ |= vars(self)
+        other.state = State(*(array.copy() for array in self.state))
+        return other
+
+    def can_afford(self, duration: float, *, flips: float = 0) -> bool:
+        """Whether so much time and so many flips are within the work left; `failed` if not."""
+        steps = steps_in(duration, self.time_step) + flips * 2 * len(_GRADES)
+        if not self.failed and steps * self._work_of_a_step > self._work_left:
+            self.failed = TOO_MUCH
+        return not self.failed
+
+    def go(self, duration: float) -> tuple[Floats, Floats]:
+        """Advance at constant speed: times since now (count,) and the poses then, (count, 6); none where it fails.
+
+        Steps are equal, but for some short ones where the motor's speed has jumped: there every mode of the tails
+        starts anew, and equal steps would converge at first order only.
+        """
+        if not self.can_afford(duration, flips=1):
+            return np.empty(0), np.empty((0, 6))
+        parts = []
+        if self._jumped:
+            share = min(self.time_step, duration / 2 / (2 * sum(_GRADES)))
+            parts = [(2, 2 * share * grade) for grade in _GRADES]
+        left = duration - sum(part for _, part in parts)
+        parts.append((int(steps_in(left, self.time_step)), left))
+        times, poses, now = [], [], 0.0
+        for count, part in parts:
+            times.append(now + part * np.arange(1, count + 1) / count)
+            poses.append(self.steps(count, part)[0])
+            now += part
+        self._jumped = False
+        times[-1][-1] = duration
+        return np.concatenate(times), np.concatenate(poses)
+
+    def steps(self, count: int, duration: float, *, shapes: int = 0) -> tuple[Floats, Floats]:
+        """Advance in `count` equal steps: poses (count, 6) and the last `shapes` shapes (K, n, N, 3)."""
+        work = count * self._work_of_a_step
+        if not self.failed and work > self._work_left:
+            self.failed = TOO_MUCH
+        if self.failed:
+            return np.empty((0, 6)), np.empty((0, *self.state.x.shape))
+        self._work_left -= work
+        poses, seen = np.full((count, 6), np.nan), np.empty((shapes, *self.state.x.shape))
+        if not advance(self.body, self.state, duration / count, count, TOLERANCE, poses, seen):
+            self.failed = BROKE_DOWN
+        return poses, seen
+
+    def flip(self) -> None:
+        """Reverse the motor: the shape goes on, velocities start from their mirror image."""
+        self.body = self.body._replace(omega=-self.body.omega)
+        self.state.u[:] *= _REVERSED
+        self.state.x_dot[:] = 0.0
+        self._jumped = True
+
+    @property
+    def pose(self) -> Floats:
+        """(x, y, ψ) of the head's centre."""
+        return self.state.pose[[X, Y, YAW]]
+
+    @property
+    def omega_t(self) -> float:
+        """Spin of the tails."""
+        return float(tail_spin(self.body, self.state.u))

@@ -1,0 +1,96 @@
+"""Derivatives of the steady motion in every input and effect size, by the implicit function theorem.
+
+The orbit depends on a robot's numbers (`sim.solve.derivative`), and these on its inputs and effect sizes
+(`sim.solve.assembly`), which is differentiated automatically: an effect needs nothing of its own here. Derivatives
+are extrapolated in the mesh like the means themselves.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from sim.arrays import Floats
+from sim.effects import catalogue
+from sim.io.errors import InputError
+from sim.model.groups import Groups
+from sim.motion.orbits import solve_orbits
+from sim.solve.assembly import numbers
+from sim.solve.refinement import MANY
+
+INPUTS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "a_over_R")
+OUTPUTS = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_rad")
+
+_FORWARD = threading.Lock()  # torch keeps one level of forward differentiation for all threads
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """Steady outputs of B robots and their derivatives in K parameters; NaN where there is no orbit."""
+
+    parameters: tuple[str, ...]
+    values: dict[str, Floats]  # OUTPUTS -> (B,)
+    derivatives: dict[str, Floats]  # OUTPUTS -> (B, K), per unit of the parameter
+
+
+def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MANY) -> Sensitivities:
+    """Steady motion and its derivatives.
+
+    Args:
+        groups: robots of one N.
+        parameters: names out of INPUTS and `sim.effects.catalogue()`; an effect that the robots do not carry is
+            differentiated at its null.
+        phases: to begin with; an effect at its null may act in phases that the motion does not need.
+
+    Raises:
+        InputError: an unknown parameter.
+    """
+    names = tuple(parameters)
+    for name in names:
+        if name not in INPUTS and name not in catalogue():
+            allowed = ", ".join((*INPUTS, *catalogue()))
+            raise InputError(f"no parameter {name!r} to differentiate in; there are {allowed}")
+    rows = np.ascontiguousarray(numbers(groups).detach().numpy().T)
+    moved = [_direction(groups, name) for name in names]
+    scales = np.stack([scale for _, scale in moved], 1) if names else np.empty((len(groups), 0))
+    directions = np.stack([d for d, _ in moved], 1) if names else np.empty((len(groups), 0, rows.shape[1]))
+    found = solve_orbits(rows, groups.N, directions, phases=phases)
+    slopes = found.slopes / scales[:, :, None]  # (B, K, 5)
+    values = dict(zip(OUTPUTS, found.means.T, strict=False))
+    derivatives = {name: slopes[:, :, i] for i, name in enumerate(OUTPUTS[:5])}
+    sway, surge, yaw = values["v_x"], values["v_z"], values["omega_yr_bar"]
+    speed = np.hypot(sway, surge)
+    values["R_yr_over_l"] = speed / np.abs(yaw)
+    values["theta_rad"] = np.arctan2(np.abs(sway), surge)
+    d_sway, d_surge, d_yaw = (derivatives[k] for k in ("v_x", "v_z", "omega_yr_bar"))
+    sway, surge, yaw, speed = (a[:, None] for a in (sway, surge, yaw, speed))
+    d_speed = (sway * d_sway + surge * d_surge) / speed
+    derivatives["R_yr_over_l"] = d_speed / np.abs(yaw) - speed * d_yaw / (yaw * np.abs(yaw))
+    derivatives["theta_rad"] = np.sign(sway) * (surge * d_sway - sway * d_surge) / speed**2
+    return Sensitivities(names, values, derivatives)
+
+
+def _direction(groups: Groups, name: str) -> tuple[Floats, Floats]:
+    """How the robots' numbers change with a parameter in units of its own size, (B, K'), and that size (B,)."""
+    if name in INPUTS:
+        value = getattr(groups, name)
+        size = value.abs()
+
+        def changed_numbers(changed: Tensor) -> Tensor:
+            return numbers(replace(groups, **{name: changed}))  # type: ignore[arg-type]
+    else:
+        effect = catalogue()[name]
+        value = groups.effects.get(name, torch.full_like(groups.omega_bar, effect.null))
+        size = torch.full_like(value, abs(effect.typical - effect.null))
+
+        def changed_numbers(changed: Tensor) -> Tensor:
+            return numbers(replace(groups, effects={**groups.effects, name: changed}))
+
+    with _FORWARD:
+        direction: Tensor = torch.func.jvp(changed_numbers, (value,), (size,))[1]
+    return direction.T.numpy(), size.numpy()

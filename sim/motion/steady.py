@@ -1,0 +1,112 @@
+"""Steady motion at constant motor speed: as an orbit where that works, by time stepping where it does not.
+
+The direct route (`sim.motion.orbits`) solves for the relative periodic orbit on which all tails move alike; it
+takes well under a millisecond a robot and gives the error of its means. Straight tails at rest reach that orbit
+wherever the robot turns slowly beside its disc (docs/branches.md). Where it may not (|ω_yr| > QUICK |ω_t|), the
+robot is stepped in time from rest as well, and what that reaches is the answer; where Newton's method fails in the
+direct route, stepping is the answer too. Such rows say so; their error is estimated from two meshes and steps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from sim.arrays import Floats, Integers, Words
+from sim.effects import check_size
+from sim.model.groups import Groups
+from sim.motion.orbits import solve_orbits
+from sim.motion.resolution import Resolution
+from sim.motion.settling import settle
+from sim.motion.steady_motion import DIRECT, Steady
+from sim.solve.assembly import numbers
+from sim.solve.refinement import FEW, REASONS, SOLVED
+
+QUICK = 0.4  # ω_yr/ω_t from which straight tails may reach another motion
+SAME = 0.02  # relative difference up to which a stepped motion counts as the direct one
+_OTHER_MOTION = "straight tails reach another motion than the one on which they move alike"
+
+
+def steady(groups: Groups) -> Steady:
+    """Steady motion of robots of one N, as reached from rest.
+
+    Args:
+        groups: B robots; ω̄ may have either sign.
+
+    Returns:
+        Their mean motion, dimensionless (lengths in l, times in μ0 l⁴/EI), and how good it is.
+
+    Raises:
+        InputError: an unknown effect, or a size outside its bounds.
+
+    Example:
+        >>> from softflagella import load_robot
+        >>> motion = steady(load_robot("paper-control").groups())
+        >>> round(float(motion.omega_yr[0]), 3), motion.method[0] == "direct"
+        (0.049, True)
+    """
+    check_groups(groups)
+    motion = orbits(groups)
+    quick = np.flatnonzero(~motion.failed & (np.abs(motion.omega_yr) > QUICK * np.abs(motion.omega_t)))
+    if len(quick):
+        reached = settle(_rows(groups, quick), resolution=Resolution.for_tracks)
+        other = quick[_difference(motion.at(quick), reached) > SAME]
+        motion = _with_stepped(motion, groups, other, np.full(len(groups), _OTHER_MOTION))
+    lost = np.flatnonzero(motion.failed & (motion.method == DIRECT))
+    return _with_stepped(motion, groups, lost, motion.note)
+
+
+def check_groups(groups: Groups) -> None:
+    """Refuse unknown effects and sizes outside their bounds."""
+    for name, sizes in groups.effects.items():
+        for end in (sizes.min(), sizes.max()):
+            check_size(name, float(end))
+
+
+def _with_stepped(motion: Steady, groups: Groups, rows: Integers, notes: Words) -> Steady:
+    """This motion with `rows` stepped instead; notes (B,) say why."""
+    if not len(rows):
+        return motion
+    return motion.with_rows(rows, stepped(_rows(groups, rows), notes[rows].tolist()))
+
+
+def _rows(groups: Groups, rows: Integers) -> Groups:
+    return groups.select(torch.as_tensor(rows))
+
+
+def orbits(groups: Groups, *, phases: int = FEW) -> Steady:
+    """The direct route alone, on `phases` phases to begin with; `failed` where it found no orbit."""
+    rows = np.ascontiguousarray(numbers(groups).detach().cpu().numpy().T)
+    found = solve_orbits(rows, groups.N, phases=phases)
+    means = found.means.T
+    solved = found.ended == SOLVED
+    return Steady(
+        omega_t=means[0],
+        omega_h=means[1],
+        omega_yr=means[2],
+        v_x=means[3],
+        v_z=means[4],
+        tail_gap=found.gap,
+        error=found.error,
+        converged=solved,
+        failed=~solved,
+        method=np.full(len(groups), DIRECT),
+        note=np.array([REASONS[k] for k in found.ended.tolist()]),
+    )
+
+
+def stepped(groups: Groups, notes: list[str]) -> Steady:
+    """Time stepping from rest on two meshes and steps; their difference gives the error of the finer."""
+    coarse = settle(groups)
+    fine = settle(groups, resolution=lambda speed: Resolution.fitting(speed).finer(2))
+    fields = {**vars(fine), "error": _difference(coarse, fine) / 3}  # of second order
+    fields["note"] = np.array([f"{a}; {b}" if b else a for a, b in zip(notes, fine.note.tolist(), strict=True)])
+    return Steady(**fields)
+
+
+def _difference(motion: Steady, other: Steady) -> Floats:
+    """Largest relative difference of the means; velocities relative to the speed."""
+    speed = np.hypot(other.v_x, other.v_z)
+    rates = [np.abs(getattr(motion, k) / getattr(other, k) - 1) for k in ("omega_t", "omega_h", "omega_yr")]
+    velocities = [np.abs(getattr(motion, k) - getattr(other, k)) / speed for k in ("v_x", "v_z")]
+    return np.asarray(np.max(rates + velocities, 0))

@@ -1,0 +1,77 @@
+"""What is said of a steady motion, however it was found.
+
+    means:  ω_t, ω_h, ω_yr, v_x, v_z (of the head's centre, body frame), over whole revolutions
+    R_yr = √(v_x² + v_z²)/|ω_yr|,   θ = atan2(|v_x|, v_z)
+
+R_yr and θ belong to the tracked point; any other point of the axis follows from (v_x, v_z, ω_yr).
+Units: l, μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from sim.arrays import Flags, Floats, Integers, Words
+
+DIRECT, STEPPING = "direct", "stepping"
+STEADY_COLUMNS = (
+    "omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z",
+    "R_yr_over_l", "theta_deg", "converged", "tail_gap",
+)  # fmt: skip
+QUALITY_COLUMNS = ("error", "method", "note")  # how good a row is, beside its numbers
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Mean motion of B robots; all (B,), dimensionless; NaN where `failed`."""
+
+    omega_t: Floats
+    omega_h: Floats
+    omega_yr: Floats
+    v_x: Floats
+    v_z: Floats
+    tail_gap: Floats  # smallest distance between tails over 2 r0; below 1 they touch
+    error: Floats  # estimated relative error of the means (velocities: of the speed); NaN: unknown
+    converged: Flags  # the motion is steady and solved to tolerance
+    failed: Flags  # no numbers
+    method: Words  # DIRECT or STEPPING
+    note: Words  # why a row is not converged, or not solved directly; else empty
+
+    def __len__(self) -> int:
+        return len(self.omega_t)
+
+    @property
+    def turn_radius(self) -> Floats:
+        """R_yr/l of the head's centre."""
+        return np.asarray(np.hypot(self.v_x, self.v_z) / np.abs(self.omega_yr))
+
+    @property
+    def slip_angle(self) -> Floats:
+        """θ [rad], between the axis and the tangent of the path."""
+        return np.asarray(np.arctan2(np.abs(self.v_x), self.v_z))
+
+    def columns(self) -> dict[str, Any]:
+        """Columns of the command `python -m sim steady`."""
+        values = (
+            self.omega_t, self.omega_h, self.omega_yr, self.v_x, self.v_z,
+            self.turn_radius, np.degrees(self.slip_angle), self.converged, self.tail_gap,
+            self.error, self.method, self.note,
+        )  # fmt: skip
+        return dict(zip((*STEADY_COLUMNS, *QUALITY_COLUMNS), values, strict=True))
+
+    def at(self, rows: Integers) -> Steady:
+        """The rows at `rows`."""
+        return Steady(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
+
+    def with_rows(self, rows: Integers, other: Steady) -> Steady:
+        """This motion with `rows` taken from `other`."""
+        changed = {}
+        for field in fields(self):
+            values = getattr(self, field.name)
+            wide = np.asarray(values, dtype=object if values.dtype.kind == "U" else None).copy()
+            wide[rows] = getattr(other, field.name)
+            changed[field.name] = wide.astype(str) if values.dtype.kind == "U" else wide
+        return Steady(**changed)

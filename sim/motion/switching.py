@@ -1,0 +1,144 @@
+"""Flips of the motor: response to one switch, and net motion when ω flips every half-period T.
+
+After a flip the tails need about 0.7 time units to turn over, and meanwhile the robot lags the circle
+that its new steady motion would draw. With g(T) the pose change over a dwell T, in the pose at the flip,
+
+    lag(T) = g(T) ∘ circle(T)⁻¹   (Δψ, Δx sideways, Δz forward)
+
+is the offset by which the robot, once the tails have turned over, follows its steady circle: lag tends to a
+constant for long T, and a schedule's motion is a product of lags and arcs.
+
+With equal dwells of T the robot zigzags along a line at the net speed
+
+    v̄ = |p + Rot(Δψ) M p| / 2T,   g = (p, Δψ),  M the mirror image,
+
+since a reversed motor mirrors the motion. Where T exceeds the tails' memory one flip from the steady motion gives
+g. Where it does not, the motor flips on until the motion repeats: the shape at a flip is the mirror image of the
+one at the flip before (the flipped periodic orbit; flips forget their start as fast as the tails turn over). g is
+the mean over two disc phases half a tail spacing apart at the first flip: the phase at a flip matters for N = 2,
+and a planner does not know it.
+
+The steady circle in the lag is that of the same mesh and step, so that the discretisation's error, which grows
+with T, cancels. The net speed is made of the lag and the arcs of the extrapolated steady motion.
+Units: l, μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.arrays import Flags, Floats
+from sim.effects import catalogue
+from sim.mechanics import planar
+from sim.model.body import Body
+from sim.model.groups import Groups
+from sim.motion.resolution import Resolution
+from sim.motion.run import Run
+from sim.motion.settling import settle_one
+from sim.motion.shapes import state_on_orbit
+from sim.motion.steady import check_groups, steady
+from sim.motion.steady_motion import Steady
+from sim.solve.assembly import bodies
+from sim.solve.march import PHASE, SURGE, SWAY, YAW
+
+MEMORY = 1.2  # time units after which a flip is forgotten: the tails turn over in about 0.7
+_AVERAGED = 2  # half-periods that the mean is taken over, where there are as many
+_ADAPTS = 0.5  # time units after which time steps have forgotten that they began on an orbit of another mesh
+_WINDOW = 0.5  # shortest averaging time of the steady circle
+
+
+@dataclass(frozen=True)
+class SwitchResponse:
+    """Response of B robots to flips with half-period T̄; all (B,), dimensionless, NaN where `failed`."""
+
+    dwell: Floats
+    net_speed: Floats
+    lag_psi: Floats  # [rad], positive in the direction of the new turn
+    lag_x: Floats  # sideways, positive towards the new turn's side
+    lag_z: Floats  # forward
+    failed: Flags
+
+
+def switch_response(
+    groups: Groups, dwell: Floats, motion: Steady | None = None, *, resolution: Resolution | None = None
+) -> SwitchResponse:
+    """Flip the motor every `dwell` from the steady motion.
+
+    Args:
+        groups: robots of one N; the sign of ω̄ is the direction before the first flip.
+        dwell: half-periods T̄, (B,).
+        motion: the robots' steady motion, if it is at hand; the net speed is made of its arcs and the lags.
+        resolution: mesh and step; by default what each robot needs.
+    """
+    check_groups(groups)
+    motion = steady(groups) if motion is None else motion
+    dwell = np.asarray(dwell, dtype=float)
+    even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
+    robots = bodies(groups)
+    lag = np.array([_lag(body, groups.N, T, even, resolution) for body, T in zip(robots, dwell, strict=True)])
+    sense = np.sign([body.omega for body in robots])
+    twist = np.stack([motion.v_z, sense * motion.v_x, sense * motion.omega_yr], -1)
+    speed = planar.net_speed(twist, lag, dwell)
+    failed = ~np.isfinite(speed)
+    lag[failed] = np.nan
+    return SwitchResponse(dwell, speed, lag[:, 2], lag[:, 1], lag[:, 0], failed)
+
+
+def _lag(body: Body, tails: int, dwell: float, even: bool, resolution: Resolution | None) -> Floats:
+    """(Δz, Δx, Δψ) of one robot; NaN where it breaks down."""
+    chosen = resolution or Resolution.fitting(body.omega)
+    state = state_on_orbit(body, tails, chosen.edges, 0.0)
+    if state is None:
+        settled = settle_one(body, tails, chosen)
+        if settled.failed:
+            return np.full(3, np.nan)
+        state = settled.state
+    run = Run(body, tails, chosen, state)
+    sense = np.sign(body.omega)
+    twist, turn = _steady_twist(run, tails, sense)
+    if run.failed:
+        return np.full(3, np.nan)
+    later = run.copy()
+    later.go(0.5 * turn)
+    changes = []
+    for copy in (run, later):
+        changes.append(_change(copy, dwell, even, sense))
+        if copy.failed:
+            return np.full(3, np.nan)
+    return planar.compose(np.mean(changes, 0), planar.inverse(planar.arc(twist, dwell)))
+
+
+def _steady_twist(run: Run, tails: int, sense: float) -> tuple[Floats, float]:
+    """Forward, leftward and yaw rate for a positive motor, and the time in which the disc turns by a tail spacing.
+
+    Velocities repeat with the spacing of the tails: means over a whole number of them.
+    """
+    run.go(_ADAPTS)
+    before = run.state.pose.copy()
+    spacing = 2 * np.pi / tails / max(abs(run.omega_t), 1e-300)
+    time = spacing * max(1, math.ceil(_WINDOW / spacing))
+    run.go(time)
+    change = (run.state.pose - before) / time
+    turn = 2 * np.pi / tails / max(abs(change[PHASE]), 1e-300)
+    return np.array([change[SURGE], sense * change[SWAY], sense * change[YAW]]), turn
+
+
+def _change(run: Run, dwell: float, even: bool, sense: float) -> Floats:
+    """Pose change over a dwell, seen in the direction of a positive motor."""
+    flips = 1 + MEMORY / dwell
+    if not run.can_afford(flips * dwell, flips=flips):
+        return np.full(3, np.nan)
+    count = int(flips)
+    count += 0 if even else count % 2
+    changes = []
+    for _ in range(count):
+        run.flip()
+        sense = -sense
+        before = run.pose
+        run.go(dwell)
+        change = planar.between(before, run.pose)
+        changes.append(change if sense > 0 else change * planar.MIRROR)
+    return np.asarray(np.mean(changes[-_AVERAGED:] if even else changes[-1:], 0))

@@ -1,0 +1,88 @@
+"""Linear theory of nearly straight tails: what the simulator must tend to for small deflections.
+
+A tail at distance a from the axis, turning steadily at ω_t, with w = x + iy in the frame of the disc:
+
+    w'''' = −i S w,   S = ζ⊥ ω_t l⁴/EI,   w(0) = a, w'(0) = 0, w''(l) = w'''(l) = 0
+
+    thrust = (ζ⊥ − ζ∥) ω_t ∫ Im(w* w') ds,   torque = ζ⊥ ω_t ∫ |w|² ds
+
+The robot then: torque of N tails against the head's, 8π C_r R³ |ω_h|; thrust against the drag of head and tails
+along the axis; the head's side force against the drag of head and of straight tails across it. Left out: the
+tails' share of the side force, bending by sway and yaw.
+Units: l, μ0 l⁴/EI, EI/l². Source: Wiggins and Goldstein (1998) for the operator; the drag is that of
+`sim.mechanics.drag`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from sim.mechanics.drag import tail_coefficients
+from sim.model.groups import Groups
+
+_POINTS = 400
+
+
+@dataclass(frozen=True)
+class LinearMotion:
+    """One robot in linear theory; thrust [EI/l²] and torque [EI/l] are those of all tails."""
+
+    omega_t: float
+    omega_yr: float
+    v_x: float  # of the head's centre
+    v_z: float
+    thrust: float
+    torque: float
+
+
+def linear_filament(S: float) -> tuple[float, float, float]:
+    """Thrust/[(ζ⊥ − ζ∥) ω_t a²], torque/[ζ⊥ ω_t a² l] and tip offset/a of one tail at a drag number S."""
+    if abs(S) < 1e-9:
+        return 0.0, 1.0, 1.0
+    roots = (-1j * S) ** 0.25 * np.array([1, 1j, -1, -1j])
+    ends = np.exp(roots)
+    rows = [np.ones(4), roots, roots**2 * ends, roots**3 * ends]
+    amplitude = np.linalg.solve(np.array(rows), np.array([1, 0, 0, 0]))
+    arc = np.linspace(0, 1, _POINTS + 1)
+    waves = np.exp(np.outer(arc, roots))
+    w, slope = waves @ amplitude, waves @ (roots * amplitude)
+    thrust = np.trapezoid((w.conj() * slope).imag, arc)
+    return abs(float(thrust)), float(np.trapezoid(np.abs(w) ** 2, arc)), float(abs(w[-1]))
+
+
+def linear_motion(groups: Groups) -> LinearMotion:
+    """Linear theory for the one robot in `groups` (effects are left out)."""
+    parallel, perp = (float(c) for c in tail_coefficients(groups.l_over_r0))
+    R, omega, tails = 1 / float(groups.l_over_R), float(groups.omega_bar), groups.N
+    length, a = float(groups.L_over_R) * R, float(groups.a_over_R) * R
+    spin_drag = 8 * math.pi * float(groups.C_r) * R**3
+    speed = abs(omega)
+
+    def torque(omega_t: float) -> float:
+        return tails * perp * omega_t * a**2 * linear_filament(perp * omega_t)[1]
+
+    omega_t = float(brentq(lambda w: torque(w) - spin_drag * (speed - w), 0.0, speed))
+    thrust = tails * (perp - parallel) * omega_t * a**2 * linear_filament(perp * omega_t)[0]
+    drag = 6 * math.pi * float(groups.C_t) * R
+    surge = thrust / (drag + tails * parallel)
+    lever = length / 2
+    # Across the axis, about J: head at +L/2, straight tails from 0 to −l.
+    across = np.array(
+        [[drag + tails * perp, drag * lever - tails * perp / 2],
+         [drag * lever - tails * perp / 2, drag * lever**2 + tails * perp / 3]]
+    )  # fmt: skip
+    push = float(groups.C_yr) * R * length * (speed - omega_t)
+    sway, yaw = np.linalg.solve(across, push * np.array([1, lever]))
+    sense = math.copysign(1.0, omega)
+    return LinearMotion(
+        omega_t=sense * omega_t,
+        omega_yr=sense * float(yaw),
+        v_x=sense * float(sway + yaw * lever),
+        v_z=surge,
+        thrust=thrust,
+        torque=sense * torque(omega_t),
+    )

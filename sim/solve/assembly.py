@@ -1,0 +1,107 @@
+"""From robots to the numbers of their balance: the paper's model, and the effects that the robots carry.
+
+Everything here is differentiable, so the derivative of a robot's numbers in any input or effect size is automatic.
+Source of the base model: Du, Miller, Jawed (arXiv 2103.05712).
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from sim.arrays import Floats
+from sim.effects import catalogue, effect_named
+from sim.mechanics.drag import head_resistance, tail_coefficients
+from sim.model.body import Body
+from sim.model.groups import Groups
+
+# Numbers of the non-local effects, by their names; plain numbers in compiled loops.
+Nonlocal = namedtuple("Nonlocal", [e.name for e in catalogue().values() if e.reach == "nonlocal"])  # type: ignore[misc]
+_SHAPES = {"resistance": (4, 5), "tail_load": (3,)}  # of the entries that are no single number
+
+
+def assemble(groups: Groups) -> Body:
+    """The numbers of B robots as tensors, effects included; single ones are (B,).
+
+    Raises:
+        InputError: an unknown effect.
+    """
+    R = 1 / groups.l_over_R
+    L = groups.L_over_R * R
+    none = torch.zeros_like(R)
+    zeta_parallel, zeta_perp = tail_coefficients(groups.l_over_r0)
+    body = Body(
+        omega=groups.omega_bar,
+        offset=groups.a_over_R * R,
+        head_radius=R,
+        head_length=L,
+        tail_radius=1 / groups.l_over_r0,
+        axial_stiffness=4 * groups.l_over_r0**2,
+        viscosity=torch.ones_like(R),
+        zeta_parallel=zeta_parallel,
+        zeta_perp=zeta_perp,
+        resistance=head_resistance(groups.C_t, groups.C_r, groups.C_yr, R, L),
+        droop=none,
+        tail_load=torch.stack([none] * 3),
+        nonlocal_terms=Nonlocal(*[none] * len(Nonlocal._fields)),
+    )
+    return with_effects(body, groups)
+
+
+def with_effects(body: Body, groups: Groups) -> Body:
+    """The body with the effects that `groups` carries: terms are added, then factors multiply.
+
+    Raises:
+        InputError: an unknown effect.
+    """
+    terms = body.nonlocal_terms._asdict()
+    viscosity = drag = tail_drag = torch.ones_like(groups.omega_bar)
+    for name, size in groups.effects.items():
+        effect = effect_named(name)
+        if effect.reach == "nonlocal":
+            terms[name] = effect.number(size, groups)
+        body = effect.adds(size, groups, body)
+        factors = effect.scales(size, groups)
+        viscosity, drag = viscosity * factors.viscosity, drag * factors.drag
+        tail_drag = tail_drag * factors.tail_drag
+    all_drag = viscosity * drag
+    terms = {name: value * all_drag if catalogue()[name].is_drag else value for name, value in terms.items()}
+    return body._replace(
+        viscosity=viscosity,
+        zeta_parallel=body.zeta_parallel * all_drag * tail_drag,
+        zeta_perp=body.zeta_perp * all_drag * tail_drag,
+        resistance=body.resistance * all_drag,
+        nonlocal_terms=Nonlocal(**terms),
+    )
+
+
+def numbers(groups: Groups) -> Tensor:
+    """The numbers of B robots one below the other, (K, B), in the order of `Body`; differentiable."""
+    body = assemble(groups)
+    parts = [getattr(body, name) for name in body._fields[:-1]] + list(body.nonlocal_terms)
+    return torch.cat([part.reshape(-1, len(groups)) for part in parts])
+
+
+def bodies(groups: Groups) -> list[Body]:
+    """The robots for the compiled loops, one by one."""
+    return unpacked(numbers(groups).detach().cpu().numpy().T)
+
+
+def unpacked(rows: Floats) -> list[Body]:
+    """Robots for the compiled loops from their `numbers`, transposed: (B, K)."""
+    columns: list[Any] = []
+    at = 0
+    for name in Body._fields[:-1]:
+        shape = _SHAPES.get(name, ())
+        part = rows[:, at : at + int(np.prod(shape))]
+        at += part.shape[1]
+        if len(shape) == 2:
+            columns.append(np.ascontiguousarray(part).reshape(-1, *shape))
+        else:
+            columns.append([tuple(values) for values in part.tolist()] if shape else part[:, 0].tolist())
+    terms = [Nonlocal(*values) for values in rows[:, at:].tolist()]
+    return [Body(*values) for values in zip(*columns, terms, strict=True)]

@@ -1,0 +1,44 @@
+"""How an orbit changes with the numbers of its robot, by the implicit function theorem.
+
+The orbit z(p) satisfies F(z, p) = 0, so dz/dp = −(∂F/∂z)⁻¹ ∂F/∂p with the matrix that Newton's method has anyway:
+one more right-hand side a parameter instead of two more solutions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.compiling import compiled
+from sim.model.body import Body
+from sim.solve.linearise import linearise
+from sim.solve.newton import factor_and_solve, new_workspace, solve_local, solve_nonlocal
+from sim.solve.orbit import FIRST_PHASE
+from sim.solve.rates import on_orbit
+from sim.solve.residual import is_local
+
+_TOLERANCE = 1e-6  # of GMRES
+
+
+@compiled
+def orbit_slopes(body: Body, r: Floats, t: Floats, x: Floats, u: Floats) -> Floats:
+    """du/dp at the orbit x (n, M, 3), u (P, 4), for K parameters, (K, P, 4).
+
+    Args:
+        r, t: derivatives of `sim.solve.orbit.residual_on_orbit` in the parameters, (K, n, M, 3) and (K, P, 4).
+    """
+    count = len(r)
+    rates = on_orbit(x.shape[1], FIRST_PHASE)
+    work = new_workspace(rates, x, u)
+    linearise(body, rates, x, u, work.room, work.equations)
+    slopes = np.empty((count, u.shape[0], 4))
+    for i in range(count):
+        dx, du = -r[i], -t[i]
+        if i == 0:
+            factor_and_solve(body, rates, u, work, dx, du)
+        else:
+            solve_local(rates, work, dx, du)
+        if not is_local(body):
+            solve_nonlocal(body, rates, x, u, work, _TOLERANCE, dx, du)
+        slopes[i] = du
+    return slopes

@@ -1,0 +1,174 @@
+"""Newton's equations of a robot on an orbit or in a stage of a time step, without the non-local effects.
+
+    A_m δx_m + B_m δu = −r_m on every tail,   Σ_m C_m δx_m + D δu = −t on the robot
+
+A tail's own blocks are the derivatives of drag and elastic forces in the positions of its nodes. In a stage
+∂ẋ/∂x = rate is one of them. On an orbit ẋ joins the phases to each other; `sim.linear.coupled` adds that.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.compiling import compiled
+from sim.linear.blocks import put, put_block, vector
+from sim.linear.chains import Chains, new_chains
+from sim.linear.vectors import (
+    E_Z,
+    ZERO,
+    ZERO_MATRIX,
+    Matrix,
+    Vector,
+    added,
+    applied,
+    cross,
+    dot,
+    minus,
+    plus,
+    subtracted,
+    times,
+    transposed,
+    turned,
+)
+from sim.mechanics.balance import (
+    Motion,
+    clamp_balance,
+    head_drag,
+    motion_at,
+    motor_gain,
+    node_balance,
+    wrench_of,
+)
+from sim.mechanics.geometry import edge_block, joint_block, measure
+from sim.model.body import Body
+from sim.solve.rates import Rates, base_phase, fill_rates, phase_gain
+from sim.solve.residual import Room
+
+
+class Equations(NamedTuple):
+    """Newton's matrix, and what is unbalanced."""
+
+    chains: Chains
+    resistance: Floats  # (n, M, 3, 3): −∂q/∂v of every free node
+    r: Floats  # (n, M, 3)
+    t: Floats  # (P, 4)
+
+
+@compiled
+def new_equations(x: Floats, u: Floats) -> Equations:
+    """Room for unknowns like x (n, M, 3) and u (P, 4)."""
+    n, columns, _ = x.shape
+    chains = new_chains(n, columns, u.shape[0])
+    return Equations(chains, np.zeros((n, columns, 3, 3)), np.zeros_like(x), np.zeros_like(u))
+
+
+@compiled
+def linearise(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, equations: Equations) -> None:
+    """Fill the equations at x (n, M, 3), u (P, 4)."""
+    columns, instants = x.shape[1], u.shape[0]
+    measure(room.geometry, x, body.offset, body.axial_stiffness)
+    fill_rates(rates, body, x, u, room.x_dot, room.by_spin)
+    base = base_phase(rates, body, u)
+    for p in range(instants):
+        _head(body, u[p], equations.chains.corner[p], equations.t[p])
+    for m in range(columns):
+        motion = motion_at(body, u[m % instants], base + 2 * np.pi * m / columns)
+        _tail(body, motion, rates, x, room, equations, m)
+        _clamp(body, motion, rates, room, equations, m, m % instants)
+
+
+@compiled
+def _head(body: Body, u: Floats, corner: Floats, t: Floats) -> None:
+    """The drag on head and disc, and its derivative in u."""
+    gain = motor_gain(body)
+    for a in range(4):
+        for c in range(4):
+            corner[a, c] = -body.resistance[a, c]
+        corner[a, 3] -= gain * body.resistance[a, 4]
+        t[a] = -head_drag(body, u, a)
+
+
+@compiled
+def _tail(body: Body, motion: Motion, rates: Rates, x: Floats, room: Room, equations: Equations, m: int) -> None:
+    """Balance of the nodes of column m, its blocks, and its derivative in the robot's velocities."""
+    n, gain, rate = x.shape[0], motor_gain(body), rates.rate
+    turning_load = times(phase_gain(rates, body) / n, _load_by_phase(body, motion))
+    chains, geometry = equations.chains, room.geometry
+    edge, joint = edge_block(geometry, 0, m, body.axial_stiffness), ZERO_MATRIX  # of node k
+    after_below = ZERO_MATRIX
+    for k in range(n):
+        edge_next, joint_next = ZERO_MATRIX, ZERO_MATRIX
+        if k < n - 1:
+            edge_next = edge_block(geometry, k + 1, m, body.axial_stiffness)
+            joint_next = joint_block(geometry, k + 1, m)
+        position = vector(x, k, m)
+        velocity = plus(plus(motion.linear, cross(motion.spin, position)), vector(room.x_dot, k, m))
+        residual, resistance, before, after = node_balance(geometry, body, motion, k, m, velocity)
+        put(equations.r, k, m, residual)
+        put_block(equations.resistance, k, m, resistance)
+
+        own = subtracted(added(joint_next, transposed(joint_next)), added(edge, edge_next))
+        own = subtracted(added(own, subtracted(after, before)), turned(resistance, motion.spin))
+        own = subtracted(own, (times(rate, resistance[0]), times(rate, resistance[1]), times(rate, resistance[2])))
+        put_block(chains.own, k, m, own)
+        if k > 0:
+            lower = subtracted(added(edge, before), transposed(added(joint, joint_next)))
+            put_block(chains.lower, k, m, lower)
+            put_block(chains.upper, k, m, subtracted(subtracted(edge, added(joint, joint_next)), after_below))
+        if k > 1:
+            put_block(chains.upper2, k, m, joint)
+            put_block(chains.lower2, k, m, transposed(joint))
+
+        about_z = times(gain, plus(cross(E_Z, position), vector(room.by_spin, k, m)))
+        border = chains.border[k]
+        put(border, m, 0, times(-1.0, applied(resistance, motion.e_x)))
+        put(border, m, 1, times(-1.0, transposed(resistance)[2]))
+        put(border, m, 2, times(-1.0, applied(resistance, cross(motion.e_y, position))))
+        by_load = times(0.5 if k == n - 1 else 1.0, turning_load)
+        put(border, m, 3, minus(by_load, applied(resistance, about_z)))
+        edge, joint, after_below = edge_next, joint_next, after
+
+
+@compiled
+def _clamp(body: Body, motion: Motion, rates: Rates, room: Room, equations: Equations, m: int, p: int) -> None:
+    """What column m puts on the disc at instant p."""
+    clamp = clamp_balance(room.geometry, body, m, motion, ZERO, ZERO)
+    chains, root = equations.chains, (body.offset, 0.0, 0.0)
+    wrench = wrench_of(motion, clamp.force, clamp.moment)
+    for a in range(4):
+        equations.t[p, a] += wrench[a]
+    _put_foot(chains.foot[0], m, motion, clamp.force_by_first, clamp.moment_by_first)
+    _put_foot(chains.foot[1], m, motion, clamp.force_by_second, clamp.moment_by_second)
+    corner = chains.corner[p]
+    directions = (motion.e_x, E_Z, cross(motion.e_y, root), times(motor_gain(body), cross(E_Z, root)))
+    for c in range(4):
+        drag = applied(clamp.resistance, directions[c])  # the half cell at the clamp moves with the disc
+        by_velocity = wrench_of(motion, drag, cross(root, drag))
+        for a in range(4):
+            corner[a, c] -= by_velocity[a]
+    # Body axes and load turn with the phase: ∂e_x/∂φ = −e_y, ∂e_y/∂φ = e_x.
+    turning = phase_gain(rates, body)
+    corner[0, 3] -= dot(motion.e_y, clamp.force) * turning
+    corner[2, 3] += dot(motion.e_x, clamp.moment) * turning
+    load = times(0.5 * turning / room.geometry.length.shape[0], _load_by_phase(body, motion))
+    by_load = wrench_of(motion, load, cross(root, load))
+    for a in range(4):
+        corner[a, 3] += by_load[a]
+
+
+@compiled
+def _load_by_phase(body: Body, motion: Motion) -> Vector:
+    """Derivative of the load on a tail, force per length, in the phase."""
+    return minus(times(body.tail_load[1], motion.e_x), times(body.tail_load[0], motion.e_y))
+
+
+@compiled
+def _put_foot(foot: Floats, m: int, motion: Motion, force: Matrix, moment: Matrix) -> None:
+    """Rows of the robot's equations for one node of column m."""
+    put(foot, m, 0, applied(transposed(force), motion.e_x))
+    put(foot, m, 1, force[2])
+    put(foot, m, 2, applied(transposed(moment), motion.e_y))
+    put(foot, m, 3, moment[2])

@@ -1,0 +1,86 @@
+"""How fast the tails change shape: the one place where an orbit and a time step differ.
+
+    orbit       ẋ = ω_t D x                          x at M phases; D: derivative of the interpolant
+    time step   ẋ = (x − x*)/τ,   φ = φ* + τ ω_t     x*, φ* from earlier steps
+
+Columns: tail j of N at instant p of P is column m = p + j P of x (n, M, 3), M = N P, and is at phase φ + 2π m/M.
+On an orbit these are all tails at P instants of an N-th of a turn, or in other words tail 0 at M phases of a whole
+turn. A time step has one instant.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.compiling import compiled
+from sim.linear.blocks import put, vector
+from sim.linear.spectral import differentiation
+from sim.linear.vectors import ZERO, cross, minus, plus, times
+from sim.mechanics.balance import motion_at, motor_gain, tail_spin
+from sim.model.body import Body
+
+
+class Rates(NamedTuple):
+    """An orbit (rate 0) or a stage of a time step (rate 1/τ)."""
+
+    rate: float
+    phase: float  # of column 0 on an orbit; φ* of a stage
+    differentiation: Floats  # D, (M, M); empty for a stage
+    start: Floats  # x*, (n, M, 3); empty for an orbit
+
+
+@compiled
+def on_orbit(phases: int, first_phase: float) -> Rates:
+    """Collocation at M equal phases."""
+    return Rates(0.0, first_phase, differentiation(phases), np.zeros((0, 0, 0)))
+
+
+@compiled
+def in_stage(rate: float, phase: float, start: Floats) -> Rates:
+    """A stage with ẋ = rate (x − start) and φ = phase + ω_t/rate."""
+    return Rates(rate, phase, np.zeros((0, 0)), start)
+
+
+@compiled
+def base_phase(rates: Rates, body: Body, u: Floats) -> float:
+    """Phase of column 0, for velocities u (P, 4); column m is 2π m/M later."""
+    return rates.phase + (tail_spin(body, u[0]) / rates.rate if rates.rate > 0 else 0.0)
+
+
+@compiled
+def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by_spin: Floats) -> None:
+    """Velocities of the free nodes in the disc frame and what a faster spin changes in them.
+
+    Args:
+        x, u: free nodes (n, M, 3) and the robot's velocities (P, 4).
+        x_dot: (n, M, 3), filled.
+        by_spin: (n, M, 3), filled: ∂v/∂ω_t beside e_z × x. On an orbit through ẋ, in a stage through the phase.
+    """
+    n, columns, _ = x.shape
+    base = base_phase(rates, body, u)
+    for m in range(columns):
+        now = u[m % u.shape[0]]
+        if rates.rate > 0:  # ∂v/∂φ = ω_yr e_x × x − v_x e_y, ∂φ/∂ω_t = 1/rate
+            motion = motion_at(body, now, base + 2 * np.pi * m / columns)
+            for k in range(n):
+                position = vector(x, k, m)
+                put(x_dot, k, m, times(rates.rate, minus(position, vector(rates.start, k, m))))
+                by_phase = minus(times(now[2], cross(motion.e_x, position)), times(now[0], motion.e_y))
+                put(by_spin, k, m, times(1 / rates.rate, by_phase))
+        else:
+            omega_t = tail_spin(body, now)
+            for k in range(n):
+                slope = ZERO
+                for j in range(columns):
+                    slope = plus(slope, times(rates.differentiation[m, j], vector(x, k, j)))
+                put(by_spin, k, m, slope)
+                put(x_dot, k, m, times(omega_t, slope))
+
+
+@compiled
+def phase_gain(rates: Rates, body: Body) -> float:
+    """∂φ/∂ω_h."""
+    return motor_gain(body) / rates.rate if rates.rate > 0 else 0.0

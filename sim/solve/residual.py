@@ -1,0 +1,110 @@
+"""What is left unbalanced on a robot: drag, elastic forces and loads on every node, the wrench on the robot.
+
+    r = 0 on every free node, t = (F_x, F_z, M_y, M_z) = 0 about J
+
+`fill_residual` sums up everything that acts. Beside local drag and the elastic forces of straight tails
+(`sim.mechanics.balance`) these are the non-local effects: material frames (`frames`), flow from one part to
+another (`flow`) and friction of the contact line. A new one is called in `_surround`.
+
+The Newton matrices of `sim.solve.linearise` leave the non-local effects out; GMRES takes them into account
+(`sim.solve.newton`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.compiling import compiled
+from sim.linear.blocks import put, vector, vector_at
+from sim.linear.vectors import cross, minus, plus
+from sim.mechanics.balance import clamp_balance, head_drag, motion_at, node_balance, wrench_of
+from sim.mechanics.contact_line import add_contact_line
+from sim.mechanics.flow import add_flow, has_flow
+from sim.mechanics.frames import add_frames, has_frames
+from sim.mechanics.geometry import Geometry, measure, new_geometry
+from sim.model.body import Body
+from sim.solve.rates import Rates, base_phase, fill_rates
+
+
+class Surroundings(NamedTuple):
+    """What non-local effects bring about; zero without them."""
+
+    flow: Floats  # of the fluid at nodes 0..n, (n + 1, M, 3)
+    moment: Floats  # further moment of each clamp on the disc, (M, 3)
+    wrench: Floats  # on the robot about J, (P, 4)
+
+
+class Room(NamedTuple):
+    """Arrays to evaluate a residual in."""
+
+    geometry: Geometry
+    around: Surroundings
+    x_dot: Floats  # (n, M, 3)
+    by_spin: Floats  # (n, M, 3), see `sim.solve.rates`
+
+
+@compiled
+def new_room(x: Floats, u: Floats) -> Room:
+    """Room for unknowns like x (n, M, 3) and u (P, 4)."""
+    n, columns, _ = x.shape
+    around = Surroundings(np.zeros((n + 1, columns, 3)), np.zeros((columns, 3)), np.zeros_like(u))
+    return Room(new_geometry(n, columns), around, np.zeros_like(x), np.zeros_like(x))
+
+
+@compiled
+def is_local(body: Body) -> bool:
+    """Whether no effect reaches further than one node."""
+    total = 0.0
+    for value in body.nonlocal_terms:
+        total += abs(value)
+    return bool(total == 0)
+
+
+@compiled
+def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r: Floats, t: Floats) -> None:
+    """What is unbalanced at x (n, M, 3), u (P, 4).
+
+    Args:
+        r: (n, M, 3), filled.
+        t: (P, 4), filled.
+    """
+    n, columns, _ = x.shape
+    instants = u.shape[0]
+    measure(room.geometry, x, body.offset, body.axial_stiffness)
+    fill_rates(rates, body, x, u, room.x_dot, room.by_spin)
+    base = base_phase(rates, body, u)
+    room.around.wrench[:] = 0.0
+    for p in range(instants):
+        phase = base + 2 * np.pi * p / columns
+        _surround(body, x, u[p], phase, p, columns // instants, room)
+        for a in range(4):
+            t[p, a] = room.around.wrench[p, a] - head_drag(body, u[p], a)
+    for m in range(columns):
+        motion = motion_at(body, u[m % instants], base + 2 * np.pi * m / columns)
+        for k in range(n):
+            velocity = plus(plus(motion.linear, cross(motion.spin, vector(x, k, m))), vector(room.x_dot, k, m))
+            velocity = minus(velocity, vector(room.around.flow, k + 1, m))
+            put(r, k, m, node_balance(room.geometry, body, motion, k, m, velocity)[0])
+        flow, moment = vector(room.around.flow, 0, m), vector_at(room.around.moment, m)
+        clamp = clamp_balance(room.geometry, body, m, motion, flow, moment)
+        wrench = wrench_of(motion, clamp.force, clamp.moment)
+        for a in range(4):
+            t[m % instants, a] += wrench[a]
+
+
+@compiled
+def _surround(body: Body, x: Floats, u: Floats, phase: float, p: int, tails: int, room: Room) -> None:
+    """Everything non-local at instant p. Forces in the tails come first, since the flow is made of them."""
+    if is_local(body):
+        return
+    geometry, around, columns = room.geometry, room.around, x.shape[1]
+    if has_frames(body):
+        for m in range(p, columns, columns // tails):
+            motion = motion_at(body, u, phase + 2 * np.pi * (m - p) / columns)
+            add_frames(body, geometry, motion, m, room.x_dot, around.moment)
+    if has_flow(body):
+        add_flow(body, geometry, x, u, phase, p, tails, around.flow, around.wrench[p])
+    add_contact_line(body, u, around.wrench[p])

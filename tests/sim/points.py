@@ -1,0 +1,14 @@
+"""Points of the shipped sweep for tests."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dataset.design import load_design
+from sim.model.groups import DWELL
+
+
+def sweep_points(count: int) -> dict[str, np.ndarray]:
+    """Columns of the first `count` robots of sweep.toml, without the dwell."""
+    points = load_design("sweep.toml").with_rows(count).points()
+    return {name: values for name, values in points.items() if name != DWELL}

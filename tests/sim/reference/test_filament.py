@@ -1,0 +1,140 @@
+"""One clamped rotating filament against its boundary-value solution, linear theory and beam theory."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from sim.mechanics.drag import tail_coefficients
+from sim.model.presets import PRESETS
+from sim.reference.balance import TensorRobots, fluid_wrench
+from sim.reference.stepper import PHASE, TensorState, at_rest, step
+from sim.solve.orbit import FIRST_PHASE, solve_orbit, straight_start
+from tests.reference.cases import BEAM_K4, FILAMENT, FILAMENT_TIP, LINEAR_FILAMENT
+from tests.sim.robots import body_of, extrapolated_loads, held_loads, single_filament
+
+ROBOT = PRESETS["paper-control"]
+EDGES = 16
+
+
+def relaxed(robots: TensorRobots, omega_bar: float, *, time: float = 6.0) -> TensorState:
+    """The shape at rest in the disc frame."""
+    omega = torch.tensor([omega_bar], dtype=torch.float64)
+    state = at_rest(robots)
+    dt = torch.tensor([min(0.05, 0.25 / omega_bar)], dtype=torch.float64)
+    while float(state.time) < time:
+        state = step(robots, state, omega, dt)
+    return step(robots, state, omega, dt, tolerance=1e-11)
+
+
+def loads(edges: int, omega: float) -> tuple[float, float, TensorState, TensorRobots]:
+    """|F_z| [N] and |M_z| [N m] of the fluid on the filament at ω [rad/s]."""
+    omega_bar = omega * ROBOT.time_scale
+    robots, _ = single_filament(edges, omega_bar, ROBOT.tail_length / ROBOT.tail_radius, 0.016 / 0.11)
+    state = relaxed(robots, omega_bar)
+    bar = torch.tensor([omega_bar], dtype=torch.float64)
+    tail, _ = fluid_wrench(robots, state.x, torch.zeros_like(state.x), state.pose[PHASE], state.u, bar)
+    force = ROBOT.bending_stiffness / ROBOT.tail_length**2
+    return abs(float(tail[1])) * force, abs(float(tail[3])) * force * ROBOT.tail_length, state, robots
+
+
+@pytest.mark.parametrize("omega", list(FILAMENT))
+def test_force_and_moment_match_the_boundary_value_solution(omega: float) -> None:
+    """The direct route, as it solves by default: within 0.1 %."""
+    slenderness, offset = ROBOT.tail_length / ROBOT.tail_radius, 0.016 / 0.11
+    wrench = extrapolated_loads(omega * ROBOT.time_scale, slenderness, offset)
+    force = ROBOT.bending_stiffness / ROBOT.tail_length**2
+    assert abs(wrench[1]) * force == pytest.approx(FILAMENT[omega][0], rel=1e-3)
+    assert abs(wrench[3]) * force * ROBOT.tail_length == pytest.approx(FILAMENT[omega][1], rel=1e-3)
+
+
+def test_the_filament_s_tip() -> None:
+    _, x = held_loads(8.0 * ROBOT.time_scale, ROBOT.tail_length / ROBOT.tail_radius, 0.016 / 0.11, edges=32)
+    assert np.abs(x[-1]) == pytest.approx(np.abs(FILAMENT_TIP), abs=2e-4)
+
+
+def test_a_slow_tail_sags_like_a_cantilever_at_every_phase() -> None:
+    """q l⁴/(8 EI), downwards in the body frame, while the tail turns with the disc."""
+    _, groups = single_filament(2, 1e-5, ROBOT.tail_length / ROBOT.tail_radius, 0.1)
+    body = body_of(groups)
+    body.resistance[:, :4] += 1e9 * np.eye(4)
+    body = body._replace(tail_load=(0.0, -0.08, 0.0))
+    x, u = straight_start(body, 32, 6, 1)
+    u[:] = 0.0
+    _, size = solve_orbit(body, x, u, 1e-9)
+    assert size < 1e-9
+    for m in range(6):
+        phase = FIRST_PHASE + 2 * np.pi * m / 6
+        tip = x[-1, m] - np.array([body.offset, 0.0, -1.0])
+        down = -(np.sin(phase) * tip[0] + np.cos(phase) * tip[1])
+        across = np.cos(phase) * tip[0] - np.sin(phase) * tip[1]
+        assert down == pytest.approx(0.01, rel=2e-3)
+        assert abs(across) < 1e-6
+
+
+def test_time_stepping_reaches_the_same_loads() -> None:
+    force, moment, _, _ = loads(EDGES, 8.0)
+    assert force == pytest.approx(FILAMENT[8.0][0], rel=6e-3)
+    assert moment == pytest.approx(FILAMENT[8.0][1], rel=1e-3)
+
+
+def test_force_converges_at_second_order_in_edges() -> None:
+    """Differences between successive meshes fall by four."""
+    forces = [loads(edges, 8.0)[:2] for edges in (8, 16, 32)]
+    for i in (0, 1):
+        order = math.log2(abs((forces[0][i] - forces[1][i]) / (forces[1][i] - forces[2][i])))
+        assert order > 1.8
+
+
+@pytest.mark.parametrize("drag_number", list(LINEAR_FILAMENT))
+def test_thrust_matches_linear_theory(drag_number: float) -> None:
+    """A small offset a: thrust/[(ζ⊥ − ζ∥) ω a²] and tip offset/a depend on S = ζ⊥ ω alone."""
+    offset, slenderness = 1e-3, 34.375
+    parallel, perp = (float(v) for v in tail_coefficients(torch.tensor([slenderness])))
+    omega = drag_number / perp
+    robots, _ = single_filament(24, omega, slenderness, offset)
+    state = relaxed(robots, omega)
+    bar = torch.tensor([omega], dtype=torch.float64)
+    tail, _ = fluid_wrench(robots, state.x, torch.zeros_like(state.x), state.pose[PHASE], state.u, bar)
+    thrust = abs(float(tail[1])) / ((perp - parallel) * omega * offset**2)
+    reach = math.hypot(float(state.x[-1, 0]), float(state.x[-1, 1])) / offset
+    assert thrust == pytest.approx(LINEAR_FILAMENT[drag_number][0], rel=0.02, abs=2e-3)
+    assert reach == pytest.approx(LINEAR_FILAMENT[drag_number][1], rel=0.01)
+
+
+def test_a_bent_tail_relaxes_at_the_rate_of_the_first_mode() -> None:
+    """Clamped-free beam in a viscous fluid: amplitude decays as exp(−k⁴ t/ζ⊥)."""
+    slenderness = 34.375
+    robots, _ = single_filament(24, 1e-9, slenderness, 0.1)
+    perp = float(robots.body.zeta_perp)
+    k = BEAM_K4[0] ** 0.25
+    arc = torch.arange(1, 25, dtype=torch.float64) / 24
+    ratio = (math.sinh(k) - math.sin(k)) / (math.cosh(k) + math.cos(k))
+    mode = torch.cosh(k * arc) - torch.cos(k * arc) - ratio * (torch.sinh(k * arc) - torch.sin(k * arc))
+    state = at_rest(robots)
+    state.x[:, 1, 0, 0] += 1e-4 * mode
+    omega, dt = torch.tensor([1e-9], dtype=torch.float64), torch.tensor([0.002], dtype=torch.float64)
+    tips = []
+    for _ in range(100):
+        state = step(robots, state, omega, dt, tolerance=1e-10)
+        tips.append(float(state.x[-1, 1]))
+    rate = math.log(tips[19] / tips[99]) / (80 * 0.002)
+    assert rate == pytest.approx(BEAM_K4[0] / perp, rel=0.01)
+
+
+def test_a_stiff_tail_is_a_rigid_rod() -> None:
+    """A tail clamped across the axis and turned slowly about its root: torque ζ⊥ ω l³/3."""
+    slenderness, omega = 34.375, 1e-4
+    robots, _ = single_filament(48, omega, slenderness, 1e-9)
+    across = torch.zeros_like(robots.root_tangent)
+    across[:, 0] = 1.0
+    from dataclasses import replace
+
+    robots = replace(robots, root_tangent=across)
+    state = relaxed(robots, omega, time=1.0)
+    bar = torch.tensor([omega], dtype=torch.float64)
+    tail, _ = fluid_wrench(robots, state.x, torch.zeros_like(state.x), state.pose[PHASE], state.u, bar)
+    assert abs(float(tail[3])) == pytest.approx(float(robots.body.zeta_perp) * omega / 3, rel=1e-3)

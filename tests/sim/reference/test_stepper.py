@@ -1,0 +1,128 @@
+"""Steps with tensors: balance, order, the compiled steps, and robots that break down."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from sim.linear.spectral import differentiation
+from sim.reference.balance import fluid_wrench, newton_correction, tensor_robots
+from sim.reference.stepper import PHASE, YAW, at_rest, step
+from sim.solve.march import TOLERANCE, advance, new_state
+from sim.solve.orbit import FIRST_PHASE
+from sim.solve.refinement import FEW, SOLVED, refined_orbit
+from tests.sim.robots import body_of, control
+
+
+@pytest.mark.parametrize("tails", [1, 2, 5])
+def test_total_force_and_moment_vanish_to_round_off(tails: int) -> None:
+    """Also in the middle of a transient, where nothing is steady."""
+    groups = control(3, N=tails, omega_bar=[3.0, 10.0, -60.0])
+    robots = tensor_robots(groups, edges=12)
+    state = at_rest(robots)
+    dt = torch.full((3,), 0.004, dtype=torch.float64)
+    for _ in range(30):
+        state = step(robots, state, groups.omega_bar, dt, tolerance=1e-12)
+    tail, head = fluid_wrench(robots, state.x, state.x_dot, state.pose[PHASE], state.u, groups.omega_bar)
+    assert (tail + head).abs().max() < 1e-11 * tail.abs().max()
+    assert tail.abs().max() > 0.1
+
+
+@pytest.mark.parametrize(("tails", "omega"), [(1, 8.0), (2, 40.0), (5, -15.0)])
+def test_compiled_steps_equal_steps_with_tensors(tails: int, omega: float) -> None:
+    """The same scheme on the same equations, from rest, with motor droop, drag on the disc and loads."""
+    groups, steps, edges = control(N=tails, omega_bar=omega, C_yr=5.0), 40, 10
+    robots = tensor_robots(groups, edges=edges)
+    load = torch.tensor([[0.3], [-0.6], [0.2]], dtype=torch.float64)
+    droop = 0.2 / robots.body.resistance[3, 3]
+    robots = replace(robots, body=robots.body._replace(droop=droop, tail_load=load))
+    robots.body.resistance[3, 4] = 0.02
+    body = body_of(groups)
+    body.resistance[3, 4] = 0.02
+    body = body._replace(droop=float(droop), tail_load=(0.3, -0.6, 0.2))
+    dt = 0.15 / abs(omega)
+    state, poses = new_state(tails, edges, body.offset), np.empty((steps, 6))
+    assert advance(body, state, dt, steps, 1e-10, poses, np.empty((0, *state.x.shape)))
+    tensors = at_rest(robots)
+    for i in range(steps):
+        tensors = step(robots, tensors, groups.omega_bar, torch.tensor([dt], dtype=torch.float64), tolerance=1e-10)
+        assert poses[i] == pytest.approx(tensors.pose[:, 0].numpy(), rel=1e-8, abs=1e-10)
+    assert state.u == pytest.approx(tensors.u[:, 0].numpy(), rel=1e-8, abs=1e-9)
+    assert state.x[:, 0] == pytest.approx(tensors.x[:, :, 0, 0].numpy(), abs=1e-9)
+
+
+def test_a_step_that_breaks_down_is_reported() -> None:
+    body = body_of(control())._replace(zeta_parallel=np.nan)
+    state = new_state(2, 8, body.offset)
+    steps = np.empty((3, 6))
+    assert not advance(body, state, 0.01, 3, TOLERANCE, steps, np.empty((0, *state.x.shape)))
+
+
+def yaw_after(steps: int, *, edges: int = 12, time: float = 1.5) -> float:
+    groups = control(omega_bar=20.0)
+    robots = tensor_robots(groups, edges=edges)
+    state = at_rest(robots)
+    dt = torch.tensor([time / steps], dtype=torch.float64)
+    for _ in range(steps):
+        state = step(robots, state, groups.omega_bar, dt, tolerance=1e-9)
+    return float(state.pose[YAW])
+
+
+def test_time_steps_are_of_second_order() -> None:
+    coarse, middle, fine = (yaw_after(n) for n in (240, 480, 960))
+    assert math.log2(abs((coarse - middle) / (middle - fine))) > 1.8
+
+
+def test_the_robot_converges_at_second_order_in_edges() -> None:
+    yaw = [yaw_after(400, edges=n) for n in (8, 16, 32)]
+    assert math.log2(abs((yaw[0] - yaw[1]) / (yaw[1] - yaw[2]))) > 1.8
+
+
+def test_one_robot_that_breaks_down_does_not_disturb_the_others() -> None:
+    groups = control(2, omega_bar=[10.0, 10.0])
+    robots = tensor_robots(groups, edges=12)
+    wrong = robots.body.zeta_perp * torch.tensor([1.0, float("nan")])
+    broken = replace(robots, body=robots.body._replace(zeta_perp=wrong))
+    state, good = at_rest(broken), at_rest(robots)
+    dt = torch.full((2,), 0.02, dtype=torch.float64)
+    for _ in range(5):
+        state = step(broken, state, groups.omega_bar, dt)
+        good = step(robots, good, groups.omega_bar, dt)
+    assert state.failed.tolist() == [False, True]
+    assert float(state.pose[YAW, 0]) == pytest.approx(float(good.pose[YAW, 0]), rel=1e-6)
+    assert torch.isfinite(state.pose).all()
+
+
+@pytest.mark.parametrize("tails", [1, 2, 3, 5])
+def test_tensors_find_the_compiled_orbit_in_balance(tails: int) -> None:
+    """At every phase, all N tails in place: no net wrench, and a Newton correction that changes nothing."""
+    groups = control(N=tails, omega_bar=-40.0, C_yr=5.0)
+    found = refined_orbit(body_of(groups), tails, FEW)
+    assert found.ended == SOLVED
+    x, u = found.x[2], found.u[2]
+    n, phases, _ = x.shape
+    derivative = np.einsum("ml,klc->kmc", differentiation(phases), x)
+    instants = torch.zeros(phases // tails, dtype=torch.long)
+    robots = tensor_robots(groups, edges=n).select(instants)
+    shape = np.empty((n, 3, tails, len(instants)))
+    rate = np.empty_like(shape)
+    for j in range(tails):
+        later = (np.arange(len(instants)) + j * len(instants)) % phases
+        angle = 2 * np.pi * j / tails
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        shape[:, :, j] = np.einsum("ab,kmb->kam", turn, x[:, later])
+        rate[:, :, j] = np.einsum("ab,kmb->kam", turn, derivative[:, later])
+    omega = groups.omega_bar[instants]
+    velocity = torch.tensor(u.T)
+    x_dot = torch.tensor(rate) * robots.omega_t(velocity, omega)
+    phase = torch.tensor(FIRST_PHASE + 2 * np.pi * np.arange(len(instants)) / phases)
+    balanced = (robots, torch.tensor(shape), x_dot, phase, velocity, omega)
+    on_tails, on_head = fluid_wrench(*balanced)
+    assert (on_tails + on_head).abs().max() < 1e-6 * on_tails.abs().max()
+    dx, du = newton_correction(*balanced, torch.full_like(omega, 1e3))
+    assert dx.abs().max() < 1e-7
+    assert du.abs().max() < 1e-6

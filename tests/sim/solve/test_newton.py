@@ -1,0 +1,149 @@
+"""Newton's method on an orbit and in a stage: the matrix is the derivative, and few corrections are needed.
+
+A wrong matrix is only slower, so the numbers of corrections are held to what quadratic convergence gives.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.effects import catalogue
+from sim.model.body import Body
+from sim.solve.linearise import linearise, new_equations
+from sim.solve.newton import factor_and_solve, new_workspace, newton
+from sim.solve.orbit import FIRST_PHASE, straight_start
+from sim.solve.rates import Rates, in_stage, on_orbit
+from sim.solve.residual import fill_residual, new_room
+from tests.sim.linear.systems import dense_matrix, joined_matrix
+from tests.sim.robots import body_of, control
+
+Unknowns = tuple[np.ndarray, np.ndarray]
+
+
+def strange(tails: int) -> Body:
+    """A robot with every local number in play: motor droop, drag on the disc, loads, odd resistances."""
+    body = body_of(control(N=tails, omega_bar=12.0, C_yr=6.0))
+    body.resistance[:] += 0.3 * np.random.default_rng(0).normal(size=(4, 5))
+    return body._replace(droop=0.3 / body.resistance[3, 3], tail_load=(0.2, -0.5, 0.1))
+
+
+def somewhere(body: Body, tails: int, phases: int, n: int) -> Unknowns:
+    """Bent tails and unsteady velocities."""
+    rng = np.random.default_rng(1)
+    x, u = straight_start(body, n, phases, tails)
+    return x + 0.02 * rng.normal(size=x.shape), u + rng.normal(size=u.shape)
+
+
+def orbit_case() -> tuple[Body, Rates, Unknowns]:
+    body = strange(2)
+    return body, on_orbit(6, FIRST_PHASE), somewhere(body, 2, 6, 4)
+
+
+def stage_case() -> tuple[Body, Rates, Unknowns]:
+    body = strange(3)
+    x, u = somewhere(body, 3, 3, 5)
+    return body, in_stage(40.0, 0.7, x + 0.01 * np.random.default_rng(2).normal(size=x.shape)), (x, u)
+
+
+def residual(body: Body, rates: Rates, z: np.ndarray, like: Unknowns) -> np.ndarray:
+    x, u = z[: like[0].size].reshape(like[0].shape), z[like[0].size :].reshape(like[1].shape)
+    r, t = np.empty_like(x), np.empty_like(u)
+    fill_residual(body, rates, x, u, new_room(x, u), r, t)
+    return np.concatenate([r.ravel(), t.ravel()])
+
+
+@pytest.mark.parametrize("case", [orbit_case, stage_case])
+def test_the_matrix_is_the_derivative_of_the_residual(case: object) -> None:
+    """Every entry, by central differences."""
+    body, rates, (x, u) = case()  # type: ignore[operator]
+    room, equations = new_room(x, u), new_equations(x, u)
+    linearise(body, rates, x, u, room, equations)
+    if rates.rate > 0:
+        matrix = dense_matrix(equations.chains)
+    else:
+        gain = 1 + body.droop * body.resistance[3, 3]
+        speed = np.array([body.omega + gain * u[m % len(u), 3] for m in range(x.shape[1])])
+        matrix = joined_matrix(equations.chains, equations.resistance, speed, rates.differentiation)
+    z = np.concatenate([x.ravel(), u.ravel()])
+    assert np.concatenate([equations.r.ravel(), equations.t.ravel()]) == pytest.approx(
+        residual(body, rates, z, (x, u)), abs=1e-12
+    )
+    for i in range(len(z)):
+        step = 1e-6 * np.eye(len(z))[i]
+        slope = (residual(body, rates, z + step, (x, u)) - residual(body, rates, z - step, (x, u))) / 2e-6
+        assert slope == pytest.approx(matrix[:, i], rel=1e-5, abs=1e-4)
+
+
+@pytest.mark.parametrize("case", [orbit_case, stage_case])
+def test_a_correction_solves_the_linear_system(case: object) -> None:
+    body, rates, (x, u) = case()  # type: ignore[operator]
+    work = new_workspace(rates, x, u)
+    linearise(body, rates, x, u, work.room, work.equations)
+    matrix = dense_matrix(work.equations.chains)
+    if not rates.rate > 0:
+        gain = 1 + body.droop * body.resistance[3, 3]
+        speed = np.array([body.omega + gain * u[m % len(u), 3] for m in range(x.shape[1])])
+        matrix = joined_matrix(work.equations.chains, work.equations.resistance, speed, rates.differentiation)
+    rng = np.random.default_rng(3)
+    dx, du = rng.normal(size=x.shape), rng.normal(size=u.shape)
+    right = np.concatenate([dx.ravel(), du.ravel()])
+    factor_and_solve(body, rates, u, work, dx, du)
+    assert matrix @ np.concatenate([dx.ravel(), du.ravel()]) == pytest.approx(right, rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.parametrize(("tails", "omega", "most"), [(2, 10.0, 5), (3, 10.0, 5), (2, 60.0, 7), (5, -100.0, 8)])
+def test_orbits_from_straight_tails_take_few_corrections(tails: int, omega: float, most: int) -> None:
+    """Quadratic convergence: one correction more takes the last one from 1e-4 to below 1e-8."""
+    body = body_of(control(N=tails, omega_bar=omega))
+    phases = tails * -(-4 // tails)
+    rates = on_orbit(phases, FIRST_PHASE)
+    x, u = straight_start(body, 8, phases, tails)
+    work = new_workspace(rates, x, u)
+    count, size = newton(body, rates, x, u, work, 1e-4)
+    assert size < 1e-4
+    assert count <= most
+    more, size = newton(body, rates, x, u, work, 1e-8)
+    assert more <= 2
+    assert size < 1e-8
+
+
+@pytest.mark.parametrize("omega", [3.0, 30.0, -90.0])
+def test_time_steps_take_one_or_two_corrections(omega: float) -> None:
+    """A step of a twenty-fourth of a revolution from a settled state, and its last correction."""
+    tails, n = 3, 10
+    body = body_of(control(N=tails, omega_bar=omega))
+    dt = 2 * np.pi / 36 / abs(omega)
+    x, u = straight_start(body, n, tails, tails)
+    phase, x_before = 0.0, x.copy()
+    counts = []
+    for i in range(60):
+        star = x.copy() if i == 0 else (4 * x - x_before) / 3
+        rates = in_stage(1 / (dt if i == 0 else dt * 2 / 3), phase, star)
+        work = new_workspace(rates, x, u)
+        x_before, guess = x.copy(), x.copy() if i == 0 else 2 * x - x_before
+        x = guess
+        count, size = newton(body, rates, x, u, work, 2e-4)
+        assert size < 2e-4
+        counts.append(count)
+        phase += dt * (body.omega + u[0, 3])
+    assert max(counts[20:]) <= 2
+
+
+@pytest.mark.parametrize("name", [e.name for e in catalogue().values() if e.reach == "nonlocal" and not e.beside])
+def test_nonlocal_effects_do_not_slow_newton_down(name: str) -> None:
+    """GMRES brings their part of the matrix in: hardly more corrections than without."""
+    body = body_of(control(N=3, **{name: catalogue()[name].typical}))
+    rates = on_orbit(6, FIRST_PHASE)
+    x, u = straight_start(body, 8, 6, 3)
+    count, size = newton(body, rates, x, u, new_workspace(rates, x, u), 1e-6)
+    assert size < 1e-6
+    assert count <= 9
+
+
+def test_a_robot_that_is_no_number_ends_at_once() -> None:
+    body = body_of(control())._replace(zeta_perp=np.nan)
+    rates = on_orbit(4, FIRST_PHASE)
+    x, u = straight_start(body, 6, 4, 2)
+    count, size = newton(body, rates, x, u, new_workspace(rates, x, u), 1e-6)
+    assert (count, size) == (1, np.inf)

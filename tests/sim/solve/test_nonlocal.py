@@ -1,0 +1,71 @@
+"""Effects that reach further than one node: as orbits, against time steps, and in derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from sim.effects import catalogue
+from sim.io.errors import InputError
+from sim.model.groups import Groups
+from sim.motion.resolution import Resolution
+from sim.motion.sensitivity import sensitivities
+from sim.motion.settling import settle
+from sim.motion.steady import orbits
+from sim.reference.stepper import at_rest
+from sim.solve.refinement import MANY
+from tests.sim.robots import control, single_filament
+
+# Natural twist alone shows nothing (it needs natural splay beside it).
+NONLOCAL = tuple(e.name for e in catalogue().values() if e.reach == "nonlocal" and not e.beside)
+
+
+@pytest.mark.parametrize("name", NONLOCAL)
+def test_orbits_are_what_time_steps_settle_to(name: str) -> None:
+    """Second order in the mesh: the finer one is four times nearer to the extrapolated orbit."""
+    groups = control(N=3, **{name: catalogue()[name].typical})
+    motion = orbits(groups)
+    assert motion.converged.all()
+    coarse, fine = (settle(groups, resolution=Resolution(n, 72)) for n in (12, 24))
+    for key in ("omega_yr", "v_x", "v_z"):
+        limit = getattr(motion, key)[0]
+        away = [abs(getattr(m, key)[0] / limit - 1) for m in (coarse, fine)]
+        assert away[1] < 5e-3
+        assert away[1] < 0.45 * away[0] + 5e-4
+
+
+def yaw_rates(groups: Groups) -> np.ndarray:
+    """ω_yr on the phases that derivatives are taken on."""
+    return orbits(groups, phases=MANY).omega_yr
+
+
+@pytest.mark.parametrize("name", NONLOCAL)
+@pytest.mark.parametrize("at", ["null", "typical"])
+def test_sensitivities_are_differences(name: str, at: str) -> None:
+    effect = catalogue()[name]
+    size, width = getattr(effect, at), 1e-3 * (effect.typical - effect.null)
+    if name == "contact_line" and at == "null":
+        pytest.skip("friction has no derivative where it starts: its bounds end at its null")
+    found = sensitivities(control(N=3, **{name: size}), (name, "C_t"))
+    around = torch.tensor([size - width, size + width])  # also below a null that is a bound
+    low, high = yaw_rates(replace(control(2, N=3), effects={name: around}))
+    slope = (high - low) / (2 * width)
+    assert found.derivatives["omega_yr_bar"][0, 0] == pytest.approx(slope, rel=2e-3, abs=1e-5)
+    C_t = 3.0
+    low, high = yaw_rates(control(2, N=3, C_t=[C_t * 0.999, C_t * 1.001], **{name: size}))
+    slope = (high - low) / (0.002 * C_t)
+    assert found.derivatives["omega_yr_bar"][0, 1] == pytest.approx(slope, rel=2e-3)
+
+
+def test_nonlocal_effects_stand_beside_each_other() -> None:
+    sizes = {name: 0.3 * catalogue()[name].typical for name in NONLOCAL}
+    assert orbits(control(N=4, **sizes)).converged.all()
+
+
+def test_tensor_steps_refuse_what_they_leave_out() -> None:
+    robots, _ = single_filament(6, 5.0, 34.375, 1 / 6.875, tail_spin_drag=1.0)
+    with pytest.raises(InputError, match="tail_spin_drag"):
+        at_rest(robots)
