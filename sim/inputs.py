@@ -6,6 +6,7 @@ names.
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -101,7 +102,8 @@ def _values(path: Path, tables: dict[str, Any]) -> dict[str, object]:
     for (table, key), attribute in _TOML.items():
         if attribute not in values and attribute not in _OPTIONAL_KEYS:
             raise InputError(f"{path}: missing entry [{table}] {key}")
-        if attribute in values and not isinstance(values[attribute], int | float):
+        value = values.get(attribute, 0)
+        if not isinstance(value, int | float) or isinstance(value, bool):
             raise InputError(f"{path}: [{table}] {key} = {values[attribute]!r}; give a number")
     return values
 
@@ -116,4 +118,5 @@ def robot_toml(robot: Robot) -> str:
     if robot.effects:
         tables["effects"] = [f"{name} = {float(size)!r}" for name, size in robot.effects.items()]
     blocks = ["\n".join([f"[{table}]", *lines]) for table, lines in tables.items()]
-    return "\n\n".join([f'name = "{robot.name}"', *blocks]) + "\n"
+    name = json.dumps(robot.name, ensure_ascii=False)  # escapes as TOML does
+    return "\n\n".join([f"name = {name}", *blocks]) + "\n"

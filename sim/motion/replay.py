@@ -16,12 +16,12 @@ import numpy as np
 import pandas as pd
 
 from sim.arrays import Floats
+from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.groups import Groups
 from sim.motion.resolution import MOST_REPLAY_WORK, Resolution
 from sim.motion.run import Run
-from sim.motion.steady import check_groups
 from sim.solve.assembly import bodies
 from sim.solve.march import YAW, X, Y
 
@@ -45,6 +45,10 @@ class Schedule:
             raise InputError("the schedule has no dwell times; give at least one")
         if not np.isfinite(self.dwells).all() or (self.dwells <= 0).any():
             raise InputError("the schedule has a dwell time that is not a positive number; mend it")
+        if not np.isfinite(self.start).all():
+            raise InputError(f"the schedule starts at {self.start}; give finite numbers")
+        if not (np.isfinite(self.time_scale) and self.time_scale > 0):
+            raise InputError(f"time_scale_s = {self.time_scale}; it must be a finite number above 0")
 
 
 def load_schedule(path: str | Path) -> Schedule:
@@ -62,7 +66,7 @@ def load_schedule(path: str | Path) -> Schedule:
         raise InputError(f"{path} is not JSON: {broken}; give a plan.json of the planner") from None
     except KeyError as missing:
         raise InputError(f"{path} has no entry {missing}; give a plan.json of the planner") from None
-    except (TypeError, ValueError, AttributeError) as wrong:
+    except (TypeError, ValueError, AttributeError, OverflowError) as wrong:
         raise InputError(f"{path}: {wrong}; give a plan.json of the planner") from None
 
 
@@ -89,8 +93,8 @@ def replay(
 def _replay(
     schedule: Schedule, resolution: Resolution | None, progress: Callable[[int], object] | None
 ) -> pd.DataFrame:
-    groups = Groups.from_columns({name: np.array([value]) for name, value in schedule.robot.items()})
-    check_groups(groups)
+    values = check_columns({name: np.array([value]) for name, value in schedule.robot.items()})
+    groups = Groups.from_columns(values)
     body = bodies(groups)[0]
     body = body._replace(omega=schedule.first_direction * abs(body.omega))
     chosen = resolution or Resolution.for_tracks(body.omega)
@@ -121,6 +125,7 @@ def _replay(
     return _track(schedule, rows)
 
 
+@np.errstate(over="ignore")  # seconds of an absurd time scale
 def _track(schedule: Schedule, rows: list[tuple[float, ...]]) -> pd.DataFrame:
     table = np.array(rows)
     pose = planar.compose(np.array(schedule.start), table[:, 1:4])

@@ -15,7 +15,7 @@ import numpy as np
 from sim.mechanics.flow import has_flow
 from sim.model.body import Body
 
-MOST_WORK = 2e8  # of one robot in a table: about two minutes
+MOST_WORK = 1e8  # of one robot in a table: about a minute
 MOST_REPLAY_WORK = 3e9  # of one schedule: about half an hour
 _LONGEST_STEP = 0.04  # time units: the tails' memory is about 0.7
 _FLOW = 3.0  # steps' worth of work for each node that a node's flow reaches

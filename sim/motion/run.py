@@ -26,16 +26,16 @@ class Run:
         resolution: Resolution,
         state: State | None = None,
         *,
-        most_work: float = MOST_WORK,
+        most_work: float | None = None,
     ):
-        """From `state`, which is changed in place, or from rest with straight tails."""
+        """From `state`, which is changed in place, or from rest; `most_work` as in `sim.motion.resolution`."""
         self.body = body
         self.state = new_state(tails, resolution.edges, body.offset) if state is None else state
         self.time_step = time_step(body.omega, resolution)
         self.failed = ""
         self._jumped = state is None
         self._work_of_a_step = resolution.work_of_a_step(body, tails)
-        self._work_left = most_work
+        self._work_left = MOST_WORK if most_work is None else most_work
 
     def copy(self) -> Run:
         """A run that goes its own way from here."""
@@ -47,7 +47,7 @@ class Run:
     def can_afford(self, duration: float, *, flips: float = 0) -> bool:
         """Whether so much time and so many flips are within the work left; `failed` if not."""
         steps = steps_in(duration, self.time_step) + flips * 2 * len(_GRADES)
-        if not self.failed and steps * self._work_of_a_step > self._work_left:
+        if not self.failed and not steps * self._work_of_a_step <= self._work_left:
             self.failed = TOO_MUCH
         return not self.failed
 

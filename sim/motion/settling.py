@@ -52,6 +52,7 @@ class Settled:
     state: State
 
 
+@np.errstate(all="ignore")  # robots that overflow are flagged
 def settle(
     groups: Groups, *, resolution: Resolution | Callable[[float], Resolution] = Resolution.fitting
 ) -> Steady:

@@ -27,6 +27,7 @@ SAME = 0.02  # relative difference up to which a stepped motion counts as the di
 _OTHER_MOTION = "straight tails reach another motion than the one on which they move alike"
 
 
+@np.errstate(all="ignore")  # robots that overflow are flagged
 def steady(groups: Groups) -> Steady:
     """Steady motion of robots of one N, as reached from rest.
 
@@ -98,7 +99,11 @@ def orbits(groups: Groups, *, phases: int = FEW) -> Steady:
 def stepped(groups: Groups, notes: list[str]) -> Steady:
     """Time stepping from rest on two meshes and steps; their difference gives the error of the finer."""
     coarse = settle(groups)
-    fine = settle(groups, resolution=lambda speed: Resolution.fitting(speed).finer(2))
+    lasting = np.flatnonzero(~coarse.failed)
+    fine = coarse
+    if len(lasting):
+        finer = settle(_rows(groups, lasting), resolution=lambda speed: Resolution.fitting(speed).finer(2))
+        fine = coarse.with_rows(lasting, finer)
     fields = {**vars(fine), "error": _difference(coarse, fine) / 3}  # of second order
     fields["note"] = np.array([f"{a}; {b}" if b else a for a, b in zip(notes, fine.note.tolist(), strict=True)])
     return Steady(**fields)

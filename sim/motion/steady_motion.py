@@ -53,6 +53,7 @@ class Steady:
         """θ [rad], between the axis and the tangent of the path."""
         return np.asarray(np.arctan2(np.abs(self.v_x), self.v_z))
 
+    @np.errstate(all="ignore")  # robots that do not turn have no radius
     def columns(self) -> dict[str, Any]:
         """Columns of the command `python -m sim steady`."""
         values = (

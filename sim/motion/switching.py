@@ -32,9 +32,10 @@ import numpy as np
 
 from sim.arrays import Flags, Floats
 from sim.effects import catalogue
+from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.body import Body
-from sim.model.groups import Groups
+from sim.model.groups import DWELL, Groups
 from sim.motion.resolution import Resolution
 from sim.motion.run import Run
 from sim.motion.settling import settle_one
@@ -62,6 +63,7 @@ class SwitchResponse:
     failed: Flags
 
 
+@np.errstate(all="ignore")  # robots that overflow are flagged
 def switch_response(
     groups: Groups, dwell: Floats, motion: Steady | None = None, *, resolution: Resolution | None = None
 ) -> SwitchResponse:
@@ -74,8 +76,10 @@ def switch_response(
         resolution: mesh and step; by default what each robot needs.
     """
     check_groups(groups)
-    motion = steady(groups) if motion is None else motion
     dwell = np.asarray(dwell, dtype=float)
+    for row in np.flatnonzero(~(np.isfinite(dwell) & (dwell > 0)))[:1]:
+        raise InputError(f"{DWELL} = {dwell[row]} in row {row + 1}; it must be a finite number above 0")
+    motion = steady(groups) if motion is None else motion
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
     robots = bodies(groups)
     lag = np.array([_lag(body, groups.N, T, even, resolution) for body, T in zip(robots, dwell, strict=True)])
@@ -129,7 +133,7 @@ def _steady_twist(run: Run, tails: int, sense: float) -> tuple[Floats, float]:
 def _change(run: Run, dwell: float, even: bool, sense: float) -> Floats:
     """Pose change over a dwell, seen in the direction of a positive motor."""
     flips = 1 + MEMORY / dwell
-    if not run.can_afford(flips * dwell, flips=flips):
+    if not run.can_afford(MEMORY + dwell, flips=flips):
         return np.full(3, np.nan)
     count = int(flips)
     count += 0 if even else count % 2

@@ -64,6 +64,8 @@ def advance(
         Whether every step converged; if not, the state is where it broke down.
     """
     x, x_dot, pose, u = state
+    if not 0 < dt < np.inf:
+        return False
     star, now, before = _copy(state), _copy(state), _copy(state)
     work = new_workspace(in_stage(1.0, 0.0, star.x), x, u.reshape(1, 4))
     for i in range(count):

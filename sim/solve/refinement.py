@@ -68,6 +68,8 @@ def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
     Returns:
         The orbit; `ended` says why it could not be solved, if so.
     """
+    if tails > _MOST_PHASES:
+        return _unsolved(MANY_PHASES, np.zeros((MESHES[0], tails, 3)), np.zeros((1, 4)))
     ended, error, x, u = _enough_phases(body, without_nonlocal(body), tails, least)
     if ended != SOLVED:
         return _unsolved(ended, x, u)
@@ -76,6 +78,8 @@ def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
 
 def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Floats]:
     """The orbit on a mesh of one's own: whether there is one, x (n, M, 3) and u (P, 4)."""
+    if tails > _MOST_PHASES:
+        return False, np.zeros((edges, tails, 3)), np.zeros((1, 4))
     ended, _, x, u = _enough_phases(body, without_nonlocal(body), tails, FEW)
     if ended != SOLVED:
         return False, x, u

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
 
+import sim.effects
 from sim.effects import catalogue
-from sim.motion.steady import steady
+from sim.motion.steady import orbits, steady
 from sim.motion.switching import switch_response
 from sim.solve.assembly import assemble, numbers
 from tests.sim.robots import control
@@ -15,8 +21,86 @@ from tests.sim.robots import control
 OUTPUTS = ("omega_t", "omega_yr", "v_x", "v_z")
 
 
+FOLDER = Path(sim.effects.__file__).parent
+
+NEW_EFFECT = """
+from dataclasses import dataclass
+
+from sim.model.effect import Effect, Factors
+
+
+@dataclass(frozen=True)
+class Stickiness(Effect):
+    def scales(self, size, groups):
+        return Factors(drag=1 + size)
+
+
+EFFECT = Stickiness(
+    name="stickiness", title="stickiness", equation="drag × (1 + ε)", source="made up", unit="1", null=0.0,
+    bounds=(0.0, 1.0), typical=0.1, symmetry="even", dissipative=True, reach={reach!r},
+)
+"""
+
+
 def test_the_folder_is_the_catalogue() -> None:
-    assert {"end_over_end_drag", "anisotropic_head_drag"} <= set(catalogue())
+    assert list(catalogue()) == sorted(f.stem for f in FOLDER.glob("*.py") if f.stem != "__init__")
+
+
+@pytest.mark.parametrize("reach", ["local", "nonlocal"])
+def test_adding_an_effect_is_adding_a_file(reach: str, tmp_path: Path) -> None:
+    """Columns, sizes, numbers of the body and candidates of the calibration follow from the file alone."""
+    for package in ("sim", "calibration", "surrogate", "dataset", "planner"):
+        shutil.copytree(
+            FOLDER.parents[1] / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__")
+        )
+    (tmp_path / "sim" / "effects" / "stickiness.py").write_text(NEW_EFFECT.format(reach=reach))
+    code = """
+import numpy as np
+from calibration.influences import influences
+from sim.inputs import check_columns
+from sim.model.groups import Groups
+from sim.model.presets import PRESETS
+from sim.solve.assembly import bodies
+columns = {**PRESETS["paper-control"].group_values(), "stickiness": 0.5}
+values = check_columns({name: np.array([value]) for name, value in columns.items()})
+body = bodies(Groups.from_columns(values))[0]
+assert "stickiness" in influences()
+print(body.resistance[3, 3], getattr(body.nonlocal_terms, "stickiness", None))
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    base = assemble(control()).resistance[3, 3, 0]
+    spin, number = done.stdout.split()
+    assert float(spin) == pytest.approx(1.5 * float(base))
+    assert number == ("0.5" if reach == "nonlocal" else "None")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_order_of_effects_does_not_matter(seed: int) -> None:
+    """Terms are added, then factors multiply: inertia scales the drag of terms that come after it, too."""
+    names = list(catalogue())
+    sizes = {name: catalogue()[name].typical for name in names}
+    shuffled = [names[i] for i in np.random.default_rng(seed).permutation(len(names))]
+    one, other = (numbers(control(**{name: sizes[name] for name in order})) for order in (names, shuffled))
+    assert torch.allclose(one, other, rtol=1e-13, atol=0)
+    disc, both = assemble(control(disc_drag=0.4)), assemble(control(inertia=0.1, disc_drag=0.4))
+    assert float(both.resistance[3, 4, 0]) == pytest.approx(1.1 * float(disc.resistance[3, 4, 0]))
+
+
+@pytest.mark.parametrize("name", [name for name in catalogue() if name != "viscosity_drift"])
+def test_dynamic_similarity_is_kept_or_said_to_be_broken(name: str) -> None:
+    """At viscosity f and speed ω a robot moves as at viscosity 1 and speed f ω, all rates divided by f."""
+    effect = catalogue()[name]
+    sizes = {name: effect.typical}
+    if effect.beside:
+        sizes[effect.beside] = catalogue()[effect.beside].typical
+    drift, speed = 0.3, 2.0
+    factor = np.exp(-drift)
+    thin = orbits(control(N=4, omega_bar=speed, viscosity_drift=drift, **sizes))
+    slow = orbits(control(N=4, omega_bar=speed * factor, **sizes))
+    away = max(abs(getattr(thin, o)[0] * factor / getattr(slow, o)[0] - 1) for o in OUTPUTS)
+    assert (away < 5e-7) == effect.similar
+    if not effect.similar:
+        assert away > 1e-6
 
 
 @pytest.mark.parametrize("name", list(catalogue()))
