@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
-SIM := $(wildcard sim/*.py sim/effects/*.py)
+SOURCES := $(wildcard sim/*.py sim/*/*.py)
 
 CONFIG ?= sweep.toml
 DATA ?= data/sweep
@@ -17,29 +17,40 @@ export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint dataset train plan calibrate report bench clean
+.PHONY: help setup demo test quick lint docs dataset train plan calibrate report bench clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1\t\2/' | expand -t 20
 
-setup: $(STAMP) ## make .venv and install everything, pinned
+setup: $(STAMP) ## make .venv, install everything, pinned, and compile the simulator's loops
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt torch
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(RUN) -m sim compile
 	touch $@
 
 demo: reports/demo.html ## the whole pipeline on the paper's robot, ends with reports/demo.html
-reports/demo.html: $(STAMP) $(SIM) $(wildcard dataset/*.py surrogate/*.py surrogate/shipped/* planner/*.py calibration/*.py) demo.toml
-	$(RUN) -m calibration demo --out $@
+reports/demo.html: $(STAMP) $(SOURCES) $(wildcard dataset/*.py surrogate/*.py surrogate/shipped/* planner/*.py calibration/*.py softflagella/*.py) demo.toml
+	$(RUN) -m softflagella demo --out $@
 
 test: $(STAMP) ## run the tests
 	$(RUN) -m pytest
+
+quick: $(STAMP) ## run the quick tests, under a minute
+	$(RUN) -m pytest -m "not slow"
 
 lint: $(STAMP) ## style and types
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+
+docs: $(VENV)/.docs ## the documentation as pages, docs/_build/html/index.html
+	$(RUN) -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	@echo "-> docs/_build/html/index.html"
+$(VENV)/.docs: $(STAMP)
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	touch $@
 
 dataset: $(DATA)/manifest.json ## simulate CONFIG into DATA (goes on where it stopped)
 $(DATA)/manifest.json: $(STAMP) $(CONFIG)
@@ -54,7 +65,7 @@ plan: $(STAMP) ## plan PLANPATH for ROBOT into reports/plan
 
 calibrate: $(STAMP) ## close the loop on TABLE=… for ROBOT into reports/calibration
 	@test -n "$(TABLE)" || { echo "error: no table; write make calibrate TABLE=runs.csv ROBOT=robot.toml" >&2; exit 2; }
-	$(RUN) -m calibration close "$(TABLE)" --robot "$(ROBOT)" --out reports/calibration
+	$(RUN) -m calibration calibrate "$(TABLE)" --robot "$(ROBOT)" --out reports/calibration
 
 report: $(DATA)/manifest.json ## picture page of DATA
 	$(RUN) -m dataset report $(DATA) --out reports/dataset.html
@@ -63,4 +74,4 @@ bench: $(STAMP) ## the figures that the README claims
 	$(RUN) -m benchmarks.run
 
 clean: ## remove what the pipeline made (not .venv)
-	rm -rf data models reports
+	rm -rf data models reports docs/_build

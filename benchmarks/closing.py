@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.locked import fitted_to_all
-from calibration.loop import close
+from calibration.loop import calibrate
 from calibration.measurements import read_measurements
 from calibration.steer import gap_closed, steer
 from calibration.swimmer import Swimmer, corrected_robot
@@ -45,7 +45,7 @@ def main(robots: str = "10") -> None:
         truth = replace(start, C_t=C_t, C_r=C_r, C_yr=C_yr, effects={name: size})
         table = make_table(truth, seed=seed, lengths_cm=LENGTHS, title="")
         model = Swimmer(start, read_measurements(table))
-        verdict = close(model, progress=False)
+        verdict = calibrate(model, progress=False)
         swimmer = replace(truth, tails=2).with_motor(10.0)
         models = {
             "before": corrected_robot(

@@ -1,6 +1,6 @@
 """Operating characteristics of closing the loop: how often it is right, wrong or silent, on planted truths.
 
-The whole procedure (`calibration.loop.close`) runs on tables of the paper's design (`benchmarks.planted`). The
+The whole procedure (`calibration.loop.calibrate`) runs on tables of the paper's design (`benchmarks.planted`). The
 bulk goes through a linear stand-in for the simulator; some of the same cases, with the same noise, go through the
 simulator: the truth by time stepping on half the edge length and half the step, the fitter as it is.
 
@@ -21,9 +21,10 @@ from joblib import Parallel, delayed
 from scipy.stats import norm
 
 from benchmarks.planted import ROBOT, Case, Design, Linear, cases, nulls, scatter, stand_in
-from calibration.loop import Verdict, close
-from calibration.model import Floats, Model, start_values
+from calibration.loop import Verdict, calibrate
+from calibration.model import Model, start_values
 from calibration.swimmer import DIRECT, Swimmer
+from sim.arrays import Floats
 from sim.motion.batches import available_jobs, stepped_columns
 
 PAGE = Path("docs/operating.md")
@@ -65,7 +66,7 @@ def judge(verdict: Verdict, case: Case) -> str:
 
 def outcome(model: Model, case: Case) -> Outcome:
     """Close the loop on a model that has its data."""
-    verdict = close(model, progress=False)
+    verdict = calibrate(model, progress=False)
     judgement = judge(verdict, case)
     start = start_values(model)
     truth = {}

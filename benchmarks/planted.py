@@ -19,14 +19,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from calibration.locked import middle_session
 from calibration.measurements import Measurements, read_measurements
 from calibration.misfit import TESTABLE
-from calibration.model import Floats, Parameter, Parameters, Runs, start_values
+from calibration.model import Parameter, Parameters, Runs, start_values
 from calibration.noise import Noise
 from calibration.swimmer import Swimmer
+from sim.arrays import Flags, Floats
 from sim.model.presets import PRESETS
 
 ROBOT = replace(PRESETS["paper-measured"], C_t=2.6, C_r=2.0, C_yr=3.2)
@@ -70,7 +70,7 @@ class Linear:
         """The same runs again."""
         return self, [{"run": i} for i in range(len(self.runs))]
 
-    def guess(self, start: dict[str, float], used: NDArray[np.bool_]) -> dict[str, float]:
+    def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """The start as it is."""
         return start
 

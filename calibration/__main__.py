@@ -1,23 +1,39 @@
 """Command line of the calibration.
 
-python -m calibration close TABLE.csv --robot robot.toml --out DIR    verdict.json, report.html, corrected.toml
-python -m calibration simulate --robot robot.toml --out TABLE.csv     a table to try it on
-python -m calibration tracks TRACKS.csv RUNS.csv --out TABLE.csv      camera tracks to a table of runs
-python -m calibration demo --out PAGE.html                            the whole pipeline, see `make demo`
+python -m calibration calibrate TABLE.csv --robot robot.toml --out DIR   verdict.json, report.html, corrected.toml
+python -m calibration simulate --robot robot.toml --out TABLE.csv        a table to try it on
+python -m calibration tracks TRACKS.csv RUNS.csv --out TABLE.csv         camera tracks to a table of runs
+
+`close` is another word for `calibrate`.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
+from argparse import Namespace
 from pathlib import Path
 
-from sim.io.errors import InputError, run_command
+from sim.io.commands import JOBS, ROBOT, Program, argument, out
+from sim.io.errors import InputError
+
+program = Program("calibration", "Find from measured runs what the model of a robot lacks, and correct it.")
+main = program.main
 
 
-def _close(arguments: argparse.Namespace) -> None:
-    from calibration.loop import close, verdict_record
+@program.command(
+    "calibrate",
+    "fit a table, find what the model lacks, correct the robot",
+    argument("table", help="CSV or Parquet of measured runs"),
+    ROBOT,
+    out("folder"),
+    argument("--protocol", choices=("session", "paper"), default="session", help="what is fitted and tested"),
+    argument("--seed", type=int, default=0, help="of the bootstrap (default: 0)"),
+    JOBS,
+    aliases=("close",),
+)
+def _calibrate(arguments: Namespace) -> None:
+    from calibration.loop import calibrate, verdict_record
     from calibration.measurements import read_measurements
     from calibration.protocols import PROTOCOLS
     from calibration.report import write_report
@@ -30,12 +46,12 @@ def _close(arguments: argparse.Namespace) -> None:
     for line in data.set_aside:
         print(f"set aside: {line}", file=sys.stderr)
     data, locked = PROTOCOLS[arguments.protocol](data)
-    result = close(Swimmer(robot, data, arguments.jobs), locked=locked, seed=arguments.seed)
-    out = Path(arguments.out)
+    result = calibrate(Swimmer(robot, data, arguments.jobs), locked=locked, seed=arguments.seed)
+    folder = Path(arguments.out)
     record = verdict_record(result, table=Path(arguments.table).name)
-    write_report(result, data, out / "report.html", title=Path(arguments.table).name)
-    write_text(out / "corrected.toml", robot_toml(corrected_robot(robot, result.delivered)))
-    write_text(out / "verdict.json", json.dumps(record, indent=1) + "\n")
+    write_report(result, data, folder / "report.html", title=Path(arguments.table).name)
+    write_text(folder / "corrected.toml", robot_toml(corrected_robot(robot, result.delivered)))
+    write_text(folder / "verdict.json", json.dumps(record, indent=1) + "\n")
     print(result.sentence)
     print(
         f"error on the locked runs ({result.locked}): as given {100 * result.error_uncalibrated:.2f} %, "
@@ -46,13 +62,23 @@ def _close(arguments: argparse.Namespace) -> None:
         print(f"a weaker conclusion: {limit}")
     if result.set_aside:
         print(f"set aside: {len(result.set_aside)}, first {result.set_aside[0]}")
-    print(f"-> {out / 'verdict.json'}, {out / 'report.html'}, {out / 'corrected.toml'}")
+    print(f"-> {folder / 'verdict.json'}, {folder / 'report.html'}, {folder / 'corrected.toml'}")
 
 
-def _simulate(arguments: argparse.Namespace) -> None:
+@program.command(
+    "simulate",
+    "make a table from the simulator, to try the calibration on",
+    ROBOT,
+    out("CSV"),
+    argument("--effect", action="append", default=[], metavar="NAME=SIZE", help="hidden effect"),
+    argument("--seed", type=int, default=0, help="of the noise (default: 0)"),
+    JOBS,
+)
+def _simulate(arguments: Namespace) -> None:
     from dataclasses import replace
 
     from calibration.synthetic import make_table
+    from sim.effects import check_effects
     from sim.inputs import load_robot
     from sim.io.files import whole_file
 
@@ -64,13 +90,21 @@ def _simulate(arguments: argparse.Namespace) -> None:
             effects[name] = float(size)
         except ValueError:
             raise InputError(f"--effect {entry!r}; write NAME=SIZE") from None
+    check_effects(effects)
     table = make_table(replace(robot, effects=effects), seed=arguments.seed, jobs=arguments.jobs)
     with whole_file(arguments.out) as part:
         table.to_csv(part, index=False, float_format="%.6g")
     print(f"{len(table)} runs -> {arguments.out}")
 
 
-def _tracks(arguments: argparse.Namespace) -> None:
+@program.command(
+    "tracks",
+    "turn camera tracks into a table of runs",
+    argument("tracks", help="CSV: run, time_s, x_cm, y_cm, heading_deg"),
+    argument("runs", help="CSV: run, N, l_cm, omega_rpm and what else was noted"),
+    out("CSV"),
+)
+def _tracks(arguments: Namespace) -> None:
     from calibration.tracks import measure_tracks
     from sim.io.files import whole_file
 
@@ -82,43 +116,5 @@ def _tracks(arguments: argparse.Namespace) -> None:
     print(f"{len(table)} runs -> {arguments.out}")
 
 
-def _demo(arguments: argparse.Namespace) -> None:
-    from calibration.demo import run_demo
-
-    run_demo(arguments.out)
-
-
-def main(argv: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(prog="python -m calibration", description=__doc__.splitlines()[0])
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    close = commands.add_parser("close", help="fit a table, find what the model lacks, correct the robot")
-    close.add_argument("table", help="CSV of measured runs")
-    close.add_argument("--robot", required=True, help="robot.toml or the name of a preset")
-    close.add_argument("--out", required=True, help="folder to write")
-    close.add_argument(
-        "--protocol", choices=("session", "paper"), default="session", help="what is fitted and tested"
-    )
-    close.add_argument("--seed", type=int, default=0, help="of the bootstrap")
-    close.add_argument("--jobs", type=int, help="processes (default: all processors)")
-    close.set_defaults(run=_close)
-    simulate = commands.add_parser("simulate", help="make a table from the simulator")
-    simulate.add_argument("--robot", required=True, help="robot.toml or the name of a preset")
-    simulate.add_argument("--out", required=True, help="CSV to write")
-    simulate.add_argument("--effect", action="append", default=[], metavar="NAME=SIZE", help="hidden effect")
-    simulate.add_argument("--seed", type=int, default=0)
-    simulate.add_argument("--jobs", type=int, help="processes (default: all processors)")
-    simulate.set_defaults(run=_simulate)
-    tracks = commands.add_parser("tracks", help="turn camera tracks into a table of runs")
-    tracks.add_argument("tracks", help="CSV: run, time_s, x_cm, y_cm, heading_deg")
-    tracks.add_argument("runs", help="CSV: run, N, l_cm, omega_rpm and what else was noted")
-    tracks.add_argument("--out", required=True, help="CSV to write")
-    tracks.set_defaults(run=_tracks)
-    demo = commands.add_parser("demo", help="the whole pipeline on the paper's robots")
-    demo.add_argument("--out", default="reports/demo.html", help="page to write")
-    demo.set_defaults(run=_demo)
-    arguments = parser.parse_args(argv)
-    arguments.run(arguments)
-
-
 if __name__ == "__main__":
-    sys.exit(run_command(main))
+    program.exit()

@@ -22,13 +22,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from calibration.fit import Fit, fit
 from calibration.misfit import TESTABLE, Misfit, check_misfit
-from calibration.model import Floats, Model, Parameter, Parameters
+from calibration.model import Model, Parameter, Parameters
 from calibration.sessions import groups
+from sim.arrays import Flags, Floats, Integers
 
 _DRAWS = 400  # for a remainder, which is judged at a coarser level
 _FIRST = 3  # single effects beside which a second one is looked for
@@ -61,7 +61,7 @@ def examine(
     misfit: Misfit,
     effects: tuple[Parameter, ...],
     along: Floats,
-    used: NDArray[np.bool_],
+    used: Flags,
     given: Parameters,
     *,
     level: float,
@@ -127,7 +127,7 @@ def examine(
 def pairs(
     model: Model,
     found: list[Candidate],
-    used: NDArray[np.bool_],
+    used: Flags,
     given: Parameters,
     *,
     level: float,
@@ -180,7 +180,7 @@ def _deviance(candidate: Candidate) -> float:
     return candidate.refit.deviance
 
 
-def _session_gain(model: Model, base: Fit, refit: Fit, used: NDArray[np.bool_]) -> tuple[float, float]:
+def _session_gain(model: Model, base: Fit, refit: Fit, used: Flags) -> tuple[float, float]:
     """Gain in log likelihood summed over left-out sessions, and its standard error (linearised refits).
 
     With whitened residuals r of the refit and r + d of the base, a session gains ½|d|² + d·r, |d| of it by noise.
@@ -198,10 +198,10 @@ def _session_gain(model: Model, base: Fit, refit: Fit, used: NDArray[np.bool_]) 
 
 def _left_out(
     y: Floats,
-    session: NDArray[np.int64],
+    session: Integers,
     fitted: Fit,
-    learn: NDArray[np.bool_],
-    out: NDArray[np.bool_],
+    learn: Flags,
+    out: Flags,
     judge: Fit,
 ) -> Floats:
     """Whitened residuals of a left-out session for a model fitted to the others, in the noise of `judge`."""

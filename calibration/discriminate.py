@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from calibration.fit import Fit
-from calibration.model import Floats, Model
+from calibration.model import Model
+from sim.arrays import Floats
 
 _DRAWS = 4000
 _DECIDES = 3.84  # χ² by which one must be better

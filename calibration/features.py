@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from calibration.model import Floats, Runs
+from calibration.model import Runs
+from sim.arrays import Flags, Floats
 
 _CUBIC = 0.2  # share of a cube that lower powers must leave
 
 
-def features(runs: Runs, used: NDArray[np.bool_]) -> tuple[tuple[str, ...], Floats]:
+def features(runs: Runs, used: Flags) -> tuple[tuple[str, ...], Floats]:
     """Names, and the inputs that differ, their squares, products and cubes for all runs, (n, f).
 
     Standardised on the runs in `used` (n,).

@@ -19,11 +19,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from calibration.model import Floats, Model, Parameter, Parameters, parameter, stepped
+from calibration.model import Model, Parameter, Parameters, parameter, stepped
 from calibration.noise import Noise, Sums, inverse_root, least_squares, repeat_covariance, sums
+from sim.arrays import Flags, Floats, Integers
 
 _MOST_STEPS = 25
 _SHORT = 0.1  # a step below this, in ln C or ε, keeps the Jacobian
@@ -76,7 +76,7 @@ def fit(
     model: Model,
     start: Parameters,
     names: tuple[str, ...],
-    used: NDArray[np.bool_],
+    used: Flags,
     *,
     title: str = "fit",
 ) -> Fit:
@@ -119,7 +119,7 @@ class _Task:
 
     model: Model
     names: tuple[str, ...]
-    used: NDArray[np.bool_]
+    used: Flags
     root: Floats
     title: str
 
@@ -204,7 +204,7 @@ def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: 
     return change
 
 
-def _inflation(condition: NDArray[np.int64], outputs: int) -> float:
+def _inflation(condition: Integers, outputs: int) -> float:
     """By how much the variance grows because S is known from ν repeats of k outputs only.
 
     ν/(ν − k − 1), since 1/S is overestimated, times 1 + (k − 1)/(ν − k), since its weights are not the best ones.

@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.features import features
-from calibration.model import Floats, Runs
+from calibration.model import Runs
 from calibration.noise import repeat_covariance
 from calibration.sessions import groups
+from sim.arrays import Flags, Floats, Integers
 
 _MOST = 6
 _GAIN = 0.02  # share of the left-out error that a feature must save
@@ -29,7 +29,7 @@ class Generic:
     correction: Floats  # (n, k), for all runs
 
 
-def correct(runs: Runs, prediction: Floats, used: NDArray[np.bool_]) -> Generic:
+def correct(runs: Runs, prediction: Floats, used: Flags) -> Generic:
     """Learn the residual of `prediction` (n, k) from the runs in `used` (n,)."""
     names, table = features(runs, used)
     scale = np.sqrt(np.diag(repeat_covariance(runs.y[used], runs.condition[used])))
@@ -60,7 +60,7 @@ def _weights(table: Floats, residual: Floats) -> Floats:
     return np.asarray(np.linalg.lstsq(_with_constant(table), residual, rcond=None)[0])
 
 
-def _left_out(table: Floats, residual: Floats, group: NDArray[np.int64], used: NDArray[np.bool_]) -> float:
+def _left_out(table: Floats, residual: Floats, group: Integers, used: Flags) -> float:
     """Mean square left on groups of runs that the weights have not seen; without features, of the residual."""
     if not table.shape[1]:
         return float((residual[used] ** 2).mean())

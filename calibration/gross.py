@@ -8,15 +8,15 @@ moves repeats alike.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from calibration.model import Floats, Runs
+from calibration.model import Runs
+from sim.arrays import Flags, Floats
 
 FAR = 12.0
 _MAD = 1.4826  # median absolute deviation to standard deviation
 
 
-def gross_errors(data: Runs, prediction: Floats) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+def gross_errors(data: Runs, prediction: Floats) -> tuple[Flags, tuple[str, ...]]:
     """Which runs (n,) to set aside, and why; `prediction` (n, k) of the model as given."""
     bad = np.zeros(len(data), dtype=bool)
     residual = data.y - prediction

@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.fit import Fit
-from calibration.model import Floats, Model, Runs, stepped
+from calibration.model import Model, Runs, stepped
 from calibration.noise import inverse_root, least_squares, sums
 from calibration.sessions import groups
+from sim.arrays import Flags, Floats
 
 _DRAWS = 2000
 
 
-def middle_session(data: Runs) -> NDArray[np.bool_]:
+def middle_session(data: Runs) -> Flags:
     """The runs (n,) of the middle session by name, so that it is interpolated to; a block where there are few."""
     group, names = groups(data)
     return np.asarray(group == len(names) // 2)
 
 
-def errors(data: Runs, prediction: Floats, rows: NDArray[np.bool_]) -> tuple[float, dict[str, float]]:
+def errors(data: Runs, prediction: Floats, rows: Flags) -> tuple[float, dict[str, float]]:
     """Relative rms over runs and outputs (θ in rad), and per output."""
     square = ((data.y - prediction)[rows] ** 2).mean(0)
     each = dict(zip(data.outputs, np.sqrt(square).tolist(), strict=True))
     return float(np.sqrt(square.mean())), each
 
 
-def error_interval(data: Runs, prediction: Floats, rows: NDArray[np.bool_], seed: int) -> tuple[float, float]:
+def error_interval(data: Runs, prediction: Floats, rows: Flags, seed: int) -> tuple[float, float]:
     """95 % interval of the relative rms by resampling conditions."""
     square = ((data.y - prediction)[rows] ** 2).mean(1)
     condition = data.condition[rows]
@@ -37,7 +37,7 @@ def error_interval(data: Runs, prediction: Floats, rows: NDArray[np.bool_], seed
     return float(np.quantile(drawn, 0.025)), float(np.quantile(drawn, 0.975))
 
 
-def locked_p_value(fitted: Fit, data: Runs, rows: NDArray[np.bool_], *, seed: int) -> float:
+def locked_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> float:
     """How often noise alone leaves the model as far from the locked runs `rows` (n,).
 
     The statistic is the sum of squares, white in S, of what is left; its null distribution is drawn from runs,
@@ -62,7 +62,7 @@ def locked_p_value(fitted: Fit, data: Runs, rows: NDArray[np.bool_], *, seed: in
     return (1 + count) / (1 + _DRAWS)
 
 
-def fitted_to_all(model: Model, fitted: Fit, rows: NDArray[np.bool_]) -> dict[str, float]:
+def fitted_to_all(model: Model, fitted: Fit, rows: Flags) -> dict[str, float]:
     """Parameters of a fitted model after one more step, to all runs in `rows`; linear, since they are near."""
     data = model.runs
     table = np.concatenate([fitted.jacobian, (data.y - fitted.prediction)[..., None]], -1)

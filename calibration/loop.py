@@ -18,103 +18,88 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.attribute import Candidate, examine, explaining, inside, pairs
 from calibration.discriminate import NextRun, next_runs
 from calibration.fit import Fit, fit
-from calibration.generic import Generic, correct
+from calibration.generic import correct
 from calibration.gross import gross_errors
 from calibration.locked import error_interval, errors, fitted_to_all, locked_p_value, middle_session
-from calibration.misfit import DRAWS, Misfit, check_misfit
-from calibration.model import Floats, Model, Parameter, start_values
+from calibration.misfit import Misfit, check_misfit
+from calibration.model import Model, Parameter, Runs, start_values
 from calibration.profile import profile_intervals
 from calibration.sessions import divided, groups, limits
-from sim.io.provenance import fingerprint, provenance
+from calibration.verdict import Verdict, verdict_record
+from sim.arrays import Flags, Floats
+from sim.io.provenance import fingerprint
+
+__all__ = ["LEVEL", "Verdict", "calibrate", "verdict_record"]
 
 LEVEL = 0.04  # α of every claim: noise is estimated, and false claims shall stay below one in twenty
-_NEAR = 0.5  # share of the residual that an effect must take away to be worth a word where none explains
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """What runs say about a model."""
+class _Task:
+    """The runs, divided, and what is fixed before they are looked at."""
 
-    verdict: str  # "none", "effect", "ambiguous", "unexplained"
-    effects: tuple[str, ...]
-    explaining: tuple[Candidate, ...]  # what explains the residual, best first; more than one: not told apart
-    base: Fit  # calibrated, without effects
-    final: Fit  # the model to go on with
-    base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
-    final_intervals: dict[str, tuple[float, float]]
+    model: Model
+    level: float
+    seed: int
+    progress: bool
+    locked: Flags  # (n,) kept for the test
+    locked_names: str
+    start: dict[str, float]  # the model as given
+    uncalibrated: Floats  # (n, k) its prediction
+    gross: Flags  # (n,) set aside
+    reasons: tuple[str, ...]
+
+    @property
+    def runs(self) -> Runs:
+        return self.model.runs
+
+    @property
+    def used(self) -> Flags:
+        """(n,) runs that are fitted."""
+        return ~self.locked & ~self.gross
+
+    @property
+    def test(self) -> Flags:
+        """(n,) runs of the locked test."""
+        return self.locked & ~self.gross
+
+    def title(self, words: str) -> str:
+        """Of a progress bar."""
+        return words if self.progress else ""
+
+    @property
+    def fixed(self) -> str:
+        """Hash of everything that was fixed beforehand."""
+        catalogue = [effect.name for effect in self.model.effects]
+        fixed = {"level": self.level, "seed": self.seed, "catalogue": catalogue, "locked": self.locked_names}
+        return fingerprint(fixed)
+
+
+@dataclass(frozen=True)
+class _Explained:
+    """What the fit without effects leaves, and what explains it."""
+
+    base: Fit
     misfit: Misfit
     candidates: tuple[Candidate, ...]
-    generic: Generic  # correction of the calibrated model
-    next_runs: tuple[NextRun, ...]  # where two effects cannot be told apart
-    error_uncalibrated: float
-    error_generic: float
-    error_before: float
-    error_after: float
-    error_after_interval: tuple[float, float]
-    noise_ceiling: float
-    locked_p: float  # agreement of the locked runs with the final model
-    delivered: dict[str, float]  # parameters of the final model fitted to all runs
-    errors_by_output: dict[str, dict[str, float]]
-    locked: str  # names of the sessions
-    used: NDArray[np.bool_]
-    uncalibrated: Floats  # (n, k) prediction of the model as given
-    untestable: dict[str, str]  # effects that these runs cannot test: what is missing
-    plan_hash: str  # of everything fixed before the data was looked at
-    set_aside: tuple[str, ...]
-    limits: tuple[str, ...]
+    best: tuple[Candidate, ...]
 
     @property
-    def sentence(self) -> str:
-        """The verdict in one sentence with its certainty."""
-        # The bootstrap resolves no smaller p than 2/(draws + 1).
-        relation = "≤" if self.misfit.p_value <= 2.01 / (DRAWS + 1) else "="
-        p = f"p {relation} {self.misfit.p_value:.2g}"
-        if self.verdict == "none":
-            return f"No effect is missing that these runs can show ({p})."
-        if self.verdict == "effect":
-            best = self.explaining[0]
-            assert best.refit is not None
-            sizes = []
-            for effect in (*best.beside, best.effect):
-                low, high = self.final_intervals[effect.name]
-                sizes.append(
-                    f"{effect.title}, size {best.refit.parameters[effect.name]:.3g} ({low:.3g} to {high:.3g})"
-                )
-            other = "other effect" if len(sizes) == 1 else "single effect or other pair"
-            said = " and ".join(sizes)
-            return f"The residual ({p}) is consistent with {said}, and with no {other} of the catalogue."
-        if self.verdict == "ambiguous":
-            names = " or ".join(" and ".join(e.title for e in (*c.beside, c.effect)) for c in self.explaining)
-            return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart."
-        none = "no effect and no pair of effects of the catalogue explains"
-        return f"There is a residual ({p}) that {none}{self._nearest}."
-
-    @property
-    def _nearest(self) -> str:
-        """Which single effect takes most of the residual away, if one was refitted and takes much."""
-        refits = [(c.refit.deviance, c.effect.title) for c in self.candidates if c.refit is not None]
-        if not refits:
-            return ""
-        deviance, title = min(refits)
-        expected = int(self.used.sum()) * self.base.prediction.shape[1]
-        share = (self.base.deviance - deviance) / max(self.base.deviance - expected, 1e-9)
-        if share < _NEAR:
-            return ""
-        return f"; the nearest, {title}, takes {100 * min(share, 1.0):.0f} % of it away and leaves more than noise"
+    def final(self) -> Fit:
+        """The model to go on with."""
+        return self.best[0].refit if self.best and self.best[0].refit else self.base
 
 
-def close(
+def calibrate(
     model: Model,
     *,
-    locked: NDArray[np.bool_] | None = None,
+    locked: Flags | None = None,
     level: float = LEVEL,
     seed: int = 0,
     progress: bool = True,
@@ -128,83 +113,103 @@ def close(
         seed: of the bootstrap; the result is deterministic given it.
         progress: show bars.
     """
-    data, effects = model.runs, model.effects
-    locked = middle_session(data) if locked is None else locked
-    group, group_names = groups(data) if divided(data, locked) else (data.session, data.session_names)
-    names = ", ".join(group_names[g] for g in np.unique(group[locked]))
-    fixed = {
-        "level": level,
-        "seed": seed,
-        "catalogue": [e.name for e in effects],
-        "locked": names,
-    }
-    start = start_values(model)
-    coefficients = tuple(p.name for p in model.coefficients)
-    uncalibrated = model.predict([start], title="as given" if progress else "")[0]
-    model.check(uncalibrated)
-    gross, reasons = gross_errors(data, uncalibrated)
-    used, test = ~locked & ~gross, locked & ~gross
-    guess = model.guess(dict(start), used)
-    base = fit(model, guess, coefficients, used, title="fit" if progress else "")
-    title = "derivatives" if progress else ""
-    along = model.derivatives(base.parameters, [e.name for e in effects], title=title)[1]
-    misfit = check_misfit(base, data, used, along, level=level, seed=seed)
-    found: list[Candidate] = []
-    if misfit.p_value < level:
-        found = examine(
-            model, base, misfit, effects, along, used, start, level=level, seed=seed, progress=progress
-        )
-    best = explaining(found)
-    if misfit.p_value < level and not best:
-        best = explaining(pairs(model, found, used, start, level=level, seed=seed, progress=progress))
-    verdict = "none" if misfit.p_value >= level else ("unexplained", "effect", "ambiguous")[min(len(best), 2)]
-    final = best[0].refit if best and best[0].refit else base
-    title = "intervals" if progress else ""
-    base_intervals = profile_intervals(model, base, used, title=title)
-    final_intervals = base_intervals if final is base else profile_intervals(model, final, used, title=title)
-    generic = correct(data, base.prediction, used)
-    ahead: list[NextRun] = []
-    if len(best) > 1 and best[0].refit and best[1].refit:
-        ahead = next_runs(model, best[0].refit, best[1].refit, seed=seed)
-    error = {
-        name: errors(data, prediction, test)
-        for name, prediction in (
-            ("uncalibrated", uncalibrated),
-            ("before", base.prediction),
-            ("after", final.prediction),
-            ("generic", base.prediction + generic.correction),
-        )
-    }
-    ceiling = float(np.sqrt(np.trace(base.noise.run) / len(base.noise.run)))
+    task = _prepare(model, locked, level, seed, progress)
+    found = _explain(task)
+    final = found.final
+    base_intervals = profile_intervals(model, found.base, task.used, title=task.title("intervals"))
+    final_intervals = base_intervals
+    if final is not found.base:
+        final_intervals = profile_intervals(model, final, task.used, title=task.title("intervals"))
+    generic = correct(task.runs, found.base.prediction, task.used)
+    error = _errors(task, found, found.base.prediction + generic.correction)
+    noise = found.base.noise.run
+    verdict = "none"
+    if found.misfit.p_value < level:
+        verdict = ("unexplained", "effect", "ambiguous")[min(len(found.best), 2)]
     return Verdict(
         verdict=verdict,
-        effects=tuple(dict.fromkeys(e.name for c in best for e in (*c.beside, c.effect))),
-        explaining=tuple(best),
-        base=base,
+        effects=tuple(dict.fromkeys(e.name for c in found.best for e in (*c.beside, c.effect))),
+        explaining=found.best,
+        base=found.base,
         final=final,
         base_intervals=base_intervals,
         final_intervals=final_intervals,
-        misfit=misfit,
-        candidates=tuple(found) or _unexamined(misfit, effects),
+        misfit=found.misfit,
+        candidates=found.candidates,
+        generic=generic,
+        next_runs=_next_runs(task, found),
         error_uncalibrated=error["uncalibrated"][0],
         error_before=error["before"][0],
         error_generic=error["generic"][0],
-        generic=generic,
-        next_runs=tuple(ahead),
         error_after=error["after"][0],
-        error_after_interval=error_interval(data, final.prediction, test, seed),
-        noise_ceiling=ceiling,
-        errors_by_output={k: v[1] for k, v in error.items()},
-        locked_p=locked_p_value(final, data, test, seed=seed + 3),
-        delivered=fitted_to_all(model, final, ~gross),
-        locked=names,
-        used=used,
-        uncalibrated=uncalibrated,
+        error_after_interval=error_interval(task.runs, final.prediction, task.test, seed),
+        noise_ceiling=float(np.sqrt(np.trace(noise) / len(noise))),
+        errors_by_output={name: by_output for name, (_, by_output) in error.items()},
+        locked_p=locked_p_value(final, task.runs, task.test, seed=seed + 3),
+        delivered=fitted_to_all(model, final, ~task.gross),
+        locked=task.locked_names,
+        used=task.used,
+        uncalibrated=task.uncalibrated,
         untestable=dict(model.untestable),
-        plan_hash=fingerprint(fixed),
-        set_aside=(*data.set_aside, *reasons),
-        limits=(*data.limits, *limits(data, locked), *_unfinished(model, base, final)),
+        plan_hash=task.fixed,
+        set_aside=(*task.runs.set_aside, *task.reasons),
+        limits=(*task.runs.limits, *limits(task.runs, task.locked), *_unfinished(model, found.base, final)),
     )
+
+
+def _prepare(model: Model, locked: Flags | None, level: float, seed: int, progress: bool) -> _Task:
+    """Lock sessions away, set gross errors aside, refuse runs in wrong units."""
+    data = model.runs
+    locked = middle_session(data) if locked is None else locked
+    group, names = groups(data) if divided(data, locked) else (data.session, data.session_names)
+    start = start_values(model)
+    uncalibrated = model.predict([start], title="as given" if progress else "")[0]
+    model.check(uncalibrated)
+    gross, reasons = gross_errors(data, uncalibrated)
+    locked_names = ", ".join(names[g] for g in np.unique(group[locked]))
+    return _Task(model, level, seed, progress, locked, locked_names, start, uncalibrated, gross, tuple(reasons))
+
+
+def _explain(task: _Task) -> _Explained:
+    """Fit the coefficients, test what is left, and examine single effects, then pairs, where something is."""
+    model, used, level, seed = task.model, task.used, task.level, task.seed
+    guess = model.guess(dict(task.start), used)
+    coefficients = tuple(p.name for p in model.coefficients)
+    base = fit(model, guess, coefficients, used, title=task.title("fit"))
+    names = [e.name for e in model.effects]
+    along = model.derivatives(base.parameters, names, title=task.title("derivatives"))[1]
+    misfit = check_misfit(base, task.runs, used, along, level=level, seed=seed)
+    if misfit.p_value >= level:
+        return _Explained(base, misfit, _unexamined(misfit, model.effects), ())
+    found = examine(
+        model, base, misfit, model.effects, along, used, task.start, level=level, seed=seed, progress=task.progress
+    )
+    best = explaining(found)
+    if not best:
+        found_pairs = pairs(model, found, used, task.start, level=level, seed=seed, progress=task.progress)
+        best = explaining(found_pairs)
+    return _Explained(base, misfit, tuple(found) or _unexamined(misfit, model.effects), tuple(best))
+
+
+def _errors(task: _Task, found: _Explained, generic: Floats) -> dict[str, tuple[float, dict[str, float]]]:
+    """Errors of four models on the locked runs: all outputs together, and by output."""
+    predictions = {
+        "uncalibrated": task.uncalibrated,
+        "before": found.base.prediction,
+        "after": found.final.prediction,
+        "generic": generic,
+    }
+    return {name: errors(task.runs, prediction, task.test) for name, prediction in predictions.items()}
+
+
+def _next_runs(task: _Task, found: _Explained) -> tuple[NextRun, ...]:
+    """Runs that would tell the two best explanations apart, where there are two."""
+    if len(found.best) < 2:
+        return ()
+    first, second = found.best[0].refit, found.best[1].refit
+    if first is None or second is None:
+        return ()
+    return tuple(next_runs(task.model, first, second, seed=task.seed))
 
 
 def _unfinished(model: Model, base: Fit, final: Fit) -> tuple[str, ...]:
@@ -227,56 +232,3 @@ def _unexamined(misfit: Misfit, effects: tuple[Parameter, ...]) -> tuple[Candida
                   "not needed")
         for e, z, s, n in zip(effects, scores.z, scores.survived, scores.length, strict=True)
     )  # fmt: skip
-
-
-def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
-    """verdict.json."""
-    final = result.final
-    parameters = {
-        name: {
-            "value": final.parameters[name],
-            "interval": list(result.final_intervals[name]),
-            "value_all_runs": result.delivered[name],
-        }
-        for name in final.names
-    }
-    return {
-        "verdict": result.verdict,
-        "effects": list(result.effects),
-        "sentence": result.sentence,
-        "parameters": parameters,
-        "error_uncalibrated": result.error_uncalibrated,
-        "error_before": result.error_before,
-        "error_after": result.error_after,
-        "error_generic": result.error_generic,
-        "error_after_interval": list(result.error_after_interval),
-        "noise_ceiling": result.noise_ceiling,
-        "errors_by_output": result.errors_by_output,
-        "p_value": result.misfit.p_value,
-        "p_general": result.misfit.general_p,
-        "p_of_each_test": result.misfit.p,
-        "critical_z": result.misfit.critical_z,
-        "candidates": [
-            {
-                "effect": c.effect.name,
-                "z": c.z,
-                "survived_share": c.survived,
-                "smallest_detectable": c.detectable,
-                "size": c.refit.parameters[c.effect.name] if c.refit else None,
-                "deviance": c.refit.deviance if c.refit else None,
-                "session_gain": [c.gain, c.gain_error],
-                "verdict": c.verdict,
-            }
-            for c in result.candidates
-        ],
-        "untestable": result.untestable,
-        "generic_features": list(result.generic.features),
-        "next_runs": [run.record() for run in result.next_runs],
-        "locked_test": result.locked,
-        "locked_p_value": result.locked_p,
-        "fixed_before": result.plan_hash,
-        "rows_set_aside": list(result.set_aside),
-        "limits": list(result.limits),
-        "table": table,
-        "provenance": provenance({"table": table}),
-    }

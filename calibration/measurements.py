@@ -23,14 +23,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from calibration.model import Runs
 from calibration.noise import repeat_covariance
+from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 from sim.io.tables import read_table
-
-Floats = NDArray[np.float64]
 
 _RPM = 2 * math.pi / 60
 # Output -> (column, factor to SI, sign relative to the motor's; 0: a magnitude)
@@ -133,7 +131,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
 
 
 def _independent(
-    y: Floats, outputs: tuple[str, ...], condition: NDArray[np.int64]
+    y: Floats, outputs: tuple[str, ...], condition: Integers
 ) -> tuple[Floats, tuple[str, ...], tuple[str, ...]]:
     """Outputs that were measured: repeats differ, and not just as other outputs do.
 

@@ -25,13 +25,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 from calibration.features import features
 from calibration.fit import Fit
-from calibration.model import Floats, Runs
+from calibration.model import Runs
 from calibration.noise import Sums, inverse_root, least_squares, repeat_covariance, sums
+from sim.arrays import Flags, Floats
 
 DRAWS = 1000
 TESTABLE = 0.1  # survived share of an effect's signal below which the coefficients absorb it
@@ -67,7 +67,7 @@ class Misfit:
 class _Tester:
     """Fixed design of the runs used; statistics of any residual."""
 
-    def __init__(self, data: Runs, used: NDArray[np.bool_], J: Floats, D: Floats):
+    def __init__(self, data: Runs, used: Flags, J: Floats, D: Floats):
         self.session, self.condition = data.session[used], data.condition[used]
         self.J, self.D = J, D
         inputs = data.inputs[used]
@@ -136,7 +136,7 @@ class _Tester:
 def check_misfit(
     fitted: Fit,
     data: Runs,
-    used: NDArray[np.bool_],
+    used: Flags,
     directions: Floats,
     *,
     level: float,
@@ -182,7 +182,7 @@ def check_misfit(
     )
 
 
-def _largest(z: Floats, testable: NDArray[np.bool_]) -> Floats:
+def _largest(z: Floats, testable: Flags) -> Floats:
     return np.abs(z[:, testable]).max(1) if testable.any() else np.zeros(len(z))
 
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from sim.arrays import Flags, Floats, Integers
+
 Parameters = Mapping[str, float]
 
 _LOG_STEP, _STEP = 0.01, 0.02  # differences: in ln C, in units of a typical size
@@ -39,19 +39,19 @@ class Runs:
 
     outputs: tuple[str, ...]
     y: Floats  # (n, k), on a scale on which errors are relative
-    condition: NDArray[np.int64]  # (n,) repeats share a number
-    session: NDArray[np.int64]  # (n,) 0, 1, …: runs made together
+    condition: Integers  # (n,) repeats share a number
+    session: Integers  # (n,) 0, 1, …: runs made together
     session_names: tuple[str, ...]
     inputs: Floats  # (n, q) what was set or noted, on scales on which structure is smooth
     input_names: tuple[str, ...]
-    rows: NDArray[np.int64]  # (n,) numbers in the table, from 1
+    rows: Integers  # (n,) numbers in the table, from 1
     set_aside: tuple[str, ...]  # "row 7: …"
     limits: tuple[str, ...]  # what these runs cannot show, in words
 
     def __len__(self) -> int:
         return len(self.y)
 
-    def subset(self, rows: NDArray[np.bool_]) -> Any:
+    def subset(self, rows: Flags) -> Any:
         """The runs in `rows` (n,)."""
         own: dict[str, Any] = {k: v[rows] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         return replace(self, **own)
@@ -100,7 +100,7 @@ class Model(Protocol):
         """A model of runs that could be made next, and their settings."""
         ...
 
-    def guess(self, start: dict[str, float], used: NDArray[np.bool_]) -> dict[str, float]:
+    def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """A better start for the coefficients, from the runs in `used` (n,), if there is a cheap one."""
         ...
 

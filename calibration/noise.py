@@ -18,12 +18,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from sim.arrays import Floats, Integers
 
 SESSION_SHARE = 1.0  # largest ρ
 
-Floats = NDArray[np.float64]
-Labels = NDArray[np.int64]
+Labels = Integers
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Sums:
         weight = 1 / (1 + share[..., None] * self.sizes)
         return np.asarray(self.within + np.einsum("...s,...sij->...ij", weight, self.between))
 
-    def take(self, columns: NDArray[np.int64]) -> Sums:
+    def take(self, columns: Integers) -> Sums:
         """The same for choices of columns (c, q), (..., c, q, q)."""
         rows, cols = columns[:, :, None], columns[:, None, :]
         between = np.swapaxes(self.between[..., rows, cols], -4, -3)

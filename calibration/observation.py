@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.model import Floats
+from sim.arrays import Floats
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.measurements import OUTPUTS, Measurements
-from calibration.model import Floats
+from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.model.robot import Robot
 

@@ -10,17 +10,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.fit import Fit
 from calibration.model import Model, moved, stepped
 from calibration.noise import inverse_root, sums
+from sim.arrays import Flags, Floats, Integers
 
 _LEAST = 0.05  # of the expected rise: below, the deviance is flat and the end stays where it is
 
 
 def profile_intervals(
-    model: Model, fitted: Fit, used: NDArray[np.bool_], *, title: str = ""
+    model: Model, fitted: Fit, used: Flags, *, title: str = ""
 ) -> dict[str, tuple[float, float]]:
     """95 % intervals of every fitted parameter, by their profile deviances."""
     data, count = model.runs, len(fitted.names)
@@ -53,10 +53,10 @@ def profile_intervals(
 
 def _deviance(
     fitted: Fit,
-    root: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    session: NDArray[np.int64],
-    used: NDArray[np.bool_],
+    root: Floats,
+    residual: Floats,
+    session: Integers,
+    used: Flags,
     others: list[int],
 ) -> float:
     """rᵀ Σ⁻¹ r with the parameters `others` refitted (linearised), in the noise of the fit."""

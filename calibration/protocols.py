@@ -11,14 +11,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.locked import middle_session
 from calibration.measurements import Measurements
 from calibration.sessions import divided
+from sim.arrays import Flags
 from sim.io.errors import InputError
 
-Rows = NDArray[np.bool_]
+Rows = Flags
 
 
 def _session(data: Measurements) -> tuple[Measurements, Rows]:

@@ -7,14 +7,14 @@ from it: it counts as one of `noise.SESSION_SHARE`, so that what shifts all its 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.model import Runs
+from sim.arrays import Flags, Integers
 
 _FEWEST = 3
 _BLOCKS = 4  # in all
 
-Labels = NDArray[np.int64]
+Labels = Integers
 
 
 def groups(data: Runs) -> tuple[Labels, tuple[str, ...]]:
@@ -33,12 +33,12 @@ def groups(data: Runs) -> tuple[Labels, tuple[str, ...]]:
     return block, tuple(names)
 
 
-def divided(data: Runs, locked: NDArray[np.bool_]) -> bool:
+def divided(data: Runs, locked: Flags) -> bool:
     """Whether some runs of a session are `locked` (n,) and others are not."""
     return bool(set(data.session[locked]) & set(data.session[~locked]))
 
 
-def limits(data: Runs, locked: NDArray[np.bool_]) -> tuple[str, ...]:
+def limits(data: Runs, locked: Flags) -> tuple[str, ...]:
     """What is weaker where the `locked` runs (n,) are no sessions of their own, in words."""
     count = len(data.session_names)
     if count >= _FEWEST or not divided(data, locked):

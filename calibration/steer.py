@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from planner.check import TrackingError, tracking_error
 from planner.path import Path2D
 from planner.plan import plan, plan_record
+from sim.arrays import Floats
 from sim.model.robot import Robot
-from sim.motion.replay import Schedule, replay
+from sim.motion.replay import replay
 from surrogate.tabulate import tabulate
 
 
@@ -29,7 +29,7 @@ class Steered:
 
     plan: dict[str, Any]  # plan.json
     error: TrackingError
-    track: NDArray[np.float64]  # (K, 2)
+    track: Floats  # (K, 2)
 
 
 def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, Steered]:
@@ -40,13 +40,9 @@ def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, 
     """
     found = {}
     for label, model in models.items():
-        content = plan_record(plan(path, model, lookup=tabulate(model)))
-        start = tuple(float(content["start"][k]) for k in ("x_over_l", "y_over_l", "heading_rad"))
-        schedule = Schedule(
-            truth.group_values(), int(content["first_direction"]), np.asarray(content["dwell_bar"], dtype=float),
-            start, truth.time_scale,  # type: ignore[arg-type]
-        )  # fmt: skip
-        track = replay([schedule])[0]
+        planned = plan(path, model, lookup=tabulate(model))
+        content = plan_record(planned)
+        track = replay([planned.schedule(truth)])[0]
         found[label] = Steered(content, tracking_error(content, track), track[["x_over_l", "y_over_l"]].to_numpy())
     return found
 

@@ -14,14 +14,14 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibration.influences import CURRENT, SLIP, TRACKED_POINT, Influence, influences, reason_untestable
 from calibration.measurements import Measurements
-from calibration.model import Floats, Parameter, Parameters, by_differences
+from calibration.model import Parameter, Parameters, by_differences
 from calibration.noise import Noise, repeat_covariance
 from calibration.observation import Observation
 from calibration.plausible import check_inputs, check_outputs
+from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.model.robot import Robot
@@ -148,7 +148,7 @@ class Swimmer:
             return by_differences(self, parameters, names, title=title)
         return seen, J
 
-    def guess(self, start: dict[str, float], used: NDArray[np.bool_]) -> dict[str, float]:
+    def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """Coefficients fitted with the look-up table to the runs that it covers; `start` if those are too few.
 
         From several starts; the one that ends nearest to the runs counts.
@@ -209,7 +209,7 @@ class Swimmer:
         )  # fmt: skip
         return replace(self, runs=own), settings
 
-    def _inside(self, lookup: Lookup, parameters: Parameters) -> NDArray[np.bool_]:
+    def _inside(self, lookup: Lookup, parameters: Parameters) -> Flags:
         """Which runs (n,) the look-up table covers at `parameters`."""
         runs, place = self._conditions(parameters)
         good = np.ones(len(runs), dtype=bool)
@@ -232,7 +232,7 @@ class Swimmer:
             found["head_over_tank"] = 2 * self.robot.head_radius / found["tank_diameter"]
         return found
 
-    def _conditions(self, parameters: Parameters, *, signed: bool = False) -> tuple[list[_Run], NDArray[np.intp]]:
+    def _conditions(self, parameters: Parameters, *, signed: bool = False) -> tuple[list[_Run], Integers]:
         """Runs that differ, as far as it matters at `parameters`, and each run's place among them.
 
         The motor's direction matters where something odd is at work, or if `signed`.

@@ -35,7 +35,26 @@ def make_table(
     jobs: int | None = None,
     title: str = "table",
 ) -> pd.DataFrame:
-    """A table of runs of `robot` (its effects are the truth) in the columns of `calibration.measurements`."""
+    """A table of runs of `robot` (its effects are the truth) in the columns of `calibration.measurements`.
+
+    Args:
+        robot: the truth; its tail count, tail length and motor speed are replaced by those of the design.
+        seed: of the noise.
+        tails, lengths_cm, motor_rpm, trials: the design; both directions of the motor.
+        noise: scatter of single runs, relative (θ: radians).
+        session_noise: scatter of sessions, one session a tail count.
+        jobs: threads; default all processors.
+        title: of the progress bar; empty for none.
+
+    Raises:
+        InputError: a robot that cannot be simulated.
+
+    Example:
+        >>> from softflagella import load_robot, make_table
+        >>> table = make_table(load_robot("paper-measured"), seed=1, tails=(2,), lengths_cm=(6.0,), title="")
+        >>> len(table), table["N"].unique().tolist()
+        (8, [2])
+    """
     design = [(n, length, rpm) for n in tails for length in lengths_cm for rpm in motor_rpm]
     runs = [replace(robot, tails=n, tail_length=length / 100, motor_speed=rpm * _RPM) for n, length, rpm in design]
     values = [run.group_values() for run in runs]

@@ -25,7 +25,7 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import least_squares
 
-from calibration.model import Floats
+from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.tables import read_table
 

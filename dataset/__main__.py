@@ -7,13 +7,26 @@ python -m dataset verify DIR [--rows N]              check the files, simulate s
 
 from __future__ import annotations
 
-import argparse
-import sys
+from argparse import Namespace
 
-from sim.io.errors import run_command
+from dataset.backends import BACKENDS
+from sim.io.commands import JOBS, Program, argument, out
+
+program = Program("dataset", "Simulate sweeps of robots into data sets.")
+main = program.main
+_DATA = argument("data", help="folder of a data set")
 
 
-def _build(arguments: argparse.Namespace) -> None:
+@program.command(
+    "build",
+    "simulate a sweep into Parquet",
+    argument("--config", required=True, help="sweep.toml"),
+    out("folder"),
+    argument("--rows", type=int, help="number of rows (default: the configuration's)"),
+    JOBS,
+    argument("--backend", default="loky", choices=BACKENDS, help="joblib backend (default: loky)"),
+)
+def _build(arguments: Namespace) -> None:
     from dataset.design import load_design
     from dataset.sweep import build
 
@@ -25,42 +38,25 @@ def _build(arguments: argparse.Namespace) -> None:
     )
 
 
-def _report(arguments: argparse.Namespace) -> None:
+@program.command("report", "the sweep at a glance, one page", _DATA, out("page", default="reports/dataset.html"))
+def _report(arguments: Namespace) -> None:
     from dataset.report import write_report
 
     write_report(arguments.data, arguments.out)
     print(f"-> {arguments.out}")
 
 
-def _verify(arguments: argparse.Namespace) -> None:
+@program.command(
+    "verify",
+    "check a data set against schema and simulator",
+    _DATA,
+    argument("--rows", type=int, default=8, help="rows to simulate again (default: 8)"),
+)
+def _verify(arguments: Namespace) -> None:
     from dataset.verify import verify
 
     print(verify(arguments.data, rows=arguments.rows))
 
 
-def main(argv: list[str] | None = None) -> None:
-    from dataset.sweep import BACKENDS
-
-    parser = argparse.ArgumentParser(prog="python -m dataset", description=__doc__.splitlines()[0])
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    build = commands.add_parser("build", help="simulate a sweep into Parquet")
-    build.add_argument("--config", required=True, help="sweep.toml")
-    build.add_argument("--out", required=True, help="folder to write")
-    build.add_argument("--rows", type=int, help="number of rows (default: the configuration's)")
-    build.add_argument("--jobs", type=int, help="processes (default: all processors)")
-    build.add_argument("--backend", default="loky", choices=BACKENDS, help="joblib backend")
-    build.set_defaults(run=_build)
-    report = commands.add_parser("report", help="the sweep at a glance, one page")
-    report.add_argument("data", help="folder of a data set")
-    report.add_argument("--out", default="reports/dataset.html", help="page to write")
-    report.set_defaults(run=_report)
-    verify = commands.add_parser("verify", help="check a data set against schema and simulator")
-    verify.add_argument("data", help="folder of a data set")
-    verify.add_argument("--rows", type=int, default=8, help="rows to simulate again")
-    verify.set_defaults(run=_verify)
-    arguments = parser.parse_args(argv)
-    arguments.run(arguments)
-
-
 if __name__ == "__main__":
-    sys.exit(run_command(main))
+    program.exit()

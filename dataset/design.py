@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.model.groups import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS
@@ -34,7 +34,7 @@ class Axis:
     high: float
     scale: str
 
-    def at(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, share: Floats) -> Floats:
         """Values at shares in [0, 1)."""
         if self.scale == "log":
             return np.asarray(self.low * (self.high / self.low) ** share)
@@ -56,7 +56,7 @@ class Design:
         axes = {n: {"range": [a.low, a.high], "scale": a.scale} for n, a in self.axes.items()}
         return {"seed": self.seed, "inputs": axes}
 
-    def points(self) -> dict[str, NDArray[np.float64]]:
+    def points(self) -> dict[str, Floats]:
         """Columns of the first `rows` robots of the sequence."""
         sampler = qmc.Sobol(len(self.axes), scramble=True, rng=np.random.default_rng(self.seed))
         share = sampler.random_base2(math.ceil(math.log2(max(self.rows, 2))))[: self.rows]

@@ -17,7 +17,6 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
 from dataset.schema import schema
 from sim.io.errors import InputError
@@ -30,9 +29,7 @@ def part_path(folder: Path, index: int) -> Path:
     return folder / f"part-{index:05d}.parquet"
 
 
-def write_part(
-    folder: Path, index: int, columns: dict[str, NDArray[Any]], effects: list[str], config_hash: str
-) -> None:
+def write_part(folder: Path, index: int, columns: dict[str, Any], effects: list[str], config_hash: str) -> None:
     """Write one chunk; `columns` must fill the schema."""
     form = schema(effects).with_metadata({"config_hash": config_hash})
     table = pa.table([pa.array(columns[f.name], type=f.type, from_pandas=False) for f in form], schema=form)

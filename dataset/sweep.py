@@ -7,18 +7,16 @@ interruption loses one batch a worker.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
-from numpy.typing import NDArray
 
+from dataset import backends
 from dataset.design import Design
 from dataset.store import MANIFEST, part_hash, part_path, write_manifest, write_part
+from sim.arrays import Floats, Integers
 from sim.effects import catalogue
 from sim.inputs import check_columns
 from sim.io.errors import InputError
@@ -30,12 +28,11 @@ from sim.motion.steady import steady
 from sim.motion.steady_motion import STEADY_COLUMNS
 from sim.motion.switching import switch_response
 
-Columns = dict[str, NDArray[Any]]
+Columns = dict[str, Any]
 PART_ROWS = 64  # what an interruption loses, a worker
-BACKENDS = ("loky", "dask", "ray")
 
 
-def simulate(points: dict[str, NDArray[np.float64]]) -> Columns:
+def simulate(points: dict[str, Floats]) -> Columns:
     """All columns of the schema for robots of one N, except `row`.
 
     Args:
@@ -95,7 +92,7 @@ def build(
     work = partial(_simulate_part, folder=out, effects=effects, config_hash=config_hash)
     todo = [(i, batches[i], {k: v[batches[i]] for k, v in points.items()}) for i in waiting]
     counts = {"rows": design.rows, "parts": len(batches)}
-    with _backend(backend):
+    with backends.backend(backend):
         run_batches(work, todo, sizes=[len(t[1]) for t in todo], jobs=jobs, title=title)
     manifest = {**provenance(config), "config_hash": config_hash, "effects": effects, **counts}
     manifest |= _count_flags(out, len(batches))
@@ -104,7 +101,7 @@ def build(
 
 
 def _simulate_part(
-    job: tuple[int, NDArray[np.int64], dict[str, NDArray[np.float64]]],
+    job: tuple[int, Integers, dict[str, Floats]],
     *,
     folder: Path,
     effects: list[str],
@@ -143,27 +140,3 @@ def _count_flags(folder: Path, parts: int) -> dict[str, int]:
         for name in names:
             totals[name] += int(np.count_nonzero(table[name].to_numpy()))
     return totals
-
-
-@contextmanager
-def _backend(name: str) -> Iterator[None]:
-    if name not in BACKENDS:
-        raise InputError(f"backend {name!r}; allowed are {', '.join(BACKENDS)}")
-    if name == "loky":
-        yield
-        return
-    try:
-        if name == "dask":
-            from distributed import Client
-
-            with Client(processes=True, threads_per_worker=1), joblib.parallel_config("dask"):
-                yield
-        else:
-            from ray.util.joblib import register_ray
-
-            register_ray()
-            with joblib.parallel_config("ray"):
-                yield
-    except ImportError:
-        package = "dask[distributed]" if name == "dask" else "ray"
-        raise InputError(f"backend {name!r} needs the package {package}; install it or use loky") from None

@@ -6,39 +6,49 @@ python -m planner check PLAN.json TRACK.csv [--out OVERLAY.png]        tracking 
 
 from __future__ import annotations
 
-import argparse
 import sys
+from argparse import Namespace
+from typing import TYPE_CHECKING
 
-from sim.io.errors import InputError, run_command
+from sim.io.commands import MODEL, ROBOT, Program, argument, out
+from sim.io.errors import InputError
 
-_UNITS = {"l": None, "m": 1.0, "cm": 0.01, "mm": 0.001}
+if TYPE_CHECKING:
+    from planner.path import Path2D
+    from sim.model.robot import Robot
+
+program = Program("planner", "Plan switching schedules for paths, without simulating.")
+main = program.main
+_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+_SHAPES = {"circle": 0, "triangle": 3, "square": 4}  # number of corners
 
 
-def _plan(arguments: argparse.Namespace) -> None:
+@program.command(
+    "plan",
+    "plan the switching times for a path",
+    argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE"),
+    ROBOT,
+    out("folder"),
+    MODEL,
+    argument("--unit", choices=("l", *_UNITS), help="unit of the path (default: the drawing's, or tail lengths)"),
+    argument("--scale", type=float, default=1.0, help="multiply the path's coordinates"),
+    argument("--shape", help="which path of an SVG with several"),
+    argument("--closed", action="store_true", help="join the path's end to its start"),
+    argument("--point", default="head_centre", choices=("head_centre", "head_tip", "pivot"),
+             help="which point follows the path (default: head_centre)"),
+    argument("--corner", default="fillet", choices=("fillet", "error"), help="round corners, or refuse them"),
+    argument("--min-dwell", type=float, help="shortest dwell, in time units μ0 l⁴/EI"),
+    argument("--tolerance", type=float, help="largest guaranteed error, in tail lengths"),
+)  # fmt: skip
+def _plan(arguments: Namespace) -> None:
     from planner.export import write_plan
-    from planner.path import circle, polygon, read_path
     from planner.plan import plan
     from sim.inputs import load_robot
     from surrogate.export import load_table
 
     robot = load_robot(arguments.robot)
-    unit = _UNITS[arguments.unit]
-    scale = arguments.scale * (1.0 if unit is None else unit / robot.tail_length)
-    if not 0 < scale < float("inf"):
-        raise InputError(f"--scale {arguments.scale}; give a number above 0")
-    shape, _, size = arguments.path.partition(":")
-    if shape in ("circle", "triangle", "square") and size:
-        try:
-            length = float(size)
-        except ValueError:
-            raise InputError(f"{arguments.path!r}; write for example circle:2 or square:3") from None
-        if not 0 < length < float("inf"):
-            raise InputError(f"{arguments.path!r}; its size must be above 0")
-        path = circle(length) if shape == "circle" else polygon(3 if shape == "triangle" else 4, length)
-    else:
-        path = read_path(arguments.path, closed=True if arguments.closed else None)
     result = plan(
-        path.scaled(scale),
+        _path(arguments, robot),
         robot,
         lookup=load_table(arguments.model),
         point=arguments.point,
@@ -51,7 +61,7 @@ def _plan(arguments: argparse.Namespace) -> None:
         print(f"warning: {warning}", file=sys.stderr)
     print(
         f"{len(result.dwells)} dwells, {result.seconds.sum():.1f} s; predicted error "
-        f"{result.predicted_rms:.4f} l rms, stated bound {result.bound:.3f} l "
+        f"{result.predicted_rms:.4f} l rms, stated error {result.stated_error:.3f} l "
         f"(guaranteed {result.guaranteed:.3f} + table {result.tube:.3f})"
     )
     if result.fillet_radius:
@@ -59,7 +69,38 @@ def _plan(arguments: argparse.Namespace) -> None:
     print(f"-> {', '.join(map(str, paths))}")
 
 
-def _check(arguments: argparse.Namespace) -> None:
+def _path(arguments: Namespace, robot: Robot) -> Path2D:
+    """The path that the command asks for, in tail lengths."""
+    from planner.drawings import Drawing, read_path
+    from planner.path import circle, polygon
+
+    shape, _, size = arguments.path.partition(":")
+    if shape in _SHAPES and size:
+        try:
+            length = float(size)
+        except ValueError:
+            raise InputError(f"{arguments.path!r}; write for example circle:2 or square:3") from None
+        if not 0 < length < float("inf"):
+            raise InputError(f"{arguments.path!r}; its size must be above 0")
+        drawing = Drawing(polygon(_SHAPES[shape], length) if _SHAPES[shape] else circle(length), None)
+    else:
+        closed = True if arguments.closed else None
+        drawing = read_path(arguments.path, closed=closed, shape=arguments.shape)
+    unit = drawing.unit if arguments.unit is None else _UNITS.get(arguments.unit)
+    scale = arguments.scale * (1.0 if unit is None else unit / robot.tail_length)
+    if not 0 < scale < float("inf"):
+        raise InputError(f"--scale {arguments.scale}; give a number above 0")
+    return drawing.path.scaled(scale)
+
+
+@program.command(
+    "check",
+    "tracking error of a replayed track",
+    argument("plan", help="plan.json"),
+    argument("track", help="CSV written by python -m sim replay"),
+    out("overlay picture, PNG,", default=None),
+)
+def _check(arguments: Namespace) -> None:
     from planner.check import draw_overlay, load_plan, tracking_error
     from sim.io.files import whole_file
     from sim.io.tables import read_table
@@ -79,32 +120,5 @@ def _check(arguments: argparse.Namespace) -> None:
         print(f"-> {arguments.out}")
 
 
-def main(argv: list[str] | None = None) -> None:
-    from surrogate.export import SHIPPED
-
-    parser = argparse.ArgumentParser(prog="python -m planner", description=__doc__.splitlines()[0])
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    plan = commands.add_parser("plan", help="plan the switching times for a path")
-    plan.add_argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE")
-    plan.add_argument("--robot", required=True, help="robot.toml or the name of a preset")
-    plan.add_argument("--out", required=True, help="folder to write")
-    plan.add_argument("--model", default=SHIPPED, help="look-up table (default: the shipped one)")
-    plan.add_argument("--unit", default="l", choices=_UNITS, help="unit of the path (default: tail lengths)")
-    plan.add_argument("--scale", type=float, default=1.0, help="multiply the path's coordinates")
-    plan.add_argument("--closed", action="store_true", help="join the path's end to its start")
-    plan.add_argument("--point", default="head_centre", choices=("head_centre", "head_tip", "pivot"))
-    plan.add_argument("--corner", default="fillet", choices=("fillet", "error"))
-    plan.add_argument("--min-dwell", type=float, help="shortest dwell, in time units mu0 l^4/EI")
-    plan.add_argument("--tolerance", type=float, help="largest guaranteed error, in tail lengths")
-    plan.set_defaults(run=_plan)
-    check = commands.add_parser("check", help="tracking error of a replayed track")
-    check.add_argument("plan", help="plan.json")
-    check.add_argument("track", help="CSV written by python -m sim replay")
-    check.add_argument("--out", help="overlay picture to write, PNG")
-    check.set_defaults(run=_check)
-    arguments = parser.parse_args(argv)
-    arguments.run(arguments)
-
-
 if __name__ == "__main__":
-    sys.exit(run_command(main))
+    program.exit()

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from planner.picture import REPLAYED, draw_tracks
 from planner.plan import distance_to
+from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.mechanics import planar
 
@@ -32,15 +32,15 @@ class TrackingError:
     largest: float
     raw_rms: float
     raw_largest: float
-    bound: float
-    track: NDArray[np.float64]  # (K, 2) tracked point
+    stated: float
+    track: Floats  # (K, 2) tracked point
 
     @property
     def line(self) -> str:
-        verdict = "within" if self.largest <= self.bound else "ABOVE"
+        verdict = "within" if self.largest <= self.stated else "ABOVE"
         return (
-            f"tracking error {self.rms:.4f} l rms, {self.largest:.4f} l at most, {verdict} the stated bound "
-            f"{self.bound:.3f} l; from the raw path {self.raw_rms:.3f} l rms, {self.raw_largest:.3f} l at most"
+            f"tracking error {self.rms:.4f} l rms, {self.largest:.4f} l at most, {verdict} the stated error "
+            f"{self.stated:.3f} l; from the raw path {self.raw_rms:.3f} l rms, {self.raw_largest:.3f} l at most"
         )
 
 
@@ -48,7 +48,7 @@ def load_plan(path: str | Path) -> dict[str, Any]:
     """The content of a plan.json."""
     try:
         content = json.loads(Path(path).read_text())
-        for key in ("reference", "raw_path", "bound_over_l", "predicted_poses", "point"):
+        for key in ("reference", "raw_path", "stated_error_over_l", "predicted_poses", "point"):
             content[key]
     except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError) as broken:
         raise InputError(f"{path} is not a plan.json of the planner ({broken}); plan again") from None
@@ -80,13 +80,13 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
         largest=float(declared.max()),
         raw_rms=float(np.sqrt((weight * raw**2).sum())),
         raw_largest=float(raw.max()),
-        bound=float(plan["bound_over_l"]),
+        stated=float(plan["stated_error_over_l"]),
         track=tracked,
     )
 
 
 def draw_overlay(axes: Axes, plan: dict[str, Any], error: TrackingError, title: str) -> None:
     """Replayed track over the declared and the raw path."""
-    draw_tracks(axes, np.array(plan["raw_path"]), np.array(plan["reference"]), error.bound)
+    draw_tracks(axes, np.array(plan["raw_path"]), np.array(plan["reference"]), error.stated)
     axes.plot(*error.track.T, color=REPLAYED, lw=0.8, label="replayed in the simulator")
     axes.set_title(f"{title}\n{error.rms:.3f} l rms, {error.largest:.3f} l at most", fontsize=10)

@@ -23,7 +23,22 @@ _MOST_MS = 65_535
 
 
 def write_plan(result: Plan, folder: str | Path) -> list[Path]:
-    """Write the four files of a plan; returns their paths."""
+    """Write the four files of a plan; returns their paths.
+
+    Args:
+        result: the plan.
+        folder: made if it is missing.
+
+    Raises:
+        InputError: a dwell that the header's whole milliseconds cannot hold, or a folder that cannot be written.
+
+    Example:
+        >>> import tempfile
+        >>> from softflagella import circle, load_robot, plan, write_plan
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in write_plan(plan(circle(2.0), load_robot("paper-control")), folder)]
+        ['plan.json', 'plan.csv', 'schedule.h', 'plan.svg']
+    """
     out = Path(folder)
     header = controller_header(result)
     record = {**plan_record(result), "code_version": code_version()}

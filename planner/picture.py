@@ -5,34 +5,34 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from planner.plan import Plan
+from sim.arrays import Floats
 
 RAW, DECLARED, PREDICTED, REPLAYED = "#b0b0b0", "#1a1a1a", "#2a7fba", "#c8452f"
 
 
 def draw_plan(result: Plan) -> Figure:
-    """One panel: the plan over its path, with the stated bound."""
+    """One panel: the plan over its path, with the stated error."""
     figure = Figure(figsize=(6, 6))
     axes = figure.add_subplot()
-    draw_tracks(axes, result.raw, result.reference, result.bound)
+    draw_tracks(axes, result.raw, result.reference, result.stated_error)
     axes.plot(*result.track.T, color=PREDICTED, lw=0.8, label="predicted")
     axes.plot(*result.track[0], "o", color=DECLARED, ms=5)
     minutes = result.seconds.sum() / 60
     axes.set_title(
         f"{result.robot.name}: {len(result.dwells)} dwells, {minutes:.1f} min\n"
-        f"predicted error {result.predicted_rms:.3f} l rms, stated bound {result.bound:.2f} l",
+        f"predicted error {result.predicted_rms:.3f} l rms, stated error {result.stated_error:.2f} l",
         fontsize=10,
     )
     axes.legend(loc="center", fontsize=8, frameon=False)
     return figure
 
 
-def draw_tracks(axes: Axes, raw: NDArray[np.float64], declared: NDArray[np.float64], bound: float) -> None:
-    """Raw and declared path with a band of the stated bound."""
-    edges = _band(declared, bound)
-    axes.fill(*edges.T, color="#2a7fba", alpha=0.10, lw=0, label=f"bound {bound:.2f} l")
+def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float) -> None:
+    """Raw and declared path with a band of the stated error."""
+    edges = _band(declared, stated)
+    axes.fill(*edges.T, color="#2a7fba", alpha=0.10, lw=0, label=f"stated error {stated:.2f} l")
     axes.plot(*raw.T, color=RAW, lw=1.0, label="path as given")
     axes.plot(*declared.T, color=DECLARED, lw=1.2, label="declared (rounded)")
     axes.set_aspect("equal")
@@ -40,7 +40,7 @@ def draw_tracks(axes: Axes, raw: NDArray[np.float64], declared: NDArray[np.float
     axes.set_ylabel("y / l")
 
 
-def _band(polyline: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+def _band(polyline: Floats, width: float) -> Floats:
     tangent = np.gradient(polyline, axis=0)
     norm = np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
     left = np.stack([-tangent[:, 1], tangent[:, 0]], 1) / norm * width

@@ -3,13 +3,13 @@
 1. The look-up table gives the vehicle (`planner.vehicle`).
 2. Corners are rounded by the smallest radius that the pivot can follow with some room; a path that is too
    tight is refused, with the place, the radii and the smallest scale that would do.
-3. The tractrix of the rounded path is the pivot's reference (`planner.path`).
+3. The tractrix of the rounded path is the pivot's reference (`planner.tractrix`).
 4. Hysteresis about the line of sight gives the dwells (`planner.schedule`).
-5. Bound, predicted error and tube are computed and stated (`planner.bound`).
+5. Guaranteed error, tube and predicted error are computed and stated (`planner.stated_error`).
 
-The shape of errors: `guaranteed` holds for the exact vehicle; `tube` is what the table's own errors add;
-`bound` is their sum, for the tracked point against the declared (rounded) path. How far the rounded path is
-from the raw one is reported beside it.
+Errors are distances of the tracked point from the declared (rounded) path: `guaranteed` holds for the exact
+vehicle; `tube` is what the table's own errors add in 95 % of draws; `stated_error` is their sum. How far the
+rounded path is from the raw one is reported beside them.
 """
 
 from __future__ import annotations
@@ -19,17 +19,19 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from planner import bound as bounds
-from planner.path import CORNER, Path2D, Reference, fillet, kinks, largest_fillet, reference
-from planner.schedule import Switches, follow, trace
+from planner.corners import CORNER, fillet, kinks, largest_fillet
+from planner.path import Path2D
+from planner.schedule import follow, trace
+from planner.stated_error import guaranteed, look_ahead, tube
+from planner.tractrix import Reference, reference
 from planner.vehicle import TURN_OVER, Vehicle, vehicle_of
+from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.model.robot import Robot
-from surrogate.export import identity, load
-from surrogate.lookup import Lookup
-from surrogate.single import SingleRobot
+from sim.model.schedule import Schedule
+from surrogate.table import LookupTable
 
 Point = Literal["head_centre", "head_tip", "pivot"]
 
@@ -41,17 +43,24 @@ _MOST_POINTS = 60_000
 
 @dataclass(frozen=True)
 class Plan:
-    """A schedule and what is known of it. Lengths in l, times in μ0 l⁴/EI, unless named otherwise."""
+    """A schedule and what is known of it. Lengths in l, times in μ0 l⁴/EI, unless named otherwise.
+
+    Example:
+        >>> from softflagella import circle, load_robot, plan
+        >>> result = plan(circle(2.0), load_robot("paper-control"))
+        >>> result.predicted_max < result.stated_error, len(result.seconds) == len(result.dwells)
+        (True, True)
+    """
 
     robot: Robot
     point: Point
     offset: float  # from the head's centre forward to the tracked point
     first_direction: int
-    dwells: NDArray[np.float64]  # (M,)
-    poses: NDArray[np.float64]  # (M + 1, 3): predicted head's centre at the flips
-    track: NDArray[np.float64]  # (K, 2): predicted tracked point, several samples a dwell
-    reference: NDArray[np.float64]  # (m, 2): declared path
-    raw: NDArray[np.float64]  # (k, 2): path as given
+    dwells: Floats  # (M,)
+    poses: Floats  # (M + 1, 3): predicted head's centre at the flips
+    track: Floats  # (K, 2): predicted tracked point, several samples a dwell
+    reference: Floats  # (m, 2): declared path
+    raw: Floats  # (k, 2): path as given
     closed: bool
     fillet_radius: float
     corner_cut: float  # largest distance of the raw path from the declared one
@@ -65,16 +74,26 @@ class Plan:
     warnings: tuple[str, ...]
 
     @property
-    def bound(self) -> float:
-        """Stated largest distance from the declared path: guaranteed error and tube [l]."""
+    def stated_error(self) -> float:
+        """Largest distance from the declared path that the plan states: guaranteed error and tube [l]."""
         return self.guaranteed + self.tube
+
+    def schedule(self, robot: Robot | None = None) -> Schedule:
+        """The schedule for `sim.motion.replay`.
+
+        Args:
+            robot: who carries it out; default the robot that was planned for.
+        """
+        own = robot or self.robot
+        start = (float(self.poses[0, 0]), float(self.poses[0, 1]), float(self.poses[0, 2]))
+        return Schedule(own.group_values(), self.first_direction, self.dwells, start, own.time_scale)
 
     @property
     def duration(self) -> float:
         return float(self.dwells.sum())
 
     @property
-    def seconds(self) -> NDArray[np.float64]:
+    def seconds(self) -> Floats:
         """Dwell times [s]."""
         return self.dwells * self.robot.time_scale
 
@@ -83,7 +102,7 @@ def plan(
     path: Path2D | ArrayLike,
     robot: Robot,
     *,
-    lookup: Lookup | SingleRobot | None = None,
+    lookup: LookupTable | None = None,
     point: Point = "head_centre",
     corner: Literal["fillet", "error"] = "fillet",
     minimum_dwell: float | None = None,
@@ -99,56 +118,36 @@ def plan(
         point: which point must follow the path.
         corner: round corners, or refuse them.
         minimum_dwell: shortest time between flips [μ0 l⁴/EI]; default the tails' turn-over time.
-        tolerance: largest acceptable bound [l]; the longest dwell that keeps it is chosen (longer is
+        tolerance: largest acceptable guaranteed error [l]; the longest dwell that keeps it is chosen (longer is
             faster and wider). Default: the minimum dwell.
         seed: of the random vehicles behind the tube.
 
     Raises:
         InputError: bad path, path too tight, dwell too short, tolerance out of reach, robot out of domain.
+
+    Example:
+        >>> from softflagella import circle, load_robot, plan
+        >>> result = plan(circle(2.0), load_robot("paper-control"))
+        >>> len(result.dwells) > 100, result.predicted_rms < 0.03
+        (True, True)
     """
-    table = lookup or load()
-    vehicle = vehicle_of(robot, table)
+    if lookup is None:
+        from surrogate.export import load
+
+        lookup = load()
+    vehicle = vehicle_of(robot, lookup)
     raw = path if isinstance(path, Path2D) else Path2D.of(path)
     offset = _offset(point, robot, vehicle)
-    rod = vehicle.rod + offset
+    distance = vehicle.pivot_distance + offset
     shortest = _minimum_dwell(minimum_dwell, vehicle)
-    declared, radius = _round_corners(raw, vehicle, rod, corner)
-    ref = reference(declared, rod, _spacing(declared))
-    curvature = _check_curvature(ref, raw, vehicle, rod, corner)
-    dwell = _choose_dwell(vehicle, rod, curvature, shortest, tolerance)
-    switches = follow(
-        ref,
-        vehicle,
-        rod=rod,
-        ahead=bounds.look_ahead(vehicle, curvature),
-        dwell=dwell,
-        offset=offset,
-    )
-    return _finish(robot, vehicle, table, point, raw, ref, switches, radius, rod, curvature, dwell, offset, seed)
-
-
-def _finish(
-    robot: Robot,
-    vehicle: Vehicle,
-    table: Lookup | SingleRobot,
-    point: Point,
-    raw: Path2D,
-    ref: Reference,
-    switches: Switches,
-    radius: float,
-    rod: float,
-    curvature: float,
-    dwell: float,
-    offset: float,
-    seed: int,
-) -> Plan:
-    start = switches.poses[0]
-    track = trace(vehicle, switches.first_direction, switches.dwells, start, offset)
+    declared, radius = _round_corners(raw, vehicle, distance, corner)
+    ref = reference(declared, distance, _spacing(declared))
+    curvature = _check_curvature(ref, raw, vehicle, distance, corner)
+    dwell = _choose_dwell(vehicle, distance, curvature, shortest, tolerance)
+    ahead = look_ahead(vehicle, curvature)
+    switches = follow(ref, vehicle, pivot_distance=distance, ahead=ahead, dwell=dwell, offset=offset)
+    track = trace(vehicle, switches, offset)
     error = distance_to(ref.p, track)
-    extra = bounds.tube(vehicle, switches.first_direction, switches.dwells, start, offset, seed=seed)
-    warnings = []
-    if vehicle.tail_gap < 1.0:
-        warnings.append(f"tails touch (predicted gap {vehicle.tail_gap:.2f} diameters): the model has no contact")
     return Plan(
         robot=robot,
         point=point,
@@ -163,17 +162,23 @@ def _finish(
         fillet_radius=radius,
         corner_cut=float(distance_to(ref.p, raw.polyline()).max()),
         minimum_dwell=dwell,
-        guaranteed=bounds.guaranteed(vehicle, rod, curvature, dwell),
-        tube=extra,
+        guaranteed=guaranteed(vehicle, distance, curvature, dwell),
+        tube=tube(vehicle, switches, offset, seed=seed),
         predicted_rms=float(np.sqrt(np.mean(error**2))),
         predicted_max=float(error.max()),
         closure=float(np.linalg.norm(track[-1] - track[0])) if raw.closed else None,
-        model=identity(table),
-        warnings=tuple(warnings),
+        model=lookup.identity,
+        warnings=_warnings(vehicle),
     )
 
 
-def distance_to(polyline: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _warnings(vehicle: Vehicle) -> tuple[str, ...]:
+    if vehicle.tail_gap < 1.0:
+        return (f"tails touch (predicted gap {vehicle.tail_gap:.2f} diameters): the model has no contact",)
+    return ()
+
+
+def distance_to(polyline: Floats, points: Floats) -> Floats:
     """Distance of points (M, 2) from a polyline (m, 2)."""
     start, along = polyline[:-1], np.diff(polyline, axis=0)
     square = np.maximum((along**2).sum(1), 1e-30)
@@ -193,7 +198,7 @@ def _offset(point: Point, robot: Robot, vehicle: Vehicle) -> float:
     if point == "head_tip":
         return robot.head_length / 2 / robot.tail_length
     if point == "pivot":
-        return -vehicle.rod
+        return -vehicle.pivot_distance
     raise InputError(f"point {point!r}; allowed are head_centre, head_tip, pivot")
 
 
@@ -217,7 +222,7 @@ def _spacing(path: Path2D) -> float:
     return max(_SPACING, path.length / _MOST_POINTS)
 
 
-def _round_corners(raw: Path2D, vehicle: Vehicle, rod: float, corner: str) -> tuple[Path2D, float]:
+def _round_corners(raw: Path2D, vehicle: Vehicle, distance: float, corner: str) -> tuple[Path2D, float]:
     """The path with its corners rounded by the smallest radius that leaves the pivot some room, and that."""
     angle = np.abs(kinks(raw))
     sharpest = int(angle.argmax())
@@ -232,21 +237,21 @@ def _round_corners(raw: Path2D, vehicle: Vehicle, rod: float, corner: str) -> tu
             "round it, or allow corner = fillet"
         )
     limit = ROOM / vehicle.pivot_radius
-    low, high = 0.0, min(largest_fillet(raw), math.hypot(rod, 1 / limit))
-    if _largest_curvature(fillet(raw, high), rod) > limit:
+    low, high = 0.0, min(largest_fillet(raw), math.hypot(distance, 1 / limit))
+    if _largest_curvature(fillet(raw, high), distance) > limit:
         return fillet(raw, high), high
     for _ in range(20):
         middle = (low + high) / 2
-        followed = _largest_curvature(fillet(raw, middle), rod) <= limit
+        followed = _largest_curvature(fillet(raw, middle), distance) <= limit
         low, high = (low, middle) if followed else (middle, high)
     return fillet(raw, high), high
 
 
-def _largest_curvature(path: Path2D, rod: float) -> float:
-    return float(np.abs(reference(path, rod, _spacing(path)).curvature).max())
+def _largest_curvature(path: Path2D, distance: float) -> float:
+    return float(np.abs(reference(path, distance, _spacing(path)).curvature).max())
 
 
-def _check_curvature(ref: Reference, raw: Path2D, vehicle: Vehicle, rod: float, corner: str) -> float:
+def _check_curvature(ref: Reference, raw: Path2D, vehicle: Vehicle, distance: float, corner: str) -> float:
     """The reference's largest curvature; refuses one that the pivot cannot follow."""
     curvature = np.abs(ref.curvature)
     worst = int(curvature.argmax())
@@ -257,29 +262,29 @@ def _check_curvature(ref: Reference, raw: Path2D, vehicle: Vehicle, rod: float, 
     raise InputError(
         f"path too tight at ({x:.3g}, {y:.3g}) l: the pivot would turn with radius "
         f"{1 / curvature[worst]:.3g} l, the robot can with {1 / limit:.3g} l (its circle has radius "
-        f"{vehicle.turn_radius:.3g} l); {_smallest_scale(raw, vehicle, rod, corner)}"
+        f"{vehicle.turn_radius:.3g} l); {_smallest_scale(raw, vehicle, distance, corner)}"
     )
 
 
-def _smallest_scale(raw: Path2D, vehicle: Vehicle, rod: float, corner: str) -> str:
+def _smallest_scale(raw: Path2D, vehicle: Vehicle, distance: float, corner: str) -> str:
     limit = TIGHTEST / vehicle.pivot_radius
     for factor in np.geomspace(1.05, 50, 80):
         try:
-            declared, _ = _round_corners(raw.scaled(factor), vehicle, rod, corner)
+            declared, _ = _round_corners(raw.scaled(factor), vehicle, distance, corner)
         except InputError:
             continue
-        if _largest_curvature(declared, rod) <= limit:
+        if _largest_curvature(declared, distance) <= limit:
             return f"scale the path by {factor:.2g}"
     return "make the path smoother"
 
 
 def _choose_dwell(
-    vehicle: Vehicle, rod: float, curvature: float, shortest: float, tolerance: float | None
+    vehicle: Vehicle, distance: float, curvature: float, shortest: float, tolerance: float | None
 ) -> float:
-    """The longest minimum dwell whose bound keeps the tolerance."""
+    """The longest minimum dwell whose guaranteed error keeps the tolerance."""
     if tolerance is None:
         return shortest
-    least = bounds.guaranteed(vehicle, rod, curvature, shortest)
+    least = guaranteed(vehicle, distance, curvature, shortest)
     if not math.isfinite(tolerance) or tolerance < least:
         raise InputError(
             f"tolerance {tolerance:g} l is below what the dwell {shortest:g} guarantees ({least:.3g} l); "
@@ -287,19 +292,19 @@ def _choose_dwell(
         )
     longest = float(vehicle.dwells[-1])
     candidates = np.linspace(shortest, max(longest, shortest), 400)
-    kept = [t for t in candidates if bounds.guaranteed(vehicle, rod, curvature, t) <= tolerance]
+    kept = [t for t in candidates if guaranteed(vehicle, distance, curvature, t) <= tolerance]
     return float(kept[-1])
 
 
 def plan_record(result: Plan) -> dict[str, Any]:
-    """The plan as JSON-like content; `sim.replay.load_schedule` reads it."""
-    robot, start = result.robot, result.poses[0]
-    groups = robot.group_values()
+    """The plan as JSON-like content; `sim.model.schedule.load_schedule` reads its schedule."""
+    robot, schedule = result.robot, result.schedule()
+    x, y, heading = schedule.start
     return {
         "format": 1,
         "robot": {
             "name": robot.name,
-            "groups": groups,
+            "groups": schedule.robot,
             "tail_length_m": robot.tail_length,
             "motor_speed_rad_s": robot.motor_speed,
             "time_scale_s": robot.time_scale,
@@ -307,11 +312,7 @@ def plan_record(result: Plan) -> dict[str, Any]:
         "point": result.point,
         "offset_over_l": result.offset,
         "first_direction": result.first_direction,
-        "start": {
-            "x_over_l": float(start[0]),
-            "y_over_l": float(start[1]),
-            "heading_rad": float(start[2]),
-        },
+        "start": {"x_over_l": x, "y_over_l": y, "heading_rad": heading},
         "dwell_bar": result.dwells.tolist(),
         "dwell_s": result.seconds.tolist(),
         "predicted_poses": result.poses.tolist(),
@@ -323,7 +324,7 @@ def plan_record(result: Plan) -> dict[str, Any]:
         "minimum_dwell_bar": result.minimum_dwell,
         "guaranteed_error_over_l": result.guaranteed,
         "tube_over_l": result.tube,
-        "bound_over_l": result.bound,
+        "stated_error_over_l": result.stated_error,
         "predicted_rms_over_l": result.predicted_rms,
         "predicted_max_over_l": result.predicted_max,
         "closure_over_l": result.closure,

@@ -1,6 +1,6 @@
 """Switching times by hysteresis about the line of sight, and the track that they predict.
 
-The pivot's reference and heading (`planner.path.Reference`) give at every place the wanted heading
+The pivot's reference and heading (`planner.tractrix.Reference`) give at every place the wanted heading
 
     φ_d = φ_ref − atan(e/Δ),
 
@@ -18,14 +18,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planner.path import Reference
+from planner.tractrix import Reference
 from planner.vehicle import FROM_REST, Vehicle
+from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 from sim.mechanics import planar
-
-Floats = NDArray[np.float64]
 
 _WINDOW = 40  # points of the reference that are searched ahead of and behind the pivot
 _TRIALS = 24  # times tried in one pass
@@ -53,7 +51,7 @@ class _Follower:
     def finished(self) -> bool:
         return self.place >= len(self._q) - 2
 
-    def look(self, q: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    def look(self, q: Floats) -> tuple[Floats, Integers]:
         """Wanted headings (T,) and places (T,) for pivots (T, 2)."""
         low = max(0, self.place - _WINDOW // 4)
         window = self._q[low : self.place + _WINDOW]
@@ -74,7 +72,7 @@ def follow(
     reference: Reference,
     vehicle: Vehicle,
     *,
-    rod: float,
+    pivot_distance: float,
     ahead: float,
     dwell: float,
     offset: float,
@@ -84,7 +82,7 @@ def follow(
     Args:
         reference: declared path and its tractrix.
         vehicle: arcs and lags of the head's centre.
-        rod: distance from pivot to tracked point.
+        pivot_distance: from the pivot to the tracked point.
         ahead: look-ahead Δ.
         dwell: minimum dwell T_min.
         offset: distance from the head's centre to the tracked point, forward.
@@ -95,7 +93,7 @@ def follow(
     pose = planar.compose(tracked, np.array([-offset, 0.0, 0.0]))
     sense = _first_sense(reference)
     first = sense
-    behind = np.array([offset - rod, 0.0, 0.0])  # head's centre -> pivot
+    behind = np.array([offset - pivot_distance, 0.0, 0.0])  # head's centre -> pivot
     dwells: list[float] = []
     poses = [pose]
     step = dwell / 6
@@ -135,28 +133,20 @@ def _first_sense(reference: Reference) -> int:
     return 1 if not len(far) or turn[far[0]] > 0 else -1
 
 
-def predict(vehicle: Vehicle, first_direction: int, dwells: Floats, start: Floats, offset: float) -> Floats:
-    """Poses (M + 1, 3) of the tracked point at the flips, for a schedule from pose `start`.
+def predict(vehicle: Vehicle, switches: Switches, offset: float) -> Floats:
+    """Poses (M + 1, 3) of the tracked point at the flips when `vehicle` carries out the switches.
 
-    `start` is the head's centre; `offset` leads from there forward to the tracked point.
+    `offset` leads forward from the head's centre to the tracked point.
     """
-    changes = _changes(vehicle, first_direction, dwells[:, None])[:, 0]
-    return planar.compose(_chain(start, changes), np.array([offset, 0.0, 0.0]))
+    changes = _changes(vehicle, switches.first_direction, switches.dwells[:, None])[:, 0]
+    return planar.compose(_chain(switches.poses[0], changes), np.array([offset, 0.0, 0.0]))
 
 
-def trace(
-    vehicle: Vehicle,
-    first_direction: int,
-    dwells: Floats,
-    start: Floats,
-    offset: float,
-    *,
-    samples: int = 8,
-) -> Floats:
+def trace(vehicle: Vehicle, switches: Switches, offset: float, *, samples: int = 8) -> Floats:
     """Predicted track of the tracked point, (M samples + 1, 2), at equal times within each dwell."""
     share = np.arange(1, samples + 1) / samples
-    changes = _changes(vehicle, first_direction, dwells[:, None] * share)
-    flips = _chain(start, changes[:, -1])
+    changes = _changes(vehicle, switches.first_direction, switches.dwells[:, None] * share)
+    flips = _chain(switches.poses[0], changes[:, -1])
     within = planar.compose(flips[:-1, None], changes).reshape(-1, 3)
     poses = np.concatenate([flips[:1], within])
     return planar.compose(poses, np.array([offset, 0.0, 0.0]))[:, :2]

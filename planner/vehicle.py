@@ -19,19 +19,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.robot import Robot
-from surrogate.lookup import Lookup
-from surrogate.single import SingleRobot
+from surrogate.table import LookupTable
 
 TURN_OVER = 0.7  # time units that the tails need after a flip
 FROM_REST = 0.5  # share of a lag that straight tails pay: they are half way
 _TABLE = 25  # dwells at which the look-up table is asked
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -61,7 +58,7 @@ class Vehicle:
         return float(np.abs(self.twist[:, 2]).mean())
 
     @property
-    def rod(self) -> float:
+    def pivot_distance(self) -> float:
         """a = R sin θ: distance from the pivot to the head's centre."""
         return float((self.twist[:, 1] / self.twist[:, 2]).mean())
 
@@ -94,7 +91,7 @@ class Vehicle:
         return replace(self, twist=twist, lag=lag)
 
 
-def vehicle_of(robot: Robot, lookup: Lookup | SingleRobot) -> Vehicle:
+def vehicle_of(robot: Robot, lookup: LookupTable) -> Vehicle:
     """The vehicle that the look-up table predicts for a robot.
 
     Raises:

@@ -4,24 +4,35 @@ python -m sim steady POINTS.csv --out OUT.csv      mean motion of each row at co
 python -m sim replay PLAN.json --out TRACK.csv     track of a switching schedule
 python -m sim robot PRESET --out robot.toml        write a preset robot, to start from
 python -m sim check                                the paper's measured point beside ours
+python -m sim compile                              compile the simulator's loops now rather than on first use
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
+from argparse import Namespace
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
-from tqdm import tqdm
+from sim.io.commands import JOBS, Program, argument, out
+from sim.io.errors import InputError
 
-from sim.io.errors import InputError, run_command
-from sim.io.files import whole_file, write_text
-from sim.io.tables import read_table
+program = Program("sim", "Simulate swimming robots.")
+main = program.main
 
 
-def _steady(arguments: argparse.Namespace) -> None:
+@program.command(
+    "steady",
+    "mean motion of robots at constant motor speed",
+    argument("points", help="CSV: C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…"),
+    out("CSV with the same rows and their motion"),
+    JOBS,
+)
+def _steady(arguments: Namespace) -> None:
+    import numpy as np
+    import pandas as pd
+
+    from sim.io.files import whole_file
+    from sim.io.tables import read_table
     from sim.motion.batches import steady_columns
     from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS
 
@@ -43,8 +54,15 @@ def _steady(arguments: argparse.Namespace) -> None:
     )
 
 
-def _replay(arguments: argparse.Namespace) -> None:
-    from sim.motion.replay import load_schedule, replay
+@program.command(
+    "replay", "simulate a planned schedule", argument("plan", help="plan.json"), out("CSV with the track")
+)
+def _replay(arguments: Namespace) -> None:
+    from tqdm import tqdm
+
+    from sim.io.files import whole_file
+    from sim.model.schedule import load_schedule
+    from sim.motion.replay import replay
 
     schedule = load_schedule(arguments.plan)
     with tqdm(total=len(schedule.dwells), desc="replay", unit="dwell", delay=1.0) as bar:
@@ -58,8 +76,15 @@ def _replay(arguments: argparse.Namespace) -> None:
     )
 
 
-def _robot(arguments: argparse.Namespace) -> None:
+@program.command(
+    "robot",
+    "write a preset robot as TOML, to start from",
+    argument("preset", help="paper-control, paper-triangle or paper-measured"),
+    out("robot.toml"),
+)
+def _robot(arguments: Namespace) -> None:
     from sim.inputs import robot_toml
+    from sim.io.files import write_text
     from sim.model.presets import PRESETS
 
     if arguments.preset not in PRESETS:
@@ -68,7 +93,8 @@ def _robot(arguments: argparse.Namespace) -> None:
     print(f"{arguments.preset} -> {Path(arguments.out)}")
 
 
-def _check(_: argparse.Namespace) -> None:
+@program.command("check", "the paper's measured point beside ours")
+def _check(_: Namespace) -> None:
     from sim.model.presets import PRESETS
     from sim.motion.steady import steady
 
@@ -79,27 +105,12 @@ def _check(_: argparse.Namespace) -> None:
     print(f"  this simulator, its fit     {share:.3f}")
 
 
-def main(argv: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(prog="python -m sim", description=__doc__.splitlines()[0])
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    steady = commands.add_parser("steady", help="mean motion of robots at constant motor speed")
-    steady.add_argument("points", help="CSV: C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…")
-    steady.add_argument("--out", required=True, help="CSV to write: the same rows and their motion")
-    steady.add_argument("--jobs", type=int, help="threads (default: all processors)")
-    steady.set_defaults(run=_steady)
-    replay = commands.add_parser("replay", help="simulate a planned schedule")
-    replay.add_argument("plan", help="plan.json")
-    replay.add_argument("--out", required=True, help="CSV to write: the track")
-    replay.set_defaults(run=_replay)
-    robot = commands.add_parser("robot", help="write a preset robot as TOML")
-    robot.add_argument("preset")
-    robot.add_argument("--out", required=True)
-    robot.set_defaults(run=_robot)
-    check = commands.add_parser("check", help="the paper's measured point beside ours")
-    check.set_defaults(run=_check)
-    arguments = parser.parse_args(argv)
-    arguments.run(arguments)
+@program.command("compile", "compile the simulator's loops now rather than on first use")
+def _compile(_: Namespace) -> None:
+    from sim.motion.warm import compile_all
+
+    compile_all()
 
 
 if __name__ == "__main__":
-    sys.exit(run_command(main))
+    program.exit()

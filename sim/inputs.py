@@ -15,6 +15,7 @@ from typing import Any
 from sim.arrays import Floats
 from sim.effects import catalogue, check_effects, check_size
 from sim.io.errors import InputError
+from sim.io.files import write_text
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
@@ -69,6 +70,7 @@ def load_robot(source: str | Path) -> Robot:
         InputError: the file is no robot; the line says which key and what is allowed.
 
     Example:
+        >>> from softflagella import load_robot
         >>> load_robot("paper-control").tails
         2
     """
@@ -106,6 +108,28 @@ def _values(path: Path, tables: dict[str, Any]) -> dict[str, object]:
         if not isinstance(value, int | float) or isinstance(value, bool):
             raise InputError(f"{path}: [{table}] {key} = {values[attribute]!r}; give a number")
     return values
+
+
+def save_robot(robot: Robot, path: str | Path) -> None:
+    """Write a robot.toml that `load_robot` reads back to the same robot.
+
+    Args:
+        robot: the robot, in SI units.
+        path: the file.
+
+    Raises:
+        InputError: the file cannot be written.
+
+    Example:
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> from softflagella import load_robot, save_robot
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     save_robot(load_robot("paper-control"), Path(folder) / "robot.toml")
+        ...     load_robot(Path(folder) / "robot.toml") == load_robot("paper-control")
+        True
+    """
+    write_text(path, robot_toml(robot))
 
 
 def robot_toml(robot: Robot) -> str:

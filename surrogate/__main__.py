@@ -8,17 +8,27 @@ python -m surrogate robot ROBOT.toml --out T.json    the table of one robot with
 
 from __future__ import annotations
 
-import argparse
-import sys
+from argparse import Namespace
 
-from sim.io.errors import InputError, run_command
+from sim.io.commands import MODEL, Program, argument, out
+from sim.io.errors import InputError
+
+program = Program("surrogate", "Train and ask look-up tables.")
+main = program.main
 
 
-def _train(arguments: argparse.Namespace) -> None:
+@program.command(
+    "train",
+    "learn a data set",
+    argument("data", help="folder made by python -m dataset build"),
+    out("model file"),
+    argument("--epochs", type=int, help="at most this many epochs"),
+)
+def _train(arguments: Namespace) -> None:
     from dataclasses import replace
 
     from surrogate.evaluate import error_table
-    from surrogate.export import identity, save
+    from surrogate.export import save
     from surrogate.train import Settings, train
 
     settings = Settings()
@@ -29,36 +39,50 @@ def _train(arguments: argparse.Namespace) -> None:
     lookup = train(arguments.data, settings)
     save(lookup, arguments.out)
     rows = lookup.provenance["rows"]
-    print(f"model {identity(lookup)}: {rows['train']} rows, held-out error on {rows['held_out']}")
+    print(f"model {lookup.identity}: {rows['train']} rows, held-out error on {rows['held_out']}")
     print(error_table(lookup))
     print(f"-> {arguments.out}")
 
 
-def _query(arguments: argparse.Namespace) -> None:
+@program.command(
+    "query",
+    "predict rows without simulating",
+    argument("points", help="CSV like that of python -m sim steady; dwell_bar optional"),
+    out("CSV"),
+    MODEL,
+)
+def _query(arguments: Namespace) -> None:
     import pandas as pd
 
     from sim.io.files import whole_file
     from sim.io.tables import read_table
-    from surrogate.export import load
+    from surrogate.export import load_table
 
     points = read_table(arguments.points)
-    result = load(arguments.model).query({str(c): points[c].to_numpy() for c in points})
+    result = load_table(arguments.model).query({str(c): points[c].to_numpy() for c in points})
     table = pd.concat([points, pd.DataFrame(result)], axis=1)
     with whole_file(arguments.out) as part:
         table.to_csv(part, index=False, float_format="%.8g")
     print(f"{len(table)} rows -> {arguments.out}")
 
 
-def _errors(arguments: argparse.Namespace) -> None:
+@program.command("errors", "print the stored held-out errors", MODEL)
+def _errors(arguments: Namespace) -> None:
     from surrogate.evaluate import error_table
-    from surrogate.export import identity, load
+    from surrogate.export import load
 
     lookup = load(arguments.model)
-    print(f"model {identity(lookup)}, trained on data of code {lookup.provenance['data_code_version']}")
+    print(f"model {lookup.identity}, trained on data of code {lookup.provenance['data_code_version']}")
     print(error_table(lookup))
 
 
-def _robot(arguments: argparse.Namespace) -> None:
+@program.command(
+    "robot",
+    "simulate the table of one robot, effects included",
+    argument("robot", help="robot.toml or the name of a preset"),
+    out("JSON"),
+)
+def _robot(arguments: Namespace) -> None:
     from sim.inputs import load_robot
     from surrogate.single import save_single
     from surrogate.tabulate import tabulate
@@ -69,31 +93,5 @@ def _robot(arguments: argparse.Namespace) -> None:
     print(f"{len(table.dwells)} dwells, largest error {100 * worst:.2f} % -> {arguments.out}")
 
 
-def main(argv: list[str] | None = None) -> None:
-    from surrogate.export import SHIPPED
-
-    parser = argparse.ArgumentParser(prog="python -m surrogate", description=__doc__.splitlines()[0])
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    train = commands.add_parser("train", help="learn a data set")
-    train.add_argument("data", help="folder made by python -m dataset build")
-    train.add_argument("--out", required=True, help="model file to write")
-    train.add_argument("--epochs", type=int, help="at most this many epochs")
-    train.set_defaults(run=_train)
-    query = commands.add_parser("query", help="predict rows without simulating")
-    query.add_argument("points", help="CSV like that of python -m sim steady; dwell_bar optional")
-    query.add_argument("--out", required=True, help="CSV to write")
-    query.add_argument("--model", default=SHIPPED, help="model file (default: the shipped one)")
-    query.set_defaults(run=_query)
-    errors = commands.add_parser("errors", help="print the stored held-out errors")
-    errors.add_argument("--model", default=SHIPPED, help="model file (default: the shipped one)")
-    errors.set_defaults(run=_errors)
-    robot = commands.add_parser("robot", help="simulate the table of one robot")
-    robot.add_argument("robot", help="robot.toml or the name of a preset")
-    robot.add_argument("--out", required=True, help="JSON to write")
-    robot.set_defaults(run=_robot)
-    arguments = parser.parse_args(argv)
-    arguments.run(arguments)
-
-
 if __name__ == "__main__":
-    sys.exit(run_command(main))
+    program.exit()

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from sim.arrays import Floats
 from surrogate.network import Columns
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 RELATIVE = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "R_yr_over_l")
 
 
-def scale_of(name: str, truth: Columns) -> NDArray[np.float64] | float:
+def scale_of(name: str, truth: Columns) -> Floats | float:
     """What an output's error is divided by."""
     if name in RELATIVE:
         return np.abs(truth[name])

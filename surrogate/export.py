@@ -7,7 +7,6 @@ works before any training.
 
 from __future__ import annotations
 
-import hashlib
 import pickle
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,8 @@ from sim.io.errors import InputError
 from sim.io.files import whole_file
 from surrogate.lookup import Lookup
 from surrogate.network import Ensemble
-from surrogate.single import SingleRobot, load_single
+from surrogate.single import load_single
+from surrogate.table import LookupTable
 
 SHIPPED = Path(__file__).parent / "shipped" / "model.pt"
 _FORMAT = 1
@@ -42,12 +42,13 @@ def save(lookup: Lookup, path: str | Path) -> None:
         torch.save(content, part)
 
 
-def load(path: str | Path = SHIPPED) -> Lookup:
-    """Read a model file.
+def load(path: str | Path | None = None) -> Lookup:
+    """Read a model file; by default the one that comes with the package.
 
     Raises:
         InputError: no such file, or no model of this version.
     """
+    path = SHIPPED if path is None else path
     if not Path(path).is_file():
         raise InputError(f"no model {path}; train one with python -m surrogate train DATA --out {path}")
     try:
@@ -67,21 +68,23 @@ def load(path: str | Path = SHIPPED) -> Lookup:
     )
 
 
-def load_table(path: str | Path = SHIPPED) -> Lookup | SingleRobot:
-    """A model file, or the table of one robot (.json)."""
-    return load_single(path) if Path(path).suffix == ".json" else load(path)
+def load_table(path: str | Path | None = None) -> LookupTable:
+    """A model file, or the table of one robot (.json); by default the one that comes with the package.
 
+    Args:
+        path: written by `surrogate train` or `surrogate robot`.
 
-def identity(lookup: Lookup | SingleRobot) -> str:
-    """Hash of the weights or numbers: tells which table made a plan."""
-    if isinstance(lookup, SingleRobot):
-        return lookup.identity
-    digest = hashlib.sha256()
-    for name in _NETWORKS:
-        for key, value in sorted(getattr(lookup, name).state_dict().items()):
-            digest.update(key.encode())
-            digest.update(value.numpy().tobytes())
-    return digest.hexdigest()[:16]
+    Raises:
+        InputError: no such file, or no table of this version.
+
+    Example:
+        >>> import numpy as np
+        >>> from softflagella import load_robot, load_table
+        >>> groups = {k: np.array([v]) for k, v in load_robot("paper-control").group_values().items()}
+        >>> load_table().query(groups)["omega_yr_bar"].round(3).tolist()
+        [0.049]
+    """
+    return load_single(path) if path is not None and Path(path).suffix == ".json" else load(path)
 
 
 def _shape(network: Ensemble) -> dict[str, int]:

@@ -6,13 +6,14 @@ its members. Outside the domain it refuses, naming the input and its range; it n
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sim.arrays import Floats
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.mechanics import planar
@@ -38,10 +39,20 @@ class Lookup:
     errors: dict[str, dict[str, float]]  # output -> held-out error, see `surrogate.evaluate`
     provenance: dict[str, Any]
 
+    @property
+    def identity(self) -> str:
+        """Hash of the weights."""
+        digest = hashlib.sha256()
+        for network in (self.steady, self.response):
+            for key, value in sorted(network.state_dict().items()):
+                digest.update(key.encode())
+                digest.update(value.numpy().tobytes())
+        return digest.hexdigest()[:16]
+
     def with_errors(self, errors: dict[str, dict[str, float]]) -> Lookup:
         return replace(self, errors=errors)
 
-    def check_domain(self, columns: Mapping[str, NDArray[np.float64]]) -> None:
+    def check_domain(self, columns: Mapping[str, Floats]) -> None:
         """Refuse robots outside the domain; |ω̄| counts.
 
         Raises:
@@ -58,7 +69,7 @@ class Lookup:
                     "change the robot, or train a table that covers it"
                 )
 
-    def query(self, columns: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
         """Predicted outputs, each (M,): the steady ones, and the response if `dwell_bar` is given.
 
         Raises:
@@ -67,7 +78,7 @@ class Lookup:
         members = self.query_members(columns)
         return {name: values.mean(0) for name, values in members.items()}
 
-    def query_members(self, columns: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    def query_members(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
         """Outputs of every ensemble member, each (K, M)."""
         values = check_columns({k: v for k, v in columns.items() if k != DWELL})
         for name in self.effects:
@@ -87,7 +98,7 @@ class Lookup:
         return result
 
 
-def _steady_outputs(raw: NDArray[np.float64], omega: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+def _steady_outputs(raw: Floats, omega: Floats) -> dict[str, Floats]:
     log_yaw, log_sway, log_cotangent, logit, log_gap = np.moveaxis(raw, -1, 0)
     sense = np.sign(omega)
     sway = np.exp(log_sway)
@@ -107,10 +118,10 @@ def _steady_outputs(raw: NDArray[np.float64], omega: NDArray[np.float64]) -> dic
 
 
 def _response_outputs(
-    raw: NDArray[np.float64],
-    steady: dict[str, NDArray[np.float64]],
-    values: Mapping[str, NDArray[np.float64]],
-) -> dict[str, NDArray[np.float64]]:
+    raw: Floats,
+    steady: dict[str, Floats],
+    values: Mapping[str, Floats],
+) -> dict[str, Floats]:
     """Lags in the sense of the turn (positive motor direction), and the net speed that follows."""
     yaw, sway = np.abs(steady["omega_yr_bar"]), np.abs(steady["v_x"])
     psi, x, z = raw[..., 0] * yaw, raw[..., 1] * sway, raw[..., 2] * sway

@@ -26,10 +26,11 @@ from itertools import pairwise
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
-Columns = Mapping[str, NDArray[np.float64]]
+from sim.arrays import Floats
+
+Columns = Mapping[str, Floats]
 
 STEADY_TARGETS = ("log_yaw_rate", "log_sway", "log_slip_cotangent", "logit_head_share", "log_tail_gap")
 RESPONSE_TARGETS = ("lag_psi_over_yaw_rate", "lag_x_over_sway", "lag_z_over_sway")
@@ -49,7 +50,7 @@ def features(columns: Columns, tail_counts: Sequence[int], effects: Sequence[str
     return torch.tensor(np.stack(table, 1), dtype=torch.float32)
 
 
-def steady_targets(columns: Columns) -> NDArray[np.float64]:
+def steady_targets(columns: Columns) -> Floats:
     """Targets of the steady network, (M, 5), from data set columns with ω̄ > 0."""
     share = -columns["omega_h_bar"] / columns["omega_bar"]
     return np.stack(
@@ -64,7 +65,7 @@ def steady_targets(columns: Columns) -> NDArray[np.float64]:
     )
 
 
-def response_targets(columns: Columns) -> NDArray[np.float64]:
+def response_targets(columns: Columns) -> Floats:
     """Targets of the response network, (M, 3)."""
     return np.stack(
         [

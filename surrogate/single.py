@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.files import write_text
 from sim.mechanics import planar
@@ -48,7 +48,7 @@ class SingleRobot:
         """Hash of the numbers."""
         return hashlib.sha256(json.dumps([self.robot, self.steady, self.lags]).encode()).hexdigest()[:16]
 
-    def query(self, columns: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
         """Outputs (M,) of this robot; `dwell_bar` asks for the response as well.
 
         Raises:

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from tqdm import tqdm
 
 from dataset.schema import INPUTS
 from dataset.store import read, read_manifest, usable
+from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 from sim.io.provenance import provenance
 from surrogate.evaluate import held_out_errors
@@ -45,7 +45,7 @@ class Settings:
     seed: int = 1
 
 
-def split(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+def split(rows: Integers) -> Integers:
     """0 training, 1 validation, 2 held out: a fixed pseudo-random split by row number."""
     mixed = (rows.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(40)
     tenth = mixed % np.uint64(10)
@@ -62,6 +62,10 @@ def train(folder: str, settings: Settings | None = None, *, title: str = "train"
 
     Raises:
         InputError: no data set there, or too few usable rows.
+
+    Example:
+        >>> from softflagella import train
+        >>> table = train("data/sweep")  # doctest: +SKIP
     """
     chosen = settings or Settings()
     manifest = read_manifest(folder)
@@ -114,9 +118,7 @@ def _domain(rows: pd.DataFrame, manifest: dict[str, Any]) -> dict[str, tuple[flo
     return {n: tuple(swept[n]["range"]) if n in swept else fixed[n] for n in names}
 
 
-def _fit(
-    inputs: Tensor, targets: NDArray[np.float64], part: NDArray[np.int64], settings: Settings, title: str
-) -> Ensemble:
+def _fit(inputs: Tensor, targets: Floats, part: Integers, settings: Settings, title: str) -> Ensemble:
     outputs = torch.tensor(targets, dtype=torch.float32)
     learn, check = torch.from_numpy(part == 0), torch.from_numpy(part == 1)
     network = Ensemble(

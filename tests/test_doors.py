@@ -21,8 +21,9 @@ from sim.inputs import load_robot, robot_toml
 from sim.io.errors import InputError, run_command
 from sim.model.groups import DWELL, GROUP_COLUMNS
 from sim.model.presets import PRESETS
+from sim.model.schedule import load_schedule
 from sim.motion.batches import steady_columns
-from sim.motion.replay import load_schedule, replay
+from sim.motion.replay import replay
 from surrogate.export import load
 
 CONTROL = PRESETS["paper-control"].group_values()

@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration.model import Floats
+from sim.arrays import Floats
 from sim.compiling import compiled
 from sim.io.errors import InputError, run_command
 from sim.io.tables import read_table

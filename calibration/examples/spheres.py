@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from calibration.loop import Verdict, close
-from calibration.model import Floats, Parameter, Parameters, Runs, by_differences
+from calibration.loop import Verdict, calibrate
+from calibration.model import Parameter, Parameters, Runs, by_differences
+from sim.arrays import Flags, Floats
 from sim.io.errors import InputError, run_command
 
 GRAVITY, FLUID, BEAD = 9.81, 1260.0, 2200.0  # m/s², kg/m³ of glycerol and Teflon
@@ -80,7 +80,7 @@ class Spheres:
             {"d_mm": round(1000 * d, 2)} for d in diameter.tolist()
         ]
 
-    def guess(self, start: dict[str, float], used: NDArray[np.bool_]) -> dict[str, float]:
+    def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """The start as it is: the fit is linear in ln μ."""
         return start
 
@@ -131,7 +131,7 @@ def median_error(model: Spheres, verdict: Verdict, effects: Parameters) -> float
 
 def main(table: str, name: str = "KW2023") -> None:
     model = read_spheres(table, name)
-    verdict = close(model, progress=False)
+    verdict = calibrate(model, progress=False)
     print(f"{name}: {verdict.sentence}")
     for candidate in verdict.candidates:
         print(f"  {candidate.effect.title}: score {candidate.z:+.1f}, {candidate.verdict}")

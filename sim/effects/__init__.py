@@ -16,7 +16,14 @@ __all__ = ["Effect", "catalogue", "check_effects", "check_size", "effect_named"]
 
 @cache
 def catalogue() -> dict[str, Effect]:
-    """Every effect in this folder, by name, in alphabetical order."""
+    """Every effect that the base model lacks, by name, in alphabetical order.
+
+    Example:
+        >>> from softflagella import effects
+        >>> drag = effects()["end_over_end_drag"]
+        >>> drag.equation, drag.bounds
+        ('M_y = −ε 8π μ0 R³ ω_yr', (0.0, 20.0))
+    """
     names = sorted(module.name for module in pkgutil.iter_modules(__path__))
     found = {name: importlib.import_module(f"{__name__}.{name}").EFFECT for name in names}
     for name, effect in found.items():

@@ -13,11 +13,11 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from torch import Tensor
-
 from sim.model.effect import Effect
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from sim.model.body import Body
     from sim.model.groups import Groups
 

@@ -13,12 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from torch import Tensor
-
 from sim.model.effect import Effect, Factors
 from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from sim.model.groups import Groups
 
 _CONTROL_SPEED = CONTROL.omega_bar / CONTROL.l_over_r0**4

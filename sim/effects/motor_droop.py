@@ -12,11 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from torch import Tensor
-
 from sim.model.effect import Effect
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from sim.model.body import Body
     from sim.model.groups import Groups
 

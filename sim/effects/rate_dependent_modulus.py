@@ -12,12 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from torch import Tensor
-
 from sim.model.effect import Effect
 from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from sim.model.groups import Groups
 
 

@@ -13,13 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import torch
-from torch import Tensor
-
 from sim.model.effect import Effect
 from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from sim.model.body import Body
     from sim.model.groups import Groups
 
@@ -28,9 +27,9 @@ if TYPE_CHECKING:
 class TailSag(Effect):
     def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
         heavier = (groups.l_over_r0 / CONTROL.l_over_r0) ** 2 * groups.l_over_R / CONTROL.l_over_R
-        down = torch.zeros_like(body.tail_load)
-        down[1] = -8 * size * heavier
-        return body.plus(tail_load=down)
+        load = body.tail_load.clone()
+        load[1] = load[1] - 8 * size * heavier
+        return body._replace(tail_load=load)
 
 
 EFFECT = TailSag(

@@ -12,19 +12,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import torch
-from torch import Tensor
-
 from sim.model.effect import Driver, Effect, Factors
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class ViscosityDrift(Effect):
     def scales(self, size: Tensor, groups: Groups) -> Factors:
-        return Factors(viscosity=torch.exp(-size))
+        return Factors(viscosity=(-size).exp())
 
 
 EFFECT = ViscosityDrift(

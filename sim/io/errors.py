@@ -11,7 +11,16 @@ from collections.abc import Callable
 
 
 class InputError(ValueError):
-    """The input cannot be used; the message is one line: given, allowed, change."""
+    """The input cannot be used; the message is one line: given, allowed, change.
+
+    Example:
+        >>> from softflagella import InputError, load_robot
+        >>> try:
+        ...     load_robot("no-such-robot")
+        ... except InputError as refusal:
+        ...     print(refusal)
+        no robot 'no-such-robot'; give a robot.toml or one of paper-control, paper-triangle, paper-measured
+    """
 
 
 def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None = None) -> int:

@@ -22,12 +22,15 @@ def fingerprint(content: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def version() -> str:
+def _version() -> str:
     """Version of the installed package; "0" where it is not installed."""
     try:
         return metadata.version("softflagella")
     except metadata.PackageNotFoundError:
         return "0"
+
+
+__version__ = _version()
 
 
 @cache
@@ -36,7 +39,7 @@ def code_version() -> str:
     digest = hashlib.sha256()
     for file in sorted(Path(__file__).parents[1].rglob("*.py")):
         digest.update(file.read_bytes())
-    return f"{version()}+{digest.hexdigest()[:8]}"
+    return f"{__version__}+{digest.hexdigest()[:8]}"
 
 
 def provenance(config: object) -> dict[str, object]:

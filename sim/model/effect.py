@@ -23,9 +23,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from torch import Tensor
-
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from sim.model.body import Body
     from sim.model.groups import Groups
 
@@ -52,7 +52,13 @@ class Driver:
 
 @dataclass(frozen=True)
 class Effect:
-    """Declaration of an effect; subclasses override one of the three ways to act. Sizes ε are dimensionless."""
+    """Declaration of an effect; subclasses override one of the three ways to act. Sizes ε are dimensionless.
+
+    Example:
+        >>> from softflagella import effects
+        >>> sorted(name for name, effect in effects().items() if effect.symmetry == "odd")
+        ['left_right_bias', 'natural_curvature', 'natural_twist']
+    """
 
     name: str  # column name and identifier, e.g. "end_over_end_drag"
     title: str  # what a person calls it

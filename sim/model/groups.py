@@ -15,14 +15,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from sim.arrays import Floats
 from sim.io.errors import InputError
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 GROUP_COLUMNS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "N")
 OPTIONAL_COLUMNS = ("a_over_R",)
@@ -60,6 +61,8 @@ class Groups:
         Raises:
             InputError: a missing column, a number that is not finite or out of its range.
         """
+        import torch
+
         values = checked_values(columns)
         counts = np.unique(values["N"])
         if len(counts) != 1:
@@ -71,7 +74,7 @@ class Groups:
     def select(self, rows: Tensor) -> Groups:
         """The robots at `rows`."""
         own = {f.name: getattr(self, f.name) for f in fields(self)}
-        picked: dict[str, Any] = {k: v[rows] for k, v in own.items() if torch.is_tensor(v)}
+        picked: dict[str, Any] = {k: v[rows] for k, v in own.items() if k not in ("N", "effects")}
         return replace(self, **picked, effects={name: size[rows] for name, size in self.effects.items()})
 
 

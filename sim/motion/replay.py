@@ -7,67 +7,22 @@ Track of the head's centre, seen from above; lengths in l, time in μ0 l⁴/EI a
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from sim.arrays import Floats
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.groups import Groups
+from sim.model.schedule import Schedule
 from sim.motion.resolution import MOST_REPLAY_WORK, Resolution
 from sim.motion.run import Run
 from sim.solve.assembly import bodies
 from sim.solve.march import YAW, X, Y
 
 _SAMPLES = 12  # track points a dwell, at most
-
-
-@dataclass(frozen=True)
-class Schedule:
-    """What the motor does, for which robot."""
-
-    robot: dict[str, float]  # dimensionless groups by column name; ω̄ is a magnitude
-    first_direction: int  # +1 or −1
-    dwells: Floats  # (M,), in time units
-    start: tuple[float, float, float]  # x, y [l], heading [rad] of the head's centre
-    time_scale: float  # seconds a time unit
-
-    def __post_init__(self) -> None:
-        if self.first_direction not in (-1, 1):
-            raise InputError(f"first_direction = {self.first_direction}; it must be 1 or -1")
-        if not len(self.dwells):
-            raise InputError("the schedule has no dwell times; give at least one")
-        if not np.isfinite(self.dwells).all() or (self.dwells <= 0).any():
-            raise InputError("the schedule has a dwell time that is not a positive number; mend it")
-        if not np.isfinite(self.start).all():
-            raise InputError(f"the schedule starts at {self.start}; give finite numbers")
-        if not (np.isfinite(self.time_scale) and self.time_scale > 0):
-            raise InputError(f"time_scale_s = {self.time_scale}; it must be a finite number above 0")
-
-
-def load_schedule(path: str | Path) -> Schedule:
-    """The schedule in a plan.json."""
-    try:
-        content = json.loads(Path(path).read_text())
-        return Schedule(
-            robot={str(k): float(v) for k, v in content["robot"]["groups"].items()},
-            first_direction=int(content["first_direction"]),
-            dwells=np.asarray(content["dwell_bar"], dtype=float),
-            start=tuple(float(content["start"][k]) for k in ("x_over_l", "y_over_l", "heading_rad")),  # type: ignore[arg-type]
-            time_scale=float(content["robot"]["time_scale_s"]),
-        )
-    except (json.JSONDecodeError, UnicodeDecodeError) as broken:
-        raise InputError(f"{path} is not JSON: {broken}; give a plan.json of the planner") from None
-    except KeyError as missing:
-        raise InputError(f"{path} has no entry {missing}; give a plan.json of the planner") from None
-    except (TypeError, ValueError, AttributeError, OverflowError) as wrong:
-        raise InputError(f"{path}: {wrong}; give a plan.json of the planner") from None
 
 
 def replay(

@@ -19,7 +19,8 @@ from calibration.examples.helices import read_helices, resistive, with_flow
 from calibration.examples.spheres import Spheres, median_error, read_spheres
 from calibration.fit import fit
 from calibration.locked import middle_session
-from calibration.loop import Verdict, close, verdict_record
+from calibration.loop import Verdict, verdict_record
+from calibration.loop import calibrate as close
 from calibration.measurements import read_measurements
 from calibration.misfit import check_misfit
 from calibration.model import Runs, start_values

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.loop import close
+from calibration.loop import calibrate as close
 from calibration.measurements import read_measurements
 from calibration.model import by_differences, start_values
 from calibration.swimmer import Swimmer

@@ -13,16 +13,17 @@ import numpy as np
 import pytest
 
 from planner import Path2D, circle, plan, polygon
-from planner.bound import guaranteed, look_ahead
+from planner.corners import fillet
 from planner.export import milliseconds, write_plan
-from planner.path import fillet, read_path, reference
 from planner.plan import distance_to, plan_record
-from planner.schedule import follow, trace
+from planner.schedule import Switches, follow, trace
+from planner.stated_error import guaranteed, look_ahead, tube
+from planner.tractrix import reference
 from planner.vehicle import TURN_OVER, vehicle_of
 from sim.io.errors import InputError, run_command
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
-from sim.motion.replay import load_schedule
+from sim.model.schedule import load_schedule
 from surrogate.export import load
 from tests.planner.vehicles import vehicle
 
@@ -49,7 +50,7 @@ def test_the_pivot_moves_as_a_slip_free_car(seed: int) -> None:
         sense = 1 if rng.random() < 0.5 else -1
         times = np.linspace(0, rng.uniform(0.5, 5), 2001)
         poses = planar.compose(pose, car.motion(sense, times))
-        q = planar.compose(poses, np.array([-car.rod, 0.0, 0.0]))
+        q = planar.compose(poses, np.array([-car.pivot_distance, 0.0, 0.0]))
         velocity = np.diff(q[:, :2], axis=0)
         middle = (poses[1:, 2] + poses[:-1, 2]) / 2
         sideways = velocity[:, 1] * np.cos(middle) - velocity[:, 0] * np.sin(middle)
@@ -64,16 +65,16 @@ def test_the_bound_holds_on_random_paths(seed: int) -> None:
     rng = np.random.default_rng(1000 + seed)
     car = vehicle(lag=rng.uniform(0, 1))
     path = random_smooth_path(seed, rng.uniform(5, 40), rng.uniform(0.05, 0.9))
-    ref = reference(path, car.rod, 0.01)
+    ref = reference(path, car.pivot_distance, 0.01)
     curvature = float(np.abs(ref.curvature).max())
     if curvature * car.pivot_radius > 0.9:
         pytest.skip("this path is tighter than the robot can turn")
     dwell = rng.uniform(TURN_OVER, 2.0)
     ahead = look_ahead(car, curvature)
-    switches = follow(ref, car, rod=car.rod, ahead=ahead, dwell=dwell, offset=0.0)
-    track = trace(car, switches.first_direction, switches.dwells, switches.poses[0], 0.0, samples=12)
+    switches = follow(ref, car, pivot_distance=car.pivot_distance, ahead=ahead, dwell=dwell, offset=0.0)
+    track = trace(car, switches, 0.0, samples=12)
     error = distance_to(ref.p, track[:-12])
-    assert error.max() <= guaranteed(car, car.rod, curvature, dwell)
+    assert error.max() <= guaranteed(car, car.pivot_distance, curvature, dwell)
     assert switches.dwells.min() >= dwell * (1 - 1e-9)
 
 
@@ -81,9 +82,11 @@ def test_error_does_not_grow_with_length() -> None:
     car = vehicle()
     worst = []
     for length in (20.0, 200.0):
-        ref = reference(Path2D.of([[0, 0], [length, 0]]), car.rod, 0.01)
-        switches = follow(ref, car, rod=car.rod, ahead=look_ahead(car, 0.0), dwell=1.0, offset=0.0)
-        track = trace(car, switches.first_direction, switches.dwells, switches.poses[0], 0.0)
+        ref = reference(Path2D.of([[0, 0], [length, 0]]), car.pivot_distance, 0.01)
+        switches = follow(
+            ref, car, pivot_distance=car.pivot_distance, ahead=look_ahead(car, 0.0), dwell=1.0, offset=0.0
+        )
+        track = trace(car, switches, 0.0)
         worst.append(np.abs(track[:, 1]).max())
     assert worst[1] < 1.2 * worst[0]
 
@@ -213,7 +216,7 @@ def test_a_tight_circle_is_refused_with_a_scale_that_works() -> None:
         ("p.csv", "x,y\n1,1\n1,1\n", "same"),
         ("p.svg", "<svg", "not SVG"),
         ("p.svg", "<svg xmlns='http://www.w3.org/2000/svg'/>", "draw one"),
-        ("p.svg", "<svg><path d='M 0 0 C 1 1 2 2 3 3'/></svg>", "flatten"),
+        ("p.svg", "<svg><path d='M 0 0 L 1 1 M 2 2 L 3 3'/></svg>", "path1/1, path1/2"),
     ],
 )
 def test_the_command_refuses_and_writes_nothing(
@@ -230,27 +233,12 @@ def test_the_command_refuses_and_writes_nothing(
     assert not (tmp_path / "out").exists()
 
 
-def test_svg_shapes(tmp_path: Path) -> None:
-    def of(body: str) -> Path2D:
-        (tmp_path / "a.svg").write_text(f"<svg xmlns='http://www.w3.org/2000/svg'>{body}</svg>")
-        return read_path(tmp_path / "a.svg")
-
-    assert of("<polyline points='0,0 3,0 3,-4'/>").length == pytest.approx(7)
-    triangle = of("<polygon points='0,0 3,0 3,-4'/>")
-    assert triangle.closed
-    assert triangle.length == pytest.approx(12)
-    assert of("<path d='M 0 0 h 3 v -4 Z'/>").points.tolist() == [[0, 0], [3, 0], [3, 4]]
-    assert of("<path d='M 1 1 L 4 1 l 0 -4'/>").points.tolist() == [[1, -1], [4, -1], [4, 3]]
-    ring = of("<circle cx='2' cy='1' r='3'/>")
-    assert np.linalg.norm(ring.points - [2, -1], axis=1) == pytest.approx(np.full(len(ring.points), 3.0))
-
-
 def test_files_of_a_plan(tmp_path: Path) -> None:
     result = plan(polygon(4, 3.0), CONTROL)
     written = write_plan(result, tmp_path / "out")
     assert [p.name for p in written] == ["plan.json", "plan.csv", "schedule.h", "plan.svg"]
     content = json.loads(written[0].read_text())
-    assert content["bound_over_l"] == pytest.approx(result.bound)
+    assert content["stated_error_over_l"] == pytest.approx(result.stated_error)
     assert content["model"] == result.model
     schedule = load_schedule(written[0])
     assert np.array_equal(schedule.dwells, result.dwells)
@@ -295,24 +283,21 @@ def test_unequal_turns_are_planned_for() -> None:
     twist = car.twist.copy()
     twist[1] *= [1.0, 1.05, 1.05]
     car = replace(car, twist=twist)
-    ref = reference(Path2D.of([[0, 0], [30, 0]]), car.rod, 0.01)
-    switches = follow(ref, car, rod=car.rod, ahead=look_ahead(car, 0.0), dwell=1.0, offset=0.0)
-    track = trace(car, switches.first_direction, switches.dwells, switches.poses[0], 0.0)
-    assert np.abs(track[:, 1]).max() < guaranteed(car, car.rod, 0.0, 1.0)
+    ref = reference(Path2D.of([[0, 0], [30, 0]]), car.pivot_distance, 0.01)
+    switches = follow(
+        ref, car, pivot_distance=car.pivot_distance, ahead=look_ahead(car, 0.0), dwell=1.0, offset=0.0
+    )
+    track = trace(car, switches, 0.0)
+    assert np.abs(track[:, 1]).max() < guaranteed(car, car.pivot_distance, 0.0, 1.0)
 
 
 def test_the_tube_grows_with_the_table_s_errors() -> None:
     from dataclasses import replace
 
-    from planner.bound import tube
-
     car = vehicle()
-    dwells = np.full(60, 1.0)
-    start = np.zeros(3)
-    small = tube(car, 1, dwells, start, 0.0)
-    large = tube(
-        replace(car, relative_error={k: 3 * v for k, v in car.relative_error.items()}), 1, dwells, start, 0.0
-    )
+    switches = Switches(1, np.full(60, 1.0), np.zeros((61, 3)))
+    small = tube(car, switches, 0.0)
+    large = tube(replace(car, relative_error={k: 3 * v for k, v in car.relative_error.items()}), switches, 0.0)
     assert 2 < large / small < 4
 
 

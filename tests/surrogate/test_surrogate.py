@@ -13,7 +13,7 @@ from dataset.design import Axis, Design
 from dataset.store import write_manifest, write_part
 from sim.io.errors import InputError, run_command
 from surrogate.__main__ import main
-from surrogate.export import SHIPPED, identity, load, save
+from surrogate.export import SHIPPED, load, save
 from surrogate.train import Settings, split, train
 from tests.reference.cases import CONTROL, STEADY_INPUTS, STEADY_POINTS
 
@@ -91,9 +91,9 @@ def test_training_learns_and_reports_held_out_errors(trained) -> None:  # type: 
 
 def test_training_is_repeatable(tmp_path: Path, trained) -> None:  # type: ignore[no-untyped-def]
     again = train(str(invented(tmp_path)), SMALL, title="")
-    assert identity(again) == identity(trained)
+    assert again.identity == trained.identity
     other = train(str(invented(tmp_path)), replace(SMALL, seed=2), title="")
-    assert identity(other) != identity(trained)
+    assert other.identity != trained.identity
 
 
 def test_early_stopping_keeps_the_best_weights(tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_the_split_is_fixed_and_disjoint() -> None:
 def test_files_come_back_as_they_were(tmp_path: Path, trained) -> None:  # type: ignore[no-untyped-def]
     save(trained, tmp_path / "model.pt")
     again = load(tmp_path / "model.pt")
-    assert identity(again) == identity(trained)
+    assert again.identity == trained.identity
     assert (again.domain, again.errors, again.provenance) == (
         trained.domain,
         trained.errors,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.motion.replay import Schedule, replay
+from sim.model.schedule import Schedule
+from sim.motion.replay import replay
 from sim.motion.resolution import Resolution
 from sim.motion.steady import steady
 from sim.motion.switching import switch_response

@@ -29,7 +29,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from calibration.loop import Verdict, close, verdict_record
+from calibration.loop import Verdict, calibrate, verdict_record
 from calibration.measurements import Measurements, read_measurements
 from calibration.report import draw_residuals
 from calibration.steer import Steered, draw_steered, gap_closed, steer
@@ -162,7 +162,7 @@ def _close(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     place.mkdir(exist_ok=True)
     table.to_csv(place / "table.csv", index=False, float_format="%.6g")
     data = read_measurements(place / "table.csv")
-    verdict = close(Swimmer(start, data))
+    verdict = calibrate(Swimmer(start, data))
     record = verdict_record(verdict, table="table.csv")
     write_text(place / "verdict.json", json.dumps(record, indent=1) + "\n")
     write_text(place / "corrected.toml", robot_toml(corrected_robot(start, verdict.delivered)))
@@ -210,7 +210,7 @@ def _write_page(
         "minutes",
         "rms / l",
         "max / l",
-        "stated bound / l",
+        "stated error / l",
         "rms / l, raw",
         "max / l, raw",
     )
@@ -218,7 +218,7 @@ def _write_page(
         header,
         [
             (name, len(plan["dwell_bar"]), f"{sum(plan['dwell_s']) / 60:.1f}", f"{e.rms:.4f}", f"{e.largest:.4f}",
-             f"{e.bound:.3f}", f"{e.raw_rms:.3f}", f"{e.raw_largest:.3f}")
+             f"{e.stated:.3f}", f"{e.raw_rms:.3f}", f"{e.raw_largest:.3f}")
             for name, (plan, e) in tracks.items()
         ],
     )  # fmt: skip

@@ -1,0 +1,151 @@
+"""The verdict on a table of runs: what it holds, in one sentence, and as verdict.json.
+
+"none": no departure beyond noise. "effect": one effect, or one pair, explains it. "ambiguous": several do, and the
+runs cannot tell them apart. "unexplained": there is a departure, and nothing in the catalogue explains it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from calibration.attribute import Candidate
+from calibration.discriminate import NextRun
+from calibration.fit import Fit
+from calibration.generic import Generic
+from calibration.misfit import DRAWS, Misfit
+from sim.arrays import Flags, Floats
+from sim.io.provenance import provenance
+
+_NEAR = 0.5  # share of the residual that an effect must take away to be named where none explains
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What runs say about a model; made by `softflagella.calibrate`.
+
+    Example:
+        >>> from softflagella import calibrate
+        >>> calibrate("runs.csv", "robot.toml").sentence  # doctest: +SKIP
+        'No effect is missing that these runs can show (p = 0.43).'
+    """
+
+    verdict: str  # "none", "effect", "ambiguous", "unexplained"
+    effects: tuple[str, ...]
+    explaining: tuple[Candidate, ...]  # what explains the residual, best first; more than one: not told apart
+    base: Fit  # calibrated, without effects
+    final: Fit  # the model to go on with
+    base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
+    final_intervals: dict[str, tuple[float, float]]
+    misfit: Misfit
+    candidates: tuple[Candidate, ...]
+    generic: Generic  # correction of the calibrated model
+    next_runs: tuple[NextRun, ...]  # where two effects cannot be told apart
+    error_uncalibrated: float
+    error_generic: float
+    error_before: float
+    error_after: float
+    error_after_interval: tuple[float, float]
+    noise_ceiling: float
+    locked_p: float  # agreement of the locked runs with the final model
+    delivered: dict[str, float]  # parameters of the final model fitted to all runs
+    errors_by_output: dict[str, dict[str, float]]
+    locked: str  # names of the sessions
+    used: Flags
+    uncalibrated: Floats  # (n, k) prediction of the model as given
+    untestable: dict[str, str]  # effects that these runs cannot test: what is missing
+    plan_hash: str  # of everything fixed before the data was looked at
+    set_aside: tuple[str, ...]
+    limits: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one sentence with its certainty."""
+        # The bootstrap resolves no smaller p than 2/(draws + 1).
+        relation = "≤" if self.misfit.p_value <= 2.01 / (DRAWS + 1) else "="
+        p = f"p {relation} {self.misfit.p_value:.2g}"
+        if self.verdict == "none":
+            return f"No effect is missing that these runs can show ({p})."
+        if self.verdict == "effect":
+            best = self.explaining[0]
+            assert best.refit is not None
+            sizes = []
+            for effect in (*best.beside, best.effect):
+                low, high = self.final_intervals[effect.name]
+                sizes.append(
+                    f"{effect.title}, size {best.refit.parameters[effect.name]:.3g} ({low:.3g} to {high:.3g})"
+                )
+            other = "other effect" if len(sizes) == 1 else "single effect or other pair"
+            said = " and ".join(sizes)
+            return f"The residual ({p}) is consistent with {said}, and with no {other} of the catalogue."
+        if self.verdict == "ambiguous":
+            names = " or ".join(" and ".join(e.title for e in (*c.beside, c.effect)) for c in self.explaining)
+            return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart."
+        none = "no effect and no pair of effects of the catalogue explains"
+        return f"There is a residual ({p}) that {none}{self._nearest}."
+
+    @property
+    def _nearest(self) -> str:
+        """Which single effect takes most of the residual away, if one was refitted and takes much."""
+        refits = [(c.refit.deviance, c.effect.title) for c in self.candidates if c.refit is not None]
+        if not refits:
+            return ""
+        deviance, title = min(refits)
+        expected = int(self.used.sum()) * self.base.prediction.shape[1]
+        share = (self.base.deviance - deviance) / max(self.base.deviance - expected, 1e-9)
+        if share < _NEAR:
+            return ""
+        return f"; the nearest, {title}, takes {100 * min(share, 1.0):.0f} % of it away and leaves more than noise"
+
+
+def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
+    """verdict.json."""
+    final = result.final
+    parameters = {
+        name: {
+            "value": final.parameters[name],
+            "interval": list(result.final_intervals[name]),
+            "value_all_runs": result.delivered[name],
+        }
+        for name in final.names
+    }
+    return {
+        "verdict": result.verdict,
+        "effects": list(result.effects),
+        "sentence": result.sentence,
+        "parameters": parameters,
+        "error_uncalibrated": result.error_uncalibrated,
+        "error_before": result.error_before,
+        "error_after": result.error_after,
+        "error_generic": result.error_generic,
+        "error_after_interval": list(result.error_after_interval),
+        "noise_ceiling": result.noise_ceiling,
+        "errors_by_output": result.errors_by_output,
+        "p_value": result.misfit.p_value,
+        "p_general": result.misfit.general_p,
+        "p_of_each_test": result.misfit.p,
+        "critical_z": result.misfit.critical_z,
+        "candidates": [
+            {
+                "effect": c.effect.name,
+                "z": c.z,
+                "survived_share": c.survived,
+                "smallest_detectable": c.detectable,
+                "size": c.refit.parameters[c.effect.name] if c.refit else None,
+                "deviance": c.refit.deviance if c.refit else None,
+                "session_gain": [c.gain, c.gain_error],
+                "verdict": c.verdict,
+            }
+            for c in result.candidates
+        ],
+        "untestable": result.untestable,
+        "generic_features": list(result.generic.features),
+        "next_runs": [run.record() for run in result.next_runs],
+        "locked_test": result.locked,
+        "locked_p_value": result.locked_p,
+        "fixed_before": result.plan_hash,
+        "rows_set_aside": list(result.set_aside),
+        "limits": list(result.limits),
+        "table": table,
+        "provenance": provenance({"table": table}),
+    }

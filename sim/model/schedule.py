@@ -1,0 +1,87 @@
+"""A schedule: what the motor does, for which robot, from which pose. Plans end as one; replays begin with one."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.io.errors import InputError
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Dwell times between flips of the motor, for one robot.
+
+    Attributes:
+        robot: dimensionless groups by column name; ω̄ is a magnitude.
+        first_direction: of the motor, +1 or −1.
+        dwells: (M,), in time units μ0 l⁴/EI.
+        start: x, y [l] and heading [rad] of the head's centre.
+        time_scale: seconds a time unit.
+
+    Raises:
+        InputError: a direction, dwell, pose or time scale that cannot be.
+
+    Example:
+        >>> import numpy as np
+        >>> from softflagella import Schedule, load_robot
+        >>> robot = load_robot("paper-control")
+        >>> groups = robot.group_values()
+        >>> float(Schedule(groups, 1, np.array([0.8, 1.2]), (0.0, 0.0, 0.0), robot.time_scale).dwells.sum())
+        2.0
+    """
+
+    robot: Mapping[str, float]
+    first_direction: int
+    dwells: Floats
+    start: tuple[float, float, float]
+    time_scale: float
+
+    def __post_init__(self) -> None:
+        if self.first_direction not in (-1, 1):
+            raise InputError(f"first_direction = {self.first_direction}; it must be 1 or -1")
+        if not len(self.dwells):
+            raise InputError("the schedule has no dwell times; give at least one")
+        if not np.isfinite(self.dwells).all() or (self.dwells <= 0).any():
+            raise InputError("the schedule has a dwell time that is not a positive number; mend it")
+        if not np.isfinite(self.start).all():
+            raise InputError(f"the schedule starts at {self.start}; give finite numbers")
+        if not (np.isfinite(self.time_scale) and self.time_scale > 0):
+            raise InputError(f"time_scale_s = {self.time_scale}; it must be a finite number above 0")
+
+
+def load_schedule(path: str | Path) -> Schedule:
+    """The schedule in a plan.json.
+
+    Raises:
+        InputError: the file is no plan.
+
+    Example:
+        >>> import tempfile
+        >>> from softflagella import circle, load_robot, load_schedule, plan, write_plan
+        >>> result = plan(circle(2.0), load_robot("paper-control"))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     same = load_schedule(write_plan(result, folder)[0])
+        >>> bool((same.dwells == result.dwells).all())
+        True
+    """
+    try:
+        content = json.loads(Path(path).read_text())
+        return Schedule(
+            robot={str(k): float(v) for k, v in content["robot"]["groups"].items()},
+            first_direction=int(content["first_direction"]),
+            dwells=np.asarray(content["dwell_bar"], dtype=float),
+            start=tuple(float(content["start"][k]) for k in ("x_over_l", "y_over_l", "heading_rad")),  # type: ignore[arg-type]
+            time_scale=float(content["robot"]["time_scale_s"]),
+        )
+    except (json.JSONDecodeError, UnicodeDecodeError) as broken:
+        raise InputError(f"{path} is not JSON: {broken}; give a plan.json of the planner") from None
+    except KeyError as missing:
+        raise InputError(f"{path} has no entry {missing}; give a plan.json of the planner") from None
+    except (TypeError, ValueError, AttributeError, OverflowError) as wrong:
+        raise InputError(f"{path}: {wrong}; give a plan.json of the planner") from None

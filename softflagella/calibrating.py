@@ -1,0 +1,48 @@
+"""Close the loop with measured data: the function behind `softflagella.calibrate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from calibration.loop import calibrate as close_loop
+from calibration.measurements import read_measurements
+from calibration.swimmer import Swimmer
+from calibration.verdict import Verdict
+from sim.inputs import load_robot
+from sim.model.robot import Robot
+
+
+def calibrate(
+    table: str | Path | pd.DataFrame,
+    robot: Robot | str | Path,
+    *,
+    seed: int = 0,
+    jobs: int | None = None,
+    progress: bool = True,
+) -> Verdict:
+    """Fit a table of measured runs, find what the model lacks, and correct the robot.
+
+    Args:
+        table: measured runs, a row a run, or the file that holds them: `N`, `l_cm`, `omega_rpm` and two or more
+            of `omega_h_rpm`, `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s`; repeats.
+        robot: the robot as given, or its robot.toml.
+        seed: of the bootstrap; the result is deterministic given it.
+        jobs: threads; default all processors.
+        progress: show bars.
+
+    Returns:
+        The verdict: `verdict` ("none", "effect", "ambiguous", "unexplained"), `sentence`, `effects`, fits with
+        intervals, errors on the locked runs.
+
+    Raises:
+        InputError: a table that cannot be used; the line says why.
+
+    Example:
+        >>> import softflagella as sf
+        >>> verdict = sf.calibrate("runs.csv", "robot.toml")  # doctest: +SKIP
+        >>> print(verdict.sentence)  # doctest: +SKIP
+    """
+    given = robot if isinstance(robot, Robot) else load_robot(robot)
+    return close_loop(Swimmer(given, read_measurements(table), jobs), seed=seed, progress=progress)

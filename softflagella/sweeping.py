@@ -1,0 +1,52 @@
+"""Sweeps: the functions behind `softflagella.sweep` and `read_sweep`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from dataset.design import load_design
+from dataset.store import read
+from dataset.sweep import build
+
+
+def sweep(
+    config: str | Path, out: str | Path, *, rows: int | None = None, jobs: int | None = None
+) -> dict[str, Any]:
+    """Simulate a sweep into a folder of Parquet files; goes on where an interrupted one stopped.
+
+    Args:
+        config: a sweep.toml.
+        out: the folder.
+        rows: number of robots; default the configuration's.
+        jobs: processes; default all processors.
+
+    Returns:
+        The manifest: configuration, code, counts of rows, converged, failed, touching.
+
+    Raises:
+        InputError: a configuration that makes no robots, or a folder that holds something else.
+
+    Example:
+        >>> import softflagella as sf
+        >>> manifest = sf.sweep("sweep.toml", "data/sweep")  # doctest: +SKIP
+    """
+    return build(load_design(config).with_rows(rows), out, jobs=jobs)
+
+
+def read_sweep(folder: str | Path) -> pd.DataFrame:
+    """All rows of a finished sweep, in the order of its design; units are in the Parquet schema.
+
+    Args:
+        folder: written by `sweep`.
+
+    Raises:
+        InputError: no finished sweep there, or damaged files.
+
+    Example:
+        >>> import softflagella as sf
+        >>> table = sf.read_sweep("data/sweep")  # doctest: +SKIP
+    """
+    return read(folder)

@@ -1,0 +1,48 @@
+"""What planner and calibration ask of a look-up table, whatever it is made of.
+
+`surrogate.lookup.Lookup` (trained networks, a domain of robots) and `surrogate.single.SingleRobot` (one robot,
+simulated) are look-up tables. `surrogate.export.load_table` reads either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from sim.arrays import Floats
+
+
+class LookupTable(Protocol):
+    """From a robot's dimensionless groups to its motion, without simulating.
+
+    Example:
+        >>> from softflagella import load_table
+        >>> load_table().domain["N"]
+        (2.0, 5.0)
+    """
+
+    @property
+    def domain(self) -> Mapping[str, tuple[float, float]]:
+        """Smallest and largest value of every input; `omega_bar` as a magnitude."""
+        ...
+
+    @property
+    def errors(self) -> Mapping[str, Mapping[str, float]]:
+        """Errors by output; each has at least "rms", see `surrogate.evaluate`."""
+        ...
+
+    @property
+    def identity(self) -> str:
+        """A hash of the numbers: tells which table made a plan."""
+        ...
+
+    def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Outputs, each (M,), of robots given by column name, each (M,).
+
+        The steady ones are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`, `theta_deg`,
+        `tail_gap`; with a column `dwell_bar` also `net_speed_bar`, `lag_psi_rad`, `lag_x`, `lag_z`.
+
+        Raises:
+            InputError: a robot that cannot be, or one outside the domain.
+        """
+        ...
