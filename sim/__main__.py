@@ -107,9 +107,10 @@ def _check(_: Namespace) -> None:
 
 @program.command("compile", "compile the simulator's loops now rather than on first use")
 def _compile(_: Namespace) -> None:
+    from sim.compiling import CACHE
     from sim.motion.warm import compile_all
 
-    compile_all()
+    print(f"loops compiled in {compile_all():.0f} s -> {CACHE}")
 
 
 if __name__ == "__main__":

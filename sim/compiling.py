@@ -7,6 +7,8 @@ or in the user's cache folder where this one cannot be written.
 
 Sums may be reordered and multiplications fused (last digits can differ between machines); NaN and infinity keep
 their meaning.
+
+The first use of a loop compiles it. A progress bar on stderr says so. `python -m sim compile` compiles all loops.
 """
 
 from __future__ import annotations
@@ -19,7 +21,10 @@ from pathlib import Path
 from shutil import rmtree
 from typing import Any, TypeVar, cast
 
+from llvmlite.binding import get_host_cpu_name
 from numba import config, njit
+from numba.core import event
+from tqdm import tqdm
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -50,8 +55,56 @@ def _cache_folder() -> Path:
 
 
 CACHE = _cache_folder()
+_ALL = CACHE / f"all-for-{get_host_cpu_name()}"  # machine code belongs to one kind of processor
 if not CACHE.exists():
     prune(CACHE.parent, _KEPT)
+
+
+def all_compiled() -> bool:
+    """Whether every loop has been compiled for this processor."""
+    return _ALL.exists()
+
+
+def mark_all_compiled() -> None:
+    """Remember that every loop has been compiled for this processor."""
+    CACHE.mkdir(parents=True, exist_ok=True)
+    _ALL.touch()
+
+
+class _Progress(event.Listener):
+    """A line on stderr while numba compiles loops of this package; it appears after a second."""
+
+    def __init__(self) -> None:
+        self._depth = 0
+        self._bar: tqdm[Any] | None = None
+
+    def on_start(self, event: Any) -> None:
+        """A loop, or one that it calls, begins to compile."""
+        if _is_ours(event):
+            self._depth += 1
+            if self._bar is None:
+                self._bar = tqdm(
+                    desc="compiling the simulator's loops for first use",
+                    bar_format="{desc}: {n_fmt} done in {elapsed} min",
+                    delay=1.0,
+                    leave=False,
+                )
+
+    def on_end(self, event: Any) -> None:
+        """A loop has been compiled."""
+        if _is_ours(event) and self._bar is not None:
+            self._depth -= 1
+            self._bar.update()
+            if self._depth == 0:
+                self._bar.close()
+                self._bar = None
+
+
+def _is_ours(event: Any) -> bool:
+    return str(event.data["dispatcher"].py_func.__module__).startswith("sim.")
+
+
+event.register("numba:compile", _Progress())  # type: ignore[no-untyped-call]
 
 
 def compiled(function: F) -> F:

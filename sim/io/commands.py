@@ -75,8 +75,16 @@ class Program:
 
     def parser(self, prog: str | None = None) -> ArgumentParser:
         """The parser of all commands."""
+        return self._parsers(prog)[0]
+
+    def help_texts(self, prog: str | None = None) -> dict[str, str]:
+        """What --help prints, by command."""
+        return {name: parser.format_help() for name, parser in self._parsers(prog)[1].items()}
+
+    def _parsers(self, prog: str | None) -> tuple[ArgumentParser, dict[str, ArgumentParser]]:
         parser = ArgumentParser(prog=prog or f"python -m {self.package}", description=self.about)
         commands = parser.add_subparsers(required=True, metavar="COMMAND")
+        own_parsers = {}
         for command in self._commands:
             own = commands.add_parser(
                 command.name, help=command.help, description=_sentence(command.help), aliases=command.aliases
@@ -84,7 +92,8 @@ class Program:
             for names, options in command.arguments:
                 own.add_argument(*names, **options)
             own.set_defaults(run=command.run)
-        return parser
+            own_parsers[command.name] = own
+        return parser, own_parsers
 
     def main(self, argv: list[str] | None = None, *, prog: str | None = None) -> None:
         """Parse and run; bad input raises `InputError`."""

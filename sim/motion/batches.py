@@ -25,6 +25,7 @@ from sim.motion.resolution import Resolution
 from sim.motion.sensitivity import Sensitivities, sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import steady
+from sim.motion.warm import compile_once
 from sim.solve.refinement import MANY
 
 _DIRECT_ROWS, _SLOPE_ROWS, _STEPPED_ROWS = 128, 16, 4  # robots between two ticks of the progress bar
@@ -65,6 +66,8 @@ def run_batches(
     here = threads or count <= 1  # thread counts belong to the process: set once, not by each worker
     task = work if here else partial(_single_threaded, work)
     results: list[Result] = []
+    if not here:
+        compile_once()
     with (
         one_thread() if here else nullcontext(),
         tqdm(total=sum(sizes), desc=title, unit="row", delay=1.0, disable=not title) as bar,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
 
 import numpy as np
 
-from sim.compiling import CACHE
+from sim.compiling import all_compiled, mark_all_compiled
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
@@ -28,10 +29,22 @@ _STAGES: tuple[tuple[str, Callable[[], object]], ...] = (
 )
 
 
-def compile_all() -> None:
-    """Call everything once; loops that are compiled already are only loaded."""
+def compile_all() -> float:
+    """Call everything once, with progress on stderr; loops that are compiled already are only loaded.
+
+    Returns:
+        Seconds that it took.
+    """
     began = time.perf_counter()
     for i, (name, call) in enumerate(_STAGES):
-        print(f"compiling {i + 1}/{len(_STAGES)}: {name} …", flush=True)
+        print(f"compiling {i + 1}/{len(_STAGES)}: {name} …", file=sys.stderr, flush=True)
         call()
-    print(f"loops compiled in {time.perf_counter() - began:.0f} s -> {CACHE}")
+    mark_all_compiled()
+    return time.perf_counter() - began
+
+
+def compile_once() -> None:
+    """Compile all loops unless that has been done: before processes start that would each compile them."""
+    if not all_compiled():
+        print("first use: compiling the simulator's loops, about a minute", file=sys.stderr, flush=True)
+        compile_all()

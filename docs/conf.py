@@ -1,0 +1,33 @@
+"""Settings of the documentation: `make docs` builds docs/_build/html. Nothing is loaded from the network."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE), str(HERE.parent)]
+
+from generate import write_generated_pages  # noqa: E402
+
+from softflagella import __version__  # noqa: E402
+
+write_generated_pages(HERE / "reference" / "generated")
+
+project = "softflagella"
+author = "the softflagella developers"
+project_copyright = author
+release = version = __version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+exclude_patterns = ["_build"]
+myst_heading_anchors = 3
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_default_options = {"members": True, "exclude-members": "__init__, __new__"}
+napoleon_numpy_docstring = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+html_theme = "furo"
+html_title = f"softflagella {release}"
+html_copy_source = False
+html_show_sphinx = False

@@ -1,0 +1,41 @@
+"""First use: compiling says what it does, and is done once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from sim import compiling
+from sim.motion import warm
+
+
+def test_compiling_a_loop_is_announced(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bar appears at once here; its text names the number of loops."""
+    shown = compiling.tqdm
+    monkeypatch.setattr(compiling, "tqdm", lambda **options: shown(**{**options, "delay": 0, "mininterval": 0}))
+
+    def formula(x: float) -> float:
+        return 2 * x
+
+    formula.__module__ = "sim.formula"
+    loop = compiling.compiled(formula)
+    assert loop(2.0) == 4.0
+    assert "compiling the simulator's loops for first use: 1 done" in capsys.readouterr().err
+    loop(3.0)
+    assert capsys.readouterr().err == ""
+
+
+def test_processes_are_preceded_by_one_compilation(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[str] = []
+    stages: tuple[tuple[str, Callable[[], object]], ...] = (("one", lambda: done.append("one")),)
+    monkeypatch.setattr(warm, "_STAGES", stages)
+    monkeypatch.setattr(warm, "all_compiled", lambda: bool(done))
+    monkeypatch.setattr(warm, "mark_all_compiled", lambda: done.append("marked"))
+    warm.compile_once()
+    assert done == ["one", "marked"]
+    assert "first use" in capsys.readouterr().err
+    warm.compile_once()
+    assert done == ["one", "marked"]
+    assert capsys.readouterr().err == ""
