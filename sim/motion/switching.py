@@ -102,7 +102,7 @@ def _lag(body: Body, tails: int, dwell: float, even: bool, resolution: Resolutio
         state = settled.state
     run = Run(body, tails, chosen, state)
     sense = np.sign(body.omega)
-    twist, turn = _steady_twist(run, tails, sense)
+    twist, turn = steady_twist(run, tails, sense)
     if run.failed:
         return np.full(3, np.nan)
     later = run.copy()
@@ -115,7 +115,7 @@ def _lag(body: Body, tails: int, dwell: float, even: bool, resolution: Resolutio
     return planar.compose(np.mean(changes, 0), planar.inverse(planar.arc(twist, dwell)))
 
 
-def _steady_twist(run: Run, tails: int, sense: float) -> tuple[Floats, float]:
+def steady_twist(run: Run, tails: int, sense: float) -> tuple[Floats, float]:
     """Forward, leftward and yaw rate for a positive motor, and the time in which the disc turns by a tail spacing.
 
     Velocities repeat with the spacing of the tails: means over a whole number of them.

@@ -22,7 +22,7 @@ from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import turned_edges
 from sim.model.body import Body
 from sim.solve.linearise import Equations, linearise, new_equations
-from sim.solve.rates import Rates
+from sim.solve.rates import Rates, is_joined
 from sim.solve.residual import Room, fill_residual, is_local, new_room
 
 FINITE_DIFFERENCE_STEP = 1e-6  # of the largest entry, in l or 1 + |ω|
@@ -44,7 +44,7 @@ class Workspace(NamedTuple):
 def new_workspace(rates: Rates, x: Floats, u: Floats) -> Workspace:
     """Room for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, instants = x.shape[0], x.shape[1], u.shape[0]
-    joined = 0 if rates.rate > 0 else 1
+    joined = 1 if is_joined(rates) else 0
     system = new_coupled(n, joined * columns, joined * instants)
     return Workspace(new_room(x, u), new_equations(x, u), system)
 
@@ -59,29 +59,46 @@ def newton(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tole
     Returns:
         Number of corrections, and size of the last one (in l and 1 + |ω|; above `tolerance`: not converged).
     """
-    local = is_local(body)
-    dx, du = np.empty_like(x), np.empty_like(u)
     size = np.inf
     for count in range(1, _MOST_CORRECTIONS + 1):
-        linearise(body, rates, x, u, work.room, work.equations)
-        if not local:
-            fill_residual(body, rates, x, u, work.room, work.equations.r, work.equations.t)
-        _negate(work.equations, dx, du)
-        factor_and_solve(body, rates, u, work, dx, du)
-        if not local:
-            solve_nonlocal(body, rates, x, u, work, RELATIVE_TOLERANCE, dx, du)
+        dx, du = correct(body, rates, x, u, work, True)
         size = max(np.max(np.abs(dx)), np.max(np.abs(du)) / (1 + abs(body.omega)))
         if not np.isfinite(size):
             return count, np.inf
         share = min(1.0, _LARGEST_MOVE / size)
-        if local:
-            x += share * dx
-        else:  # stretched edges would be flows
-            x[:] = turned_edges(x, share * dx, body.offset)
+        move(body, x, share * dx)
         u += share * du
         if size < tolerance:
             return count, size
     return _MOST_CORRECTIONS, size
+
+
+@compiled
+def correct(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, anew: bool) -> tuple[Floats, Floats]:
+    """One correction dx (n, M, 3), du (P, 4); `anew`: with a new factorisation, else with the stored factors."""
+    local = is_local(body)
+    dx, du = np.empty_like(x), np.empty_like(u)
+    if anew:
+        linearise(body, rates, x, u, work.room, work.equations)
+    if not (anew and local):
+        fill_residual(body, rates, x, u, work.room, work.equations.r, work.equations.t)
+    _negate(work.equations, dx, du)
+    if anew:
+        factor_and_solve(body, rates, u, work, dx, du)
+    else:
+        solve_local(rates, work, dx, du)
+    if not local:
+        solve_nonlocal(body, rates, x, u, work, RELATIVE_TOLERANCE, dx, du)
+    return dx, du
+
+
+@compiled
+def move(body: Body, x: Floats, dx: Floats) -> None:
+    """Correct the nodes x (n, M, 3) by dx; with flow, edges are turned, since stretching them would drive flow."""
+    if is_local(body):
+        x += dx
+    else:
+        x[:] = turned_edges(x, dx, body.offset)
 
 
 @compiled
@@ -105,7 +122,7 @@ def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: F
         dx, du: come in as right-hand sides, (n, M, 3) and (P, 4); solved in place.
     """
     chains = work.equations.chains
-    if rates.rate > 0:
+    if not is_joined(rates):
         separate.factor_and_solve(chains, dx, du[0])
         return
     n, columns, _ = dx.shape
@@ -119,7 +136,7 @@ def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: F
 @compiled
 def solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
     """Solve with the factors, in place: dx (n, M, 3) and du (P, 4) come in as right-hand sides."""
-    if rates.rate > 0:
+    if not is_joined(rates):
         separate.solve(work.equations.chains, dx, du[0])
     else:
         n, columns, _ = dx.shape

@@ -1,7 +1,8 @@
-"""How fast the tails change shape: the one place where an orbit and a time step differ.
+"""How fast the tails change shape: the one place where an orbit, a time step and a transient differ.
 
     orbit       ẋ = ω_t D x                          x at M phases; D: derivative of the interpolant
     time step   ẋ = (x − x*)/τ,   φ = φ* + τ ω_t     x*, φ* from earlier steps
+    transient   ẋ = ω_t D x + (x − x*)/τ             x at M phases, changing from turn to turn
 
 Columns: tail j of N at instant p of P is column m = p + j P of x (n, M, 3), M = N P, and is at phase φ + 2π m/M.
 On an orbit these are all tails at P instants of an N-th of a turn, or in other words tail 0 at M phases of a whole
@@ -24,11 +25,11 @@ from sim.model.body import Body
 
 
 class Rates(NamedTuple):
-    """An orbit (rate 0) or a stage of a time step (rate 1/τ)."""
+    """An orbit (D alone), a stage of a time step (rate 1/τ alone) or a stage of a transient (both)."""
 
     rate: float
-    phase: float  # of column 0 on an orbit; φ* of a stage
-    differentiation: Floats  # D, (M, M); empty for a stage
+    phase: float  # of column 0; φ* in a stage of a time step
+    differentiation: Floats  # D, (M, M); empty where columns are tails at one instant
     start: Floats  # x*, (n, M, 3); empty for an orbit
 
 
@@ -45,9 +46,21 @@ def in_stage(rate: float, phase: float, start: Floats) -> Rates:
 
 
 @compiled
+def in_transient(rate: float, first_phase: float, start: Floats) -> Rates:
+    """A stage with ẋ = ω_t ∂x/∂φ + rate (x − start), at M equal phases."""
+    return Rates(rate, first_phase, differentiation(start.shape[1]), start)
+
+
+@compiled
+def is_joined(rates: Rates) -> bool:
+    """Whether the columns are phases, joined to each other by ∂x/∂φ."""
+    return rates.differentiation.shape[0] > 0
+
+
+@compiled
 def base_phase(rates: Rates, body: Body, u: Floats) -> float:
     """Phase of column 0, for velocities u (P, 4); column m is 2π m/M later."""
-    return rates.phase + (tail_spin(body, u[0]) / rates.rate if rates.rate > 0 else 0.0)
+    return rates.phase + (0.0 if is_joined(rates) else tail_spin(body, u[0]) / rates.rate)
 
 
 @compiled
@@ -63,7 +76,7 @@ def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by
     base = base_phase(rates, body, u)
     for m in range(columns):
         now = u[m % u.shape[0]]
-        if rates.rate > 0:  # ∂v/∂φ = ω_yr e_x × x − v_x e_y, ∂φ/∂ω_t = 1/rate
+        if not is_joined(rates):  # ∂v/∂φ = ω_yr e_x × x − v_x e_y, ∂φ/∂ω_t = 1/rate
             motion = motion_at(body, now, base + 2 * np.pi * m / columns)
             for k in range(n):
                 position = vector(x, k, m)
@@ -77,10 +90,13 @@ def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by
                 for j in range(columns):
                     slope = plus(slope, times(rates.differentiation[m, j], vector(x, k, j)))
                 put(by_spin, k, m, slope)
-                put(x_dot, k, m, times(omega_t, slope))
+                change = times(omega_t, slope)
+                if rates.rate > 0:
+                    change = plus(change, times(rates.rate, minus(vector(x, k, m), vector(rates.start, k, m))))
+                put(x_dot, k, m, change)
 
 
 @compiled
 def phase_gain(rates: Rates, body: Body) -> float:
     """∂φ/∂ω_h."""
-    return motor_gain(body) / rates.rate if rates.rate > 0 else 0.0
+    return 0.0 if is_joined(rates) else motor_gain(body) / rates.rate

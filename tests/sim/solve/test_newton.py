@@ -13,7 +13,7 @@ from sim.model.body import Body
 from sim.solve.linearise import linearise, new_equations
 from sim.solve.newton import factor_and_solve, new_workspace, newton
 from sim.solve.orbit import FIRST_PHASE, straight_start
-from sim.solve.rates import Rates, in_stage, on_orbit
+from sim.solve.rates import Rates, in_stage, in_transient, is_joined, on_orbit
 from sim.solve.residual import fill_residual, new_room
 from tests.sim.linear.systems import dense_matrix, joined_matrix
 from tests.sim.robots import body_of, control
@@ -46,6 +46,12 @@ def stage_case() -> tuple[Body, Rates, Unknowns]:
     return body, in_stage(40.0, 0.7, x + 0.01 * np.random.default_rng(2).normal(size=x.shape)), (x, u)
 
 
+def transient_case() -> tuple[Body, Rates, Unknowns]:
+    body = strange(2)
+    x, u = somewhere(body, 2, 6, 4)
+    return body, in_transient(30.0, FIRST_PHASE, x + 0.01 * np.random.default_rng(2).normal(size=x.shape)), (x, u)
+
+
 def residual(body: Body, rates: Rates, z: np.ndarray, like: Unknowns) -> np.ndarray:
     x, u = z[: like[0].size].reshape(like[0].shape), z[like[0].size :].reshape(like[1].shape)
     r, t = np.empty_like(x), np.empty_like(u)
@@ -53,13 +59,13 @@ def residual(body: Body, rates: Rates, z: np.ndarray, like: Unknowns) -> np.ndar
     return np.concatenate([r.ravel(), t.ravel()])
 
 
-@pytest.mark.parametrize("case", [orbit_case, stage_case])
+@pytest.mark.parametrize("case", [orbit_case, stage_case, transient_case])
 def test_the_matrix_is_the_derivative_of_the_residual(case: object) -> None:
     """Every entry, by central differences."""
     body, rates, (x, u) = case()  # type: ignore[operator]
     room, equations = new_room(x, u), new_equations(x, u)
     linearise(body, rates, x, u, room, equations)
-    if rates.rate > 0:
+    if not is_joined(rates):
         matrix = dense_matrix(equations.chains)
     else:
         gain = 1 + body.droop * body.resistance[3, 3]
@@ -75,13 +81,13 @@ def test_the_matrix_is_the_derivative_of_the_residual(case: object) -> None:
         assert slope == pytest.approx(matrix[:, i], rel=1e-5, abs=1e-4)
 
 
-@pytest.mark.parametrize("case", [orbit_case, stage_case])
+@pytest.mark.parametrize("case", [orbit_case, stage_case, transient_case])
 def test_a_correction_solves_the_linear_system(case: object) -> None:
     body, rates, (x, u) = case()  # type: ignore[operator]
     work = new_workspace(rates, x, u)
     linearise(body, rates, x, u, work.room, work.equations)
     matrix = dense_matrix(work.equations.chains)
-    if not rates.rate > 0:
+    if is_joined(rates):
         gain = 1 + body.droop * body.resistance[3, 3]
         speed = np.array([body.omega + gain * u[m % len(u), 3] for m in range(x.shape[1])])
         matrix = joined_matrix(work.equations.chains, work.equations.resistance, speed, rates.differentiation)

@@ -1,0 +1,206 @@
+"""The response of a robot to a flip of its motor: curves over the dwell, and over the dwell before.
+
+After a flip the tails need about 0.7 time units to turn over, and meanwhile the robot lags the circle of its new
+steady motion. With g(T) the pose change in a dwell of length T, in the frame of the pose at the flip,
+
+    g(T) = lag(T) ∘ circle(T),   lag = (Δz, Δx, Δψ)
+
+and the lag stops changing after about two time units. So one simulated flip gives the response to every dwell.
+Three things change it:
+
+    before   a dwell before the flip that was too short for the tails to turn over: `memory` is added to the lag.
+             Dwells before that one hardly matter (below 1e-4 l and rad where none is shorter than 0.3).
+    rest     the first dwell of all starts from straight tails at rest
+    phase    of the disc at the flip, which nobody knows: curves are means over it, `spread` their deviation
+
+Equal dwells of T make the net speed v̄ = |p + Rot(Δψ) M p| / 2T with g = (p, Δψ) and M the mirror image.
+
+Solved for directly (`sim.solve.transient`) where the steady motion is; by time steps where it is not. A robot's
+curves are those of its direction of the motor (the sign of ω̄), seen as for a positive motor. Units: l, μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.arrays import Flags, Floats
+from sim.effects import catalogue
+from sim.linear.spectral import with_phases
+from sim.mechanics import planar
+from sim.mechanics.geometry import straight
+from sim.model.body import Body
+from sim.model.groups import Groups
+from sim.motion.steady import check_groups, steady
+from sim.motion.steady_motion import Steady
+from sim.motion.stepped_response import stepped_response
+from sim.solve.assembly import bodies
+from sim.solve.orbit import mean_motion, solve_orbit
+from sim.solve.refinement import CORRECTION, orbit_on_mesh
+from sim.solve.transient import lag_at, transient
+
+DWELLS = np.geomspace(0.2, 4.0, 25)  # T̄ of the curves
+BEFORE = np.array([0.2, 0.25, 0.32, 0.42, 0.6, 0.9])  # T̄ of the dwell before
+FORGOTTEN = 1.4  # T̄ of the dwell before from which on the response is that after a long one
+SETTLED = 2.0  # time units after a flip from which the lag is constant
+_SAME = 1.2  # time units from which the memory is constant
+_MESHES = (6, 9)  # edges; errors go as 1/n², extrapolated
+_TOLERANCE = 1e-3  # of a time step, in l: see `sim.solve.transient`
+_FLIPPED = np.array([-1.0, 1.0, -1.0, -1.0])  # of (v_x, v_z, ω_yr, ω_h)
+_LEAST_INSTANTS = {1: 3, 2: 3}  # by N; with more tails the phase at the flip hardly matters
+
+
+@dataclass(frozen=True)
+class Responses:
+    """Response of B robots, over D dwells and K dwells before; lags are (Δz, Δx, Δψ) in l, l, rad; NaN if
+    failed."""
+
+    lag: Floats  # (B, D, 3)
+    memory: Floats  # (B, K, D, 3), added to the lag
+    rest: Floats  # (B, D, 3): the lag of a first dwell
+    spread: Floats  # (B, D, 3), standard deviation of the lag over the disc's phase at the flip
+    net_speed: Floats  # (B, D), of equal dwells
+    failed: Flags  # (B,)
+    stepped: Flags  # (B,): by time steps
+
+
+class Curves(NamedTuple):
+    """Response of one robot, as in `Responses`."""
+
+    lag: Floats
+    memory: Floats
+    rest: Floats
+    spread: Floats
+
+
+@np.errstate(all="ignore")  # robots that overflow are flagged
+def responses(groups: Groups, motion: Steady | None = None, *, history: bool = True) -> Responses:
+    """Response of B robots of one N to a flip of the motor.
+
+    Args:
+        groups: robots; the sign of ω̄ is the direction of the motor after the flip.
+        motion: the robots' steady motion, if it is at hand.
+        history: with memory and rest, which cost three times as much as the rest. Without, both are NaN, and the
+            net
+            speed is where the dwell before is not FORGOTTEN.
+    """
+    check_groups(groups)
+    motion = steady(groups) if motion is None else motion
+    even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
+    robots = bodies(groups)
+    found, stepped = [], np.zeros(len(robots), dtype=bool)
+    for i, body in enumerate(robots):
+        curves = _solved(body, groups.N, even, history)
+        if curves is None:
+            stepped[i] = True
+            curves = Curves(*stepped_response(body, groups.N, DWELLS, BEFORE))
+        found.append(curves)
+    lag, memory, rest, spread = (np.array(column) for column in zip(*found, strict=True))
+    sense = np.sign([body.omega for body in robots])
+    twist = np.stack([motion.v_z, sense * motion.v_x, sense * motion.omega_yr], -1)
+    if not history:
+        memory[:], rest[:] = np.nan, np.nan
+    speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory), DWELLS)
+    failed = ~np.isfinite(speed[:, -1])
+    for array in (lag, memory, rest, spread, speed):
+        array[failed] = np.nan
+    return Responses(lag, memory, rest, spread, speed, failed, stepped)
+
+
+def at_equal_dwells(memory: Floats) -> Floats:
+    """Memory (..., K, D, 3) where the dwell before is as long as the dwell, (..., D, 3)."""
+    return np.stack([memory_after(memory, dwell)[..., i, :] for i, dwell in enumerate(DWELLS)], -2)
+
+
+def memory_after(memory: Floats, before: float) -> Floats:
+    """Memory (..., K, D, 3) after a dwell of length `before`, (..., D, 3): linear between BEFORE and FORGOTTEN."""
+    if before >= FORGOTTEN:
+        return np.zeros_like(memory[..., 0, :, :])
+    k = max(int(np.searchsorted(BEFORE, before, side="right")) - 1, 0)
+    if k == len(BEFORE) - 1:
+        return (FORGOTTEN - before) / (FORGOTTEN - BEFORE[k]) * memory[..., k, :, :]
+    share = (before - BEFORE[k]) / (BEFORE[k + 1] - BEFORE[k])
+    return (1 - share) * memory[..., k, :, :] + share * memory[..., k + 1, :, :]
+
+
+def _solved(body: Body, tails: int, even: bool, history: bool) -> Curves | None:
+    """Curves of one robot by transients; None where its motion, or a transient, cannot be solved for."""
+    coarse = _on_mesh(body, tails, even, _MESHES[0], history=False)
+    if coarse is None:
+        return None
+    fine = _on_mesh(body, tails, even, _MESHES[1], history=history)
+    if fine is None:
+        return None
+    a, b = _MESHES
+    change = (fine.lag - coarse.lag) * a**2 / (b**2 - a**2)
+    mirror = planar.MIRROR if body.omega < 0 else np.ones(3)
+    return Curves((fine.lag + change) * mirror, fine.memory * mirror, (fine.rest + change) * mirror, fine.spread)
+
+
+def _on_mesh(body: Body, tails: int, even: bool, edges: int, *, history: bool) -> Curves | None:
+    """Curves on one mesh; memory and rest only with `history`."""
+    after = _orbit(body, tails, edges)
+    if after is None:
+        return None
+    x, u, twist = after
+    marks = BEFORE if history else np.empty(0)
+    if even:
+        start, first = _mirrored(x), u
+    else:
+        reverse = body._replace(omega=-body.omega)
+        before = _orbit(reverse, tails, edges, instants=u.shape[0])
+        if before is None:
+            return None
+        other = before[2]
+        start, first = before[0], before[1] * _FLIPPED
+    main = transient(body, start.copy(), first.copy(), twist, SETTLED, marks, _TOLERANCE)
+    if not main.solved:
+        return None
+    dwells = np.minimum(DWELLS, SETTLED)
+    fields = lag_at(main, dwells)
+    lag, spread = fields.mean(1), fields.std(1)
+    memory, rest = np.zeros((len(BEFORE), *lag.shape)), np.zeros_like(lag)
+    if not history:
+        return Curves(lag, memory, rest, spread)
+    shapes = main.shapes
+    if even:
+        shapes = np.array([_mirrored(shape) for shape in shapes])
+    else:
+        back = transient(reverse, x.copy(), u * _FLIPPED, other, float(BEFORE[-1]), marks, _TOLERANCE)
+        if not back.solved:
+            return None
+        shapes = back.shapes
+    starts = [*shapes, straight(edges, x.shape[1], body.offset)]
+    curves = np.empty((len(starts), *lag.shape))
+    for i, shape in enumerate(starts):
+        until = _SAME if i < len(shapes) else SETTLED
+        found = transient(body, shape, first.copy(), twist, until, np.empty(0), _TOLERANCE)
+        if not found.solved:
+            return None
+        curves[i] = lag_at(found, np.minimum(DWELLS, until)).mean(1)
+    same = lag_at(main, np.minimum(DWELLS, _SAME)).mean(1)
+    return Curves(lag, curves[:-1] - same, curves[-1], spread)
+
+
+def _orbit(body: Body, tails: int, edges: int, instants: int = 0) -> tuple[Floats, Floats, Floats] | None:
+    """Steady x (n, M, 3), u (P, 4) and (v_z, h_x, ω_yr) on as many instants a turn as the response needs."""
+    found, x, u = orbit_on_mesh(body, tails, edges)
+    if not found:
+        return None
+    wanted = instants or max(u.shape[0], _LEAST_INSTANTS.get(tails, 1))
+    if tails in _LEAST_INSTANTS and wanted % 2 == 0:
+        wanted += 1
+    if wanted != u.shape[0]:
+        x, u = with_phases(x, tails * wanted), with_phases(u[None], wanted)[0]
+        _, size = solve_orbit(body, x, u, CORRECTION)
+        if not size < CORRECTION:
+            return None
+    mean = mean_motion(body, u)
+    return x, u, mean[[4, 3, 2]]
+
+
+def _mirrored(x: Floats) -> Floats:
+    """The mirror image of a robot's shape (n, M, 3): what a reversed motor makes of it."""
+    return np.ascontiguousarray(x[:, -np.arange(x.shape[1])] * np.array([1.0, -1.0, 1.0]))

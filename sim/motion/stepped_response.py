@@ -1,0 +1,97 @@
+"""The response to a flip by time steps, for robots whose steady motion cannot be solved for directly.
+
+From the steady motion in the opposite direction: one flip, and poses after every dwell. The state at the end is
+steady in the new direction. From there two flips, a short dwell apart, give the response after a short dwell.
+Curves are means over two phases of the disc, half a tail spacing apart, and their spread is that of the two.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.mechanics import planar
+from sim.model.body import Body
+from sim.motion.resolution import Resolution
+from sim.motion.run import Run
+from sim.motion.settling import settle_one
+from sim.motion.shapes import state_on_orbit
+from sim.motion.switching import steady_twist
+
+
+def stepped_response(
+    body: Body, tails: int, dwells: Floats, before: Floats, *, resolution: Resolution | None = None
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Lag (D, 3), memory (K, D, 3), lag from rest (D, 3) and spread (D, 3) as in `sim.motion.response.Responses`.
+
+    Args:
+        body: with the motor's speed after the flip.
+        dwells: T̄, (D,), increasing; the last one long enough for the motion to settle.
+        before: T̄ of the dwell before, (K,), increasing.
+        resolution: mesh and step; by default what the motor's speed needs.
+
+    Returns:
+        NaN where the robot breaks down.
+    """
+    chosen = resolution or Resolution.fitting(body.omega)
+    lost = tuple(np.full(shape, np.nan) for shape in ((len(dwells), 3), (len(before), len(dwells), 3)))
+    failed = (lost[0], lost[1], lost[0].copy(), lost[0].copy())
+    reverse = body._replace(omega=-body.omega)
+    state = state_on_orbit(reverse, tails, chosen.edges, 0.0)
+    if state is None:
+        settled = settle_one(reverse, tails, chosen)
+        if settled.failed:
+            return failed
+        state = settled.state
+    run = Run(reverse, tails, chosen, state)
+    sense = float(np.sign(body.omega))
+    _, turn = steady_twist(run, tails, sense)
+    changes, after_short = [], []
+    for share in (0.0, 0.5):
+        if run.failed:
+            return failed
+        copy = run.copy()
+        if share:
+            copy.go(share * turn)
+        changes.append(_flipped_poses(copy, dwells, sense))
+        after_short.append(_after_short_dwells(copy, before, dwells, sense))
+    twist, _ = steady_twist(copy, tails, sense)
+    rest = Run(body, tails, chosen)
+    from_rest = _poses(rest, dwells, sense)
+    if run.failed or copy.failed or rest.failed:
+        return failed
+    circle = planar.inverse(planar.arc(twist, dwells))
+    each = planar.compose(np.array(changes), circle)
+    lag = each.mean(0)
+    memory = planar.compose(np.mean(after_short, 0), circle) - lag
+    return lag, memory, planar.compose(from_rest, circle), each.std(0)
+
+
+def _after_short_dwells(run: Run, before: Floats, dwells: Floats, sense: float) -> Floats:
+    """Pose changes (K, D, 3) from a steady run: back for each of `before`, then forth."""
+    back = run.copy()
+    back.flip()
+    found, now = np.full((len(before), len(dwells), 3), np.nan), 0.0
+    for k, time in enumerate(before):
+        back.go(float(time - now))
+        now = time
+        found[k] = _flipped_poses(back.copy(), dwells, sense)
+    return found
+
+
+def _flipped_poses(run: Run, dwells: Floats, sense: float) -> Floats:
+    run.flip()
+    return _poses(run, dwells, sense)
+
+
+def _poses(run: Run, dwells: Floats, sense: float) -> Floats:
+    """Pose changes after each dwell (D, 3), seen as for a positive motor; NaN where the run breaks down."""
+    start, now = run.pose, 0.0
+    found = np.full((len(dwells), 3), np.nan)
+    for i, time in enumerate(dwells):
+        run.go(float(time - now))
+        if run.failed:
+            return found
+        now = time
+        found[i] = planar.between(start, run.pose)
+    return found if sense > 0 else found * planar.MIRROR

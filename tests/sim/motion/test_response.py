@@ -1,0 +1,124 @@
+"""Response curves: against time steps, against brute-force replays of random schedules, and for what they must
+tend to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.mechanics import planar
+from sim.model.groups import Groups
+from sim.model.schedule import Schedule
+from sim.motion import response
+from sim.motion.replay import replay
+from sim.motion.resolution import Resolution
+from sim.motion.response import BEFORE, DWELLS, FORGOTTEN, Responses, at_equal_dwells, memory_after, responses
+from sim.motion.steady import steady
+from sim.motion.stepped_response import stepped_response
+from sim.motion.switching import switch_response
+from tests.sim.robots import CONTROL_VALUES, body_of, control
+
+FINE = Resolution(24, 72)
+FEW = np.array([0, 6, 12, 18, 24])  # of the dwells
+
+
+@pytest.mark.parametrize(
+    ("omega_bar", "changes"), [(12.0, {"N": 4.0}), (25.0, {"N": 2.0}), (12.0, {"N": 3.0, "left_right_bias": 0.3})]
+)
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_curves_agree_with_time_steps(omega_bar: float, changes: dict[str, float], sense: float) -> None:
+    groups = control(omega_bar=sense * omega_bar, **changes)
+    found = responses(groups)
+    assert not found.stepped.any()
+    lag, memory, rest, spread = stepped_response(
+        body_of(groups), groups.N, DWELLS[FEW], BEFORE[[1, 3]], resolution=FINE
+    )
+    assert found.lag[0, FEW] == pytest.approx(lag, abs=2.5e-4)
+    assert found.memory[0][[1, 3]][:, FEW] == pytest.approx(memory, abs=5e-4)
+    assert found.rest[0, FEW] == pytest.approx(rest, abs=6e-4)
+    assert found.spread[0, FEW] == pytest.approx(spread, abs=4e-4)
+
+
+@pytest.mark.parametrize("tails", [2.0, 4.0])
+@pytest.mark.parametrize("ends", [(0.3, 0.6), (0.5, 2.0)])
+def test_a_random_schedule_is_the_product_of_its_responses(tails: float, ends: tuple[float, float]) -> None:
+    """A replay in the lab against lag, memory and arc of every dwell, with nothing fitted."""
+    dwells = np.random.default_rng(4).uniform(*ends, 12)
+    values = {**CONTROL_VALUES, "N": tails, "omega_bar": 15.0}
+    track = replay([Schedule(values, 1, dwells, (0.0, 0.0, 0.0), 1.0)])[0]
+    flips = track.groupby("dwell").last()[["x_over_l", "y_over_l", "heading_rad"]].to_numpy()
+    predicted = composed(responses(control(N=tails, omega_bar=15.0)), control(N=tails, omega_bar=15.0), dwells)
+    travelled = np.abs(np.diff(flips[:, 2])).sum()
+    assert predicted[:, 2] == pytest.approx(flips[:, 2], abs=max(2e-3, 2e-3 * travelled))
+    assert predicted[:, :2] == pytest.approx(flips[:, :2], abs=3e-3)
+
+
+def composed(found: Responses, groups: Groups, dwells: np.ndarray) -> np.ndarray:
+    """Poses at the ends of the dwells of a schedule from rest, the first dwell with a positive motor."""
+    motion = steady(groups)
+    twist = np.array([motion.v_z[0], motion.v_x[0], motion.omega_yr[0]])
+    pose, poses = np.zeros(3), []
+    for i, dwell in enumerate(dwells):
+        curve = found.rest[0] if i == 0 else found.lag[0] + memory_after(found.memory[0], dwells[i - 1])
+        lag = np.array([np.interp(np.log(dwell), np.log(DWELLS), column) for column in curve.T])
+        change = planar.compose(lag, planar.arc(twist, dwell))
+        pose = planar.compose(pose, change * (planar.MIRROR if i % 2 else 1.0))
+        poses.append(pose)
+    return np.array(poses)
+
+
+def test_net_speed_agrees_with_flips_that_go_on_until_the_motion_repeats() -> None:
+    groups = control(len(FEW), omega_bar=20.0, N=3.0)
+    stepped = switch_response(groups, DWELLS[FEW], resolution=FINE)
+    found = responses(groups)
+    speed = np.hypot(steady(groups).v_x, steady(groups).v_z)
+    away = np.abs(np.diagonal(found.net_speed[:, FEW]) - stepped.net_speed) / speed
+    assert away[0] < 0.02  # dwells of 0.2: two dwells before matter as well
+    assert (away[1:] < 1e-3).all()
+
+
+def test_the_lag_stops_changing_and_a_long_dwell_is_forgotten() -> None:
+    found = responses(control(omega_bar=20.0))
+    late = DWELLS > 1.9
+    assert np.ptp(found.lag[0, late], axis=0) == pytest.approx(0, abs=2e-4)
+    first, last = np.abs(found.memory[0]).max((1, 2))[[0, -1]]
+    assert last < 0.2 * first
+    assert (memory_after(found.memory[0], FORGOTTEN) == 0).all()
+    assert memory_after(found.memory[0], BEFORE[2]) == pytest.approx(found.memory[0, 2])
+
+
+def test_equal_dwells_take_the_memory_of_their_own_length() -> None:
+    memory = np.random.default_rng(0).normal(size=(len(BEFORE), len(DWELLS), 3))
+    found = at_equal_dwells(memory)
+    assert found[0] == pytest.approx(memory[0, 0])
+    assert (found[DWELLS >= FORGOTTEN] == 0).all()
+
+
+def test_a_reversed_motor_gives_the_same_curves_to_an_even_robot() -> None:
+    there, back = (responses(control(omega_bar=w, end_over_end_drag=3.0)) for w in (12.0, -12.0))
+    assert there.lag == pytest.approx(back.lag, abs=1e-6)
+    assert there.memory == pytest.approx(back.memory, abs=1e-6)
+
+
+def test_without_history_the_net_speed_of_quick_flips_is_not_known() -> None:
+    found = responses(control(), history=False)
+    assert np.isnan(found.memory).all()
+    assert np.isnan(found.rest).all()
+    assert (np.isfinite(found.net_speed[0]) == (DWELLS >= FORGOTTEN)).all()
+    assert np.isfinite(found.lag).all()
+
+
+def test_a_robot_that_cannot_be_solved_for_is_stepped(monkeypatch: pytest.MonkeyPatch) -> None:
+    direct = responses(control())
+    monkeypatch.setattr(response, "orbit_on_mesh", lambda *_: (False, None, None))
+    stepped = responses(control())
+    assert stepped.stepped.all()
+    assert not stepped.failed.any()
+    assert stepped.lag == pytest.approx(direct.lag, abs=1e-3)
+
+
+def test_a_robot_that_breaks_down_is_flagged_and_the_others_go_on() -> None:
+    found = responses(control(2, omega_bar=np.array([10.0, 1e9])))
+    assert found.failed.tolist() == [False, True]
+    assert np.isnan(found.lag[1]).all()
+    assert np.isfinite(found.lag[0]).all()
