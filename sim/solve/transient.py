@@ -229,7 +229,9 @@ def _instants(body: Body, u: Floats, fields: int) -> Floats:
 @compiled
 def lag_at(found: Transient, times: Floats) -> Floats:
     """The lag (T, Q, 3) at `times` (T,) between the first step and the last: cubic Hermite interpolation."""
-    out = np.empty((len(times), found.lag.shape[1], 3)) k = 1 for i in range(len(times)):
+    out = np.empty((len(times), found.lag.shape[1], 3))
+    k = 1
+    for i in range(len(times)):
         while k < len(found.times) - 2 and found.times[k + 1] < times[i]:
             k += 1
         span = found.times[k + 1] - found.times[k]
