@@ -20,6 +20,8 @@ project_copyright = author
 release = version = __version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
 exclude_patterns = ["_build"]
+default_role = "code"
+maximum_signature_line_length = 80
 myst_heading_anchors = 3
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
@@ -29,5 +31,7 @@ napoleon_use_rtype = False
 napoleon_use_ivar = True
 html_theme = "furo"
 html_title = f"softflagella {release}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False

@@ -66,8 +66,8 @@ def _about(effect: Effect) -> str:
         ("energy", "only dissipates" if effect.dissipative else "may also drive"),
     ]
     for driver in effect.drivers:
-        words = f"`{driver.name}`: {driver.title}, from the column of `{driver.column}`, per {driver.unit}"
-        properties.append(("in a measured table", words))
+        words = f"`{driver.name}`, {driver.title}: size = null + ε × `{driver.column}`; unit of ε: {driver.unit}"
+        properties.append(("candidate in a calibration", words))
     if effect.beside:
         properties.append(("shows only beside", f"`{effect.beside}`"))
     words = inspect.getdoc(import_module(f"sim.effects.{effect.name}")) or ""
@@ -94,7 +94,7 @@ def commands_page() -> str:
     ]
     for package, what in PACKAGES.items():
         program = import_module(f"{package}.__main__").program
-        parts.append(f"## {package}: {what}")
+        parts += [f"## {package}", f"{what[0].upper()}{what[1:]}."]
         for name, text in program.help_texts(f"softflagella {package}").items():
             parts += [f"### {package} {name}", f"```text\n{text.rstrip()}\n```"]
     return "\n\n".join(parts) + "\n"
