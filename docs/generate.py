@@ -35,9 +35,10 @@ def effects_page() -> str:
     )
     parts = [
         "# Effects",
-        f"The base model leaves things out. Each of these {len(effects)} files in `sim/effects` adds one of them. An "
-        "effect has one size ε. At its null value the model is exactly the base model.",
-        'In a robot.toml, effects are lines `name = size` in the table `[effects]`. In a table of robots they are columns.',
+        f"The base model leaves things out. Each of these {len(effects)} files in `sim/effects` adds one of them. "
+        "An effect has one size ε. At its null value the model is exactly the base model.",
+        "In a robot.toml, effects are lines `name = size` in the table `[effects]`. In a table of robots they are "
+        "columns.",
         summary,
     ]
     for effect in effects.values():
@@ -54,11 +55,15 @@ def _about(effect: Effect) -> str:
         ("null, bounds, typical", f"{effect.null:g}, {bounds(effect.bounds)}, {effect.typical:g}"),
         (
             "when the motor is reversed",
-            "left and right turns stay mirror images" if effect.symmetry == "even" else "left and right turns differ",
+            "left and right turns stay mirror images"
+            if effect.symmetry == "even"
+            else "left and right turns differ",
         ),
         (
             "twice the viscosity at half the speed",
-            "the same motion at half the rate" if effect.similar else "another motion: the effect has a scale of its own",
+            "the same motion at half the rate"
+            if effect.similar
+            else "another motion: the effect has a scale of its own",
         ),
         ("energy", "only dissipates" if effect.dissipative else "may also drive"),
     ]
@@ -87,8 +92,8 @@ def commands_page() -> str:
     os.environ["COLUMNS"] = "100"
     parts = [
         "# Commands",
-        "`softflagella PACKAGE COMMAND` and `python -m PACKAGE COMMAND` are the same. Bad input ends with one line on "
-        "stderr and exit status 2.",
+        "`softflagella PACKAGE COMMAND` and `python -m PACKAGE COMMAND` are the same. Bad input ends with one line "
+        "on stderr and exit status 2.",
     ]
     for package, what in PACKAGES.items():
         program = import_module(f"{package}.__main__").program
