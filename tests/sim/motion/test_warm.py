@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+
 from sim import compiling
 from sim.motion import warm
 
 
-def test_compiling_a_loop_is_announced(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_compiling_a_loop_is_announced(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The bar appears at once here; its text names the number of loops."""
     shown = compiling.tqdm
     monkeypatch.setattr(compiling, "tqdm", lambda **options: shown(**{**options, "delay": 0, "mininterval": 0}))
