@@ -44,8 +44,8 @@ def limits(data: Runs, locked: Flags) -> tuple[str, ...]:
     if count >= _FEWEST or not divided(data, locked):
         return ()
     found = (
-        f"{count} session{'s' * (count > 1)} only: the locked runs are a quarter of the conditions, not a session of "
-        "their own, so the error on them does not contain the differences between sessions"
+        f"{count} session{'s' * (count > 1)} only: the locked runs are a quarter of the conditions, not a session "
+        "of their own, so the error on them does not contain the differences between sessions"
     )
     if count == 1:
         found += ", and a shift that is equal in all runs is no evidence for an effect"

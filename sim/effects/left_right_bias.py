@@ -2,7 +2,7 @@
 
     M_y = ε μ0 R L² |ω_t|/2
 
-If the head hangs askew or a tail is bent, there is a yaw moment that does not reverse with the motor. Then the
+If the head is not level or a tail is bent, there is a yaw moment that does not reverse with the motor. Then the
 turn rates to the left and to the right differ. The moment is that of a side force ε μ0 R L |ω_t| at the head's
 centre about J; the force itself is left out. Fit this effect before less common ones.
 """
