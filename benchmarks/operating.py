@@ -46,9 +46,8 @@ class Outcome:
     verdict: str
     effects: tuple[str, ...]
     held_out: float  # error on the locked session over the noise of a run
-    covered: tuple[
-        bool, ...
-    ]  # by the intervals: the effects that were named alone and rightly; nulls: coefficients
+    # Whether intervals contain the truth: those of rightly named effects, or of the coefficients of a null.
+    covered: tuple[bool, ...]
 
 
 def judge(verdict: Verdict, case: Case) -> str:
