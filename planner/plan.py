@@ -75,7 +75,7 @@ class Plan:
 
     @property
     def stated_error(self) -> float:
-        """The error that the plan states: guaranteed error plus tube [l]."""
+        """The error that the plan states, guaranteed error plus tube [l]."""
         return self.guaranteed + self.tube
 
     def schedule(self, robot: Robot | None = None) -> Schedule:

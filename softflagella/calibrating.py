@@ -33,8 +33,8 @@ def calibrate(
         progress: show progress bars.
 
     Returns:
-        The verdict: `verdict` ("none", "effect", "ambiguous", "unexplained"), `sentence`, `effects`, fits with
-        intervals, errors on the locked runs.
+        The verdict, with `verdict` ("none", "effect", "ambiguous", "unexplained"), `sentence`, `effects`, fits
+        with intervals, and errors on the locked runs.
 
     Raises:
         InputError: the table cannot be used; the message says why.

@@ -51,10 +51,10 @@ def steady(robots: Robots, *, jobs: int | None = None) -> pd.DataFrame:
         jobs: threads; default all processors.
 
     Returns:
-        A table with M rows. `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`: spins of tails and head and yaw rate
-        [EI/(μ0 l⁴)]; `v_x`, `v_z`: sway and surge of the head's centre [EI/(μ0 l³)]; `R_yr_over_l`; `theta_deg`;
-        `converged`; `tail_gap` [2 r0], below 1 if tails touch; `error`, the estimated relative error; `method`
-        ("direct" or "stepping"); `note`, why a row is not converged or not solved directly.
+        A table with M rows and the columns `omega_t_bar`, `omega_h_bar`, `omega_yr_bar` (spins of tails and head
+        and yaw rate [EI/(μ0 l⁴)]), `v_x`, `v_z` (sway and surge of the head's centre [EI/(μ0 l³)]), `R_yr_over_l`,
+        `theta_deg`, `converged`, `tail_gap` ([2 r0], below 1 if tails touch), `error` (the estimated relative
+        error), `method` ("direct" or "stepping") and `note` (why a row is not converged or not solved directly).
 
     Raises:
         InputError: a column is unknown, or a number is not possible.
@@ -81,8 +81,8 @@ def switch_response(robots: Robots, dwell: ArrayLike) -> pd.DataFrame:
         dwell: half-period T̄ [μ0 l⁴/EI], one for all robots or (M,).
 
     Returns:
-        A table with M rows: `dwell_bar`, `net_speed_bar` [EI/(μ0 l³)], and the offset of a flip `lag_psi_rad`,
-        `lag_x`, `lag_z` [l]; NaN where a simulation broke down.
+        A table with M rows and the columns `dwell_bar`, `net_speed_bar` [EI/(μ0 l³)], and the offset of a flip
+        `lag_psi_rad`, `lag_x`, `lag_z` [l]; NaN where a simulation broke down.
 
     Raises:
         InputError: a robot is not possible, or a dwell is not above 0.
@@ -113,9 +113,9 @@ def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None
         jobs: threads; default all processors.
 
     Returns:
-        A table with M rows and a column for each pair, (output, parameter): the derivative per unit of the
-        parameter. Outputs: `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`, `theta_rad`.
-        NaN where there is no direct solution.
+        A table with M rows and a column for each pair (output, parameter), which holds the derivative per unit of
+        the parameter. Outputs are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`,
+        `theta_rad`. NaN where there is no direct solution.
 
     Raises:
         InputError: a robot is not possible, or a parameter is unknown.
@@ -143,8 +143,8 @@ def replay(schedule: Schedule | Plan, robot: Robot | None = None) -> pd.DataFram
         robot: the robot that carries out a plan; default: the one that the plan was made for.
 
     Returns:
-        The track of the head's centre: `time_bar` [μ0 l⁴/EI], `time_s`, `x_over_l`, `y_over_l`, `heading_rad`,
-        `direction` of the motor, `dwell` (index).
+        The track of the head's centre, with the columns `time_bar` [μ0 l⁴/EI], `time_s`, `x_over_l`, `y_over_l`,
+        `heading_rad`, `direction` of the motor, `dwell` (index).
 
     Raises:
         InputError: the schedule cannot be simulated, or it needs too many time steps.

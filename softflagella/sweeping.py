@@ -24,7 +24,7 @@ def sweep(
         jobs: processes; default all processors.
 
     Returns:
-        The manifest: configuration, code, counts of rows, converged, failed, touching.
+        The manifest, with the configuration, the code and the counts of rows (all, converged, failed, touching).
 
     Raises:
         InputError: the configuration has no valid robots, or the folder holds something else.

@@ -33,7 +33,7 @@ class LookupTable(Protocol):
 
     @property
     def identity(self) -> str:
-        """A hash of the numbers: tells which table made a plan."""
+        """A hash of the numbers; it tells which table made a plan."""
         ...
 
     def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:

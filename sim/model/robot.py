@@ -64,7 +64,7 @@ class Robot:
 
     @property
     def time_scale(self) -> float:
-        """μ0 l⁴/EI [s]: the unit of dimensionless time."""
+        """The unit of dimensionless time, μ0 l⁴/EI [s]."""
         return self.viscosity * self.tail_length**4 / self.bending_stiffness
 
     @property
