@@ -45,9 +45,8 @@ def short_aliases(
     app: Sphinx, what: str, name: str, found: object, options: object, arguments: str | None, returned: str | None
 ) -> tuple[str | None, str | None]:
     """Signatures with the names of type aliases: Sphinx writes TypeAliasForwardRef('Floats') inside other types."""
-    plain = [
-        re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text) if text else text for text in (arguments, returned)
-    ]
+    alias = r"TypeAliasForwardRef\('(\w+)'\)"
+    plain = [re.sub(alias, r"\1", text) if text else text for text in (arguments, returned)]
     return plain[0], plain[1]
 
 
