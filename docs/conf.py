@@ -44,7 +44,7 @@ html_show_sphinx = False
 def short_aliases(
     app: Sphinx, what: str, name: str, found: object, options: object, arguments: str | None, returned: str | None
 ) -> tuple[str | None, str | None]:
-    """Signatures with the names of type aliases: Sphinx writes TypeAliasForwardRef('Floats') inside other types."""
+    """Write type aliases by their names; Sphinx writes TypeAliasForwardRef("Floats") inside other types."""
     alias = r"TypeAliasForwardRef\('(\w+)'\)"
     plain = [re.sub(alias, r"\1", text) if text else text for text in (arguments, returned)]
     return plain[0], plain[1]
