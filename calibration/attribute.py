@@ -93,7 +93,7 @@ def examine(
         elif abs(z) < misfit.critical_z:
             reason = "score within the noise"
         elif not low <= guess <= high and (guess < low) == (effect.start == low):
-            reason = "acts against its sign"
+            reason = "its score has a sign that the effect cannot have"
         if reason:
             found.append(Candidate(effect, beside, z, survived, detectable, None, None, 0.0, 0.0, reason))
             continue
