@@ -46,9 +46,8 @@ class Outcome:
     verdict: str
     effects: tuple[str, ...]
     held_out: float  # error on the locked session over the noise of a run
-    covered: tuple[
-        bool, ...
-    ]  # whether the intervals of effects (named alone and rightly) or of coefficients (null) cover
+    # Whether intervals contain the truth: those of rightly named effects, or of the coefficients of a null.
+    covered: tuple[bool, ...]
 
 
 def judge(verdict: Verdict, case: Case) -> str:
@@ -183,17 +182,17 @@ def main(count: str = "500", repeats: str = "6") -> None:
     through = [o for group in real for o in group]
     agree = sum(a.verdict == b.verdict and a.effects == b.effects for a, b in zip(through, stand, strict=True))
     parts = [
-        "## By kind, through the stand-in\n\n" + summary(results, by_level),
-        "## By effect, λ = 8, through the stand-in\n\n" + summary(eights, lambda s: s),
-        "## Intervals\n\nHow often a 95 % interval covers what was planted: effects that were named alone, and "
-        "the three coefficients of nulls.\n\n| case | intervals | cover (95 %) |\n|---|---|---|\n"
-        + "\n".join(line for line in coverage if line),
+        "## By kind, linear model\n\n" + summary(results, by_level),
+        "## By effect, λ = 8, linear model\n\n" + summary(eights, lambda s: s),
+        "## Intervals\n\nHow often a 95 % interval contains what was planted. Counted are effects that were named "
+        "alone, and the three coefficients where nothing was planted.\n\n"
+        "| case | intervals | contain it (95 %) |\n|---|---|---|\n" + "\n".join(line for line in coverage if line),
         f"Held-out error over the noise of a run, where the effect was named: median {np.median(named):.3f}, "
         f"95 % of {len(named)} tables below {np.quantile(named, 0.95):.3f}.",
-        f"## Other designs, through the stand-in\n\n{OTHER_NULLS} nulls and each effect once at λ = 8.\n\n"
-        + summary(designs, str),
-        "## Through the simulator\n\nThe same cases with the same noise; truth by time stepping on a finer mesh "
-        f"and step. {agree} of {len(through)} verdicts are those of the stand-in, word for word.\n\n"
+        f"## Other designs, linear model\n\n{OTHER_NULLS} tables with nothing planted, and each effect once at "
+        "λ = 8.\n\n" + summary(designs, str),
+        "## Through the simulator\n\nThe same cases with the same noise. The truth is stepped in time on a finer "
+        f"mesh and step. {agree} of {len(through)} verdicts are the same as with the linear model.\n\n"
         + summary(through, by_level),
         f"Held-out error over noise, where the effect was named: {_range(through)}.",
     ]

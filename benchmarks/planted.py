@@ -206,7 +206,7 @@ def cases(model: Linear, repeats: int) -> list[Case]:
     for label, signal in outside(model).items():
         for level in (8.0, 16.0):
             scale = level / signals.beyond_catalogue(signal)
-            found += [Case(f"outside: {label}, {level:g} beyond it", {}, signal * scale)] * (2 * repeats)
+            found += [Case(f"outside: {label}, size {level:g}", {}, signal * scale)] * (2 * repeats)
     return found
 
 

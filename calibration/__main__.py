@@ -4,7 +4,7 @@ python -m calibration calibrate TABLE.csv --robot robot.toml --out DIR   verdict
 python -m calibration simulate --robot robot.toml --out TABLE.csv        a table to try it on
 python -m calibration tracks TRACKS.csv RUNS.csv --out TABLE.csv         camera tracks to a table of runs
 
-`close` is another word for `calibrate`.
+`close` is another name of `calibrate`.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def _calibrate(arguments: Namespace) -> None:
         f"noise {100 * result.noise_ceiling:.2f} %"
     )
     for limit in result.limits:
-        print(f"a weaker conclusion: {limit}")
+        print(f"the conclusion is weaker: {limit}")
     if result.set_aside:
         print(f"set aside: {len(result.set_aside)}, first {result.set_aside[0]}")
     print(f"-> {folder / 'verdict.json'}, {folder / 'report.html'}, {folder / 'corrected.toml'}")
@@ -101,7 +101,7 @@ def _simulate(arguments: Namespace) -> None:
     "tracks",
     "turn camera tracks into a table of runs",
     argument("tracks", help="CSV: run, time_s, x_cm, y_cm, heading_deg"),
-    argument("runs", help="CSV: run, N, l_cm, omega_rpm and what else was noted"),
+    argument("runs", help="CSV: run, N, l_cm, omega_rpm and other columns of a measured table"),
     out("CSV"),
 )
 def _tracks(arguments: Namespace) -> None:

@@ -1,20 +1,20 @@
-"""Which effect explains the residual: candidates, refits, and what survives.
+"""Which effect explains the residual: candidates, refits, and which of them are kept.
 
-Every effect that the runs can test is a candidate. One whose score passes the critical |z| (`calibration.misfit`),
-in the direction that its bounds allow, is refitted together with the coefficients in the model, and kept if
+Every effect that the runs can test is a candidate. If its score exceeds the critical |z| (`calibration.misfit`),
+with a sign that its bounds allow, the effect is fitted together with the coefficients. It is kept if
 
     the fit arrives at a minimum,
     the residual that it leaves passes the general tests and the scores of all other effects (at half of the
-    level, since a true effect must not be lost too often),
+    level, so that a true effect is not lost too often),
     its interval excludes the null, and
     it predicts left-out sessions better, by more than the uncertainty of that gain.
 
-Scores are local: where a coefficient ran to an end of its range for want of an effect, they say nothing, and every
-effect is refitted, from the model as given.
+Scores hold near the fit only. If a coefficient ran to an end of its range because an effect is missing, scores say
+nothing. Then every effect is fitted, starting from the model as given.
 
-Kept effects whose deviances differ by less than what one parameter gains by chance (6.63) cannot be told apart.
-Where none alone is kept, each of the best few is taken as given and a second one is looked for in the same way
-(`pairs`).
+Kept effects cannot be told apart if their deviances differ by less than one parameter can gain by chance (6.63).
+If no single effect is kept, each of the best few is taken into the model, and a second one is looked for in the
+same way (`pairs`).
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from calibration.model import Model, Parameter, Parameters
 from calibration.sessions import groups
 from sim.arrays import Flags, Floats, Integers
 
-_DRAWS = 400  # for a remainder, which is judged at a coarser level
-_FIRST = 3  # single effects beside which a second one is looked for
+_DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
+_FIRST = 3  # number of single effects to which a second one is added
 _INDISTINGUISHABLE = 6.63  # χ² with one degree of freedom, 99 %
 
 
@@ -40,10 +40,10 @@ class Candidate:
     """What was found about one effect."""
 
     effect: Parameter
-    beside: tuple[Parameter, ...]  # effects that were taken as given
+    beside: tuple[Parameter, ...]  # effects that were in the model before
     z: float
     survived: float
-    detectable: float  # size that |z| would find half of the time: critical |z| / signal per unit
+    detectable: float  # size that is found half of the time: critical |z| / signal per unit
     refit: Fit | None
     refit_misfit: Misfit | None
     gain: float  # predictive gain summed over left-out sessions, in log likelihood
@@ -69,7 +69,7 @@ def examine(
     beside: tuple[Parameter, ...] = (),
     progress: bool = True,
 ) -> list[Candidate]:
-    """Refit and judge every effect, best score first; `given` is where refits start if a coefficient ran away.
+    """Refit and judge every effect, best score first; refits start at `given` if a coefficient ran away.
 
     Args:
         base: the fit without them; it has `beside`.
@@ -89,11 +89,11 @@ def examine(
         if not local:
             guess = effect.start
         elif survived < TESTABLE:
-            reason = "absorbed by the coefficients: not testable with these runs"
+            reason = "the coefficients absorb it: not testable with these runs"
         elif abs(z) < misfit.critical_z:
             reason = "score within the noise"
         elif not low <= guess <= high and (guess < low) == (effect.start == low):
-            reason = "acts against its sign"
+            reason = "its score has a sign that the effect cannot have"
         if reason:
             found.append(Candidate(effect, beside, z, survived, detectable, None, None, 0.0, 0.0, reason))
             continue
@@ -134,7 +134,7 @@ def pairs(
     seed: int,
     progress: bool = True,
 ) -> list[Candidate]:
-    """Second effects beside the best refits of single ones."""
+    """Second effects, added to the best fits with a single one."""
     refitted = [c for c in found if c.refit is not None]
     second: list[Candidate] = []
     for first in sorted(refitted, key=_deviance)[:_FIRST]:
@@ -170,7 +170,7 @@ def inside(model: Model, fitted: Parameters) -> bool:
 
 
 def explaining(found: list[Candidate]) -> list[Candidate]:
-    """Kept effects that the data cannot tell from the best of them, best first."""
+    """Kept effects that the runs cannot tell from the best one, best first."""
     kept = sorted((c for c in found if c.kept and c.refit), key=lambda c: _deviance(c))
     return [c for c in kept if _deviance(c) - _deviance(kept[0]) < _INDISTINGUISHABLE]
 

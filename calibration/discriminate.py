@@ -1,13 +1,14 @@
-"""Which runs to make next, so that rivals can be told apart.
+"""Which runs to make next, so that two effects can be told apart.
 
-Two effects A and B that explain the runs alike differ elsewhere. If A is true, one more run at x, made m times,
-adds
+Two effects A and B may explain the runs equally well and predict different outputs at other inputs. If A is true,
+a run at x that is made m times adds
 
     λ(x) = dᵀ (S/m + J Cov Jᵀ)⁻¹ d,   d = f_A(x) − f_B(x)
 
-to χ² of B over A: S the scatter of a run, J and Cov the derivatives of B and the covariance of its fit, since B
-may be refitted (T-optimal design, linearised). Both ways round; the smaller counts. How often the runs then decide
-is found by drawing them. Source: Atkinson and Fedorov (1975).
+to the difference of χ² between B and A. S is the covariance of a run. J and Cov are the derivatives of B and the
+covariance of its fit, because B can be fitted again (T-optimal design, linearised). The same is computed with A
+and B exchanged; the smaller value counts. How often the runs decide is found by drawing them at random. Source:
+Atkinson and Fedorov (1975).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from calibration.model import Model
 from sim.arrays import Floats
 
 _DRAWS = 4000
-_DECIDES = 3.84  # χ² by which one must be better
+_DECIDES = 3.84  # difference of χ² at which one of the two is chosen
 _WANTED = 0.9  # share of draws that should decide
 _MOST_REPEATS = 16
 
@@ -34,7 +35,7 @@ class NextRun:
     settings: dict[str, Any]
     repeats: int
     separation: float  # λ of all repeats
-    decides: float  # share of draws in which the true one is better by enough
+    decides: float  # share of draws in which the true one is chosen
 
     def record(self) -> dict[str, Any]:
         return {

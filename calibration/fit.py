@@ -4,10 +4,10 @@ Steps of Levenberg (1944) with the model's own derivatives:
 
     θ ← θ + (A + λ D⁻²)⁻¹ JᵀΣ⁻¹ (y − f(θ)),   A = JᵀΣ⁻¹J,   θ = (ln C_1, …, ε_1, …),
 
-D is 1 for ln C and a typical size for ε; λ = 0 unless the step is long or misses. A parameter at a bound from
-which the step would lead out stays there. The covariance of the parameters is V = A⁻¹, more for an estimated S
-(`_inflation`); intervals are 95 %, by Student's t with the degrees of freedom that the scatter ρ of a few sessions
-leaves (Satterthwaite 1946),
+D is 1 for ln C and a typical size for ε. λ is 0, unless the step is too long or does not improve the fit. A
+parameter at a bound stays there if the step would lead out. The covariance of the parameters is V = A⁻¹, times a
+factor because S is estimated (`_inflation`). Intervals are 95 %, by Student's t. The scatter ρ of a few sessions
+is uncertain, which limits the degrees of freedom (Satterthwaite 1946):
 
     ν = 2 V² / (V′² Var ρ),   Var ρ ≈ 2 (ρ + 1/n)² / (k (s − 1)),   n runs in each of s sessions.
 """
@@ -26,12 +26,12 @@ from calibration.noise import Noise, Sums, inverse_root, least_squares, repeat_c
 from sim.arrays import Flags, Floats, Integers
 
 _MOST_STEPS = 25
-_SHORT = 0.1  # a step below this, in ln C or ε, keeps the Jacobian
-_SMALL = 0.01  # a step that promises less than this in rᵀ Σ⁻¹ r ends the iteration
+_SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
+_SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ⁻¹ r by less
 _LARGEST = 0.7  # change of ln C in one step
-_PASSES = 3  # of the scatter of the sessions
+_PASSES = 3  # iterations for the scatter of the sessions
 _DAMPING = (0.0, *(10.0**e for e in range(-3, 9)))  # λ
-_UNSETTLED = 1.0  # what one more step may promise of a fit that has arrived
+_UNSETTLED = 1.0  # a fit has not arrived if one more step is expected to reduce rᵀ Σ⁻¹ r by more
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,13 @@ class Fit:
     parameters: dict[str, float]
     fitted: tuple[Parameter, ...]  # in the order of the covariance
     covariance: Floats  # (p, p) of (ln C, ε)
-    inflation: float  # in the covariance, for S being estimated
+    inflation: float  # factor in the covariance, because S is estimated
     freedom: Floats  # (p,) degrees of freedom of the intervals
     prediction: Floats  # (n, k)
     jacobian: Floats  # (n, k, p)
     noise: Noise
     deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
-    arrived: bool  # at a minimum, or as far as the bounds let it
+    arrived: bool  # the fit is at a minimum, or at one within the bounds
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -105,17 +105,17 @@ def fit(
 
 @dataclass(frozen=True)
 class _Point:
-    """A model where the search is."""
+    """The model at the present parameters of the search."""
 
     parameters: dict[str, float]
     prediction: Floats  # (n, k)
-    derivative: Floats  # (n, k, p), here or a short step away
+    derivative: Floats  # (n, k, p), at these parameters or near them
     products: Sums  # of the derivatives and the residual
 
 
 @dataclass(frozen=True)
 class _Task:
-    """What is fitted to what."""
+    """The model, the runs, and the names of the parameters to fit."""
 
     model: Model
     names: tuple[str, ...]
@@ -139,7 +139,7 @@ class _Task:
 class _Step(NamedTuple):
     parameters: dict[str, float]  # after it
     size: float  # largest change, of ln C or ε
-    promise: float  # what it takes off rᵀ Σ⁻¹ r if the model is linear
+    promise: float  # by how much it reduces rᵀ Σ⁻¹ r if the model is linear
     damping: int  # place of its λ in _DAMPING
 
 
@@ -149,8 +149,8 @@ def _descend(task: _Task, start: dict[str, float]) -> _Point:
     point = task.at(start, None, 1)
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
     for count in range(1, _MOST_STEPS + 1):
-        # Near the end with the scatter of sessions that the fit's own residuals imply. Far from the solution
-        # every session looks shifted, and a large ρ would hide what pulls towards it.
+        # The scatter of the sessions comes from the residuals of the fit, but only near the solution. Far from it
+        # every session looks shifted, and with a large ρ the search would stop there.
         share = least_squares(point.products, passes=0 if count == 1 else _PASSES).share
         step = _step(fitted, point.parameters, point.products.at(share), least)
         if step.promise < _SMALL and count > 1:
@@ -184,7 +184,7 @@ def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: Fl
 
 
 def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: Floats, damping: float) -> Floats:
-    """Change (p,) of the parameters; none of those that a bound holds."""
+    """Change (p,) of the parameters; zero for those that stay at a bound."""
     at_low = np.array([parameters[one.name] <= one.bounds[0] for one in fitted])
     at_high = np.array([parameters[one.name] >= one.bounds[1] for one in fitted])
     typical = np.array([1.0 if one.logarithmic else abs(one.typical) for one in fitted])
@@ -205,9 +205,9 @@ def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: 
 
 
 def _inflation(condition: Integers, outputs: int) -> float:
-    """By how much the variance grows because S is known from ν repeats of k outputs only.
+    """Factor by which the variance is larger because S is estimated from ν repeats of k outputs.
 
-    ν/(ν − k − 1), since 1/S is overestimated, times 1 + (k − 1)/(ν − k), since its weights are not the best ones.
+    ν/(ν − k − 1), because 1/S is overestimated, times 1 + (k − 1)/(ν − k), because its weights are not optimal.
     """
     repeats = len(condition) - len(np.unique(condition))
     if repeats <= outputs + 1:

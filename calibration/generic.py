@@ -1,8 +1,8 @@
-"""Generic correction: what is left, as a small regression on the runs' inputs, for when no effect explains it.
+"""Generic correction: a small regression of the residual on the runs' inputs, for use when no effect explains it.
 
-Features are the inputs, their squares and their products, standardised. They are taken up one at a time as long as
-they predict left-out sessions better (each output has its own weights); none may be taken. It is a description,
-not an explanation, and holds between the runs that it was made from.
+Features are the inputs, their squares and their products, standardised. They are added one at a time, as long as
+left-out sessions are predicted better. Each output has its own weights. There may be no feature at all. The
+correction describes the residual and does not explain it. It holds only between the runs that it was made from.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _GAIN = 0.02  # share of the left-out error that a feature must save
 class Generic:
     """A correction to the prediction."""
 
-    features: tuple[str, ...]  # taken up, in order
+    features: tuple[str, ...]  # in the order in which they were added
     correction: Floats  # (n, k), for all runs
 
 

@@ -1,8 +1,7 @@
-"""Gross errors: runs that stand far from their own repeats, such as a slipped decimal point.
+"""Gross errors: runs that are far from their own repeats, for example because of a misplaced decimal point.
 
-A run is set aside where, in one output, its condition's runs lie more than `FAR` robust standard deviations of the
-repeats apart, and it is the one that is farthest from the model as given. A missing effect hardly does that: it
-moves repeats alike.
+If, in one output, the runs of a condition are more than `FAR` robust standard deviations apart, the run that is
+farthest from the model as given is set aside. A missing effect does not cause this: it changes all repeats alike.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
-"""What may be missing from the swimmer's model of a run: effects of the simulator, driven by what was noted of the
-run.
+"""Influences: what the model of a run may lack.
 
-An influence of size ε turns a run's robot into another: an effect of `sim.effects` gets the size null + ε s, where
-s is 1, or a column of the table (hours since the first run, kelvin above the mean). Some act on the observation
-alone: the motor's true speed, the point of the axis that was tracked, a current in the lab. A table without the
-column cannot test the influence that needs it, and says so.
+Most influences change the robot of a run: an effect of `sim.effects` gets the size null + ε s. Here s is 1 or a
+column of the table (hours since the first run, kelvin above the mean). Others change the observation only: the
+true speed of the motor, the tracked point of the axis, a current in the lab. Some influences need a column. If the
+table does not have it, they cannot be tested, and the report says so.
 """
 
 from __future__ import annotations
@@ -25,8 +24,8 @@ class Influence:
 
     parameter: Parameter
     effect: str | None  # of `sim.effects`; None: acts on the observation
-    needs: str | None  # column of the table that drives it
-    odd: bool  # tells left turns from right turns
+    needs: str | None  # column of the table that it needs
+    odd: bool  # left and right turns differ with it
 
     @property
     def name(self) -> str:
@@ -34,7 +33,7 @@ class Influence:
 
 
 def influences() -> dict[str, Influence]:
-    """Everything that may be missing, by name."""
+    """All influences by name."""
     found = {}
     for effect in catalogue().values():
         if not effect.drivers and not effect.beside:

@@ -1,4 +1,4 @@
-"""The locked runs: which they are, errors on them, whether they agree with a model; the last fit, to all runs."""
+"""The locked runs: which they are, errors on them, agreement with a model. The last fit, to all runs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _DRAWS = 2000
 
 
 def middle_session(data: Runs) -> Flags:
-    """The runs (n,) of the middle session by name, so that it is interpolated to; a block where there are few."""
+    """The runs (n,) of the middle session by name, which needs no extrapolation; a block if there are few."""
     group, names = groups(data)
     return np.asarray(group == len(names) // 2)
 
@@ -38,10 +38,10 @@ def error_interval(data: Runs, prediction: Floats, rows: Flags, seed: int) -> tu
 
 
 def locked_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> float:
-    """How often noise alone leaves the model as far from the locked runs `rows` (n,).
+    """Probability that noise alone puts the locked runs `rows` (n,) as far from the model.
 
-    The statistic is the sum of squares, white in S, of what is left; its null distribution is drawn from runs,
-    sessions, the error of the fitted parameters, and S as uncertain as the repeats leave it.
+    The statistic is the sum of squares of the residual, whitened by S. Its null distribution is drawn with the
+    noise of runs and sessions, the error of the fitted parameters, and the uncertainty of S.
     """
     root = inverse_root(fitted.noise.run)
     residual = (data.y - fitted.prediction)[rows] @ root.T
@@ -63,7 +63,7 @@ def locked_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> float:
 
 
 def fitted_to_all(model: Model, fitted: Fit, rows: Flags) -> dict[str, float]:
-    """Parameters of a fitted model after one more step, to all runs in `rows`; linear, since they are near."""
+    """Parameters of a fitted model after one linear step that fits it to all runs in `rows`."""
     data = model.runs
     table = np.concatenate([fitted.jacobian, (data.y - fitted.prediction)[..., None]], -1)
     products = sums(inverse_root(fitted.noise.run) @ table[rows], data.session[rows], len(fitted.noise.run))

@@ -1,6 +1,6 @@
-"""The whole loop: split, fit, test, attribute, refit, and open the locked test once.
+"""The whole calibration: split, fit, test, attribute, refit, and open the locked test once.
 
-1. Whole sessions are locked away before anything is looked at (by default the middle one); rows are never split.
+1. Whole sessions are locked away before anything is looked at (by default the middle one).
    Runs with gross errors are set aside (`calibration.gross`).
 2. Covariance from the repeats and the sessions (`calibration.noise`).
 3. Fit of the coefficients to the other sessions (`calibration.fit`).
@@ -8,9 +8,9 @@
 5. Refit with each effect that passes; keep what explains (`calibration.attribute`).
 6. Verdict: "none" (no departure beyond noise), "effect" (one explains it), "ambiguous" (several do and the runs
    cannot tell them apart), "unexplained" (there is a departure, and no effect in the catalogue explains it).
-7. Where no single effect explains it, pairs; where several do, the runs that would tell them apart.
+7. If no single effect explains it, pairs are tried. If several explain it, next runs that would tell them apart.
 8. Errors on the locked runs: as given, calibrated, with the effect, with a generic correction of the calibrated
-   model (`calibration.generic`), and the noise ceiling; and whether they agree with the final model
+   model (`calibration.generic`), and from noise alone. Whether the locked runs agree with the final model
    (`calibration.locked`).
 9. For use, the model is fitted once more to all runs, the locked ones included.
 """
@@ -37,12 +37,14 @@ from sim.io.provenance import fingerprint
 
 __all__ = ["LEVEL", "Verdict", "calibrate", "verdict_record"]
 
-LEVEL = 0.04  # α of every claim: noise is estimated, and false claims shall stay below one in twenty
+LEVEL = (
+    0.04  # α of every claim; below 0.05, since noise is estimated and false claims must stay below one in twenty
+)
 
 
 @dataclass(frozen=True)
 class _Task:
-    """The runs, divided, and what is fixed before they are looked at."""
+    """The divided runs, and everything that is fixed before they are looked at."""
 
     model: Model
     level: float
@@ -83,7 +85,7 @@ class _Task:
 
 @dataclass(frozen=True)
 class _Explained:
-    """What the fit without effects leaves, and what explains it."""
+    """The fit without effects, its residual, and the effects that explain the residual."""
 
     base: Fit
     misfit: Misfit
@@ -92,7 +94,7 @@ class _Explained:
 
     @property
     def final(self) -> Fit:
-        """The model to go on with."""
+        """The model with the effects of the verdict, or without any."""
         return self.best[0].refit if self.best and self.best[0].refit else self.base
 
 
@@ -104,14 +106,14 @@ def calibrate(
     seed: int = 0,
     progress: bool = True,
 ) -> Verdict:
-    """Close the loop on a model's runs.
+    """Calibrate a model with its runs, and find what it lacks.
 
     Args:
         model: its parameters' starts are the model "as given" (uncalibrated).
         locked: (n,) runs kept for the test, whole sessions; default `locked.middle_session`.
         level: α of every claim.
-        seed: of the bootstrap; the result is deterministic given it.
-        progress: show bars.
+        seed: of the bootstrap; the same seed gives the same result.
+        progress: show progress bars.
     """
     task = _prepare(model, locked, level, seed, progress)
     found = _explain(task)
@@ -171,7 +173,7 @@ def _prepare(model: Model, locked: Flags | None, level: float, seed: int, progre
 
 
 def _explain(task: _Task) -> _Explained:
-    """Fit the coefficients, test what is left, and examine single effects, then pairs, where something is."""
+    """Fit the coefficients and test the residual. If it is more than noise, examine single effects, then pairs."""
     model, used, level, seed = task.model, task.used, task.level, task.seed
     guess = model.guess(dict(task.start), used)
     coefficients = tuple(p.name for p in model.coefficients)
@@ -213,15 +215,15 @@ def _next_runs(task: _Task, found: _Explained) -> tuple[NextRun, ...]:
 
 
 def _unfinished(model: Model, base: Fit, final: Fit) -> tuple[str, ...]:
-    """What keeps a fit from being the best one, in words."""
+    """Reasons why a fit may not be the best one, in words."""
     found = [f"{name} is at the end of its range: these runs do not determine it" for name in final.at_bounds]
     if not inside(model, base.parameters):
         found.append(
             "without effects the coefficients run to the end of their range, so every effect was refitted from "
-            "the model as given, and effects are told apart less surely"
+            "the model as given, and it is less sure which effect it is"
         )
     if not final.arrived:
-        found.append("the fit did not arrive at a minimum: its coefficients are not to be trusted")
+        found.append("the fit did not arrive at a minimum: do not trust its coefficients")
     return tuple(found)
 
 

@@ -1,17 +1,17 @@
 """Measured tables: one run a row, units in the column names.
 
-Needed: N, l_cm, omega_rpm (head relative to tails, signed) and some of the outputs
+Needed: N, l_cm, omega_rpm (tails relative to head, signed) and some of the outputs
 
-    omega_h_rpm, omega_t_rpm, omega_yr_rad_s (signed), R_yr_cm, theta_deg, v_cm_s (of the head's centre),
+    omega_h_rpm, omega_t_rpm, omega_yr_rad_s (signed), R_yr_cm, theta_deg, v_cm_s (of the head's centre).
 
-and more runs than one per condition, so that the noise can be told from the repeats. `session` groups runs
-made together; where it is missing, runs of one N count as one session. elapsed_min, temperature_C,
-tank_diameter_cm and heading_deg (direction of the path in the lab, where a run is a part of a circle) open effects
-to test that need them. Rows that cannot be used are set aside by number and reason, never dropped in silence; so
-are columns of other names, unless they look like a known one misspelt.
+Some conditions must be repeated, because the noise is estimated from repeats. `session` names the group of runs
+that were made together. Without it, all runs of one N are one session. Some effects need elapsed_min,
+temperature_C, tank_diameter_cm or heading_deg (direction of the path in the lab, where a run is a part of a
+circle). Rows that cannot be used are set aside with number and reason. So are columns of other names, unless the
+name looks like a misspelt one.
 
-Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians.
-A wrong sign is a bad row, since the motor's direction sets the sign of all of them.
+Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians. A
+row with a wrong sign is a bad row, because the direction of the motor determines all signs.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ OUTPUTS = {
     "theta": ("theta_deg", math.pi / 180, 0),
     "v": ("v_cm_s", 0.01, 0),
 }
-_ERRORS = (  # of `calibration.tracks`; repeats tell more
+_ERRORS = (  # of `calibration.tracks`; not used, since repeats give the noise
     "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
 )  # fmt: skip
 _INPUTS = ("N", "l_cm", "omega_rpm")
 _NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm", "heading_deg")
-_KNOWN = {*_INPUTS, *(c for c, _, _ in OUTPUTS.values()), "run", "trial", "session", *_NOTED, *_ERRORS}
+KNOWN_COLUMNS = {*_INPUTS, *(c for c, _, _ in OUTPUTS.values()), "run", "trial", "session", *_NOTED, *_ERRORS}
 _FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
-_OWN = 1e-3  # share of an output's scatter that must be its own
+_OWN = 1e-3  # share of an output's scatter that must be independent of the other outputs
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,9 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
     for name in _INPUTS:
         if name not in table:
             raise InputError(f"the table has no column {name!r}; it needs {', '.join(_INPUTS)}")
-    unknown = [str(c) for c in table if c not in _KNOWN]
+    unknown = [str(c) for c in table if c not in KNOWN_COLUMNS]
     for name in unknown:
-        near = difflib.get_close_matches(name, _KNOWN, n=1)
+        near = difflib.get_close_matches(name, KNOWN_COLUMNS, n=1)
         if near:
             raise InputError(f"unknown column {name!r}: is it {near[0]!r}? rename or drop it")
     outputs = tuple(name for name, (column, _, _) in OUTPUTS.items() if column in table)
@@ -99,7 +99,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
     session_names, session = np.unique(names.to_numpy(dtype=str), return_inverse=True)
     repeats = len(good) - len(np.unique(condition))
     if repeats < _FEWEST_REPEATS:
-        raise InputError(f"{repeats} repeated runs; the noise is told from at least {_FEWEST_REPEATS}")
+        raise InputError(f"{repeats} repeated runs; to estimate the noise, give at least {_FEWEST_REPEATS}")
     columns = []
     for name in outputs:
         column, factor, _ = OUTPUTS[name]
@@ -158,19 +158,19 @@ def _independent(
 
 
 def _limits(tails: Floats, length: Floats, omega: Floats) -> tuple[str, ...]:
-    """What was the same in all runs."""
+    """Inputs that are the same in all runs, in words."""
     found = []
     if np.ptp(tails) == 0:
-        found.append(f"all runs have N = {tails[0]:.0f}: what depends on the number of tails cannot be seen")
+        found.append(f"all runs have N = {tails[0]:.0f}: what depends on the number of tails cannot be found")
     if np.ptp(length) == 0:
-        found.append("all runs have one tail length: what depends on it cannot be seen")
+        found.append("all runs have one tail length: what depends on it cannot be found")
     if np.ptp(np.abs(omega)) < 0.01 * np.abs(omega).max():
-        found.append("all runs have one motor speed: what depends on it cannot be seen")
+        found.append("all runs have one motor speed: what depends on it cannot be found")
     return tuple(found)
 
 
 def _noted(good: pd.DataFrame) -> dict[str, Floats]:
-    """What was noted of every run and differs between runs."""
+    """Notes that every run has and that differ between runs."""
     found = {}
     for column, (name, scale) in {
         "elapsed_min": ("elapsed_h", 1 / 60),
@@ -195,9 +195,9 @@ def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...
     for column in used:
         value = numbers[column].to_numpy(dtype=float)
         for i in np.flatnonzero(~np.isfinite(value)):
-            reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is no finite number"
+            reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is not a finite number"
     for i in np.flatnonzero(numbers["N"].to_numpy() % 1 != 0):
-        reasons[i] = reasons[i] or f"N = {table['N'].iloc[i]} is no whole number"
+        reasons[i] = reasons[i] or f"N = {table['N'].iloc[i]} is not a whole number"
     for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s"):
         if column in used:
             for i in np.flatnonzero(numbers[column].to_numpy(dtype=float) <= 0):

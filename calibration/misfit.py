@@ -1,6 +1,6 @@
 """Is the residual more than noise? General tests and projected scores, by one parametric bootstrap.
 
-With W = Σ^−½ and Q = orth(W ∂f/∂C), what the coefficients absorb is projected out:
+With W = Σ^−½ and Q = orth(W ∂f/∂C), the part that the coefficients can absorb is projected out:
 
     r = (I − QQᵀ) W (y − f),   d_j = (I − QQᵀ) W ∂f/∂ε_j,   z_j = d̂_jᵀ r.
 
@@ -9,13 +9,13 @@ Four statistics:
     lack     χ² of the condition means: lack of fit against pure error;
     kernel   rᵀ K r: smooth structure over the runs' inputs;
     shape    max |z| over directions in which one output follows an input, a square or a product of two;
-    score    max |z_j| over the catalogue; the scatter of the sessions is estimated with effect j in the model,
-             since without it a shift of all runs looks like scatter.
+    score    max |z_j| over the catalogue. The scatter of the sessions is estimated with effect j in the model,
+             because otherwise a shift of all runs would look like scatter.
 
-Their null distribution comes from data drawn with the fitted noise (repeats and sessions), each draw going through
-the same steps: S and ρ estimated anew, coefficients refitted (linearised). So the p-values account for the fit,
-for the noise being estimated, and for correlated candidates. Several statistics together are judged by the least
-of their p-values, whose null distribution the same draws give (Westfall and Young 1993).
+Their null distribution comes from data drawn with the fitted noise (repeats and sessions). Each draw goes through
+the same steps: S and ρ are estimated, and the coefficients are refitted (linearised). So the p-values take into
+account the fit, the estimated noise, and correlated candidates. Several statistics are judged together by the
+smallest of their p-values. Its null distribution comes from the same draws (Westfall and Young 1993).
 
 Source: score tests after projection, Rao (1948); kernel score, e.g. Liu, Lin, Ghosh (2007).
 """
@@ -34,7 +34,7 @@ from calibration.noise import Sums, inverse_root, least_squares, repeat_covarian
 from sim.arrays import Flags, Floats
 
 DRAWS = 1000
-TESTABLE = 0.1  # survived share of an effect's signal below which the coefficients absorb it
+TESTABLE = 0.1  # an effect cannot be tested if less than this share of its signal survives the projection
 GENERAL = ("lack", "kernel", "shape")
 _PASSES = 3
 _AT_ONCE = 50  # draws
@@ -65,7 +65,7 @@ class Misfit:
 
 
 class _Tester:
-    """Fixed design of the runs used; statistics of any residual."""
+    """The design of the runs used, which is fixed, and the statistics of any residual."""
 
     def __init__(self, data: Runs, used: Flags, J: Floats, D: Floats):
         self.session, self.condition = data.session[used], data.condition[used]
@@ -101,7 +101,7 @@ class _Tester:
         return Scores(np.stack([lack, kernel, largest], -1), *self._effects(products, p, e), shapes, share)
 
     def _effects(self, products: Sums, p: int, e: int) -> tuple[Floats, Floats, Floats]:
-        """z, survived share and length of every effect, each with the scatter of sessions that it leaves."""
+        """z, survived share and length of every effect, each with the scatter of sessions that remains with it."""
         own = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
         part = products.take(own)
         whole = part.at(least_squares(part, passes=_PASSES).share)  # (B, e, p + 2, p + 2)
@@ -127,7 +127,7 @@ class _Tester:
         return np.asarray(np.where(seen, score / np.sqrt(np.where(seen, rest, 1.0)), 0.0)).reshape(count, k, -1)
 
     def _shrunk(self, table: Floats, share: Floats) -> Floats:
-        """Runs (B, n, c) that are white in S made white in Σ."""
+        """Whiten runs (B, n, c) in Σ that are white in S."""
         size = self.sessions.sum(1)
         weight = (1 / np.sqrt(1 + share[:, None] * size) - 1) / size  # (B, s)
         return np.asarray(table + self.sessions.T @ (weight[..., None] * (self.sessions @ table)))

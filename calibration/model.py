@@ -1,7 +1,8 @@
-"""What the engine that closes the loop knows of its subject: runs, parameters, and a forward model.
+"""What a calibration needs of its subject: runs, parameters, and a forward model.
 
-Nothing here or in fit, noise, misfit, attribute and loop is about robots. The swimmer (`calibration.swimmer`) is
-one model; a sphere that settles in a vessel is another (`calibration/examples/spheres.py`).
+Nothing in this file or in fit, noise, misfit, attribute and loop is about robots. The swimmer
+(`calibration.swimmer`) is one model; a sphere that settles in a vessel is another one
+(`calibration/examples/spheres.py`).
 """
 
 from __future__ import annotations
@@ -16,19 +17,19 @@ from sim.arrays import Flags, Floats, Integers
 
 Parameters = Mapping[str, float]
 
-_LOG_STEP, _STEP = 0.01, 0.02  # differences: in ln C, in units of a typical size
-_LARGEST = 100.0  # change of ln C that is a number
+_LOG_STEP, _STEP = 0.01, 0.02  # finite-difference steps: in ln C, in units of a typical size
+_LARGEST = 100.0  # change of ln C, so that C stays a number
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """Something to fit: a coefficient that the model always has, or the size of an effect that it may lack."""
+    """A number to fit: a coefficient, which the model always has, or the size of an effect, which it may lack."""
 
     name: str
     title: str
     start: float  # the value as given; for an effect its null
     bounds: tuple[float, float]
-    typical: float  # a size that matters; sets the step of differences
+    typical: float  # a typical size; it sets the finite-difference step
     logarithmic: bool = False  # fitted as its logarithm
     unit: str = "1"
 
@@ -38,11 +39,11 @@ class Runs:
     """Measured runs, ready to be compared: n runs of k outputs."""
 
     outputs: tuple[str, ...]
-    y: Floats  # (n, k), on a scale on which errors are relative
+    y: Floats  # (n, k), scaled so that errors are relative
     condition: Integers  # (n,) repeats share a number
     session: Integers  # (n,) 0, 1, …: runs made together
     session_names: tuple[str, ...]
-    inputs: Floats  # (n, q) what was set or noted, on scales on which structure is smooth
+    inputs: Floats  # (n, q) what was set or noted, scaled (some by logarithm)
     input_names: tuple[str, ...]
     rows: Integers  # (n,) numbers in the table, from 1
     set_aside: tuple[str, ...]  # "row 7: …"
@@ -89,15 +90,15 @@ class Model(Protocol):
         ...
 
     def check(self, prediction: Floats) -> None:
-        """Refuse runs that cannot be what they claim, given the prediction (n, k) of the model as given.
+        """Refuse runs that cannot have the units that they name; (n, k): prediction of the model as given.
 
         Raises:
-            InputError: a column is off by a factor that no robot explains.
+            InputError: a column is wrong by a factor that is not possible.
         """
         ...
 
     def possible(self) -> tuple[Model, list[dict[str, Any]]]:
-        """A model of runs that could be made next, and their settings."""
+        """A model of runs that can be made next, and their settings."""
         ...
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
@@ -130,7 +131,7 @@ def stepped(fitted: Sequence[Parameter], parameters: Parameters, step: Floats) -
 def by_differences(
     model: Model, parameters: Parameters, names: Sequence[str], *, title: str = ""
 ) -> tuple[Floats, Floats]:
-    """`Model.derivatives` by differences, for models that know no better: all perturbed models in one go."""
+    """`Model.derivatives` by finite differences; all changed models are computed together."""
     sets, widths = [dict(parameters)], []
     for name in names:
         one = parameter(model, name)

@@ -1,16 +1,17 @@
 """Noise of a table: scatter of the repeats, and of the sessions; generalised least squares in that noise.
 
-Runs under the same condition give the covariance S (k, k) of one run's outputs, jointly: R_yr and θ are not
-independent of the spins and the yaw rate. A session may shift all its runs together, by a share ρ of that
-variance. Repeats within a session do not average that shift away, so the covariance of a session's n runs is
+Runs under the same condition give the covariance S (k, k) of the outputs of one run. All outputs together are
+needed, because R_yr and θ are not independent of the spins and the yaw rate. A session may shift all its runs
+together, with a variance that is a share ρ of that of a run. Repeats within a session do not average this shift
+out. So the covariance of a session's n runs is
 
     Σ = (I_n + ρ 1 1ᵀ) ⊗ S.
 
-One ρ for all outputs: three sessions of five outputs leave it a dozen degrees of freedom, where one for each
-output would have two. It comes from the residuals of the fitted model, so an effect that the model lacks inflates
-it. It is therefore held below `SESSION_SHARE`: sessions are taken to scatter no more than single runs do, and a
-larger shift of a whole session counts as something that the model must explain. A single session tells nothing of
-it; there ρ is that limit, and what shifts all runs alike has next to no weight.
+There is one ρ for all outputs. With three sessions and five outputs it has about a dozen degrees of freedom; a ρ
+for each output would have two. ρ comes from the residuals of the fitted model, so a missing effect makes it
+larger. Therefore it is at most `SESSION_SHARE`: sessions are assumed to scatter no more than single runs do, and a
+larger shift of a whole session must be explained by the model. With a single session nothing is known about ρ.
+Then ρ is that limit, and a shift that is equal in all runs has almost no weight.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ class Whitener:
 
 @dataclass(frozen=True)
 class Sums:
-    """Products of columns in the noise of any ρ: within sessions, and of the means of each; ... for batches."""
+    """Products of columns, within sessions and of the sessions' means, for any ρ; `...` stands for batches."""
 
     within: Floats  # (..., m, m)
     between: Floats  # (..., s, m, m)
@@ -76,7 +77,7 @@ class Sums:
 
 @dataclass(frozen=True)
 class Linear:
-    """Generalised least squares of the last column by the others; ... for batches."""
+    """Generalised least squares of the last column by the others; `...` stands for batches."""
 
     step: Floats  # (..., p)
     covariance: Floats  # (..., p, p)
@@ -101,10 +102,10 @@ def sums(columns: Floats, session: Labels, outputs: int) -> Sums:
 
 
 def least_squares(products: Sums, *, passes: int) -> Linear:
-    """Fit the last of the columns, with the ρ that its own residuals imply after `passes` passes (none: 0).
+    """Fit the last of the columns, with ρ from its own residuals after `passes` iterations (0: ρ = 0).
 
-    The means of the sessions scatter by Σ_s n_s |m_s|² = (k − h/s) Σ_s (1 + ρ n_s), where h is what the fit takes
-    of their k s degrees of freedom.
+    The expected scatter of the sessions' means is Σ_s n_s |m_s|² = (k − h/s) Σ_s (1 + ρ n_s), where h of their k s
+    degrees of freedom are used by the fit.
     """
     count = len(products.sizes)
     p = products.within.shape[-1] - 1

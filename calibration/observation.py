@@ -1,4 +1,4 @@
-"""What a camera sees of a steady motion: the outputs of a table and their derivatives.
+"""What a camera measures of a steady motion: the outputs of a table and their derivatives.
 
     v = v_head + ω_yr × (p L ahead),   R = |v|/|ω_yr|,   θ = ∠(v, axis),   |v + U| along the path,
 
@@ -18,7 +18,7 @@ from sim.arrays import Floats
 
 @dataclass(frozen=True)
 class Observation:
-    """How m runs are seen."""
+    """How m runs are observed."""
 
     outputs: tuple[str, ...]
     time: Floats  # (m,) time scale [s]

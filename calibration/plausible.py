@@ -1,6 +1,6 @@
-"""Can a table's units be those that its columns name? Factors that no robot explains are refused.
+"""Checks of units: columns that are wrong by a factor that is not possible are refused.
 
-Inputs are judged before anything is simulated, outputs against the model as given.
+Inputs are checked before anything is simulated. Outputs are compared with the model as given.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def check_inputs(robot: Robot, runs: Measurements) -> None:
     """Tail lengths and motor speeds.
 
     Raises:
-        InputError: l_cm or omega_rpm must be in another unit.
+        InputError: l_cm or omega_rpm seems to be in another unit.
     """
     longest = float(runs.length.max())
     for length in (longest, float(runs.length.min())):
@@ -45,7 +45,7 @@ def check_outputs(runs: Measurements, prediction: Floats) -> None:
     """Outputs against the prediction (n, k) of the model as given.
 
     Raises:
-        InputError: an output must be in another unit.
+        InputError: an output seems to be in another unit.
     """
     y = {name: runs.y[:, i] for i, name in enumerate(runs.outputs)}
     if "omega_h" in y and "omega_t" in y:

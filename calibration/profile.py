@@ -1,8 +1,8 @@
-"""How well the runs determine what was fitted: profile intervals, and the combinations they say least about.
+"""How well the runs determine the fitted parameters: profile intervals, and the least determined combination.
 
-The deviance along one parameter, with the others refitted, need not be a parabola. At the ends of the interval
-that the covariance gives, the model is run again; the ends move to where the deviance, taken as a parabola on
-either side, has risen by t², with t the quantile of `Fit.interval`.
+The deviance along one parameter, with the others refitted, may differ from a parabola. So the model is run at both
+ends of the interval that the covariance gives. Each end moves to where the deviance, as a parabola on its side,
+has risen by t². Here t is the quantile of `Fit.interval`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from calibration.model import Model, moved, stepped
 from calibration.noise import inverse_root, sums
 from sim.arrays import Flags, Floats, Integers
 
-_LEAST = 0.05  # of the expected rise: below, the deviance is flat and the end stays where it is
+_LEAST = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
 
 
 def profile_intervals(
@@ -35,7 +35,7 @@ def profile_intervals(
                 if one.logarithmic
                 else end - fitted.parameters[one.name]
             )
-            along = fitted.covariance[i] / fitted.covariance[i, i] * own  # where the others go with it
+            along = fitted.covariance[i] / fitted.covariance[i, i] * own  # how the others change with it
             sets.append(stepped(fitted.fitted, fitted.parameters, along))
             ends.append((i, own))
     found = model.predict(sets, title=title)
@@ -68,7 +68,7 @@ def _deviance(
 
 
 def least_determined(fitted: Fit) -> tuple[str, float]:
-    """The combination of logarithmic parameters that the runs say least about, and its standard error (of ln)."""
+    """The combination of logarithmic parameters that the runs determine worst, and its standard error (of ln)."""
     own = [i for i, p in enumerate(fitted.fitted) if p.logarithmic]
     values, vectors = np.linalg.eigh(fitted.covariance[np.ix_(own, own)])
     vector = vectors[:, -1] * np.sign(vectors[np.argmax(np.abs(vectors[:, -1])), -1])

@@ -1,8 +1,8 @@
 """Which runs are fitted and which are locked away for the test, fixed before the data is looked at.
 
-session   one whole session is locked away, the middle one by name, so that it is interpolated to;
+session   one whole session is locked away, the middle one by name, so that no extrapolation is needed;
 paper     as in the paper: C_t, C_r, C_yr from ω_h and ω_yr of the robots with 3 and 4 tails, prediction for 2 and
-          5 tails. Theirs came out 14.8 % and 10 % off.
+          5 tails. The errors of the paper's predictions are 14.8 % and 10 %.
 """
 
 from __future__ import annotations

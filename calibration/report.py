@@ -1,4 +1,4 @@
-"""The page of a closed loop: data, fit, evidence, residuals before and after, errors with their ceiling."""
+"""The report of a calibration: data, fit, evidence, residuals before and after, errors compared with the noise."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def write_report(result: Verdict, data: Measurements, out: str | Path, *, title:
 
 
 def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
-    """The sections of a closed loop."""
+    """The sections of the report."""
     _add_data(page, result, data)
     _add_fit(page, result)
     page.section("Residuals on the runs that were fitted, before and after")
     page.figure(draw_residuals(result, data), "residuals by output and number of tails, before and after")
     page.text(
-        "Where the residual lives: each output along each input, square and product, in standard deviations, "
-        "after what the fit absorbs."
+        "Where the residual is large: each output along each input, square and product, in standard deviations, "
+        "after the fit."
     )
     page.figure(draw_map(result, data), "map of the residual over the runs' inputs, before and after")
     _add_evidence(page, result)
@@ -49,7 +49,7 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
     if result.next_runs:
         page.section("Runs to make next")
         page.text(
-            "They would tell the first two explanations apart; the last column is how often, by drawing them."
+            "These runs would tell the first two explanations apart. The last column says how often they would."
         )
         settings = list(result.next_runs[0].settings)
         page.table(
@@ -72,10 +72,10 @@ def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
     share = f"{100 * math.sqrt(result.final.noise.share):.0f} % of that"
     shift = f"A session shifts all its runs by {share}."
     if len(data.session_names) == 1:
-        shift = f"What the session shifts all its runs by cannot be told from it; {share} is allowed for."
+        shift = f"With one session its shift cannot be measured; {share} is assumed."
     page.text(f"Scatter of one run, from the repeats: {noise}. {shift}")
     for limit in result.limits:
-        page.text(f"A weaker conclusion: {limit}.", tone="bad")
+        page.text(f"The conclusion is weaker: {limit}.", tone="bad")
 
 
 def _add_fit(page: Page, result: Verdict) -> None:
@@ -95,8 +95,8 @@ def _add_fit(page: Page, result: Verdict) -> None:
     page.table(("parameter", "value", "95 % interval, by profile deviance"), rows)
     combination, error = least_determined(result.final)
     page.text(
-        f"These runs say least about {combination}: {100 * error:.1f} %. corrected.toml has the model fitted once "
-        "more to all runs, the locked ones included: "
+        f"The runs determine {combination} worst: {100 * error:.1f} %. corrected.toml has the model fitted once "
+        "more to all runs, with the locked ones: "
         + ", ".join(f"{name} {result.delivered[name]:.4g}" for name in result.final.names)
         + "."
     )
@@ -107,7 +107,7 @@ def _add_evidence(page: Page, result: Verdict) -> None:
     each = ", ".join(f"{_TESTS[name]} {p:.2g}" for name, p in result.misfit.p.items())
     page.text(
         f"Is there more than noise? p = {result.misfit.p_value:.2g} by all tests together ({each}). Below: score "
-        "of each effect after what the coefficients absorb is projected out; claims need more than "
+        "of each effect, without the part that the coefficients can absorb; claims need more than "
         f"{result.misfit.critical_z:.2f}."
     )
     page.figure(draw_evidence(result), "score of each effect against what a claim needs")
@@ -120,7 +120,8 @@ def _add_evidence(page: Page, result: Verdict) -> None:
     )
     if result.untestable:
         page.text(
-            "Not tested, for want of data: " + "; ".join(f"{t} ({why})" for t, why in result.untestable.items())
+            "Not tested, because data are missing: "
+            + "; ".join(f"{t} ({why})" for t, why in result.untestable.items())
         )
 
 
@@ -145,7 +146,7 @@ def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
         f"95 % interval with effects: {100 * low:.2f} to {100 * high:.2f} %. "
         f"Noise of one run from the repeats: {100 * result.noise_ceiling:.2f} %. The locked runs "
         f"{'agree' if agree else 'do not agree'} with the final model (p = {result.locked_p:.2g}). "
-        f"Generic correction: {features} (it describes, and explains nothing).",
+        f"Generic correction: {features} (it describes the residual and does not explain it).",
         tone="good" if agree else "bad",
     )
 
@@ -196,7 +197,7 @@ def draw_evidence(result: Verdict) -> Figure:
     axes.set_xscale("symlog", linthresh=2 * result.misfit.critical_z)
     axes.tick_params(axis="x", labelsize=8)
     axes.set_xlabel(
-        "score z (dashed: what a claim needs; green: explains; orange: refitted and rejected)", fontsize=8
+        "score z (dashed: needed for a claim; green: explains; orange: refitted and rejected)", fontsize=8
     )
     figure.tight_layout()
     return figure

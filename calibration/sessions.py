@@ -1,7 +1,7 @@
-"""Groups of runs that are locked away or left out whole: sessions, or blocks of conditions where they are too few.
+"""Groups of runs that are locked away or left out together: sessions, or blocks of conditions if sessions are few.
 
-Blocks are drawn from the conditions within a session, repeats together. One session's shift cannot be estimated
-from it: it counts as one of `noise.SESSION_SHARE`, so that what shifts all its runs alike is no evidence.
+Blocks are drawn from the conditions within a session; repeats stay together. The shift of a single session cannot
+be estimated. Its variance is taken to be `noise.SESSION_SHARE`, so a shift of all its runs is no evidence.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ def divided(data: Runs, locked: Flags) -> bool:
 
 
 def limits(data: Runs, locked: Flags) -> tuple[str, ...]:
-    """What is weaker where the `locked` runs (n,) are no sessions of their own, in words."""
+    """What is weaker if the `locked` runs (n,) are not whole sessions, in words."""
     count = len(data.session_names)
     if count >= _FEWEST or not divided(data, locked):
         return ()
     found = (
-        f"{count} session{'s' * (count > 1)} only: the locked runs are a quarter of the conditions, no session of "
+        f"{count} session{'s' * (count > 1)} only: the locked runs are a quarter of the conditions, not a session "
+        "of their own, so the error on them does not contain the differences between sessions"
     )
-    found += "their own, so the error on them does not allow for what would differ in another session"
     if count == 1:
-        found += ", and what shifts all runs alike is no evidence for an effect"
+        found += ", and a shift that is equal in all runs is no evidence for an effect"
     return (found,)

@@ -1,8 +1,8 @@
-"""What a corrected model is worth on the path: plan with different models, run every schedule on the true robot.
+"""What a corrected model gains on the path: plan with different models, run every schedule on the true robot.
 
-Each model is tabulated (`surrogate.tabulate`) and plans the same path; the schedule then steers the truth,
-simulated. With a wrong yaw rate the robot leaves the path a little with every dwell, open loop, so errors of a few
-percent in the model are errors of the path's size.
+Each model is tabulated (`surrogate.tabulate`) and plans the same path. Then the schedule is run on the simulated
+true robot, without feedback. With a wrong yaw rate the robot leaves the path a little more with every dwell. So
+errors of a few percent in the model can lead to errors as large as the path.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, 
     """Plan `path` with every model and run the schedules on `truth`.
 
     Args:
-        models: by label; the same robot but for coefficients and effects.
+        models: by label; the same robot with other coefficients and effects.
     """
     found = {}
     for label, model in models.items():
@@ -48,7 +48,7 @@ def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, 
 
 
 def gap_closed(before: float, after: float, best: float) -> float:
-    """Share of the avoidable error that the correction takes away."""
+    """Share of the avoidable error that the correction removes."""
     return (before - after) / (before - best)
 
 

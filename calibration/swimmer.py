@@ -1,8 +1,8 @@
-"""The swimming robot as a model for the engine: the simulator, for any coefficients and influences.
+"""The swimming robot as a model for the calibration: the simulator, for any coefficients and influences.
 
-Runs under equal conditions share one simulation; a reversed motor mirrors the motion unless an odd influence is at
-work. Simulations are solved directly and extrapolated in the mesh (`sim.direct`): a few hundredths of a percent,
-far below any measurement. Outputs are compared as ln |output|, θ in radians.
+Runs under equal conditions share one simulation. A reversed motor mirrors the motion, unless an odd influence is
+present. Motions are solved directly and extrapolated in the mesh (`sim.motion.orbits`); their errors of a few
+hundredths of a percent are far below those of measurements. Outputs are compared as ln |output|, θ in radians.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from surrogate.export import load
 from surrogate.lookup import Lookup
 
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
-SANE = (0.1, 20.0)  # coefficients stay within: beyond, they say that the model lacks something
+SANE = (0.1, 20.0)  # range of the coefficients; at its ends the model lacks something
 
-_STEP = 0.05  # finite difference in ln C, by the look-up table
+_STEP = 0.05  # finite-difference step in ln C, with the look-up table
 _MOST_GUESSES = 12
-_STARTS = (1.0, 0.6, 1.6)  # times the coefficients as given
+_STARTS = (1.0, 0.6, 1.6)  # factors on the coefficients as given, for several starts
 _FEWEST_COVERED = 24  # runs
 
 
 class _Run(NamedTuple):
-    """One run as the simulator and the camera have it."""
+    """One run: the simulated robot, and how it is observed."""
 
     robot: Robot
     sign: float  # direction of the motor
@@ -50,7 +50,7 @@ class _Run(NamedTuple):
 
 
 class Solver(NamedTuple):
-    """Where motions and their derivatives come from: like `sim.batches.steady_columns`, `sensitivity_columns`."""
+    """Functions for motions and derivatives, like `steady_columns` and `sensitivity_columns`."""
 
     steady: Callable[..., Mapping[str, Floats]]
     slopes: Callable[..., Sensitivities]
@@ -69,7 +69,7 @@ class Swimmer:
     solver: Solver = DIRECT
 
     def __post_init__(self) -> None:
-        """Refuse lengths and speeds that no swimmer of this kind has, before anything is simulated."""
+        """Refuse lengths and speeds that are not possible, before anything is simulated."""
         check_inputs(self.robot, self.runs)
 
     @property
@@ -97,10 +97,10 @@ class Swimmer:
         return reason_untestable(influence, self._drivers, both, self.runs.outputs)
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "", lookup: Lookup | None = None) -> Floats:
-        """Predictions (P, n, k) for P parameter sets, all simulated in one go.
+        """Predictions (P, n, k) for P parameter sets, all simulated together.
 
-        With `lookup` the look-up table answers instead of the simulator: good for a first guess, and no
-        more, since its error would pass for physics.
+        With `lookup` the look-up table is used, not the simulator. That is good for a first guess only, because
+        the errors of the table would look like physics.
         """
         parts = [self._conditions(parameters) for parameters in sets]
         runs = [run for own, _ in parts for run in own]
@@ -128,7 +128,7 @@ class Swimmer:
         columns = self._columns(runs, [parameters])
         moves = {name: _moves(name, influence) for name, influence in influences.items()}
         wanted = tuple(dict.fromkeys(move for move in moves.values() if move))
-        # What is at work shows in the motion and so in the phases that it asks for; at its null it does not.
+        # Effects at their null may need more phases than the motion; effects that are present have them already.
         phases = FEW if any(i.effect for i in self._at_work(parameters)) else MANY
         found = self.solver.slopes(columns, wanted, phases=phases, jobs=self.jobs, title=title)
         view = self._observation(runs)
@@ -151,7 +151,7 @@ class Swimmer:
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """Coefficients fitted with the look-up table to the runs that it covers; `start` if those are too few.
 
-        From several starts; the one that ends nearest to the runs counts.
+        Of several starts, the one that ends nearest to the runs is taken.
         """
         lookup = load()
         covered = used & self._inside(lookup, start)
@@ -233,9 +233,9 @@ class Swimmer:
         return found
 
     def _conditions(self, parameters: Parameters, *, signed: bool = False) -> tuple[list[_Run], Integers]:
-        """Runs that differ, as far as it matters at `parameters`, and each run's place among them.
+        """Runs that must be simulated at `parameters`, without duplicates, and the place of each run among them.
 
-        The motor's direction matters where something odd is at work, or if `signed`.
+        The motor's direction matters if something odd is present, or if `signed`.
         """
         runs, work = self.runs, self._at_work(parameters)
         signed |= any(i.odd for i in work) or any(catalogue()[e].symmetry == "odd" for e in self.robot.effects)
@@ -265,7 +265,7 @@ class Swimmer:
         return _Run(robot, math.copysign(1.0, omega), parameters.get(TRACKED_POINT, 0.0), current)
 
     def _columns(self, runs: list[_Run], sets: Sequence[Parameters]) -> dict[str, Floats]:
-        """Runs as columns for the simulator, with every effect that any of the sets has at work."""
+        """Runs as columns for the simulator, with every effect that is present in any of the sets."""
         names = {i.effect for parameters in sets for i in self._at_work(parameters) if i.effect}
         nulls = {name: catalogue()[name].null for name in sorted(names)}
         rows = [{**nulls, **run.robot.group_values()} for run in runs]
@@ -285,14 +285,14 @@ class Swimmer:
 
 
 def _moves(name: str, influence: Influence | None) -> str | None:
-    """The simulator's parameter that a parameter of the calibration moves, if it is not the observation's."""
+    """The simulator's parameter that a parameter of the calibration changes; none if it acts on what is seen."""
     if influence is None:
         return name
     return "omega_bar" if name == SLIP else influence.effect
 
 
 def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
-    """`robot` with fitted coefficients and effects; drift between runs and the observation stay out."""
+    """`robot` with fitted coefficients and effects; drift between runs and the observation are left out."""
     own: dict[str, Any] = {name: float(parameters[name]) for name in COEFFICIENTS}
     sizes = {
         name: float(value)

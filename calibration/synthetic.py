@@ -1,9 +1,9 @@
-"""Tables to test the loop on: the simulator with a hidden effect, on a finer mesh, with noise.
+"""Tables to test a calibration on: the simulator with a hidden effect, on a finer mesh, with noise.
 
 The design is the paper's: tail counts, tail lengths, two motor levels, both directions, repeated trials, one
-session a tail count. The truth is simulated on half the edge length and half the step of the fitter's model, so
-that the fitter's discretisation cannot pass for physics. Noise is multiplicative on spins, yaw rate and
-radius, additive on θ; a session shifts all its runs together.
+session for each tail count. The truth is simulated with half the edge length and half the step of the fitted
+model, so that the two do not share their discretisation. Noise is multiplicative on spins, yaw rate and radius,
+and additive on θ. A session shifts all its runs together.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def make_table(
         title: of the progress bar; empty for none.
 
     Raises:
-        InputError: a robot that cannot be simulated.
+        InputError: the robot cannot be simulated.
 
     Example:
         >>> from softflagella import load_robot, make_table

@@ -5,14 +5,14 @@ A run at constant motor speed is a circle with a heading that turns at the same 
     x = c_x + R cos α,  y = c_y + R sin α,  heading = h0 + ω_yr t,   α = α0 + ω_yr t,
 
 fitted to all samples of a run at once (least squares; positions and heading weighted by their own scatter). A run
-of a whole turn and more also shows whether the circle drifts, c → c + U t, as in a current of the fluid; its
-radius and speed are then those relative to the fluid. The slip angle is that between the heading and the circle's
-tangent, the speed R |ω_yr|. Samples of a camera are not independent: the robot wobbles with its disc. Standard
-errors are therefore widened by the residuals' correlation time. A run that turns by less than LEAST_TURN is fitted
-by a straight line, and gives a speed and a slip angle alone.
+of a whole turn or more also shows whether the circle drifts in a current, c → c + U t. Then its radius and speed
+are those relative to the fluid. The slip angle is the angle between the heading and the tangent of the circle. The
+speed is R |ω_yr|. Samples of a camera are not independent, because the robot wobbles as its disc turns. So
+standard errors are widened by the correlation time of the residuals. A run that turns by less than LEAST_TURN is
+fitted by a straight line. It gives only a speed and a slip angle.
 
-The tracked point must be the head's centre (or `tracked_point` will be found). Times in s, lengths in cm, angles
-in degrees, counter-clockwise, seen from above.
+The tracked point must be the head's centre; with another point the calibration finds `tracked_point`. Times are in
+s, lengths in cm, angles in degrees, counter-clockwise, seen from above.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from sim.io.errors import InputError
 from sim.io.tables import read_table
 
 COLUMNS = ("run", "time_s", "x_cm", "y_cm", "heading_deg")
-LEAST_TURN = math.radians(20)  # of a run, for a circle to be fitted
-_FEWEST = 12  # samples of a run
+LEAST_TURN = math.radians(20)  # smallest turn of a run to which a circle is fitted
+_FEWEST = 12  # samples that a run needs
 
 
 @dataclass(frozen=True)
 class TrackedRun:
-    """What a run's track gives; NaN where it gives nothing; errors are standard errors."""
+    """Results of one track; NaN where it does not give a result; errors are standard errors."""
 
     omega_yr_rad_s: float = math.nan
     omega_yr_error: float = math.nan
@@ -54,11 +54,11 @@ class TrackedRun:
 def measure_tracks(
     tracks: str | Path | pd.DataFrame, runs: str | Path | pd.DataFrame
 ) -> tuple[pd.DataFrame, list[str]]:
-    """A table for `calibration.measurements` out of tracks and what was set in each run.
+    """A table for `calibration.measurements` from tracks and the settings of each run.
 
     Args:
-        tracks: run, time_s, x_cm, y_cm, heading_deg, a row a sample.
-        runs: run, N, l_cm, omega_rpm and what else was noted, a row a run.
+        tracks: run, time_s, x_cm, y_cm, heading_deg; one row for each sample.
+        runs: run, N, l_cm, omega_rpm and other notes; one row for each run.
 
     Returns:
         The runs with omega_yr_rad_s, R_yr_cm, theta_deg, v_cm_s and their errors; what was set aside, and why.
@@ -78,7 +78,7 @@ def measure_tracks(
         own = samples[samples["run"] == run][list(COLUMNS[1:])].apply(pd.to_numeric, errors="coerce")
         bad = int((~np.isfinite(own.to_numpy())).any(axis=1).sum())
         if bad:
-            aside.append(f"run {run}: {bad} samples with something that is no number")
+            aside.append(f"run {run}: {bad} samples with a value that is not a number")
         own = own[np.isfinite(own.to_numpy()).all(axis=1)].sort_values("time_s")
         if len(own) < _FEWEST:
             aside.append(f"run {run}: {len(own)} samples; a track needs at least {_FEWEST}")

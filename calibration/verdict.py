@@ -1,4 +1,4 @@
-"""The verdict on a table of runs: what it holds, in one sentence, and as verdict.json.
+"""The verdict on a table of runs: its contents, in one sentence, and as verdict.json.
 
 "none": no departure beyond noise. "effect": one effect, or one pair, explains it. "ambiguous": several do, and the
 runs cannot tell them apart. "unexplained": there is a departure, and nothing in the catalogue explains it.
@@ -17,7 +17,7 @@ from calibration.misfit import DRAWS, Misfit
 from sim.arrays import Flags, Floats
 from sim.io.provenance import provenance
 
-_NEAR = 0.5  # share of the residual that an effect must take away to be named where none explains
+_NEAR = 0.5  # if no effect explains the residual, the best one is named if it removes at least this share
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Verdict:
     effects: tuple[str, ...]
     explaining: tuple[Candidate, ...]  # what explains the residual, best first; more than one: not told apart
     base: Fit  # calibrated, without effects
-    final: Fit  # the model to go on with
+    final: Fit  # the model with the effects of the verdict, or without any
     base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
     final_intervals: dict[str, tuple[float, float]]
     misfit: Misfit
@@ -86,7 +86,7 @@ class Verdict:
 
     @property
     def _nearest(self) -> str:
-        """Which single effect takes most of the residual away, if one was refitted and takes much."""
+        """The single effect that removes most of the residual, if one was refitted and removes much."""
         refits = [(c.refit.deviance, c.effect.title) for c in self.candidates if c.refit is not None]
         if not refits:
             return ""
@@ -95,7 +95,7 @@ class Verdict:
         share = (self.base.deviance - deviance) / max(self.base.deviance - expected, 1e-9)
         if share < _NEAR:
             return ""
-        return f"; the nearest, {title}, takes {100 * min(share, 1.0):.0f} % of it away and leaves more than noise"
+        return f"; the nearest, {title}, removes {100 * min(share, 1.0):.0f} % of it and leaves more than noise"
 
 
 def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:

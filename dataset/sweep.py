@@ -1,8 +1,8 @@
 """Robots -> rows: simulate a design in parallel, chunk by chunk.
 
-Each robot's steady motion is solved for (`sim.steady`), and from there it is stepped through flips of the motor
-with its own half-period (`sim.switching`). Rows are batched by N; every finished batch is stored at once, so an
-interruption loses one batch a worker.
+Each robot's steady motion is solved for (`sim.motion.steady`), and from there it is stepped through flips of the
+motor with its own half-period (`sim.motion.switching`). Rows are batched by N; every finished batch is stored at
+once, so an interruption loses one batch a worker.
 """
 
 from __future__ import annotations

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
+
+from sphinx.application import Sphinx
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
@@ -20,14 +23,33 @@ project_copyright = author
 release = version = __version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
 exclude_patterns = ["_build"]
+default_role = "code"
+maximum_signature_line_length = 80
 myst_heading_anchors = 3
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
+autodoc_type_aliases = {"ArrayLike": "ArrayLike", "Floats": "Floats", "Integers": "Integers"}
 autodoc_default_options = {"members": True, "exclude-members": "__init__, __new__"}
 napoleon_numpy_docstring = False
 napoleon_use_rtype = False
 napoleon_use_ivar = True
 html_theme = "furo"
 html_title = f"softflagella {release}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False
+
+
+def short_aliases(
+    app: Sphinx, what: str, name: str, found: object, options: object, arguments: str | None, returned: str | None
+) -> tuple[str | None, str | None]:
+    """Write type aliases by their names; Sphinx writes TypeAliasForwardRef("Floats") inside other types."""
+    alias = r"TypeAliasForwardRef\('(\w+)'\)"
+    plain = [re.sub(alias, r"\1", text) if text else text for text in (arguments, returned)]
+    return plain[0], plain[1]
+
+
+def setup(app: Sphinx) -> None:
+    """Called by Sphinx."""
+    app.connect("autodoc-process-signature", short_aliases)

@@ -29,7 +29,7 @@ def effects_page() -> str:
     summary = table(
         ("effect", "what it is", "null", "bounds", "unit of ε"),
         [
-            (f"[`{e.name}`](#{e.name.replace('_', '-')})", e.title, f"{e.null:g}", bounds(e.bounds), e.unit)
+            (f"[`{e.name}`](#{e.name.replace('_', '-')})", e.title, number(e.null), bounds(e.bounds), e.unit)
             for e in effects.values()
         ],
     )
@@ -47,34 +47,31 @@ def effects_page() -> str:
 
 
 def _about(effect: Effect) -> str:
+    if effect.symmetry == "even":
+        reversed_motor = "left and right turns stay mirror images"
+    else:
+        reversed_motor = "left and right turns differ"
+    if effect.similar:
+        viscosity = "the same motion at half the rate"
+    else:
+        viscosity = "another motion: the effect has a scale of its own"
     properties = [
         ("name", f"`{effect.name}`"),
         ("equation", f"`{effect.equation}`"),
         ("source", effect.source),
         ("unit of ε", effect.unit),
-        ("null, bounds, typical", f"{effect.null:g}, {bounds(effect.bounds)}, {effect.typical:g}"),
-        (
-            "when the motor is reversed",
-            "left and right turns stay mirror images"
-            if effect.symmetry == "even"
-            else "left and right turns differ",
-        ),
-        (
-            "twice the viscosity at half the speed",
-            "the same motion at half the rate"
-            if effect.similar
-            else "another motion: the effect has a scale of its own",
-        ),
+        ("null, bounds, typical", f"{number(effect.null)}, {bounds(effect.bounds)}, {number(effect.typical)}"),
+        ("when the motor is reversed", reversed_motor),
+        ("twice the viscosity at half the speed", viscosity),
         ("energy", "only dissipates" if effect.dissipative else "may also drive"),
     ]
     for driver in effect.drivers:
-        words = f"`{driver.name}`: {driver.title}, from the column of `{driver.column}`, per {driver.unit}"
-        properties.append(("in a measured table", words))
+        words = f"`{driver.name}`, {driver.title}: size = null + ε × `{driver.column}`; unit of ε: {driver.unit}"
+        properties.append(("candidate in a calibration", words))
     if effect.beside:
         properties.append(("shows only beside", f"`{effect.beside}`"))
     words = inspect.getdoc(import_module(f"sim.effects.{effect.name}")) or ""
-    lines = words.splitlines()
-    return "\n".join([lines[0], *lines[1:]]) + "\n\n" + table(("property", ""), properties)
+    return f"{words}\n\n{table(('property', ''), properties)}"
 
 
 def columns_page() -> str:
@@ -92,20 +89,25 @@ def commands_page() -> str:
     os.environ["COLUMNS"] = "100"
     parts = [
         "# Commands",
-        "`softflagella PACKAGE COMMAND` and `python -m PACKAGE COMMAND` are the same. Bad input ends with one line "
-        "on stderr and exit status 2.",
+        "`softflagella PACKAGE COMMAND` and `python -m PACKAGE COMMAND` are the same. Bad input ends with one "
+        "line on stderr and exit status 2.",
     ]
     for package, what in PACKAGES.items():
         program = import_module(f"{package}.__main__").program
-        parts.append(f"## {package}: {what}")
+        parts += [f"## {package}", f"{what[0].upper()}{what[1:]}."]
         for name, text in program.help_texts(f"softflagella {package}").items():
             parts += [f"### {package} {name}", f"```text\n{text.rstrip()}\n```"]
     return "\n\n".join(parts) + "\n"
 
 
+def number(value: float) -> str:
+    """A number with a typographic minus."""
+    return f"{value:g}".replace("-", "−")
+
+
 def bounds(ends: tuple[float, float]) -> str:
     """An interval in words."""
-    return f"{ends[0]:g} to {ends[1]:g}".replace("-", "−")
+    return f"{number(ends[0])} to {number(ends[1])}"
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -98,7 +98,7 @@ def _path(arguments: Namespace, robot: Robot) -> Path2D:
     "tracking error of a replayed track",
     argument("plan", help="plan.json"),
     argument("track", help="CSV written by python -m sim replay"),
-    out("overlay picture, PNG,", default=None),
+    out("overlay picture, PNG", default=None),
 )
 def _check(arguments: Namespace) -> None:
     from planner.check import draw_overlay, load_plan, tracking_error

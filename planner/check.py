@@ -1,7 +1,7 @@
 """A replayed (or measured) track against its plan: tracking error and an overlay.
 
-Error: distance of the tracked point from the declared path, weighted by time; beside it the distance from the
-raw path as given. The track is that of the head's centre with its heading, so any tracked point follows.
+The error is the distance of the tracked point from the declared path, weighted by time. The distance from the path
+as given is computed, too. A track holds the head's centre and the heading. The tracked point follows from them.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
 
 @dataclass(frozen=True)
 class TrackingError:
-    """In tail lengths l, against the declared path unless it says raw."""
+    """Errors in tail lengths l, from the declared path; those called raw from the path as given."""
 
     rms: float
     largest: float
@@ -68,7 +68,7 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
     values = {name: track[name].to_numpy(dtype=float) for name in _COLUMNS}
     pose = np.stack([values["x_over_l"], values["y_over_l"], values["heading_rad"]], 1)
     if not np.isfinite(pose).all():
-        raise InputError("the track has a value that is no finite number; mend the file")
+        raise InputError("the track has a value that is not a finite number; correct the file")
     offset = np.array([plan.get("offset_over_l", 0.0), 0.0, 0.0])
     tracked = planar.compose(pose, offset)[:, :2]
     declared = distance_to(np.array(plan["reference"]), tracked)

@@ -9,7 +9,7 @@ import numpy as np
 from planner.path import Path2D
 from sim.arrays import Floats
 
-CORNER = math.radians(15.0)  # kinks above this are corners; below, samples of a curve
+CORNER = math.radians(15.0)  # larger kinks are corners; smaller ones belong to curves
 
 
 def kinks(path: Path2D) -> Floats:

@@ -1,8 +1,8 @@
-"""Paths that people draw: CSV tables and SVG files.
+"""Paths from files: CSV tables and SVG drawings.
 
-SVG is read by svgelements: transforms, viewBox, curves, basic shapes and <use> included, what is in <defs> left
-out. SVG's y points down and is turned up. Every shape, and every subpath of a shape, is a path of its own; a file
-with several is refused unless one is named. Curves become polylines.
+SVG is read by svgelements, with transforms, viewBox, curves, basic shapes and <use>. What is in <defs> is left
+out. In SVG y points down; here it points up. Every shape, and every subpath of a shape, is a path of its own. A
+file with several paths is refused, unless one is chosen by its name. Curves become polylines.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from sim.io.tables import read_table
 
 METRES_PER_PIXEL = 0.0254 / 96  # of SVG
 _PHYSICAL = re.compile(r"\s*[0-9.eE+-]+\s*(mm|cm|in|pt|pc)\s*$")
-_TURN = math.radians(2.0)  # of a curve between two points
-_PROBES = 64  # places on a curve where its direction is looked at
+_TURN = math.radians(2.0)  # largest turn of a curve between two points
+_PROBES = 64  # places on a curve where its direction is measured
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A path, and the size of its unit in metres where the file gives physical units."""
+    """A path, and the size of its unit in metres if the file has physical units."""
 
     path: Path2D
     unit: float | None
@@ -42,10 +42,10 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
     Args:
         source: the file.
         closed: join the end to the start; by default what the file says.
-        shape: which path of an SVG with several, by the name that the refusal lists.
+        shape: name of the path, for an SVG with several; without it the error message lists the names.
 
     Raises:
-        InputError: the file holds no path, or several and none is chosen.
+        InputError: the file has no path, or several and none is chosen.
 
     Example:
         >>> import tempfile
@@ -59,7 +59,7 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
     if Path(source).suffix.lower() == ".svg":
         return _read_svg(Path(source), closed, shape)
     if shape is not None:
-        raise InputError(f"{source} is no SVG, so it has no shape {shape!r} to choose; leave --shape out")
+        raise InputError(f"{source} is no SVG, so it has no shape {shape!r}; leave --shape out")
     table = read_table(source)
     if "x" not in table or "y" not in table:
         raise InputError(f"{source} has columns {', '.join(map(str, table))}; give x and y")
@@ -134,7 +134,7 @@ def _points(subpath: Any) -> tuple[Floats, bool]:
 
 
 def _enough(curve: Any) -> int:
-    """Pieces of a curve so that none turns by much."""
+    """Number of pieces of a curve such that none turns by more than _TURN."""
     probes = np.array([[p.x, p.y] for p in (curve.point(t) for t in np.linspace(0, 1, _PROBES + 1).tolist())])
     moves = np.diff(probes, axis=0)
     moves = moves[np.linalg.norm(moves, axis=1) > 0]

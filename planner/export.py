@@ -1,9 +1,9 @@
-"""What a plan leaves behind: plan.json, plan.csv, schedule.h for a microcontroller, plan.svg.
+"""The files of a plan: plan.json, plan.csv, schedule.h for a microcontroller, plan.svg.
 
-schedule.h holds dwell times in whole milliseconds as 16-bit numbers; the motor flips after each. Rounding
-is carried forward, so the flips never drift by more than half a millisecond. A dwell that does not fit
-16 bits is split by entries of 0 ms (two flips at once: the direction stays). A dwell that rounds to 0 ms is
-refused, since the header uses it for that.
+schedule.h has dwell times in whole milliseconds as 16-bit numbers. The motor flips after each. The rounding error
+of a dwell is carried over to the next one, so no flip is more than half a millisecond early or late. A dwell that
+does not fit 16 bits is split by entries of 0 ms: two flips at once, so the direction stays. A dwell that rounds to
+0 ms is refused, because 0 has this other meaning.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ def write_plan(result: Plan, folder: str | Path) -> list[Path]:
 
     Args:
         result: the plan.
-        folder: made if it is missing.
+        folder: it is made if it is missing.
 
     Raises:
-        InputError: a dwell that the header's whole milliseconds cannot hold, or a folder that cannot be written.
+        InputError: a dwell is too short for whole milliseconds, or the folder cannot be written.
 
     Example:
         >>> import tempfile
@@ -52,7 +52,7 @@ def write_plan(result: Plan, folder: str | Path) -> list[Path]:
 
 
 def dwell_table(result: Plan) -> pd.DataFrame:
-    """One row a dwell: when it starts, its direction and length, where the robot is predicted to be."""
+    """One row for each dwell: its start, its direction and length, and the predicted pose."""
     count = len(result.dwells)
     start = np.concatenate([[0.0], np.cumsum(result.dwells)[:-1]])
     return pd.DataFrame(
@@ -69,10 +69,10 @@ def dwell_table(result: Plan) -> pd.DataFrame:
 
 
 def milliseconds(seconds: np.ndarray) -> list[int]:
-    """Dwells in whole ms with rounding carried forward; long ones split by zeros.
+    """Dwells in whole ms, rounding errors carried over; long ones are split by zeros.
 
     Raises:
-        InputError: a dwell rounds to nothing.
+        InputError: a dwell rounds to 0 ms.
     """
     edges = np.round(1000 * np.cumsum(seconds)).astype(np.int64)
     entries: list[int] = []

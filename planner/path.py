@@ -1,6 +1,6 @@
 """Paths in the plane: polylines, circles, polygons, and points at equal distances.
 
-Lengths in tail lengths l (any one unit works).
+Lengths are in tail lengths l, but any unit works.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _CIRCLE_POINTS = 720
 
 @dataclass(frozen=True)
 class Path2D:
-    """A polyline (n, 2); `closed` joins its last point to the first. Any one unit of length.
+    """A polyline (n, 2); `closed` joins its last point to the first. Any unit of length.
 
     Example:
         >>> from softflagella import Path2D
@@ -32,10 +32,10 @@ class Path2D:
 
     @staticmethod
     def of(points: ArrayLike, *, closed: bool | None = None) -> Path2D:
-        """A path from points (n, 2); closed if it ends where it begins, unless told.
+        """A path from points (n, 2). By default it is closed if it ends where it begins.
 
         Raises:
-            InputError: empty, not a list of finite pairs, or without length.
+            InputError: the points are none, no finite pairs, or all the same.
         """
         try:
             table = np.asarray(points, dtype=float)
@@ -44,7 +44,7 @@ class Path2D:
         if table.size == 0:
             raise InputError("the path is empty; give at least two points")
         if table.ndim != 2 or table.shape[1] != 2:
-            raise InputError(f"the path has shape {table.shape}; give (n, 2): one x, y a point")
+            raise InputError(f"the path has shape {table.shape}; give (n, 2): x and y of each point")
         bad = np.flatnonzero(~np.isfinite(table).all(1))
         if len(bad):
             raise InputError(f"point {bad[0] + 1} of the path is {table[bad[0]].tolist()}; give finite numbers")
@@ -62,7 +62,7 @@ class Path2D:
         return Path2D(self.points * factor, self.closed)
 
     def polyline(self) -> Floats:
-        """Floats with the first repeated at the end if closed."""
+        """The points; of a closed path with the first one repeated at the end."""
         return np.concatenate([self.points, self.points[:1]]) if self.closed else self.points
 
     @property
@@ -102,7 +102,7 @@ def polygon(corners: int, side: float) -> Path2D:
 
 
 def resample(polyline: Floats, spacing: float) -> Floats:
-    """Floats at equal arc length, at most `spacing` apart, ends kept."""
+    """Points at equal arc length, at most `spacing` apart; the ends are kept."""
     lengths = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(polyline, axis=0), axis=1))])
     count = max(2, math.ceil(lengths[-1] / spacing) + 1)
     at = np.linspace(0, lengths[-1], count)

@@ -1,4 +1,4 @@
-"""Pictures of plans and replays: the path as given, as declared, as predicted, as it came out."""
+"""Pictures of plans and replays: the path as given, the declared path, the predicted track, the replayed track."""
 
 from __future__ import annotations
 

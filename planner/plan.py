@@ -1,15 +1,15 @@
 """plan(path, robot): from a path to a frozen plan, without simulating.
 
 1. The look-up table gives the vehicle (`planner.vehicle`).
-2. Corners are rounded by the smallest radius that the pivot can follow with some room; a path that is too
-   tight is refused, with the place, the radii and the smallest scale that would do.
+2. Corners are rounded by the smallest radius that the pivot can follow with some margin. A path that is
+   too tight is refused. The message gives the place, the radii and the smallest scale that works.
 3. The tractrix of the rounded path is the pivot's reference (`planner.tractrix`).
 4. Hysteresis about the line of sight gives the dwells (`planner.schedule`).
 5. Guaranteed error, tube and predicted error are computed and stated (`planner.stated_error`).
 
-Errors are distances of the tracked point from the declared (rounded) path: `guaranteed` holds for the exact
-vehicle; `tube` is what the table's own errors add in 95 % of draws; `stated_error` is their sum. How far the
-rounded path is from the raw one is reported beside them.
+Errors are distances of the tracked point from the declared path, which has rounded corners. `guaranteed` is a
+bound for a vehicle without errors. `tube` is what the errors of the table add, in 95 % of random draws.
+`stated_error` is their sum. The distance between the declared path and the path as given is reported, too.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ from surrogate.table import LookupTable
 
 Point = Literal["head_centre", "head_tip", "pivot"]
 
-ROOM = 0.7  # corners are rounded until the pivot turns at most this share of what it can
-TIGHTEST = 0.9  # share of the pivot's largest curvature above which a path is refused
-_SPACING = 0.01  # of the reference, in l
+ROOM = 0.7  # rounded corners need at most this share of the pivot's largest curvature
+TIGHTEST = 0.9  # a path that needs more than this share of the pivot's largest curvature is refused
+_SPACING = 0.01  # of points on the reference, in l
 _MOST_POINTS = 60_000
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A schedule and what is known of it. Lengths in l, times in μ0 l⁴/EI, unless named otherwise.
+    """A schedule and its errors. Lengths are in l, times in μ0 l⁴/EI, unless a name says its unit.
 
     Example:
         >>> from softflagella import circle, load_robot, plan
@@ -75,14 +75,14 @@ class Plan:
 
     @property
     def stated_error(self) -> float:
-        """Largest distance from the declared path that the plan states: guaranteed error and tube [l]."""
+        """The error that the plan states, guaranteed error plus tube [l]."""
         return self.guaranteed + self.tube
 
     def schedule(self, robot: Robot | None = None) -> Schedule:
         """The schedule for `sim.motion.replay`.
 
         Args:
-            robot: who carries it out; default the robot that was planned for.
+            robot: the robot that carries it out; default: the one that the plan was made for.
         """
         own = robot or self.robot
         start = (float(self.poses[0, 0]), float(self.poses[0, 1]), float(self.poses[0, 2]))
@@ -118,12 +118,13 @@ def plan(
         point: which point must follow the path.
         corner: round corners, or refuse them.
         minimum_dwell: shortest time between flips [μ0 l⁴/EI]; default the tails' turn-over time.
-        tolerance: largest acceptable guaranteed error [l]; the longest dwell that keeps it is chosen (longer is
-            faster and wider). Default: the minimum dwell.
-        seed: of the random vehicles behind the tube.
+        tolerance: largest acceptable guaranteed error [l]. The longest dwell with this error is chosen, since
+            with longer dwells the robot is faster and strays more. By default the minimum dwell is used.
+        seed: of the random vehicles from which the tube is computed.
 
     Raises:
-        InputError: bad path, path too tight, dwell too short, tolerance out of reach, robot out of domain.
+        InputError: the path is bad or too tight, the dwell too short, the tolerance too small, or the robot
+            outside the table's domain.
 
     Example:
         >>> from softflagella import circle, load_robot, plan
@@ -223,7 +224,7 @@ def _spacing(path: Path2D) -> float:
 
 
 def _round_corners(raw: Path2D, vehicle: Vehicle, distance: float, corner: str) -> tuple[Path2D, float]:
-    """The path with its corners rounded by the smallest radius that leaves the pivot some room, and that."""
+    """The path with rounded corners, and their radius: the smallest one that leaves the pivot some margin."""
     angle = np.abs(kinks(raw))
     sharpest = int(angle.argmax())
     if angle[sharpest] <= CORNER:
@@ -252,7 +253,7 @@ def _largest_curvature(path: Path2D, distance: float) -> float:
 
 
 def _check_curvature(ref: Reference, raw: Path2D, vehicle: Vehicle, distance: float, corner: str) -> float:
-    """The reference's largest curvature; refuses one that the pivot cannot follow."""
+    """The largest curvature of the reference. One that the pivot cannot follow is refused."""
     curvature = np.abs(ref.curvature)
     worst = int(curvature.argmax())
     limit = TIGHTEST / vehicle.pivot_radius
@@ -281,7 +282,7 @@ def _smallest_scale(raw: Path2D, vehicle: Vehicle, distance: float, corner: str)
 def _choose_dwell(
     vehicle: Vehicle, distance: float, curvature: float, shortest: float, tolerance: float | None
 ) -> float:
-    """The longest minimum dwell whose guaranteed error keeps the tolerance."""
+    """The longest minimum dwell whose guaranteed error is within the tolerance."""
     if tolerance is None:
         return shortest
     least = guaranteed(vehicle, distance, curvature, shortest)

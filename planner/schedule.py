@@ -1,6 +1,6 @@
 """Switching times by hysteresis about the line of sight, and the track that they predict.
 
-The pivot's reference and heading (`planner.tractrix.Reference`) give at every place the wanted heading
+The reference of the pivot and its heading (`planner.tractrix.Reference`) give the wanted heading at every place:
 
     φ_d = φ_ref − atan(e/Δ),
 
@@ -8,8 +8,8 @@ with e the pivot's cross-track error (left positive) and Δ the look-ahead. The 
 
     σ (φ − φ_d) ≥ h = Ω T_min,   not before T_min after the last flip,
 
-and the pose after each dwell comes from the vehicle: predicted feedback, so errors do not add up along
-the path. Rounding dwells without that feedback drifts linearly with length (docs/log.md).
+and the pose after each dwell is predicted with the vehicle. The next dwell starts from the predicted pose, so
+errors do not add up along the path. Without this feedback they grow with the length of the path (docs/log.md).
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 from sim.mechanics import planar
 
-_WINDOW = 40  # points of the reference that are searched ahead of and behind the pivot
-_TRIALS = 24  # times tried in one pass
+_WINDOW = 40  # points of the reference that are searched before and after the last place
+_TRIALS = 24  # times tried at once
 _MOST_SWITCHES = 200_000
 
 
@@ -40,7 +40,7 @@ class Switches:
 
 
 class _Follower:
-    """Cross-track error and wanted heading along a reference; remembers how far it has come."""
+    """Cross-track error and wanted heading along a reference; it remembers the last place."""
 
     def __init__(self, reference: Reference, ahead: float):
         self._q, self._heading, self._arc = reference.q, reference.heading, reference.arc
@@ -113,7 +113,7 @@ def follow(
             follower.place = int(place[-1])
             begin = float(times[-1]) + step
             if begin > 4 * math.pi / vehicle.yaw_rate:
-                raise InputError("the robot circles without meeting the path; check the path's scale")
+                raise InputError("the robot turns in circles and does not reach the path; check the path's scale")
         i = int(hit[0])
         time = float(times[i])
         if i and excess[i] >= 0:
@@ -134,9 +134,9 @@ def _first_sense(reference: Reference) -> int:
 
 
 def predict(vehicle: Vehicle, switches: Switches, offset: float) -> Floats:
-    """Poses (M + 1, 3) of the tracked point at the flips when `vehicle` carries out the switches.
+    """Poses (M + 1, 3) of the tracked point at the flips, if `vehicle` carries out the schedule.
 
-    `offset` leads forward from the head's centre to the tracked point.
+    `offset` is the distance from the head's centre forward to the tracked point.
     """
     changes = _changes(vehicle, switches.first_direction, switches.dwells[:, None])[:, 0]
     return planar.compose(_chain(switches.poses[0], changes), np.array([offset, 0.0, 0.0]))

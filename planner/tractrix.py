@@ -1,12 +1,12 @@
-"""What the robot's pivot and heading do while the tracked point follows a path: a tractrix.
+"""How the robot's pivot and heading move while the tracked point follows a path: the pivot draws a tractrix.
 
-The tracked point p runs ahead of the pivot q by a, along the heading e(φ). When p moves along a path, q is dragged
-behind it like a trailer:
+The tracked point p is ahead of the pivot q by the distance a, along the heading e(φ). When p moves along a path, q
+is dragged behind it like a trailer:
 
     δ = angle from heading to the path's tangent,   dφ/ds = sin δ / a,   dq/ds = cos δ e(φ),
 
-so q's curvature is tan δ / a. A kink of angle α in the path jumps δ by α; rounding it by an arc lets δ relax
-meanwhile. A closed path is dragged for a few laps until the motion repeats.
+so the curvature of q's track is tan δ / a. At a kink of angle α in the path, δ jumps by α. If the kink is rounded
+by an arc, δ grows less. On a closed path the pivot is dragged for a few laps, until the motion repeats.
 
 Lengths in tail lengths l. Source: the slip-free reduction is ours; tractrix as in any text on the planar trailer.
 """
@@ -26,7 +26,7 @@ _LAPS = 6
 
 @dataclass(frozen=True)
 class Reference:
-    """What must be followed: p (the declared path), and where the pivot and the heading are meanwhile."""
+    """The declared path p, and the pivot q and heading that belong to each of its points."""
 
     p: Floats  # (m, 2), closed paths end where they begin
     q: Floats  # (m, 2)

@@ -1,16 +1,16 @@
-"""The robot as the planner sees it: two arcs and the response to a switch.
+"""The robot as a vehicle for the planner: two arcs and the response to a switch.
 
-In motor direction σ = ±1 the tracked point moves on a circle with a constant body twist; a flip costs a
-fixed offset once the tails have turned over (`sim.switching`), so a dwell of T moves the robot by
+In motor direction σ = ±1 the robot moves on a circle with a constant body twist. After a flip, when the tails have
+turned over, the robot is displaced by a fixed offset, the lag (`sim.motion.switching`). So a dwell T moves it by
 
     E_σ(T) = lag_σ(T) ∘ arc(twist_σ, T).
 
-Both directions are parameters: the look-up table gives mirror images, a calibration may give others. The
-first dwell starts from straight tails, half way between the two turned-over shapes, and gets half a lag.
+The two directions have their own numbers; those from the look-up table are mirror images. The first dwell starts
+from straight tails, which are half way between the shapes of the two directions. So it has half a lag.
 
-Between table points the lag is interpolated, from none at a flip; beyond the table's longest dwell it
-is constant, since the tails have long turned over. Poses are of the head's centre, lengths in l, times
-in μ0 l⁴/EI.
+Between the dwells of the table the lag is interpolated; at a flip it is zero. For longer dwells than the longest
+one of the table it is constant, because the tails have turned over long before. Poses are those of the head's
+centre. Lengths are in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from sim.model.robot import Robot
 from surrogate.table import LookupTable
 
 TURN_OVER = 0.7  # time units that the tails need after a flip
-FROM_REST = 0.5  # share of a lag that straight tails pay: they are half way
-_TABLE = 25  # dwells at which the look-up table is asked
+FROM_REST = 0.5  # share of a lag in the first dwell: straight tails are half way
+_TABLE = 25  # number of dwells for which the look-up table is asked
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Vehicle:
         return float(np.hypot(pair[0], pair[1]) / (2 * dwell))
 
     def perturbed(self, rng: np.random.Generator) -> Vehicle:
-        """The vehicle with errors drawn as large as the table's held-out ones."""
+        """The vehicle with random errors that are as large as the held-out errors of the table."""
         e = self.relative_error
         speed = float(np.hypot(self.twist[0, 0], self.twist[0, 1]))
         yaw = abs(float(self.twist[0, 2]))

@@ -1,1 +1,1 @@
-"""Simulator of the swimming robot: batched discrete elastic rods with resistive force theory."""
+"""Simulator of the swimming robot: discrete elastic rods with resistive force theory."""

@@ -3,7 +3,7 @@
 python -m sim steady POINTS.csv --out OUT.csv      mean motion of each row at constant motor speed
 python -m sim replay PLAN.json --out TRACK.csv     track of a switching schedule
 python -m sim robot PRESET --out robot.toml        write a preset robot, to start from
-python -m sim check                                the paper's measured point beside ours
+python -m sim check                                the paper's measured point, measured and simulated
 python -m sim compile                              compile the simulator's loops now rather than on first use
 """
 
@@ -39,7 +39,9 @@ def _steady(arguments: Namespace) -> None:
     points = read_table(arguments.points)
     replaced = [name for name in (*STEADY_COLUMNS, *QUALITY_COLUMNS) if name in points]
     if replaced:
-        print(f"note: computed anew, not read: {', '.join(replaced)}", file=sys.stderr)
+        print(
+            f"note: these columns of the input are replaced by new results: {', '.join(replaced)}", file=sys.stderr
+        )
         points = points.drop(columns=replaced)
     result = steady_columns({str(c): points[c].to_numpy() for c in points}, jobs=arguments.jobs)
     table = pd.concat([points, pd.DataFrame(result)], axis=1)
@@ -93,7 +95,7 @@ def _robot(arguments: Namespace) -> None:
     print(f"{arguments.preset} -> {Path(arguments.out)}")
 
 
-@program.command("check", "the paper's measured point beside ours")
+@program.command("check", "the paper's measured point, measured and simulated")
 def _check(_: Namespace) -> None:
     from sim.model.presets import PRESETS
     from sim.motion.steady import steady

@@ -1,11 +1,11 @@
 """Compiled loops: machine code by numba, kept on disk between runs.
 
-numba's own cache looks at the file of the loop alone, and would go on using old machine code after a formula in
-another file has changed. So the cache lies in a folder named by a digest of all files that compiled loops are made
-of: changed physics is always compiled anew. The folders of the last few versions stay. They lie beside this file,
-or in the user's cache folder where this one cannot be written.
+numba's own cache depends only on the file of the loop. If a formula in another file changes, it would use old
+machine code. So the cache is a folder whose name has a digest of all files that compiled loops are made of. After
+a change the loops are always compiled again. The folders of the last few versions are kept. They are beside this
+file, or in the user's cache folder if this one cannot be written.
 
-Sums may be reordered and multiplications fused (last digits can differ between machines); NaN and infinity keep
+Sums may be reordered and multiplications fused, so last digits can differ between machines. NaN and infinity keep
 their meaning.
 
 The first use of a loop compiles it. A progress bar on stderr says so. `python -m sim compile` compiles all loops.
@@ -31,7 +31,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
 _SOURCES = ("arrays.py", "compiling.py", "linear/*.py", "mechanics/*.py", "model/body.py", "solve/*.py")
 _KEPT = 3  # folders of other versions
-_LEVEL = 1  # of optimisation: as fast as level 3 here, in less than half the compile time
+_LEVEL = 1  # of optimisation: loops run as fast as at level 3 and compile in less than half the time
 
 
 def digest_of(root: Path) -> str:

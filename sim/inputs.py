@@ -1,7 +1,7 @@
-"""Robots as people bring them: robot.toml, names of presets, columns of a table. Checked here, effects included.
+"""Robots as users give them: robot.toml, names of presets, columns of a table. Checked here, with effects.
 
-robot.toml has the tables [head], [tails], [fluid], [motor], [drag] and, if any, [effects]; units are in the key
-names.
+A robot.toml has the tables [head], [tails], [fluid], [motor], [drag] and, if there are any, [effects]. The names
+of the keys say their units.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ _OPTIONAL_KEYS = {"disc_offset"}
 
 
 def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
-    """Columns of robots as float64 arrays, with a_over_R filled in; rejects what cannot be simulated.
+    """Columns of robots as float64 arrays, with a_over_R filled in. Robots that cannot be simulated are refused.
 
     Args:
         columns: `sim.model.groups.GROUP_COLUMNS`, optionally a_over_R and effect sizes, each (M,).
 
     Raises:
-        InputError: a missing or unknown column, a number that is not finite or out of its range.
+        InputError: a column is missing or unknown, or a number is not finite or out of its range.
     """
     known = {*GROUP_COLUMNS, *OPTIONAL_COLUMNS, *catalogue()}
     unknown = sorted(set(columns) - known)
@@ -67,7 +67,7 @@ def load_robot(source: str | Path) -> Robot:
         source: path of a file, or one of `sim.model.presets.PRESETS`.
 
     Raises:
-        InputError: the file is no robot; the line says which key and what is allowed.
+        InputError: the file does not describe a robot; the message names the key and what is allowed.
 
     Example:
         >>> from softflagella import load_robot

@@ -17,7 +17,7 @@ from sim.io.errors import run_command
 PACKAGES = {
     "sim": "simulate robots: steady motion, replays of schedules, presets",
     "dataset": "simulate sweeps into data sets, report and verify them",
-    "surrogate": "train look-up tables and ask them",
+    "surrogate": "train look-up tables and query them",
     "planner": "plan switching schedules for paths, check tracks",
     "calibration": "find from measured runs what the model lacks",
 }

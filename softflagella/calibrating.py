@@ -1,4 +1,4 @@
-"""Close the loop with measured data: the function behind `softflagella.calibrate`."""
+"""Calibrate with measured data: the function behind `softflagella.calibrate`."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ def calibrate(
     """Fit a table of measured runs, find what the model lacks, and correct the robot.
 
     Args:
-        table: measured runs, a row a run, or the file that holds them: `N`, `l_cm`, `omega_rpm` and two or more
+        table: measured runs, one row for each run, or their file: `N`, `l_cm`, `omega_rpm` and two or more
             of `omega_h_rpm`, `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s`; repeats.
         robot: the robot as given, or its robot.toml.
-        seed: of the bootstrap; the result is deterministic given it.
+        seed: of the bootstrap; the same seed gives the same result.
         jobs: threads; default all processors.
-        progress: show bars.
+        progress: show progress bars.
 
     Returns:
-        The verdict: `verdict` ("none", "effect", "ambiguous", "unexplained"), `sentence`, `effects`, fits with
-        intervals, errors on the locked runs.
+        The verdict, with `verdict` ("none", "effect", "ambiguous", "unexplained"), `sentence`, `effects`, fits
+        with intervals, and errors on the locked runs.
 
     Raises:
-        InputError: a table that cannot be used; the line says why.
+        InputError: the table cannot be used; the message says why.
 
     Example:
         >>> import softflagella as sf

@@ -49,6 +49,7 @@ from sim.motion.batches import available_jobs
 from sim.motion.shapes import tails_over_a_revolution
 from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady
+from sim.motion.warm import compile_once
 from surrogate.evaluate import scale_of
 from surrogate.export import load
 from surrogate.lookup import Lookup
@@ -78,6 +79,7 @@ def run_demo(out: str | Path) -> None:
     page_path = Path(out)
     folder = page_path.parent / "demo"
     folder.mkdir(parents=True, exist_ok=True)
+    compile_once()
     print("1/4 the robot at constant motor speed")
     _command("sim", "check")
     robot, motions = _look(folder)

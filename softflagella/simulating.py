@@ -1,7 +1,8 @@
 """Simulate robots: the functions behind `softflagella.steady`, `switch_response`, `sensitivities` and `replay`.
 
-A robot is a `Robot`, or a table with a row a robot: a mapping or a pandas table with the columns `C_t`, `C_r`,
-`C_yr`, `l_over_R`, `L_over_R`, `l_over_r0`, `omega_bar`, `N`, and if wanted `a_over_R` and sizes of effects.
+Robots are a `Robot`, or a table with one row for each robot: a mapping or a pandas table with the columns `C_t`,
+`C_r`, `C_yr`, `l_over_R`, `L_over_R`, `l_over_r0`, `omega_bar`, `N`, and optionally `a_over_R` and sizes of
+effects.
 """
 
 from __future__ import annotations
@@ -36,7 +37,9 @@ def columns_of(robots: Robots) -> dict[str, Floats]:
         rows = np.broadcast_shapes(*(column.shape for column in columns.values()))
     except ValueError:
         sizes = ", ".join(f"{name} {len(column)}" for name, column in columns.items())
-        raise InputError(f"columns differ in length ({sizes}); give one value a robot, or one for all") from None
+        raise InputError(
+            f"columns differ in length ({sizes}); give one value for each robot, or one for all"
+        ) from None
     return check_columns({name: np.broadcast_to(column, rows) for name, column in columns.items()})
 
 
@@ -48,13 +51,13 @@ def steady(robots: Robots, *, jobs: int | None = None) -> pd.DataFrame:
         jobs: threads; default all processors.
 
     Returns:
-        A table with M rows. `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`: spins of tails and head and yaw rate
-        [EI/(μ0 l⁴)]; `v_x`, `v_z`: sway and surge of the head's centre [EI/(μ0 l³)]; `R_yr_over_l`; `theta_deg`;
-        `converged`; `tail_gap` [2 r0], below 1 where tails touch; `error`, the estimated relative error; `method`
-        ("direct" or "stepping"); `note`, why a row is not converged or not solved directly.
+        A table with M rows and the columns `omega_t_bar`, `omega_h_bar`, `omega_yr_bar` (spins of tails and head
+        and yaw rate [EI/(μ0 l⁴)]), `v_x`, `v_z` (sway and surge of the head's centre [EI/(μ0 l³)]), `R_yr_over_l`,
+        `theta_deg`, `converged`, `tail_gap` ([2 r0], below 1 if tails touch), `error` (the estimated relative
+        error), `method` ("direct" or "stepping") and `note` (why a row is not converged or not solved directly).
 
     Raises:
-        InputError: an unknown column, or a number that no robot has.
+        InputError: a column is unknown, or a number is not possible.
 
     Source: Du, Miller, Jawed (arXiv 2103.05712) for the model.
 
@@ -78,11 +81,11 @@ def switch_response(robots: Robots, dwell: ArrayLike) -> pd.DataFrame:
         dwell: half-period T̄ [μ0 l⁴/EI], one for all robots or (M,).
 
     Returns:
-        A table with M rows: `dwell_bar`, `net_speed_bar` [EI/(μ0 l³)], and the offset of a flip `lag_psi_rad`,
-        `lag_x`, `lag_z` [l]; NaN where a simulation broke down.
+        A table with M rows and the columns `dwell_bar`, `net_speed_bar` [EI/(μ0 l³)], and the offset of a flip
+        `lag_psi_rad`, `lag_x`, `lag_z` [l]; NaN where a simulation broke down.
 
     Raises:
-        InputError: a robot that cannot be, or a dwell that is not above 0.
+        InputError: a robot is not possible, or a dwell is not above 0.
 
     Example:
         >>> import softflagella as sf
@@ -106,16 +109,16 @@ def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None
 
     Args:
         robots: a `Robot`, or a table with M rows.
-        parameters: names of inputs (but N) and of effects, K of them.
+        parameters: names of inputs (except N) and of effects, K of them.
         jobs: threads; default all processors.
 
     Returns:
-        A table with M rows and a column for each pair, (output, parameter): the derivative per unit of the
-        parameter. Outputs: `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`, `theta_rad`.
-        NaN where there is no direct solution.
+        A table with M rows and a column for each pair (output, parameter), which holds the derivative per unit of
+        the parameter. Outputs are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`,
+        `theta_rad`. NaN where there is no direct solution.
 
     Raises:
-        InputError: a robot that cannot be, or an unknown parameter.
+        InputError: a robot is not possible, or a parameter is unknown.
 
     Example:
         >>> import softflagella as sf
@@ -137,14 +140,14 @@ def replay(schedule: Schedule | Plan, robot: Robot | None = None) -> pd.DataFram
 
     Args:
         schedule: a plan, or its schedule.
-        robot: who carries a plan out; default the robot that was planned for.
+        robot: the robot that carries out a plan; default: the one that the plan was made for.
 
     Returns:
-        The track of the head's centre: `time_bar` [μ0 l⁴/EI], `time_s`, `x_over_l`, `y_over_l`, `heading_rad`,
-        `direction` of the motor, `dwell` (index).
+        The track of the head's centre, with the columns `time_bar` [μ0 l⁴/EI], `time_s`, `x_over_l`, `y_over_l`,
+        `heading_rad`, `direction` of the motor, `dwell` (index).
 
     Raises:
-        InputError: a schedule that cannot be simulated, or that asks for too many time steps.
+        InputError: the schedule cannot be simulated, or it needs too many time steps.
 
     Example:
         >>> import softflagella as sf

@@ -15,7 +15,7 @@ from dataset.sweep import build
 def sweep(
     config: str | Path, out: str | Path, *, rows: int | None = None, jobs: int | None = None
 ) -> dict[str, Any]:
-    """Simulate a sweep into a folder of Parquet files; goes on where an interrupted one stopped.
+    """Simulate a sweep into a folder of Parquet files. An interrupted sweep goes on where it stopped.
 
     Args:
         config: a sweep.toml.
@@ -24,10 +24,10 @@ def sweep(
         jobs: processes; default all processors.
 
     Returns:
-        The manifest: configuration, code, counts of rows, converged, failed, touching.
+        The manifest, with the configuration, the code and the counts of rows (all, converged, failed, touching).
 
     Raises:
-        InputError: a configuration that makes no robots, or a folder that holds something else.
+        InputError: the configuration has no valid robots, or the folder holds something else.
 
     Example:
         >>> import softflagella as sf
@@ -43,7 +43,7 @@ def read_sweep(folder: str | Path) -> pd.DataFrame:
         folder: written by `sweep`.
 
     Raises:
-        InputError: no finished sweep there, or damaged files.
+        InputError: there is no finished sweep, or its files are damaged.
 
     Example:
         >>> import softflagella as sf

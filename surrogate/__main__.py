@@ -13,7 +13,7 @@ from argparse import Namespace
 from sim.io.commands import MODEL, Program, argument, out
 from sim.io.errors import InputError
 
-program = Program("surrogate", "Train and ask look-up tables.")
+program = Program("surrogate", "Train look-up tables and query them.")
 main = program.main
 
 

@@ -1,10 +1,10 @@
 """Held-out error of the look-up table, per output, and a picture of it.
 
-For outputs that keep their sign the error is relative; for θ it is in degrees; for v_z and the response to a
-switch it is relative to the distance (or turn) that the robot makes in one time unit, and for the net speed to
-v_z, which is its limit for long dwells. Reported: root mean square,
-median and 95th percentile over rows whose tails do not touch (the model's validity), and the rms over all.
-The ensemble's spread is compared with the error: `calibration` is the rms of error over spread.
+For outputs that keep their sign the error is relative. For θ it is in degrees. For v_z and for the response to a
+switch it is relative to the distance (or turn) of the robot in one unit of time. For the net speed it is relative
+to v_z, which is its limit for long dwells. Reported are the root mean square, the median and the 95th percentile
+over rows whose tails do not touch, where the model is valid, and the rms over all rows. `calibration` compares the
+error with the spread of the ensemble: it is the rms of error over spread.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ RELATIVE = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "R_yr_over_l")
 
 
 def scale_of(name: str, truth: Columns) -> Floats | float:
-    """What an output's error is divided by."""
+    """The number by which the error of an output is divided."""
     if name in RELATIVE:
         return np.abs(truth[name])
     if name == "theta_deg":

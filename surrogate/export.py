@@ -1,8 +1,8 @@
-"""Model files: everything a query needs in one file, read without running code from it.
+"""Model files: everything that a query needs in one file. Reading a file runs no code from it.
 
-A model is a torch file of tensors and plain values (loaded with weights_only); its identity is the hash of
-its weights, which every plan made with it carries. The repository ships one, `SHIPPED`, so that planning
-works before any training.
+A model is a torch file of tensors and plain values (loaded with weights_only). Its identity is the hash of its
+weights; every plan stores the identity of the model that made it. One model comes with the package (`SHIPPED`), so
+that planning works without training.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _NETWORKS = ("steady", "response")
 
 
 def save(lookup: Lookup, path: str | Path) -> None:
-    """Write a model file, whole or not at all."""
+    """Write a model file completely or not at all."""
     content: dict[str, Any] = {
         "format": _FORMAT,
         "tail_counts": lookup.tail_counts,
@@ -46,7 +46,7 @@ def load(path: str | Path | None = None) -> Lookup:
     """Read a model file; by default the one that comes with the package.
 
     Raises:
-        InputError: no such file, or no model of this version.
+        InputError: there is no such file, or it is not a model of this version.
     """
     path = SHIPPED if path is None else path
     if not Path(path).is_file():
@@ -72,10 +72,10 @@ def load_table(path: str | Path | None = None) -> LookupTable:
     """A model file, or the table of one robot (.json); by default the one that comes with the package.
 
     Args:
-        path: written by `surrogate train` or `surrogate robot`.
+        path: a file written by `surrogate train` or `surrogate robot`.
 
     Raises:
-        InputError: no such file, or no table of this version.
+        InputError: there is no such file, or it is not a table of this version.
 
     Example:
         >>> import numpy as np

@@ -1,7 +1,7 @@
-"""The look-up table: query a trained model, inside the domain that it was trained on.
+"""The look-up table: a trained model, for robots inside the domain that it was trained on.
 
-A query returns the mean of the ensemble for every output of the data set, and can return the spread of
-its members. Outside the domain it refuses, naming the input and its range; it never extrapolates.
+A query returns the mean of the ensemble for every output of the data set. It can also return the outputs of every
+member. Robots outside the domain are refused, with the input and its range; the table never extrapolates.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Lookup:
         return replace(self, errors=errors)
 
     def check_domain(self, columns: Mapping[str, Floats]) -> None:
-        """Refuse robots outside the domain; |ω̄| counts.
+        """Refuse robots outside the domain; for ω̄ the magnitude counts.
 
         Raises:
             InputError: names the input, its value and its range.
@@ -73,7 +73,7 @@ class Lookup:
         """Predicted outputs, each (M,): the steady ones, and the response if `dwell_bar` is given.
 
         Raises:
-            InputError: a robot that cannot be, or one outside the domain.
+            InputError: a robot is not possible, or it is outside the domain.
         """
         members = self.query_members(columns)
         return {name: values.mean(0) for name, values in members.items()}
@@ -86,7 +86,7 @@ class Lookup:
         if DWELL in columns:
             values[DWELL] = np.asarray(columns[DWELL], dtype=float)
             if not np.isfinite(values[DWELL]).all():
-                raise InputError(f"{DWELL} has a value that is no finite number; give numbers")
+                raise InputError(f"{DWELL} has a value that is not a finite number; give numbers")
         self.check_domain(values)
         table = features(values, self.tail_counts, self.effects, dwell=False)
         raw = self.steady.predict(table).double().numpy()
@@ -122,7 +122,7 @@ def _response_outputs(
     steady: dict[str, Floats],
     values: Mapping[str, Floats],
 ) -> dict[str, Floats]:
-    """Lags in the sense of the turn (positive motor direction), and the net speed that follows."""
+    """Lags for the positive direction of the motor, and the net speed that follows from them."""
     yaw, sway = np.abs(steady["omega_yr_bar"]), np.abs(steady["v_x"])
     psi, x, z = raw[..., 0] * yaw, raw[..., 1] * sway, raw[..., 2] * sway
     twist = np.stack([steady["v_z"], sway, yaw], -1)

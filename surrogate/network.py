@@ -1,21 +1,21 @@
 """The look-up table's networks: features, targets, and an ensemble of multilayer perceptrons.
 
-Features. The head enters the force balance only through its resistances, so the network sees their
-logarithms in units of the tail's length rather than the raw coefficients,
+Features. The force balance depends on the head only through its resistances. So the inputs of the networks are the
+logarithms of the resistances in units of tail length, not the coefficients:
 
     log C_t R/l, log C_r (R/l)³, log C_yr (R/l)(L/l), log L/l, log R/l, log l/r0, log |ω̄|, one-hot N,
 
-and log T̄ for the response to a switch. Effects that were swept enter as they are.
+and log T̄ for the response to a switch. Sizes of effects, if they were swept, are inputs without a logarithm.
 
-Targets are what is smooth over the whole domain and keeps signs and bounds by construction:
+Targets are smooth over the whole domain. With logarithms, signs and bounds hold for any output of a network:
 
     log ω_yr, log v_x, log v_z/v_x, logit |ω_h|/ω, log tail gap         (steady network)
     lag_ψ/ω_yr, lag_x/v_x, lag_z/v_x                                                (response network)
 
-all for a positive motor speed; a negative one mirrors them (even effects). R_yr/l, θ and v̄ follow.
+They are those of a positive motor speed; a negative one mirrors them. R_yr/l, θ and v̄ follow from them.
 
-Each network is a perceptron beside a linear map, K of them trained side by side from different seeds; the
-mean predicts, the spread is part of the stated error.
+Each network is the sum of a perceptron and a linear map. K of them are trained side by side from different seeds.
+Their mean is the prediction; their spread is part of the stated error.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def response_targets(columns: Columns) -> Floats:
 
 
 class Ensemble(nn.Module):
-    """K perceptrons with linear by-pass, evaluated together; standardises its inputs and outputs."""
+    """K networks, each a perceptron plus a linear map, evaluated together; inputs and outputs are standardised."""
 
     input_mean: Tensor
     input_scale: Tensor

@@ -1,8 +1,9 @@
 """A table of one robot: its response to a switch at some dwell times, simulated, for the planner.
 
-The shipped look-up table covers a domain of robots without effects. A robot that calibration has corrected may lie
-outside; a few dozen simulated switches of that robot alone (`surrogate.tabulate`, seconds) serve the planner as
-well. Between dwell times lags are interpolated (monotone cubic in ln T̄); planning itself still simulates nothing.
+The look-up table that comes with the package covers a domain of robots without effects. A corrected robot may lie
+outside this domain. For the planner, a few dozen simulated switches of that robot are enough
+(`surrogate.tabulate`, seconds). Between their dwell times lags are interpolated (monotone cubic in ln T̄).
+Planning simulates nothing.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ LAGS = ("lag_z", "lag_x", "lag_psi_rad")
 
 @dataclass(frozen=True)
 class SingleRobot:
-    """Steady motion and lags of one robot; what the planner asks of a `surrogate.lookup.Lookup`."""
+    """Steady motion and lags of one robot, with the interface of `surrogate.table.LookupTable`."""
 
     robot: dict[str, float]  # dimensionless groups, effects among them
     steady: dict[str, float]  # columns of `sim steady`, positive motor
@@ -39,7 +40,7 @@ class SingleRobot:
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
-        """Range of every input: one value, but for the dwell."""
+        """Range of every input: a single value, except for the dwell."""
         own = {name: (value, value) for name, value in self.robot.items()}
         return {**own, DWELL: (self.dwells[0], self.dwells[-1])}
 
@@ -49,10 +50,10 @@ class SingleRobot:
         return hashlib.sha256(json.dumps([self.robot, self.steady, self.lags]).encode()).hexdigest()[:16]
 
     def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Outputs (M,) of this robot; `dwell_bar` asks for the response as well.
+        """Outputs (M,) of this robot; with a column `dwell_bar` also its response to a switch.
 
         Raises:
-            InputError: another robot, or a dwell outside the table.
+            InputError: the columns are another robot's, or a dwell is outside the table.
         """
         count = len(next(iter(columns.values())))
         for name, values in columns.items():
@@ -81,7 +82,7 @@ def load_single(path: str | Path) -> SingleRobot:
     """Read a table of one robot.
 
     Raises:
-        InputError: the file is none.
+        InputError: the file is not such a table.
     """
     try:
         return SingleRobot(**json.loads(Path(path).read_text()))

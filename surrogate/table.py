@@ -1,4 +1,4 @@
-"""What planner and calibration ask of a look-up table, whatever it is made of.
+"""The interface of a look-up table, which planner and calibration use.
 
 `surrogate.lookup.Lookup` (trained networks, a domain of robots) and `surrogate.single.SingleRobot` (one robot,
 simulated) are look-up tables. `surrogate.export.load_table` reads either.
@@ -13,7 +13,7 @@ from sim.arrays import Floats
 
 
 class LookupTable(Protocol):
-    """From a robot's dimensionless groups to its motion, without simulating.
+    """Gives the motion for a robot's dimensionless groups, without simulating.
 
     Example:
         >>> from softflagella import load_table
@@ -33,7 +33,7 @@ class LookupTable(Protocol):
 
     @property
     def identity(self) -> str:
-        """A hash of the numbers: tells which table made a plan."""
+        """A hash of the numbers; it tells which table made a plan."""
         ...
 
     def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -43,6 +43,6 @@ class LookupTable(Protocol):
         `tail_gap`; with a column `dwell_bar` also `net_speed_bar`, `lag_psi_rad`, `lag_x`, `lag_z`.
 
         Raises:
-            InputError: a robot that cannot be, or one outside the domain.
+            InputError: a robot is not possible, or it is outside the domain.
         """
         ...

@@ -19,7 +19,7 @@ from sim.motion.switching import switch_response
 from surrogate.lookup import STEADY_OUTPUTS
 from surrogate.single import LAGS, SingleRobot
 
-DWELLS = (0.2, 8.0)  # half-periods covered
+DWELLS = (0.2, 8.0)  # range of the half-periods
 _POINTS, _HELD_OUT = 24, 6
 
 
@@ -27,7 +27,7 @@ def tabulate(robot: Robot) -> SingleRobot:
     """Simulate one robot's steady motion and its response to switches.
 
     Args:
-        robot: any robot, effects included.
+        robot: any robot, with or without effects.
 
     Raises:
         InputError: left and right turns of the robot differ, or its motion cannot be found.

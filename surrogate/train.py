@@ -1,10 +1,10 @@
 """Train the look-up table on a data set.
 
-Rows are split once, by a fixed hash of their number, into training (80 %), validation (10 %, early
-stopping) and held-out (10 %, never seen: the errors that are printed and stored). Loss: mean square of the
-standardised targets, Adam with a cosine step size; the weights of the best validation epoch are kept for
-every member. Rows that failed or did not converge, and the few that move backwards,
-are left out; touching tails stay in.
+A fixed hash of a row's number puts it into one of three sets: training (80 %), validation (10 %, for early
+stopping) and held-out (10 %, never used in training; the errors on these rows are printed and stored). The loss is
+the mean square of the standardised targets. The optimiser is Adam with a cosine step size. Every member keeps the
+weights of its best validation epoch. Rows that failed or did not converge, and the few robots that move backwards,
+are left out. Rows whose tails touch are used.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def train(folder: str, settings: Settings | None = None, *, title: str = "train"
         title: of the progress bars; empty for none.
 
     Raises:
-        InputError: no data set there, or too few usable rows.
+        InputError: there is no data set, or it has too few usable rows.
 
     Example:
         >>> from softflagella import train

@@ -1,1 +1,1 @@
-"""Models other than the swimmer: the engine that closes the loop knows no robots."""
+"""Models other than the swimmer. The calibration itself knows nothing about robots."""

@@ -7,11 +7,11 @@ With the pitch angle ψ, tan ψ = 2πR/λ, and the contour length L/cos ψ,
     torque/(μΩR³) = (ζ⊥ cos²ψ + ζ∥ sin²ψ) × length/R,    drag/(μUR) = (ζ⊥ sin²ψ + ζ∥ cos²ψ) × length/R,
 
 with ζ∥ = 2π/(ln(2λ/a) − ½), ζ⊥ = 4π/(ln(2λ/a) + ½) after Gray and Hancock, or 2π/ln q, 4π/(ln q + ½) with
-q = 0.18 λ/(a cos ψ) after Lighthill. What these leave out is the flow that one part of the wire makes at another:
-the Stokeslets of `sim.flow`, spread over √e a, which is slender-body theory (Keller and Rubinow 1976).
+q = 0.18 λ/(a cos ψ) after Lighthill. Both leave out the flow that one part of the wire makes at another part:
+the Stokeslets of `sim.mechanics.flow`, spread over √e a, which is slender-body theory (Keller and Rubinow 1976).
 
-A table has lambda_over_R, thrust_over_etaOmR2, torque_over_etaOmR3 and drag_over_etaUR, a row a helix; Rodenborn
-et al. (2013) measured such.
+A table has the columns lambda_over_R, thrust_over_etaOmR2, torque_over_etaOmR3 and drag_over_etaUR, and one row
+for each helix. Rodenborn et al. (2013) measured such helices.
 
 Usage: python -m calibration.examples.helices TABLE.csv
 """

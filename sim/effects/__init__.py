@@ -33,10 +33,10 @@ def catalogue() -> dict[str, Effect]:
 
 
 def effect_named(name: str) -> Effect:
-    """One effect.
+    """The effect of that name.
 
     Raises:
-        InputError: there is none of that name.
+        InputError: there is no such effect.
     """
     if name not in catalogue():
         raise InputError(f"unknown effect {name!r}; known are {', '.join(catalogue())}")
@@ -44,13 +44,13 @@ def effect_named(name: str) -> Effect:
 
 
 def check_effects(effects: Mapping[str, float]) -> None:
-    """Reject unknown effects, and sizes that are no numbers or outside their bounds."""
+    """Reject unknown effects, and sizes that are not numbers or outside their bounds."""
     for name, size in effects.items():
         check_size(name, size)
 
 
 def check_size(name: str, size: float) -> None:
-    """Reject an unknown effect, or a size that is no number or outside its bounds."""
+    """Reject an unknown effect, or a size that is not a number or outside its bounds."""
     low, high = effect_named(name).bounds
     if not isinstance(size, int | float) or not math.isfinite(size):
         raise InputError(f"{name} = {size}; it must be a finite number")

@@ -2,9 +2,9 @@
 
     F_x = −6π μ0 R C_t v_x,    F_z = −6π μ0 R C_t (1 + ε) v_z
 
-The paper gives the head one translation coefficient. A bare cylinder of L/R = 3.75 has about a tenth less drag
-along its axis than across it (Tirado and Garcia de la Torre 1979), ε ≈ −0.1; θ moves by 2 to 4 degrees.
-C_t stays the drag across the axis, which moves yaw rate and radius, so that ε is what only the slip angle sees.
+The paper gives the head one coefficient for translation. A bare cylinder of L/R = 3.75 has about a tenth less drag
+along its axis than across it (Tirado and Garcia de la Torre 1979): ε ≈ −0.1. This changes θ by 2 to 4 degrees.
+C_t stays the drag across the axis, which changes yaw rate and radius. So ε changes only the slip angle.
 """
 
 from __future__ import annotations

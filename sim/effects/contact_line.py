@@ -1,10 +1,11 @@
 """Friction of the contact line on the head, which does not depend on speed.
 
-    F = −ε F_0 s v/√(v² + v_s²),   F_0 s one and the same force in newton for one material, fluid and head
+    F = −ε F_0 s v/√(v² + v_s²)
 
-The edge of the wetted surface is pinned and creeps. In units of EI/l² a constant force goes as l²/r0⁴; s = (l/r0)⁴
-(R/l)² over its value for the control example. F_0 = 0.1 EI/l², about its thrust. Left out: the moment against
-yaw about the head's centre.
+The edge of the wetted surface sticks to the head and creeps along it. For one material, fluid and head the force
+F_0 s is the same number of newtons for all robots. In units of EI/l² a constant force is proportional to l²/r0⁴.
+So s is (l/r0)⁴ (R/l)², divided by its value for the control example. F_0 = 0.1 EI/l² there, about the thrust of
+that robot. Left out: the moment against yaw about the head's centre.
 """
 
 from __future__ import annotations

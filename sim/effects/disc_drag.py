@@ -2,9 +2,9 @@
 
     M_z = −ε 8π μ0 R³ ω_t
 
-The paper's motor balances the tails' torque against the head's; the disc itself turns in the fluid too. A thin
-disc of radius R that turns about its axis, far from everything, has ε = 32/3/(8π) = 0.42. It acts like the drag on
-the tails' own spin, except that it does not depend on the tails' length. Left out: the gap between disc and head.
+In the paper the torques of tails and head are equal. But the disc turns in the fluid, too. A thin disc of radius R
+that turns about its axis, far from everything, has ε = 32/3/(8π) = 0.42. The effect is like that of the drag on
+the tails' own spin, but it does not depend on the length of the tails. Left out: the gap between disc and head.
 """
 
 from __future__ import annotations

@@ -2,10 +2,9 @@
 
     M_y = −ε 8π μ0 R³ ω_yr
 
-The paper's head has drag on its translation and on its spin about the axis, but none on yaw about its
-own centre. A cylinder of L/R = 3.75 has ε ≈ 5 (Tirado and Garcia de la Torre 1980, rotation about a
-transverse axis); it lowers ω_yr by 5 % (N = 4, l = 15 cm) to 35 % (N = 2, l = 5 cm).
-Left out: the part of it that the free surface changes.
+In the paper the fluid resists the head's translation and its spin about the axis, but not its yaw about its own
+centre. A cylinder of L/R = 3.75 has ε ≈ 5 (Tirado and Garcia de la Torre 1980, rotation about a transverse axis).
+This lowers ω_yr by 5 % (N = 4, l = 15 cm) to 35 % (N = 2, l = 5 cm). Left out: how the free surface changes it.
 """
 
 from __future__ import annotations

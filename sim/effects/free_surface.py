@@ -1,11 +1,11 @@
-"""The surface above sends the flow of tails and head back.
+"""The free surface changes the flow that tails and head make.
 
     v_k → v_k − ε Σ_j G(x_k − y*_j) f*_j,   y* = (x, 2H − y, z),   f* = (f_x, −f_y, f_z),   H = 1.25 max(R, a)
 
-Image system of a flat surface without shear. Each tail meets its own image, and with `tail_interaction` or
-`head_flow` the images of the others as well. A tail passes more easily along the surface above than below the
-axis: a side force behind the head, which yaws. The real interface bends over head and tails, so H is an estimate
-and ε not exactly 1.
+The flow is that of mirror images above a flat surface without shear. Each tail is in the flow of its own image;
+with `tail_interaction` or `head_flow` it is in the flow of the other images, too. A tail meets less resistance
+while it passes above the axis, near the surface, than below it. So there is a side force behind the head, which
+yaws the robot. The real surface bends over head and tails. So H is an estimate, and ε is not exactly 1.
 """
 
 from __future__ import annotations

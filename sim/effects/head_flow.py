@@ -1,9 +1,9 @@
-"""Tails swim in the flow of the head, and the head in theirs.
+"""Tails swim in the flow of the head, and the head in the flow of the tails.
 
     v → v − ε (Stokeslets of the head's drag, rotlet of its spin) at the tails, and of the tails at the head
 
-The head is points along its axis that share its drag, spread over R. ε = 1 is the full sum. Matters for short
-tails.
+The head is represented by pieces of its axis. Each has an equal part of the head's drag, spread over R. ε = 1 is
+the full flow. The effect is large for short tails.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""Drag that grows with speed: the first trace of inertia.
+"""Drag that grows with speed: the first effect of inertia at small Reynolds number.
 
     ζ∥, ζ⊥, R_head × (1 + ε s),   s = |ω| / ω_control
 
-At low Reynolds number drag is linear in velocity; Oseen's correction adds a part in proportion to Re ∝ |ω|. The
-motor speed in rad/s is ω̄ (r0/l)⁴ π E/(4 μ0), so with one material and fluid s = |ω̄| (r0/l)⁴ divided by its
-value for the paper's control example. Left out: the mass terms (centripetal loads, added mass), which are not a
-change of drag.
+At low Reynolds number drag is proportional to velocity. Oseen's correction adds a part that is proportional to the
+Reynolds number, and so to |ω|. The motor speed in rad/s is ω̄ (r0/l)⁴ π E/(4 μ0). So with one material and fluid,
+s is |ω̄| (r0/l)⁴ divided by its value for the paper's control example. Left out: centripetal loads and added mass,
+which are no change of drag.
 """
 
 from __future__ import annotations

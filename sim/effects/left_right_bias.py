@@ -2,9 +2,9 @@
 
     M_y = ε μ0 R L² |ω_t|/2
 
-A head that hangs askew or a tail that is bent gives a yaw moment that does not reverse with the motor: turn
-rates to the left and to the right differ. To be fitted before anything exotic. Written as a side force ε μ0 R L
-|ω_t| at the head's centre, of which only the moment about J is kept.
+If the head is not level or a tail is bent, there is a yaw moment that does not reverse with the motor. Then the
+turn rates to the left and to the right differ. The moment is that of a side force ε μ0 R L |ω_t| at the head's
+centre about J; the force itself is left out. Fit this effect before less common ones.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
     ω_t − ω_h = ω − ε T/(μ0 l³),   T = 8π C_r μ R³ |ω_h| the torque that the motor carries
 
-The paper's motor holds its commanded speed. A direct-current motor on a fixed voltage loses speed in proportion to
-its torque; then |ω_h| + |ω_t| is less than the commanded |ω|. The torque is that of the head, with all that scales
-its drag. Left out: slip of a drive, which is a part of the speed and not of the torque.
+The paper's motor holds its set speed. A direct-current motor on a fixed voltage loses speed in proportion to its
+torque. Then |ω_h| + |ω_t| is less than the set speed |ω|. The torque is that of the head. It changes with all
+effects that change the head's spin drag. Left out: slip, which is proportional to the speed, not to the torque.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Tails that are curved by nature, across the plane of the axis.
+"""Tails that are curved without load, along the circle of the clamps.
 
-    κ⁰ = (0, ε/l):  each tail alone, unloaded, is an arc that leans along the circle of the clamps, against +φ
+    κ⁰ = (0, ε/l):  each tail alone, without load, is an arc that leans along the circle of the clamps, against +φ
 
-Casting and storage bend soft tails. All tails curved in one sense are a screw: turning one way they wind up, the
-other way they unwind, so left and right turns are no longer mirror images. An arc of angle ε has its tip ε l/2
-aside. Left out: tails that differ from each other.
+Casting and storage bend soft tails. If all tails are curved in the same sense, they form a screw. Turning one way
+winds it up, turning the other way unwinds it. So left and right turns are no longer mirror images. The tip of an
+arc of angle ε is displaced by ε l/2. Left out: tails that differ from each other.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Tails that are curved by nature, away from the axis.
+"""Tails that are curved without load, away from the axis.
 
-    κ⁰ = (ε/l, 0):  each tail alone, unloaded, is an arc that opens outward (ε > 0) or closes (ε < 0)
+    κ⁰ = (ε/l, 0):  each tail alone, without load, is an arc that bends outward (ε > 0) or inward (ε < 0)
 
 Unlike `natural_curvature` it leaves left and right turns mirror images of each other. Left out: tails that
 differ from each other.

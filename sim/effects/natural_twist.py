@@ -1,9 +1,9 @@
-"""Tails that are twisted by nature.
+"""Tails that are twisted without load.
 
-    τ⁰ = ε/l:  the free end is turned about the tangent by ε against the clamp
+    τ⁰ = ε/l:  the free end is turned about the tangent by ε relative to the clamp
 
-A straight tail of round section hides its twist; one with natural curvature becomes a helix, handed like the
-twist. Left out: tails that differ from each other.
+Twist alone does not change the shape of a straight tail with a round section. Together with natural curvature it
+makes the tail a helix, which has the same handedness. Left out: tails that differ from each other.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Bending moments that follow a change of curvature late (Kelvin-Voigt).
+"""Bending moments that depend on the rate of curvature, too (Kelvin-Voigt).
 
     M = EI (κ + ε t_control κ̇)
 
-Soft rubber under glycerol creeps. In steady swimming curvature hardly changes along the disc's turn, so the effect
-shows where tails turn over: after a flip of the motor, and at high speed. ε is in the time scale of the
-control robot (2.207 s), which for one material and fluid is a fixed time: t_control μ0 l⁴/EI ∝ (l/r0)⁴.
+Soft rubber in glycerol creeps. In steady swimming the curvature hardly changes while the disc turns. So the effect
+is seen where it does change: after a flip of the motor, and at high speed. ε is in units of t_control, the time
+scale of the control robot (2.207 s). For one material and fluid, time scales μ0 l⁴/EI are proportional to (l/r0)⁴.
 """
 
 from __future__ import annotations

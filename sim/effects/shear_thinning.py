@@ -2,10 +2,11 @@
 
     ζ∥, ζ⊥ × (1 + ε s²)^(−1/4),   s = |ω| a/r0 over its value for the paper's control example
 
-Carreau's law with exponent n = 1/2; the rate of shear at a tail is its speed |ω| a over its radius r0. √ε is the
-fluid's relaxation time times the rate of the control example. ε itself is the size, since the model changes in
-proportion to ε and not to its root. Pure glycerol does not thin: a good false candidate. Left out: thinning at
-the head, which turns more slowly, and the change of the rate along a bent tail.
+Carreau's law with exponent n = 1/2. The rate of shear at a tail is its speed |ω| a over its radius r0. √ε is the
+relaxation time of the fluid times the rate of shear of the control example. The size is ε and not √ε, because for
+small ε the motion changes in proportion to ε. Pure glycerol does not thin, so a verdict should not name this
+effect there. Left out: thinning at the head, which turns more slowly, and the change of the rate along a bent
+tail.
 """
 
 from __future__ import annotations

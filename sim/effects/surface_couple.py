@@ -2,9 +2,10 @@
 
     M_y = ε μ0 N a² l ω_t
 
-Tails sweep a drum of radius a that is nearer to the surface above than to the bottom below; like the head it is
-pushed sideways, behind J, which yaws the robot. The form is an estimate: proportional to the spin, the number and
-the length of the tails. Expected to change ω_yr by 10 to 70 %, of either sign. Left out: the side force itself.
+The turning tails act like a drum of radius a under the surface. Like the head, such a drum is pushed sideways. The
+force acts behind J, so it yaws the robot. The formula is an estimate: a moment proportional to the spin, the
+number and the length of the tails. It may change ω_yr by 10 to 70 %, with either sign. Left out: the side force
+itself.
 """
 
 from __future__ import annotations

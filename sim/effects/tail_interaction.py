@@ -2,9 +2,9 @@
 
     v_k → v_k − ε Σ_j G(x_k − y_j) f_j   (nodes j of the other tails; G: Stokeslet)
 
-Tails that move along together drag each other: the axial drag of N rigid tails falls to .78, .61, .49, .40 of N
-single ones for N = 2 to 5. ε = 1 is the full sum. It is solved with the balance (`sim.flow`): taken a step late it
-would diverge at N ≥ 4, where the gain exceeds one.
+Tails that move together carry each other along. The drag of N rigid tails along the axis is 0.78, 0.61, 0.49 and
+0.40 times that of N single ones, for N = 2 to 5. ε = 1 is the full sum. The flow is solved together with the
+balance (`sim.mechanics.flow`). The flow of the step before would not do: for N ≥ 4 its errors would grow.
 """
 
 from __future__ import annotations

@@ -2,10 +2,11 @@
 
     b = −8 ε EI/l³ s e_y,   s = (l/r0)² (l/R) over its value for the paper's control example
 
-A load q per length bends a cantilever by q l⁴/(8 EI) at its tip: for the control example this is ε l. With
-q = Δρ g π r0² it goes as l³/r0², so with one material, fluid and head s carries it to other tails. The load stays
-upright while the tails turn, so they no longer keep a fixed shape on the disc. Vinyl polysiloxane in glycerol: 5
-to 14 % of l. Left out: the moment that tips the robot's axis, which the surface carries.
+A load q per length moves the tip of a cantilever by q l⁴/(8 EI). For the control example this is ε l. The load is
+q = Δρ g π r0², so the deflection over l is proportional to l³/r0². With one material, fluid and head, s gives the
+load of other tails. The load stays vertical while the tails turn, so they do not keep a fixed shape on the disc.
+For vinyl polysiloxane in glycerol, the deflection is 5 to 14 % of l. Left out: the moment that tips the robot's
+axis, which the surface balances.
 """
 
 from __future__ import annotations

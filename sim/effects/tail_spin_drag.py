@@ -2,8 +2,9 @@
 
     torque per length = −ε 4π μ0 r0² (Ω·t) t
 
-A tail that is clamped to the disc turns about itself as often as about the axis; resistive force theory leaves
-that out. It twists the tails and brakes the disc: on the single filament the moment grows by a third.
+A tail that is clamped to the disc turns about its own tangent once in each turn of the disc. Resistive force
+theory leaves out the drag on this spin. It twists the tails and brakes the disc. For a single filament the moment
+about the axis grows by a third.
 """
 
 from __future__ import annotations

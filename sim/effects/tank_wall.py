@@ -1,10 +1,10 @@
-"""A tank not much wider than the head.
+"""The wall of a tank that is not much wider than the head.
 
     F = −6π μ0 R C_t v × 1/(1 − 2.104 x + 2.089 x³ − 0.948 x⁵),   x = d/D
 
-Walls hold the fluid back: the drag on a body of diameter d in a vessel of diameter D grows. The correction is
-that of a sphere on the axis of a tube (Faxén, Haberman). Needs the position in the tank or several tanks; in
-one tank C_t takes it up.
+Walls hold the fluid back. So a body of diameter d has more drag in a vessel of diameter D than far from walls. The
+correction is that of a sphere on the axis of a tube (Faxén, Haberman). It can be found only from runs in several
+tanks: in one tank, a larger C_t does the same.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Fluid warmer or colder than when its viscosity was taken.
+"""Fluid that is warmer or colder than when its viscosity was measured.
 
     μ = μ0 exp(−β (T − T0)),   ε = β (T − T0)
 
-Glycerol loses 8.6 % of its viscosity a kelvin. Everything that drags scales with μ, and the flow that a force
-makes with 1/μ. It shows where runs differ in temperature or in time: with one viscosity for all runs it is only
-another unit of time.
+Glycerol loses 8.6 % of its viscosity for each kelvin. All drag is proportional to μ. The flow that a force makes
+is proportional to 1/μ. The effect can be found only where runs differ in temperature or in time. If all runs have
+the same viscosity, only the unit of time changes.
 """
 
 from __future__ import annotations

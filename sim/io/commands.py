@@ -1,11 +1,11 @@
-"""Command lines: one program a package, one function a command, the same options spelt the same everywhere.
+"""Command lines: one program for each package, one function for each command, the same options everywhere.
 
     program = Program("sim", "Simulate swimming robots.")
 
     @program.command("steady", "mean motion at constant motor speed", argument("points", help="CSV"), out("CSV"))
     def _steady(arguments: Namespace) -> None: ...
 
-`python -m sim steady …` and `softflagella sim steady …` both run it.
+`python -m sim steady …` and `softflagella sim steady …` run the same function.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ Run = Callable[[Namespace], None]
 
 
 class Argument(NamedTuple):
-    """What `ArgumentParser.add_argument` is called with."""
+    """Arguments for `ArgumentParser.add_argument`."""
 
     names: tuple[str, ...]
     options: dict[str, Any]
 
 
 def argument(*names: str, **options: Any) -> Argument:
-    """An argument of a command, as for argparse."""
+    """An argument of a command, written as for argparse."""
     return Argument(names, options)
 
 
 def out(what: str, **options: Any) -> Argument:
-    """--out, required unless it has a default."""
-    return Argument(("--out",), {"required": "default" not in options, "help": f"{what} to write", **options})
+    """The option --out; it is required unless it has a default."""
+    return Argument(("--out",), {"required": "default" not in options, "help": f"output: {what}", **options})
 
 
 ROBOT = argument("--robot", required=True, help="robot.toml or the name of a preset")
@@ -101,7 +101,7 @@ class Program:
         arguments.run(arguments)
 
     def exit(self) -> None:
-        """Run as a process: exit status 0, or 2 with one line on stderr for bad input."""
+        """Run as a process: exit status 0; for bad input 2, with one line on stderr."""
         sys.exit(run_command(self.main))
 
 

@@ -1,7 +1,7 @@
-"""How the program refuses: one sentence that says what was given, what is allowed, what to change.
+"""Errors for bad input: one sentence that says what was given, what is allowed, what to change.
 
-Every command turns an `InputError` into one line on stderr and exit status 2 (`run_command`); inside
-Python it is an ordinary `ValueError`. Anything else that goes wrong is a bug and keeps its traceback.
+Every command turns an `InputError` into one line on stderr and exit status 2 (`run_command`). In Python it is a
+`ValueError`. All other errors are bugs and keep their traceback.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 
 class InputError(ValueError):
-    """The input cannot be used; the message is one line: given, allowed, change.
+    """The input cannot be used. The message is one line: what was given, what is allowed, what to change.
 
     Example:
         >>> from softflagella import InputError, load_robot
@@ -24,7 +24,7 @@ class InputError(ValueError):
 
 
 def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None = None) -> int:
-    """Run a command-line entry point: 0 when it worked, 2 with one line on stderr for bad input."""
+    """Run a command-line entry point. Returns 0; for bad input 2, after one line on stderr."""
     try:
         main(argv)
     except InputError as refusal:

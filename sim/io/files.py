@@ -1,6 +1,6 @@
-"""Files that the pipeline makes: written whole or not at all.
+"""Files that the pipeline makes: written completely or not at all.
 
-A file is written beside its place under another name and moved there when complete, so that an error or an
+A file is written under another name in the same folder. When it is complete, it is renamed. So an error or an
 interruption leaves either the old file or the new one.
 """
 
@@ -33,6 +33,6 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text file whole or not at all."""
+    """Write a text file completely or not at all."""
     with whole_file(path) as part:
         part.write_text(text)

@@ -51,14 +51,14 @@ class Page:
         self._parts.append(f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>')
 
     def figure(self, figure: Figure, description: str) -> None:
-        """A picture with its description for those who cannot see it."""
+        """A picture, with a description for people who cannot see it."""
         store = io.BytesIO()
         figure.savefig(store, format="png", dpi=110, bbox_inches="tight")
         data = base64.b64encode(store.getvalue()).decode()
         self._parts.append(f'<img alt="{html.escape(description)}" src="data:image/png;base64,{data}">')
 
     def write(self, path: str | Path, footer: str) -> None:
-        """Write the page, whole or not at all."""
+        """Write the page completely or not at all."""
         end = "</section>" if self._open else ""
         body = "\n".join(self._parts)
         write_text(

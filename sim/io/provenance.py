@@ -1,7 +1,7 @@
-"""What made an artefact: code, libraries, configuration and its hash.
+"""Where a result comes from: version of the code, libraries, configuration and its hash.
 
-Provenance is a plain dictionary; each artefact stores it in its own way (Parquet metadata, JSON entry, footer of a
-page).
+Provenance is a plain dictionary. Each kind of file stores it in its own way: as Parquet metadata, as a JSON entry,
+or at the foot of a page.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def code_version() -> str:
 
 
 def provenance(config: object) -> dict[str, object]:
-    """What made an artefact: code, libraries, configuration and its hash."""
+    """Version of the code, libraries, configuration and its hash."""
     return {
         "code_version": code_version(),
         "config": config,

@@ -14,7 +14,7 @@ def read_table(path: str | Path, *, comment: str | None = None) -> pd.DataFrame:
     """A table: Parquet if the name ends so, otherwise CSV with a header.
 
     Raises:
-        InputError: the file is empty or no table.
+        InputError: the file is empty, or it is not a table.
     """
     parquet = Path(path).suffix.lower() in (".parquet", ".pq")
     try:

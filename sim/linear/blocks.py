@@ -1,4 +1,4 @@
-"""3-vectors and 3×3 blocks that are stored in arrays: read, write, add, in compiled loops."""
+"""Vectors and 3×3 blocks in arrays: read, write, add, in compiled loops."""
 
 from __future__ import annotations
 

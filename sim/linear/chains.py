@@ -1,13 +1,13 @@
-"""Newton's equations of M chains of 3×3 blocks and of the body that carries them, in compiled loops.
+"""Linear equations of M chains of 3×3 blocks and of the body that carries them, in compiled loops.
 
     A_m δx_m + B_m δu = s_m on every chain,   Σ_m C_m δx_m + D δu = t on the body
 
-A chain is a tail at one instant, A_m is block pentadiagonal: a node meets its first and second neighbours. δu has
-four entries. `Chains` holds the equations. Where chains meet through the body alone, `factor` and `solve` of this
-file solve them; where they meet each other in time as well, `sim.linear.coupled` does.
+A chain is a tail at one instant. A_m is block pentadiagonal: a node is coupled to its first and second neighbours.
+δu has four entries. `Chains` holds the equations. If the chains are coupled through the body only, `factor` and
+`solve` of this file solve them. If they are coupled in time, too, `sim.linear.coupled` does.
 
-Nodes are eliminated from the tip to the root, so that C, which sees the first two nodes of each chain alone, needs
-no more. No pivoting between nodes: A is minus drag plus stiffness, whose symmetric part is definite.
+Nodes are eliminated from the tip to the root, because C depends only on the first two nodes of each chain. There
+is no pivoting between nodes: A is minus (drag plus stiffness), whose symmetric part is definite.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def new_chains(n: int, chains: int, instants: int) -> Chains:
 
 @compiled
 def factor_and_solve(chains: Chains, s: Floats, t: Floats) -> None:
-    """Turn the equations into their factors; s (n, M, 3) becomes δx, t (4,) becomes δu. See `factor`, `solve`."""
+    """Factor the equations and solve them: s (n, M, 3) becomes δx, t (4,) becomes δu. See `factor`, `solve`."""
     factor(chains)
     solve(chains, s, t)
 

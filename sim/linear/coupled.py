@@ -1,21 +1,22 @@
-"""Chains that meet in time: block-pentadiagonal systems with dense blocks and a border, for one robot.
+"""Chains that are coupled in time: block-pentadiagonal systems with dense blocks and a border, for one robot.
 
 On a periodic orbit the velocity of a node at one phase depends on its position at all phases,
-ẋ_m = ω_m Σ_j D_mj x_j. So the blocks of one node in all M chains (`sim.linear.chains`) make one dense block of
-3 M rows, here joined by −ω_m D_mj R_m, with R_m the node's resistance:
+ẋ_m = ω_m Σ_j D_mj x_j. So the blocks of one node in all M chains (`sim.linear.chains`) form one dense block of 3 M
+rows. The coupling of chains m and j is −ω_m D_mj R_m, with R_m the node's resistance:
 
     A_kk δx_k + A_{k,k±1} δx_{k±1} + A_{k,k±2} δx_{k±2} + B_k δu = s_k,   k = 1..n
     C_1 δx_1 + C_2 δx_2 + D δu = t
 
-Blocks at distance two join a chain to itself alone and stay M matrices of 3×3; the others fill up. Nodes are
-eliminated from the tip to the root, so that the Schur complement of the body needs the first two nodes alone:
+Blocks at distance two do not couple the chains, so they stay M matrices of 3×3. The other blocks become dense.
+Nodes are eliminated from the tip to the root, so that the Schur complement of the body needs the first two nodes
+only:
 
     Z_k = A_kk⁻¹ [A_{k,k−1} | A_{k,k−2} | B_k | s_k],   rows k−1 and k−2 −= A_{k−1,k} Z_k and A_{k−2,k} Z_k.
 
-The first right-hand side goes along with the elimination; `solve` uses the factors for further ones.
+The first right-hand side is eliminated together with the matrix. `solve` uses the stored factors for further ones.
 
-No pivoting between nodes: A is minus drag plus stiffness, whose symmetric part is definite. Cost: about 8 m³
-multiplications a node, m = 3 M, nearly all of them in matrix products (BLAS).
+There is no pivoting between nodes: A is minus (drag plus stiffness), whose symmetric part is definite. Cost: about
+8 m³ multiplications for each node, m = 3 M, nearly all of them in matrix products (BLAS).
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def new_coupled(n: int, chains: int, instants: int) -> Coupled:
 
 @compiled
 def couple(system: Coupled, chains: Chains, resistance: Floats, speed: Floats, differentiation: Floats) -> None:
-    """Fill `system` with the equations of the chains, joined in time.
+    """Fill `system` with the equations of the chains, coupled in time.
 
     Args:
         resistance: R of every node, (n, M, 3, 3).
@@ -92,7 +93,7 @@ def couple(system: Coupled, chains: Chains, resistance: Floats, speed: Floats, d
 
 @compiled
 def factor_and_solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
-    """Turn the equations into their factors; s (n, m) becomes δx, t (u,) becomes δu."""
+    """Factor the equations and solve them: s (n, m) becomes δx, t (u,) becomes δu."""
     n, m, width = system.others.shape
     for i in range(n):
         for a in range(m):
@@ -183,7 +184,7 @@ def solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
 
 @compiled
 def _substitute(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
-    """The body's unknowns, then from the root to the tip; s comes in as A⁻¹ s of each node without those below."""
+    """Solve for the body, then for the nodes from root to tip; on entry s has the values after the elimination."""
     n, m, width = system.folded.shape
     instants, count = chains.corner.shape[0], m // 3
     image, around = np.empty(m), np.zeros(width)

@@ -10,7 +10,7 @@ from sim.linear.vectors import inverse
 
 @compiled
 def invert(a: Floats) -> None:
-    """Invert `a` (m, m) in place: Gauss-Jordan, a 3×3 pivot at a time, without exchanges."""
+    """Invert `a` (m, m) in place: Gauss-Jordan with 3×3 pivots, without exchanges."""
     m = a.shape[0]
     for k in range(0, m, 3):
         pivot = inverse(block_at(a, k, k))
@@ -32,7 +32,7 @@ def invert(a: Floats) -> None:
 
 @compiled
 def solve_dense(a: Floats, b: Floats) -> None:
-    """b = a⁻¹ b (n, K) in place by Gaussian elimination with row exchanges; a is used up. NaN in, NaN out."""
+    """b = a⁻¹ b (n, K) in place by Gaussian elimination with row exchanges; a is overwritten. NaN in, NaN out."""
     n, columns = b.shape
     for k in range(n):
         best = k

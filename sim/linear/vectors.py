@@ -1,8 +1,8 @@
 """Vectors and 3×3 matrices as tuples of components: the algebra in which the formulas are written.
 
-A vector is (a_x, a_y, a_z), a matrix a tuple of three such rows. A component is whatever can be added and
-multiplied: a number in a compiled loop, a tensor with one entry a node and robot on any device. So a formula
-of `sim.mechanics` is read in one place and serves every path.
+A vector is (a_x, a_y, a_z); a matrix is a tuple of three such rows. A component is anything that can be added and
+multiplied: a number in a compiled loop, or a tensor with an entry for each node and robot. So a formula of
+`sim.mechanics` is written once and used by both.
 
 `formula` marks such a function: plain Python when called from Python, inlined machine code when called from
 a compiled loop (`sim.compiling`).
@@ -25,7 +25,7 @@ E_Z: Vector = (0.0, 0.0, 1.0)
 
 
 def formula(function: F) -> F:
-    """Physics of one node: the same source for numbers in compiled loops and for tensors."""
+    """Decorator of a formula: the same source for numbers in compiled loops and for tensors."""
     marked: F = register_jitable(function)
     return marked
 

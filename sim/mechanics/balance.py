@@ -1,17 +1,17 @@
-"""Forces on one node, one clamp and the head, in compiled loops. Their sums are zero where a robot is in balance.
+"""Forces on one node, one clamp and the head, in compiled loops. If a robot is in balance, their sums are zero.
 
     node   r_k = q_k + ∂E/∂e_{k+1} − ∂E/∂e_k + l_k b          (drag + elastic force + load)
     clamp  force and moment of edge 0, its bending spring and the drag on node 0, about J
     head   −R (v_x, v_z, ω_yr, ω_h, ω_t)                       (`sim.mechanics.drag`)
 
-Frames. Body: origin J (disc centre), e_z forward along the axis, e_y up, e_x = e_y × e_z. Disc: body turned about
-e_z by the phase φ, φ' = ω_t. A tail is held in the disc frame, turned so that its clamp lies at (a, 0, 0). At a
-phase the body axes are there
+Frames. Body: origin J (disc centre), e_z forward along the axis, e_y up, e_x = e_y × e_z. Disc: the body frame
+turned about e_z by the phase φ, φ' = ω_t. A tail's frame is the disc frame, turned so that the clamp is at (a, 0,
+0). In this frame the body axes at a phase φ are
 
     e_x = (cos φ, −sin φ, 0),   e_y = (sin φ, cos φ, 0),   e_z = (0, 0, 1).
 
-The motor sets ω_t = ω + gain ω_h; gain is 1 where it holds its speed, and 1 + droop R_spin where it loses speed in
-proportion to the head's torque.
+The motor sets ω_t = ω + gain ω_h. The gain is 1 if the motor holds its speed. It is 1 + droop R_spin if the motor
+loses speed in proportion to the head's torque.
 
 Units: l, μ0 l⁴/EI, EI/l². Source: Du, Miller, Jawed (arXiv 2103.05712), force balance; the disc frame is ours.
 """
@@ -60,7 +60,7 @@ def tail_spin(body: Body, u: Floats) -> float:
 
 
 class Motion(NamedTuple):
-    """Velocities of the robot as a tail at some phase sees them."""
+    """Velocities of the robot in the frame of a tail at some phase."""
 
     e_x: Vector
     e_y: Vector
@@ -104,7 +104,7 @@ def node_balance(
 
 
 class Clamp(NamedTuple):
-    """What a tail puts on the disc, about J, and its derivatives in the first two free nodes."""
+    """Force and moment of a tail on the disc, about J, and their derivatives in the first two free nodes."""
 
     force: Vector
     moment: Vector
@@ -117,14 +117,14 @@ class Clamp(NamedTuple):
 
 @compiled
 def clamp_balance(geometry: Geometry, body: Body, m: int, motion: Motion, flow: Vector, moment: Vector) -> Clamp:
-    """Load that edge 0, its bending spring and the drag on node 0 pass to the disc; n ≥ 2 edges.
+    """Load of edge 0, its bending spring and the drag on node 0 on the disc; n ≥ 2 edges.
 
-    Where the nodes are in balance this equals the sum of drag over the tail, but its derivative touches the first
-    two nodes alone.
+    If the nodes are in balance, this is equal to the sum of drag over the tail. But its derivative depends only on
+    the first two nodes.
 
     Args:
         flow: velocity of the fluid at the clamp.
-        moment: what the clamp passes on beside the bending of an elastic, straight tail.
+        moment: further moment of the clamp, beside the bending moment of an elastic, straight tail.
     """
     root = (body.offset, 0.0, 0.0)
     voronoi = 0.5 / geometry.length.shape[0]
@@ -159,7 +159,7 @@ def wrench_of(motion: Motion, force: Vector, moment: Vector) -> tuple[float, flo
 
 @compiled
 def head_drag(body: Body, u: Floats, a: int) -> float:
-    """Entry a of R (v_x, v_z, ω_yr, ω_h, ω_t): what the fluid takes from head and disc, about J."""
+    """Entry a of R (v_x, v_z, ω_yr, ω_h, ω_t): the resistance of the fluid to head and disc, about J."""
     total = body.resistance[a, 4] * tail_spin(body, u)
     for c in range(4):
         total += body.resistance[a, c] * u[c]

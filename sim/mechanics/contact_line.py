@@ -2,8 +2,8 @@
 
     F = −F_0 v/√(v² + v_s²)
 
-on the head's centre against its motion v in the plane. Above v_s = CREEP it hardly depends on speed: the edge of
-the wetted surface is pinned and creeps along the head. Source: Joanny and de Gennes (1984).
+on the head's centre, against its motion v in the plane. Above the speed v_s = CREEP the force hardly depends on
+speed: the edge of the wetted surface sticks to the head and creeps along it. Source: Joanny and de Gennes (1984).
 Units: l, μ0 l⁴/EI, EI/l².
 """
 
@@ -15,7 +15,7 @@ from sim.arrays import Floats
 from sim.compiling import compiled
 from sim.model.body import Body
 
-CREEP = 1e-3  # l EI/(μ0 l⁴): below this speed the line resists like a liquid
+CREEP = 1e-3  # l EI/(μ0 l⁴): below this speed the friction is proportional to the speed
 
 
 @compiled

@@ -8,8 +8,8 @@ Head (velocity of its centre v_c, spin ω_h about the axis; x across, z along th
 
     F = −6π μ0 R C_t v_c − C_yr μ0 R L ω_h e_x,     M_z = −8π μ0 R³ C_r ω_h.
 
-Both are linear in velocity. The loads on head and disc are written as a resistance in the generalized velocity
-(v_x, v_z, ω_yr, ω_h, ω_t) of the disc centre J, which lies L/2 behind the head's centre:
+Both are linear in velocity. The loads on head and disc are a resistance matrix R times the generalized velocity
+(v_x, v_z, ω_yr, ω_h, ω_t) of the disc centre J, which is L/2 behind the head's centre:
 wrench (F_x, F_z, M_y, M_z) about J = −R (v_x, v_z, ω_yr, ω_h, ω_t).
 
 Units: length l, time μ0 l⁴/EI, force EI/l² (so μ0 = 1). Validity: slender tails (l/r0 ≳ 10), no

@@ -1,27 +1,30 @@
-"""Flow of the fluid around tails and head: each feels the others, and their images in the surface above.
+"""Flow of the fluid around tails and head: each part is in the flow of the others, and of images in the surface.
 
-A force f on the fluid at y moves it at x by G(x − y) f/μ, G the Stokeslet. Resistive force theory has the drag of
-a node on the fluid at rest; here it is on the fluid as the others move it,
+A force f on the fluid at y moves the fluid at x with the velocity G(x − y) f/μ, where G is the Stokeslet. In
+resistive force theory the drag on a node depends on its velocity relative to fluid at rest. Here it depends on the
+velocity relative to the fluid that the other parts move:
 
-    q_k = −l_k [ζ⊥ I + (ζ∥ − ζ⊥) tt] (v_k − w_k),   w_k = Σ ∫ G(x_k − y) f/μ ds,
+    q_k = −l_k [ζ⊥ I + (ζ∥ − ζ⊥) tt] (v_k − w_k),   w_k = Σ ∫ G(x_k − y) f/μ ds.
 
-the sum over the edges of the other tails (a node's force lies evenly on the edges beside it; the integral over a
-straight edge is exact, however near), over the head (pieces of its axis that share its drag, and rotlets for its
-spin) and over images. Where the balance holds, the force of a free node on the fluid is its elastic force and
-load, so w follows from the shape alone; only clamps and head, whose velocity is given, feel each other's answer (a
-few rounds, each smaller than the last by the length of half an edge). The head's drag is on the fluid as the tails
-move it, too. All of it is solved together with the balance, not a step later.
+The sum is over the edges of the other tails, over the head, and over images. The force of a node is spread evenly
+over the edges beside it, and the integral over a straight edge is exact at any distance. The head is pieces of its
+axis with equal parts of its drag, and rotlets for its spin. In balance, the force of a free node on the fluid is
+its elastic force and load. So w follows from the shape. Only the velocities of clamps and head are given, so their
+forces depend on each other's flow. They are found in a few rounds; each change is smaller than the last one. The
+head's drag, too, is relative to the fluid that the tails move. All of this is solved together with the balance,
+not one step later.
 
-C_t is a fitted number and above what a cylinder needs (about 1.4): with its whole drag on the fluid the head would
-move the fluid at the clamps faster than itself. So the part of the drag that moves the fluid is at most the drag
-that the head's own pieces have, which carries the fluid on the axis along. The rest has other causes.
+C_t is fitted and larger than that of a cylinder (about 1.4). With all of this drag on the fluid, the head would
+move the fluid at the clamps faster than it moves itself. So only a part of the drag moves the fluid: at most the
+drag with which the head's pieces would move with the fluid on the axis. The rest of the drag has other causes.
 
-Surface: a flat plane without shear or flow through it, HEIGHT times the larger of R and a above the axis. The
-image of f at (x, 2H − y, z) is (f_x, −f_y, f_z); a spin about z turns backwards. Each tail meets its own image,
-and the images of those whose flow it meets (images of others alone would take more drag off a tail than it has).
+Surface: a flat plane without shear and without flow through it, at a height of HEIGHT times the larger of R and a
+above the axis. The image of f at (x, y, z) is (f_x, −f_y, f_z) at (x, 2H − y, z); the image of a spin about z
+turns backwards. A tail is in the flow of its own image. It is in the flow of another part's image only if it is in
+the flow of that part, because images of others alone would reduce the drag on a tail by more than all of it.
 
-The singularities are spread over r0 (tails) and R (head), as Cortez, Fauci and Medovikov (2005) do. Left out: the
-head's spin in the tails' flow, and its finite thickness (the flow goes through it).
+The singularities are spread over r0 (tails) and R (head), as in Cortez, Fauci and Medovikov (2005). Left out: the
+effect of the tails' flow on the head's spin, and the thickness of the head (the flow goes through it).
 Units: l, μ0 l⁴/EI, EI/l². Source: Pozrikidis (1992), ch. 2; images: Blake (1971), free surface.
 """
 
@@ -47,7 +50,7 @@ _ROUNDS = 3
 
 
 class Scene(NamedTuple):
-    """A robot at one instant in the body frame: places where the flow is wanted, and pieces that make it.
+    """A robot at one instant in the body frame: places where the flow is computed, and pieces that make it.
 
     Places: nodes 0..n of each tail, then the middles of the head's pieces. Pieces: edges of the tails under the
     forces of free nodes, first edges under the drag of the clamps, then the head's pieces.
@@ -76,7 +79,7 @@ def _new_scene(n: int, tails: int) -> Scene:
 
 @compiled
 def has_flow(body: Body) -> bool:
-    """Whether any part of the robot feels the flow of another."""
+    """Whether any part of the robot is in the flow of another part."""
     terms = body.nonlocal_terms
     return bool(terms.tail_interaction != 0 or terms.head_flow != 0 or terms.free_surface != 0)
 
@@ -92,8 +95,8 @@ def add_flow(
         x: free nodes, (n, M, 3); tail j at instant p of P is column p + j P, at phase φ + 2πj/N.
         u: (v_x, v_z, ω_yr, ω_h), (4,).
         phase: φ.
-        flow: (n + 1, M, 3), filled in the robot's columns, each in its own frame.
-        wrench: (4,), on the robot about J through its head; added to.
+        flow: (n + 1, M, 3), filled in the columns of this instant, each in the frame of its tail.
+        wrench: (4,), about J; the effect of the flow on the head is added.
     """
     n, columns, _ = x.shape
     scene, instants = _new_scene(n, tails), columns // tails
@@ -164,9 +167,10 @@ def _place_head(scene: Scene, body: Body, n: int, tails: int) -> None:
 def _answer(
     scene: Scene, body: Body, geometry: Geometry, u: Floats, phase: float, instant: int, tails: int, moved: Floats
 ) -> None:
-    """Forces of clamps and head on the fluid, which move with given velocities through a fluid that `moved`.
+    """Forces on the fluid of clamps and head, which have given velocities, in a fluid with the velocities `moved`.
 
-    They feel each other's flow as well: a few rounds, each smaller than the last.
+    The forces depend on each other's flow. They are found in a few rounds; each change is smaller than the last
+    one.
     """
     n, columns = geometry.length.shape
     nodes, first_clamp, cell = (n + 1) * tails, n * tails, 1.0 / n
@@ -207,7 +211,7 @@ def _in_tail(motion: Motion, v: Vector) -> Vector:
 
 @compiled
 def _add_stokeslets(body: Body, scene: Scene, places: Integers, pieces: Integers, flow: Floats) -> None:
-    """Add to `flow` (K, 3) at some places what the forces of some pieces bring about."""
+    """Add to `flow` (K, 3), at some places, the flow of the forces of some pieces."""
     height = HEIGHT * max(body.offset, body.head_radius)
     head = scene.of[len(scene.of) - 1]
     for i in places:
@@ -229,7 +233,7 @@ def _add_stokeslets(body: Body, scene: Scene, places: Integers, pieces: Integers
 
 @compiled
 def _shares(body: Body, on: int, by: int, head: int) -> tuple[float, float]:
-    """Shares of the flow of one part that another meets: directly, and from the surface."""
+    """Factors on the flow of one part at another part: on the direct flow, and on that of the image."""
     terms = body.nonlocal_terms
     if on == by:
         return 0.0, 0.0 if on == head else terms.free_surface
@@ -241,7 +245,7 @@ def _shares(body: Body, on: int, by: int, head: int) -> tuple[float, float]:
 def _head_resistance(body: Body) -> tuple[float, float]:
     """The part of the head's drag that moves the fluid, across and along the axis.
 
-    It is at most the drag with which the head's pieces alone would go along with the flow that they make.
+    It is at most the drag with which the head's pieces would move with the flow that they make.
     """
     end, across, along = (0.0, 0.0, body.head_length), 0.0, 0.0
     for i in range(_PIECES):
@@ -254,7 +258,7 @@ def _head_resistance(body: Body) -> tuple[float, float]:
 
 @compiled
 def _add_rotlets(body: Body, scene: Scene, nodes: int, torque: float, flow: Floats) -> None:
-    """Add to `flow` at the tails' nodes what the head's spin brings about."""
+    """Add to `flow`, at the tails' nodes, the flow of the head's spin."""
     terms = body.nonlocal_terms
     height = HEIGHT * max(body.offset, body.head_radius)
     for i in range(nodes):

@@ -1,22 +1,23 @@
 """Material frames of a tail: natural curvature, natural twist, twist under torque, bending viscosity.
 
-Every edge carries a material frame (m1, m2, t), the clamp's carried along the tail without twist (Bishop) and
-turned by the edge's angle θ; the clamp's own has m1 away from the axis. With joint k between edges e and f,
+Every edge has a material frame (m1, m2, t). It is the frame of the clamp, carried along the tail without twist
+(Bishop frame), and then turned by the angle θ of the edge. In the clamp's frame m1 points away from the axis. With
+joint k between edges e and f,
 
     κ1 = ½ κb·(m2_e + m2_f),   κ2 = −½ κb·(m1_e + m1_f),   κb = 2 t_e × t_f/(1 + t_e·t_f),   τ = θ_f − θ_e
     E = Σ ½ [|κ − κ⁰ l_k|² + β (τ − τ⁰ l_k)²]/l_k,   β = GJ/EI = 2/3 (G = E/3)
     R = Σ ½ η |κ̇|²/l_k                      (Kelvin-Voigt: moments κ + η κ̇; R is a dissipation function)
 
-The fluid resists the spin of a section about its own tangent with the torque −ζ_r Ω·t a length. Twist travels
-along a tail much faster than anything else, so θ is where it is in balance: ∂E/∂θ_j = −ζ_r l_j Ω·t_j, a
-tridiagonal system. Then the force of an edge is ∂(E + R)/∂e at constant θ, where frames follow the edges by
-parallel transport in time (that is what makes ∂τ/∂e = κb/2|e| local).
+The fluid resists the spin of a section about its own tangent with the torque −ζ_r Ω·t per length. Twist settles
+much faster than bending. So θ is always in balance: ∂E/∂θ_j = −ζ_r l_j Ω·t_j, a tridiagonal system. Then the force
+of an edge is ∂(E + R)/∂e at constant θ. Here the frames follow the edges by parallel transport in time, so that
+∂τ/∂e = κb/2|e| depends on neighbouring edges only.
 
-`add_frames` adds what this changes to the elastic forces of straight, untwisted tails (`sim.mechanics.rod`), in
-which θ and all of this is zero. `sim.reference.framed_rod` has the same rod by automatic differentiation; a test
-shows that the two agree. Left out: θ̇ in the torque and the directors' turning in κ̇ (both small as curvature
-squared). Units: EI = 1, l = 1. Source: Bergou et al. (2008, 2010); Jawed, Novelia, O'Reilly, *A Primer on the
-Kinematics of Discrete Elastic Rods* (2018).
+`add_frames` adds the difference to the elastic forces of straight, untwisted tails (`sim.mechanics.rod`), where θ
+is zero. `sim.reference.framed_rod` has the same rod by automatic differentiation; a test shows that the two agree.
+Left out: θ̇ in the torque and the turning of the directors in κ̇ (both are of second order in curvature).
+Units: EI = 1, l = 1. Source: Bergou et al. (2008, 2010); Jawed, Novelia, O'Reilly, *A Primer on the Kinematics of
+Discrete Elastic Rods* (2018).
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ def curvatures_by_edges(
 
 @compiled
 def _twist(a: Floats, b: Floats, torque: Floats, natural_twist: float) -> Floats:
-    """Angles θ (n,) in balance: joint k pulls with ½ (a_k sin θ + b_k cos θ) on both its edges."""
+    """Angles θ (n,) in balance; the torque of joint k on both its edges is ½ (a_k sin θ + b_k cos θ)."""
     n = len(torque)
     theta, change = np.zeros(n), np.zeros(n)
     slope, right = np.zeros(n), np.zeros(n)
@@ -122,7 +123,7 @@ def _add_viscosity(
 ) -> Vector:
     """Add forces and torques of the moments η κ̇ in untwisted frames (n + 1, 1, 3); returns the clamp's moment.
 
-    The tail stays untwisted: θ̇ makes up for what transport in time would twist it.
+    The tail stays untwisted: θ̇ cancels the twist that parallel transport in time would make.
     """
     n = geometry.length.shape[0]
     before, spin_before, rate_before = ROOT_TANGENT, 0.0, ZERO
@@ -164,7 +165,7 @@ def has_frames(body: Body) -> bool:
 
 @compiled
 def add_frames(body: Body, geometry: Geometry, motion: Motion, m: int, x_dot: Floats, moments: Floats) -> None:
-    """Add to the forces of the edges of tail m, and put the clamp's further moment on the disc into `moments`.
+    """Add the forces of the frames to the edges of tail m, and put the clamp's further moment into `moments`.
 
     Args:
         x_dot: velocities of the free nodes in the disc frame, (n, M, 3).
@@ -207,12 +208,12 @@ def add_frames(body: Body, geometry: Geometry, motion: Motion, m: int, x_dot: Fl
 def _untwisted(
     body: Body, geometry: Geometry, motion: Motion, m: int, directors: Floats, a: Floats, b: Floats, torque: Floats
 ) -> None:
-    """Carry the clamp's director along tail m without twist, and fill in what turns the edges.
+    """Carry the clamp's director along tail m without twist, and compute the torques on the edges.
 
     Args:
         directors: (n + 1, 1, 3), filled.
-        a, b: (n,), filled: joint k turns both its edges with ½ (a_k sin θ + b_k cos θ).
-        torque: (n,), filled: of the fluid on each edge.
+        a, b: (n,), filled: the torque of joint k on both its edges is ½ (a_k sin θ + b_k cos θ).
+        torque: (n,), filled: the torque of the fluid on each edge.
     """
     n = len(torque)
     terms = body.nonlocal_terms

@@ -1,7 +1,7 @@
 """Tails as arrays in compiled loops: edges, joints, elastic forces and their derivatives.
 
-The formulas of `sim.mechanics.rod` over the nodes of M tails side by side. Every tail is turned about the axis so
-that its clamp lies at (a, 0, 0): tail j of a robot at disc phase φ is at phase φ + 2πj/N.
+The formulas of `sim.mechanics.rod`, applied to the nodes of M tails. Every tail is in its own frame, in which its
+clamp is at (a, 0, 0). So tail j of a robot at disc phase φ is at phase φ + 2πj/N.
 
 Arrays are (node, tail, component). Units: l, μ0 l⁴/EI, EI/l².
 """
@@ -59,8 +59,8 @@ def straight(n: int, tails: int, offset: float) -> Floats:
 def turned_edges(x: Floats, dx: Floats, offset: float) -> Floats:
     """Free nodes (n, M, 3) after a correction dx that turns the edges.
 
-    Added to the positions, a correction would also stretch the edges that it turns, in second order. Here every
-    edge gets the new direction, and stretches by the first order of the correction alone.
+    If dx were added to the positions, edges that turn would also become longer, by a term of second order. Here
+    every edge gets its new direction, and its length changes only by the first-order term of dx.
     """
     n, tails, _ = x.shape
     out = np.empty_like(x)

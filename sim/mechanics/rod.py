@@ -5,16 +5,16 @@ A tail has nodes 0..n and edges e_j = x_{j+1} − x_j of natural length h = 1/n.
     E_s = ½ EA Σ (|e_j|/h − 1)² h
     E_b = ½ EI Σ |κ_k|² / l_k,   κ_k = 2 t_{k−1} × t_k / (1 + t_{k−1}·t_k)   (t = e/|e|).
 
-Since |κ_k|² = 4 (1 − c)/(1 + c) depends on c = t_{k−1}·t_k alone, E_b = Σ g(c_k), with
-g' = −4 EI/l_k (1 + c)⁻² and g'' = 8 EI/l_k (1 + c)⁻³; all that follows is the chain rule.
+Since |κ_k|² = 4 (1 − c)/(1 + c) depends only on c = t_{k−1}·t_k, the energy is E_b = Σ g(c_k), with
+g' = −4 EI/l_k (1 + c)⁻² and g'' = 8 EI/l_k (1 + c)⁻³. Forces and stiffness follow by the chain rule.
 
-Clamp: node 0 and the root *tangent* t_{−1} are held; the bending energy between that tangent and edge 0
-has the half Voronoi length l_0 = h/2 (l_k = h elsewhere). This converges at second order; holding two
-nodes instead shortens the tail and converges at first order only.
+Clamp: node 0 and the root *tangent* t_{−1} are fixed. The bending energy between this tangent and edge 0 has the
+half Voronoi length l_0 = h/2 (l_k = h elsewhere). This converges at second order. With two fixed nodes the tail
+would be too short, and the error would be of first order.
 
-Natural curvature and twist are zero here: then the twist of a free-ended isotropic rod relaxes to zero
-whatever its shape and puts no force on the nodes (`sim.reference.framed_rod` has the material frames, and a test
-shows that the two agree).
+Natural curvature and twist are zero here. Then the twist of an isotropic rod with a free end relaxes to zero,
+whatever the shape, and there is no force of twist on the nodes. `sim.reference.framed_rod` has the material
+frames; a test shows that the two agree.
 
 Written node by node on component tuples (`sim.linear.vectors`), so that compiled loops (`sim.mechanics.geometry`)
 and tensors (`sim.reference.elastic`) read the same lines. Units: EI = 1, l = 1, so EA = 4 (l/r0)².

@@ -1,11 +1,11 @@
-"""The numbers that make one robot: everything that its balance of forces reads.
+"""The numbers of one robot: everything that its balance of forces depends on.
 
-`Body` is the only list of them. `sim.solve.assembly` fills it for a batch of robots as tensors, effects included,
-and hands it to the compiled loops as numbers, one robot at a time. Packing, unpacking and derivatives follow from
+`Body` is the only list of these numbers. `sim.solve.assembly` fills it for a batch of robots as tensors, with
+effects. The compiled loops get it as numbers, one robot at a time. Packing, unpacking and derivatives follow from
 its fields.
 
-Numbers of effects that reach further than one node of a straight, untwisted, elastic tail are in `nonlocal_terms`,
-each under the name of its effect.
+Some effects reach further than one node of a straight, untwisted, elastic tail. Their numbers are in
+`nonlocal_terms`, each under the name of its effect.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Meaning(NamedTuple):
 class Body(NamedTuple):
     """One robot, or a batch of B robots while effects are applied; then every entry ends with (B,)."""
 
-    omega: Annotated[Any, Meaning("EI/(μ0 l⁴)", "ω̄, motor speed, head relative to tails")]
+    omega: Annotated[Any, Meaning("EI/(μ0 l⁴)", "ω̄, motor speed, tails relative to head")]
     offset: Annotated[Any, Meaning("l", "a/l, distance of the clamps from the axis")]
     head_radius: Annotated[Any, Meaning("l", "R/l")]
     head_length: Annotated[Any, Meaning("l", "L/l")]

@@ -2,9 +2,9 @@
 
     C_t, C_r, C_yr   the head's drag, spin and side-force coefficients
     l/R, L/R, l/r0   tail length, head length, tail slenderness
-    a/R              radius of the circle on which the tails are clamped (default 1: not printed in the paper; its
-                     one measured point and the balance of torque put it there)
-    ω̄ = ω μ0 l⁴/EI   motor speed, head relative to tails, signed
+    a/R              radius of the circle on which the tails are clamped (default 1: the paper does not print it;
+                     its one measured point and the balance of torque give a value near 1)
+    ω̄ = ω μ0 l⁴/EI   motor speed, tails relative to head, signed
     N                number of tails
 
 and the sizes of the effects of `sim.effects` (absent means null).

@@ -1,19 +1,19 @@
 """Side force on the head from the viscosity profile near the air-fluid interface.
 
-A head that spins at ω_h just under the surface drags harder on the fluid below than on the thin,
-half-wetted layer above, so it is pushed sideways. With the smoothed step in viscosity
+A head that spins at ω_h just under the surface meets more resistance below than above, where it is hardly wetted.
+So it is pushed sideways. With a smoothed step in viscosity
 
     μ(y) = μ0 / (1 + exp(k (y − h)/R)),   y = R sin ϑ,
 
-a wall element R dϑ dz feels the traction μ ω_h R dϑ dz along −e_ϑ, and the sum over the wall is
+the traction on a wall element R dϑ dz is μ ω_h R dϑ dz along −e_ϑ. The sum over the wall is
 
     F_x = c μ0 R L ω_h,   c = ∫₀^2π sin ϑ / (1 + exp(k (sin ϑ − h/R))) dϑ,   F_y = 0.
 
-c = −1.4026 for the paper's profile (h = 0.7 R, k = 20; the paper prints −1.403); the limit of a sharp
-step is −2 √(1 − (h/R)²) = −1.4283. In the model the coefficient C_yr replaces −c, since the true
-profile is unknown: F_x = −C_yr μ0 R L ω_h.
+c = −1.4026 for the paper's profile (h = 0.7 R, k = 20; the paper prints −1.403). The limit of a sharp step is
+−2 √(1 − (h/R)²) = −1.4283. The true profile is not known, so in the model the coefficient C_yr replaces −c:
+F_x = −C_yr μ0 R L ω_h.
 
-Left out: the flow that the profile itself would cause; the profile is a closure, not a solution.
+Left out: the flow that the profile itself would cause. The profile is an assumption, not a solution.
 Source: Du, Miller, Jawed (arXiv 2103.05712), the head's force model.
 """
 

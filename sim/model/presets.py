@@ -1,7 +1,7 @@
 """The paper's robots by name, and the numbers of its control example.
 
-Source: Du, Miller, Jawed (arXiv 2103.05712). The paper has two sets of coefficients, one in its control section
-and one fitted to its experiments; both are kept.
+Source: Du, Miller, Jawed (arXiv 2103.05712). The paper has two sets of coefficients, one in its section on control
+and one fitted to its experiments. Both are here.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from sim.model.robot import Robot
 
 
 class ControlExample(NamedTuple):
-    """Groups of the paper's control example, to which sizes of some effects refer."""
+    """Groups of the paper's control example. The sizes of some effects are relative to it."""
 
     l_over_R: float = 6.875
     L_over_R: float = 3.75
@@ -49,8 +49,8 @@ def _paper(name: str, **changes: object) -> Robot:
 PRESETS: dict[str, Robot] = {
     # Control section: N = 2, ω̄ = ±10, C = (3.0, 2.8, 2.0).
     "paper-control": _paper("paper-control").with_motor(CONTROL.omega_bar),
-    # The same robot with four tails, for the triangle of its first figure (N = 4, l = 11 cm). The motor speed
-    # there is not given; at ω̄ = 10 the tails stay apart, at its measured 143.66 rpm the model has them touch.
+    # The same robot with four tails, for the triangle of its first figure (N = 4, l = 11 cm). The paper does not
+    # give the motor speed there. In the model tails stay apart at ω̄ = 10 and touch at the measured 143.66 rpm.
     "paper-triangle": _paper("paper-triangle", tails=4).with_motor(CONTROL.omega_bar),
     # Its one measured point: N = 4, l = 11 cm, 143.66 rpm.
     "paper-measured": _paper("paper-measured", tails=4, motor_speed=_MEASURED_SPEED, **_FITTED),

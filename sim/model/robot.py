@@ -1,7 +1,7 @@
-"""The robot in SI units, and the only place where SI becomes dimensionless and back.
+"""The robot in SI units. Only here SI units become dimensionless numbers and back.
 
 Scales: length l, time μ0 l⁴/EI (2.207 s for the paper's control example), force EI/l², with EI = E π r0⁴/4. In
-these units the motion depends on the groups of `sim.model.groups` alone.
+these units the motion depends only on the groups of `sim.model.groups`.
 
 `sim.inputs` reads and writes robots as files.
 """
@@ -21,8 +21,9 @@ from sim.model.groups import Groups, check_finite, check_positive, check_slender
 class Robot:
     """A robot and its fluid in SI units.
 
-    Lengths in m, Young's modulus in Pa, viscosity in Pa s, motor speed in rad/s (magnitude; the direction is the
-    control). Effects map names of `sim.effects` to sizes; they are checked when the robot is read or simulated.
+    Lengths are in m, Young's modulus in Pa, viscosity in Pa s, motor speed in rad/s (a magnitude; the direction is
+    the control). `effects` maps names of `sim.effects` to sizes, which are checked when the robot is read or
+    simulated.
 
     Example:
         >>> from softflagella import load_robot
@@ -63,7 +64,7 @@ class Robot:
 
     @property
     def time_scale(self) -> float:
-        """μ0 l⁴/EI [s]: one dimensionless time unit."""
+        """The unit of dimensionless time, μ0 l⁴/EI [s]."""
         return self.viscosity * self.tail_length**4 / self.bending_stiffness
 
     @property
@@ -72,7 +73,7 @@ class Robot:
         return self.motor_speed * self.time_scale
 
     def group_values(self) -> dict[str, float]:
-        """The dimensionless groups of this robot by column name (positive motor direction)."""
+        """The dimensionless groups of this robot by column name, for the positive direction of the motor."""
         return {
             "C_t": self.C_t,
             "C_r": self.C_r,

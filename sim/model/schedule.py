@@ -1,4 +1,4 @@
-"""A schedule: what the motor does, for which robot, from which pose. Plans end as one; replays begin with one."""
+"""A schedule: when the motor flips, for which robot, from which pose. Plans contain one; replays need one."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ class Schedule:
     Attributes:
         robot: dimensionless groups by column name; ω̄ is a magnitude.
         first_direction: of the motor, +1 or −1.
-        dwells: (M,), in time units μ0 l⁴/EI.
+        dwells: times between flips, (M,), in units of μ0 l⁴/EI.
         start: x, y [l] and heading [rad] of the head's centre.
-        time_scale: seconds a time unit.
+        time_scale: the unit of time in seconds.
 
     Raises:
-        InputError: a direction, dwell, pose or time scale that cannot be.
+        InputError: a direction, dwell, pose or time scale is not possible.
 
     Example:
         >>> import numpy as np
@@ -59,7 +59,7 @@ def load_schedule(path: str | Path) -> Schedule:
     """The schedule in a plan.json.
 
     Raises:
-        InputError: the file is no plan.
+        InputError: the file is not a plan.
 
     Example:
         >>> import tempfile

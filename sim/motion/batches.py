@@ -1,6 +1,6 @@
-"""Many robots in parallel: rows are split into batches of one N, spread over threads or processes.
+"""Many robots in parallel: rows are split into batches of one N, which run in threads or processes.
 
-Each worker uses one thread: batches are the parallelism; threads inside small operations would only fight them.
+Each worker uses one thread. More threads inside small operations would only compete with the other workers.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from sim.motion.steady import steady
 from sim.motion.warm import compile_once
 from sim.solve.refinement import MANY
 
-_DIRECT_ROWS, _SLOPE_ROWS, _STEPPED_ROWS = 128, 16, 4  # robots between two ticks of the progress bar
+_DIRECT_ROWS, _SLOPE_ROWS, _STEPPED_ROWS = 128, 16, 4  # robots a batch: the progress bar moves after each
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -42,7 +42,7 @@ def split(tails: Floats, rows: int) -> list[Integers]:
 
 
 def available_jobs() -> int:
-    """Processes to use by default: the processors that this process may run on."""
+    """Number of processes to use by default: the processors that this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -57,13 +57,15 @@ def run_batches(
 ) -> list[Result]:
     """Apply `work` to every job in parallel processes, with a progress bar over rows.
 
-    Results come back in the order of the jobs; the longest jobs should come first. `threads`: in parallel threads
-    instead, for work in compiled loops, which do not hold the interpreter's lock.
+    Results have the order of the jobs. The longest jobs should come first. With `threads`, jobs run in threads of
+    this process; use it for compiled loops, which do not hold the interpreter's lock.
     """
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs = {jobs}; give at least 1, or nothing for all processors")
     count = min(jobs or available_jobs(), len(jobs_to_do))
-    here = threads or count <= 1  # thread counts belong to the process: set once, not by each worker
+    here = (
+        threads or count <= 1
+    )  # the number of threads is a setting of the process: set it once, not in each worker
     task = work if here else partial(_single_threaded, work)
     results: list[Result] = []
     if not here:
@@ -87,7 +89,7 @@ def run_batches(
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Tensor and matrix operations of this process on one thread each."""
+    """Tensor and matrix operations of this process use one thread each."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -132,7 +134,7 @@ def sensitivity_columns(
     Args:
         columns: robots by column name, each (M,).
         parameters: names out of `sim.motion.sensitivity.INPUTS` and `sim.effects.catalogue()`, K of them.
-        phases: to begin with, see `sim.motion.sensitivity`.
+        phases: number of phases to begin with, see `sim.motion.sensitivity`.
         jobs: threads; default all processors.
         title: of the progress bar; empty for none.
     """
@@ -157,12 +159,12 @@ def stepped_columns(
     jobs: int | None = None,
     title: str = "time stepping",
 ) -> dict[str, Any]:
-    """The same by time stepping from rest (`sim.motion.settling`): the reference for the direct route.
+    """The same by time stepping from rest (`sim.motion.settling`): the reference for the direct solution.
 
     Args:
         columns: robots by column name, each (M,).
         resolution: mesh and step of all rows; by default what each needs.
-        finer: divide edge length and step by this.
+        finer: a factor; edge length and time step are divided by it.
         jobs: threads; default all processors.
         title: of the progress bar; empty for none.
     """

@@ -1,6 +1,6 @@
-"""Orbits of many robots: their mean motion, how it ended, the gap between their tails, and derivatives.
+"""Orbits of many robots: mean motion, whether it was found, the gap between the tails, and derivatives.
 
-The loops over robots are plain Python: only what a single robot needs is compiled together.
+The loops over robots are plain Python. What a single robot needs is compiled.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from sim.solve.derivative import orbit_slopes
 from sim.solve.orbit import mean_motion, residual_on_orbit, smallest_gap
 from sim.solve.refinement import FEW, SOLVED, Orbit, extrapolate, refined_orbit
 
-WIDTH = 1e-5  # step of the differences in a robot's numbers, on which the balance depends almost linearly
+WIDTH = 1e-5  # finite-difference step in a robot's numbers; the balance depends almost linearly on them
 
 
 class Orbits(NamedTuple):
@@ -35,8 +35,8 @@ def solve_orbits(rows: Floats, tails: int, directions: Floats | None = None, *, 
     Args:
         rows: (B, K'), the robots' numbers (`sim.solve.assembly.numbers`, transposed).
         tails: N.
-        directions: (B, K, K'), in which the means are to be differentiated (none by default).
-        phases: to begin with.
+        directions: (B, K, K'), directions of the derivatives (none by default).
+        phases: number of phases to begin with.
     """
     count = 0 if directions is None else directions.shape[1]
     slopes = np.full((len(rows), count, 5), np.nan)

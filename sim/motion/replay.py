@@ -1,8 +1,8 @@
 """Replay of any switching schedule: the robot's track in the lab, simulated.
 
-A schedule is the motor's first direction and the dwell times between flips. The robot starts from rest
-with straight tails at the schedule's start pose; dwells end where a step ends.
-Track of the head's centre, seen from above; lengths in l, time in μ0 l⁴/EI and seconds.
+A schedule is the motor's first direction and the dwell times between flips. The robot starts from rest with
+straight tails, at the schedule's start pose. Every dwell ends at the end of a time step. The track is that of the
+head's centre, seen from above. Lengths are in l, times in μ0 l⁴/EI and in seconds.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sim.motion.run import Run
 from sim.solve.assembly import bodies
 from sim.solve.march import YAW, X, Y
 
-_SAMPLES = 12  # track points a dwell, at most
+_SAMPLES = 12  # track points in a dwell, at most
 
 
 def replay(
@@ -36,7 +36,7 @@ def replay(
     Args:
         schedules: any robots.
         resolution: mesh and step; default `Resolution.for_tracks`.
-        progress: called with the number of dwells done, counted over all schedules.
+        progress: called after each dwell with the number of dwells done since the last call.
 
     Returns:
         A track for each schedule: time_bar, time_s, x_over_l, y_over_l, heading_rad, direction,

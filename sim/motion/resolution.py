@@ -1,8 +1,8 @@
-"""Mesh and step of time stepping, and the most work that a run may ask for.
+"""Mesh and step of time stepping, and the largest work that a run may take.
 
-At the control robot 12 edges and 24 steps a revolution miss ω_yr by 1 %; high ω̄ needs more, so the default follows
-ω̄. Work is counted in nodes moved by one step each; a node takes about 0.6 µs. Flow from part to part makes a step
-of M nodes cost as much as 3 M steps without.
+With 12 edges and 24 steps a revolution the error of ω_yr is 1 % for the control robot. High ω̄ needs more, so the
+default grows with ω̄. The unit of work is one node moved by one step, about 0.6 µs. With flow between the parts, a
+step of M nodes costs as much as 3 M steps without flow.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from sim.model.body import Body
 
 MOST_WORK = 1e8  # of one robot in a table: about a minute
 MOST_REPLAY_WORK = 3e9  # of one schedule: about half an hour
-_LONGEST_STEP = 0.04  # time units: the tails' memory is about 0.7
-_FLOW = 3.0  # steps' worth of work for each node that a node's flow reaches
+_LONGEST_STEP = 0.04  # time units: the tails need about 0.7 to turn over
+_FLOW = 3.0  # work for the flow of one node at another, in units of a node's step
 
 
 @dataclass(frozen=True)
 class Resolution:
-    """Edges a tail and time steps a motor revolution."""
+    """Number of edges in a tail and of time steps in a motor revolution."""
 
     edges: int
     steps: int
@@ -40,7 +40,7 @@ class Resolution:
 
     @staticmethod
     def for_tracks(omega_bar: float) -> Resolution:
-        """The default where an error of the yaw rate adds up: about 0.2 % in it."""
+        """The default for tracks, where an error of the yaw rate accumulates: its error is about 0.2 %."""
         plain = Resolution.fitting(omega_bar)
         return Resolution(plain.edges + 8, 2 * plain.steps)
 
@@ -53,18 +53,18 @@ class Resolution:
         return Resolution(factor * self.edges, factor * self.steps)
 
     def work_of_a_step(self, body: Body, tails: int) -> float:
-        """Nodes moved by one step, flow counted in."""
+        """Work of one step, with the work for flow."""
         nodes = self.edges * tails
         return nodes * (1 + _FLOW * nodes) if has_flow(body) else float(nodes)
 
 
 def time_step(omega_bar: float, resolution: Resolution) -> float:
-    """dt for a motor speed: a share of a motor revolution, but never longer than a part of the tails' memory."""
+    """dt for a motor speed: a part of a motor revolution, at most _LONGEST_STEP."""
     with np.errstate(over="ignore"):
         return min(float(2 * math.pi / (resolution.steps * np.float64(abs(omega_bar)))), _LONGEST_STEP)
 
 
 def steps_in(duration: float, dt: float) -> float:
-    """Steps of at most dt in a duration; a float, since there may be more than any integer type holds."""
+    """Number of steps of at most dt in a duration; a float, since it may be too large for an integer type."""
     with np.errstate(over="ignore", divide="ignore"):
         return max(1.0, float(np.ceil(np.float64(duration) / dt - 1e-9)))

@@ -1,4 +1,4 @@
-"""One robot in time: go on at constant motor speed, flip the motor, look where it is."""
+"""One robot stepped in time: advance at constant motor speed, flip the motor, read the pose."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from sim.solve.march import TOLERANCE, YAW, State, X, Y, advance, new_state
 
 BROKE_DOWN = "Newton's method did not converge in a time step"
 TOO_MUCH = "it would take more time steps than a row may ask for"
-_GRADES = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2)  # of a step, twice each, after a jump of the motor's speed
-_REVERSED = np.array([-1.0, 1.0, -1.0, -1.0])  # of (v_x, v_z, ω_yr, ω_h), by a flip
+_GRADES = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2)  # parts of a step, two of each, after a jump of the motor's speed
+_REVERSED = np.array([-1.0, 1.0, -1.0, -1.0])  # signs of (v_x, v_z, ω_yr, ω_h) after a flip
 
 
 class Run:
@@ -28,7 +28,7 @@ class Run:
         *,
         most_work: float | None = None,
     ):
-        """From `state`, which is changed in place, or from rest; `most_work` as in `sim.motion.resolution`."""
+        """Start from `state` (changed in place) or from rest; `most_work`: see `sim.motion.resolution`."""
         self.body = body
         self.state = new_state(tails, resolution.edges, body.offset) if state is None else state
         self.time_step = time_step(body.omega, resolution)
@@ -38,24 +38,24 @@ class Run:
         self._work_left = MOST_WORK if most_work is None else most_work
 
     def copy(self) -> Run:
-        """A run that goes its own way from here."""
+        """An independent copy of this run."""
         other = object.__new__(Run)
         other.__dict__ |= vars(self)
         other.state = State(*(array.copy() for array in self.state))
         return other
 
     def can_afford(self, duration: float, *, flips: float = 0) -> bool:
-        """Whether so much time and so many flips are within the work left; `failed` if not."""
+        """Whether the work that is left is enough for this time and these flips; sets `failed` if not."""
         steps = steps_in(duration, self.time_step) + flips * 2 * len(_GRADES)
         if not self.failed and not steps * self._work_of_a_step <= self._work_left:
             self.failed = TOO_MUCH
         return not self.failed
 
     def go(self, duration: float) -> tuple[Floats, Floats]:
-        """Advance at constant speed: times since now (count,) and the poses then, (count, 6); none where it fails.
+        """Advance at constant speed: times from now (count,) and the poses then, (count, 6); none if it fails.
 
-        Steps are equal, but for some short ones where the motor's speed has jumped: there every mode of the tails
-        starts anew, and equal steps would converge at first order only.
+        Steps are equal, except for some short ones after a jump of the motor's speed. There all modes of the tails
+        start anew, and equal steps would converge at first order only.
         """
         if not self.can_afford(duration, flips=1):
             return np.empty(0), np.empty((0, 6))
@@ -88,7 +88,7 @@ class Run:
         return poses, seen
 
     def flip(self) -> None:
-        """Reverse the motor: the shape goes on, velocities start from their mirror image."""
+        """Reverse the motor: the shape stays, velocities become their mirror image."""
         self.body = self.body._replace(omega=-self.body.omega)
         self.state.u[:] *= _REVERSED
         self.state.x_dot[:] = 0.0

@@ -1,8 +1,8 @@
 """Derivatives of the steady motion in every input and effect size, by the implicit function theorem.
 
-The orbit depends on a robot's numbers (`sim.solve.derivative`), and these on its inputs and effect sizes
-(`sim.solve.assembly`), which is differentiated automatically: an effect needs nothing of its own here. Derivatives
-are extrapolated in the mesh like the means themselves.
+The orbit depends on a robot's numbers (`sim.solve.derivative`). These depend on its inputs and effect sizes
+(`sim.solve.assembly`), and that part is differentiated automatically. So an effect needs no code for its
+derivative. Derivatives are extrapolated in the mesh, like the means.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from sim.solve.refinement import MANY
 INPUTS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "a_over_R")
 OUTPUTS = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_rad")
 
-_FORWARD = threading.Lock()  # torch keeps one level of forward differentiation for all threads
+_FORWARD = threading.Lock()  # torch has one level of forward differentiation for all threads together
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MA
         groups: robots of one N.
         parameters: names out of INPUTS and `sim.effects.catalogue()`; an effect that the robots do not carry is
             differentiated at its null.
-        phases: to begin with; an effect at its null may act in phases that the motion does not need.
+        phases: number of phases to begin with; an effect at its null may need more phases than the motion.
 
     Raises:
         InputError: an unknown parameter.
@@ -76,7 +76,7 @@ def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MA
 
 
 def _direction(groups: Groups, name: str) -> tuple[Floats, Floats]:
-    """How the robots' numbers change with a parameter in units of its own size, (B, K'), and that size (B,)."""
+    """Derivative of the robots' numbers in parameter/scale, (B, K'), and the scale, (B,)."""
     if name in INPUTS:
         value = getattr(groups, name)
         size = value.abs()

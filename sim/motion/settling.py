@@ -1,13 +1,13 @@
 """Settling: time stepping from rest until the motion is steady.
 
 A robot starts from rest with straight tails and is stepped in time (`sim.solve.march`). From time SETTLED on,
-means over whole revolutions of the disc are compared with those of the revolutions before; it is converged when
-all of them agree to DRIFT, and given up, flagged, at LONGEST. Every row is averaged over at least one whole
-revolution: with N = 2 a fraction of a revolution biases ω_yr. A row whose Newton iteration fails is tried once
-more with half the step.
+means over whole revolutions of the disc are compared with those of the revolutions before. The motion is converged
+when all means agree to DRIFT. At time LONGEST the run ends, and the row is flagged. Every mean is taken over at
+least one whole revolution, because with N = 2 a part of a revolution gives a wrong ω_yr. If Newton's method fails,
+the robot is tried once more with half the step.
 
-This is the reference for the orbits of `sim.motion.orbits`, and finds the branch that straight tails reach from
-rest, whether or not the tails move alike on it.
+This is the reference for the orbits of `sim.motion.orbits`. It finds the motion that straight tails reach from
+rest, also where the tails do not move alike. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ from sim.solve.assembly import bodies
 from sim.solve.march import PHASE, SURGE, SWAY, YAW, State
 
 SETTLED = 1.5  # time units before the first mean
-LONGEST = 12.0  # give up then, or as soon after as one mean over whole revolutions is known
+LONGEST = 12.0  # the run ends then, or later when the first mean over whole revolutions is known
 DRIFT = 2e-4  # relative change between consecutive means that counts as converged
 NO_REVOLUTION = "the tails do not complete a revolution"
 _WINDOW = 0.5  # shortest averaging time
-_CHUNK = 0.25  # time units between two looks at the means
+_CHUNK = 0.25  # time units after which the means are compared
 _MEANS = [PHASE, YAW, SWAY, SURGE]
 _GAP_SHAPES = 12  # shapes of the last revolution in which the gap between tails is measured
 
 
 @dataclass(frozen=True)
 class Settled:
-    """How one robot ended."""
+    """What came out for one robot."""
 
     means: Floats  # (4,): ω_t, ω_yr, v_x, v_z of the head's centre; NaN where failed
     drift: float
@@ -135,8 +135,8 @@ def _smallest_gap(run: Run, revolution: float) -> float:
 def _means(time: Floats, poses: Floats, omega: float, tails: int) -> tuple[Floats, float, bool]:
     """Rates (4,) over the last whole revolutions, their drift, and whether they are known.
 
-    The drift compares the last window with the one before it; where one revolution outlasts the
-    transient, with the same window an N-th of a revolution earlier, scaled up to a whole window.
+    The drift compares the last window with the one before it. Where one revolution is longer than the transient,
+    it compares with the same window an N-th of a revolution earlier, scaled up to a whole window.
     """
     phase = poses[:, PHASE] * np.sign(omega)
     unknown = np.full(4, np.nan), np.inf, False

@@ -23,7 +23,7 @@ def tails_over_a_revolution(robot: Robot, frames: int) -> tuple[Floats, Floats]:
     """Disc phases (F,) and tails (F, N, n + 1, 3), clamp to tip, with the motor in its positive direction.
 
     Raises:
-        InputError: the robot has no steady motion on which its tails move alike.
+        InputError: the robot has no steady motion in which its tails move alike.
     """
     groups = robot.groups()
     body = bodies(groups)[0]
@@ -37,7 +37,7 @@ def tails_over_a_revolution(robot: Robot, frames: int) -> tuple[Floats, Floats]:
     nodes = np.concatenate([root, x])
     tails = np.empty((frames, groups.N, len(nodes), 3))
     for j in range(groups.N):
-        turn = phases + 2 * np.pi * j / groups.N  # tail j is tail 0 a j-th part of a turn later
+        turn = phases + 2 * np.pi * j / groups.N  # tail j moves like tail 0, at the phase 2πj/N later
         shape = at_phases(nodes, turn)
         cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
         tails[:, j, :, 0] = cos * shape[..., 0] - sin * shape[..., 1]

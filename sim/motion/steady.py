@@ -1,10 +1,11 @@
-"""Steady motion at constant motor speed: as an orbit where that works, by time stepping where it does not.
+"""Steady motion at constant motor speed: solved for directly where that works, else by time stepping.
 
-The direct route (`sim.motion.orbits`) solves for the relative periodic orbit on which all tails move alike; it
-takes well under a millisecond a robot and gives the error of its means. Straight tails at rest reach that orbit
-wherever the robot turns slowly beside its disc (docs/branches.md). Where it may not (|ω_yr| > QUICK |ω_t|), the
-robot is stepped in time from rest as well, and what that reaches is the answer; where Newton's method fails in the
-direct route, stepping is the answer too. Such rows say so; their error is estimated from two meshes and steps.
+The direct solution (`sim.motion.orbits`) is the relative periodic orbit in which all tails move alike. It takes
+less than a millisecond a robot and states the error of its means. Straight tails at rest reach this orbit if the
+robot yaws slowly compared with the spin of its disc (docs/branches.md). If it yaws faster (|ω_yr| > QUICK |ω_t|),
+the robot is stepped in time from rest as well. If stepping reaches another motion, that one is the answer. If
+Newton's method does not converge, stepping gives the answer, too. Such rows say so. Their error is estimated from
+two meshes and steps. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from sim.solve.refinement import FEW, REASONS, SOLVED
 
 QUICK = 0.4  # ω_yr/ω_t from which straight tails may reach another motion
 SAME = 0.02  # relative difference up to which a stepped motion counts as the direct one
-_OTHER_MOTION = "straight tails reach another motion than the one on which they move alike"
+_OTHER_MOTION = "straight tails reach another motion than the one in which they move alike"
 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
@@ -76,7 +77,7 @@ def _rows(groups: Groups, rows: Integers) -> Groups:
 
 
 def orbits(groups: Groups, *, phases: int = FEW) -> Steady:
-    """The direct route alone, on `phases` phases to begin with; `failed` where it found no orbit."""
+    """The direct solution alone, with `phases` phases to begin with; `failed` where there is no orbit."""
     rows = np.ascontiguousarray(numbers(groups).detach().cpu().numpy().T)
     found = solve_orbits(rows, groups.N, phases=phases)
     means = found.means.T

@@ -1,9 +1,9 @@
-"""What is said of a steady motion, however it was found.
+"""Steady motion of robots: the numbers of a row, whichever way it was solved.
 
     means:  ω_t, ω_h, ω_yr, v_x, v_z (of the head's centre, body frame), over whole revolutions
     R_yr = √(v_x² + v_z²)/|ω_yr|,   θ = atan2(|v_x|, v_z)
 
-R_yr and θ belong to the tracked point; any other point of the axis follows from (v_x, v_z, ω_yr).
+R_yr and θ are those of the head's centre. Those of another point of the axis follow from (v_x, v_z, ω_yr).
 Units: l, μ0 l⁴/EI.
 """
 

@@ -1,4 +1,4 @@
-"""Compile all loops of the simulator, with progress: what a first use would otherwise wait for."""
+"""Compile all loops of the simulator, with progress, so that the first use need not wait for it."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ _STAGES: tuple[tuple[str, Callable[[], object]], ...] = (
 
 
 def compile_all() -> float:
-    """Call everything once, with progress on stderr; loops that are compiled already are only loaded.
+    """Call every loop once, with progress on stderr. Loops that are compiled already are only loaded.
 
     Returns:
-        Seconds that it took.
+        The time that it took, in seconds.
     """
     began = time.perf_counter()
     for i, (name, call) in enumerate(_STAGES):
@@ -44,7 +44,7 @@ def compile_all() -> float:
 
 
 def compile_once() -> None:
-    """Compile all loops unless that has been done: before processes start that would each compile them."""
+    """Compile all loops, unless that has been done. Call it before starting processes: each would compile."""
     if not all_compiled():
         print("first use: compiling the simulator's loops, about a minute", file=sys.stderr, flush=True)
         compile_all()

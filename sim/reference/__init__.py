@@ -1,1 +1,1 @@
-"""Slow and independent ways to the same answers, for tests and teaching: tensors, framed rods, linear theory."""
+"""Slow, independent solutions of the same problems, for tests and teaching: tensors, framed rod, linear theory."""

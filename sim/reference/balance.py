@@ -1,8 +1,8 @@
 """Force balance of the whole robot with tensors: residual and Newton matrix in the disc frame.
 
 Frames. Body: origin J (disc centre), e_z forward along the axis, e_y up, e_x = e_y × e_z. Disc: body
-turned about e_z by the phase φ, φ' = ω_t. Tails are held in the disc frame, so the clamps stand still
-and a constant motor speed gives an almost steady shape. Components below are in the disc frame:
+turned about e_z by the phase φ, φ' = ω_t. Positions are in the disc frame. There the clamps do not move, and the
+shape is almost steady at constant motor speed. Components below are in the disc frame:
 
     e_x = (cos φ, −sin φ, 0),   e_y = (sin φ, cos φ, 0),   e_z = (0, 0, 1).
 
@@ -14,11 +14,11 @@ The motor sets ω = ω_t − ω_h, so the unknown body velocity is u = (v_x, v_z
 (gain 1: the motor holds its speed). At low Reynolds number (no inertia):
 
     tails, each free node:   r_k = q_k(x, ẋ, u, φ) + f_k(x) + l_k b(φ) = 0   (drag + elastic force + load)
-    body, total wrench:      T = Gᵀ-projection of what the clamps transmit − R (u, ω_t) = 0
+    body, total wrench:      T = Gᵀ-projection of the loads at the clamps − R (u, ω_t) = 0
 
-T uses the force and moment that pass through each clamp (edge 0, its bending spring, drag on node 0)
-instead of the sum of drag over the tail: where r = 0 the two are equal, and the derivative of T then
-touches only the first two nodes. `fluid_wrench` is the other one, the sum over the fluid's loads.
+T contains the force and moment at each clamp (edge 0, its bending spring, drag on node 0), not the sum of drag
+over the tail. If r = 0, the two are equal. But the derivative of the force at the clamp depends only on the first
+two nodes. `fluid_wrench` is the sum over the loads of the fluid.
 
 The numbers of the robots, local effects included, come from `sim.solve.assembly`. Left out: inertia, contact
 between tails, the non-local effects. Units: length l, time μ0 l⁴/EI, force EI/l². Arrays (n, 3, N, B), see
@@ -47,7 +47,7 @@ from sim.solve.assembly import assemble
 
 @dataclass(frozen=True)
 class TensorRobots:
-    """A batch of B robots with N tails of n edges, ready to be balanced (dimensionless)."""
+    """A batch of B robots with N tails of n edges (dimensionless)."""
 
     n: int
     root: Tensor  # (1, 3, N, B): clamps in the disc frame
@@ -203,7 +203,7 @@ def newton_correction(
     _add_elastic(matrix, response.stiffness)
     _add_drag(matrix, shape, drag_, velocity, w, e_y, rate)
 
-    # Columns: how the body's velocities, and through ω_h the phase, move the drag.
+    # Columns: derivative of the drag in the body's velocities; ω_h changes the phase, too.
     by_phase = -w[0] * e_y + w[2] * torch.linalg.cross(e_x.expand_as(nodes), nodes, dim=1)  # ∂v/∂φ
     G_total = G.clone()
     G_total[3] = motor_gain(robots.body) * (G[3] + by_phase / rate)

@@ -7,14 +7,14 @@ Newton's matrix for one robot is
     [          A_N B_N ] [δx_N]   [r_N]
     [ C_1  …   C_N  D  ] [ δu ]   [ s ]
 
-with A_j block pentadiagonal in 3×3 blocks (a rod couples a node to two neighbours on either side), B_j
-four columns (the body's velocities move every node) and C_j non-zero on the two nodes next to the
-clamp only. A_j is eliminated from the tip to the root, so that the Schur complement D − Σ C_j A_j⁻¹ B_j
-needs the first six unknowns alone.
+A_j is block pentadiagonal in 3×3 blocks, since a rod couples a node to two neighbours on either side. B_j has four
+columns, since the body's velocities move every node. C_j is zero except at the two nodes next to the clamp. A_j is
+eliminated from the tip to the root, so that the Schur complement D − Σ C_j A_j⁻¹ B_j needs the first
+six unknowns only.
 
-No pivoting: A is (minus) drag plus stiffness, whose symmetric part is definite. For a handful of tails
-a dense LU is faster than many small vector operations, and the same entries are written into a dense
-array instead; a test holds the two equal.
+There is no pivoting: A is minus (drag plus stiffness), whose symmetric part is definite. For a few tails a dense
+LU is faster than many small vector operations. Then the same entries are written into a dense array; a test shows
+that both give the same result.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from torch import Tensor
 
 HALF_BANDWIDTH = 8  # two neighbours of three components, counted from the far corner of a block
 _ROW = 2 * HALF_BANDWIDTH  # a band is stored as a dense matrix whose rows overlap: row stride 16
-_DENSE_BELOW = 12  # tails: below this LAPACK on dense matrices wins on the machines tried
+_DENSE_BELOW = 12  # tails: for fewer, LAPACK on dense matrices was faster on the machines tried
 
 
 class BlockBanded:

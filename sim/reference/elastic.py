@@ -30,7 +30,7 @@ class EdgeStiffness(NamedTuple):
 
 
 class ElasticResponse(NamedTuple):
-    """Forces and stiffness of tails, and what the clamp transmits."""
+    """Forces and stiffness of tails, and the moment at the clamp."""
 
     edge_force: Tensor  # ∂E/∂e, (n, 3, N, B)
     stiffness: EdgeStiffness
@@ -77,7 +77,7 @@ def energy(shape: Shape, axial_stiffness: Tensor) -> Tensor:
 
 
 class _Joints(NamedTuple):
-    """The joint before each edge, and (zero beyond the tip) the joint after it."""
+    """The joint before each edge, and the joint after it (zero after the last edge)."""
 
     tangent: Vector
     cosine: Tensor

@@ -11,10 +11,10 @@ transport from an earlier configuration, so θ alone counts twist. At the node b
     E_b = ½ EI Σ (|κb|² − 2 κ·κ⁰ + |κ⁰|²) / l_k       (isotropic: |κ| = |κb|)
     E_t = ½ GJ Σ (τ − τ⁰)² / l_k,   GJ/EI = 2/3 for an incompressible rod (G = E/3)
 
-The paper's tails are straight and untwisted by nature. Then the twist of a free-ended rod relaxes to zero for any
-shape and exerts no force, and `sim.mechanics.rod` (no frames, analytic stiffness) is the same rod; the tests show
-both. This module is the reference for that, and the place where κ⁰ and τ⁰ enter; forces and stiffness come from
-automatic differentiation of the energy. Not batched, not used in time stepping.
+Without load, the paper's tails are straight and untwisted. Then the twist of a rod with a free end relaxes to zero
+for any shape and makes no force. So `sim.mechanics.rod` (no frames, analytic stiffness) is the same rod; tests
+show both. This module is the reference for it, and it has natural curvature κ⁰ and twist τ⁰. Forces and stiffness
+come from automatic differentiation of the energy. It has no batches and is not used in time steps.
 
 Units: EI = 1, l = 1. Source: Bergou et al. (2008, 2010); Jawed et al. (2018); the paper's eqs. 1-3.
 """

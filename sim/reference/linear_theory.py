@@ -1,4 +1,4 @@
-"""Linear theory of nearly straight tails: what the simulator must tend to for small deflections.
+"""Linear theory of nearly straight tails: the limit of the simulator for small deflections.
 
 A tail at distance a from the axis, turning steadily at ω_t, with w = x + iy in the frame of the disc:
 
@@ -6,9 +6,9 @@ A tail at distance a from the axis, turning steadily at ω_t, with w = x + iy in
 
     thrust = (ζ⊥ − ζ∥) ω_t ∫ Im(w* w') ds,   torque = ζ⊥ ω_t ∫ |w|² ds
 
-The robot then: torque of N tails against the head's, 8π C_r R³ |ω_h|; thrust against the drag of head and tails
-along the axis; the head's side force against the drag of head and of straight tails across it. Left out: the
-tails' share of the side force, bending by sway and yaw.
+Balance of the robot: the torque of N tails is equal to that of the head, 8π C_r R³ |ω_h|. The thrust is equal to
+the drag of head and tails along the axis. The head's side force is balanced by the drag of head and straight tails
+across the axis. Left out: the side force of the tails, and bending by sway and yaw.
 Units: l, μ0 l⁴/EI, EI/l². Source: Wiggins and Goldstein (1998) for the operator; the drag is that of
 `sim.mechanics.drag`.
 """

@@ -6,19 +6,19 @@ Every stage solves the balance r(x, ẋ, u, φ) = 0, T = 0 (`sim.reference.balan
 
     x = x* + τ ẋ,   φ = φ* + τ (ω + ω_h),   τ = γ dt,
 
-by Newton's method; one or two corrections are usual, since the predictor is good: in the disc frame the
-shape hardly moves. A segment of constant motor direction starts with one step of SDIRK2 (γ = 1 − 1/√2:
-one-step, L-stable) and goes on with BDF2 (γ = 2/3); both are of second order and stiffly stable, which
-stretching needs. A flip of the motor starts a new segment: the shape is continuous, velocities are not.
+by Newton's method. One or two corrections are enough in most steps, because in the disc frame the shape hardly
+changes and the prediction is good. After a flip of the motor the first step is SDIRK2 (γ = 1 − 1/√2, one-step,
+L-stable). All later steps are BDF2 (γ = 2/3). Both are of second order and stiffly stable, which is necessary
+because stretching is stiff. At a flip the shape is continuous, velocities are not.
 
 The pose is part of the same step (same formula, same order):
 
     ψ' = ω_yr,   X' = v_z cos ψ − h_x sin ψ,   Y' = v_z sin ψ + h_x cos ψ,   h_x = v_x + ω_yr L/2,
 
-the track of the head's centre in the plane seen from above: X along the starting heading, Y to its left,
-ψ counter-clockwise. ∫h_x dt and ∫v_z dt (body frame) are kept as well, for means.
+the track of the head's centre in the plane seen from above: X along the first heading, Y to its left, ψ
+counter-clockwise. The integrals of h_x and v_z (body frame) are stored as well, for means.
 
-A robot whose Newton iteration fails is marked and frozen; it never disturbs the others.
+If Newton's method fails for a robot, this robot is marked and stays as it is. The others go on.
 Units: length l, time μ0 l⁴/EI. Source: Alexander (1977) for SDIRK2; Hairer and Wanner, *Solving ODEs II*,
 V.1 for BDF2.
 """
@@ -56,11 +56,14 @@ def at_rest(robots: TensorRobots, phase: float = 0.0) -> TensorState:
     """Straight tails parallel to the axis, at time 0, heading along X.
 
     Raises:
-        InputError: the robots have non-local effects, which are not balanced here.
+        InputError: the robots have non-local effects, which these steps do not have.
     """
     present = [name for name, sizes in robots.body.nonlocal_terms._asdict().items() if bool(sizes.any())]
     if present:
-        raise InputError(f"steps with tensors leave out {', '.join(present)}; those of sim.motion have them")
+        raise InputError(
+            f"time steps with tensors do not have the effects {', '.join(present)}; "
+            "use softflagella.steady or softflagella.replay"
+        )
     x = robots.straight()
     pose = x.new_zeros(6, robots.robots)
     pose[PHASE] = phase
@@ -142,7 +145,7 @@ def _stage(
         phase = pose_star[PHASE] + tau * robots.omega_t(u, omega)
         dx, du = newton_correction(robots, x, x_dot, phase, u, omega, rate)
         size = torch.maximum(dx.abs().amax((0, 1, 2)), du.abs().amax(0) / scale)
-        # Damp what would bend a tail out of its neighbourhood in one go; keep settled robots still.
+        # Damp corrections that bend a tail too far at once; do not move robots that have converged.
         factor = torch.where(size.isfinite() & ~settled, (0.3 / size).clamp(max=1.0), 0.0)
         x = x + factor * dx.nan_to_num()
         u = u + factor * du.nan_to_num()

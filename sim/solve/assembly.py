@@ -1,6 +1,6 @@
-"""From robots to the numbers of their balance: the paper's model, and the effects that the robots carry.
+"""From robots to the numbers of their balance (`Body`): the paper's model, and the effects of the robots.
 
-Everything here is differentiable, so the derivative of a robot's numbers in any input or effect size is automatic.
+Everything here is differentiable. So torch gives the derivatives of a robot's numbers in any input or effect size.
 Source of the base model: Du, Miller, Jawed (arXiv 2103.05712).
 """
 
@@ -21,7 +21,7 @@ from sim.model.groups import Groups
 
 # Numbers of the non-local effects, by their names; plain numbers in compiled loops.
 Nonlocal = namedtuple("Nonlocal", [e.name for e in catalogue().values() if e.reach == "nonlocal"])  # type: ignore[misc]
-_SHAPES = {"resistance": (4, 5), "tail_load": (3,)}  # of the entries that are no single number
+_SHAPES = {"resistance": (4, 5), "tail_load": (3,)}  # of the entries that are not single numbers
 
 
 def assemble(groups: Groups) -> Body:
@@ -53,7 +53,7 @@ def assemble(groups: Groups) -> Body:
 
 
 def with_effects(body: Body, groups: Groups) -> Body:
-    """The body with the effects that `groups` carries: terms are added, then factors multiply.
+    """The body with the effects of `groups`: first all terms are added, then all factors multiply.
 
     Raises:
         InputError: an unknown effect.
@@ -80,7 +80,7 @@ def with_effects(body: Body, groups: Groups) -> Body:
 
 
 def numbers(groups: Groups) -> Tensor:
-    """The numbers of B robots one below the other, (K, B), in the order of `Body`; differentiable."""
+    """The numbers of B robots as rows, (K, B), in the order of `Body`; differentiable."""
     body = assemble(groups)
     parts = [getattr(body, name) for name in body._fields[:-1]] + list(body.nonlocal_terms)
     return torch.cat([part.reshape(-1, len(groups)) for part in parts])

@@ -2,8 +2,9 @@
 
     A_m δx_m + B_m δu = −r_m on every tail,   Σ_m C_m δx_m + D δu = −t on the robot
 
-A tail's own blocks are the derivatives of drag and elastic forces in the positions of its nodes. In a stage
-∂ẋ/∂x = rate is one of them. On an orbit ẋ joins the phases to each other; `sim.linear.coupled` adds that.
+The blocks of a tail are the derivatives of drag and elastic forces in the positions of its nodes. In a time step
+the blocks contain ∂ẋ/∂x = rate. On an orbit ẋ couples the phases; `sim.linear.coupled` adds this coupling.
+Units: l, μ0 l⁴/EI, EI/l².
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ from sim.solve.residual import Room
 
 
 class Equations(NamedTuple):
-    """Newton's matrix, and what is unbalanced."""
+    """Newton's matrix, and the residual."""
 
     chains: Chains
     resistance: Floats  # (n, M, 3, 3): −∂q/∂v of every free node
@@ -134,7 +135,7 @@ def _tail(body: Body, motion: Motion, rates: Rates, x: Floats, room: Room, equat
 
 @compiled
 def _clamp(body: Body, motion: Motion, rates: Rates, room: Room, equations: Equations, m: int, p: int) -> None:
-    """What column m puts on the disc at instant p."""
+    """Force and moment of column m on the disc at instant p."""
     clamp = clamp_balance(room.geometry, body, m, motion, ZERO, ZERO)
     chains, root = equations.chains, (body.offset, 0.0, 0.0)
     wrench = wrench_of(motion, clamp.force, clamp.moment)

@@ -1,17 +1,18 @@
 """Implicit time steps of one robot at constant motor speed, in the disc frame.
 
-Tails are held in the disc frame, where a constant motor speed gives an almost steady shape. Every stage solves the
-balance with x = x* + τ ẋ, φ = φ* + τ ω_t by Newton's method (`sim.solve.newton`); one or two corrections are
-usual, since the prediction is good. A segment of constant motor direction starts with one step of SDIRK2 (γ = 1 −
-1/√2: one-step, L-stable) and goes on with BDF2 (γ = 2/3). Both are of second order and stiffly stable, which
-stretching needs. The pose is part of the same step:
+Positions are in the disc frame, in which the shape is almost steady at constant motor speed. Every stage solves
+the balance with x = x* + τ ẋ, φ = φ* + τ ω_t by Newton's method (`sim.solve.newton`). One or two corrections are
+enough in most steps, because the prediction is good. After a flip of the motor the first step is SDIRK2 (γ = 1 −
+1/√2, one-step, L-stable). All later steps are BDF2 (γ = 2/3). Both are of second order and stiffly stable, which
+is necessary because stretching is stiff. The pose is part of the same step:
 
     ψ' = ω_yr,   X' = v_z cos ψ − h_x sin ψ,   Y' = v_z sin ψ + h_x cos ψ,   h_x = v_x + ω_yr L/2,
 
-the track of the head's centre seen from above: X along the starting heading, Y to its left, ψ counter-clockwise.
-∫h_x dt and ∫v_z dt (body frame) are kept as well, for means.
+the track of the head's centre seen from above: X along the first heading, Y to its left, ψ counter-clockwise. The
+integrals of h_x and v_z (body frame) are stored as well, for means.
 
-`sim.reference.stepper` does the same with tensors; a test shows that the two agree. Units: l, μ0 l⁴/EI, EI/l².
+`sim.reference.stepper` takes the same steps with tensors; a test shows that the two agree.
+Units: l, μ0 l⁴/EI, EI/l².
 Source: Alexander (1977) for SDIRK2; Hairer and Wanner, *Solving ODEs II*, V.1 for BDF2.
 """
 
@@ -35,7 +36,7 @@ GAMMA = 1 - 1 / np.sqrt(2)
 
 
 class State(NamedTuple):
-    """Where a robot is; changed in place by `advance`. Shapes are (n, N, 3), every tail in its own frame."""
+    """Shape, pose and velocities of a robot, changed in place by `advance`; tails are in their own frames."""
 
     x: Floats
     x_dot: Floats
@@ -54,14 +55,14 @@ def new_state(tails: int, edges: int, offset: float) -> State:
 def advance(
     body: Body, state: State, dt: float, count: int, tolerance: float, poses: Floats, shapes: Floats
 ) -> bool:
-    """Make `count` steps of dt at constant motor speed, from a state without memory of earlier steps.
+    """Make `count` steps of dt at constant motor speed; the first is a one-step method.
 
     Args:
         poses: (count, 6), filled with the pose after every step.
         shapes: (K, n, N, 3), filled with the shape after each of the last K steps.
 
     Returns:
-        Whether every step converged; if not, the state is where it broke down.
+        Whether every step converged. If not, the state is that of the step that failed.
     """
     x, x_dot, pose, u = state
     if not 0 < dt < np.inf:

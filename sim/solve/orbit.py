@@ -1,17 +1,19 @@
 """Relative periodic orbit: the steady motion at constant motor speed, solved for directly.
 
-At constant ω the robot's shape and velocities repeat with the disc's phase φ. Taking φ itself as the independent
-variable, ẋ = ω_t dx/dφ, there is no unknown period:
+At constant ω the robot's shape and velocities repeat with the disc's phase φ. With φ as the independent variable,
+ẋ = ω_t dx/dφ, and there is no unknown period:
 
     r(x(φ), ω_t x'(φ), u(φ), φ) = 0 on each tail,   t(φ) = 0 on the robot,   x and u 2π-periodic.
 
-Tails are equal and evenly spaced, so on the branch where they move alike tail j is tail 0 a j-th part of a turn
-later: one tail at all phases stands for all of them, and u has period 2π/N. x is collocated at M = N P phases
-φ_m = π/2 + 2π m/M (so placed, the mirror image of a robot is solved on the mirror image of the phases), u at the P
-phases of one period. d/dφ is the derivative of the trigonometric interpolant (spectral accuracy: at low ω̄ the
-shape hardly depends on φ and M = 4 to 8 phases do). Newton's method on all phases together (`sim.solve.newton`).
+Tails are equal and evenly spaced. In the motion in which they move alike, tail j at phase φ has the shape of tail
+0 at phase φ + 2πj/N. So one tail at all phases is enough, and u has the period 2π/N. x is collocated at M = N P
+phases φ_m = π/2 + 2π m/M, u at the P phases of one period. (The mirror image of this set of phases is the same
+set, so a reversed motor gives exactly the mirror image.) d/dφ is the derivative of the trigonometric interpolant.
+It has spectral
+accuracy: at low ω̄ the shape hardly depends on φ, and M = 4 to 8 phases are enough. Newton's method solves for all
+phases together (`sim.solve.newton`).
 
-Left out: branches on which the tails move differently (time stepping finds those, `sim.motion.settling`).
+Left out: motions in which the tails move differently (time stepping finds those, `sim.motion.settling`).
 Units: l, μ0 l⁴/EI, EI/l². Source: the paper's model (arXiv 2103.05712); for collocation Trefethen (2000), ch. 3.
 """
 
@@ -31,12 +33,12 @@ from sim.solve.rates import on_orbit
 from sim.solve.residual import fill_residual, new_room
 
 FIRST_PHASE = np.pi / 2
-_HEAD_SHARE = 0.3  # of the motor's speed, to begin with
+_HEAD_SHARE = 0.3  # of the motor's speed, in the first guess
 
 
 @compiled
 def straight_start(body: Body, n: int, phases: int, tails: int) -> tuple[Floats, Floats]:
-    """x (n, M, 3) and u (P, 4) of straight tails on a robot that shares the motor's speed with its head."""
+    """First guess: x (n, M, 3) and u (P, 4) of straight tails, with a part of the motor's speed in the head."""
     u = np.zeros((phases // tails, 4))
     u[:, 3] = -_HEAD_SHARE * body.omega
     return straight(n, phases, body.offset), u
@@ -51,7 +53,7 @@ def solve_orbit(body: Body, x: Floats, u: Floats, tolerance: float) -> tuple[int
 
 @compiled
 def residual_on_orbit(body: Body, x: Floats, u: Floats) -> tuple[Floats, Floats]:
-    """What is unbalanced at x (n, M, 3), u (P, 4): r (n, M, 3) on the nodes and t (P, 4) on the robot."""
+    """The residual at x (n, M, 3), u (P, 4): r (n, M, 3) on the nodes and t (P, 4) on the robot."""
     room = new_room(x, u)
     r, t = np.empty_like(x), np.empty_like(u)
     fill_residual(body, on_orbit(x.shape[1], FIRST_PHASE), x, u, room, r, t)
@@ -67,7 +69,7 @@ def largest_force(body: Body, x: Floats) -> float:
 
 
 def mean_tail_wrench(body: Body, x: Floats, u: Floats) -> Floats:
-    """(F_x, F_z, M_y, M_z) about J that the tails put on the disc, mean over the phases, (4,)."""
+    """(F_x, F_z, M_y, M_z) of the tails on the disc about J, mean over the phases, (4,)."""
     _, t = residual_on_orbit(body, x, u)
     on_head = [[head_drag(body, now, a) for a in range(4)] for now in u]
     return np.asarray((t + np.array(on_head)).mean(0))
@@ -99,7 +101,7 @@ def turns_forward(body: Body, u: Floats) -> bool:
 
 @compiled
 def smallest_gap(body: Body, x: Floats, tails: int) -> float:
-    """Smallest gap between tails over a revolution, over 2 r0; tail j is tail 0 a j-th part of a turn later."""
+    """Smallest gap between tails in a revolution, over 2 r0."""
     x = with_phases(x, 2 * x.shape[1])
     spacing = x.shape[1] // tails
     shape, smallest = np.empty((x.shape[0], tails, 3)), np.inf

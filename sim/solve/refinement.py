@@ -1,13 +1,14 @@
-"""How many phases and edges an orbit needs, what its means are for n → ∞, and their error.
+"""Number of phases and meshes of an orbit, the limit of its means for n → ∞, and their error.
 
-1. From straight tails on the coarsest mesh, with more and more phases until the means stop changing. The change
-   from one number of phases to the next is the error of the smaller one.
-2. On finer meshes from the solution before. Rods converge at second order (error c₂/n² + c₄/n⁴ + …), so the means
-   on n = 6, 8 and 12 edges are extrapolated to n → ∞. The error is put at what the term c₄ changed plus 3 % of
-   what extrapolation changed at all: over the sweep's domain that covers the true one in more than 95 % of rows.
+1. The first solution starts from straight tails on the coarsest mesh. Phases are added until the means stop
+   changing. The change from one number of phases to the next is the error of the smaller number.
+2. Finer meshes start from the solution before. Rods converge at second order (error c₂/n² + c₄/n⁴ + …), so the
+   means on n = 6, 8 and 12 edges are extrapolated to n → ∞. The stated error is the change by the term c₄ plus 3 %
+   of the whole change by extrapolation. Over the sweep it is larger than the true error in more than 95 % of the
+   rows.
 
-Each robot says how it ended: solved, or why not. Left out: whether the orbit is stable; docs/branches.md has where
-it is not.
+Every result says whether the robot was solved, and if not, why. Left out: whether the orbit is stable;
+docs/branches.md says where it is not. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -42,13 +43,13 @@ REASONS = {
     BACKWARDS: "the tails stop or turn backwards during a revolution",
     UNBALANCED: "forces are left unbalanced",
 }
-CORRECTION = 1e-6  # last Newton correction; convergence is quadratic, but stretching is stiff: see BALANCED
-ROUGH = 1e-5  # the same on the coarser meshes, where only the means are wanted: it leaves 1e-9 of them
-BALANCED = 1e-5  # largest unbalanced force over the largest that an edge carries
-FEW, MANY = 3, 12  # phases to begin with; a derivative may depend on the phase where the motion hardly does
+CORRECTION = 1e-6  # limit of the last Newton correction on the finest mesh; stretching is stiff: see BALANCED
+ROUGH = 1e-5  # the same on coarser meshes, where only the means are needed: their error is then about 1e-9
+BALANCED = 1e-5  # largest unbalanced force over the largest force in an edge
+FEW, MANY = 3, 12  # phases to begin with; MANY for derivatives, which may depend more on the phase than the motion
 _PHASE_ERROR = 1e-4  # relative, in the means
 _DOUBT = 0.03  # share of the extrapolation that counts as error
-_SHRINKS = 0.2  # assumed fall of the phase error with the next number of phases, where only one is known
+_SHRINKS = 0.2  # assumed factor on the phase error with the next number of phases, if only one is known
 _MOST_PHASES = 48
 
 
@@ -77,7 +78,7 @@ def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
 
 
 def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Floats]:
-    """The orbit on a mesh of one's own: whether there is one, x (n, M, 3) and u (P, 4)."""
+    """The orbit on a given mesh: whether there is one, x (n, M, 3) and u (P, 4)."""
     if tails > _MOST_PHASES:
         return False, np.zeros((edges, tails, 3)), np.zeros((1, 4))
     ended, _, x, u = _enough_phases(body, without_nonlocal(body), tails, FEW)
@@ -101,7 +102,7 @@ def _unsolved(ended: int, x: Floats, u: Floats) -> Orbit:
 
 @compiled
 def _on_finer_meshes(body: Body, error: float, x: Floats, u: Floats) -> Orbit:
-    """The orbit on all MESHES from that on the coarsest, and its means; `error` is what the phases leave."""
+    """The orbit on all MESHES, from that on the coarsest, and its means; `error` is that of the phases."""
     xs, us = (x, x, x), (u, u, u)
     rates = on_orbit(x.shape[1], FIRST_PHASE)
     for i in (1, 2):
@@ -140,17 +141,17 @@ def _on_finer_meshes(body: Body, error: float, x: Floats, u: Floats) -> Orbit:
 
 @compiled
 def _is_balanced(body: Body, x: Floats, u: Floats) -> bool:
-    """Whether what is left unbalanced is small beside the forces that the edges carry."""
+    """Whether the unbalanced forces are small compared with the forces in the edges."""
     r, t = residual_on_orbit(body, x, u)
     return bool(max(np.max(np.abs(r)), np.max(np.abs(t))) < BALANCED * largest_force(body, x))
 
 
 @compiled
 def _enough_phases(body: Body, plain: Body, tails: int, least: int) -> tuple[int, float, Floats, Floats]:
-    """How the coarsest mesh ended, the error that its phases leave, x and u; with `least` phases or more.
+    """On the coarsest mesh, with `least` phases or more: SOLVED or why not, the error of the phases, x and u.
 
-    First a rough solution for the robot without its non-local effects (`plain`) on the fewest phases. Then more
-    and more phases, each from the solution before, until the means stop changing.
+    The first solution is a rough one for the robot without its non-local effects (`plain`), on the fewest phases.
+    Then phases are added, each time from the solution before, until the means stop changing.
     """
     n = MESHES[0]
     phases = tails * int(np.ceil(2 / tails))

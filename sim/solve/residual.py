@@ -1,10 +1,10 @@
-"""What is left unbalanced on a robot: drag, elastic forces and loads on every node, the wrench on the robot.
+"""The residual of a robot's balance: drag, elastic forces and loads on every node, and the wrench on the robot.
 
     r = 0 on every free node, t = (F_x, F_z, M_y, M_z) = 0 about J
 
-`fill_residual` sums up everything that acts. Beside local drag and the elastic forces of straight tails
-(`sim.mechanics.balance`) these are the non-local effects: material frames (`frames`), flow from one part to
-another (`flow`) and friction of the contact line. A new one is called in `_surround`.
+`fill_residual` adds up all forces: local drag and the elastic forces of straight tails (`sim.mechanics.balance`),
+and the non-local effects. These are material frames (`frames`), flow between the parts (`flow`) and friction of
+the contact line. A new non-local effect is called in `_surround`. Units: l, μ0 l⁴/EI, EI/l².
 
 The Newton matrices of `sim.solve.linearise` leave the non-local effects out; GMRES takes them into account
 (`sim.solve.newton`).
@@ -30,7 +30,7 @@ from sim.solve.rates import Rates, base_phase, fill_rates
 
 
 class Surroundings(NamedTuple):
-    """What non-local effects bring about; zero without them."""
+    """Results of the non-local effects; zero without them."""
 
     flow: Floats  # of the fluid at nodes 0..n, (n + 1, M, 3)
     moment: Floats  # further moment of each clamp on the disc, (M, 3)
@@ -65,7 +65,7 @@ def is_local(body: Body) -> bool:
 
 @compiled
 def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r: Floats, t: Floats) -> None:
-    """What is unbalanced at x (n, M, 3), u (P, 4).
+    """The residual at x (n, M, 3), u (P, 4).
 
     Args:
         r: (n, M, 3), filled.
@@ -97,7 +97,7 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
 
 @compiled
 def _surround(body: Body, x: Floats, u: Floats, phase: float, p: int, tails: int, room: Room) -> None:
-    """Everything non-local at instant p. Forces in the tails come first, since the flow is made of them."""
+    """All non-local effects at instant p. The forces in the tails come first, because the flow depends on them."""
     if is_local(body):
         return
     geometry, around, columns = room.geometry, room.around, x.shape[1]

@@ -1,0 +1,62 @@
+"""Pages of the documentation, and what stands in them."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+from types import ModuleType
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(p for p in DOCS.rglob("*.md") if not {"generated", "_build"} & set(p.relative_to(DOCS).parts))
+_NOT_RUN = r"(?P<before><!-- not run: (?P<reason>.+?) -->\s*\n+)?"
+_BLOCK = re.compile(_NOT_RUN + r"^```(?P<language>\w+)\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL)
+_NAME = re.compile(r"`([^`]+)`")
+
+
+class Block(NamedTuple):
+    """A block of code; it is run unless a reason says why not."""
+
+    language: str
+    code: str
+    reason: str
+
+
+def name_of(page: Path) -> str:
+    """A page's path in the folder of the documentation."""
+    return page.relative_to(DOCS).as_posix()
+
+
+def blocks(page: Path) -> list[Block]:
+    """The blocks of code on a page, in order."""
+    found = _BLOCK.finditer(page.read_text())
+    return [Block(match["language"], match["code"], match["reason"] or "") for match in found]
+
+
+def glossary() -> dict[str, str]:
+    """Unit by name in code; the unit is empty in tables without one."""
+    units: dict[str, str] = {}
+    header: list[str] = []
+    for line in (DOCS / "reference" / "glossary.md").read_text().splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if not line.startswith("|"):
+            header = []
+        elif not header:
+            header = cells
+        elif not cells[0].startswith("---"):
+            row = dict(zip(header, cells, strict=True))
+            for name in _NAME.findall(row["in code"] if "in code" in row else row["name"]):
+                units.setdefault(name, row.get("unit", ""))
+    return units
+
+
+def generator() -> ModuleType:
+    """docs/generate.py as a module."""
+    spec = importlib.util.spec_from_file_location("generate", DOCS / "generate.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

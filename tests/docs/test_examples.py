@@ -1,0 +1,82 @@
+"""The pages' examples run: the blocks of a page, in order, in an empty folder."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from sim.inputs import load_robot
+from tests.docs.pages import DOCS, PAGES, ROOT, blocks, name_of
+
+RUN = ("sh", "python")
+SLOW = {"tutorial/closing.md", "tutorial/schedule.md", "howto/effect.md", "howto/cluster.md"}
+SHOWN = {*RUN, "toml", "text"}
+
+
+def marked() -> list[Any]:
+    """Pages with something to run; the slow ones are marked."""
+    pages = [p for p in PAGES if any(b.language in RUN and not b.reason for b in blocks(p))]
+    return [pytest.param(p, id=name_of(p), marks=[pytest.mark.slow] if name_of(p) in SLOW else []) for p in pages]
+
+
+def environment(folder: Path) -> dict[str, str]:
+    """An environment in which `softflagella` is the command of this source tree."""
+    command = folder / "softflagella"
+    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m softflagella "$@"\n')
+    command.chmod(0o755)
+    path = os.pathsep.join([str(folder), os.environ.get("PATH", "")])
+    return {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)}
+
+
+@pytest.mark.parametrize("page", marked())
+def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    commands, work = tmp_path / "bin", tmp_path / "work"
+    commands.mkdir()
+    work.mkdir()
+    monkeypatch.chdir(work)
+    shell, names = environment(commands), {"__name__": "__page__"}
+    for block in blocks(page):
+        if block.reason or block.language not in RUN:
+            continue
+        if block.language == "python":
+            exec(compile(block.code, name_of(page), "exec"), names)
+        else:
+            done = subprocess.run(
+                ["sh", "-e", "-c", block.code], env=shell, cwd=work, capture_output=True, text=True, check=False
+            )
+            assert done.returncode == 0, f"{block.code}\n{done.stdout}\n{done.stderr}"
+
+
+def test_every_block_is_of_a_known_language() -> None:
+    """A block that is to be run but is written as another language would pass unseen."""
+    for page in PAGES:
+        fences = [line for line in page.read_text().splitlines() if line.startswith("```") and line != "```"]
+        directives = [line for line in fences if line.startswith("```{")]
+        found = blocks(page)
+        assert len(found) == len(fences) - len(directives), name_of(page)
+        assert {block.language for block in found} <= SHOWN, name_of(page)
+
+
+def test_the_robot_on_the_page_of_files_is_one(tmp_path: Path) -> None:
+    robot = next(block for block in blocks(DOCS / "reference" / "files.md") if block.language == "toml")
+    file = tmp_path / "robot.toml"
+    file.write_text(robot.code)
+    assert load_robot(file).tails == 2
+    file.write_text(
+        robot.code.replace("# [effects]", "[effects]").replace("# end_", "end_").replace("# disc", "disc")
+    )
+    assert load_robot(file).effects == {"end_over_end_drag": 5.0}
+    assert load_robot(file).disc_offset == 0.016
+
+
+def test_toml_on_pages_is_toml() -> None:
+    for page in PAGES:
+        for block in blocks(page):
+            if block.language == "toml":
+                tomllib.loads(block.code)

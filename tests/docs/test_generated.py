@@ -1,0 +1,89 @@
+"""Pages that are written from the code contain what the code declares, and pages name only what there is."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from dataset.schema import FLAGS, INPUTS, OUTPUTS
+from sim.effects import catalogue
+from softflagella.__main__ import PACKAGES
+from tests.docs.pages import DOCS, PAGES, ROOT, generator, name_of
+
+TOP = (*PACKAGES, "softflagella", "benchmarks", "tests")
+_MODULE = re.compile(rf"`((?:{'|'.join(TOP)})(?:\.\w+)+)`")
+_COMMAND = re.compile(rf"python -m ((?:{'|'.join(TOP)})(?:\.\w+)*)")
+_FILE = re.compile(rf"`((?:{'|'.join((*TOP, 'docs'))})/[\w/.-]+)`")
+SOURCES = sorted(file for top in (*PACKAGES, "softflagella", "benchmarks") for file in (ROOT / top).rglob("*.py"))
+
+
+def test_the_page_of_effects_has_each() -> None:
+    page = generator().effects_page()
+    for effect in catalogue().values():
+        for words in (f"`{effect.name}`", effect.title, f"`{effect.equation}`", effect.source, effect.unit):
+            assert words.replace("|", "\\|") in page, effect.name
+        for driver in effect.drivers:
+            assert f"`{driver.name}`" in page
+
+
+def test_the_page_of_columns_has_each() -> None:
+    page = generator().columns_page()
+    for column in (*INPUTS, *OUTPUTS, *FLAGS):
+        assert f"| `{column.name}` | {column.type} | {column.unit} | {column.meaning} |" in page
+
+
+def test_the_page_of_commands_has_each() -> None:
+    page = generator().commands_page()
+    for package in PACKAGES:
+        for name in import_module(f"{package}.__main__").program.names:
+            assert f"usage: softflagella {package} {name}" in page
+
+
+def test_generated_pages_are_written_once(tmp_path: Path) -> None:
+    write = generator().write_generated_pages
+    write(tmp_path / "new")
+    files = sorted((tmp_path / "new").iterdir())
+    assert [file.name for file in files] == ["columns.md", "commands.md", "effects.md"]
+    before = [file.stat().st_mtime_ns for file in files]
+    write(tmp_path / "new")
+    assert [file.stat().st_mtime_ns for file in files] == before
+
+
+def exists(name: str) -> bool:
+    """Whether a dotted name is a module, or something in one."""
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        module = ".".join(parts[:count])
+        try:
+            if find_spec(module) is None:
+                continue
+        except ModuleNotFoundError:
+            continue
+        value: object = import_module(module)
+        for part in parts[count:]:
+            if not hasattr(value, part) and part not in getattr(value, "__annotations__", {}):
+                return False
+            value = getattr(value, part, None)
+        return True
+    return False
+
+
+@pytest.mark.parametrize("file", [*PAGES, *SOURCES], ids=lambda f: f.relative_to(ROOT).as_posix())
+def test_what_is_named_exists(file: Path) -> None:
+    text = file.read_text()
+    for name in {*_MODULE.findall(text), *_COMMAND.findall(text)}:
+        assert exists(name), f"{file.relative_to(ROOT)} names {name}"
+    for path in _FILE.findall(text):
+        assert (ROOT / path).exists(), f"{file.relative_to(ROOT)} names {path}"
+
+
+def test_every_page_is_in_the_table_of_contents() -> None:
+    entries = (DOCS / "index.md").read_text().splitlines()
+    for page in PAGES:
+        name = name_of(page).removesuffix(".md")
+        if not name.startswith("decisions/0"):  # found by their numbers
+            assert name == "index" or name in entries

@@ -1,0 +1,65 @@
+"""The glossary has every name that people meet: columns, keys, options of the model, public names."""
+
+from __future__ import annotations
+
+import re
+from typing import get_type_hints
+
+import numpy as np
+import pytest
+
+import softflagella as sf
+from calibration.influences import influences
+from calibration.measurements import KNOWN_COLUMNS
+from calibration.tracks import COLUMNS
+from dataset.schema import FLAGS, INPUTS, OUTPUTS
+from planner.export import dwell_table
+from planner.plan import plan_record
+from sim.effects import catalogue
+from sim.model.body import Body
+from sim.model.groups import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS
+from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS
+from tests.docs.pages import glossary
+
+
+def plan_names() -> set[str]:
+    """Keys of plan.json, and columns of plan.csv and of a track."""
+    robot = sf.load_robot("paper-control")
+    result = sf.plan(sf.circle(2.0), robot)
+    record = plan_record(result)
+    inside = {key for value in record.values() if isinstance(value, dict) for key in value}
+    schedule = sf.Schedule(robot.group_values(), 1, np.array([0.05]), (0.0, 0.0, 0.0), robot.time_scale)
+    return {*record, *inside, *dwell_table(result), *sf.replay(schedule), "code_version"}
+
+
+def sources() -> dict[str, set[str]]:
+    effects = catalogue()
+    return {
+        "a robot's numbers": {*Body._fields},
+        "groups": {*GROUP_COLUMNS, *OPTIONAL_COLUMNS, DWELL},
+        "a data set": {column.name for column in (*INPUTS, *OUTPUTS, *FLAGS)},
+        "steady motion": {*STEADY_COLUMNS, *QUALITY_COLUMNS},
+        "measured tables": {*KNOWN_COLUMNS},
+        "camera tracks": {*COLUMNS},
+        "effects": {*effects, *(driver.name for effect in effects.values() for driver in effect.drivers)},
+        "influences": {*influences()},
+        "public names": {*sf.__all__},
+    }
+
+
+@pytest.mark.parametrize("source", sources())
+def test_every_name_is_in_the_glossary(source: str) -> None:
+    assert sources()[source] - set(glossary()) == set()
+
+
+def test_names_in_plans_and_tracks_are_in_the_glossary() -> None:
+    assert plan_names() - set(glossary()) == set()
+
+
+def test_a_robots_numbers_have_their_unit() -> None:
+    """As declared, alone or as one of several ("m; l inside")."""
+    units = glossary()
+    for name, hint in get_type_hints(Body, include_extras=True).items():
+        (meaning,) = hint.__metadata__
+        given = {part.removesuffix(" inside").strip() for part in re.split(";", units[name])}
+        assert meaning.unit in given, name
