@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from sim.arrays import Floats
+from sim.motion.response import Responses
 
 
 class LookupTable(Protocol):
@@ -39,10 +40,20 @@ class LookupTable(Protocol):
     def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
         """Outputs, each (M,), of robots given by column name, each (M,).
 
-        The steady ones are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`, `theta_deg`,
-        `tail_gap`; with a column `dwell_bar` also `net_speed_bar`, `lag_psi_rad`, `lag_x`, `lag_z`.
+        They are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`, `theta_deg`, `tail_gap`.
 
         Raises:
-            InputError: a robot is not possible, or it is outside the domain.
+            InputError: a robot that cannot be, or one outside the domain.
+        """
+        ...
+
+    def response(self, columns: Mapping[str, Floats]) -> Responses:
+        """Response to a flip of the motor, as `sim.motion.response.responses` would simulate it.
+
+        Args:
+            columns: robots by column name, each (M,); the sign of `omega_bar` is the motor's direction after the flip.
+
+        Raises:
+            InputError: a robot that cannot be, or one outside the domain.
         """
         ...
