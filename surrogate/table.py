@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from sim.arrays import Floats
-from sim.motion.response import Responses
+from sim.model.response import Responses
 
 
 class LookupTable(Protocol):
@@ -40,7 +40,8 @@ class LookupTable(Protocol):
     def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
         """Outputs, each (M,), of robots given by column name, each (M,).
 
-        They are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`, `theta_deg`, `tail_gap`.
+        They are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`, `theta_deg` and
+        `tail_gap`.
 
         Raises:
             InputError: a robot that cannot be, or one outside the domain.
@@ -51,7 +52,7 @@ class LookupTable(Protocol):
         """Response to a flip of the motor, as `sim.motion.response.responses` would simulate it.
 
         Args:
-            columns: robots by column name, each (M,); the sign of `omega_bar` is the motor's direction after the flip.
+            columns: robots by column name, each (M,); the sign of `omega_bar` is the direction after the flip.
 
         Raises:
             InputError: a robot that cannot be, or one outside the domain.

@@ -1,38 +1,24 @@
-"""The response of a robot to a flip of its motor: curves over the dwell, and over the dwell before.
+"""Simulate the response of robots to a flip of the motor (`sim.model.response` says what the curves are).
 
-After a flip the tails need about 0.7 time units to turn over, and meanwhile the robot lags the circle of its new
-steady motion. With g(T) the pose change in a dwell of length T, in the frame of the pose at the flip,
-
-    g(T) = lag(T) ∘ circle(T),   lag = (Δz, Δx, Δψ)
-
-and the lag stops changing after about two time units. So one simulated flip gives the response to every dwell.
-Three things change it:
-
-    before   a dwell before the flip that was too short for the tails to turn over: `memory` is added to the lag.
-             Dwells before that one hardly matter (below 1e-4 l and rad where none is shorter than 0.3).
-    rest     the first dwell of all starts from straight tails at rest
-    phase    of the disc at the flip, which nobody knows: curves are means over it, `spread` their deviation
-
-Equal dwells of T make the net speed v̄ = |p + Rot(Δψ) M p| / 2T with g = (p, Δψ) and M the mirror image.
-
-Solved for directly (`sim.solve.transient`) where the steady motion is; by time steps where it is not. A robot's
-curves are those of its direction of the motor (the sign of ω̄), seen as for a positive motor. Units: l, μ0 l⁴/EI.
+One flip from the steady motion in the other direction gives the response to every dwell. Flips from the shapes that
+it passes through give the response after short dwells. Solved for directly (`sim.solve.transient`) where the steady
+motion is, on two meshes, extrapolated; by time steps where it is not. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from sim.arrays import Flags, Floats
+from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.linear.spectral import with_phases
 from sim.mechanics import planar
 from sim.mechanics.geometry import straight
 from sim.model.body import Body
 from sim.model.groups import Groups
+from sim.model.response import BEFORE, DWELLS, SETTLED, Responses, at_equal_dwells
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady
 from sim.motion.stepped_response import stepped_response
@@ -41,29 +27,11 @@ from sim.solve.orbit import mean_motion, solve_orbit
 from sim.solve.refinement import CORRECTION, orbit_on_mesh
 from sim.solve.transient import lag_at, transient
 
-DWELLS = np.geomspace(0.2, 4.0, 25)  # T̄ of the curves
-BEFORE = np.array([0.2, 0.25, 0.32, 0.42, 0.6, 0.9])  # T̄ of the dwell before
-FORGOTTEN = 1.4  # T̄ of the dwell before from which on the response is that after a long one
-SETTLED = 2.0  # time units after a flip from which the lag is constant
 _SAME = 1.2  # time units from which the memory is constant
 _MESHES = (6, 9)  # edges; errors go as 1/n², extrapolated
 _TOLERANCE = 1e-3  # of a time step, in l: see `sim.solve.transient`
 _FLIPPED = np.array([-1.0, 1.0, -1.0, -1.0])  # of (v_x, v_z, ω_yr, ω_h)
 _LEAST_INSTANTS = {1: 3, 2: 3}  # by N; with more tails the phase at the flip hardly matters
-
-
-@dataclass(frozen=True)
-class Responses:
-    """Response of B robots, over D dwells and K dwells before; lags are (Δz, Δx, Δψ) in l, l, rad; NaN if
-    failed."""
-
-    lag: Floats  # (B, D, 3)
-    memory: Floats  # (B, K, D, 3), added to the lag
-    rest: Floats  # (B, D, 3): the lag of a first dwell
-    spread: Floats  # (B, D, 3), standard deviation of the lag over the disc's phase at the flip
-    net_speed: Floats  # (B, D), of equal dwells
-    failed: Flags  # (B,)
-    stepped: Flags  # (B,): by time steps
 
 
 class Curves(NamedTuple):
@@ -82,9 +50,8 @@ def responses(groups: Groups, motion: Steady | None = None, *, history: bool = T
     Args:
         groups: robots; the sign of ω̄ is the direction of the motor after the flip.
         motion: the robots' steady motion, if it is at hand.
-        history: with memory and rest, which cost three times as much as the rest. Without, both are NaN, and the
-            net
-            speed is where the dwell before is not FORGOTTEN.
+        history: simulate memory and rest, too; it takes four times as long. Without, both are NaN, and so is the
+            net speed of dwells shorter than FORGOTTEN.
     """
     check_groups(groups)
     motion = steady(groups) if motion is None else motion
@@ -107,22 +74,6 @@ def responses(groups: Groups, motion: Steady | None = None, *, history: bool = T
     for array in (lag, memory, rest, spread, speed):
         array[failed] = np.nan
     return Responses(lag, memory, rest, spread, speed, failed, stepped)
-
-
-def at_equal_dwells(memory: Floats) -> Floats:
-    """Memory (..., K, D, 3) where the dwell before is as long as the dwell, (..., D, 3)."""
-    return np.stack([memory_after(memory, dwell)[..., i, :] for i, dwell in enumerate(DWELLS)], -2)
-
-
-def memory_after(memory: Floats, before: float) -> Floats:
-    """Memory (..., K, D, 3) after a dwell of length `before`, (..., D, 3): linear between BEFORE and FORGOTTEN."""
-    if before >= FORGOTTEN:
-        return np.zeros_like(memory[..., 0, :, :])
-    k = max(int(np.searchsorted(BEFORE, before, side="right")) - 1, 0)
-    if k == len(BEFORE) - 1:
-        return (FORGOTTEN - before) / (FORGOTTEN - BEFORE[k]) * memory[..., k, :, :]
-    share = (before - BEFORE[k]) / (BEFORE[k + 1] - BEFORE[k])
-    return (1 - share) * memory[..., k, :, :] + share * memory[..., k + 1, :, :]
 
 
 def _solved(body: Body, tails: int, even: bool, history: bool) -> Curves | None:

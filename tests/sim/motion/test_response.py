@@ -8,11 +8,12 @@ import pytest
 
 from sim.mechanics import planar
 from sim.model.groups import Groups
+from sim.model.response import BEFORE, DWELLS, FORGOTTEN, Responses, at_equal_dwells, memory_after
 from sim.model.schedule import Schedule
 from sim.motion import response
 from sim.motion.replay import replay
 from sim.motion.resolution import Resolution
-from sim.motion.response import BEFORE, DWELLS, FORGOTTEN, Responses, at_equal_dwells, memory_after, responses
+from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.motion.stepped_response import stepped_response
 from sim.motion.switching import switch_response
