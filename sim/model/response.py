@@ -7,8 +7,8 @@ steady motion. With g(T) the pose change in a dwell of length T, in the frame of
 
 and the lag stops changing after about two time units. Three things change it:
 
-    memory   after a dwell that was too short for the tails to turn over, this is added to the lag. What came before
-             that dwell hardly matters (below 1e-4 l and rad where no dwell is shorter than 0.3)
+    memory   after a dwell that was too short for the tails to turn over, this is added to the lag. What came
+             before that dwell hardly matters (below 1e-4 l and rad where no dwell is shorter than 0.3)
     rest     the lag of the first dwell of all, from straight tails at rest
     spread   the phase of the disc at the flip is unknown: curves are means over it, and this is their deviation
 
