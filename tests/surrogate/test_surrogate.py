@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import torch
 
+import surrogate.train
 from dataset.design import Axis, Design
 from dataset.store import write_manifest, write_part
 from sim.io.errors import InputError, run_command
@@ -96,11 +98,29 @@ def test_training_is_repeatable(tmp_path: Path, trained) -> None:  # type: ignor
     assert other.identity != trained.identity
 
 
-def test_early_stopping_keeps_the_best_weights(tmp_path: Path) -> None:
-    """A step size that diverges after a while must not spoil what was good."""
-    wild = replace(SMALL, learning_rate=0.5, epochs=60, patience=5)
-    table = train(str(invented(tmp_path)), wild, title="")
-    assert np.isfinite(table.errors["omega_yr_bar"]["rms"])
+def test_early_stopping_keeps_the_best_weights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After eight epochs the step size grows a thousandfold and wrecks the weights: those before are kept."""
+    folder, good, patience, made = str(invented(tmp_path)), 8, 5, []
+
+    def wrecking(optimiser: torch.optim.Optimizer, steps: int) -> torch.optim.lr_scheduler.LRScheduler:
+        batches = steps // settings.epochs
+        factors = [1.0 if step < good * batches else 1000.0 for step in range(steps + 1)]
+        made.append((batches, torch.optim.lr_scheduler.LambdaLR(optimiser, factors.__getitem__)))
+        return made[-1][1]
+
+    monkeypatch.setattr(torch.optim.lr_scheduler, "CosineAnnealingLR", wrecking)
+    settings = replace(SMALL, epochs=good)
+    stopped = train(folder, settings, title="")
+    settings = replace(SMALL, epochs=60, patience=patience)
+    wild = train(folder, settings, title="")
+    assert identity(wild) == identity(stopped)
+    assert wild.errors == stopped.errors
+    epochs = [schedule.last_epoch / batches for batches, schedule in made[2:]]
+    assert all(good < count <= good + patience for count in epochs)  # it went on, and then gave up
+    # The same without keeping: errors of another order.
+    monkeypatch.setattr(surrogate.train, "_keep", lambda kept, network, _: kept.update(network.state_dict()))
+    wrecked = train(folder, settings, title="")
+    assert wrecked.errors["omega_yr_bar"]["rms"] > 5 * wild.errors["omega_yr_bar"]["rms"]
 
 
 def test_the_split_is_fixed_and_disjoint() -> None:
