@@ -56,7 +56,9 @@ def with_imports(files: set[Path]) -> set[Path]:
 
 LOOPS = {file for file in SIM.rglob("*.py") if has_loops(file)}
 MADE_OF = sorted(str(path.relative_to(SIM)) for path in with_imports(LOOPS))
-ELSEWHERE = sorted(str(p.relative_to(SIM)) for room in ("effects", "motion", "io") for p in (SIM / room).glob("*.py"))
+ELSEWHERE = sorted(
+    str(p.relative_to(SIM)) for room in ("effects", "motion", "io") for p in (SIM / room).glob("*.py")
+)
 
 
 @pytest.fixture(scope="module")
@@ -96,5 +98,3 @@ def test_a_change_of_what_loops_are_made_of_is_another_version(name: str, copied
 def test_a_change_elsewhere_is_the_same_version(name: str, copied: Path) -> None:
     """An effect or a way to use the loops is no reason to compile them anew."""
     assert digest_with_a_change(copied, name) == digest_of(copied)
-
-

@@ -113,7 +113,7 @@ def test_early_stopping_keeps_the_best_weights(tmp_path: Path, monkeypatch: pyte
     stopped = train(folder, settings, title="")
     settings = replace(SMALL, epochs=60, patience=patience)
     wild = train(folder, settings, title="")
-    assert identity(wild) == identity(stopped)
+    assert wild.identity == stopped.identity
     assert wild.errors == stopped.errors
     epochs = [schedule.last_epoch / batches for batches, schedule in made[2:]]
     assert all(good < count <= good + patience for count in epochs)  # it went on, and then gave up
