@@ -1,9 +1,9 @@
 """A robot with rigid straight tails: the balance in closed form, for fast tests of the statistics.
 
-Tails are straight rods along the axis at radius a. Their thrust and torque grow less than in proportion to the motor's
-speed, as if they bent. Head, drag on the tails and viscosity are those of the real model, effects included. In a
-thinner fluid it moves as with a slower motor, all rates scaled, as the real robot does. It has the columns of the
-simulator and no discretisation.
+Tails are straight rods along the axis at radius a. Their thrust and torque grow less than in proportion to the
+motor's speed, as if they bent. Head, drag on the tails and viscosity are those of the real model, effects
+included. In a thinner fluid it moves as with a slower motor, all rates scaled, as the real robot does. It has
+the columns of the simulator and no discretisation.
 """
 
 from __future__ import annotations
