@@ -45,6 +45,7 @@ def with_more_falls(
     return replace(both, runs=replace(both.runs, y=y))
 
 
+@pytest.mark.slow
 def test_the_engine_closes_a_model_that_is_no_robot() -> None:
     beads = np.array([1.5, 2.5, 3.5, 5.0, 7.0, 9.0]) / 1000
     assert calibrate(spheres(0.0, 0.0, 0, beads), progress=False).verdict == "none"
@@ -55,6 +56,7 @@ def test_the_engine_closes_a_model_that_is_no_robot() -> None:
     assert np.mean([r.error_after / r.noise_ceiling for r in results]) < 1.15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("truth", [{"wall": 1.0}, {"inertia": 5.0}], ids=["wall", "inertia"])
 def test_twins_are_called_ambiguous_and_the_next_runs_tell_them_apart(truth: dict[str, float]) -> None:
     """Small beads alone do not tell the wall from inertia; the beads asked for do, more small ones do not."""

@@ -20,6 +20,7 @@ from tests.calibration import toy
 from tests.calibration.toy_tables import START, TRUTH, closed, toy_swimmer, toy_table
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_a_planted_effect_is_found_sized_and_removed() -> None:
     name, size = "end_over_end_drag", 5.0
@@ -39,6 +40,7 @@ def test_a_planted_effect_is_found_sized_and_removed() -> None:
     assert covered >= named - 1
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_an_effect_that_the_coefficients_absorb_is_not_testable() -> None:
     """A direction that C_t covers leaves nothing to score, however wrong the model is."""
@@ -64,6 +66,7 @@ def test_an_effect_outside_the_catalogue_is_left_unexplained() -> None:
     assert "no effect and no pair" in result.sentence
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_what_comes_nearest_is_said_where_nothing_explains() -> None:
     table = toy_table(7, end_over_end_drag=5.0)
@@ -97,6 +100,7 @@ def test_fits_arrive_along_a_valley() -> None:
     assert here.deviance == pytest.approx(there.deviance, abs=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_two_effects_are_found_as_a_pair() -> None:
     result = closed(toy_table(31, end_over_end_drag=5.0, left_right_bias=0.15))
@@ -135,6 +139,7 @@ def in_thinning_fluid(table: pd.DataFrame, rate: float) -> pd.DataFrame:
     return table.assign(**ratios, theta_deg=table["theta_deg"] + after["theta_deg"] - before["theta_deg"])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 @pytest.mark.parametrize("seed", [7, 8, 9])
 def test_a_drift_with_time_is_found_where_there_is_a_clock(seed: int) -> None:
@@ -153,6 +158,7 @@ def test_a_drift_with_time_is_found_where_there_is_a_clock(seed: int) -> None:
     assert result.error_after < 1.25 * result.noise_ceiling
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_without_a_clock_a_drift_is_no_effect_of_the_robot() -> None:
     """It stays unexplained, or passes for nothing; no effect is named for it, and the table says what it lacks."""
@@ -174,6 +180,7 @@ def test_a_tracked_point_off_the_centre_changes_radius_and_angle_alone() -> None
     }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_the_generic_correction_helps_where_no_effect_explains() -> None:
     """A yaw rate that grows with tail length, of no effect's form."""

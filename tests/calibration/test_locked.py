@@ -12,6 +12,7 @@ from calibration.profile import least_determined
 from tests.calibration.toy_tables import closed, toy_table
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_the_locked_session_has_no_say() -> None:
     """Ruining the locked session changes the reported errors and nothing else."""
@@ -26,6 +27,7 @@ def test_the_locked_session_has_no_say() -> None:
     assert two.error_after > 1.5 * one.error_after
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_the_result_is_deterministic() -> None:
     table = toy_table(9, end_over_end_drag=5.0)
@@ -33,6 +35,7 @@ def test_the_result_is_deterministic() -> None:
     assert one == two
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_the_locked_session_is_judged_and_used_in_the_end() -> None:
     """p is even for a good model and nothing for a bad one; the last fit has all runs."""
@@ -47,6 +50,7 @@ def test_the_locked_session_is_judged_and_used_in_the_end() -> None:
     assert result.delivered["C_yr"] != pytest.approx(result.final.parameters["C_yr"], rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_profile_intervals_are_those_of_the_covariance_where_the_model_is_linear() -> None:
     """And lean to one side where it is not."""

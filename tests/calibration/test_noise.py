@@ -61,6 +61,7 @@ def test_noise_is_recovered_from_repeats_and_sessions() -> None:
     assert np.mean(shares) == pytest.approx(0.1, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_p_values_of_nulls_are_spread_evenly() -> None:
     """The bootstrap accounts for the fit: p-values of pure noise are neither small nor large on the whole."""

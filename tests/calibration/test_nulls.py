@@ -41,6 +41,7 @@ def nulls() -> list[Verdict]:
         return [closed(toy_table(seed, lengths_cm=(6.0, 9.0))) for seed in range(60)]
 
 
+@pytest.mark.slow
 def test_no_effect_is_claimed_where_there_is_none(nulls: list[Verdict]) -> None:
     """One claim in twenty is stated; more than `most` would come from that once in a hundred times (binomial)."""
     most = binom.isf(0.01, len(nulls), 0.05)
@@ -48,6 +49,7 @@ def test_no_effect_is_claimed_where_there_is_none(nulls: list[Verdict]) -> None:
     assert all(null.effects == () for null in nulls if null.verdict == "none")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COEFFICIENTS)
 def test_intervals_of_coefficients_cover(name: str, nulls: list[Verdict]) -> None:
     """As often as 95 % intervals may miss (binomial, once in a hundred times); stated errors are those found."""
@@ -60,6 +62,7 @@ def test_intervals_of_coefficients_cover(name: str, nulls: list[Verdict]) -> Non
     assert 0.7 < stated / found < 2.0  # above 1 for C_r: the scatter of sessions cannot come out below none
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_twice_the_heavy_tails_do_not_make_an_effect() -> None:
     """Student noise with three degrees of freedom on the toy."""

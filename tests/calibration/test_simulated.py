@@ -6,6 +6,8 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from calibration.steer import draw_steered, gap_closed, steer
 from calibration.synthetic import make_table
 from planner.path import polygon
@@ -15,6 +17,7 @@ from sim.model.presets import PRESETS
 from tests.calibration.toy_tables import TRUTH
 
 
+@pytest.mark.slow
 def test_the_real_simulator_closes_a_table_with_a_hidden_effect(tmp_path: Path) -> None:
     """Truth on a finer mesh and step; the fitter is not told of the effect."""
     truth = replace(TRUTH, effects={"end_over_end_drag": 5.0})
@@ -37,6 +40,7 @@ def test_the_real_simulator_closes_a_table_with_a_hidden_effect(tmp_path: Path) 
     assert "data:image/png" in (out / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_the_right_model_brings_the_robot_back_on_its_path() -> None:
     """A robot with end-over-end drag: planned without it, nearly with it, and with the truth."""
     truth = replace(PRESETS["paper-control"], effects={"end_over_end_drag": 5.0})

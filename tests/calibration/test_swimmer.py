@@ -36,6 +36,7 @@ def table() -> pd.DataFrame:
     return found
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_the_prediction(table: pd.DataFrame) -> None:
     """The simulator's sensitivities, through drivers and camera, against differences of predictions."""
     rows = table.iloc[::6]

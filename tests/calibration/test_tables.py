@@ -66,6 +66,7 @@ def test_bad_rows_are_named_and_set_aside(toy_model: None) -> None:
         read_measurements(table.rename(columns={"trial": "tri al"}))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 @pytest.mark.parametrize("names", [("one",), ("one", "two")])
 def test_few_sessions_give_a_weaker_conclusion(names: tuple[str, ...]) -> None:
@@ -116,6 +117,7 @@ def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 @pytest.mark.parametrize(
     "kept", [("omega_h_rpm", "omega_yr_rad_s"), ("R_yr_cm", "theta_deg"), ("omega_t_rpm", "omega_yr_rad_s")]
@@ -143,6 +145,7 @@ def test_a_slipped_decimal_point_is_named_and_set_aside() -> None:
     assert result.noise_ceiling == pytest.approx(without.noise_ceiling, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_noise_and_missing_effects_are_no_gross_errors() -> None:
     assert closed(toy_table(13, end_over_end_drag=5.0)).set_aside == ()
@@ -169,6 +172,7 @@ def test_runs_of_one_robot_give_a_weaker_conclusion_that_is_stated() -> None:
     assert verdict_record(result, table="t")["limits"] == list(result.limits)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five() -> None:
     data, locked = PROTOCOLS["paper"](read_measurements(toy_table(16, end_over_end_drag=5.0)))

@@ -59,7 +59,7 @@ def test_the_pivot_moves_as_a_slip_free_car(seed: int) -> None:
         pose = poses[-1]
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(i, marks=pytest.mark.slow) for i in range(4, 40))])
 def test_the_bound_holds_on_random_paths(seed: int) -> None:
     """Predicted track within the guaranteed error, for paths of many lengths and curvatures."""
     rng = np.random.default_rng(1000 + seed)
@@ -77,6 +77,7 @@ def test_the_bound_holds_on_random_paths(seed: int) -> None:
     assert switches.dwells.min() >= dwell * (1 - 1e-9)
 
 
+@pytest.mark.slow
 def test_error_does_not_grow_with_length() -> None:
     car = vehicle()
     worst = []
@@ -320,3 +321,11 @@ def test_vehicle_of_the_shipped_table_matches_the_reference_robot() -> None:
     car = vehicle_of(CONTROL, load())
     assert car.twist[0] == pytest.approx([0.0180, 0.0425, 0.0490], rel=0.02)
     assert car.net_speed(2.0) == pytest.approx(0.0169, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("radius", "expected"), [(1e300, "give numbers below"), (1e3, "tail lengths long"), (1e-3, "too short for a")]
+)
+def test_paths_far_too_long_or_short_are_refused_at_once(radius: float, expected: str) -> None:
+    with pytest.raises(InputError, match=expected):
+        plan(circle(radius), CONTROL)

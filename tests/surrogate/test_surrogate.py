@@ -53,6 +53,7 @@ def test_the_shipped_table_states_its_errors() -> None:
         assert 0 < table.errors[name]["median"] <= table.errors[name]["rms"] < 0.01
 
 
+@pytest.mark.slow
 def test_training_learns_and_reports_held_out_errors(trained) -> None:  # type: ignore[no-untyped-def]
     assert trained.errors["omega_yr_bar"]["rms"] < 0.05
     assert trained.errors["omega_t_bar"]["rms"] < 0.02
@@ -61,6 +62,7 @@ def test_training_learns_and_reports_held_out_errors(trained) -> None:  # type: 
     assert rows["held_out"] > 30
 
 
+@pytest.mark.slow
 def test_training_is_repeatable(tmp_path: Path, trained) -> None:  # type: ignore[no-untyped-def]
     again = train(str(invented(tmp_path)), SMALL, title="")
     assert again.identity == trained.identity
@@ -162,3 +164,9 @@ def test_training_refuses_what_is_no_data_set(tmp_path: Path, capsys: pytest.Cap
     with pytest.raises(InputError, match="training needs"):
         train(str(invented(tmp_path / "few", rows=40)), SMALL, title="")
     assert not (tmp_path / "m.pt").exists()
+
+
+def test_a_dwell_that_is_no_number_is_refused() -> None:
+    columns = {**columns_of(tuple(p[0] for p in STEADY_POINTS)), "dwell_bar": np.array(["x"] * len(STEADY_POINTS))}
+    with pytest.raises(InputError, match="dwell_bar has a value that is no number"):
+        load().query(columns)

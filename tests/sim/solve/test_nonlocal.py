@@ -23,6 +23,7 @@ from tests.sim.robots import control, single_filament
 NONLOCAL = tuple(e.name for e in catalogue().values() if e.reach == "nonlocal" and not e.beside)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NONLOCAL)
 def test_orbits_are_what_time_steps_settle_to(name: str) -> None:
     """Second order in the mesh: the finer one is four times nearer to the extrapolated orbit."""
