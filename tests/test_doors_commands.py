@@ -33,6 +33,12 @@ few = settings(
 )
 
 
+@pytest.fixture(autouse=True)
+def _short_paths(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Paths that take more than about a second are refused, so that the tests stay short."""
+    monkeypatch.setattr("planner.plan._LONGEST", 20.0)
+
+
 def answered(words: list[object], capsys: pytest.CaptureFixture[str]) -> bool:
     """Whether a command worked; where it did not, it must have said why in one line."""
     capsys.readouterr()
