@@ -48,8 +48,9 @@ class Path2D:
             raise InputError(f"the path has shape {table.shape}; give (n, 2): x and y of each point")
         bad = np.flatnonzero(~(np.abs(table) < _LARGEST).all(1))
         if len(bad):
+            point = table[bad[0]].tolist()
             raise InputError(
-                f"point {bad[0] + 1} of the path is {table[bad[0]].tolist()}; give numbers below {_LARGEST:g}"
+                f"point {bad[0] + 1} of the path is {point}; give finite numbers, smaller than {_LARGEST:g}"
             )
         moves = np.linalg.norm(np.diff(table, axis=0), axis=1)
         size = float(np.abs(table - table[0]).max())
