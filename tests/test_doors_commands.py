@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ few = settings(
 @pytest.fixture(autouse=True)
 def _short_paths(monkeypatch: pytest.MonkeyPatch) -> None:
     """Paths that take more than about a second are refused, so that the tests stay short."""
-    monkeypatch.setattr("planner.plan._LONGEST", 20.0)
+    monkeypatch.setattr(import_module("planner.plan"), "_LONGEST", 20.0)
 
 
 def answered(words: list[object], capsys: pytest.CaptureFixture[str]) -> bool:
