@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pandas as pd
 import pytest
 
 from calibration.loop import calibrate
 from calibration.measurements import read_measurements
+from calibration.report import write_report
 from calibration.swimmer import Swimmer
 from calibration.verdict import Verdict
 from sim.inputs import load_robot
@@ -48,3 +51,20 @@ def test_what_no_effect_does_is_left_unexplained() -> None:
     assert result.verdict == "unexplained"
     assert result.effects == ()
     assert "no effect and no pair" in result.sentence
+
+
+def test_rivals_are_all_named_with_the_runs_that_would_tell_them_apart(tmp_path: Path) -> None:
+    """The verdict, the first rival's size, and the page that a lab reads."""
+    data = read_measurements(HERE / "ambiguous.csv")
+    result = calibrate(Swimmer(load_robot(HERE / "robot.toml"), data), progress=False)
+    assert result.verdict == "ambiguous"
+    assert "tail_spin_drag" in result.effects
+    assert len(result.effects) > 1
+    assert result.next_runs
+    page = tmp_path / "report.html"
+    write_report(result, data, page, title="t")
+    text = page.read_text()
+    assert "Runs to make next" in text
+    for run in result.next_runs:
+        for value in run.settings.values():
+            assert str(value) in text

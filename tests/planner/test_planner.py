@@ -324,7 +324,8 @@ def test_vehicle_of_the_shipped_table_matches_the_reference_robot() -> None:
 
 
 @pytest.mark.parametrize(
-    ("radius", "expected"), [(1e300, "give finite numbers, smaller than"), (1e3, "tail lengths long"), (1e-3, "too short for a")]
+    ("radius", "expected"),
+    [(1e300, "give finite numbers, smaller than"), (1e3, "tail lengths long"), (1e-3, "too short for a")],
 )
 def test_paths_far_too_long_or_short_are_refused_at_once(radius: float, expected: str) -> None:
     with pytest.raises(InputError, match=expected):

@@ -40,7 +40,13 @@ def unexplained() -> pd.DataFrame:
     return table
 
 
-TABLES = {"none": none, "effect": effect, "unexplained": unexplained}
+def ambiguous() -> pd.DataFrame:
+    """Drag on the tails' own spin, seen by tails of one length on robots of two kinds: too few to tell its rivals."""
+    hidden = replace(TRUTH, effects={"tail_spin_drag": 1.0})
+    return make_table(hidden, seed=5, tails=(3, 4), lengths_cm=(8.0,), trials=4, title="")
+
+
+TABLES = {"none": none, "effect": effect, "ambiguous": ambiguous, "unexplained": unexplained}
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE
