@@ -41,7 +41,7 @@ def unexplained() -> pd.DataFrame:
 
 
 def ambiguous() -> pd.DataFrame:
-    """Drag on the tails' own spin, seen by tails of one length on robots of two kinds: too few to tell its rivals."""
+    """Drag on the tails' own spin, on robots of two kinds with tails of one length: too few to tell its rivals."""
     hidden = replace(TRUTH, effects={"tail_spin_drag": 1.0})
     return make_table(hidden, seed=5, tails=(3, 4), lengths_cm=(8.0,), trials=4, title="")
 
