@@ -84,7 +84,10 @@ class Lookup:
         for name in self.effects:
             values.setdefault(name, np.zeros_like(values["N"]))
         if DWELL in columns:
-            values[DWELL] = np.asarray(columns[DWELL], dtype=float)
+            try:
+                values[DWELL] = np.asarray(columns[DWELL], dtype=float)
+            except (TypeError, ValueError):
+                raise InputError(f"{DWELL} has a value that is no number; give numbers") from None
             if not np.isfinite(values[DWELL]).all():
                 raise InputError(f"{DWELL} has a value that is not a finite number; give numbers")
         self.check_domain(values)
