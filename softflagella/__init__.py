@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from sim.model.robot import Robot
     from sim.model.schedule import Schedule, load_schedule
     from softflagella.calibrating import calibrate
-    from softflagella.simulating import replay, sensitivities, steady, switch_response
+    from softflagella.simulating import replay, response, sensitivities, steady, switch_response
     from softflagella.sweeping import read_sweep, sweep
     from surrogate.export import load_table
     from surrogate.table import LookupTable
@@ -60,6 +60,7 @@ _HOMES = {
     "read_path": "planner.drawings",
     "read_sweep": "softflagella.sweeping",
     "replay": "softflagella.simulating",
+    "response": "softflagella.simulating",
     "save_robot": "sim.inputs",
     "sensitivities": "softflagella.simulating",
     "steady": "softflagella.simulating",
@@ -73,8 +74,8 @@ _HOMES = {
 __all__ = [
     "Effect", "InputError", "LookupTable", "Path2D", "Plan", "Robot", "Schedule", "Verdict", "__version__",
     "calibrate", "circle", "effects", "load_robot", "load_schedule", "load_table", "make_table", "plan", "polygon",
-    "read_path", "read_sweep", "replay", "save_robot", "sensitivities", "steady", "sweep", "switch_response",
-    "tabulate", "train", "write_plan",
+    "read_path", "read_sweep", "replay", "response", "save_robot", "sensitivities", "steady", "sweep",
+    "switch_response", "tabulate", "train", "write_plan",
 ]  # fmt: skip
 
 

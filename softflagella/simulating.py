@@ -1,4 +1,4 @@
-"""Simulate robots: the functions behind `softflagella.steady`, `switch_response`, `sensitivities` and `replay`.
+"""Simulate robots: `softflagella.steady`, `response`, `switch_response`, `sensitivities` and `replay`.
 
 Robots are a `Robot`, or a table with one row for each robot: a mapping or a pandas table with the columns `C_t`,
 `C_r`, `C_yr`, `l_over_R`, `L_over_R`, `l_over_r0`, `omega_bar`, `N`, and optionally `a_over_R` and sizes of
@@ -8,6 +8,7 @@ effects.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,12 @@ from sim.arrays import Floats
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.model.groups import DWELL, Groups
+from sim.model.response import BEFORE, DWELLS
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
 from sim.motion.batches import sensitivity_columns, split, steady_columns
 from sim.motion.replay import replay as replay_schedules
+from sim.motion.response import responses
 from sim.motion.switching import switch_response as respond
 
 Robots = Robot | Mapping[str, Any] | pd.DataFrame
@@ -102,6 +105,43 @@ def switch_response(robots: Robots, dwell: ArrayLike) -> pd.DataFrame:
         for name, column in zip(names, values, strict=True):
             table.loc[rows, name] = column
     return table
+
+
+def response(robot: Robot) -> pd.DataFrame:
+    """The whole response of a robot to a flip of its motor: one row for each direction, dwell before and dwell.
+
+    Args:
+        robot: any robot, effects included.
+
+    Returns:
+        A table with the columns `direction` (of the motor after the flip), `before_bar` (the dwell before, infinite
+        after a long one, 0 for the start from rest), `dwell_bar`, `lag_z`, `lag_x` [l], `lag_psi_rad` (the lag), and
+        `net_speed_bar` of equal dwells, where `before_bar` is infinite. `sim.model.response` defines them.
+
+    Raises:
+        InputError: the robot breaks down.
+
+    Example:
+        >>> import softflagella as sf
+        >>> table = sf.response(sf.load_robot("paper-control"))
+        >>> long = table[(table["direction"] == 1) & np.isinf(table["before_bar"])]
+        >>> long["net_speed_bar"].iloc[[6, 12, 24]].round(4).tolist()
+        [0.0116, 0.0159, 0.0174]
+    """
+    tables = []
+    for direction in (1, -1):
+        groups = robot.groups()
+        found = responses(replace(groups, omega_bar=direction * groups.omega_bar))
+        if found.failed.any():
+            raise InputError(f"{robot.name}: the response to a flip breaks down; try a slower motor")
+        curves = {np.inf: found.lag[0], 0.0: found.rest[0]}
+        curves |= {float(T): found.lag[0] + memory for T, memory in zip(BEFORE, found.memory[0], strict=True)}
+        for before, lag in curves.items():
+            table = pd.DataFrame({"direction": direction, "before_bar": before, DWELL: DWELLS})
+            table[["lag_z", "lag_x", "lag_psi_rad"]] = lag
+            table["net_speed_bar"] = found.net_speed[0] if before == np.inf else np.nan
+            tables.append(table)
+    return pd.concat(tables, ignore_index=True)
 
 
 def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None = None) -> pd.DataFrame:

@@ -12,17 +12,17 @@ from sim.compiling import all_compiled, mark_all_compiled
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
+from sim.motion.response import responses
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
 from sim.motion.shapes import tails_over_a_revolution
 from sim.motion.steady import steady
-from sim.motion.switching import switch_response
 
 _ROBOT = PRESETS["paper-control"]
 _STAGES: tuple[tuple[str, Callable[[], object]], ...] = (
     ("steady motion", lambda: steady(_ROBOT.groups())),
     ("time steps", lambda: settle(_ROBOT.groups())),
-    ("response to switches", lambda: switch_response(_ROBOT.groups(), np.array([1.0]))),
+    ("response to flips", lambda: responses(_ROBOT.groups())),
     ("replay", lambda: replay([Schedule(_ROBOT.group_values(), 1, np.array([0.1]), (0.0, 0.0, 0.0), 1.0)])),
     ("derivatives", lambda: sensitivities(_ROBOT.groups(), ("C_t", "tail_interaction"))),
     ("pictures", lambda: tails_over_a_revolution(_ROBOT, 4)),
