@@ -114,9 +114,10 @@ def response(robot: Robot) -> pd.DataFrame:
         robot: any robot, effects included.
 
     Returns:
-        A table with the columns `direction` (of the motor after the flip), `before_bar` (the dwell before, infinite
-        after a long one, 0 for the start from rest), `dwell_bar`, `lag_z`, `lag_x` [l], `lag_psi_rad` (the lag), and
-        `net_speed_bar` of equal dwells, where `before_bar` is infinite. `sim.model.response` defines them.
+        A table with the columns `direction` (of the motor after the flip), `before_bar` (the dwell before:
+        infinite after a long one, 0 for the start from rest), `dwell_bar`, the lag `lag_z`, `lag_x` [l] and
+        `lag_psi_rad`, and `net_speed_bar` of equal dwells, where `before_bar` is infinite. `sim.model.response`
+        defines them.
 
     Raises:
         InputError: the robot breaks down.
