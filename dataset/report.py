@@ -1,4 +1,4 @@
-"""A data set at a glance: outputs against motor speed, counts and ranges, one page."""
+"""A sweep as one page: what was swept, what depends on what, and where the model or the solver meets its limits."""
 
 from __future__ import annotations
 
@@ -6,75 +6,182 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.axis import Axis
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from scipy.stats import qmc
 
+from dataset.figures import LABELS, draw_collapse, draw_indices, draw_responses, draw_trends, draw_where
+from dataset.indices import sobol_indices
 from dataset.schema import INPUTS
+
+COST = "cost_s"
 from dataset.store import read, read_manifest
+from dataset.trends import Exponents, exponents, linear_rows
+from sim.arrays import Floats
 from sim.io.pages import Page
 
-COLOURS = {2: "#2a7fba", 3: "#e08a1e", 4: "#3d9a5f", 5: "#8a4fa3"}
-_SHOWN = (
-    ("omega_yr_bar", "yaw rate $\\bar\\omega_{yr}$", "log"),
-    ("R_yr_over_l", "turn radius $R_{yr}/l$", "linear"),
-    ("theta_deg", "slip angle $\\theta$ [deg]", "linear"),
-    ("net_speed_bar", "net speed $\\bar v$", "log"),
-    ("share", "head's share $|\\omega_h|/\\omega$", "linear"),
-    ("tail_gap", "gap between tails / $2r_0$", "log"),
-)
-
-
-def draw_sweep(rows: pd.DataFrame) -> Figure:
-    """Six outputs against ω̄, coloured by N; rows whose tails touch are pale."""
-    table = rows.assign(share=-rows["omega_h_bar"] / rows["omega_bar"])
-    figure = Figure(figsize=(11, 6))
-    for place, (name, label, scale) in enumerate(_SHOWN):
-        axes = figure.add_subplot(2, 3, place + 1)
-        for count, part in table.groupby("N"):
-            for touching, alpha in ((False, 0.8), (True, 0.15)):
-                some = part[part["touching"] == touching]
-                good = some[some[name] > 0] if scale == "log" else some
-                axes.scatter(
-                    good["omega_bar"],
-                    good[name],
-                    s=5,
-                    alpha=alpha,
-                    color=COLOURS.get(int(str(count)), "#555555"),
-                    lw=0,
-                    label=f"N = {count}" if not touching else None,
-                )
-        axes.set_xscale("log")
-        axes.set_yscale(scale)
-        plain_logarithms(axes.xaxis)
-        if scale == "log":
-            plain_logarithms(axes.yaxis)
-        axes.set_xlabel("motor speed $\\bar\\omega$")
-        axes.set_ylabel(label)
-        axes.grid(alpha=0.25, lw=0.5)
-    figure.axes[0].legend(fontsize=8, frameon=False)
-    figure.tight_layout()
-    return figure
-
-
-def plain_logarithms(axis: Axis) -> None:
-    """Label a logarithmic axis with few plain numbers (1, 2, 5, 10, …)."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
+OUTPUTS = ("omega_yr_bar", "v_z", "R_yr_over_l", "theta_deg")
+_FEW = 40  # usable rows below which nothing is fitted
+_SMALL = 0.1  # exponents below it are not listed
 
 
 def write_report(folder: str, out: str | Path) -> None:
     """Write the page of a finished data set."""
     manifest, rows = read_manifest(folder), read(folder)
-    page = Page("Sweep at a glance", f"{len(rows)} robots, simulated to steady motion and through flips.")
-    page.section("Outputs")
-    page.text("Each point is one robot; pale points have tails that touch, where the model has no contact.")
-    page.figure(draw_sweep(rows), "six outputs against motor speed, by number of tails")
-    page.section("Inputs")
-    ranges = [(c.name, f"{rows[c.name].min():.4g}", f"{rows[c.name].max():.4g}", c.unit) for c in INPUTS]
-    page.table(("input", "smallest", "largest", "unit"), ranges)
-    page.section("Rows")
-    flags = [(name, int(np.count_nonzero(rows[name]))) for name in ("converged", "failed", "touching")]
-    page.table(("flag", "rows"), flags)
+    page = Page("Sweep report", _lead(rows))
+    add_sections(page, rows)
     page.write(out, f"configuration {manifest['config_hash']}, code {manifest['code_version']}")
+
+
+def _lead(rows: pd.DataFrame) -> str:
+    usable = usable_rows(rows)
+    return (
+        f"{len(rows)} robots, each simulated to its steady motion and through flips of its motor. {len(usable)} of "
+        "them converged with tails that do not touch."
+    )
+
+
+def usable_rows(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows that converged and whose tails do not touch."""
+    return rows[rows["converged"] & ~rows["failed"] & ~rows["touching"]]
+
+
+def add_sections(page: Page, rows: pd.DataFrame) -> None:
+    """All sections of the report."""
+    usable = usable_rows(rows)
+    inputs = {c.name: rows[c.name].to_numpy(float) for c in INPUTS if np.ptp(rows[c.name].to_numpy(float)) > 0}
+    _add_inputs(page, rows, inputs)
+    if len(usable) < _FEW:
+        page.section("Too few usable rows")
+        page.text(f"{len(usable)} rows are usable; what depends on what needs {_FEW} or more.", tone="bad")
+    else:
+        _add_dependence(page, usable, list(inputs))
+        _add_linear_theory(page, usable, list(inputs))
+        page.section("Response to a flip of the motor")
+        page.text(
+            "After a flip the robot lags its new circle until the tails have turned over. Lags are divided by the "
+            "speed that they cost, so they are times. Lines: medians; bands: the middle half of the rows."
+        )
+        page.figure(
+            draw_responses(usable), "lags and net speed over the dwell, for slow, middling and fast motors"
+        )
+    _add_limits(page, rows)
+
+
+def _add_inputs(page: Page, rows: pd.DataFrame, inputs: dict[str, Floats]) -> None:
+    page.section("What was swept")
+    table = np.stack([_ranks(values) for values in inputs.values()], 1)
+    some = table[:2048]
+    random = np.random.default_rng(0).random(some.shape)
+    page.text(
+        f"{len(inputs)} inputs varied. Discrepancy of the design (0: perfectly even) "
+        f"{qmc.discrepancy(some):.2g}, of as many random points {qmc.discrepancy(random):.2g}."
+    )
+    found = [
+        (c.name, f"{rows[c.name].min():.4g}", f"{rows[c.name].median():.4g}", f"{rows[c.name].max():.4g}", c.unit)
+        for c in INPUTS
+    ]
+    page.table(("input", "smallest", "median", "largest", "unit"), found)
+
+
+def _ranks(values: Floats) -> Floats:
+    """Values as even ranks between 0 and 1; equal values are spread."""
+    order = np.argsort(values + 1e-12 * np.arange(len(values)), kind="stable")
+    ranks = np.empty(len(values))
+    ranks[order] = (np.arange(len(values)) + 0.5) / len(values)
+    return ranks
+
+
+def _add_dependence(page: Page, usable: pd.DataFrame, names: list[str]) -> None:
+    page.section("What depends on what")
+    inputs = {name: usable[name].to_numpy(float) for name in names}
+    found = {}
+    for output in OUTPUTS:
+        values = np.abs(usable[output].to_numpy(float))
+        found[output] = sobol_indices(inputs, values if output == "theta_deg" else np.log(values))
+    page.text(
+        "Sobol indices: the share of an output's variance over the sweep that an input explains alone (first order) "
+        "and with all others together (total). Yaw rate, surge and radius are taken as logarithms."
+    )
+    page.figure(draw_indices(found), "Sobol indices of four outputs in all inputs, with 95 % intervals")
+    worst = min(found, key=lambda output: found[output].explained)
+    page.text(
+        f"The polynomials behind the indices explain {100 * found[worst].explained:.1f} % of the variance or more "
+        f"(least: {_plain(worst)})."
+    )
+    for output in OUTPUTS:
+        page.figure(
+            draw_trends(usable, output, [name for name in names if name != "N"]),
+            f"{_plain(output)} against each input, by number of tails",
+        )
+    page.text("Lines: medians by number of tails. Bands: the middle half of the rows.")
+
+
+def _add_linear_theory(page: Page, usable: pd.DataFrame, names: list[str]) -> None:
+    base = [c.name for c in INPUTS]
+    rows, linear = linear_rows({name: usable[name].to_numpy(float) for name in base})
+    some = usable.iloc[rows]
+    inputs = {name: some[name].to_numpy(float) for name in names}
+    page.section("Scaling laws")
+    page.text(
+        "Exponents: by how many per cent an output grows when an input grows by one per cent and all others are "
+        "held, in the lower, middle and upper third of the input. Where the three agree to 0.1, a power law holds "
+        "over the sweep. The last three columns are those of linear theory, for the same robots. Inputs that change "
+        f"an output by less than the power {_SMALL:g} are left out."
+    )
+    table = []
+    for output in OUTPUTS:
+        simulated = exponents(inputs, output, np.abs(some[output].to_numpy(float)))
+        theory = exponents(inputs, output, linear[output])
+        for one, other in zip(simulated, theory, strict=True):
+            if np.nanmax(np.abs(one.value)) > _SMALL:
+                verdict = "power law" if one.holds else "changes"
+                table.append((_plain(output), one.input, *_cells(one), verdict, *_plain_cells(other)))
+    thirds = ("lower third", "middle", "upper third")
+    page.table(("output", "input", *thirds, "", *(f"linear: {third}" for third in thirds)), table)
+    page.section("Against linear theory")
+    page.text(
+        "Each point is a robot. S is the drag number of a tail: viscous against elastic forces. For small S the tails "
+        "stay nearly straight and the ratio tends to what linear theory leaves out."
+    )
+    page.figure(draw_collapse(some, linear, OUTPUTS), "outputs over linear theory against the drag number")
+
+
+def _cells(one: Exponents) -> list[str]:
+    return [f"{v:.2f} ± {w:.2f}" for v, w in zip(one.value, one.half_width, strict=True)]
+
+
+def _plain_cells(one: Exponents) -> list[str]:
+    return [f"{v:.2f}" for v in one.value]
+
+
+def _add_limits(page: Page, rows: pd.DataFrame) -> None:
+    page.section("Where tails touch, where the solver struggled")
+    stepped = rows["reason"].astype(str) != ""
+    page.figure(
+        draw_where(rows.assign(hard=rows["failed"] | stepped)), "share of rows that touch, and that failed, over ω̄"
+    )
+    page.text(
+        f"In {int(rows['touching'].sum())} of {len(rows)} rows tails touch: their numbers are of a model without "
+        f"contact. {int(rows['failed'].sum())} rows failed."
+    )
+    reasons = rows.loc[stepped, "reason"].value_counts()
+    if len(reasons):
+        page.table(("reason", "rows"), [(str(reason), int(count)) for reason, count in reasons.items()])
+    page.section("Cost")
+    cost = rows[COST].to_numpy(float) * 1e3
+    page.text(f"{cost.sum() / 6e4:.1f} minutes of processor time, {cost.mean():.1f} ms a row on average.")
+    page.table(
+        ("N", "rows", "median [ms]", "mean [ms]", "slowest [ms]"),
+        [
+            (
+                str(n),
+                len(part),
+                *(f"{f(1e3 * part[COST].to_numpy(float)):.1f}" for f in (np.median, np.mean, np.max)),
+            )
+            for n, part in rows.groupby("N")
+        ],
+    )
+
+
+def _plain(name: str) -> str:
+    """A label without formulas."""
+    return LABELS.get(name, name).split(" $")[0]
