@@ -6,8 +6,8 @@ expansion). The variance then is the sum of squared coefficients:
     first order   share of the variance from terms in one input alone
     total         share from all terms that the input is part of
 
-Intervals are percentiles over resampled rows. Inputs enter through their ranks: a sweep's design is even in the scale
-that its configuration declares. Source: Sudret (2008), Reliability Engineering and System Safety 93, 964.
+Intervals are percentiles over resampled rows. Inputs enter through their ranks: a sweep's design is even in the
+scale that its configuration declares. Source: Sudret (2008), Reliability Engineering and System Safety 93, 964.
 """
 
 from __future__ import annotations

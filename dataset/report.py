@@ -1,4 +1,4 @@
-"""A sweep as one page: what was swept, what depends on what, and where the model or the solver meets its limits."""
+"""A sweep as one page: what was swept, what depends on what, where model or solver meet their limits."""
 
 from __future__ import annotations
 
@@ -10,9 +10,7 @@ from scipy.stats import qmc
 
 from dataset.figures import LABELS, draw_collapse, draw_indices, draw_responses, draw_trends, draw_where
 from dataset.indices import sobol_indices
-from dataset.schema import INPUTS
-
-COST = "cost_s"
+from dataset.schema import COST, INPUTS
 from dataset.store import read, read_manifest
 from dataset.trends import Exponents, exponents, linear_rows
 from sim.arrays import Floats
@@ -34,8 +32,8 @@ def write_report(folder: str, out: str | Path) -> None:
 def _lead(rows: pd.DataFrame) -> str:
     usable = usable_rows(rows)
     return (
-        f"{len(rows)} robots, each simulated to its steady motion and through flips of its motor. {len(usable)} of "
-        "them converged with tails that do not touch."
+        f"{len(rows)} robots, each simulated to its steady motion and through flips of its motor. {len(usable)} "
+        "of them converged with tails that do not touch."
     )
 
 
@@ -98,8 +96,8 @@ def _add_dependence(page: Page, usable: pd.DataFrame, names: list[str]) -> None:
         values = np.abs(usable[output].to_numpy(float))
         found[output] = sobol_indices(inputs, values if output == "theta_deg" else np.log(values))
     page.text(
-        "Sobol indices: the share of an output's variance over the sweep that an input explains alone (first order) "
-        "and with all others together (total). Yaw rate, surge and radius are taken as logarithms."
+        "Sobol indices: the share of an output's variance over the sweep that an input explains alone (first "
+        "order) and with all others together (total). Yaw rate, surge and radius are taken as logarithms."
     )
     page.figure(draw_indices(found), "Sobol indices of four outputs in all inputs, with 95 % intervals")
     worst = min(found, key=lambda output: found[output].explained)
@@ -124,8 +122,8 @@ def _add_linear_theory(page: Page, usable: pd.DataFrame, names: list[str]) -> No
     page.text(
         "Exponents: by how many per cent an output grows when an input grows by one per cent and all others are "
         "held, in the lower, middle and upper third of the input. Where the three agree to 0.1, a power law holds "
-        "over the sweep. The last three columns are those of linear theory, for the same robots. Inputs that change "
-        f"an output by less than the power {_SMALL:g} are left out."
+        "over the sweep. The last three columns are those of linear theory, for the same robots. Inputs that "
+        f"change an output by less than the power {_SMALL:g} are left out."
     )
     table = []
     for output in OUTPUTS:
@@ -139,8 +137,8 @@ def _add_linear_theory(page: Page, usable: pd.DataFrame, names: list[str]) -> No
     page.table(("output", "input", *thirds, "", *(f"linear: {third}" for third in thirds)), table)
     page.section("Against linear theory")
     page.text(
-        "Each point is a robot. S is the drag number of a tail: viscous against elastic forces. For small S the tails "
-        "stay nearly straight and the ratio tends to what linear theory leaves out."
+        "Each point is a robot. S is the drag number of a tail: viscous against elastic forces. For small S the "
+        "tails stay nearly straight and the ratio tends to what linear theory leaves out."
     )
     page.figure(draw_collapse(some, linear, OUTPUTS), "outputs over linear theory against the drag number")
 

@@ -1,13 +1,14 @@
 """How outputs go with inputs: exponents of scaling laws, and linear theory beside them.
 
-An exponent is ∂ln y/∂ln x with all other inputs held, from a linear fit of ln y to the logarithms of all inputs over
-the rows in which x lies in one third of its range. A scaling law holds where the three thirds agree.
+An exponent is ∂ln y/∂ln x with all other inputs held. It comes from a linear fit of ln y to the logarithms of all
+inputs, over the rows in which x lies in one third of its range. A scaling law holds where the three thirds agree.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -48,7 +49,7 @@ def exponents(inputs: Mapping[str, Floats], output: str, values: Floats) -> list
 def _by_third(logs: Floats, y: Floats, k: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     edges = np.quantile(logs[:, k], [0, 1 / 3, 2 / 3, 1])
     slopes, errors = [], []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         some = (logs[:, k] >= low) & (logs[:, k] <= high)
         x = logs[some] - logs[some].mean(0)
         if np.ptp(x[:, k]) == 0 or some.sum() < 3 * logs.shape[1]:

@@ -22,7 +22,8 @@ section { background: #fff; border: 1px solid var(--line); border-radius: 10px; 
   margin: 20px 0; } img { max-width: 100%; height: auto; display: block; margin: 12px auto; }
 table { border-collapse: collapse; margin: 12px 0; font-size: 14px; } td, th { text-align: right;
   padding: 4px 12px; border-bottom: 1px solid var(--line); white-space: nowrap; } td:first-child, th:first-child {
-  text-align: left; white-space: normal; } .wide { overflow-x: auto; } .good { color: #1c7c43; } .bad { color: #b3391f; }
+  text-align: left; white-space: normal; } .wide { overflow-x: auto; } .good { color: #1c7c43; }
+.bad { color: #b3391f; }
 footer { color: var(--soft); font-size: 13px; overflow-wrap: anywhere; } code { font-size: 14px; }
 """
 
