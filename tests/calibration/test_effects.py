@@ -73,7 +73,7 @@ def test_what_comes_nearest_is_said_where_nothing_explains() -> None:
     table["omega_h_rpm"] *= np.exp(0.04 * np.sin(3.0 * table["l_cm"]) * np.sign(table["omega_rpm"]))
     result = closed(table)
     assert result.verdict == "unexplained"
-    assert "the nearest, head's end-over-end drag, takes" in result.sentence
+    assert "the nearest, head's end-over-end drag, removes" in result.sentence
 
 
 @pytest.mark.usefixtures("toy_model")
