@@ -90,8 +90,8 @@ def _parts(place: Place, manifest: dict[str, Any], seen: _Seen) -> Iterable[str]
     yield _reading(place)
     yield "## Inputs"
     yield (
-        f"Points of a scrambled Sobol sequence, seed {manifest['config']['seed']}; row i is its point i. Coverage: "
-        f"rows in the emptiest and the fullest of {_BINS} equal parts of the range, over their mean."
+        f"Points of a scrambled Sobol sequence, seed {manifest['config']['seed']}; row i is its point i. "
+        f"Coverage: rows in the emptiest and the fullest of {_BINS} equal parts of the range, over their mean."
     )
     yield _table(("input", "range", "scale", "smallest", "largest", "coverage"), _inputs(seen))
     yield "## Failures"
@@ -125,7 +125,7 @@ def _reading(place: Place) -> str:
             "```",
             "",
             "These do not check the files against the manifest; "
-            f'`dataset.store.read("{place.address}")` does, and `dataset.store.batches` does where rows exceed memory.',
+            f'`dataset.store.read("{place.address}")` does, and so does `dataset.store.batches`, piece by piece.',
         )
     )
 

@@ -91,12 +91,14 @@ class SweepFolder:
         return InputError(f"{self.place.address} holds {what}; give another folder or remove this one")
 
     def rows_there(self) -> int:
-        """Rows of the finished data set in the folder, going by the names in rows/; 0 where there is none."""
-        return (
-            max((piece.stop for piece in pieces(self.place, ROWS)), default=0)
-            if MANIFEST in self.place.names()
-            else 0
-        )
+        """Rows of the finished data set in the folder, by its manifest and the names in rows/; 0 without one."""
+        if self.place.size(MANIFEST) is None:
+            return 0
+        named = max((piece.stop for piece in pieces(self.place, ROWS)), default=0)
+        try:
+            return max(named, int(read_manifest(self.place)["rows"]))
+        except InputError:  # edited or damaged
+            return named
 
     def holds(self, *, mending: bool = False) -> Held:
         """Whole pieces that together hold each row at most once; everything is read and checked.
