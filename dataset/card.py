@@ -120,7 +120,7 @@ def _reading(place: Place) -> str:
         (
             "```python",
             f'rows = pandas.read_parquet("{folder}")',
-            f'rows = polars.read_parquet("{folder}/*.parquet")',
+            f'rows = polars.read_parquet("{folder}")',
             f"rows = duckdb.sql(\"from '{folder}/*.parquet'\")",
             "```",
             "",

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ import pandas as pd
 
 from dataset.design import Axis, Design
 from dataset.schema import COST
+from dataset.work import rows_version as code
 
 SMALL = """
 rows = 6
@@ -27,8 +30,11 @@ omega_bar = { range = [6.0, 12.0], scale = "log" }
 N = { range = [2, 3], scale = "integer" }
 dwell_bar = { range = [1.2, 1.5], scale = "log" }
 """
+__all__ = ["Axis", "code"]
+Rows = Callable[[dict[str, np.ndarray]], dict[str, Any]]
 ROOT = Path(__file__).parents[2]
-PATTERN = "SOFTFLAGELLA_TEST_FOLDER"  # where workers of a test leave marks
+# Where workers of tests leave marks; set before any worker starts.
+MARKS = Path(os.environ.setdefault("SOFTFLAGELLA_TEST_MARKS", mkdtemp()))
 
 
 def design(rows: int, seed: int = 5) -> Design:
@@ -64,10 +70,9 @@ def invented(p: dict[str, np.ndarray]) -> dict[str, Any]:
 
 def _mark(p: dict[str, np.ndarray], word: str) -> int:
     """Leave a mark for this chunk; how many there are now."""
-    folder = Path(os.environ[PATTERN])
     name = f"{word}-{float(p['C_t'][0]).hex()}"
-    count = len(list(folder.glob(f"{name}-*")))
-    (folder / f"{name}-{count}-{os.getpid()}").touch()
+    count = len(list(MARKS.glob(f"{name}-*")))
+    (MARKS / f"{name}-{count}-{os.getpid()}").touch()
     return count + 1
 
 
