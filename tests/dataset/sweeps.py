@@ -115,3 +115,17 @@ def endless(p: dict[str, np.ndarray]) -> dict[str, Any]:
 def without_cost(rows: pd.DataFrame) -> pd.DataFrame:
     """All columns that are the same whenever a row is simulated."""
     return rows.drop(columns=COST)
+
+
+def dying_in_the_write(p: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Rows whose worker is killed while it writes them: first when it synchronises the file, then when it renames it."""
+    attempt = _mark(p, "write")
+
+    def kill(*_: Any, **__: Any) -> None:
+        os.kill(os.getpid(), 9)
+
+    if attempt == 1:
+        os.fsync = kill
+    if attempt == 2:
+        os.replace = kill
+    return invented(p)
