@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import shlex
 import sys
+import threading
 from argparse import Namespace
 from collections.abc import Callable
 from typing import TypeVar
@@ -76,13 +77,18 @@ def _command(arguments: Namespace) -> str:
 
 def _ended(work: Callable[[], T]) -> T:
     """The result of long work; where it ends early, one line and its exit status."""
-    from dataset.sweep import UnfinishedError
-
     try:
+        from dataset.sweep import UnfinishedError
+
         return work()
+    except KeyboardInterrupt:
+        print("\nstopped before it began", file=sys.stderr)
+        sys.exit(130)
     except Interrupted as stop:  # its line has been printed
-        sys.stdout.flush()
-        os._exit(stop.status)  # at once: workers are dead, and libraries wait for them at an ordinary exit
+        emergency = threading.Timer(1.0, os._exit, (stop.status,))  # for libraries that wait at an ordinary exit
+        emergency.daemon = True
+        emergency.start()
+        sys.exit(stop.status)
     except UnfinishedError as ended:
         print(f"unfinished: {ended}", file=sys.stderr)
         sys.exit(ended.status)

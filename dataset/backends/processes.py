@@ -14,7 +14,6 @@ import os
 import signal
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
@@ -25,8 +24,6 @@ from joblib.externals.loky import ProcessPoolExecutor
 
 from dataset.backends import LOST, Lost
 from dataset.work import Outcome, Task, run_task
-
-_LOOKED = 0.5  # seconds between two looks at whether the parent lives
 
 
 class Processes:
@@ -89,12 +86,12 @@ def _apart() -> Iterator[None]:
 
 
 def _begin() -> None:
-    """In a worker: end when the fork server does, which ends with our process."""
-    parent = os.getppid()
+    """In a worker: end when the process that uses it does, however that ends."""
+    user = multiprocessing.parent_process()
 
     def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(_LOOKED)
-        os._exit(1)
+        if user is not None:
+            user.join()
+            os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

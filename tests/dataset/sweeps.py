@@ -14,7 +14,6 @@ import pandas as pd
 
 from dataset.design import Axis, Design
 from dataset.schema import COST
-from dataset.work import rows_version as code
 
 SMALL = """
 rows = 6
@@ -30,7 +29,6 @@ omega_bar = { range = [6.0, 12.0], scale = "log" }
 N = { range = [2, 3], scale = "integer" }
 dwell_bar = { range = [1.2, 1.5], scale = "log" }
 """
-__all__ = ["Axis", "code"]
 Rows = Callable[[dict[str, np.ndarray]], dict[str, Any]]
 ROOT = Path(__file__).parents[2]
 # Where workers of tests leave marks; set before any worker starts.
@@ -118,7 +116,7 @@ def without_cost(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def dying_in_the_write(p: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Rows whose worker is killed while it writes them: first when it synchronises the file, then when it renames it."""
+    """Rows whose worker dies as it writes them: first where it synchronises the file, then when it renames it."""
     attempt = _mark(p, "write")
 
     def kill(*_: Any, **__: Any) -> None:

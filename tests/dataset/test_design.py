@@ -1,4 +1,4 @@
-"""The design: even, a prefix of any longer one, the same rows whatever the order in sweep.toml; what breaks is refused."""
+"""The design: even, a prefix of any longer one, whatever the order in sweep.toml; what breaks is refused."""
 
 from __future__ import annotations
 
@@ -57,7 +57,9 @@ def test_both_directions_are_mirror_images_in_number_and_range() -> None:
 
 
 def test_optional_inputs_effects_and_directions_are_swept(tmp_path: Path) -> None:
-    text = SMALL.replace('scale = "log" }', 'scale = "log", both_directions = true }', 1).replace("[2, 3]", "[1, 8]")
+    text = SMALL.replace('scale = "log" }', 'scale = "log", both_directions = true }', 1).replace(
+        "[2, 3]", "[1, 8]"
+    )
     text += "a_over_R = { range = [0.5, 1.2] }\nleft_right_bias = { range = [-0.05, 0.05] }\n"
     sweep = loaded(tmp_path, text).with_rows(256)
     points = sweep.points()
@@ -85,7 +87,11 @@ def test_optional_inputs_effects_and_directions_are_swept(tmp_path: Path) -> Non
         ("C_t = { range = [2.0, 5.0] }", "C_t = { range = [2.0, 5.0], both_directions = true }", "only omega_bar"),
         ("C_t =", "C_x =", "unknown input"),
         ("C_t = { range = [2.0, 5.0] }", "", "missing input"),
-        ("C_t = { range = [2.0, 5.0] }", "C_t = { range = [2.0, 5.0] }\ntail_interaction = { range = [0, 99] }", "99"),
+        (
+            "C_t = { range = [2.0, 5.0] }",
+            "C_t = { range = [2.0, 5.0] }\ntail_interaction = { range = [0, 99] }",
+            "99",
+        ),
         ("rows = 6", "rows = 0", "rows = 0"),
         ("rows = 6", "rows = true", "rows = True"),
         ("rows = 6", "rows = ", "not TOML"),

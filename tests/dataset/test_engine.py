@@ -1,4 +1,4 @@
-"""The engine: rows are added, not made anew; a worker's death costs its chunk; one writer, one configuration a folder."""
+"""The engine: rows are added, not made anew; a dead worker is replaced; one writer and one sweep a folder."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import pytest
 
 from dataset import engine
 from dataset.backends import GONE, Lost
+from dataset.design import Axis
 from dataset.lock import locked
 from dataset.places import place
 from dataset.store import read, read_manifest
 from dataset.sweep import UnfinishedError, build, chunks
-from dataset.work import Outcome, Task, run_task
+from dataset.work import Outcome, Task, rows_version, run_task
 from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import design, invented
@@ -41,7 +42,9 @@ def test_more_rows_only_add_chunks(tmp_path: Path, marks: Path) -> None:
     made = [p.name.split("-")[1] for p in marks.iterdir()]
     assert len(made) > done == 4
     assert sum(name in first for name in made) == done
-    assert [name for name in files(short) if name.startswith("rows")] == ["rows/rows-0000000000-0000000200.parquet"]
+    assert [name for name in files(short) if name.startswith("rows")] == [
+        "rows/rows-0000000000-0000000200.parquet"
+    ]
 
 
 def test_a_finished_build_is_left_alone(tmp_path: Path) -> None:
@@ -59,7 +62,7 @@ def test_another_configuration_is_not_mixed_in(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="seed 5 there, 6 here"):
         build(design(20, seed=6), tmp_path / "out", jobs=1, title="", simulate=invented)
     other = design(20)
-    other.axes["C_r"] = sweeps.Axis(1.5, 3.0, "linear")
+    other.axes["C_r"] = Axis(1.5, 3.0, "linear")
     with pytest.raises(InputError, match=r"C_r \[1.5, 3.5\] linear there, \[1.5, 3\] linear here"):
         build(other, tmp_path / "out", jobs=1, title="", simulate=invented)
     with pytest.raises(InputError, match="another version"):
@@ -77,7 +80,10 @@ def test_a_folder_with_other_files_is_left_alone(name: str, tmp_path: Path) -> N
 
 
 def test_a_second_writer_is_refused_and_told_who_writes(tmp_path: Path) -> None:
-    with locked(place(tmp_path / "out")), pytest.raises(InputError, match=r"is being written by process \d+ on .* min"):
+    with (
+        locked(place(tmp_path / "out")),
+        pytest.raises(InputError, match=r"is being written by process \d+ on .* min"),
+    ):
         build(design(20), tmp_path / "out", jobs=1, title="", simulate=invented)
     build(design(20), tmp_path / "out", jobs=1, title="", simulate=invented)
 
@@ -169,13 +175,13 @@ def test_without_workers_it_ends_with_a_line(tmp_path: Path, monkeypatch: pytest
 
 def test_a_worker_with_other_code_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dataset.sweep.rows_version", lambda: "0.0+other")
-    with pytest.raises(InputError, match="has version .* the build has 0.0\\+other"):
+    with pytest.raises(InputError, match=r"has version .* the build has 0\.0\+other"):
         build(design(50), tmp_path / "out", jobs=1, title="", simulate=invented)
 
 
 def test_a_worker_that_does_not_see_the_folder_is_refused(tmp_path: Path) -> None:
     there = place(tmp_path / "elsewhere")
-    outcome = run_task(Task(there.address, design(1).config(), "", sweeps.code(), invented, False, 0, 1))
+    outcome = run_task(Task(there.address, design(1).config(), "", rows_version(), invented, False, 0, 1))
     assert outcome[0] == "storage"
     assert "does not see" in outcome[1]
 

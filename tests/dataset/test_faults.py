@@ -38,7 +38,9 @@ def started(code: str, *, limit: int | None = None) -> subprocess.Popen[str]:
         if limit is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
-    words = "from tests.dataset.sweeps import *; from dataset.sweep import *; from dataset.__main__ import program; "
+    words = (
+        "from tests.dataset.sweeps import *; from dataset.sweep import *; from dataset.__main__ import program; "
+    )
     return subprocess.Popen(
         [sys.executable, "-c", words + code],
         cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=limited,
@@ -48,14 +50,16 @@ def started(code: str, *, limit: int | None = None) -> subprocess.Popen[str]:
 def building(folder: Path, rows: int, rows_by: str, jobs: int = 2) -> str:
     """Code that builds as the command line does."""
     return (
-        "import sys; from dataset.__main__ import _ended; from sim.io.errors import run_command; "
-        f"sys.exit(run_command(lambda _: _ended(lambda: build(design({rows}), {str(folder)!r}, jobs={jobs}, title='', "
-        f"simulate={rows_by}, resume='the same words'))))"
+        "import sys; from dataset.__main__ import _ended; "
+        "from sim.io.errors import run_command; "
+        f"sys.exit(run_command(lambda _: _ended(lambda: build(design({rows}), {str(folder)!r}, jobs={jobs}, "
+        f"title='', simulate={rows_by}, resume='the same words'))))"
     )
 
 
-def until(true: Callable[[], bool]) -> None:
+def until(true: Callable[[], bool], process: subprocess.Popen[str] | None = None) -> None:
     while not true():
+        assert process is None or process.poll() is None, process.communicate()
         time.sleep(0.05)
 
 
@@ -73,13 +77,12 @@ def workers() -> list[int]:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_ends_it_with_one_line_and_the_workers(number: int, tmp_path: Path) -> None:
     process = started(building(tmp_path / "out", 400, "endless"))
-    until(lambda: len(workers()) == 2)
+    until(lambda: len(workers()) == 2, process)
     process.send_signal(number)
     _, line = process.communicate()
     assert process.returncode == 128 + number
     assert line.strip() == f"stopped: 0 of 400 rows are stored in {tmp_path}/out; go on with: the same words"
     until(lambda: not any(alive(worker) for worker in workers()))
-    build(design(40), tmp_path / "again", jobs=1, title="", simulate=invented)
     assert not (tmp_path / "out" / ".lock").exists()
 
 
@@ -87,7 +90,7 @@ def test_the_command_line_stops_and_goes_on(tmp_path: Path) -> None:
     (tmp_path / "sweep.toml").write_text(SMALL.replace("rows = 6", "rows = 64"))
     words = ["build", "--config", str(tmp_path / "sweep.toml"), "--out", str(tmp_path / "out"), "--jobs", "2"]
     process = started(f"import sys; sys.argv[1:] = {words}; program.exit()")
-    until(lambda: bool(list(tmp_path.glob("out/pending/rows-*"))))
+    until(lambda: bool(list(tmp_path.glob("out/pending/rows-*"))), process)
     os.kill(process.pid, signal.SIGINT)
     _, error = process.communicate()
     assert process.returncode == 130
@@ -97,28 +100,28 @@ def test_the_command_line_stops_and_goes_on(tmp_path: Path) -> None:
     assert command[1:] == ["-m", "dataset", *words]
     kept = {p.name for p in (tmp_path / "out" / "pending").iterdir() if p.name[0] != "."}
     assert kept
-    again = started(f"import sys; sys.argv[1:] = {command[3:]}; program.exit()")
-    assert again.wait() == 0
-    calm = started(f"import sys; sys.argv[1:] = {[w.replace('out', 'calm') for w in words]}; program.exit()")
-    assert calm.wait() == 0
+    calm = [str(tmp_path / "calm") if word == str(tmp_path / "out") else word for word in words]
+    for each in (command[3:], calm):
+        again = started(f"import sys; sys.argv[1:] = {each}; program.exit()")
+        assert "64 rows: 64 converged" in again.communicate()[0]
     assert without_cost(read(tmp_path / "out")).equals(without_cost(read(tmp_path / "calm")))
 
 
 def test_workers_end_with_their_parent(tmp_path: Path) -> None:
     process = started(building(tmp_path / "out", 400, "endless"))
-    until(lambda: len(workers()) == 2)
+    until(lambda: len(workers()) == 2, process)
     process.kill()
     process.communicate()
     until(lambda: not any(alive(worker) for worker in workers()))
     again = started(building(tmp_path / "out", 400, "endless"))
-    until(lambda: len(workers()) == 4)  # the lock went with its owner
+    until(lambda: len(workers()) == 4, again)  # the lock went with its owner
     again.kill()
     again.communicate()
 
 
 def test_two_builds_at_once(tmp_path: Path) -> None:
     first = started(building(tmp_path / "out", 400, "endless"))
-    until(lambda: len(workers()) == 2)
+    until(lambda: len(workers()) == 2, first)
     second = started(building(tmp_path / "out", 400, "invented"))
     _, line = second.communicate()
     assert second.returncode == 2

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -32,8 +31,8 @@ def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def built(original: Path, tmp_path: Path) -> Iterator[Path]:
-    yield Path(shutil.copytree(original, tmp_path / "out"))
+def built(original: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(original, tmp_path / "out"))
 
 
 def part(folder: Path) -> Path:
@@ -193,7 +192,13 @@ def test_duckdb_reads_the_folder(original: Path) -> None:
 
 def test_the_card_says_how_to_read_and_what_failed(original: Path) -> None:
     card = (original / "card.md").read_text()
-    for words in ("pandas.read_parquet", "polars.read_parquet", "duckdb.sql", "it turns too fast", "| omega_bar |"):
+    for words in (
+        "pandas.read_parquet",
+        "polars.read_parquet",
+        "duckdb.sql",
+        "it turns too fast",
+        "| omega_bar |",
+    ):
         assert words in card
     assert read_manifest(original)["digest"] in card
 
