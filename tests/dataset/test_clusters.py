@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +64,7 @@ class Dask:
     def _start(self, *words: str) -> subprocess.Popen[bytes]:
         with open(self.folder / "dask.log", "ab") as log:
             command = [sys.executable, "-m", "distributed.cli.dask_" + words[0], *words[1:]]
-            return subprocess.Popen(command, cwd=self.folder, env=ENVIRONMENT, stdout=log, stderr=log)
+            return subprocess.Popen(command, cwd=self.folder, env=ENVIRONMENT, stdout=log, stderr=log, start_new_session=True)
 
     def add_worker(self, *words: str) -> subprocess.Popen[bytes]:
         """A worker under a nanny, which starts it again where it dies."""
@@ -71,8 +72,8 @@ class Dask:
 
     def stop(self) -> None:
         for process in (*self.workers, self.scheduler):
-            process.terminate()
-        for process in (*self.workers, self.scheduler):
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)  # with what it has started
             process.wait()
 
 
@@ -80,6 +81,7 @@ class Dask:
 def dask(tmp_path: Path) -> Iterator[Dask]:
     pytest.importorskip("distributed", reason="the extra dask is not installed")
     cluster = Dask(tmp_path)
+    until(lambda: (tmp_path / "dask.log").read_bytes().count(b"Registered to") == 2)
     yield cluster
     cluster.stop()
 
@@ -108,7 +110,7 @@ def test_dask_sets_a_poisonous_chunk_aside(dask: Dask, tmp_path: Path) -> None:
             design(200), tmp_path / "out", backend="dask", address=dask.address, title="",
             simulate=sweeps.poisonous,
         )  # fmt: skip
-    assert len(list((tmp_path / "out" / "pending").iterdir())) >= 7
+    assert len(list((tmp_path / "out" / "pending").iterdir())) == 7
 
 
 def test_dask_goes_on_when_a_nanny_is_killed(dask: Dask, calm: Path, tmp_path: Path) -> None:
@@ -178,7 +180,7 @@ def ray(tmp_path: Path) -> Iterator[str]:
     until(lambda: b"Ray runtime started" in log.read_bytes() or head.poll() is not None)
     assert head.poll() is None, log.read_text()
     yield f"127.0.0.1:{port}"
-    head.terminate()
+    os.killpg(head.pid, signal.SIGKILL)
     head.wait()
 
 
