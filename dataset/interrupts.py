@@ -35,7 +35,7 @@ def interruptible(last_words: Callable[[], str]) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    said = threading.Event()
+    said, received = threading.Event(), list[int]()
 
     def say(number: int) -> None:
         if not said.is_set():
@@ -45,6 +45,7 @@ def interruptible(last_words: Callable[[], str]) -> Iterator[None]:
     def handle(number: int, _: FrameType | None) -> None:
         for each in _SIGNALS:
             signal.signal(each, signal.SIG_IGN)
+        received.append(number)
         raise Interrupted(number)
 
     heard, wakes = os.pipe()
@@ -63,9 +64,11 @@ def interruptible(last_words: Callable[[], str]) -> Iterator[None]:
     watcher.start()
     try:
         yield
-    except Interrupted as stop:
-        say(stop.status - 128)
-        raise
+    except BaseException:
+        if not received:
+            raise
+        say(received[0])  # whatever libraries have made of `Interrupted` on its way
+        raise Interrupted(received[0]) from None
     finally:
         over.set()
         signal.set_wakeup_fd(awake)
