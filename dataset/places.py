@@ -180,6 +180,21 @@ class _Whole:
         """Nothing is buffered."""
 
 
+class _Refusing:
+    """A file behind a URL whose errors are one line."""
+
+    def __init__(self, file: Any, attempt: str):
+        self._file, self._attempt = file, attempt
+
+    def write(self, view: memoryview) -> None:
+        """Write all of it."""
+        with _refusals(self._attempt, Exception):
+            self._file.write(view)
+
+    def flush(self) -> None:
+        """The upload decides when."""
+
+
 class Remote(Place):
     """A folder behind a URL."""
 
@@ -223,16 +238,20 @@ class Remote(Place):
 
     @contextmanager
     def writer(self, name: str) -> Iterator[Sink]:
-        with _refusals(f"write {self.path(name)}", Exception):
-            file = self._files.open(self._path(name), "wb")
-            try:
-                yield Sink(file)
-            except BaseException:
-                with suppress(Exception):
-                    file.discard()
+        attempt = f"write {self.path(name)}"
+        with _refusals(attempt, Exception):
+            file = self._files.open(self._path(name), "wb", autocommit=False)
+        try:
+            yield Sink(_Refusing(file, attempt))  # type: ignore[arg-type]
+        except BaseException:
+            with suppress(Exception):
+                file.discard()
+            with suppress(AttributeError):
                 file.closed = True  # or it would be completed when it is collected
-                raise
+            raise
+        with _refusals(attempt, Exception):
             file.close()
+            file.commit()
 
     def create(self, name: str, text: str) -> bool:
         """Write a file unless it is there; False where it is."""

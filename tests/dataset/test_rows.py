@@ -25,8 +25,8 @@ def bits(columns: dict[str, np.ndarray], row: int) -> dict[str, object]:
 def test_any_batch_and_any_order_give_the_same_bits() -> None:
     """Robots that fall back to time steps used to take their mesh from the fastest robot of their batch."""
     points = load_design("sweep.toml").with_rows(24).points()
-    quick = {"C_t": 0.5, "C_r": 0.5, "C_yr": 12.0, "l_over_R": 3.0, "L_over_R": 2.0, "l_over_r0": 15.0,
-             "omega_bar": 5.0, "N": 1.0, "dwell_bar": 1.0}  # fmt: skip
+    quick = {"C_t": 0.55, "C_r": 0.54, "C_yr": 4.1, "l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2,
+             "omega_bar": 117.0, "N": 6.0, "dwell_bar": 1.0}  # fmt: skip
     points = {name: np.append(values, quick[name]) for name, values in points.items()}
     whole = simulate(points)
     assert whole["reason"][-1]  # it is stepped in time
