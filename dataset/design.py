@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
 from sim.arrays import Floats
 from sim.effects import catalogue
@@ -90,6 +89,8 @@ class Design:
 
     def points(self, start: int = 0, stop: int | None = None) -> dict[str, Floats]:
         """Columns of the robots `start` … `stop` − 1 of the sequence; by default the first `rows`."""
+        from scipy.stats import qmc  # slow to import, and only workers need points
+
         end = self.rows if stop is None else stop
         names = [name for name in _order() if name in self.axes]
         sampler = qmc.Sobol(len(names), scramble=True, rng=np.random.default_rng(self.seed))

@@ -16,10 +16,9 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from dataset.pieces import BadPieceError, Contents, Piece, piece_name, pieces, tables, write_piece
@@ -27,6 +26,9 @@ from dataset.places import Place, place
 from dataset.schema import schema, table_of
 from sim.io.errors import InputError
 from sim.io.provenance import fingerprint, provenance
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MANIFEST, SWEEP, CARD, ROWS, PENDING = "manifest.json", "sweep.json", "card.md", "rows", "pending"
 FORMAT = 2  # of the folder

@@ -29,6 +29,7 @@ from sim.io.errors import InputError
 _SECONDS = 20.0  # of processor time that a chunk should take
 _FEWEST, _MOST = 1024, 4096  # rows of a chunk, unless there are few rows for many workers
 _CHUNKS = 4  # a worker, where there are few rows
+_STANDARD = "dataset.simulate.simulate"
 _GUESS = 0.02  # seconds a row, until rows are there that tell
 
 
@@ -92,8 +93,7 @@ def mend(folder: str | Path, *, jobs: int | None = None, title: str = "mend") ->
     begun = _Begun(there, f"python -m dataset verify {there.address} --mend")
     with interruptible(begun.words), locked(there):
         design, source = load_sweep(there)
-        standard = _standard()
-        simulate = None if source == _name(standard) else _imported(source)
+        simulate = None if source == _STANDARD else _imported(source)
         before = there.read(MANIFEST).to_pybytes() if there.size(MANIFEST) is not None else b""
         manifest = _build(
             design, there, simulate, begun, lambda: open_backend("loky", jobs=jobs), title, mending=True
@@ -129,22 +129,22 @@ def _build(
     *,
     mending: bool = False,
 ) -> dict[str, Any]:
-    work, standard = simulate or _standard(), simulate is None
     code = rows_version()
-    folder = SweepFolder(there, design, code, _name(work))
+    source = f"{simulate.__module__}.{simulate.__qualname__}" if simulate else _STANDARD
+    folder = SweepFolder(there, design, code, source)
     folder.claim(mending=mending)
     rows = max(design.rows, folder.rows_there())
     held = folder.holds(mending=mending)
     gaps = folder.missing(held, rows)
     if gaps:
-        if standard:
+        if simulate is None:
             _compile_first()
         done = rows - sum(stop - start for start, stop in gaps)
         begun.progress = engine.Progress(title, rows, done=done, failed=sum(c.failed for c in held.values()))
         workers = opened()
         try:
             tasks = [
-                Task(there.address, folder.config, folder.key, code, work, standard, start, stop)
+                Task(there.address, folder.config, folder.key, code, simulate, start, stop)
                 for start, stop in chunks(gaps, workers.slots(), _cost(held))
             ]
             result = engine.run(tasks, workers, begun.progress)
@@ -180,16 +180,6 @@ def _cost(held: Held) -> float:
     """Seconds a row, from the rows that are there."""
     rows, cost = sum(p.stop - p.start for p in held), sum(c.cost_s for c in held.values())
     return max(cost / rows, 1e-6) if rows else _GUESS
-
-
-def _standard() -> Simulate:
-    from dataset.simulate import simulate
-
-    return simulate
-
-
-def _name(simulate: Simulate) -> str:
-    return f"{simulate.__module__}.{simulate.__qualname__}"
 
 
 def _imported(name: str) -> Simulate:

@@ -12,7 +12,7 @@ import os
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from tempfile import gettempdir
@@ -38,8 +38,7 @@ class Task(NamedTuple):
     config: dict[str, Any]
     key: str
     code: str
-    simulate: Simulate
-    compiled: bool  # whether `simulate` uses the simulator's compiled loops
+    simulate: Simulate | None  # None: `dataset.simulate.simulate`, which only workers import
     start: int
     stop: int
 
@@ -101,8 +100,13 @@ def run_task(task: Task) -> Outcome:
 
 def _simulate(task: Task) -> dict[str, Any]:
     points = Design.from_config(task.config, task.stop).points(task.start, task.stop)
-    with _loops() if task.compiled else nullcontext():
+    if task.simulate is not None:
         columns = task.simulate(points)
+    else:
+        with _loops():
+            from dataset.simulate import simulate
+
+            columns = simulate(points)
     return {**columns, "row": np.arange(task.start, task.stop)}
 
 

@@ -23,7 +23,10 @@ from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import MARKS, ROOT, design, invented
 
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning"),
+]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
 
 
@@ -64,7 +67,9 @@ class Dask:
     def _start(self, *words: str) -> subprocess.Popen[bytes]:
         with open(self.folder / "dask.log", "ab") as log:
             command = [sys.executable, "-m", "distributed.cli.dask_" + words[0], *words[1:]]
-            return subprocess.Popen(command, cwd=self.folder, env=ENVIRONMENT, stdout=log, stderr=log, start_new_session=True)
+            return subprocess.Popen(
+                command, cwd=self.folder, env=ENVIRONMENT, stdout=log, stderr=log, start_new_session=True
+            )
 
     def add_worker(self, *words: str) -> subprocess.Popen[bytes]:
         """A worker under a nanny, which starts it again where it dies."""

@@ -52,7 +52,10 @@ def test_verify_passes(built: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_verify_notices_a_changed_number_under_sound_digests(built: Path, tmp_path: Path) -> None:
     table, manifest = read(built / "out"), read_manifest(built / "out")
-    for column, change, words in (("omega_yr_bar", 1.0000001, "omega_yr_bar of rows simulated"), ("C_t", 1.1, "C_t")):
+    for column, change, words in (
+        ("omega_yr_bar", 1.0000001, "omega_yr_bar of rows simulated"),
+        ("C_t", 1.1, "C_t"),
+    ):
         columns = {name: table[name].to_numpy() for name in table}
         columns[column] = columns[column] * change
         out = tmp_path / column

@@ -181,7 +181,7 @@ def test_a_worker_with_other_code_is_refused(tmp_path: Path, monkeypatch: pytest
 
 def test_a_worker_that_does_not_see_the_folder_is_refused(tmp_path: Path) -> None:
     there = place(tmp_path / "elsewhere")
-    outcome = run_task(Task(there.address, design(1).config(), "", rows_version(), invented, False, 0, 1))
+    outcome = run_task(Task(there.address, design(1).config(), "", rows_version(), invented, 0, 1))
     assert outcome[0] == "storage"
     assert "does not see" in outcome[1]
 

@@ -14,7 +14,9 @@ CONTROL = {**PRESETS["paper-control"].group_values(), "dwell_bar": 1.2}
 
 
 def rows_of(*changes: dict[str, float]) -> dict[str, np.ndarray]:
-    return {name: np.array([{**CONTROL, **change}[name] for change in changes]) for name in {**CONTROL, **changes[0]}}
+    return {
+        name: np.array([{**CONTROL, **change}[name] for change in changes]) for name in {**CONTROL, **changes[0]}
+    }
 
 
 def bits(columns: dict[str, np.ndarray], row: int) -> dict[str, object]:

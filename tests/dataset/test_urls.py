@@ -53,7 +53,9 @@ def test_a_url_holds_the_same_files(memory: str, calm: Path) -> None:
     assert sum(batch.num_rows for batch in batches(memory, ["v_x"])) == 200
 
 
-def test_damage_behind_a_url_is_refused_and_mended(memory: str, calm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_damage_behind_a_url_is_refused_and_mended(
+    memory: str, calm: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     build(design(200), memory, title="", simulate=invented)
     there = place(memory)
     (name,) = there.names("rows")
@@ -93,8 +95,8 @@ def bucket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
         one.bind(("127.0.0.1", 0))
         port = one.getsockname()[1]
     for name, value in {
-        "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}", "AWS_ACCESS_KEY_ID": "test", "AWS_SECRET_ACCESS_KEY": "test",
-        "AWS_DEFAULT_REGION": "us-east-1",
+        "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}", "AWS_ACCESS_KEY_ID": "test",
+        "AWS_SECRET_ACCESS_KEY": "test", "AWS_DEFAULT_REGION": "us-east-1",
     }.items():  # fmt: skip
         monkeypatch.setenv(name, value)
     with open(tmp_path / "moto.log", "wb") as log:
@@ -115,6 +117,12 @@ def bucket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
     server.wait()
 
 
+def break_off(there: Remote) -> None:
+    with there.writer("rows/x") as sink:
+        sink.write(b"half")
+        raise ZeroDivisionError
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 def test_s3_holds_the_same_files(bucket: str, calm: Path) -> None:
@@ -122,7 +130,9 @@ def test_s3_holds_the_same_files(bucket: str, calm: Path) -> None:
         "from tests.dataset.sweeps import *; from dataset.sweep import build; "
         f"build(design(200), {bucket!r}, jobs=2, title='', simulate=invented)"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=dict(os.environ), text=True, capture_output=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, env=dict(os.environ), text=True, capture_output=True
+    )
     assert done.returncode == 0, done.stderr
     assert read(bucket).equals(read(calm))
     assert files(bucket) == files(str(calm))
@@ -131,9 +141,8 @@ def test_s3_holds_the_same_files(bucket: str, calm: Path) -> None:
     assert isinstance(there, Remote)
     with locked(there):
         assert not there.create(lock.LOCK, "{}")
-    with pytest.raises(ZeroDivisionError), there.writer("rows/x") as sink:
-        sink.write(b"half")
-        raise ZeroDivisionError
+    with pytest.raises(ZeroDivisionError):
+        break_off(there)
     assert there.size("rows/x") is None
     there.delete("manifest.json")
     with pytest.raises(InputError, match="no finished data set"):
