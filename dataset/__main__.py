@@ -81,14 +81,14 @@ def _ended(work: Callable[[], T]) -> T:
         from dataset.sweep import UnfinishedError
 
         return work()
-    except KeyboardInterrupt:
-        print("\nstopped before it began", file=sys.stderr)
-        sys.exit(130)
     except Interrupted as stop:  # its line has been printed
         emergency = threading.Timer(1.0, os._exit, (stop.status,))  # for libraries that wait at an ordinary exit
         emergency.daemon = True
         emergency.start()
         sys.exit(stop.status)
+    except KeyboardInterrupt:
+        print("\nstopped before it began", file=sys.stderr)
+        sys.exit(130)
     except UnfinishedError as ended:
         print(f"unfinished: {ended}", file=sys.stderr)
         sys.exit(ended.status)

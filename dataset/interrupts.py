@@ -18,8 +18,8 @@ _GRACE = 1.3  # seconds for an orderly end
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-class Interrupted(BaseException):
-    """The user, or the system, ends the run. It is no `Exception`, so that none may hold it up."""
+class Interrupted(KeyboardInterrupt):
+    """The user, or the system, ends the run."""
 
     def __init__(self, number: int):
         self.status = 128 + number

@@ -27,6 +27,7 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning"),
 ]
+Head = tuple[str, Callable[[], None]]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
 
 
@@ -171,8 +172,8 @@ def build_apart(
 
 
 @pytest.fixture
-def ray(tmp_path: Path) -> Iterator[str]:
-    """Address of a ray head with two processors; the head is stopped by the ids of the processes it started."""
+def ray(tmp_path: Path) -> Iterator[Head]:
+    """Address of a ray head with two processors, and how to kill it with all that it has started."""
     pytest.importorskip("ray", reason="the extra ray is not installed")
     port, log = free_port(), tmp_path / "ray.log"
     words = ["start", "--head", "--block", "--port", str(port), "--num-cpus", "2", "--include-dashboard", "false"]
@@ -184,25 +185,39 @@ def ray(tmp_path: Path) -> Iterator[str]:
         )  # fmt: skip
     until(lambda: b"Ray runtime started" in log.read_bytes() or head.poll() is not None)
     assert head.poll() is None, log.read_text()
-    yield f"127.0.0.1:{port}"
-    os.killpg(head.pid, signal.SIGKILL)
-    head.wait()
+
+    def kill() -> None:
+        with suppress(ProcessLookupError):
+            os.killpg(head.pid, signal.SIGKILL)
+        head.wait()
+
+    yield f"127.0.0.1:{port}", kill
+    kill()
 
 
-def test_ray_makes_the_same_rows(ray: str, calm: Path, tmp_path: Path) -> None:
-    process = build_apart(tmp_path / "out", "killing_once", "ray", ray)
+def test_ray_ends_when_its_head_is_killed(ray: Head, tmp_path: Path) -> None:
+    process = build_apart(tmp_path / "out", "endless", "ray", ray[0], patience=2)
+    until(lambda: len(list(MARKS.iterdir())) >= 2)
+    ray[1]()
+    line = process.communicate()[1].strip().splitlines()[-1]
+    assert re.search(r"^unfinished: no workers for 2 s: 0 of 200 rows are stored .* go on with", line)
+    assert process.returncode == 1
+
+
+def test_ray_makes_the_same_rows(ray: Head, calm: Path, tmp_path: Path) -> None:
+    process = build_apart(tmp_path / "out", "killing_once", "ray", ray[0])
     _, words = process.communicate()
     assert process.returncode == 0, words
     assert read(tmp_path / "out").equals(read(calm))
     assert {mark.name.split("-")[-2] for mark in MARKS.iterdir()} >= {"0", "1"}
 
 
-def test_ray_sets_a_poisonous_chunk_aside_and_stops_when_told(ray: str, tmp_path: Path) -> None:
-    process = build_apart(tmp_path / "out", "poisonous", "ray", ray)
+def test_ray_sets_a_poisonous_chunk_aside_and_stops_when_told(ray: Head, tmp_path: Path) -> None:
+    process = build_apart(tmp_path / "out", "poisonous", "ray", ray[0])
     line = process.communicate()[1].strip().splitlines()[-1]
     assert re.search(r"rows \d+ to \d+ \(its worker died 3 times", line)
     assert process.returncode == 1
-    stopped = build_apart(tmp_path / "stopped", "endless", "ray", ray)
+    stopped = build_apart(tmp_path / "stopped", "endless", "ray", ray[0])
     until(lambda: any("endless" in mark.name for mark in MARKS.iterdir()))
     stopped.send_signal(signal.SIGINT)
     assert stopped.communicate()[1].strip().splitlines()[-1].startswith("stopped: 0 of 200 rows")
