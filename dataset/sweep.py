@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from dataset import engine
-from dataset.backends import Backend, open_backend
+from dataset.backends import Backend, check_backend, open_backend
 from dataset.design import Design
 from dataset.folder import Held, SweepFolder, load_sweep
 from dataset.interrupts import interruptible
@@ -69,6 +69,7 @@ def build(
         InputError: the folder holds something else or refuses, another process writes there, no such backend.
         UnfinishedError: some chunks were set aside, or there were no workers.
     """
+    check_backend(backend, jobs)
     there = place(folder)
     begun = _Begun(there, resume)
     with interruptible(begun.words), locked(there):

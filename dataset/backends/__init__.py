@@ -7,6 +7,7 @@ what it was given comes back by `collect` as a receipt, a refusal, or one of the
 from __future__ import annotations
 
 import os
+from importlib.util import find_spec
 from typing import Literal, Protocol
 
 from dataset.work import Outcome, Task
@@ -40,6 +41,19 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def check_backend(name: str, jobs: int | None) -> None:
+    """Refuse an unknown backend, one whose package is missing, and an impossible number of workers."""
+    if name not in BACKENDS:
+        raise InputError(f"backend {name!r}; allowed are {', '.join(BACKENDS)}")
+    package = {"dask": "distributed", "ray": "ray"}.get(name)
+    if package and find_spec(package) is None:
+        raise InputError(
+            f"backend {name!r} needs the package {package}; pip install 'softflagella[{name}]', or use loky"
+        )
+    if jobs is not None and jobs < 1:
+        raise InputError(f"jobs = {jobs}; give at least 1, or nothing for all processors")
+
+
 def open_backend(name: str, *, jobs: int | None = None, address: str | None = None) -> Backend:
     """The backend of a name.
 
@@ -49,25 +63,18 @@ def open_backend(name: str, *, jobs: int | None = None, address: str | None = No
         address: of a running dask scheduler or ray cluster; default: workers on this machine.
 
     Raises:
-        InputError: an unknown backend, one whose package is missing, or a cluster that does not answer.
+        InputError: as for `check_backend`, or a cluster that does not answer.
     """
-    if name not in BACKENDS:
-        raise InputError(f"backend {name!r}; allowed are {', '.join(BACKENDS)}")
-    if jobs is not None and jobs < 1:
-        raise InputError(f"jobs = {jobs}; give at least 1, or nothing for all processors")
+    check_backend(name, jobs)
     count = jobs or processors()
-    try:
-        if name == "loky":
-            from dataset.backends.processes import Processes
+    if name == "loky":
+        from dataset.backends.processes import Processes
 
-            return Processes(count)
-        if name == "dask":
-            from dataset.backends.dask_cluster import DaskCluster
+        return Processes(count)
+    if name == "dask":
+        from dataset.backends.dask_cluster import DaskCluster
 
-            return DaskCluster(address, count)
-        from dataset.backends.ray_cluster import RayCluster
+        return DaskCluster(address, count)
+    from dataset.backends.ray_cluster import RayCluster
 
-        return RayCluster(address, count)
-    except ImportError as missing:
-        words = f"{missing.name} is missing; pip install 'softflagella[{name}]', or use loky"
-        raise InputError(f"backend {name!r} needs a package: {words}") from None
+    return RayCluster(address, count)

@@ -31,6 +31,7 @@ def files(folder: Path) -> dict[str, int]:
     return {str(p.relative_to(folder)): p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()}
 
 
+@pytest.mark.slow
 def test_more_rows_only_add_chunks(tmp_path: Path, marks: Path) -> None:
     long, short = tmp_path / "long", tmp_path / "short"
     build(design(200), long, jobs=2, title="", simulate=invented)
@@ -88,6 +89,7 @@ def test_a_second_writer_is_refused_and_told_who_writes(tmp_path: Path) -> None:
     build(design(20), tmp_path / "out", jobs=1, title="", simulate=invented)
 
 
+@pytest.mark.slow
 def test_a_killed_worker_is_replaced_and_its_chunk_tried_again(tmp_path: Path, marks: Path) -> None:
     build(design(100), tmp_path / "out", jobs=2, title="", simulate=sweeps.killing_once)
     build(design(100), tmp_path / "calm", jobs=1, title="", simulate=invented)
@@ -96,6 +98,7 @@ def test_a_killed_worker_is_replaced_and_its_chunk_tried_again(tmp_path: Path, m
     assert attempts.count("0") == attempts.count("1") == 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("simulate", "reason"),
     [(sweeps.poisonous, "its worker died 3 times"), (sweeps.raising, "ZeroDivisionError: a robot that nobody")],
@@ -114,6 +117,7 @@ def test_a_poisonous_chunk_is_set_aside_and_named(
     assert f"{held} of 200 rows" in str(ended.value)
 
 
+@pytest.mark.slow
 def test_a_damaged_pending_piece_is_made_again(tmp_path: Path) -> None:
     with pytest.raises(UnfinishedError):
         build(design(200), tmp_path / "out", jobs=1, title="", simulate=sweeps.raising)
@@ -197,7 +201,14 @@ def test_chunks_are_sized_by_cost_and_workers() -> None:
     assert list(chunks([(0, 3), (10, 12)], 1, 1.0)) == [(0, 2), (2, 3), (10, 12)]
 
 
-@pytest.mark.parametrize(("backend", "words"), [("slurm", "allowed are loky"), ("loky", "jobs = 0")])
-def test_impossible_backends(backend: str, words: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("backend", "words"),
+    [("slurm", "allowed are loky"), ("loky", "jobs = 0"), ("dask", "distributed"), ("ray", "ray")],
+)
+def test_impossible_backends_leave_no_folder(
+    backend: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dataset.backends.find_spec", lambda _: None)
     with pytest.raises(InputError, match=words):
         build(design(4), tmp_path / "out", backend=backend, jobs=0, title="", simulate=invented)
+    assert not (tmp_path / "out").exists()

@@ -131,6 +131,20 @@ def test_two_builds_at_once(tmp_path: Path) -> None:
     first.communicate()
 
 
+def test_a_script_is_not_run_again_by_its_workers(tmp_path: Path) -> None:
+    """It has no `if __name__ == "__main__"`, and its rows are made by a function of its own."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from tests.dataset.sweeps import *\nfrom dataset.sweep import build\nprint('once')\n"
+        "def own(points):\n    return invented(points)\n"
+        f"build(design(40), {str(tmp_path / 'out')!r}, jobs=2, title='', simulate=own)\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
+    done = subprocess.run([sys.executable, str(script)], env=environment, text=True, capture_output=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "once\n", "")
+    assert len(read(tmp_path / "out")) == 40
+
+
 def test_a_worker_killed_at_each_step_of_its_write(tmp_path: Path) -> None:
     build(design(60), tmp_path / "out", jobs=2, title="", simulate=sweeps.dying_in_the_write)
     build(design(60), tmp_path / "calm", jobs=1, title="", simulate=invented)
