@@ -1,7 +1,10 @@
 """What every worker of this machine needs: loaded once, in the process that workers are forked from."""
 
 import numpy as np
+import pandas  # noqa: F401: pyarrow loads it when it makes its first array
+from scipy.stats import qmc  # noqa: F401
 
+import dataset.work  # noqa: F401
 from dataset.simulate import simulate
 from sim.compiling import all_compiled
 from sim.model.groups import DWELL
