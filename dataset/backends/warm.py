@@ -1,7 +1,7 @@
-"""What every worker of this machine needs: loaded once, in the process that workers are forked from."""
+"""What every worker of this machine needs, pandas for pyarrow included: loaded once, before workers are forked."""
 
 import numpy as np
-import pandas  # noqa: F401: pyarrow loads it when it makes its first array
+import pandas  # noqa: F401
 from scipy.stats import qmc  # noqa: F401
 
 import dataset.work  # noqa: F401
