@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import os
 from importlib.util import find_spec
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
-from dataset.work import Outcome, Task
 from sim.io.errors import InputError
+
+if TYPE_CHECKING:
+    from dataset.work import Outcome, Task
 
 BACKENDS = ("loky", "dask", "ray")
 Lost = Literal["lost", "killer", "gone"]
