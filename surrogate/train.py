@@ -69,7 +69,7 @@ def train(folder: str, settings: Settings | None = None, *, title: str = "train"
     """
     chosen = settings or Settings()
     manifest = read_manifest(folder)
-    rows = usable(read(folder))
+    rows = usable(read(folder)).drop(columns="reason")  # the one column of words
     positive = rows[["v_x", "v_z", "omega_yr_bar", "tail_gap"]].to_numpy() > 0
     rows = rows[positive.all(1) & (rows["omega_h_bar"].to_numpy() < 0)]
     if len(rows) < _FEWEST_ROWS:
