@@ -48,8 +48,7 @@ def timed(work: Callable[[], Result], *, repeats: int = 1) -> tuple[float, Resul
 
 
 def sweep(rows: int) -> dict[str, np.ndarray]:
-    points = load_design("sweep.toml").with_rows(rows).points()
-    return {name: values for name, values in points.items() if name != "dwell_bar"}
+    return load_design("sweep.toml").with_rows(rows).points()
 
 
 def robots() -> None:

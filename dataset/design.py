@@ -27,11 +27,11 @@ from sim.model.groups import DWELL, GROUP_COLUMNS, MOST_TAILS, OPTIONAL_COLUMNS
 
 _SCALES = ("linear", "log", "integer")
 MOST_ROWS = 2**30  # points of the sequence in double precision
+HISTORY_BLOCK = 256  # rows
 # Beyond these ends every robot would only be flagged.
 _LIMITS = {
     "C_t": (1e-3, 1e3), "C_r": (1e-3, 1e3), "C_yr": (1e-3, 1e3), "l_over_R": (0.1, 100), "L_over_R": (0.1, 100),
     "l_over_r0": (5, 1e4), "omega_bar": (1e-3, 1e3), "N": (1, MOST_TAILS), "a_over_R": (0.01, 10),
-    DWELL: (0.01, 100),
 }  # fmt: skip
 
 
@@ -63,11 +63,12 @@ class Axis:
 
 @dataclass(frozen=True)
 class Design:
-    """A sweep: axes by column name, number of rows, seed."""
+    """A sweep: axes by column name, number of rows, seed, and the share of rows with memory and rest."""
 
     axes: dict[str, Axis]
     rows: int
     seed: int
+    history_every: int = 4  # one block of HISTORY_BLOCK rows in so many has them; 0: none
 
     @staticmethod
     def from_config(config: Mapping[str, Any], rows: int) -> Design:
@@ -76,11 +77,12 @@ class Design:
             name: Axis(spec["range"][0], spec["range"][1], spec["scale"], spec.get("both_directions", False))
             for name, spec in config["inputs"].items()
         }
-        return Design(axes, rows, config["seed"])
+        return Design(axes, rows, config["seed"], config["history_every"])
 
     def config(self) -> dict[str, Any]:
         """What determines the robots, JSON-like (without the number of rows)."""
-        return {"seed": self.seed, "inputs": {name: axis.config() for name, axis in self.axes.items()}}
+        inputs = {name: axis.config() for name, axis in self.axes.items()}
+        return {"seed": self.seed, "history_every": self.history_every, "inputs": inputs}
 
     @property
     def effects(self) -> list[str]:
@@ -102,6 +104,14 @@ class Design:
         columns = {name: self.axes[name].at(np.ascontiguousarray(share[:, i])) for i, name in enumerate(names)}
         return {name: columns[name] for name in self.axes}
 
+    def history(self, start: int = 0, stop: int | None = None) -> np.ndarray:
+        """Whether memory and rest are simulated for the robots `start` … `stop` − 1.
+
+        Whole blocks of the sequence are, since each block covers the inputs evenly.
+        """
+        block = np.arange(start, self.rows if stop is None else stop) // HISTORY_BLOCK
+        return block % self.history_every == 0 if self.history_every else np.zeros(len(block), dtype=bool)
+
     def with_rows(self, rows: int | None) -> Design:
         """The same design, longer or shorter."""
         return self if rows is None else replace(self, rows=_check_rows(rows))
@@ -109,7 +119,7 @@ class Design:
 
 def _order() -> tuple[str, ...]:
     """Inputs in the order of the sequence's dimensions, whatever the order in sweep.toml."""
-    return (*GROUP_COLUMNS, *OPTIONAL_COLUMNS, DWELL, *catalogue())
+    return (*GROUP_COLUMNS, *OPTIONAL_COLUMNS, *catalogue())
 
 
 def load_design(path: str | Path) -> Design:
@@ -124,16 +134,17 @@ def load_design(path: str | Path) -> Design:
         raise InputError(f"{path} is not TOML: {broken}") from None
     except IsADirectoryError:
         raise InputError(f"{path} is a folder; give a sweep.toml") from None
-    for name in set(content) - {"rows", "seed", "inputs"}:
-        raise InputError(f"{path}: unknown entry {name!r}; allowed are rows, seed and [inputs]")
-    required = (*GROUP_COLUMNS, DWELL)
+    for name in set(content) - {"rows", "seed", "history_every", "inputs"}:
+        raise InputError(f"{path}: unknown entry {name!r}; allowed are rows, seed, history_every and [inputs]")
     inputs = content.get("inputs", {})
     if not isinstance(inputs, dict):
         raise InputError(f"{path}: inputs = {inputs!r}; write a table [inputs]")
     for name in inputs:
+        if name == DWELL:
+            raise InputError(f"{path}: {name} is no input any more, rows hold all dwells; take the line out")
         if name not in _order():
             raise InputError(f"{path}: unknown input {name!r}; allowed are {', '.join(sorted(_order()))}")
-    for name in required:
+    for name in GROUP_COLUMNS:
         if name not in inputs:
             raise InputError(f"{path}: missing input {name!r} in [inputs]")
     axes = {name: _axis(str(path), name, inputs[name]) for name in _order() if name in inputs}
@@ -141,7 +152,10 @@ def load_design(path: str | Path) -> Design:
     seed = content.get("seed", 0)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise InputError(f"{path}: seed = {seed!r}; give a whole number from 0")
-    return Design(axes, _check_rows(content.get("rows", 1024)), seed)
+    every = content.get("history_every", 4)
+    if not isinstance(every, int) or isinstance(every, bool) or every < 0:
+        raise InputError(f"{path}: history_every = {every!r}; give a whole number, 0 for none")
+    return Design(axes, _check_rows(content.get("rows", 1024)), seed, every)
 
 
 def _axis(path: str, name: str, spec: Any) -> Axis:
@@ -180,7 +194,7 @@ def _check_ends(path: str, axes: dict[str, Axis]) -> None:
             )
     for end in ("low", "high"):
         try:
-            check_columns({name: np.array([getattr(a, end)]) for name, a in axes.items() if name != DWELL})
+            check_columns({name: np.array([getattr(a, end)]) for name, a in axes.items()})
         except InputError as refusal:
             raise InputError(f"{path}: the {end} ends of the ranges make no robot: {refusal}") from None
 

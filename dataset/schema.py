@@ -4,18 +4,21 @@ Rows that failed or whose tails touch are kept and flagged: `failed` rows have N
 have numbers of a model without contact. `usable` rows are the ones to learn from.
 
 A column may hold a list of numbers a row, all rows equally many: values on a grid, which is stored with the field.
+The response to a flip is such lists (`sim.model.response`). In `memory_…` the values of each dwell before follow
+each other.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 
 from sim.effects import catalogue
+from sim.model.response import BEFORE, DWELLS
 
 
 class Column(NamedTuple):
@@ -23,11 +26,25 @@ class Column(NamedTuple):
     type: pa.DataType
     unit: str
     meaning: str
-    grid: tuple[float, ...] = ()  # of a list: what its values are given at
+    grid: tuple[float, ...] = ()  # of a list: the dwells that its values are given at
+    before: tuple[float, ...] = ()  # of a list of lists: the dwells before
 
 
 _real, _whole, _flag = pa.float64(), pa.int32(), pa.bool_()
+_LAG = (("z", "l", "forward"), ("x", "l", "to the new turn's side"), ("psi_rad", "radian", "of the heading"))
 COST = "cost_s"  # how long a row took: the one column that differs when the row is simulated again
+
+
+def _curve(name: str, unit: str, meaning: str, before: Sequence[float] = ()) -> Column:
+    """A column of values over the dwell."""
+    size = len(DWELLS) * max(len(before), 1)
+    return Column(name, pa.list_(pa.float32(), size), unit, meaning, tuple(DWELLS), tuple(before))
+
+
+def _curves(name: str, meaning: str, before: Sequence[float] = ()) -> tuple[Column, ...]:
+    """The three columns of a lag."""
+    return tuple(_curve(f"{name}_{axis}", unit, f"{meaning}, {what}", before) for axis, unit, what in _LAG)
+
 
 INPUTS = (
     Column("C_t", _real, "1", "head's translational drag coefficient"),
@@ -39,7 +56,6 @@ INPUTS = (
     Column("omega_bar", _real, "EI/(mu0 l^4)", "motor speed, head relative to tails"),
     Column("N", _whole, "1", "number of tails"),
     Column("a_over_R", _real, "1", "radius of the circle of clamps over head radius"),
-    Column("dwell_bar", _real, "mu0 l^4/EI", "switching half-period"),
 )
 OUTPUTS = (
     Column("omega_t_bar", _real, "EI/(mu0 l^4)", "mean spin of the tails about the axis"),
@@ -49,20 +65,21 @@ OUTPUTS = (
     Column("v_z", _real, "EI/(mu0 l^3)", "mean surge of the head's centre"),
     Column("R_yr_over_l", _real, "l", "radius of the circle of the head's centre"),
     Column("theta_deg", _real, "degree", "angle between axis and path of the head's centre"),
-    Column("net_speed_bar", _real, "EI/(mu0 l^3)", "net speed when the motor flips every dwell_bar"),
-    Column("lag_psi_rad", _real, "radian", "response to a switch: heading offset after dwell_bar"),
-    Column("lag_x", _real, "l", "response to a switch: offset to the new turn's side"),
-    Column("lag_z", _real, "l", "response to a switch: offset forward"),
     Column("tail_gap", _real, "2 r0", "smallest distance between tails; below 1 they touch"),
     Column("error", _real, "1", "estimated relative error of the steady outputs (velocities: of the speed)"),
+    _curve("net_speed_bar", "EI/(mu0 l^3)", "net speed when the motor flips after every dwell"),
+    *_curves("lag", "lag after a flip"),
+    *_curves("spread", "standard deviation of the lag over the disc's phase at the flip"),
+    *_curves("rest", "lag of a first dwell from rest; NaN without history"),
+    *_curves("memory", "what a short dwell before adds to the lag; NaN without history", BEFORE),
 )
 FLAGS = (
     Column("row", _whole, "1", "row of the design"),
     Column("converged", _flag, "1", "the motion is steady and solved to tolerance"),
     Column("failed", _flag, "1", "the simulation broke down; outputs are NaN"),
     Column("touching", _flag, "1", "tails touch: outside the model's validity"),
-    Column("edges", _whole, "1", "edges a tail in the response to a switch"),
-    Column("steps", _whole, "1", "time steps a motor revolution in the response to a switch"),
+    Column("stepped", _flag, "1", "the response was simulated by time steps"),
+    Column("history", _flag, "1", "memory and rest were simulated"),
     Column("reason", pa.string(), "1", "why the row failed, did not converge or was stepped in time; else empty"),
     Column(COST, pa.float32(), "s", "processor time that the row took"),
 )
@@ -79,6 +96,8 @@ def field_of(column: Column) -> pa.Field:
     words = {"unit": column.unit, "meaning": column.meaning}
     if column.grid:
         words["grid"] = json.dumps(column.grid)
+    if column.before:
+        words["before"] = json.dumps(column.before)
     return pa.field(column.name, column.type, nullable=False, metadata=words)
 
 
@@ -89,7 +108,7 @@ def table_of(columns: Mapping[str, Any], form: pa.Schema) -> pa.Table:
 
 def _array(values: Any, kind: pa.DataType) -> pa.Array:
     if pa.types.is_fixed_size_list(kind):
-        rows = np.ascontiguousarray(values)
+        rows = np.stack(list(values)) if len(values) else np.empty((0, kind.list_size))
         if rows.shape[1:] != (kind.list_size,):
             raise ValueError(f"lists of {kind.list_size} values expected, given {rows.shape}")
         inner = pa.array(rows.ravel(), type=kind.value_type, from_pandas=False)

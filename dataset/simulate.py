@@ -1,8 +1,8 @@
 """Inputs -> rows: what is simulated of each robot.
 
-Each robot's steady motion is solved for (`sim.motion.steady`), and from there it is stepped through flips of the
-motor with its own half-period (`sim.motion.switching`). Robots are simulated one by one, so that a row depends on
-nothing but its inputs: not on the robots beside it, and not on their order.
+Each robot's steady motion is solved for (`sim.motion.steady`), and from there its response to a flip of the
+motor, over all dwells (`sim.motion.response`). Robots are simulated one by one, so that a row depends on nothing
+but its inputs: not on the robots beside it, and not on their order.
 """
 
 from __future__ import annotations
@@ -14,53 +14,56 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.inputs import check_columns
-from sim.model.groups import DWELL, Groups
-from sim.motion.resolution import Resolution
+from sim.model.groups import Groups
+from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.motion.steady_motion import STEADY_COLUMNS
-from sim.motion.switching import switch_response
 
 Columns = dict[str, Any]
-NO_RESPONSE = "the response to a switch broke down, or asked for more time steps than a row may"
+NO_RESPONSE = "the response to a flip broke down, or asked for more time steps than a row may"
+HISTORY = "history"  # an input of a row that is no number of the robot: whether memory and rest are simulated
 
 
-def simulate(inputs: dict[str, Floats]) -> Columns:
+def simulate(inputs: dict[str, Any]) -> Columns:
     """All columns of the schema except `row`.
 
     Args:
-        inputs: robots by column name, `dwell_bar` included, each (B,).
+        inputs: robots by column name, each (B,); `history`, (B,), says of which memory and rest are simulated.
 
     Raises:
         InputError: a column is missing or unknown, or a number is outside its range.
     """
-    values = check_columns({name: array for name, array in inputs.items() if name != DWELL})
-    values[DWELL] = np.asarray(inputs[DWELL], dtype=float)
-    rows = [_row({name: array[i : i + 1] for name, array in values.items()}) for i in range(len(values["N"]))]
+    values = check_columns({name: array for name, array in inputs.items() if name != HISTORY})
+    history = np.asarray(inputs[HISTORY], dtype=bool)
+    rows = [
+        _row({name: array[i : i + 1] for name, array in values.items()}, bool(history[i]))
+        for i in range(len(history))
+    ]
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
-def _row(values: dict[str, Floats]) -> Columns:
+def _row(values: dict[str, Floats], history: bool) -> Columns:
     began = time.thread_time()
-    groups = Groups.from_columns({name: array for name, array in values.items() if name != DWELL})
+    groups = Groups.from_columns(values)
     motion = steady(groups)
-    response = switch_response(groups, values[DWELL], motion)
-    resolution = Resolution.fitting(float(values["omega_bar"][0]))
+    response = responses(groups, motion, history=history)
     steady_values = motion.columns()
     columns: Columns = {**values, **{k: steady_values[k] for k in STEADY_COLUMNS}}
     failed = motion.failed | response.failed
     columns |= {
         "net_speed_bar": response.net_speed,
-        "lag_psi_rad": response.lag_psi,
-        "lag_x": response.lag_x,
-        "lag_z": response.lag_z,
         "error": motion.error,
         "failed": failed,
         "converged": columns["converged"] & ~failed,
         "touching": columns["tail_gap"] < 1,
-        "edges": np.array([resolution.edges]),
-        "steps": np.array([resolution.steps]),
+        "stepped": response.stepped,
+        HISTORY: np.array([history]),
         "reason": np.where(response.failed & ~motion.failed, NO_RESPONSE, motion.note),
     }
+    curves = {"lag": response.lag, "spread": response.spread, "rest": response.rest, "memory": response.memory}
+    for name, curve in curves.items():
+        for i, axis in enumerate(("z", "x", "psi_rad")):
+            columns[f"{name}_{axis}"] = curve[..., i].reshape(1, -1)
     for name in STEADY_COLUMNS[:7]:
         columns[name] = np.where(failed, np.nan, columns[name])
     columns["N"] = values["N"].astype(int)

@@ -15,11 +15,10 @@ import pyarrow as pa
 from dataset.design import Design
 from dataset.places import place
 from dataset.schema import COST, schema, table_of
-from dataset.simulate import simulate
+from dataset.simulate import HISTORY, simulate
 from dataset.store import batches, read_manifest
 from dataset.work import rows_version
 from sim.io.errors import InputError
-from sim.model.groups import DWELL
 from sim.motion.batches import stepped_columns
 
 _SPINS = ("omega_t_bar", "omega_h_bar")
@@ -64,7 +63,7 @@ def _check_batch(address: str, design: Design, batch: pa.RecordBatch, start: int
     for name, values in design.points(start, stop).items():
         if not np.array_equal(batch[name].to_numpy(), values):
             raise InputError(f"{address}: {name} in rows {start} to {stop - 1} is not that of its design")
-    outputs = [batch[n].to_numpy() for n in (*_SPINS, *_REST, "net_speed_bar", "lag_psi_rad")]
+    outputs = [batch[n].to_numpy() for n in (*_SPINS, *_REST)]
     failed = batch["failed"].to_numpy(zero_copy_only=False)
     lost = int((np.isnan(outputs).any(0) & ~failed).sum())
     if lost:
@@ -73,6 +72,7 @@ def _check_batch(address: str, design: Design, batch: pa.RecordBatch, start: int
 
 def _check_again(address: str, design: Design, stored: pa.Table, chosen: np.ndarray) -> None:
     points = {name: stored[name].to_numpy().astype(float) for name in design.axes}
+    points[HISTORY] = stored[HISTORY].to_numpy()
     again = table_of({**simulate(points), "row": chosen}, schema(design.effects))
     for name in stored.schema.names:
         one, other = (_bits(table[name]) for table in (stored, again))
@@ -95,7 +95,7 @@ def _check_stepped(address: str, design: Design, stored: pd.DataFrame) -> float:
     good = stored[stored["converged"]]
     if good.empty:
         return 0.0
-    again = stepped_columns({n: good[n].to_numpy(dtype=float) for n in design.axes if n != DWELL}, title="")
+    again = stepped_columns({n: good[n].to_numpy(dtype=float) for n in design.axes}, title="")
     worst = max(_worst(good, again, _SPINS) / _SPIN_ERROR, _worst(good, again, _REST) / _REST_ERROR)
     if worst > 1:
         raise InputError(

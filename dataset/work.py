@@ -99,7 +99,9 @@ def run_task(task: Task) -> Outcome:
 
 
 def _simulate(task: Task) -> dict[str, Any]:
-    points = Design.from_config(task.config, task.stop).points(task.start, task.stop)
+    design = Design.from_config(task.config, task.stop)
+    points: dict[str, Any] = design.points(task.start, task.stop)
+    points["history"] = design.history(task.start, task.stop)
     if task.simulate is not None:
         columns = task.simulate(points)
     else:

@@ -34,7 +34,6 @@ L_over_R = { range = [3.0, 5.0] }
 l_over_r0 = { range = [20.0, 45.0] }
 omega_bar = { range = [6.0, 12.0], scale = "log" }
 N = { range = [2, 3], scale = "integer" }
-dwell_bar = { range = [0.7, 1.5], scale = "log" }
 """
 
 

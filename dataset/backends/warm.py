@@ -5,11 +5,10 @@ import pandas  # noqa: F401
 from scipy.stats import qmc  # noqa: F401
 
 import dataset.work  # noqa: F401
-from dataset.simulate import simulate
+from dataset.simulate import HISTORY, simulate
 from sim.compiling import all_compiled
-from sim.model.groups import DWELL
 from sim.model.presets import PRESETS
 
 if all_compiled():  # load the machine code, too
-    _values = {**PRESETS["paper-control"].group_values(), DWELL: 1.0}
+    _values = {**PRESETS["paper-control"].group_values(), HISTORY: True}
     simulate({name: np.array([value]) for name, value in _values.items()})

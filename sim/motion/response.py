@@ -96,7 +96,6 @@ def _on_mesh(body: Body, tails: int, even: bool, edges: int, *, history: bool) -
     if after is None:
         return None
     x, u, twist = after
-    marks = BEFORE if history else np.empty(0)
     if even:
         start, first = _mirrored(x), u
     else:
@@ -106,7 +105,7 @@ def _on_mesh(body: Body, tails: int, even: bool, edges: int, *, history: bool) -
             return None
         other = before[2]
         start, first = before[0], before[1] * _FLIPPED
-    main = transient(body, start.copy(), first.copy(), twist, SETTLED, marks, _TOLERANCE)
+    main = transient(body, start.copy(), first.copy(), twist, SETTLED, BEFORE, _TOLERANCE)
     if not main.solved:
         return None
     dwells = np.minimum(DWELLS, SETTLED)
@@ -119,7 +118,7 @@ def _on_mesh(body: Body, tails: int, even: bool, edges: int, *, history: bool) -
     if even:
         shapes = np.array([_mirrored(shape) for shape in shapes])
     else:
-        back = transient(reverse, x.copy(), u * _FLIPPED, other, float(BEFORE[-1]), marks, _TOLERANCE)
+        back = transient(reverse, x.copy(), u * _FLIPPED, other, float(BEFORE[-1]), BEFORE, _TOLERANCE)
         if not back.solved:
             return None
         shapes = back.shapes

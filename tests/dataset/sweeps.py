@@ -14,6 +14,7 @@ import pandas as pd
 
 from dataset.design import Axis, Design
 from dataset.schema import COST
+from sim.model.response import BEFORE, DWELLS
 
 SMALL = """
 rows = 6
@@ -27,7 +28,6 @@ L_over_R = { range = [3.0, 5.0] }
 l_over_r0 = { range = [20.0, 45.0] }
 omega_bar = { range = [6.0, 12.0], scale = "log" }
 N = { range = [2, 3], scale = "integer" }
-dwell_bar = { range = [1.2, 1.5], scale = "log" }
 """
 Rows = Callable[[dict[str, np.ndarray]], dict[str, Any]]
 ROOT = Path(__file__).parents[2]
@@ -40,7 +40,7 @@ def design(rows: int, seed: int = 5) -> Design:
     axes = {
         "C_t": Axis(2, 5, "linear"), "C_r": Axis(1.5, 3.5, "linear"), "C_yr": Axis(1, 7, "linear"),
         "l_over_R": Axis(4, 9, "linear"), "L_over_R": Axis(3, 5, "linear"), "l_over_r0": Axis(20, 45, "linear"),
-        "omega_bar": Axis(3, 18, "log"), "N": Axis(2, 5, "integer"), "dwell_bar": Axis(0.7, 2, "log"),
+        "omega_bar": Axis(3, 18, "log"), "N": Axis(2, 5, "integer"),
     }  # fmt: skip
     return Design(axes, rows, seed)
 
@@ -53,15 +53,21 @@ def invented(p: dict[str, np.ndarray]) -> dict[str, Any]:
     sway = 0.9 * yaw * (1 + 1 / p["C_t"])
     surge = sway * (0.2 + 0.1 * np.log(p["l_over_r0"]) / p["L_over_R"])
     failed = p["omega_bar"] > 17.5
+    dwells = len(DWELLS)
+    lag = {"z": -0.04 * sway[:, None] * np.exp(-DWELLS), "x": -0.02 * sway[:, None] * np.ones(dwells),
+           "psi_rad": 0.02 * yaw[:, None] * np.ones(dwells)}  # fmt: skip
+    curves = {f"lag_{axis}": values for axis, values in lag.items()}
+    for axis, values in lag.items():
+        curves |= {f"spread_{axis}": 0.01 * np.abs(values), f"rest_{axis}": 0.5 * values}
+        curves[f"memory_{axis}"] = np.concatenate([0.1 * values / (1 + k) for k in range(len(BEFORE))], 1)
     return {
         **p, "N": p["N"].astype(int), "a_over_R": np.ones(rows),
         "omega_t_bar": p["omega_bar"] * (1 - share), "omega_h_bar": -p["omega_bar"] * share,
         "omega_yr_bar": yaw, "v_x": sway, "v_z": surge, "R_yr_over_l": np.hypot(sway, surge) / yaw,
-        "theta_deg": np.degrees(np.arctan2(sway, surge)), "net_speed_bar": surge,
-        "lag_psi_rad": 0.02 * yaw, "lag_x": -0.02 * sway, "lag_z": -0.04 * sway * np.exp(-p["dwell_bar"]),
-        "tail_gap": 2 + p["l_over_R"] / p["N"], "error": np.zeros(rows),
+        "theta_deg": np.degrees(np.arctan2(sway, surge)), "net_speed_bar": surge[:, None] * np.ones(dwells),
+        **curves, "tail_gap": 2 + p["l_over_R"] / p["N"], "error": np.zeros(rows),
         "converged": ~failed, "failed": failed, "touching": np.zeros(rows, bool),
-        "edges": np.full(rows, 16), "steps": np.full(rows, 24),
+        "stepped": np.zeros(rows, bool),
         "reason": np.where(failed, "it turns too fast", ""), COST: np.full(rows, 1e-3),
     }  # fmt: skip
 

@@ -7,10 +7,10 @@ import pytest
 
 from dataset.design import load_design
 from dataset.schema import COST
-from dataset.simulate import NO_RESPONSE, simulate
+from dataset.simulate import simulate
 from sim.model.presets import PRESETS
 
-CONTROL = {**PRESETS["paper-control"].group_values(), "dwell_bar": 1.2}
+CONTROL = {**PRESETS["paper-control"].group_values(), "history": True}
 
 
 def rows_of(*changes: dict[str, float]) -> dict[str, np.ndarray]:
@@ -28,8 +28,9 @@ def test_any_batch_and_any_order_give_the_same_bits() -> None:
     """Robots that fall back to time steps used to take their mesh from the fastest robot of their batch."""
     points = load_design("sweep.toml").with_rows(24).points()
     quick = {"C_t": 0.55, "C_r": 0.54, "C_yr": 4.1, "l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2,
-             "omega_bar": 117.0, "N": 6.0, "dwell_bar": 1.0}  # fmt: skip
+             "omega_bar": 117.0, "N": 6.0}  # fmt: skip
     points = {name: np.append(values, quick[name]) for name, values in points.items()}
+    points["history"] = np.arange(25) % 8 == 0
     whole = simulate(points)
     assert whole["reason"][-1]  # it is stepped in time
     order = np.random.default_rng(2).permutation(25)
@@ -42,15 +43,13 @@ def test_any_batch_and_any_order_give_the_same_bits() -> None:
 
 
 def test_rows_beyond_their_budget_say_so() -> None:
-    """C_t = C_r = 1e-9 asked for 24 TiB, a dwell of 1e-9 for 1.2e9 flips, ω̄ = 1e-6 for days."""
-    found = simulate(
-        rows_of({"C_t": 1e-9, "C_r": 1e-9}, {"dwell_bar": 1e-9}, {"omega_bar": 1e-6}, {"dwell_bar": 1.2})
-    )
+    """C_t = C_r = 1e-9 asked for 24 TiB, ω̄ = 1e-6 for days, ω̄ = 1e9 for 85 GiB."""
+    found = simulate(rows_of({"C_t": 1e-9, "C_r": 1e-9}, {"omega_bar": 1e-6}, {"omega_bar": 1e9}, {}))
     assert found["failed"].tolist() == [True, True, True, False]
     assert all(found["reason"][:3])
-    assert found["reason"][1] == NO_RESPONSE
     assert found["reason"][3] == ""
     assert np.isnan(found["omega_yr_bar"][:3]).all()
+    assert np.isnan(found["lag_z"][:3]).all()
     assert found[COST].max() < 60
 
 
@@ -64,7 +63,15 @@ def test_one_to_eight_tails_other_discs_and_a_reversed_motor() -> None:
     )  # fmt: skip
     assert found["converged"].all()
     assert found["omega_yr_bar"][3] == pytest.approx(-found["omega_yr_bar"][5], rel=1e-9)
-    assert found["net_speed_bar"][3] == pytest.approx(found["net_speed_bar"][5], rel=1e-9)
+    assert found["net_speed_bar"][3] == pytest.approx(found["net_speed_bar"][5], rel=1e-6)
+
+
+def test_memory_and_rest_are_simulated_where_asked_for() -> None:
+    found = simulate(rows_of({"history": True}, {"history": False}))
+    assert np.isfinite(found["memory_psi_rad"][0]).all()
+    assert np.isfinite(found["rest_z"][0]).all()
+    assert np.isnan(found["memory_psi_rad"][1]).all()
+    assert found["lag_z"][0] == pytest.approx(found["lag_z"][1], abs=1e-12)
 
 
 def test_odd_effects_make_the_two_directions_differ() -> None:
@@ -75,7 +82,7 @@ def test_odd_effects_make_the_two_directions_differ() -> None:
 
 def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither an orbit nor a time step can be solved."""
-    from sim.motion import run, steady, switching
+    from sim.motion import response, run, steady, stepped_response
     from sim.motion.orbits import Orbits
     from sim.solve.refinement import NO_START
 
@@ -84,9 +91,10 @@ def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> No
         return Orbits(np.full((count, 5), np.nan), np.empty((count, 0, 5)), none, np.full(count, NO_START), none)
 
     monkeypatch.setattr(steady, "solve_orbits", lost)
-    monkeypatch.setattr(switching, "state_on_orbit", lambda *_: None)
+    monkeypatch.setattr(response, "orbit_on_mesh", lambda *_: (False, None, None))
+    monkeypatch.setattr(stepped_response, "state_on_orbit", lambda *_: None)
     monkeypatch.setattr(run, "advance", lambda *_: False)
-    columns = simulate(rows_of({"dwell_bar": 1.2}))
+    columns = simulate(rows_of({}))
     assert columns["failed"].tolist() == [True]
     assert columns["converged"].tolist() == [False]
     assert np.isnan(columns["omega_yr_bar"]).all()

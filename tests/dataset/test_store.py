@@ -227,6 +227,6 @@ def test_usable_leaves_failed_rows_out(original: Path) -> None:
     table = read(original).iloc[:6].assign(failed=False, converged=True, row=range(6))
     table.loc[0, "failed"] = True
     table.loc[1, "converged"] = False
-    table.loc[2, "lag_x"] = np.nan
+    table.loc[2, "v_z"] = np.nan
     assert usable(table)["row"].tolist() == [3, 4, 5]
     assert len(without_cost(table).columns) == len(table.columns) - 1
