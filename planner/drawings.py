@@ -66,7 +66,7 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
     return Drawing(Path2D.of(table[["x", "y"]].to_numpy(), closed=closed), None)
 
 
-# What svgelements raises at a drawing that is none: a transform without numbers, a path that begins with a curve, …
+# What svgelements raises at a drawing that is none: a transform without numbers, a path that begins with a curve
 _BROKEN = (
     ParseError, AttributeError, TypeError, UnicodeDecodeError, ValueError, ArithmeticError, LookupError,
 )  # fmt: skip
