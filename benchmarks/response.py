@@ -1,7 +1,7 @@
 """The response of robots to a flip: processor time and error of the curves, beside one dwell by time steps.
 
-Usage: python -m benchmarks.response [ROBOTS]. Single-threaded; the reference for errors has 24 edges and 72 steps a
-motor revolution.
+Usage: python -m benchmarks.response [ROBOTS]. Single-threaded. The reference for errors has 24 edges and 72 steps
+a motor revolution.
 """
 
 from __future__ import annotations
