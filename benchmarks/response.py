@@ -22,6 +22,7 @@ from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.motion.stepped_response import stepped_response
 from sim.motion.switching import switch_response
+from sim.motion.warm import compile_once
 from sim.solve.assembly import bodies
 
 _REFERENCE = Resolution(24, 72)
@@ -47,6 +48,9 @@ def costs(parts: list[Groups], robots: int) -> None:
         "… and memory of the dwell before, and rest": lambda: [responses(part) for part in parts],
         "one dwell by time steps": lambda: [switch_response(p, T) for p, T in zip(parts, dwells, strict=True)],
     }
+    compile_once()
+    for work in ways.values():
+        work()  # load the machine code
     print(f"\n{robots} robots of the sweep, processor time a robot")
     for name, work in ways.items():
         began = time.process_time()
