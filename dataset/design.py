@@ -25,6 +25,7 @@ from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.model.groups import DWELL, GROUP_COLUMNS, MOST_TAILS, OPTIONAL_COLUMNS
 
+_ENTRIES = ("rows", "seed", "history_every", "sensitivities", "inputs")
 _SCALES = ("linear", "log", "integer")
 MOST_ROWS = 2**30  # points of the sequence in double precision
 HISTORY_BLOCK = 256  # rows
@@ -69,6 +70,7 @@ class Design:
     rows: int
     seed: int
     history_every: int = 4  # one block of HISTORY_BLOCK rows in so many has them; 0: none
+    sensitivities: bool = False  # derivatives of the steady motion in the inputs, as columns
 
     @staticmethod
     def from_config(config: Mapping[str, Any], rows: int) -> Design:
@@ -77,12 +79,13 @@ class Design:
             name: Axis(spec["range"][0], spec["range"][1], spec["scale"], spec.get("both_directions", False))
             for name, spec in config["inputs"].items()
         }
-        return Design(axes, rows, config["seed"], config["history_every"])
+        return Design(axes, rows, config["seed"], config["history_every"], config["sensitivities"])
 
     def config(self) -> dict[str, Any]:
         """What determines the robots, JSON-like (without the number of rows)."""
         inputs = {name: axis.config() for name, axis in self.axes.items()}
-        return {"seed": self.seed, "history_every": self.history_every, "inputs": inputs}
+        extra = {"history_every": self.history_every, "sensitivities": self.sensitivities}
+        return {"seed": self.seed, **extra, "inputs": inputs}
 
     @property
     def effects(self) -> list[str]:
@@ -134,8 +137,8 @@ def load_design(path: str | Path) -> Design:
         raise InputError(f"{path} is not TOML: {broken}") from None
     except IsADirectoryError:
         raise InputError(f"{path} is a folder; give a sweep.toml") from None
-    for name in set(content) - {"rows", "seed", "history_every", "inputs"}:
-        raise InputError(f"{path}: unknown entry {name!r}; allowed are rows, seed, history_every and [inputs]")
+    for name in set(content) - set(_ENTRIES):
+        raise InputError(f"{path}: unknown entry {name!r}; allowed are {', '.join(_ENTRIES)}")
     inputs = content.get("inputs", {})
     if not isinstance(inputs, dict):
         raise InputError(f"{path}: inputs = {inputs!r}; write a table [inputs]")
@@ -155,7 +158,10 @@ def load_design(path: str | Path) -> Design:
     every = content.get("history_every", 4)
     if not isinstance(every, int) or isinstance(every, bool) or every < 0:
         raise InputError(f"{path}: history_every = {every!r}; give a whole number, 0 for none")
-    return Design(axes, _check_rows(content.get("rows", 1024)), seed, every)
+    slopes = content.get("sensitivities", False)
+    if not isinstance(slopes, bool):
+        raise InputError(f"{path}: sensitivities = {slopes!r}; give true or false")
+    return Design(axes, _check_rows(content.get("rows", 1024)), seed, every, slopes)
 
 
 def _axis(path: str, name: str, spec: Any) -> Axis:

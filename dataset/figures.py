@@ -124,12 +124,12 @@ def draw_responses(rows: pd.DataFrame) -> Figure:
         ("lag_z", rows["v_z"].to_numpy(float), "forward lag / surge [time units]"),
         ("net_speed_bar", speed, "net speed / speed"),
     )
-    thirds = pd.qcut(rows["omega_bar"].abs(), 3, labels=False)
+    thirds = np.asarray(pd.qcut(rows["omega_bar"].abs(), 3, labels=False))
     for place, (name, scale, label) in enumerate(panels):
         axes = figure.add_subplot(1, 3, place + 1)
         curves = np.stack([np.asarray(curve, dtype=float) for curve in rows[name]]) / scale[:, None]
         for third, (shade, which) in enumerate(zip(COLOURS[1:4], ("slow", "middling", "fast"), strict=True)):
-            some = curves[(thirds == third).to_numpy()]
+            some = curves[thirds == third]
             known = np.isfinite(some).mean(0) > 0.5
             low, middle, high = np.nanquantile(some[:, known], [0.25, 0.5, 0.75], axis=0)
             axes.plot(DWELLS[known], middle, color=shade, lw=1.4, label=f"{which} motors")

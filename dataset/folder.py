@@ -38,7 +38,7 @@ class SweepFolder:
         self.place, self.design, self.code = place, design, code
         self.config = design.config()
         self.key = key_of(self.config, code, source)
-        self.form: pa.Schema = schema(design.effects)
+        self.form: pa.Schema = schema(design.effects, design.sensitivities)
         self._sweep = {"config": self.config, "code": code, "rows_by": source, "key": self.key}
 
     def claim(self, *, mending: bool = False) -> None:

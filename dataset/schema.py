@@ -28,9 +28,13 @@ class Column(NamedTuple):
     meaning: str
     grid: tuple[float, ...] = ()  # of a list: the dwells that its values are given at
     before: tuple[float, ...] = ()  # of a list of lists: the dwells before
+    inputs: tuple[str, ...] = ()  # of derivatives: the inputs that its values are for
 
 
 _real, _whole, _flag = pa.float64(), pa.int32(), pa.bool_()
+# Names as in `sim.motion.sensitivity`, which loads the simulator; a test compares them.
+SLOPE_INPUTS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "a_over_R")
+SLOPE_OUTPUTS = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_rad")
 _LAG = (("z", "l", "forward"), ("x", "l", "to the new turn's side"), ("psi_rad", "radian", "of the heading"))
 COST = "cost_s"  # how long a row took: the one column that differs when the row is simulated again
 
@@ -71,7 +75,19 @@ OUTPUTS = (
     *_curves("lag", "lag after a flip"),
     *_curves("spread", "standard deviation of the lag over the disc's phase at the flip"),
     *_curves("rest", "lag of a first dwell from rest; NaN without history"),
-    *_curves("memory", "what a short dwell before adds to the lag; NaN without history", BEFORE),
+    *_curves("memory", "what a short dwell before adds to the lag; NaN without history", tuple(BEFORE)),
+)
+SLOPES = tuple(
+    Column(
+        f"d_{name}",
+        pa.list_(_real, len(SLOPE_INPUTS)),
+        "1",
+        f"derivatives of {name} in the inputs",
+        (),
+        (),
+        SLOPE_INPUTS,
+    )
+    for name in SLOPE_OUTPUTS
 )
 FLAGS = (
     Column("row", _whole, "1", "row of the design"),
@@ -85,10 +101,11 @@ FLAGS = (
 )
 
 
-def schema(effects: Iterable[str] = ()) -> pa.Schema:
-    """Schema of a data set that sweeps the named effects as well."""
+def schema(effects: Iterable[str] = (), sensitivities: bool = False) -> pa.Schema:
+    """Schema of a data set that sweeps the named effects as well, with derivatives or without."""
     extra = tuple(Column(name, _real, catalogue()[name].unit, catalogue()[name].title) for name in sorted(effects))
-    return pa.schema([field_of(column) for column in (*INPUTS, *extra, *OUTPUTS, *FLAGS)])
+    slopes = SLOPES if sensitivities else ()
+    return pa.schema([field_of(column) for column in (*INPUTS, *extra, *OUTPUTS, *slopes, *FLAGS)])
 
 
 def field_of(column: Column) -> pa.Field:
@@ -98,6 +115,8 @@ def field_of(column: Column) -> pa.Field:
         words["grid"] = json.dumps(column.grid)
     if column.before:
         words["before"] = json.dumps(column.before)
+    if column.inputs:
+        words["inputs"] = json.dumps(column.inputs)
     return pa.field(column.name, column.type, nullable=False, metadata=words)
 
 

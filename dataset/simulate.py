@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from dataset.schema import SLOPE_INPUTS
 from sim.arrays import Floats
 from sim.inputs import check_columns
 from sim.model.groups import Groups
 from sim.motion.response import responses
+from sim.motion.sensitivity import sensitivities as derivatives
 from sim.motion.steady import steady
 from sim.motion.steady_motion import STEADY_COLUMNS
 
@@ -24,11 +26,12 @@ NO_RESPONSE = "the response to a flip broke down, or asked for more time steps t
 HISTORY = "history"  # an input of a row that is no number of the robot: whether memory and rest are simulated
 
 
-def simulate(inputs: dict[str, Any]) -> Columns:
+def simulate(inputs: dict[str, Any], *, sensitivities: bool = False) -> Columns:
     """All columns of the schema except `row`.
 
     Args:
         inputs: robots by column name, each (B,); `history`, (B,), says of which memory and rest are simulated.
+        sensitivities: with derivatives of the steady motion in the inputs.
 
     Raises:
         InputError: a column is missing or unknown, or a number is outside its range.
@@ -36,13 +39,13 @@ def simulate(inputs: dict[str, Any]) -> Columns:
     values = check_columns({name: array for name, array in inputs.items() if name != HISTORY})
     history = np.asarray(inputs[HISTORY], dtype=bool)
     rows = [
-        _row({name: array[i : i + 1] for name, array in values.items()}, bool(history[i]))
+        _row({name: array[i : i + 1] for name, array in values.items()}, bool(history[i]), sensitivities)
         for i in range(len(history))
     ]
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
-def _row(values: dict[str, Floats], history: bool) -> Columns:
+def _row(values: dict[str, Floats], history: bool, sensitivities: bool) -> Columns:
     began = time.thread_time()
     groups = Groups.from_columns(values)
     motion = steady(groups)
@@ -66,6 +69,9 @@ def _row(values: dict[str, Floats], history: bool) -> Columns:
             columns[f"{name}_{axis}"] = curve[..., i].reshape(1, -1)
     for name in STEADY_COLUMNS[:7]:
         columns[name] = np.where(failed, np.nan, columns[name])
+    if sensitivities:
+        slopes = derivatives(groups, SLOPE_INPUTS).derivatives
+        columns |= {f"d_{name}": slope for name, slope in slopes.items()}
     columns["N"] = values["N"].astype(int)
     columns["cost_s"] = np.array([time.thread_time() - began])
     return columns

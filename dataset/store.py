@@ -118,7 +118,7 @@ def write_rows(
     there, key = place(folder), fingerprint({**config, "code": code})
     if there.names():
         raise InputError(f"{there.address} is not empty; give a new folder")
-    table = table_of({**columns, "row": np.arange(len(columns["row"]))}, schema(effects))
+    table = table_of({**columns, "row": np.arange(len(columns["row"]))}, schema(effects, config["sensitivities"]))
     part = write_piece(there, piece_name(ROWS, 0, len(table)), table, key)
     return write_manifest(there, manifest_of(config, key, code, effects, [part]))
 
@@ -143,7 +143,7 @@ def batches(
     """
     there = place(folder)
     manifest = read_manifest(there)
-    form = schema(manifest["effects"])
+    form = schema(manifest["effects"], manifest["config"]["sensitivities"])
     unknown = sorted(set(columns or ()) - set(form.names))
     if unknown:
         raise InputError(f"no column {unknown[0]!r} in a data set; there are {', '.join(form.names)}")

@@ -73,7 +73,10 @@ def _check_batch(address: str, design: Design, batch: pa.RecordBatch, start: int
 def _check_again(address: str, design: Design, stored: pa.Table, chosen: np.ndarray) -> None:
     points = {name: stored[name].to_numpy().astype(float) for name in design.axes}
     points[HISTORY] = stored[HISTORY].to_numpy()
-    again = table_of({**simulate(points), "row": chosen}, schema(design.effects))
+    again = table_of(
+        {**simulate(points, sensitivities=design.sensitivities), "row": chosen},
+        schema(design.effects, design.sensitivities),
+    )
     for name in stored.schema.names:
         one, other = (_bits(table[name]) for table in (stored, again))
         if name != COST and one != other:

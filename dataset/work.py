@@ -88,9 +88,10 @@ def run_task(task: Task) -> Outcome:
             )
         began = time.perf_counter()
         columns = _simulate(task)
-        effects = Design.from_config(task.config, 1).effects
+        design = Design.from_config(task.config, 1)
+        form = schema(design.effects, design.sensitivities)
         name = piece_name(PENDING, task.start, task.stop)
-        contents = write_piece(there, name, table_of(columns, schema(effects)), task.key)
+        contents = write_piece(there, name, table_of(columns, form), task.key)
         return Receipt(contents, time.perf_counter() - began, here)
     except StorageError as refusal:
         return Refusal("storage", str(refusal), here)
@@ -108,7 +109,7 @@ def _simulate(task: Task) -> dict[str, Any]:
         with _loops():
             from dataset.simulate import simulate
 
-            columns = simulate(points)
+            columns = simulate(points, sensitivities=design.sensitivities)
     return {**columns, "row": np.arange(task.start, task.stop)}
 
 

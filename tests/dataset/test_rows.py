@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from dataset.design import load_design
-from dataset.schema import COST
+from dataset.schema import COST, SLOPE_INPUTS, SLOPE_OUTPUTS
 from dataset.simulate import simulate
 from sim.model.presets import PRESETS
+from sim.motion import sensitivity
 
 CONTROL = {**PRESETS["paper-control"].group_values(), "history": True}
 
@@ -72,6 +73,20 @@ def test_memory_and_rest_are_simulated_where_asked_for() -> None:
     assert np.isfinite(found["rest_z"][0]).all()
     assert np.isnan(found["memory_psi_rad"][1]).all()
     assert found["lag_z"][0] == pytest.approx(found["lag_z"][1], abs=1e-12)
+
+
+def test_derivatives_on_request() -> None:
+    """Against differences of rows; the names are those of the simulator."""
+    assert (SLOPE_INPUTS, SLOPE_OUTPUTS) == (sensitivity.INPUTS, sensitivity.OUTPUTS)
+    step = 1e-3
+    rows = rows_of(
+        {"history": False}, {"history": False, "C_yr": 2.0 - step}, {"history": False, "C_yr": 2.0 + step}
+    )
+    found = simulate(rows, sensitivities=True)
+    place = SLOPE_INPUTS.index("C_yr")
+    for name in ("omega_yr_bar", "v_x", "v_z", "R_yr_over_l"):
+        slope = (found[name][2] - found[name][1]) / (2 * step)
+        assert found[f"d_{name}"][0, place] == pytest.approx(slope, rel=1e-3, abs=1e-5)
 
 
 def test_odd_effects_make_the_two_directions_differ() -> None:
