@@ -117,7 +117,7 @@ def draw_collapse(rows: pd.DataFrame, linear: Mapping[str, Floats], outputs: Seq
 def draw_responses(rows: pd.DataFrame) -> Figure:
     """Lags and net speed over the dwell: medians and the middle half, for slow, middling and fast motors."""
     figure = Figure(figsize=(11, 3))
-    speed = np.hypot(rows["v_x"], rows["v_z"]).to_numpy(float)
+    speed = np.hypot(rows["v_x"].to_numpy(float), rows["v_z"].to_numpy(float))
     turn = np.abs(rows["omega_yr_bar"]).to_numpy(float)
     panels = (
         ("lag_psi_rad", turn, "heading lag / yaw rate [time units]"),
