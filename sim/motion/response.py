@@ -22,7 +22,7 @@ from sim.model.response import BEFORE, DWELLS, SETTLED, Responses, at_equal_dwel
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady
 from sim.motion.stepped_response import stepped_response
-from sim.solve.assembly import bodies
+from sim.solve.assembly import bodies, reversed_bodies
 from sim.solve.orbit import mean_motion, solve_orbit
 from sim.solve.refinement import CORRECTION, orbit_on_mesh
 from sim.solve.transient import lag_at, transient
@@ -58,11 +58,11 @@ def responses(groups: Groups, motion: Steady | None = None, *, history: bool = T
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
     robots = bodies(groups)
     found, stepped = [], np.zeros(len(robots), dtype=bool)
-    for i, body in enumerate(robots):
-        curves = _solved(body, groups.N, even, history)
+    for i, (body, reverse) in enumerate(zip(robots, reversed_bodies(groups), strict=True)):
+        curves = _solved(body, reverse, groups.N, even, history)
         if curves is None:
             stepped[i] = True
-            curves = Curves(*stepped_response(body, groups.N, DWELLS, BEFORE))
+            curves = Curves(*stepped_response(body, groups.N, DWELLS, BEFORE, reverse=reverse))
         found.append(curves)
     lag, memory, rest, spread = (np.array(column) for column in zip(*found, strict=True))
     sense = np.sign([body.omega for body in robots])
@@ -76,12 +76,12 @@ def responses(groups: Groups, motion: Steady | None = None, *, history: bool = T
     return Responses(lag, memory, rest, spread, speed, failed, stepped)
 
 
-def _solved(body: Body, tails: int, even: bool, history: bool) -> Curves | None:
+def _solved(body: Body, reverse: Body, tails: int, even: bool, history: bool) -> Curves | None:
     """Curves of one robot by transients; None where its motion, or a transient, cannot be solved for."""
-    coarse = _on_mesh(body, tails, even, _MESHES[0], history=False)
+    coarse = _on_mesh(body, reverse, tails, even, _MESHES[0], history=False)
     if coarse is None:
         return None
-    fine = _on_mesh(body, tails, even, _MESHES[1], history=history)
+    fine = _on_mesh(body, reverse, tails, even, _MESHES[1], history=history)
     if fine is None:
         return None
     a, b = _MESHES
@@ -90,7 +90,9 @@ def _solved(body: Body, tails: int, even: bool, history: bool) -> Curves | None:
     return Curves((fine.lag + change) * mirror, fine.memory * mirror, (fine.rest + change) * mirror, fine.spread)
 
 
-def _on_mesh(body: Body, tails: int, even: bool, edges: int, *, history: bool) -> Curves | None:
+def _on_mesh(
+    body: Body, reverse: Body, tails: int, even: bool, edges: int, *, history: bool
+) -> Curves | None:
     """Curves on one mesh; memory and rest only with `history`."""
     after = _orbit(body, tails, edges)
     if after is None:
@@ -100,7 +102,6 @@ def _on_mesh(body: Body, tails: int, even: bool, edges: int, *, history: bool) -
     if even:
         start, first = _mirrored(x), u
     else:
-        reverse = body._replace(omega=-body.omega)
         before = _orbit(reverse, tails, edges, instants=u.shape[0])
         if before is None:
             return None
