@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from planner.plan import Plan, plan_record
+from planner.plan import Plan
+from planner.record import plan_record
 from sim.io.errors import InputError
 from sim.io.files import whole_file, write_text
 from sim.io.provenance import code_version

@@ -6,7 +6,9 @@ the table predicts. The mean difference over the dwells, with its standard error
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +29,8 @@ LAGS = ("lag_z", "lag_x", "lag_psi_rad")
 _OUTPUTS = (
     "omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "tail_gap",
 )  # fmt: skip
+COEFFICIENTS = ("C_t", "C_r", "C_yr")
+_STEP = 0.02  # in ln C, for derivatives
 _CHECKED = 24  # dwells of the random schedule
 _RANGE = (0.35, 1.8)  # of their lengths
 
@@ -41,7 +45,9 @@ def tabulate(robot: Robot) -> SingleRobot:
         InputError: the robot's motion cannot be found, or a simulated flip breaks down.
 
     Example:
-        >>> from dataclasses import replace
+        >>> import math
+from dataclasses import replace
+from typing import Any
         >>> from softflagella import circle, load_robot, plan, tabulate
         >>> robot = replace(load_robot("paper-control"), effects={"left_right_bias": 0.2})
         >>> plan(circle(2.0), robot, lookup=tabulate(robot)).predicted_rms < 0.03
@@ -65,6 +71,7 @@ def tabulate(robot: Robot) -> SingleRobot:
         memory=found.memory.tolist(),
         rest=found.rest.tolist(),
         spread=found.spread.tolist(),
+        slopes=_slopes(values),
         errors={},
         provenance=provenance({"robot": robot.name}),
     )
@@ -75,6 +82,19 @@ def tabulate(robot: Robot) -> SingleRobot:
     bias = np.sqrt(missed.mean(0) ** 2 + missed.var(0) / len(missed))
     errors |= {name: {"rms": float(value)} for name, value in zip(LAGS, bias, strict=True)}
     return replace(table, errors=errors)
+
+
+def _slopes(values: dict[str, float]) -> dict[str, Any]:
+    """Derivatives (2, 3) of the twists in ln C of each coefficient, by differences."""
+    ends = [(name, sign) for name in COEFFICIENTS for sign in (1.0, -1.0)]
+    rows = [{**values, name: values[name] * math.exp(sign * _STEP)} for name, sign in ends for _ in (0, 1)]
+    columns = {name: np.array([row[name] for row in rows]) for name in values}
+    columns["omega_bar"] = columns["omega_bar"] * np.tile([1.0, -1.0], len(ends))
+    motion = steady(Groups.from_columns(columns))
+    twist = np.stack([motion.v_z, motion.v_x, motion.omega_yr], -1).reshape(len(COEFFICIENTS), 2, 2, 3)
+    slopes = (twist[:, 0] - twist[:, 1]) / (2 * _STEP)
+    found = dict(zip(COEFFICIENTS, slopes, strict=True))
+    return {name: slope.tolist() for name, slope in found.items() if np.isfinite(slope).all()}
 
 
 def _missed(table: SingleRobot) -> Floats:

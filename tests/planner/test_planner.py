@@ -14,12 +14,14 @@ import pytest
 
 from planner import Path2D, circle, plan, polygon
 from planner.corners import fillet
+from planner.distance import distance_to
 from planner.export import milliseconds, write_plan
-from planner.plan import distance_to, plan_record
-from planner.schedule import Switches, follow, trace
-from planner.stated_error import guaranteed, look_ahead, tube
+from planner.lookup import vehicle_of
+from planner.record import plan_record
+from planner.schedule import follow, trace
+from planner.stated_error import guaranteed, look_ahead
 from planner.tractrix import reference
-from planner.vehicle import TURN_OVER, vehicle_of
+from planner.zigzag import zigzag
 from sim.io.errors import InputError, run_command
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
@@ -49,7 +51,7 @@ def test_the_pivot_moves_as_a_slip_free_car(seed: int) -> None:
     for _ in range(10):
         sense = 1 if rng.random() < 0.5 else -1
         times = np.linspace(0, rng.uniform(0.5, 5), 2001)
-        poses = planar.compose(pose, car.motion(sense, times))
+        poses = planar.compose(pose, car.motion(sense, 1.0, times))
         q = planar.compose(poses, np.array([-car.pivot_distance, 0.0, 0.0]))
         velocity = np.diff(q[:, :2], axis=0)
         middle = (poses[1:, 2] + poses[:-1, 2]) / 2
@@ -69,7 +71,7 @@ def test_the_bound_holds_on_random_paths(seed: int) -> None:
     curvature = float(np.abs(ref.curvature).max())
     if curvature * car.pivot_radius > 0.9:
         pytest.skip("this path is tighter than the robot can turn")
-    dwell = rng.uniform(TURN_OVER, 2.0)
+    dwell = rng.uniform(0.3, 2.0)
     ahead = look_ahead(car, curvature)
     switches = follow(ref, car, pivot_distance=car.pivot_distance, ahead=ahead, dwell=dwell, offset=0.0)
     track = trace(car, switches, 0.0, samples=12)
@@ -122,11 +124,12 @@ def test_paper_cases_are_planned_within_their_bound(name: str) -> None:
     path = {"circle": circle(1.5), "square": polygon(4, 3.0), "triangle": polygon(3, 4.0)}[name]
     robot = PRESETS["paper-triangle"] if name == "triangle" else CONTROL
     result = plan(path, robot)
-    assert result.predicted_rms < 0.05
-    assert result.predicted_max <= result.guaranteed
+    assert result.predicted_rms < 1.3 * result.zigzag_rms
+    assert result.drawn_rms < {"circle": 0.020, "square": 0.025, "triangle": 0.06}[name]
+    assert result.predicted_max <= min(result.guaranteed, result.stated_error)
     assert result.closure is not None
-    assert result.closure < 0.15
-    assert result.dwells.min() >= TURN_OVER * (1 - 1e-9)
+    assert result.closure < 0.05
+    assert result.dwells.min() >= result.minimum_dwell * (1 - 1e-9)
     again = plan(path, robot)
     assert np.array_equal(again.dwells, result.dwells)
 
@@ -165,14 +168,26 @@ def test_other_points_of_the_axis() -> None:
         assert result.offset != 0
 
 
-def test_tolerance_chooses_a_longer_dwell_and_says_when_it_cannot() -> None:
-    tight = plan(circle(2.0), CONTROL)
-    loose = plan(circle(2.0), CONTROL, tolerance=2 * tight.guaranteed)
-    assert loose.minimum_dwell > tight.minimum_dwell
-    assert loose.guaranteed <= 2 * tight.guaranteed
-    assert loose.duration < tight.duration
-    with pytest.raises(InputError, match="allow more"):
+def test_a_tolerance_shortens_the_dwell_and_says_when_it_cannot() -> None:
+    free = plan(circle(2.0), CONTROL, objective="flips")
+    tight = plan(circle(2.0), CONTROL, objective="flips", tolerance=0.6 * free.stated_error)
+    assert tight.minimum_dwell < free.minimum_dwell
+    assert tight.stated_error <= 0.6 * free.stated_error
+    assert len(tight.dwells) > len(free.dwells)
+    with pytest.raises(InputError, match="smallest stated error is"):
         plan(circle(2.0), CONTROL, tolerance=1e-3)
+
+
+def test_objectives_trade_error_for_time_and_flips() -> None:
+    found = {name: plan(circle(2.0), CONTROL, objective=name) for name in ("error", "time", "flips")}  # type: ignore[arg-type]
+    assert found["error"].predicted_rms < found["time"].predicted_rms
+    assert found["time"].duration < found["error"].duration
+    assert len(found["flips"].dwells) <= len(found["time"].dwells) < len(found["error"].dwells)
+
+
+def test_a_shortest_dwell_in_seconds() -> None:
+    result = plan(circle(2.0), CONTROL, minimum_seconds=4.0)
+    assert result.seconds[:-1].min() >= 4.0 * (1 - 1e-9)
 
 
 def refused(path: Any, expected: str, **options: Any) -> None:
@@ -191,20 +206,24 @@ def test_refusals() -> None:
     refused([[0, 0, 0], [1, 1, 1]], r"\(n, 2\)")
     refused([["a", "b"]], "no number")
     refused(circle(0.5), "too tight .* scale the path by")
-    refused(polygon(4, 0.4), "too tight .* scale the path by")
+    refused(polygon(4, 0.8), "too tight .* scale the path by")
+    refused(polygon(4, 0.1), "too small, the robot's circle has a radius")
+    refused([[0, 0], [8e4, 0]], "if you gave m and mean mm")
     refused(polygon(4, 3.0), "corner of 90 degrees", corner="error")
-    refused(circle(2.0), "turn-over", minimum_dwell=0.1)
+    refused(circle(2.0), "below 0.2 time units", minimum_dwell=0.1)
+    refused(circle(2.0), "objective", objective="speed")
     refused(circle(2.0), "omega_bar = 500 is outside", robot=CONTROL.with_motor(500.0))
     refused(circle(2.0), "N = 7 is outside", robot=replace(CONTROL, tails=7))
     refused(circle(2.0), "a_over_R = 0.5 is outside", robot=replace(CONTROL, disc_offset=0.008))
     refused(circle(2.0), "end_over_end_drag", robot=replace(CONTROL, effects={"end_over_end_drag": 5.0}))
 
 
-def test_a_tight_circle_is_refused_with_a_scale_that_works() -> None:
+@pytest.mark.parametrize("radius", [0.5, 0.57, 0.63])
+def test_a_tight_circle_is_refused_with_a_scale_that_works(radius: float) -> None:
     with pytest.raises(InputError) as caught:
-        plan(circle(0.8), CONTROL)
+        plan(circle(radius), CONTROL)
     factor = float(str(caught.value).rsplit(" ", 1)[1])
-    assert plan(circle(0.8 * factor), CONTROL).predicted_rms < 0.1
+    assert plan(circle(radius * factor), CONTROL).predicted_rms < 0.1
 
 
 @pytest.mark.parametrize(
@@ -275,34 +294,8 @@ def test_milliseconds_carry_rounding_and_split_long_dwells() -> None:
         milliseconds(np.array([1.0, 0.0001]))
 
 
-def test_unequal_turns_are_planned_for() -> None:
-    """A vehicle that turns 5 % faster to one side still keeps to a line."""
-    from dataclasses import replace
-
-    car = vehicle()
-    twist = car.twist.copy()
-    twist[1] *= [1.0, 1.05, 1.05]
-    car = replace(car, twist=twist)
-    ref = reference(Path2D.of([[0, 0], [30, 0]]), car.pivot_distance, 0.01)
-    switches = follow(
-        ref, car, pivot_distance=car.pivot_distance, ahead=look_ahead(car, 0.0), dwell=1.0, offset=0.0
-    )
-    track = trace(car, switches, 0.0)
-    assert np.abs(track[:, 1]).max() < guaranteed(car, car.pivot_distance, 0.0, 1.0)
-
-
-def test_the_tube_grows_with_the_table_s_errors() -> None:
-    from dataclasses import replace
-
-    car = vehicle()
-    switches = Switches(1, np.full(60, 1.0), np.zeros((61, 3)))
-    small = tube(car, switches, 0.0)
-    large = tube(replace(car, relative_error={k: 3 * v for k, v in car.relative_error.items()}), switches, 0.0)
-    assert 2 < large / small < 4
-
-
 def test_vehicle_of_the_shipped_table_matches_the_reference_robot() -> None:
     """ω̄_yr, v_x, v_z of the control example from an independent solver."""
     car = vehicle_of(CONTROL, load())
     assert car.twist[0] == pytest.approx([0.0180, 0.0425, 0.0490], rel=0.02)
-    assert car.net_speed(2.0) == pytest.approx(0.0169, rel=0.02)
+    assert zigzag(car, 2.0).net_speed == pytest.approx(0.0169, rel=0.02)

@@ -10,7 +10,8 @@ import pytest
 
 from planner.check import tracking_error
 from planner.path import polygon
-from planner.plan import plan, plan_record
+from planner.plan import plan
+from planner.record import plan_record
 from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
