@@ -61,7 +61,9 @@ def random_path(rng: np.random.Generator, radius: float) -> Path2D:
         turns = np.cumsum(rng.uniform(-1.5, 1.5, 6))
         return Path2D.of(np.cumsum(length / 6 * np.stack([np.cos(turns), np.sin(turns)], 1), 0), closed=False)
     s = np.linspace(0, length, 800)
-    waves = rng.normal(size=(5, 1)) * np.sin(rng.uniform(0.2, 0.8, (5, 1)) / radius * s + rng.uniform(0, 6, (5, 1)))
+    waves = rng.normal(size=(5, 1)) * np.sin(
+        rng.uniform(0.2, 0.8, (5, 1)) / radius * s + rng.uniform(0, 6, (5, 1))
+    )
     heading = np.cumsum(0.5 / radius * np.tanh(waves.sum(0) / 2)) * (s[1] - s[0])
     return Path2D.of(np.cumsum((s[1] - s[0]) * np.stack([np.cos(heading), np.sin(heading)], 1), 0), closed=False)
 

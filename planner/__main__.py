@@ -77,7 +77,9 @@ def _plan(arguments: Namespace) -> None:
     for warning in result.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     x, y, heading = result.start
-    print(f"start: put the head's centre at ({x:.3f}, {y:.3f}) l, heading {math.degrees(heading):.1f} degrees, at rest")
+    print(
+        f"start: put the head's centre at ({x:.3f}, {y:.3f}) l, heading {math.degrees(heading):.1f} degrees, at rest"
+    )
     print(
         f"{len(result.dwells)} dwells of {result.minimum_dwell:.2f} time units or more, {result.seconds.sum():.1f} s"
     )

@@ -46,7 +46,9 @@ class Knowledge:
         if len(V) and np.linalg.eigvalsh(V).min() < -1e-9 * np.abs(V).max():
             raise InputError("calibration: covariance has a negative eigenvalue; copy it from the calibration")
         if not np.isfinite([*self.current, *self.current_error]).all() or min(self.current_error) < 0:
-            raise InputError("calibration: the current and its error must be finite numbers, the error not below 0")
+            raise InputError(
+                "calibration: the current and its error must be finite numbers, the error not below 0"
+            )
 
 
 def read_knowledge(path: str | Path) -> Knowledge:

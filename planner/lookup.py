@@ -41,7 +41,7 @@ def vehicle_of(robot: Robot, lookup: LookupTable, knowledge: Knowledge | None = 
         raise InputError(f"robot {robot.name!r} turns to the same side in both directions of its motor; it cannot "
                          "follow a path")  # fmt: skip
     mirror = np.stack([np.ones(3), planar.MIRROR])
-    lag = np.stack([lags_of(curves.lag[i], curves.memory[i]) for i in (0, 1)]) * mirror[:, None, None]
+    lag = np.stack([lags_of(curves.lag[i], curves.memory[i], curves.before) for i in (0, 1)]) * mirror[:, None, None]
     unit = robot.time_scale / robot.tail_length  # from m/s
     return Vehicle(
         twist=twist,

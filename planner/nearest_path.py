@@ -32,6 +32,7 @@ _EVEN = 0.01  # weight of equal steps
 _SHORTEST_STEP = 0.25  # of the steps, as a share of the spacing
 _OVERLAP = 6.0  # pivot distances of the next lap, for closed paths
 _BAND = 5
+_PIECES = 4  # points of the path for each pose
 
 
 def nearest_path(
@@ -55,10 +56,17 @@ def nearest_path(
     poses = _start(target, pivot_distance)
     for weight in _WEIGHTS:
         poses = _descend(poses, target, pivot_distance, radius, drift, spacing, weight, time_weight)
-    found = poses[:, :2] + pivot_distance * np.stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])], 1)
     if raw.closed:
-        found = found[extra : extra + lap]
-    return Path2D.of(found, closed=raw.closed)
+        poses = poses[extra : extra + lap + 1]
+    at = np.arange(_PIECES * (len(poses) - 1) + 1) / _PIECES
+    x, y, heading = (np.interp(at, np.arange(len(poses)), column) for column in poses.T)
+    # Between two poses the pivot moves on an arc, which lies off its chord.
+    turn = np.append(np.repeat(np.diff(poses[:, 2]), _PIECES), 0.0)
+    chord = np.append(np.repeat(np.hypot(*np.diff(poses[:, :2], axis=0).T), _PIECES), 0.0)
+    off = -turn * chord * (at % 1) * (1 - at % 1) / 2
+    found = np.stack([x - off * np.sin(heading), y + off * np.cos(heading)], 1)
+    found += pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
+    return Path2D.of(found[:-1] if raw.closed else found, closed=raw.closed)
 
 
 def _start(target: Floats, pivot_distance: float) -> Floats:
@@ -113,7 +121,7 @@ def _descend(
         poses, cost = tried, new
         residual, single, pair = system
         damping = max(damping / 5, 1e-9)
-        if gained < 1e-5 * cost:
+        if gained < 1e-3 * cost:
             break
     return poses
 

@@ -131,7 +131,9 @@ def smoothed(path: Path2D, length: float) -> tuple[Path2D, float]:
         around = np.take(ring, np.arange(-reach, len(ring) + reach), axis=0, mode="wrap")
     else:  # turned about the ends, which therefore stay
         inside = np.minimum(np.arange(1, reach + 1), len(points) - 1)
-        around = np.concatenate([2 * points[0] - points[inside][::-1], points, 2 * points[-1] - points[-1 - inside]])
+        around = np.concatenate(
+            [2 * points[0] - points[inside][::-1], points, 2 * points[-1] - points[-1 - inside]]
+        )
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
     kernel /= kernel.sum()
     mean = np.stack([np.convolve(around[:, i], kernel, mode="valid") for i in (0, 1)], 1)

@@ -162,7 +162,7 @@ def plan(
     raw = path if isinstance(path, Path2D) else Path2D.of(path)
     check_size(raw, robot, vehicle.turn_radius)
     offset = _offset(point, robot, vehicle)
-    dwells = dwells_for(vehicle, objective, _least(minimum_dwell, minimum_seconds, robot), offset)
+    dwells = dwells_for(vehicle, objective, _least(minimum_dwell, minimum_seconds, robot))
 
     def made(dwell: float) -> Plan:
         return _plan(raw, robot, vehicle, lookup, point, offset, corner, objective, dwell, seed, progress)
@@ -211,9 +211,16 @@ def _plan(
     distance = vehicle.pivot_distance + offset
     declared = declare(raw, vehicle, distance, corner, drift)
     guide = declared.reference
-    ahead = look_ahead(vehicle, declared.curvature)
+    ahead = look_ahead(vehicle, declared.curvature, straight)
     switches = follow(
-        guide, vehicle, pivot_distance=distance, ahead=ahead, dwell=dwell, offset=offset, progress=progress
+        guide,
+        vehicle,
+        pivot_distance=distance,
+        ahead=ahead,
+        dwell=dwell,
+        swing=straight.hysteresis(ahead),
+        offset=offset,
+        progress=progress,
     )
     track = trace(vehicle, switches, offset)
     error = predicted_error(guide.p, track, closed=raw.closed)
@@ -240,7 +247,7 @@ def _plan(
         drawn_max=float(drawn.max()),
         stated_error=stated_error(vehicle, switches, track, error, seed=seed),
         feedback_error=stated_error(vehicle, switches, track, error, every=FEEDBACK_EVERY, seed=seed),
-        guaranteed=guaranteed(vehicle, distance, declared.curvature, dwell),
+        guaranteed=guaranteed(vehicle, distance, straight.swing, ahead),
         closure=float(np.linalg.norm(track[-1] - guide.p[0])) if raw.closed else None,
         model=lookup.identity,
         warnings=(*declared.warnings, *_warnings(vehicle)),

@@ -2,13 +2,15 @@
 
 The reference of the pivot and its heading (`planner.tractrix.Reference`) give the wanted heading at every place:
 
-    φ_d = φ_ref − atan(e/Δ),
+    φ_d = φ_ref − atan(e/Δ) − ∫ e ds/(2 Δ²),
 
-with e the pivot's cross-track error (left positive) and Δ the look-ahead. The motor flips when
+with e the pivot's cross-track error (left positive) and Δ the look-ahead. The integral takes out a constant error,
+which is left where the robot moves at an angle to its heading. The motor flips when
 
     σ (φ − φ_d) ≥ h,   not before the shortest dwell T after the last flip,
 
-with h = Ω T (1 + |κ| R′)/2: on a path of curvature κ the shorter one of two dwells then lasts T. The pose after
+with h = β (1 + |κ| R′)/2 and β the angle by which the heading swings to and fro on a straight line with dwells T
+(Ω T without lags): on a path of curvature κ the shorter one of two dwells then lasts about T. The pose after
 each dwell is predicted with the vehicle, memory included. The next dwell starts from the predicted pose, so errors
 do not add up along the path. Without this feedback they grow with the length of the path (docs/log.md).
 
@@ -34,6 +36,7 @@ MOST_SWITCHES = 200_000
 _EXACT = 1e-7  # rad, of the heading at a flip
 _LARGEST_STEP = 0.4  # rad that the robot turns between two evaluations
 _TURNS = 4 * math.pi  # a dwell that turns further than this leads nowhere
+_MOST_BIAS = 0.3  # rad
 _EVERY = 2_000  # switches between two calls of `progress`
 _KNOTS: list[float] = BEFORE_KNOTS.tolist()
 
@@ -68,6 +71,7 @@ def follow(
     ahead: float,
     dwell: float,
     offset: float,
+    swing: float | None = None,
     start: Start | None = None,
     most: int = MOST_SWITCHES,
     progress: Callable[[float], object] | None = None,
@@ -80,6 +84,7 @@ def follow(
         pivot_distance: from the pivot to the tracked point.
         ahead: look-ahead Δ.
         dwell: shortest dwell T.
+        swing: β; default Ω T.
         offset: distance from the head's centre to the tracked point, forward.
         start: default: at rest at the beginning of the reference, with its heading.
         most: end after this many dwells.
@@ -88,9 +93,11 @@ def follow(
     Raises:
         InputError: the path needs too many switches, or the robot turns in circles.
     """
-    start = start or start_of(reference, vehicle, offset, dwell)
-    follower = _Follower(reference, vehicle, ahead, offset - pivot_distance, dwell)
+    swing = float(np.abs(vehicle.twist[:, 2]).max()) * dwell if swing is None else swing
+    start = start or start_of(reference, vehicle, offset, swing)
+    follower = _Follower(reference, vehicle, ahead, offset - pivot_distance, dwell, swing)
     follower.place = start.place
+    follower.begin()
     pose, sense, before = start.pose, start.sense, start.before
     dwells: list[float] = []
     poses = [pose]
@@ -100,6 +107,7 @@ def follow(
             time = dwell if 2 * time > dwell else 0.0  # nearest that the motor may do
         if time > 0:
             pose = follower.moved(pose, sense, before, time)
+            follower.learn(pose, sense)
             dwells.append(time)
             poses.append(pose)
             sense, before = -sense, time
@@ -112,7 +120,7 @@ def follow(
     return Switches(start.sense, np.array(dwells), np.array(poses))
 
 
-def start_of(reference: Reference, vehicle: Vehicle, offset: float, dwell: float) -> Start:
+def start_of(reference: Reference, vehicle: Vehicle, offset: float, swing: float) -> Start:
     """At rest, where the reference begins.
 
     The robot turns first to the side to which the reference turns first. So it must look to the other side of the
@@ -121,36 +129,40 @@ def start_of(reference: Reference, vehicle: Vehicle, offset: float, dwell: float
     turn = reference.heading - reference.heading[0]
     far = np.flatnonzero(np.abs(turn) > 1e-6)
     sense = 1 if not len(far) or turn[far[0]] > 0 else -1
-    heading = float(reference.heading[0]) - sense * float(_hysteresis(reference, vehicle, dwell)[0])
+    heading = float(reference.heading[0]) - sense * float(_hysteresis(reference, vehicle, swing)[0])
     ahead = reference.p[0] - reference.q[0]
     rod = math.hypot(*ahead.tolist()) - offset
     x, y = (reference.q[0] + rod * np.array([math.cos(heading), math.sin(heading)])).tolist()
     return Start((x, y, heading), 0, sense)
 
 
-def _hysteresis(reference: Reference, vehicle: Vehicle, dwell: float) -> Floats:
+def _hysteresis(reference: Reference, vehicle: Vehicle, swing: float) -> Floats:
     """h at every step of the reference; see the module."""
-    fast = float(np.abs(vehicle.twist[:, 2]).max())
     bend = np.minimum(np.abs(reference.curvature) * vehicle.pivot_radius, 1.0)
-    return np.asarray(fast * dwell * (1 + bend) / 2)
+    return np.asarray(swing * (1 + bend) / 2)
 
 
 class _Follower:
     """The equation for the next flip, in plain numbers, because one switch at a time is asked for."""
 
-    def __init__(self, reference: Reference, vehicle: Vehicle, ahead: float, behind: float, dwell: float):
+    def __init__(self, reference: Reference, vehicle: Vehicle, ahead: float, behind: float, dwell: float,
+                 swing: float):  # fmt: skip
         self._x, self._y = reference.q[:, 0].tolist(), reference.q[:, 1].tolist()
         self._heading: list[float] = reference.heading.tolist()
         self._last = len(self._x) - 2
         self._ahead, self._behind, self._dwell = ahead, behind, dwell
-        self._hysteresis: list[float] = _hysteresis(reference, vehicle, dwell).tolist()
+        self._hysteresis: list[float] = _hysteresis(reference, vehicle, swing).tolist()
         self._twist: list[list[float]] = vehicle.twist.tolist()
         self._lag = vehicle.lag.tolist()
         self._rest = vehicle.rest.tolist()
         self._current: list[float] = vehicle.current.tolist()
         self.place = 0
         self.share = 0.0  # of the segment at the place
-        self._excess = 0.0
+        self._arc: list[float] = reference.arc.tolist()
+        self._error = self._before = self._bias = self._reached = 0.0
+
+    def begin(self) -> None:
+        self._reached = self._arc[self.place]
 
     def moved(
         self, pose: tuple[float, float, float], sense: int, before: float | None, time: float
@@ -190,6 +202,15 @@ class _Follower:
             pose[2] + turned + angle,
         )
 
+    def learn(self, pose: tuple[float, float, float], sense: int) -> None:
+        """Add the mean error of the last two dwells to the integral; errors at flips alternate."""
+        self._look(pose, sense)
+        reached = self._arc[self.place]
+        way, self._reached = reached - self._reached, reached
+        self._bias += (self._error + self._before) * way / (4 * self._ahead**2)
+        self._bias = min(max(self._bias, -_MOST_BIAS), _MOST_BIAS)
+        self._before = self._error
+
     def _look(self, pose: tuple[float, float, float], sense: int) -> float:
         """σ(φ − φ_d) − h; moves the place to the nearest one."""
         x = pose[0] + self._behind * math.cos(pose[2])
@@ -211,16 +232,15 @@ class _Follower:
         error = (dx * away_y - dy * away_x) / math.sqrt(square) if square > 0 else 0.0
         inside = min(max(share, 0.0), 1.0)
         wanted = self._heading[i] + inside * (self._heading[i + 1] - self._heading[i])
-        wanted -= math.atan(error / self._ahead)
+        self._error = error
+        wanted -= math.atan(error / self._ahead) + self._bias
         return sense * (pose[2] - wanted) - self._hysteresis[i]
 
     @property
     def _ended(self) -> bool:
         return self.place >= self._last and self.share >= 1
 
-    def next_flip(
-        self, pose: tuple[float, float, float], sense: int, before: float | None
-    ) -> tuple[float, bool]:
+    def next_flip(self, pose: tuple[float, float, float], sense: int, before: float | None) -> tuple[float, bool]:
         """Length of the dwell that begins at `pose`, and whether the path ends in it."""
         rate = abs(self._twist[0 if sense > 0 else 1][2])
         longest, largest = _TURNS / rate, _LARGEST_STEP / rate

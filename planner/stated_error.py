@@ -7,10 +7,10 @@ with every dwell. Deviations are of first order in all of them.
 
 *With feedback*: the same, if every k flips the pose is measured and the rest is planned again.
 
-*Guaranteed error*: a bound for a vehicle without errors, however long the path is. With the hysteresis h ≤ Ω T, the
-look-ahead Δ = R′/(1 − κ̄ R′), R′ = R cos θ, and κ̄ the largest curvature of the reference,
+*Guaranteed error*: a bound for a vehicle without errors, however long the path is. With the swing β of the heading
+(Ω T without lags) and the look-ahead Δ ≥ R′/(1 − κ̄ R′), R′ = R cos θ, and κ̄ the largest curvature of the reference,
 
-    |e| ≤ V T [cos θ/(1 − κ̄ R cos θ) + 2 sin θ] = Ω T [R′/(1 − κ̄ R′) + 2 a],
+    |e| ≤ β (Δ + 2 a),
 
 where a is the distance from the pivot to the tracked point. A flip adds its lag: at most |lag_x, lag_z| + 2 a
 |lag_ψ| + Δ |lag_ψ|. Lengths are in l, times in μ0 l⁴/EI. Source: ours; the tests check it on random paths.
@@ -24,7 +24,8 @@ import numpy as np
 
 from planner.distance import nearest
 from planner.schedule import Switches, pose_changes, poses_at_flips
-from planner.vehicle import SHORTEST, Vehicle
+from planner.vehicle import SHORTEST, STEP, Vehicle
+from planner.zigzag import Zigzag
 from sim.arrays import Floats
 from sim.mechanics import planar
 
@@ -32,20 +33,20 @@ LEVEL = 0.95
 _DRAWS = 400
 _BLOCKS = 300  # places along the schedule where deviations are drawn
 _TIGHTEST = 0.97
+_PAIRS_AHEAD = 4.0
 
 
-def look_ahead(vehicle: Vehicle, curvature: float) -> float:
-    """Δ = R′/(1 − κ̄ R′)."""
-    return vehicle.pivot_radius / (1 - min(curvature * vehicle.pivot_radius, _TIGHTEST))
+def look_ahead(vehicle: Vehicle, curvature: float, straight: Zigzag | None = None) -> float:
+    """Δ = R′/(1 − κ̄ R′), and not below the way that the robot makes in some pairs of dwells."""
+    least = vehicle.pivot_radius / (1 - min(curvature * vehicle.pivot_radius, _TIGHTEST))
+    return least if straight is None else max(least, _PAIRS_AHEAD * straight.net_speed * sum(straight.dwells))
 
 
-def guaranteed(vehicle: Vehicle, pivot_distance: float, curvature: float, dwell: float) -> float:
+def guaranteed(vehicle: Vehicle, pivot_distance: float, swing: float, ahead: float) -> float:
     """Bound on the distance from the reference [l] for a vehicle without errors; see the module."""
-    ahead = look_ahead(vehicle, curvature)
-    swing = float(np.abs(vehicle.twist[:, 2]).max()) * dwell * (ahead + 2 * pivot_distance)
-    lag = np.abs(vehicle.lag[:, :, round(SHORTEST / 0.02) :]).max((0, 1, 2))
+    lag = np.abs(vehicle.lag[:, :, round(SHORTEST / STEP) :]).max((0, 1, 2))
     flip = float(np.hypot(lag[0], lag[1]) + (ahead + 2 * pivot_distance) * lag[2])
-    return swing + flip
+    return swing * (ahead + 2 * pivot_distance) + flip
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,9 @@ def stated_error(
     rng = np.random.default_rng(seed)
     z = rng.standard_normal((_DRAWS, len(vehicle.modes)))
     if every:  # each window starts from a known pose
-        relative = deviation[1:] - deviation[:-1] - turned[:-1, :, None] * _left(np.diff(position, axis=0))[:, None]
+        relative = (
+            deviation[1:] - deviation[:-1] - turned[:-1, :, None] * _left(np.diff(position, axis=0))[:, None]
+        )
         share = np.maximum(every / np.diff(edges), 0.0).clip(max=1.0)
         moved = np.einsum("dp,kpi->dki", z, relative) * share[:, None]
         moved += rng.standard_normal((_DRAWS, len(noise), 2)) * noise[:, :2] * np.sqrt(share)[:, None]

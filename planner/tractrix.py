@@ -26,7 +26,7 @@ from sim.arrays import Floats
 from sim.io.errors import InputError
 
 _LAPS = 6
-_MOST_SLIP = 0.9  # sine of the largest angle between heading and path
+_MOST_SLIP = 3.0  # sideways by forward motion
 
 
 @dataclass(frozen=True)
@@ -105,19 +105,19 @@ def _slip(direction: float, drift: Drift) -> float:
         return 0.0
     slip = 0.0
     for _ in range(50):
-        slip = math.asin(_sine(slip, direction - slip, drift))
+        slip = math.atan(_ratio(direction - slip, drift))
     return slip
 
 
-def _sine(slip: float, heading: float, drift: Drift) -> float:
-    """(u + c·n)/v."""
+def _ratio(heading: float, drift: Drift) -> float:
+    """Sideways part of the motion by its forward part, (u + c·n)/(V + c·e)."""
     cx, cy = drift.current
     ahead = 1 + cx * math.cos(heading) + cy * math.sin(heading)
     aside = drift.sideways - cx * math.sin(heading) + cy * math.cos(heading)
-    if ahead <= 0 or abs(aside) > _MOST_SLIP * math.hypot(ahead, aside):
+    if ahead <= 0 or abs(aside) > _MOST_SLIP * ahead:
         raise InputError("the current, or the difference of left and right turns, is as fast as the robot's net "
                          "motion; use a longer dwell or a faster motor")  # fmt: skip
-    return aside * max(math.cos(slip), 0.2) / ahead
+    return aside / ahead
 
 
 def _drag(tangent: Floats, length: Floats, pivot_distance: float, start: float, drift: Drift) -> Floats:
@@ -132,6 +132,6 @@ def _drag(tangent: Floats, length: Floats, pivot_distance: float, start: float, 
         gap = (direction - now + math.pi) % turn - math.pi
         now += gap - 2 * math.atan(math.tan(gap / 2) * factor)
         if not still:
-            now -= _sine(gap, now, drift) * step / pivot_distance
+            now -= _ratio(now, drift) * max(math.cos(gap), 0.0) * step / pivot_distance
         heading[i + 1] = now
     return heading

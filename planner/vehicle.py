@@ -8,8 +8,8 @@ dwell of length S moves it by
 The lag is what the tails lose or gain while they turn over (`sim.model.response`). The first dwell starts from
 rest and has a lag of its own. The two directions have their own numbers, so left and right turns may differ.
 
-Lags are kept at equal steps of T up to SETTLED; after that they are constant. Between the lengths of the dwell
-before they are linear, and from FORGOTTEN on they do not depend on it. Poses are those of the head's centre. A
+Lags are kept at equal steps of T up to SETTLED; after that they are constant. From FORGOTTEN on they do not depend
+on the dwell before. Below that, a cubic spline in ln S joins the lengths at which the memory was simulated. Poses are those of the head's centre. A
 current moves the robot in the lab: it adds to the pose at the end of a dwell. Lengths are in l, times in μ0 l⁴/EI.
 """
 
@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import CubicSpline
 
 from sim.arrays import Floats
 from sim.mechanics import planar
@@ -29,7 +29,7 @@ TURN_OVER = 0.7  # time units that the tails need after a flip
 SHORTEST = float(DWELLS[0])  # shortest dwell whose response is known
 STEP = 0.02  # between the dwells at which lags are kept
 TIMES = np.arange(0.0, SETTLED + STEP / 2, STEP)
-BEFORE_KNOTS = np.append(BEFORE, FORGOTTEN)
+BEFORE_KNOTS = np.geomspace(BEFORE[0], FORGOTTEN, 33)  # lengths of the dwell before at which lags are kept
 
 
 @dataclass(frozen=True)
@@ -113,13 +113,17 @@ class Mode:
 
 
 def resampled(curve: Floats) -> Floats:
-    """Curves (..., D, 3) over DWELLS at TIMES, (..., T, 3); zero at a flip, constant after SETTLED."""
-    knots = np.concatenate([[0.0], DWELLS])
-    known = np.concatenate([np.zeros_like(curve[..., :1, :]), curve], -2)
-    return np.asarray(PchipInterpolator(knots, known, axis=-2)(TIMES))
+    """Curves (..., D, 3) over DWELLS at TIMES, (..., T, 3): a cubic spline in ln T; constant after SETTLED.
+
+    Below the shortest dwell it is a straight line to zero.
+    """
+    spline = CubicSpline(np.log(DWELLS), curve, axis=-2)(np.log(np.maximum(TIMES, DWELLS[0])))
+    return np.asarray(spline * np.minimum(TIMES / DWELLS[0], 1.0)[:, None])
 
 
-def lags_of(lag: Floats, memory: Floats) -> Floats:
+def lags_of(lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
     """Lags (K, T, 3) after dwells of BEFORE_KNOTS, from curves of `sim.model.response`."""
-    after = np.concatenate([lag + memory, lag[None]])
-    return resampled(after)
+    knots = np.log(np.append(before, FORGOTTEN))
+    known = np.concatenate([memory, np.zeros_like(memory[:1])])
+    fine = CubicSpline(knots, known, bc_type=("not-a-knot", "clamped"))(np.log(BEFORE_KNOTS))
+    return resampled(lag + fine)

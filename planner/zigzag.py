@@ -26,9 +26,15 @@ class Zigzag:
 
     dwells: tuple[float, float]  # in the positive and in the negative direction
     speed: float  # net, along the heading's middle
+    swing: float  # of the heading, to and fro
+    sway: float  # of the pivot: from its mean line to where it is when the motor stops turning left
     drift: float  # net, to the left of the heading's middle
     rms: float  # distance of the tracked point from its mean line
     largest: float
+
+    def hysteresis(self, ahead: float) -> float:
+        """2 h: what the heading swings past the line of sight, with look-ahead `ahead`."""
+        return max(self.swing + 2 * math.atan(self.sway / ahead), 0.2 * self.swing)
 
     @property
     def net_speed(self) -> float:
@@ -59,10 +65,20 @@ def zigzag(vehicle: Vehicle, dwell: float, offset: float = 0.0) -> Zigzag:
     return Zigzag(
         dwells=(float(pair[0]), float(pair[1])),
         speed=float(c * move[0] + s * move[1]) / duration,
+        swing=abs(float(poses[-1, 2] - poses[-2, 2])),
+        sway=_sway(vehicle, poses, move / length),
         drift=float(c * move[1] - s * move[0]) / duration,
         rms=float(across.std()),
         largest=float(np.abs(across).max()),
     )
+
+
+def _sway(vehicle: Vehicle, poses: Floats, along: Floats) -> float:
+    """Half of the distance between the pivot's places at flips to the right and at flips to the left."""
+    axis = np.stack([np.cos(poses[-3:, 2]), np.sin(poses[-3:, 2])], 1)
+    pivot = poses[-3:, :2] - vehicle.pivot_distance * axis
+    across = pivot @ np.array([-along[1], along[0]])
+    return float(across[1] - (across[0] + across[2]) / 2) / 2
 
 
 def _repeated(vehicle: Vehicle, pair: list[float]) -> tuple[Switches, Floats]:

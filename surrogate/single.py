@@ -20,10 +20,10 @@ from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.files import write_text
 from sim.mechanics import planar
-from sim.model.response import BEFORE, DWELLS, Responses, at_equal_dwells
+from sim.model.response import DWELLS, Responses, at_equal_dwells
 
 FORMAT = 2
-_CURVES = {"lag": (2, len(DWELLS), 3), "memory": (2, len(BEFORE), len(DWELLS), 3),
+_CURVES = {"lag": (2, len(DWELLS), 3), "memory": (2, -1, len(DWELLS), 3),
            "rest": (2, len(DWELLS), 3), "spread": (2, len(DWELLS), 3)}  # fmt: skip
 
 
@@ -38,6 +38,7 @@ class SingleRobot:
     robot: dict[str, float]  # dimensionless groups, effects among them
     steady: dict[str, list[float]]  # columns of `sim steady`, both directions
     lag: list[Any]  # (2, D, 3)
+    before: list[float]  # (K,), of `memory`
     memory: list[Any]  # (2, K, D, 3)
     rest: list[Any]  # (2, D, 3)
     spread: list[Any]  # (2, D, 3)
@@ -71,13 +72,13 @@ class SingleRobot:
         Raises:
             InputError: the columns are another robot's.
         """
-        side = self._side(columns)
+        side, before = self._side(columns), np.array(self.before)
         lag, memory, rest, spread = (np.array(getattr(self, name))[side] for name in _CURVES)
         found, sense = self.query(columns), np.where(side == 0, 1.0, -1.0)
         twist = np.stack([found["v_z"], sense * found["v_x"], sense * found["omega_yr_bar"]], -1)
-        speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory), DWELLS)
+        speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory, before), DWELLS)
         none = np.zeros(len(side), dtype=bool)
-        return Responses(lag, memory, rest, spread, speed, none, none)
+        return Responses(lag, memory, rest, spread, speed, none, none, before)
 
     def _side(self, columns: Mapping[str, Floats]) -> Any:
         """0 or 1 for every row, by the direction of its motor."""
@@ -114,8 +115,9 @@ def load_single(path: str | Path) -> SingleRobot:
         table = SingleRobot(**content)
         for name, shape in _CURVES.items():
             curves = np.array(getattr(table, name), dtype=float)
-            if curves.shape != shape or not np.isfinite(curves).all():
-                raise InputError(f"{path} has no curves {name!r} of shape {shape} in finite numbers: {remedy}")
+            wanted = tuple(len(table.before) if size < 0 else size for size in shape)
+            if curves.shape != wanted or not np.isfinite(curves).all():
+                raise InputError(f"{path} has no curves {name!r} of shape {wanted} in finite numbers: {remedy}")
     except OSError as missing:
         raise InputError(f"{path} cannot be read ({missing.strerror}); {remedy}") from None
     except (json.JSONDecodeError, UnicodeDecodeError, TypeError, ValueError, AttributeError) as broken:

@@ -31,6 +31,7 @@ _OUTPUTS = (
 )  # fmt: skip
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
 _STEP = 0.02  # in ln C, for derivatives
+BEFORE = np.geomspace(0.2, 1.2, 16)  # lengths of the dwell before
 _CHECKED = 24  # dwells of the random schedule
 _RANGE = (0.35, 1.8)  # of their lengths
 
@@ -38,20 +39,20 @@ _RANGE = (0.35, 1.8)  # of their lengths
 def tabulate(robot: Robot) -> SingleRobot:
     """Simulate one robot's steady motion and its response to flips, in both directions of the motor.
 
-    Args:
-        robot: any robot, with or without effects.
+        Args:
+            robot: any robot, with or without effects.
 
-    Raises:
-        InputError: the robot's motion cannot be found, or a simulated flip breaks down.
+        Raises:
+            InputError: the robot's motion cannot be found, or a simulated flip breaks down.
 
-    Example:
-        >>> import math
-from dataclasses import replace
-from typing import Any
-        >>> from softflagella import circle, load_robot, plan, tabulate
-        >>> robot = replace(load_robot("paper-control"), effects={"left_right_bias": 0.2})
-        >>> plan(circle(2.0), robot, lookup=tabulate(robot)).predicted_rms < 0.03
-        True
+        Example:
+            >>> import math
+    from dataclasses import replace
+    from typing import Any
+            >>> from softflagella import circle, load_robot, plan, tabulate
+            >>> robot = replace(load_robot("paper-control"), effects={"left_right_bias": 0.2})
+            >>> plan(circle(2.0), robot, lookup=tabulate(robot)).predicted_rms < 0.03
+            True
     """
     values = robot.group_values()
     both = {name: np.array([value, value]) for name, value in values.items()}
@@ -60,7 +61,7 @@ from typing import Any
     motion = steady(groups)
     if not motion.converged.all():
         raise InputError(f"{robot.name} has no steady motion to tabulate: {motion.note[0]}")
-    found = responses(groups, motion)
+    found = responses(groups, motion, before=BEFORE)
     if found.failed.any():
         raise InputError(f"{robot.name}: a simulated flip broke down; a slower motor may help")
     columns = motion.columns()
@@ -68,6 +69,7 @@ from typing import Any
         robot=values,
         steady={name: np.asarray(columns[name], dtype=float).tolist() for name in _OUTPUTS},
         lag=found.lag.tolist(),
+        before=BEFORE.tolist(),
         memory=found.memory.tolist(),
         rest=found.rest.tolist(),
         spread=found.spread.tolist(),
@@ -110,7 +112,7 @@ def _missed(table: SingleRobot) -> Floats:
         mirror = planar.MIRROR if side else np.ones(3)
         twist = np.array([table.steady[name][side] for name in ("v_z", "v_x", "omega_yr_bar")]) * mirror
         simulated = planar.compose(moved[i] * mirror, planar.inverse(planar.arc(twist, dwells[i])))
-        curve = np.array(table.lag[side]) + memory_after(np.array(table.memory[side]), float(dwells[i - 1]))
+        curve = np.array(table.lag[side]) + memory_after(np.array(table.memory[side]), float(dwells[i - 1]), BEFORE)
         predicted = [np.interp(np.log(dwells[i]), np.log(DWELLS), column) for column in curve.T]
         missed.append(simulated - predicted)
     return np.array(missed)

@@ -44,7 +44,9 @@ class Curves(NamedTuple):
 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
-def responses(groups: Groups, motion: Steady | None = None, *, history: bool = True) -> Responses:
+def responses(
+    groups: Groups, motion: Steady | None = None, *, history: bool = True, before: Floats = BEFORE
+) -> Responses:
     """Response of B robots of one N to a flip of the motor.
 
     Args:
@@ -52,6 +54,7 @@ def responses(groups: Groups, motion: Steady | None = None, *, history: bool = T
         motion: the robots' steady motion, if it is at hand.
         history: simulate memory and rest, too; it takes four times as long. Without, both are NaN, and so is the
             net speed of dwells shorter than FORGOTTEN.
+        before: T̄ of the dwell before, (K,), increasing, below FORGOTTEN.
     """
     check_groups(groups)
     motion = steady(groups) if motion is None else motion
@@ -59,29 +62,31 @@ def responses(groups: Groups, motion: Steady | None = None, *, history: bool = T
     robots = bodies(groups)
     found, stepped = [], np.zeros(len(robots), dtype=bool)
     for i, (body, reverse) in enumerate(zip(robots, reversed_bodies(groups), strict=True)):
-        curves = _solved(body, reverse, groups.N, even, history)
+        curves = _solved(body, reverse, groups.N, even, history, before)
         if curves is None:
             stepped[i] = True
-            curves = Curves(*stepped_response(body, groups.N, DWELLS, BEFORE, reverse=reverse))
+            curves = Curves(*stepped_response(body, groups.N, DWELLS, before, reverse=reverse))
         found.append(curves)
     lag, memory, rest, spread = (np.array(column) for column in zip(*found, strict=True))
     sense = np.sign([body.omega for body in robots])
     twist = np.stack([motion.v_z, sense * motion.v_x, sense * motion.omega_yr], -1)
     if not history:
         memory[:], rest[:] = np.nan, np.nan
-    speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory), DWELLS)
+    speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory, before), DWELLS)
     failed = ~np.isfinite(speed[:, -1])
     for array in (lag, memory, rest, spread, speed):
         array[failed] = np.nan
-    return Responses(lag, memory, rest, spread, speed, failed, stepped)
+    return Responses(lag, memory, rest, spread, speed, failed, stepped, before)
 
 
-def _solved(body: Body, reverse: Body, tails: int, even: bool, history: bool) -> Curves | None:
+def _solved(
+    body: Body, reverse: Body, tails: int, even: bool, history: bool, before: Floats
+) -> Curves | None:
     """Curves of one robot by transients; None where its motion, or a transient, cannot be solved for."""
-    coarse = _on_mesh(body, reverse, tails, even, _MESHES[0], history=False)
+    coarse = _on_mesh(body, reverse, tails, even, _MESHES[0], before[:0])
     if coarse is None:
         return None
-    fine = _on_mesh(body, reverse, tails, even, _MESHES[1], history=history)
+    fine = _on_mesh(body, reverse, tails, even, _MESHES[1], before if history else before[:0])
     if fine is None:
         return None
     a, b = _MESHES
@@ -91,36 +96,35 @@ def _solved(body: Body, reverse: Body, tails: int, even: bool, history: bool) ->
 
 
 def _on_mesh(
-    body: Body, reverse: Body, tails: int, even: bool, edges: int, *, history: bool
+    body: Body, reverse: Body, tails: int, even: bool, edges: int, marks: Floats
 ) -> Curves | None:
-    """Curves on one mesh; memory and rest only with `history`."""
+    """Curves on one mesh; memory and rest only if there are dwells before, `marks`."""
     after = _orbit(body, tails, edges)
     if after is None:
         return None
     x, u, twist = after
-    marks = BEFORE if history else np.empty(0)
     if even:
         start, first = _mirrored(x), u
     else:
-        before = _orbit(reverse, tails, edges, instants=u.shape[0])
-        if before is None:
+        came = _orbit(reverse, tails, edges, instants=u.shape[0])
+        if came is None:
             return None
-        other = before[2]
-        start, first = before[0], before[1] * _FLIPPED
+        other = came[2]
+        start, first = came[0], came[1] * _FLIPPED
     main = transient(body, start.copy(), first.copy(), twist, SETTLED, marks, _TOLERANCE)
     if not main.solved:
         return None
     dwells = np.minimum(DWELLS, SETTLED)
     fields = lag_at(main, dwells)
     lag, spread = fields.mean(1), fields.std(1)
-    memory, rest = np.zeros((len(BEFORE), *lag.shape)), np.zeros_like(lag)
-    if not history:
+    memory, rest = np.zeros((len(marks), *lag.shape)), np.zeros_like(lag)
+    if not len(marks):
         return Curves(lag, memory, rest, spread)
     shapes = main.shapes
     if even:
         shapes = np.array([_mirrored(shape) for shape in shapes])
     else:
-        back = transient(reverse, x.copy(), u * _FLIPPED, other, float(BEFORE[-1]), marks, _TOLERANCE)
+        back = transient(reverse, x.copy(), u * _FLIPPED, other, float(marks[-1]), marks, _TOLERANCE)
         if not back.solved:
             return None
         shapes = back.shapes

@@ -76,7 +76,7 @@ def test_the_bound_holds_on_random_paths(seed: int) -> None:
     switches = follow(ref, car, pivot_distance=car.pivot_distance, ahead=ahead, dwell=dwell, offset=0.0)
     track = trace(car, switches, 0.0, samples=12)
     error = distance_to(ref.p, track[:-12])
-    assert error.max() <= guaranteed(car, car.pivot_distance, curvature, dwell)
+    assert error.max() <= guaranteed(car, car.pivot_distance, car.yaw_rate * dwell, ahead)
     assert switches.dwells.min() >= dwell * (1 - 1e-9)
 
 
