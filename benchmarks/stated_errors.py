@@ -49,9 +49,9 @@ def random_robot(rng: np.random.Generator) -> Robot:
 
 
 def random_path(rng: np.random.Generator, radius: float) -> Path2D:
-    """A path of 15 to 40 turn radii: a smooth curve, a polygon, a circle or a zigzag."""
+    """A path of 6 to 15 turn radii: a smooth curve, a polygon, a circle or a zigzag."""
     kind = rng.integers(4)
-    length = radius * rng.uniform(15, 40)
+    length = radius * rng.uniform(6, 15)
     if kind == 0:
         return circle(length / 2 / np.pi)
     if kind == 1:

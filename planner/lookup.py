@@ -82,19 +82,25 @@ def _old_response(columns: dict[str, Floats], lookup: Any) -> Responses:
 
 
 def _table_modes(twist: Floats, lookup: LookupTable) -> list[Mode]:
-    """The held-out errors of the table. Errors of the two directions are mirror images."""
+    """The held-out errors of the table.
+
+    The two directions of a mirror-symmetric robot have the same errors. Those of other robots are independent.
+    """
     error = {name: float(values["rms"]) for name, values in lookup.errors.items()}
     speed, yaw = float(np.hypot(twist[0, 0], twist[0, 1])), abs(float(twist[0, 2]))
-    none = np.zeros((2, 3))
+    mirrored = np.allclose(twist[1], twist[0] * planar.MIRROR, rtol=1e-9, atol=0)
+    sides = [np.ones((2, 1))] if mirrored else [np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]])]
     modes = []
-    for i, name in enumerate(_STEADY):
-        size = np.zeros((2, 3))
-        size[:, i] = twist[:, i] * error[name] if i else error[name] * speed
-        modes.append(Mode(f"table: {name}", size, none))
-    for i, (name, scale) in enumerate((("lag_z", speed), ("lag_x", speed), ("lag_psi_rad", yaw))):
-        size = np.zeros(3)
-        size[i] = error[name] * scale
-        modes.append(Mode(f"table: {name}", none, np.stack([size, size * planar.MIRROR])))
+    for side in sides:
+        for i, name in enumerate(_STEADY):
+            size = np.zeros((2, 3))
+            size[:, i] = twist[:, i] * error[name] if i else error[name] * speed
+            modes.append(Mode(f"table: {name}", side * size, np.zeros((2, 3))))
+        for i, (name, scale) in enumerate((("lag_z", speed), ("lag_x", speed), ("lag_psi_rad", yaw))):
+            one = np.zeros(3)
+            one[i] = error[name] * scale
+            lag = np.stack([one, one * planar.MIRROR])
+            modes.append(Mode(f"table: {name}", np.zeros((2, 3)), side * lag))
     return modes
 
 

@@ -83,7 +83,9 @@ class Plan:
     vehicle: Vehicle
     guide: Reference  # declared path, with the pivot and heading that belong to it
     pivot_distance: float
-    ahead: float
+    ahead: float  # look-ahead Δ
+    net_speed: float  # on a straight line
+    swing: float  # 2 h, of the hysteresis on a straight line
 
     @property
     def start(self) -> tuple[float, float, float]:
@@ -212,13 +214,14 @@ def _plan(
     declared = declare(raw, vehicle, distance, corner, drift)
     guide = declared.reference
     ahead = look_ahead(vehicle, declared.curvature, straight)
+    swing = straight.hysteresis(ahead)
     switches = follow(
         guide,
         vehicle,
         pivot_distance=distance,
         ahead=ahead,
         dwell=dwell,
-        swing=straight.hysteresis(ahead),
+        swing=swing,
         offset=offset,
         progress=progress,
     )
@@ -255,6 +258,8 @@ def _plan(
         guide=guide,
         pivot_distance=distance,
         ahead=ahead,
+        net_speed=straight.net_speed,
+        swing=swing,
     )
 
 
