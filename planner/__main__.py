@@ -1,6 +1,7 @@
 """Command line of the planner.
 
 python -m planner plan PATH.{csv,svg} --robot robot.toml --out DIR     plan.json, plan.csv, schedule.h, plan.svg
+python -m planner track PATH --robot robot.toml                        poses on a pipe in, orders out
 python -m planner check PLAN.json TRACK.csv [--out OVERLAY.png]        tracking error of a replayed track
 """
 
@@ -19,6 +20,7 @@ from sim.io.errors import InputError
 
 if TYPE_CHECKING:
     from planner.path import Path2D
+    from planner.plan import Plan
     from sim.model.robot import Robot
 
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
@@ -26,17 +28,15 @@ main = program.main
 _SHAPES = {"circle": 0, "triangle": 3, "square": 4}  # number of corners
 
 
-@program.command(
-    "plan",
-    "plan the switching times for a path",
+_PLANNING = (
     argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE"),
     ROBOT,
-    out("folder"),
     MODEL,
     argument("--unit", choices=("l", *UNITS), help="unit of the path (default: the drawing's, or tail lengths)"),
     argument("--scale", type=float, default=1.0, help="multiply the path's coordinates"),
     argument("--shape", help="which path of an SVG with several"),
     argument("--closed", action="store_true", help="join the path's end to its start"),
+    argument("--smooth", type=float, help="smooth the path over this length, in tail lengths"),
     argument("--point", default="head_centre", choices=("head_centre", "head_tip", "pivot"),
              help="which point follows the path (default: head_centre)"),
     argument("--corner", default="nearest", choices=("nearest", "fillet", "error"),
@@ -46,10 +46,66 @@ _SHAPES = {"circle": 0, "triangle": 3, "square": 4}  # number of corners
     argument("--min-dwell", type=float, help="shortest dwell, in time units μ0 l⁴/EI"),
     argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
     argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
-    argument("--smooth", type=float, help="smooth the path over this length, in tail lengths"),
 )  # fmt: skip
+
+
+@program.command("plan", "plan the switching times for a path", *_PLANNING, out("folder"))
 def _plan(arguments: Namespace) -> None:
     from planner.export import write_plan
+
+    result = _planned(arguments)
+    paths = write_plan(result, arguments.out)
+    for warning in result.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    x, y, heading = result.start
+    print(
+        f"start: put the head's centre at ({x:.3f}, {y:.3f}) l, heading {math.degrees(heading):.1f} degrees, "
+        "at rest"
+    )
+    print(
+        f"{len(result.dwells)} dwells of {result.minimum_dwell:.2f} time units or more, "
+        f"{result.seconds.sum():.1f} s"
+    )
+    print(
+        f"predicted error {result.predicted_rms:.4f} l rms, {result.predicted_max:.3f} l at most; stated error "
+        f"{result.stated_error:.3f} l, with feedback {result.feedback_error:.3f} l"
+    )
+    print(
+        f"from the path as drawn {result.drawn_rms:.4f} l rms, {result.drawn_max:.3f} l at most; every drawn "
+        f"point is within {result.missed:.3f} l of the declared path"
+    )
+    print(f"-> {', '.join(map(str, paths))}")
+
+
+@program.command(
+    "track",
+    "keep a robot on its path: poses come in on a pipe, orders go out (planner.tracker_pipe says how)",
+    *_PLANNING,
+    argument("--noise", type=float, default=0.01, help="standard deviation of x and y, in tail lengths"),
+    argument("--noise-rad", type=float, default=0.01, help="standard deviation of the heading"),
+    argument("--latency", type=float, default=0.0, help="age of a pose when it comes in, in seconds"),
+)
+def _track(arguments: Namespace) -> None:
+    from contextlib import redirect_stdout
+
+    from planner.tracker import Tracker
+    from planner.tracker_pipe import answers
+
+    for name in ("noise", "noise_rad"):
+        if not 0 < getattr(arguments, name) < math.inf:
+            raise InputError(f"--{name.replace('_', '-')} {getattr(arguments, name)}; give a number above 0")
+    if not 0 <= arguments.latency < math.inf:
+        raise InputError(f"--latency {arguments.latency}; give a number of seconds, 0 or more")
+    with redirect_stdout(sys.stderr):
+        result = _planned(arguments)
+    scale = result.robot.time_scale
+    tracker = Tracker(result, noise=(arguments.noise, arguments.noise_rad), latency=arguments.latency / scale)
+    for answer in answers(tracker, sys.stdin, scale):
+        print(answer, flush=True)
+
+
+def _planned(arguments: Namespace) -> Plan:
+    """The plan that the command asks for."""
     from planner.knowledge import read_knowledge
     from planner.plan import plan
     from planner.size import describe
@@ -60,7 +116,7 @@ def _plan(arguments: Namespace) -> None:
     path = _path(arguments, robot)
     print(f"path: {describe(path, robot)}")
     with _progress() as progress:
-        result = plan(
+        return plan(
             path,
             robot,
             lookup=load_table(arguments.model),
@@ -73,25 +129,6 @@ def _plan(arguments: Namespace) -> None:
             knowledge=read_knowledge(arguments.robot),
             progress=progress,
         )
-    paths = write_plan(result, arguments.out)
-    for warning in result.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
-    x, y, heading = result.start
-    print(
-        f"start: put the head's centre at ({x:.3f}, {y:.3f}) l, heading {math.degrees(heading):.1f} degrees, at rest"
-    )
-    print(
-        f"{len(result.dwells)} dwells of {result.minimum_dwell:.2f} time units or more, {result.seconds.sum():.1f} s"
-    )
-    print(
-        f"predicted error {result.predicted_rms:.4f} l rms, {result.predicted_max:.3f} l at most; stated error "
-        f"{result.stated_error:.3f} l, with feedback {result.feedback_error:.3f} l"
-    )
-    print(
-        f"from the path as drawn {result.drawn_rms:.4f} l rms, {result.drawn_max:.3f} l at most; every drawn point "
-        f"is within {result.missed:.3f} l of the declared path"
-    )
-    print(f"-> {', '.join(map(str, paths))}")
 
 
 @contextmanager

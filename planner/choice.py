@@ -26,12 +26,13 @@ _COUNT = 100
 
 
 def dwells_for(vehicle: Vehicle, objective: Objective, least: float | None) -> list[float]:
-    """Dwells in the order of preference: the first one for itself, the others where a tolerance asks for less error.
+    """Dwells in the order of preference: the first one for itself, the others where a tolerance asks for less.
 
     Args:
         vehicle: both directions.
         objective: "error": the shortest dwell that costs at most 10 % of the speed, then shorter ones; "time": the
-            fastest, then shorter ones; "flips": the longest that costs at most 5 % of the speed, then shorter ones.
+            fastest, then shorter ones; "flips": the longest that costs at most 5 % of the speed, then shorter
+            ones.
         least: the shortest dwell that the motor or the user allows; None: QUICK.
 
     Raises:
@@ -70,7 +71,7 @@ def check_least(least: float | None) -> float:
         return QUICK
     if not math.isfinite(least) or least < SHORTEST:
         raise InputError(
-            f"minimum dwell {least:g} is below {SHORTEST:g} time units; for shorter dwells the response of the tails "
-            f"is not known: give at least {SHORTEST:g}"
+            f"minimum dwell {least:g} is below {SHORTEST:g} time units; for shorter dwells the response of the "
+            f"tails is not known: give at least {SHORTEST:g}"
         )
     return least

@@ -142,9 +142,9 @@ def _too_tight(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, d
     scale = _working_scale(raw, vehicle, distance, corner, drift)
     remedy = f"scale the path by {scale:.3g}" if scale else "smooth the path, with --smooth LENGTH"
     return (
-        f"path too tight at ({x:.3g}, {y:.3g}) l: the pivot would turn with radius {1 / curvature[worst]:.3g} l, the "
-        f"robot can with {vehicle.pivot_radius / TIGHTEST:.3g} l (its circle has radius {vehicle.turn_radius:.3g} l), "
-        f"and the nearest path that it can follow has lost the shape; {remedy}"
+        f"path too tight at ({x:.3g}, {y:.3g}) l: the pivot would turn with radius {1 / curvature[worst]:.3g} l, "
+        f"the robot can with {vehicle.pivot_radius / TIGHTEST:.3g} l (its circle has radius "
+        f"{vehicle.turn_radius:.3g} l), and the nearest path that it can follow has lost the shape; {remedy}"
     )
 
 

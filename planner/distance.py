@@ -1,4 +1,4 @@
-"""Distances between points and polylines, in time linear in both: a tree finds candidates, geometry the distance."""
+"""Distances between points and polylines, in time linear in both: a tree finds the candidates."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def nearest(polyline: Floats, points: Floats) -> tuple[Floats, Integers, Floats]
     tree = cKDTree(np.concatenate([places, polyline[-1:]]))
     half = float((length / pieces).max()) / 2
     count = min(_FINE, len(owner))
-    gap, found = tree.query(points, k=count)
-    gap, found = gap.reshape(len(points), count), found.reshape(len(points), count)
+    raw = tree.query(points, k=count)
+    gap, found = (np.reshape(part, (len(points), count)) for part in raw)
     candidates = np.concatenate([owner[found], other[found]], 1)
     distance, segment, place = _closest(start, along, points, candidates)
     unsure = np.flatnonzero((gap[:, -1] ** 2 < distance**2 + half**2) & (count < len(owner)))

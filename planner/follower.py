@@ -1,7 +1,7 @@
 """The equation for the next flip, in plain numbers, because one switch at a time is asked for.
 
-`planner.schedule` plans with it and `planner.tracker` keeps a robot on its path with it. A pose is x, y and heading
-of the head's centre. Lengths in l, times in μ0 l⁴/EI.
+`planner.schedule` plans with it and `planner.tracker` keeps a robot on its path with it. A pose is x, y and
+heading of the head's centre. Lengths in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -54,9 +54,9 @@ class Follower:
     ) -> None:
         """Go on with another robot: twists (2, 3), an angle added to all lags, and a current (2,).
 
-        `slip` is what drifts beside what the reference was made for, as shares of the net speed: to the left of the
-        heading, and along x and y. The robot then moves at an angle to its heading. So the reference's heading and
-        its pivot are turned about the tracked point by that angle.
+        `slip` is what drifts beside what the reference was made for, as shares of the net speed: to the left of
+        the heading, and along x and y. The robot then moves at an angle to its heading. So the reference's
+        heading and its pivot are turned about the tracked point by that angle.
         """
         self._twist, self._lag_angle, self._current, self._slip = twist, lag_angle, current, slip
 
@@ -144,9 +144,7 @@ class Follower:
     def _ended(self) -> bool:
         return self.place >= self._last and self.share >= 1
 
-    def next_dwell(
-        self, pose: tuple[float, float, float], sense: int, before: float | None
-    ) -> tuple[float, bool]:
+    def next_dwell(self, pose: tuple[float, float, float], sense: int, before: float | None) -> tuple[float, bool]:
         """Length of the dwell that begins at `pose`, and whether the path ends in it.
 
         The last dwell is trimmed. If it were too short for the motor, it is the shortest one or none at all,
@@ -218,5 +216,3 @@ def _between(before: float) -> tuple[int, float]:
     while before > _KNOTS[k + 1]:
         k += 1
     return k, max((before - _KNOTS[k]) / (_KNOTS[k + 1] - _KNOTS[k]), 0.0)
-
-

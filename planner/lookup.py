@@ -18,6 +18,7 @@ from sim.model.robot import Robot
 from surrogate.table import LookupTable
 
 _STEADY = ("v_z", "v_x", "omega_yr_bar")
+_ODD = 0.2  # share of a table's error that has opposite signs in the two directions
 _STEP = 0.02  # of a coefficient, for derivatives
 
 
@@ -41,7 +42,9 @@ def vehicle_of(robot: Robot, lookup: LookupTable, knowledge: Knowledge | None = 
         raise InputError(f"robot {robot.name!r} turns to the same side in both directions of its motor; it cannot "
                          "follow a path")  # fmt: skip
     mirror = np.stack([np.ones(3), planar.MIRROR])
-    lag = np.stack([lags_of(curves.lag[i], curves.memory[i], curves.before) for i in (0, 1)]) * mirror[:, None, None]
+    lag = (
+        np.stack([lags_of(curves.lag[i], curves.memory[i], curves.before) for i in (0, 1)]) * mirror[:, None, None]
+    )
     unit = robot.time_scale / robot.tail_length  # from m/s
     return Vehicle(
         twist=twist,
@@ -84,12 +87,13 @@ def _old_response(columns: dict[str, Floats], lookup: Any) -> Responses:
 def _table_modes(twist: Floats, lookup: LookupTable) -> list[Mode]:
     """The held-out errors of the table.
 
-    The two directions of a mirror-symmetric robot have the same errors. Those of other robots are independent.
+    The two directions of a mirror-symmetric robot have the same errors. Those of other robots also have a part of
+    opposite signs.
     """
     error = {name: float(values["rms"]) for name, values in lookup.errors.items()}
     speed, yaw = float(np.hypot(twist[0, 0], twist[0, 1])), abs(float(twist[0, 2]))
     mirrored = np.allclose(twist[1], twist[0] * planar.MIRROR, rtol=1e-9, atol=0)
-    sides = [np.ones((2, 1))] if mirrored else [np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]])]
+    sides = [np.ones((2, 1))] if mirrored else [np.ones((2, 1)), _ODD * np.array([[1.0], [-1.0]])]
     modes = []
     for side in sides:
         for i, name in enumerate(_STEADY):

@@ -9,8 +9,9 @@ with r_i points at equal distances on the path as drawn. Two things hold the pos
 has no sideways part, except for the drift; and it turns by at most κ times its length. Both enter as least squares
 with large weights; the second only where it is broken. The tractrix of the result is checked afterwards.
 
-Every residual belongs to one pose or to two neighbours. So a Gauss-Newton step is a banded system, and its cost is
-linear in the length of the path. A closed path is solved with a stretch of the next lap at both ends. Lengths in l.
+Every residual belongs to one pose or to two neighbours. So a Gauss-Newton step is a banded system, and its cost
+is linear in the length of the path. A closed path is solved with a stretch of the next lap at both ends. Lengths
+in l.
 """
 
 from __future__ import annotations
@@ -161,15 +162,16 @@ def _system(
         pair[:, row, 3], pair[:, row, 4], pair[:, row, 5] = dx, dy, swing + turning
 
     one, none = np.ones(count - 1), np.zeros(count - 1)
+    broken: Floats
     steps[:, 0] = weight * (aside - slip * forward)
-    put(0, -weight * slip, weight * one, none)
+    put(0, np.asarray(-weight * slip, dtype=np.float64), weight * one, none)
     sense = np.sign(turn)
     over = sense * turn * radius - forward
-    broken = weight * (over > 0)
+    broken = np.asarray(weight * (over > 0), dtype=np.float64)
     steps[:, 1] = broken * over
-    put(1, -broken, none, broken * sense * radius)
+    put(1, -broken, none, np.asarray(broken * sense * radius, dtype=np.float64))
     short = _SHORTEST_STEP * spacing - forward
-    broken = 10 * (short > 0)
+    broken = np.asarray(10.0 * (short > 0), dtype=np.float64)
     steps[:, 2] = broken * short
     put(2, -broken * one, none, none)
     steps[:, 3] = _EVEN * (forward - (1 - time_weight) * spacing)

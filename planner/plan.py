@@ -8,8 +8,8 @@
 5. The errors of this schedule are computed and stated (`planner.stated_error`). If there is a tolerance and they
    are above it, a shorter dwell is tried.
 
-Errors are distances of the tracked point from the declared path. The distance of the declared path from the path as
-drawn is reported from both sides.
+Errors are distances of the tracked point from the declared path. The distance of the declared path from the path
+as drawn is reported from both sides.
 """
 
 from __future__ import annotations
@@ -185,8 +185,8 @@ def plan(
             low = middle
     if kept is None:
         raise InputError(
-            f"tolerance {tolerance:g} l cannot be kept: the smallest stated error is {best.stated_error:.3g} l, with "
-            f"dwells from {best.minimum_dwell:.2g} time units; allow more, or make a table of this robot with "
+            f"tolerance {tolerance:g} l cannot be kept: the smallest stated error is {best.stated_error:.3g} l, "
+            f"with dwells from {best.minimum_dwell:.2g} time units; allow more, or make a table of this robot with "
             "python -m surrogate robot"
         )
     return kept

@@ -1,4 +1,4 @@
-"""The size of a path beside the robot. Sizes that make no sense are refused, with the unit that would make sense."""
+"""The size of a path beside the robot. What makes no sense is refused, with the unit that would."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def check_size(path: Path2D, robot: Robot, turn_radius: float) -> None:
                          f"{_hint(path, robot)}")  # fmt: skip
     if max(extent(path)) < SMALLEST * turn_radius:
         raise InputError(
-            f"the path is {describe(path, robot)}: too small, the robot's circle has a radius of {turn_radius:.3g} l"
-            f"{_hint(path, robot)}"
+            f"the path is {describe(path, robot)}: too small, the robot's circle has a radius of "
+            f"{turn_radius:.3g} l{_hint(path, robot)}"
         )
 
 

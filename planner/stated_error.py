@@ -7,8 +7,9 @@ with every dwell. Deviations are of first order in all of them.
 
 *With feedback*: the same, if every k flips the pose is measured and the rest is planned again.
 
-*Guaranteed error*: a bound for a vehicle without errors, however long the path is. With the swing β of the heading
-(Ω T without lags) and the look-ahead Δ ≥ R′/(1 − κ̄ R′), R′ = R cos θ, and κ̄ the largest curvature of the reference,
+*Guaranteed error*: a bound for a vehicle without errors, however long the path is. With the swing β of the
+heading (Ω T without lags) and the look-ahead Δ ≥ R′/(1 − κ̄ R′), R′ = R cos θ, and κ̄ the largest curvature of
+the reference,
 
     |e| ≤ β (Δ + 2 a),
 
@@ -95,7 +96,7 @@ def stated_error(
     edges = np.unique(np.linspace(0, count, min(count, _BLOCKS) + 1).astype(int))
     if every:
         edges = np.unique(np.append(np.arange(0, count, max(every, count // _BLOCKS)), count))
-    position, heading, deviation, turned, noise = _deviations(vehicle, switches, edges)
+    position, deviation, turned, noise = _deviations(vehicle, switches, edges)
     samples = (len(track) - 1) // count
     low, high, normal = _extremes(predicted, edges, samples)
     rng = np.random.default_rng(seed)
@@ -123,10 +124,8 @@ def stated_error(
     return float(np.quantile(worst.max(1), LEVEL))
 
 
-def _deviations(
-    vehicle: Vehicle, switches: Switches, edges: Floats
-) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """At the flips `edges` (E,): position (E, 2), heading (E,), deviation (E, P, 2) and turn (E, P) by mode, and
+def _deviations(vehicle: Vehicle, switches: Switches, edges: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """At the flips `edges` (E,): position (E, 2), deviation (E, P, 2) and turn (E, P) by mode, and
 
     noise (E − 1, 3) of the blocks between: x and y in the lab, and heading.
     """
@@ -152,11 +151,11 @@ def _deviations(
     variance = np.diff(total, axis=0)
     across = variance[:, :2].mean(1)  # x and y of the body are mixed in the lab
     noise = np.sqrt(np.stack([across, across, variance[:, 2]], 1))
-    return poses[edges, :2], poses[edges, 2], deviation, turned, noise
+    return poses[edges, :2], deviation, turned, noise
 
 
 def _extremes(predicted: Predicted, edges: Floats, samples: int) -> tuple[Floats, Floats, Floats]:
-    """Lowest and highest signed distance in each block, (E − 1,), and the normal at the block's end, (E − 1, 2)."""
+    """Lowest and highest signed distance in each block, (E − 1,), and the normal at its end, (E − 1, 2)."""
     signed = np.copysign(predicted.distance, predicted.signed)
     starts = (edges[:-1] * samples).astype(int)
     low, high = np.minimum.reduceat(signed, starts), np.maximum.reduceat(signed, starts)

@@ -4,14 +4,15 @@
     advice = tracker.feed(now)                              # no pose
     advice = tracker.feed(now, (x, y, heading), seen_at)    # a pose, and when it was true
 
-Every call says the direction of the motor and when to flip next. At most one flip can have happened since the last
-call: the one that was announced. The tracker estimates nine numbers with a Kalman filter: the pose at the last flip,
-relative errors of the two yaw rates and of the speed, an error of the lag's angle, and the current. A pose may be
-late: it is compared with the place where the robot was then, counted back from now. Poses that cannot be are left
-out; so are values that are not finite, and times that go back. A pose may be missing for as long as you like.
+Every call says the direction of the motor and when to flip next. At most one flip can have happened since the
+last call: the one that was announced. The tracker estimates nine numbers with a Kalman filter: the pose at the
+last flip, relative errors of the two yaw rates and of the speed, an error of the lag's angle, and the current. A
+pose may be late: it is compared with the place where the robot was then, counted back from now. Poses that cannot
+be are left out; so are values that are not finite, and times that go back. A pose may be missing for as long as
+you like.
 
-The next flip is the root of the same equation as in planning (`planner.schedule`), from the estimated pose and with
-the learned robot. It is never before the shortest dwell, whatever is fed.
+The next flip is the root of the same equation as in planning (`planner.schedule`), from the estimated pose and
+with the learned robot. It is never before the shortest dwell, whatever is fed.
 
 Poses are those of the head's centre in l and rad; times in μ0 l⁴/EI. `planner.tracker_pipe` has seconds.
 """
@@ -118,7 +119,12 @@ class Tracker:
             self._flip()
         if pose is not None:
             when = self._now - self._latency if seen_at is None else seen_at
-            if len(pose) == 3 and all(map(math.isfinite, (*pose, when))) and when <= self._now and self._see(pose, when):
+            if (
+                len(pose) == 3
+                and all(map(math.isfinite, (*pose, when)))
+                and when <= self._now
+                and self._see(pose, when)
+            ):
                 self._plan_flip()
         return self.advice
 
@@ -178,7 +184,7 @@ class Tracker:
         )
 
     def _sideways(self, state: list[float]) -> float:
-        """Mean speed to the left that the learned robot has beside the planned one: left and right turns differ."""
+        """Mean speed to the left, beside the plan's, that comes from unequal turns."""
         (_, left, fast), (_, right, slow) = self._twist
         a, b = fast * (1 + state[3]), -slow * (1 + state[4])
         return ((b * left + a * right) * (1 + state[5]) / (a + b)) - (-slow * left + fast * right) / (fast - slow)
@@ -271,7 +277,7 @@ class Tracker:
 
 
 def prior(plan: Plan) -> list[list[float]]:
-    """Covariance (9, 9) before the first pose: the pose is as good as the robot was put; the rest as the plan says."""
+    """Covariance (9, 9) before the first pose: how well the robot was put, and what the plan says of the rest."""
     vehicle = plan.vehicle
     P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in _DOUBT), 1e-6, 1e-12, 1e-12])
     speed = np.hypot(vehicle.twist[0, 0], vehicle.twist[0, 1])
@@ -290,7 +296,9 @@ def prior(plan: Plan) -> list[list[float]]:
 def _propagated(P: list[list[float]], F: list[list[float]]) -> list[list[float]]:
     """Covariance after a dwell: the first three rows of the transition are F, the others keep the state."""
     n = STATES
-    half = [[sum(F[i][k] * P[k][j] for k in range(n)) for j in range(n)] for i in range(3)] + [row[:] for row in P[3:]]
+    half = [[sum(F[i][k] * P[k][j] for k in range(n)) for j in range(n)] for i in range(3)] + [
+        row[:] for row in P[3:]
+    ]
     full = [row[:] for row in half]
     for i in range(n):
         for j in range(3):

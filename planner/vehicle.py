@@ -1,16 +1,17 @@
 """The robot as a vehicle for the planner: an arc in each direction of the motor, and a memory of the last dwell.
 
-In motor direction σ = ±1 the robot moves on a circle with a constant body twist. A dwell of length T that follows a
-dwell of length S moves it by
+In motor direction σ = ±1 the robot moves on a circle with a constant body twist. A dwell of length T that follows
+a dwell of length S moves it by
 
     E_σ(T | S) = lag_σ(T | S) ∘ arc(twist_σ, T).
 
 The lag is what the tails lose or gain while they turn over (`sim.model.response`). The first dwell starts from
 rest and has a lag of its own. The two directions have their own numbers, so left and right turns may differ.
 
-Lags are kept at equal steps of T up to SETTLED; after that they are constant. From FORGOTTEN on they do not depend
-on the dwell before. Below that, a cubic spline in ln S joins the lengths at which the memory was simulated. Poses are those of the head's centre. A
-current moves the robot in the lab: it adds to the pose at the end of a dwell. Lengths are in l, times in μ0 l⁴/EI.
+Lags are kept at equal steps of T up to SETTLED; after that they are constant. From FORGOTTEN on they do not
+depend on the dwell before. Below that, a cubic spline in ln S joins the lengths at which the memory was
+simulated. Poses are those of the head's centre. A current moves the robot in the lab: it adds to the pose at the
+end of a dwell. Lengths are in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -70,6 +71,7 @@ class Vehicle:
     def noise_of(self, sense: int, time: ArrayLike) -> Floats:
         """One standard deviation (..., 3) of the lag after `time`, over the phase of the disc at the flip."""
         table = self.spread[0 if sense > 0 else 1]
+        time = np.asarray(time, dtype=float)
         parts = [np.interp(time, TIMES, table[:, i]) for i in range(3)]
         return np.stack(parts, -1)
 

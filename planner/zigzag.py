@@ -1,8 +1,8 @@
 """How a vehicle moves along a straight line when the motor flips at even times.
 
-Two dwells, one in each direction, turn the robot by as much to the left as to the right. The shorter one of the two
-lasts T. The robot then moves along a line, and its heading swings about a middle. Robots whose two directions differ
-move at an angle to that middle: they drift sideways. Lengths in l, times in μ0 l⁴/EI.
+Two dwells, one in each direction, turn the robot by as much to the left as to the right. The shorter one of the
+two lasts T. The robot then moves along a line, and its heading swings about a middle. Robots whose two directions
+differ move at an angle to that middle: they drift sideways. Lengths in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations

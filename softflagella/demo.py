@@ -38,8 +38,8 @@ from calibration.synthetic import make_table
 from dataset.report import draw_sweep, plain_logarithms
 from dataset.store import read
 from planner.check import TrackingError, draw_overlay, tracking_error
-from planner.record import load_plan
 from planner.path import polygon
+from planner.record import load_plan
 from sim.inputs import robot_toml
 from sim.io.files import write_text
 from sim.io.pages import Page

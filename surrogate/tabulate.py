@@ -101,7 +101,7 @@ def _slopes(values: dict[str, float]) -> dict[str, Any]:
 
 def _missed(table: SingleRobot) -> Floats:
     """Differences (M, 3) of lags between a replay in time steps and the table, seen as for a positive motor."""
-    dwells = np.exp(np.random.default_rng(0).uniform(*np.log(_RANGE), _CHECKED))
+    dwells = np.exp(np.random.default_rng(0).uniform(math.log(_RANGE[0]), math.log(_RANGE[1]), _CHECKED))
     track = replay([Schedule(table.robot, 1, dwells, (0.0, 0.0, 0.0), 1.0)])[0]
     flips = track.groupby("dwell").last()[["x_over_l", "y_over_l", "heading_rad"]].to_numpy()
     poses = np.concatenate([np.zeros((1, 3)), flips])
@@ -112,7 +112,9 @@ def _missed(table: SingleRobot) -> Floats:
         mirror = planar.MIRROR if side else np.ones(3)
         twist = np.array([table.steady[name][side] for name in ("v_z", "v_x", "omega_yr_bar")]) * mirror
         simulated = planar.compose(moved[i] * mirror, planar.inverse(planar.arc(twist, dwells[i])))
-        curve = np.array(table.lag[side]) + memory_after(np.array(table.memory[side]), float(dwells[i - 1]), BEFORE)
+        curve = np.array(table.lag[side]) + memory_after(
+            np.array(table.memory[side]), float(dwells[i - 1]), BEFORE
+        )
         predicted = [np.interp(np.log(dwells[i]), np.log(DWELLS), column) for column in curve.T]
         missed.append(simulated - predicted)
     return np.array(missed)

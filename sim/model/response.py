@@ -7,7 +7,8 @@ steady motion. With g(T) the pose change in a dwell of length T, in the frame of
 
 and the lag stops changing after about two time units. Three things change it:
 
-    memory   after a dwell that was too short for the tails to turn over, this is added to the lag. What came before
+    memory   after a dwell that was too short for the tails to turn over, this is added to the lag. What came
+    before
              that dwell hardly matters (below 1e-4 l and rad where no dwell is shorter than 0.3)
     rest     the lag of the first dwell of all, from straight tails at rest
     spread   the phase of the disc at the flip is unknown: curves are means over it, and this is their deviation
@@ -52,7 +53,7 @@ def at_equal_dwells(memory: Floats, knots: Floats = BEFORE) -> Floats:
 
 
 def memory_after(memory: Floats, before: float, knots: Floats = BEFORE) -> Floats:
-    """Memory (..., K, D, 3) after a dwell of length `before`, (..., D, 3): linear between `knots` and FORGOTTEN."""
+    """Memory (..., K, D, 3) after a dwell `before`, (..., D, 3): linear between `knots` and FORGOTTEN."""
     if before >= FORGOTTEN:
         return np.zeros_like(memory[..., 0, :, :])
     k = max(int(np.searchsorted(knots, before, side="right")) - 1, 0)

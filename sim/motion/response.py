@@ -1,8 +1,8 @@
 """Simulate the response of robots to a flip of the motor (`sim.model.response` says what the curves are).
 
-One flip from the steady motion in the other direction gives the response to every dwell. Flips from the shapes that
-it passes through give the response after short dwells. Solved for directly (`sim.solve.transient`) where the steady
-motion is, on two meshes, extrapolated; by time steps where it is not. Units: l, μ0 l⁴/EI.
+One flip from the steady motion in the other direction gives the response to every dwell. Flips from the shapes
+that it passes through give the response after short dwells. Solved for directly (`sim.solve.transient`) where the
+steady motion is, on two meshes, extrapolated; by time steps where it is not. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations

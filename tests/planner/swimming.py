@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,11 @@ class Camera:
         return x, y, (heading + np.pi) % (2 * np.pi) - np.pi
 
 
+def _moved(car: Vehicle, pose: np.ndarray, sense: int, before: float | None, start: float, time: float) -> Any:
+    moved = planar.compose(pose, car.motion(sense, before, time - start))
+    return moved + np.append(car.current * (time - start), 0.0)
+
+
 def swim(tracker: Tracker, plan: Plan, truth: Vehicle, camera: Camera, *, changes_to: Vehicle | None = None,
          most: int = 5000) -> tuple[np.ndarray, list[float]]:  # fmt: skip
     """Distances from the declared path at many instants, and the dwells that were ordered."""
@@ -44,10 +50,7 @@ def swim(tracker: Tracker, plan: Plan, truth: Vehicle, camera: Camera, *, change
         sense, known = advice.direction, advice.flip_at
         car = changes_to if changes_to is not None and len(dwells) > half else truth
 
-        def at(time: float) -> np.ndarray:
-            moved = planar.compose(pose, car.motion(sense, before, time - start))
-            return np.asarray(moved + np.array([*(car.current * (time - start)), 0.0]))
-
+        at = partial(_moved, car, pose, sense, before, start)
         while seen + camera.every <= known or (waiting and waiting[0][0] <= known):
             if waiting and waiting[0][0] <= min(known, seen + camera.every):
                 when, found, taken = waiting.pop(0)

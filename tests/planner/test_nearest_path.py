@@ -1,4 +1,4 @@
-"""The nearest path that can be followed: nearer than rounded corners, within what the pivot can do, equivariant."""
+"""The nearest path that can be followed: nearer than rounded corners, and within what the pivot can do."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from planner.corners import fillet
 from planner.distance import distance_to, two_sided
 from planner.nearest_path import nearest_path
 from planner.path import Path2D, circle, polygon
-from planner.tractrix import Drift, reference
+from planner.tractrix import STILL, Drift, reference
 
 A, RADIUS = 0.87, 0.37
 ZIGZAG = Path2D.of([[0, 0], [3, 0], [3, 3], [6, 3], [4.5, 0.0], [8, 0]])
@@ -21,7 +21,7 @@ def off(path: Path2D, raw: Path2D) -> float:
     return float(np.sqrt(np.mean(distance_to(raw.polyline(), reference(path, A, 0.01).p) ** 2)))
 
 
-def sharpest(path: Path2D, drift: Drift = Drift()) -> float:
+def sharpest(path: Path2D, drift: Drift = STILL) -> float:
     return float(np.abs(reference(path, A, 0.02, drift).curvature).max()) * RADIUS
 
 

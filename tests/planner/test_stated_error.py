@@ -47,7 +47,7 @@ def test_without_uncertainty_it_is_the_predicted_error() -> None:
 
 def test_random_phases_add_as_a_walk() -> None:
     """On a line, a heading that jitters by s at each of M flips leads s √(M³/3) steps aside."""
-    car = replace(vehicle(errors=0.0), spread=np.zeros((2, len(TIMES), 3)) + [0.0, 0.0, 1e-3])
+    car = replace(vehicle(errors=0.0), spread=np.tile([0.0, 0.0, 1e-3], (2, len(TIMES), 1)))
     switches, ref, track = planned(car, Path2D.of([[0, 0], [30, 0]]))
     error = predicted_error(ref.p, track, closed=False)
     stated = stated_error(car, switches, track, error)

@@ -24,8 +24,8 @@ def test_lags_are_those_of_the_curves() -> None:
     lag, memory = rng.normal(size=(len(DWELLS), 3)), rng.normal(size=(len(BEFORE), len(DWELLS), 3))
     table = lags_of(lag, memory)
     car = replace(vehicle(), lag=np.stack([table, table * planar.MIRROR]))
-    at = DWELLS[DWELLS < TIMES[-1]][-1]
-    i = int(np.flatnonzero(DWELLS == at)[0])
+    at = DWELLS[TIMES[-1] > DWELLS][-1]
+    i = int(np.flatnonzero(at == DWELLS)[0])
     for before in (0.2, 0.27, 0.42, 0.7, 1.1, 1.4, 3.0):
         expected = lag[i] + memory_after(memory, before)[i]
         near = car.lag_of(1, before, np.array([at - 0.01, at + 0.01]))
@@ -52,7 +52,7 @@ def test_the_schedule_predicts_what_the_vehicle_does(bias: float) -> None:
     before = None
     for i, dwell in enumerate(switches.dwells[:40]):
         pose = planar.compose(pose, car.motion(switches.first_direction * (-1) ** i, before, dwell))
-        pose = pose + [*(car.current * dwell), 0.0]
+        pose = pose + np.append(car.current * dwell, 0.0)
         assert switches.poses[i + 1] == pytest.approx(pose, abs=1e-9)
         before = dwell
     assert poses_at_flips(car, switches) == pytest.approx(switches.poses, abs=1e-8)
