@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from planner import circle, plan, polygon
 from planner.check import tracking_error
-from planner.plan import plan_record
+from planner.record import plan_record
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay

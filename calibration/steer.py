@@ -16,7 +16,8 @@ from matplotlib.figure import Figure
 
 from planner.check import TrackingError, tracking_error
 from planner.path import Path2D
-from planner.plan import plan, plan_record
+from planner.plan import plan
+from planner.record import plan_record
 from sim.arrays import Floats
 from sim.model.robot import Robot
 from sim.motion.replay import replay

@@ -1,78 +1,149 @@
 """Command line of the planner.
 
 python -m planner plan PATH.{csv,svg} --robot robot.toml --out DIR     plan.json, plan.csv, schedule.h, plan.svg
+python -m planner track PATH --robot robot.toml                        poses on a pipe in, orders out
 python -m planner check PLAN.json TRACK.csv [--out OVERLAY.png]        tracking error of a replayed track
 """
 
 from __future__ import annotations
 
+import math
 import sys
 from argparse import Namespace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from planner.size import UNITS
 from sim.io.commands import MODEL, ROBOT, Program, argument, out
 from sim.io.errors import InputError
 
 if TYPE_CHECKING:
     from planner.path import Path2D
+    from planner.plan import Plan
     from sim.model.robot import Robot
 
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
 main = program.main
-_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _SHAPES = {"circle": 0, "triangle": 3, "square": 4}  # number of corners
 
 
-@program.command(
-    "plan",
-    "plan the switching times for a path",
+_PLANNING = (
     argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE"),
     ROBOT,
-    out("folder"),
     MODEL,
-    argument("--unit", choices=("l", *_UNITS), help="unit of the path (default: the drawing's, or tail lengths)"),
+    argument("--unit", choices=("l", *UNITS), help="unit of the path (default: the drawing's, or tail lengths)"),
     argument("--scale", type=float, default=1.0, help="multiply the path's coordinates"),
     argument("--shape", help="which path of an SVG with several"),
     argument("--closed", action="store_true", help="join the path's end to its start"),
+    argument("--smooth", type=float, help="smooth the path over this length, in tail lengths"),
     argument("--point", default="head_centre", choices=("head_centre", "head_tip", "pivot"),
              help="which point follows the path (default: head_centre)"),
-    argument("--corner", default="fillet", choices=("fillet", "error"), help="round corners, or refuse them"),
+    argument("--corner", default="nearest", choices=("nearest", "fillet", "error"),
+             help="places that are too tight: the nearest path that can be followed, round corners, or refuse"),
+    argument("--objective", default="error", choices=("error", "time", "flips"),
+             help="what decides the dwell: small error, short time, or few flips (default: error)"),
     argument("--min-dwell", type=float, help="shortest dwell, in time units μ0 l⁴/EI"),
-    argument("--tolerance", type=float, help="largest guaranteed error, in tail lengths"),
+    argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
+    argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
 )  # fmt: skip
+
+
+@program.command("plan", "plan the switching times for a path", *_PLANNING, out("folder"))
 def _plan(arguments: Namespace) -> None:
     from planner.export import write_plan
+
+    result = _planned(arguments)
+    paths = write_plan(result, arguments.out)
+    for warning in result.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    x, y, heading = result.start
+    print(
+        f"start: put the head's centre at ({x:.3f}, {y:.3f}) l, heading {math.degrees(heading):.1f} degrees, "
+        "at rest"
+    )
+    print(
+        f"{len(result.dwells)} dwells of {result.minimum_dwell:.2f} time units or more, "
+        f"{result.seconds.sum():.1f} s"
+    )
+    print(
+        f"predicted error {result.predicted_rms:.4f} l rms, {result.predicted_max:.3f} l at most; stated error "
+        f"{result.stated_error:.3f} l, with feedback {result.feedback_error:.3f} l"
+    )
+    print(
+        f"from the path as drawn {result.drawn_rms:.4f} l rms, {result.drawn_max:.3f} l at most; every drawn "
+        f"point is within {result.missed:.3f} l of the declared path"
+    )
+    print(f"-> {', '.join(map(str, paths))}")
+
+
+@program.command(
+    "track",
+    "keep a robot on its path: poses come in on a pipe, orders go out (planner.tracker_pipe says how)",
+    *_PLANNING,
+    argument("--noise", type=float, default=0.01, help="standard deviation of x and y, in tail lengths"),
+    argument("--noise-rad", type=float, default=0.01, help="standard deviation of the heading"),
+    argument("--latency", type=float, default=0.0, help="age of a pose when it comes in, in seconds"),
+)
+def _track(arguments: Namespace) -> None:
+    from contextlib import redirect_stdout
+
+    from planner.tracker import Tracker
+    from planner.tracker_pipe import answers
+
+    for name in ("noise", "noise_rad"):
+        if not 0 < getattr(arguments, name) < math.inf:
+            raise InputError(f"--{name.replace('_', '-')} {getattr(arguments, name)}; give a number above 0")
+    if not 0 <= arguments.latency < math.inf:
+        raise InputError(f"--latency {arguments.latency}; give a number of seconds, 0 or more")
+    with redirect_stdout(sys.stderr):
+        result = _planned(arguments)
+    scale = result.robot.time_scale
+    tracker = Tracker(result, noise=(arguments.noise, arguments.noise_rad), latency=arguments.latency / scale)
+    for answer in answers(tracker, sys.stdin, scale):
+        print(answer, flush=True)
+
+
+def _planned(arguments: Namespace) -> Plan:
+    """The plan that the command asks for."""
+    from planner.knowledge import read_knowledge
     from planner.plan import plan
+    from planner.size import describe
     from sim.inputs import load_robot
     from surrogate.export import load_table
 
     robot = load_robot(arguments.robot)
-    result = plan(
-        _path(arguments, robot),
-        robot,
-        lookup=load_table(arguments.model),
-        point=arguments.point,
-        corner=arguments.corner,
-        minimum_dwell=arguments.min_dwell,
-        tolerance=arguments.tolerance,
-    )
-    paths = write_plan(result, arguments.out)
-    for warning in result.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
-    print(
-        f"{len(result.dwells)} dwells, {result.seconds.sum():.1f} s; predicted error "
-        f"{result.predicted_rms:.4f} l rms, stated error {result.stated_error:.3f} l "
-        f"(guaranteed {result.guaranteed:.3f} + table {result.tube:.3f})"
-    )
-    if result.fillet_radius:
-        print(f"corners rounded to {result.fillet_radius:.3f} l, which cuts {result.corner_cut:.3f} l")
-    print(f"-> {', '.join(map(str, paths))}")
+    path = _path(arguments, robot)
+    print(f"path: {describe(path, robot)}")
+    with _progress() as progress:
+        return plan(
+            path,
+            robot,
+            lookup=load_table(arguments.model),
+            point=arguments.point,
+            corner=arguments.corner,
+            objective=arguments.objective,
+            minimum_dwell=arguments.min_dwell,
+            minimum_seconds=arguments.min_dwell_s,
+            tolerance=arguments.tolerance,
+            knowledge=read_knowledge(arguments.robot),
+            progress=progress,
+        )
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[float], object]]:
+    """A bar on a terminal, for long paths."""
+    from tqdm import tqdm
+
+    with tqdm(total=100, desc="plan", unit="%", leave=False, delay=1.0, disable=not sys.stderr.isatty()) as bar:
+        yield lambda share: bar.update(100 * share - bar.n)
 
 
 def _path(arguments: Namespace, robot: Robot) -> Path2D:
     """The path that the command asks for, in tail lengths."""
     from planner.drawings import Drawing, read_path
-    from planner.path import circle, polygon
+    from planner.path import circle, polygon, smoothed
 
     shape, _, size = arguments.path.partition(":")
     if shape in _SHAPES and size:
@@ -86,11 +157,16 @@ def _path(arguments: Namespace, robot: Robot) -> Path2D:
     else:
         closed = True if arguments.closed else None
         drawing = read_path(arguments.path, closed=closed, shape=arguments.shape)
-    unit = drawing.unit if arguments.unit is None else _UNITS.get(arguments.unit)
+    unit = drawing.unit if arguments.unit is None else UNITS.get(arguments.unit)
     scale = arguments.scale * (1.0 if unit is None else unit / robot.tail_length)
     if not 0 < scale < float("inf"):
         raise InputError(f"--scale {arguments.scale}; give a number above 0")
-    return drawing.path.scaled(scale)
+    path = drawing.path.scaled(scale)
+    if arguments.smooth is None:
+        return path
+    smooth, moved = smoothed(path, arguments.smooth)
+    print(f"smoothed over {arguments.smooth:g} l, which moves the path by up to {moved:.3g} l")
+    return smooth
 
 
 @program.command(
@@ -101,7 +177,8 @@ def _path(arguments: Namespace, robot: Robot) -> Path2D:
     out("overlay picture, PNG", default=None),
 )
 def _check(arguments: Namespace) -> None:
-    from planner.check import draw_overlay, load_plan, tracking_error
+    from planner.check import draw_overlay, tracking_error
+    from planner.record import load_plan
     from sim.io.files import whole_file
     from sim.io.tables import read_table
 

@@ -6,17 +6,15 @@ as given is computed, too. A track holds the head's centre and the heading. The 
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from planner.distance import distance_to, two_sided
 from planner.picture import REPLAYED, draw_tracks
-from planner.plan import distance_to
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.mechanics import planar
@@ -32,6 +30,7 @@ class TrackingError:
     largest: float
     raw_rms: float
     raw_largest: float
+    missed: float  # largest distance of a point of the path as given from the track
     stated: float
     track: Floats  # (K, 2) tracked point
 
@@ -40,19 +39,9 @@ class TrackingError:
         verdict = "within" if self.largest <= self.stated else "ABOVE"
         return (
             f"tracking error {self.rms:.4f} l rms, {self.largest:.4f} l at most, {verdict} the stated error "
-            f"{self.stated:.3f} l; from the raw path {self.raw_rms:.3f} l rms, {self.raw_largest:.3f} l at most"
+            f"{self.stated:.3f} l; from the raw path {self.raw_rms:.3f} l rms, {self.raw_largest:.3f} l at most, "
+            f"every point of it within {self.missed:.3f} l"
         )
-
-
-def load_plan(path: str | Path) -> dict[str, Any]:
-    """The content of a plan.json."""
-    try:
-        content = json.loads(Path(path).read_text())
-        for key in ("reference", "raw_path", "stated_error_over_l", "predicted_poses", "point"):
-            content[key]
-    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError) as broken:
-        raise InputError(f"{path} is not a plan.json of the planner ({broken}); plan again") from None
-    return dict(content)
 
 
 def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
@@ -80,6 +69,7 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
         largest=float(declared.max()),
         raw_rms=float(np.sqrt((weight * raw**2).sum())),
         raw_largest=float(raw.max()),
+        missed=float(two_sided(np.array(plan["raw_path"]), tracked)[0]),
         stated=float(plan["stated_error_over_l"]),
         track=tracked,
     )

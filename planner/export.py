@@ -14,12 +14,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from planner.plan import Plan, plan_record
+from planner.plan import Plan
+from planner.record import plan_record
 from sim.io.errors import InputError
 from sim.io.files import whole_file, write_text
 from sim.io.provenance import code_version
 
 _MOST_MS = 65_535
+_CHECKPOINTS = 32
 
 
 def write_plan(result: Plan, folder: str | Path) -> list[Path]:
@@ -95,20 +97,44 @@ def controller_header(result: Plan) -> str:
     lines = [", ".join(map(str, entries[i : i + 12])) for i in range(0, len(entries), 12)]
     body = ",\n    ".join(lines)
     name = "".join(c for c in result.robot.name if c.isalnum() or c in " -_.")
+    x, y, heading = result.start
+    checkpoints = _checkpoints(result)
+    places = ",\n    ".join(checkpoints)
     return f"""/* Motor schedule for robot "{name}": turn in FIRST_DIRECTION for the first entry,
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
- * lengthens the dwell before it. Stop after the last entry. Look-up table {result.model}. */
+ * lengthens the dwell before it. Stop after the last entry. Look-up table {result.model}.
+ * Put the head's centre at START_X, START_Y with heading START_HEADING, at rest. Checkpoints say where it should
+ * be later. x and y in tail lengths, heading in rad from the x axis to the left. */
 #ifndef SCHEDULE_H
 #define SCHEDULE_H
 #include <stdint.h>
 #define SCHEDULE_FIRST_DIRECTION ({result.first_direction})
 #define SCHEDULE_COUNT {len(entries)}
+#define SCHEDULE_TOTAL_MS {sum(entries)}UL
 #define SCHEDULE_MOTOR_RPM {result.robot.motor_speed * 30 / np.pi:.3f}
+#define SCHEDULE_START_X {x:.6f}
+#define SCHEDULE_START_Y {y:.6f}
+#define SCHEDULE_START_HEADING {heading:.6f}
+#define SCHEDULE_CHECKPOINTS {len(checkpoints)}
 static const uint16_t schedule_ms[SCHEDULE_COUNT] = {{
     {body}
 }};
+typedef struct {{ uint32_t ms; float x, y, heading; }} schedule_checkpoint;
+static const schedule_checkpoint schedule_checkpoints[SCHEDULE_CHECKPOINTS] = {{
+    {places}
+}};
 #endif
 """
+
+
+def _checkpoints(result: Plan) -> list[str]:
+    """Time in ms and predicted pose of some flips and of the end, as C."""
+    ends = np.concatenate([[0.0], np.cumsum(result.seconds)])
+    places = np.unique(np.linspace(0, len(ends) - 1, min(len(ends), _CHECKPOINTS)).astype(int))
+    return [
+        f"{{{round(1000 * ends[i])}UL, {', '.join(f'{value:.5f}f' for value in result.poses[i])}}}"
+        for i in places.tolist()
+    ]
 
 
 def _picture(result: Plan, path: Path) -> None:

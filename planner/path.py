@@ -16,6 +16,7 @@ from sim.io.errors import InputError
 
 _CIRCLE_POINTS = 720
 _LARGEST = 1e100  # coordinate: squares of larger ones overflow
+_MOST_SMOOTHED = 200_000
 
 
 @dataclass(frozen=True)
@@ -111,3 +112,34 @@ def resample(polyline: Floats, spacing: float) -> Floats:
     count = max(2, math.ceil(lengths[-1] / spacing) + 1)
     at = np.linspace(0, lengths[-1], count)
     return np.stack([np.interp(at, lengths, polyline[:, i]) for i in (0, 1)], 1)
+
+
+def smoothed(path: Path2D, length: float) -> tuple[Path2D, float]:
+    """The path smoothed over a length, and how far that moves it.
+
+    Each point becomes a Gaussian mean over its neighbours, with a standard deviation of half the length along the
+    path. So noise of a camera is taken out, and corners are rounded. The ends of an open path stay.
+
+    Raises:
+        InputError: the length is no number above 0, or as long as the path.
+    """
+    if not 0 < length < path.length / 2:
+        raise InputError(f"smoothing over {length:g} l; give a length above 0 and below half the path's")
+    spacing = max(length / 20, path.length / _MOST_SMOOTHED)
+    points = resample(path.polyline(), spacing)
+    spacing = path.length / (len(points) - 1)
+    sigma = length / 2 / spacing
+    reach = math.ceil(4 * sigma)
+    if path.closed:
+        ring = points[:-1]
+        around = np.take(ring, np.arange(-reach, len(ring) + reach), axis=0, mode="wrap")
+    else:  # turned about the ends, which therefore stay
+        inside = np.minimum(np.arange(1, reach + 1), len(points) - 1)
+        around = np.concatenate(
+            [2 * points[0] - points[inside][::-1], points, 2 * points[-1] - points[-1 - inside]]
+        )
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
+    kernel /= kernel.sum()
+    mean = np.stack([np.convolve(around[:, i], kernel, mode="valid") for i in (0, 1)], 1)
+    moved = float(np.hypot(*(mean - points[: len(mean)]).T).max())
+    return Path2D.of(mean, closed=path.closed), moved

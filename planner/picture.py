@@ -34,7 +34,7 @@ def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float) -> Non
     edges = _band(declared, stated)
     axes.fill(*edges.T, color="#2a7fba", alpha=0.10, lw=0, label=f"stated error {stated:.2f} l")
     axes.plot(*raw.T, color=RAW, lw=1.0, label="path as given")
-    axes.plot(*declared.T, color=DECLARED, lw=1.2, label="declared (rounded)")
+    axes.plot(*declared.T, color=DECLARED, lw=1.2, label="declared")
     axes.set_aspect("equal")
     axes.set_xlabel("x / l")
     axes.set_ylabel("y / l")

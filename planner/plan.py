@@ -1,32 +1,39 @@
 """plan(path, robot): from a path to a frozen plan, without simulating.
 
-1. The look-up table gives the vehicle (`planner.vehicle`).
-2. Corners are rounded by the smallest radius that the pivot can follow with some margin. A path that is
-   too tight is refused. The message gives the place, the radii and the smallest scale that works.
-3. The tractrix of the rounded path is the pivot's reference (`planner.tractrix`).
+1. The look-up table gives the vehicle, both directions and the memory of the last dwell (`planner.lookup`).
+2. The shortest dwell is chosen from the objective (`planner.choice`).
+3. The path that the robot can follow and that is nearest to the one drawn is declared (`planner.declared`). Its
+   tractrix is the pivot's reference (`planner.tractrix`).
 4. Hysteresis about the line of sight gives the dwells (`planner.schedule`).
-5. Guaranteed error, tube and predicted error are computed and stated (`planner.stated_error`).
+5. The errors of this schedule are computed and stated (`planner.stated_error`). If there is a tolerance and they
+   are above it, a shorter dwell is tried.
 
-Errors are distances of the tracked point from the declared path, which has rounded corners. `guaranteed` is a
-bound for a vehicle without errors. `tube` is what the errors of the table add, in 95 % of random draws.
-`stated_error` is their sum. The distance between the declared path and the path as given is reported, too.
+Errors are distances of the tracked point from the declared path. The distance of the declared path from the path
+as drawn is reported from both sides.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.corners import CORNER, fillet, kinks, largest_fillet
+from planner.choice import QUICK, Objective, dwells_for
+from planner.declared import Corner, declare
+from planner.distance import distance_to
+from planner.knowledge import Knowledge
+from planner.lookup import vehicle_of
 from planner.path import Path2D
 from planner.schedule import follow, trace
-from planner.stated_error import guaranteed, look_ahead, tube
-from planner.tractrix import Reference, reference
-from planner.vehicle import TURN_OVER, Vehicle, vehicle_of
+from planner.size import check_size
+from planner.stated_error import guaranteed, look_ahead, predicted_error, stated_error
+from planner.tractrix import Drift, Reference
+from planner.vehicle import Vehicle
+from planner.zigzag import zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.model.robot import Robot
@@ -34,13 +41,7 @@ from sim.model.schedule import Schedule
 from surrogate.table import LookupTable
 
 Point = Literal["head_centre", "head_tip", "pivot"]
-
-ROOM = 0.7  # rounded corners need at most this share of the pivot's largest curvature
-TIGHTEST = 0.9  # a path that needs more than this share of the pivot's largest curvature is refused
-_SPACING = 0.01  # of points on the reference, in l
-_MOST_POINTS = 60_000
-_LONGEST = 200.0  # path, in l: 8000 flips; time and memory grow with its square
-_SHORTEST = 1e-3  # path, in l: a flip alone moves the robot by more
+FEEDBACK_EVERY = 20  # flips
 
 
 @dataclass(frozen=True)
@@ -62,23 +63,35 @@ class Plan:
     poses: Floats  # (M + 1, 3): predicted head's centre at the flips
     track: Floats  # (K, 2): predicted tracked point, several samples a dwell
     reference: Floats  # (m, 2): declared path
-    raw: Floats  # (k, 2): path as given
+    raw: Floats  # (k, 2): path as drawn
     closed: bool
-    fillet_radius: float
-    corner_cut: float  # largest distance of the raw path from the declared one
+    objective: Objective
     minimum_dwell: float
-    guaranteed: float
-    tube: float
+    off_drawn: float  # largest distance of a declared point from the drawn path
+    missed: float  # largest distance of a drawn point from the declared path
+    zigzag_rms: float  # of straight motion with this dwell: no schedule does better
     predicted_rms: float
     predicted_max: float
+    drawn_rms: float  # predicted, from the drawn path
+    drawn_max: float
+    stated_error: float  # holds for 95 % of the robots that the model's uncertainty allows, open loop
+    feedback_error: float  # the same where the pose is measured, and the rest planned again, every 20 flips
+    guaranteed: float  # bound for a robot without errors, however long the path
     closure: float | None
     model: str  # hash of the look-up table
     warnings: tuple[str, ...]
+    vehicle: Vehicle
+    guide: Reference  # declared path, with the pivot and heading that belong to it
+    pivot_distance: float
+    ahead: float  # look-ahead Δ
+    net_speed: float  # on a straight line
+    swing: float  # 2 h, of the hysteresis on a straight line
 
     @property
-    def stated_error(self) -> float:
-        """The error that the plan states, guaranteed error plus tube [l]."""
-        return self.guaranteed + self.tube
+    def start(self) -> tuple[float, float, float]:
+        """Where the head's centre must be put, at rest: x, y [l] and heading [rad]."""
+        x, y, heading = self.poses[0].tolist()
+        return x, y, heading
 
     def schedule(self, robot: Robot | None = None) -> Schedule:
         """The schedule for `sim.motion.replay`.
@@ -87,8 +100,7 @@ class Plan:
             robot: the robot that carries it out; default: the one that the plan was made for.
         """
         own = robot or self.robot
-        start = (float(self.poses[0, 0]), float(self.poses[0, 1]), float(self.poses[0, 2]))
-        return Schedule(own.group_values(), self.first_direction, self.dwells, start, own.time_scale)
+        return Schedule(own.group_values(), self.first_direction, self.dwells, self.start, own.time_scale)
 
     @property
     def duration(self) -> float:
@@ -106,10 +118,14 @@ def plan(
     *,
     lookup: LookupTable | None = None,
     point: Point = "head_centre",
-    corner: Literal["fillet", "error"] = "fillet",
+    corner: Corner = "nearest",
+    objective: Objective = "error",
     minimum_dwell: float | None = None,
+    minimum_seconds: float | None = None,
     tolerance: float | None = None,
+    knowledge: Knowledge | None = None,
     seed: int = 0,
+    progress: Callable[[float], object] | None = None,
 ) -> Plan:
     """Plan the motor's switching times for a path.
 
@@ -118,11 +134,15 @@ def plan(
         robot: the robot; its motor speed is used in both directions.
         lookup: trained table, or the table of this one robot; default the shipped one.
         point: which point must follow the path.
-        corner: round corners, or refuse them.
-        minimum_dwell: shortest time between flips [μ0 l⁴/EI]; default the tails' turn-over time.
-        tolerance: largest acceptable guaranteed error [l]. The longest dwell with this error is chosen, since
-            with longer dwells the robot is faster and strays more. By default the minimum dwell is used.
-        seed: of the random vehicles from which the tube is computed.
+        corner: places that are too tight: declare the nearest path that can be followed ("nearest"), round corners
+            ("fillet"), or refuse them ("error").
+        objective: what decides the dwell: small "error", short "time", or few "flips"; see `planner.choice`.
+        minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
+        minimum_seconds: the same in seconds; the larger one counts.
+        tolerance: largest acceptable stated error [l]. The dwell is shortened until it is kept.
+        knowledge: what a calibration found besides the robot: covariance, current.
+        seed: of the random robots from which the stated error is computed.
+        progress: called now and then with the share of the path that is done.
 
     Raises:
         InputError: the path is bad or too tight, the dwell too short, the tolerance too small, or the robot
@@ -138,20 +158,76 @@ def plan(
         from surrogate.export import load
 
         lookup = load()
-    vehicle = vehicle_of(robot, lookup)
+    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0):
+        raise InputError(f"tolerance {tolerance:g} l; give a number above 0")
+    vehicle = vehicle_of(robot, lookup, knowledge)
     raw = path if isinstance(path, Path2D) else Path2D.of(path)
+    check_size(raw, robot, vehicle.turn_radius)
     offset = _offset(point, robot, vehicle)
-    _check_length(raw)
+    dwells = dwells_for(vehicle, objective, _least(minimum_dwell, minimum_seconds, robot))
+
+    def made(dwell: float) -> Plan:
+        return _plan(raw, robot, vehicle, lookup, point, offset, corner, objective, dwell, seed, progress)
+
+    best = made(dwells[0])
+    if tolerance is None or best.stated_error <= tolerance:
+        return best
+    low, high = 0, len(dwells)  # the first dwell is too long; halve between it and the shortest
+    kept: Plan | None = None
+    while high - low > 1:
+        middle = (low + high) // 2
+        tried = made(dwells[middle])
+        if tried.stated_error < best.stated_error:
+            best = tried
+        if tried.stated_error <= tolerance:
+            kept, high = tried, middle
+        else:
+            low = middle
+    if kept is None:
+        raise InputError(
+            f"tolerance {tolerance:g} l cannot be kept: the smallest stated error is {best.stated_error:.3g} l, "
+            f"with dwells from {best.minimum_dwell:.2g} time units; allow more, or make a table of this robot with "
+            "python -m surrogate robot"
+        )
+    return kept
+
+
+def _plan(
+    raw: Path2D,
+    robot: Robot,
+    vehicle: Vehicle,
+    lookup: LookupTable,
+    point: Point,
+    offset: float,
+    corner: Corner,
+    objective: Objective,
+    dwell: float,
+    seed: int,
+    progress: Callable[[float], object] | None,
+) -> Plan:
+    """The plan with one shortest dwell."""
+    straight = zigzag(vehicle, dwell, offset)
+    if straight.speed <= 0:
+        raise InputError(f"with dwells of {dwell:.2g} time units the robot does not get ahead; allow longer ones")
+    drift = Drift(_clean(straight.drift / straight.speed), _shares(vehicle.current, straight.speed))
     distance = vehicle.pivot_distance + offset
-    shortest = _minimum_dwell(minimum_dwell, vehicle)
-    declared, radius = _round_corners(raw, vehicle, distance, corner)
-    ref = reference(declared, distance, _spacing(declared))
-    curvature = _check_curvature(ref, raw, vehicle, distance, corner)
-    dwell = _choose_dwell(vehicle, distance, curvature, shortest, tolerance)
-    ahead = look_ahead(vehicle, curvature)
-    switches = follow(ref, vehicle, pivot_distance=distance, ahead=ahead, dwell=dwell, offset=offset)
+    declared = declare(raw, vehicle, distance, corner, drift)
+    guide = declared.reference
+    ahead = look_ahead(vehicle, declared.curvature, straight)
+    swing = straight.hysteresis(ahead)
+    switches = follow(
+        guide,
+        vehicle,
+        pivot_distance=distance,
+        ahead=ahead,
+        dwell=dwell,
+        swing=swing,
+        offset=offset,
+        progress=progress,
+    )
     track = trace(vehicle, switches, offset)
-    error = distance_to(ref.p, track)
+    error = predicted_error(guide.p, track, closed=raw.closed)
+    drawn = distance_to(raw.polyline(), track)
     return Plan(
         robot=robot,
         point=point,
@@ -160,19 +236,30 @@ def plan(
         dwells=switches.dwells,
         poses=switches.poses,
         track=track,
-        reference=ref.p,
+        reference=guide.p,
         raw=raw.polyline(),
         closed=raw.closed,
-        fillet_radius=radius,
-        corner_cut=float(distance_to(ref.p, raw.polyline()).max()),
+        objective=objective,
         minimum_dwell=dwell,
-        guaranteed=guaranteed(vehicle, distance, curvature, dwell),
-        tube=tube(vehicle, switches, offset, seed=seed),
-        predicted_rms=float(np.sqrt(np.mean(error**2))),
-        predicted_max=float(error.max()),
-        closure=float(np.linalg.norm(track[-1] - track[0])) if raw.closed else None,
+        off_drawn=declared.off_drawn,
+        missed=declared.missed,
+        zigzag_rms=straight.rms,
+        predicted_rms=error.rms,
+        predicted_max=error.largest,
+        drawn_rms=float(np.sqrt(np.mean(drawn**2))),
+        drawn_max=float(drawn.max()),
+        stated_error=stated_error(vehicle, switches, track, error, seed=seed),
+        feedback_error=stated_error(vehicle, switches, track, error, every=FEEDBACK_EVERY, seed=seed),
+        guaranteed=guaranteed(vehicle, distance, straight.swing, ahead),
+        closure=float(np.linalg.norm(track[-1] - guide.p[0])) if raw.closed else None,
         model=lookup.identity,
-        warnings=_warnings(vehicle),
+        warnings=(*declared.warnings, *_warnings(vehicle)),
+        vehicle=vehicle,
+        guide=guide,
+        pivot_distance=distance,
+        ahead=ahead,
+        net_speed=straight.net_speed,
+        swing=swing,
     )
 
 
@@ -182,17 +269,24 @@ def _warnings(vehicle: Vehicle) -> tuple[str, ...]:
     return ()
 
 
-def distance_to(polyline: Floats, points: Floats) -> Floats:
-    """Distance of points (M, 2) from a polyline (m, 2)."""
-    start, along = polyline[:-1], np.diff(polyline, axis=0)
-    square = np.maximum((along**2).sum(1), 1e-30)
-    result = np.empty(len(points))
-    for begin in range(0, len(points), 512):
-        away = points[begin : begin + 512, None] - start
-        share = np.clip((away * along).sum(-1) / square, 0, 1)
-        gap = away - share[..., None] * along
-        result[begin : begin + 512] = np.sqrt((gap**2).sum(-1).min(1))
-    return result
+def _least(dwell: float | None, seconds: float | None, robot: Robot) -> float | None:
+    """The shortest dwell that the motor allows, in time units."""
+    if seconds is None:
+        return dwell
+    if not (math.isfinite(seconds) and seconds > 0):
+        raise InputError(f"minimum dwell {seconds:g} s; give a number above 0")
+    own = seconds / robot.time_scale
+    return max(own, dwell) if dwell is not None else max(own, QUICK)
+
+
+def _clean(value: float) -> float:
+    """Rounding errors of a mirror-symmetric robot are no drift."""
+    return 0.0 if abs(value) < 1e-9 else value
+
+
+def _shares(current: Floats, speed: float) -> tuple[float, float]:
+    x, y = (current / speed).tolist()
+    return x, y
 
 
 def _offset(point: Point, robot: Robot, vehicle: Vehicle) -> float:
@@ -204,145 +298,3 @@ def _offset(point: Point, robot: Robot, vehicle: Vehicle) -> float:
     if point == "pivot":
         return -vehicle.pivot_distance
     raise InputError(f"point {point!r}; allowed are head_centre, head_tip, pivot")
-
-
-def _minimum_dwell(wanted: float | None, vehicle: Vehicle) -> float:
-    if wanted is None:
-        return TURN_OVER
-    if not math.isfinite(wanted) or wanted < TURN_OVER:
-        raise InputError(
-            f"minimum dwell {wanted:g} is below the tails' turn-over time; give at least {TURN_OVER:g} "
-            f"(time units), where a flip moves the robot by {_flip_size(vehicle):.3g} l"
-        )
-    return wanted
-
-
-def _flip_size(vehicle: Vehicle) -> float:
-    lag = vehicle.lag_at(1, np.array(TURN_OVER))
-    return float(np.hypot(lag[0], lag[1]))
-
-
-def _check_length(path: Path2D) -> None:
-    """Refuse a path that would ask for unbounded time and memory, or that is shorter than a flip."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        length = path.length
-    if not _SHORTEST <= length <= _LONGEST:
-        raise InputError(
-            f"the path is {length:.3g} tail lengths long; give between {_SHORTEST:g} and {_LONGEST:g}: scale it, "
-            "check its unit, or split it"
-        )
-
-
-def _spacing(path: Path2D) -> float:
-    return max(_SPACING, path.length / _MOST_POINTS)
-
-
-def _round_corners(raw: Path2D, vehicle: Vehicle, distance: float, corner: str) -> tuple[Path2D, float]:
-    """The path with rounded corners, and their radius: the smallest one that leaves the pivot some margin."""
-    angle = np.abs(kinks(raw))
-    sharpest = int(angle.argmax())
-    if angle[sharpest] <= CORNER:
-        return raw, 0.0
-    if corner not in ("fillet", "error"):
-        raise InputError(f"corner {corner!r}; allowed are fillet, error")
-    if corner == "error":
-        x, y = raw.points[sharpest]
-        raise InputError(
-            f"corner of {math.degrees(angle[sharpest]):.0f} degrees at ({x:.3g}, {y:.3g}); "
-            "round it, or allow corner = fillet"
-        )
-    limit = ROOM / vehicle.pivot_radius
-    low, high = 0.0, min(largest_fillet(raw), math.hypot(distance, 1 / limit))
-    if _largest_curvature(fillet(raw, high), distance) > limit:
-        return fillet(raw, high), high
-    for _ in range(20):
-        middle = (low + high) / 2
-        followed = _largest_curvature(fillet(raw, middle), distance) <= limit
-        low, high = (low, middle) if followed else (middle, high)
-    return fillet(raw, high), high
-
-
-def _largest_curvature(path: Path2D, distance: float) -> float:
-    return float(np.abs(reference(path, distance, _spacing(path)).curvature).max())
-
-
-def _check_curvature(ref: Reference, raw: Path2D, vehicle: Vehicle, distance: float, corner: str) -> float:
-    """The largest curvature of the reference. One that the pivot cannot follow is refused."""
-    curvature = np.abs(ref.curvature)
-    worst = int(curvature.argmax())
-    limit = TIGHTEST / vehicle.pivot_radius
-    if curvature[worst] <= limit:
-        return float(curvature[worst])
-    x, y = ref.p[worst]
-    raise InputError(
-        f"path too tight at ({x:.3g}, {y:.3g}) l: the pivot would turn with radius "
-        f"{1 / curvature[worst]:.3g} l, the robot can with {1 / limit:.3g} l (its circle has radius "
-        f"{vehicle.turn_radius:.3g} l); {_smallest_scale(raw, vehicle, distance, corner)}"
-    )
-
-
-def _smallest_scale(raw: Path2D, vehicle: Vehicle, distance: float, corner: str) -> str:
-    limit = TIGHTEST / vehicle.pivot_radius
-    for factor in np.geomspace(1.05, 50, 80):
-        try:
-            declared, _ = _round_corners(raw.scaled(factor), vehicle, distance, corner)
-        except InputError:
-            continue
-        if _largest_curvature(declared, distance) <= limit:
-            return f"scale the path by {factor:.2g}"
-    return "make the path smoother"
-
-
-def _choose_dwell(
-    vehicle: Vehicle, distance: float, curvature: float, shortest: float, tolerance: float | None
-) -> float:
-    """The longest minimum dwell whose guaranteed error is within the tolerance."""
-    if tolerance is None:
-        return shortest
-    least = guaranteed(vehicle, distance, curvature, shortest)
-    if not math.isfinite(tolerance) or tolerance < least:
-        raise InputError(
-            f"tolerance {tolerance:g} l is below what the dwell {shortest:g} guarantees ({least:.3g} l); "
-            "allow more"
-        )
-    longest = float(vehicle.dwells[-1])
-    candidates = np.linspace(shortest, max(longest, shortest), 400)
-    kept = [t for t in candidates if guaranteed(vehicle, distance, curvature, t) <= tolerance]
-    return float(kept[-1])
-
-
-def plan_record(result: Plan) -> dict[str, Any]:
-    """The plan as JSON-like content; `sim.model.schedule.load_schedule` reads its schedule."""
-    robot, schedule = result.robot, result.schedule()
-    x, y, heading = schedule.start
-    return {
-        "format": 1,
-        "robot": {
-            "name": robot.name,
-            "groups": schedule.robot,
-            "tail_length_m": robot.tail_length,
-            "motor_speed_rad_s": robot.motor_speed,
-            "time_scale_s": robot.time_scale,
-        },
-        "point": result.point,
-        "offset_over_l": result.offset,
-        "first_direction": result.first_direction,
-        "start": {"x_over_l": x, "y_over_l": y, "heading_rad": heading},
-        "dwell_bar": result.dwells.tolist(),
-        "dwell_s": result.seconds.tolist(),
-        "predicted_poses": result.poses.tolist(),
-        "reference": result.reference.tolist(),
-        "raw_path": result.raw.tolist(),
-        "closed": result.closed,
-        "fillet_radius_over_l": result.fillet_radius,
-        "corner_cut_over_l": result.corner_cut,
-        "minimum_dwell_bar": result.minimum_dwell,
-        "guaranteed_error_over_l": result.guaranteed,
-        "tube_over_l": result.tube,
-        "stated_error_over_l": result.stated_error,
-        "predicted_rms_over_l": result.predicted_rms,
-        "predicted_max_over_l": result.predicted_max,
-        "closure_over_l": result.closure,
-        "model": result.model,
-        "warnings": list(result.warnings),
-    }

@@ -1,56 +1,79 @@
-"""The robot as a vehicle for the planner: two arcs and the response to a switch.
+"""The robot as a vehicle for the planner: an arc in each direction of the motor, and a memory of the last dwell.
 
-In motor direction σ = ±1 the robot moves on a circle with a constant body twist. After a flip, when the tails have
-turned over, the robot is displaced by a fixed offset, the lag (`sim.motion.switching`). So a dwell T moves it by
+In motor direction σ = ±1 the robot moves on a circle with a constant body twist. A dwell of length T that follows
+a dwell of length S moves it by
 
-    E_σ(T) = lag_σ(T) ∘ arc(twist_σ, T).
+    E_σ(T | S) = lag_σ(T | S) ∘ arc(twist_σ, T).
 
-The two directions have their own numbers; those from the look-up table are mirror images. The first dwell starts
-from straight tails, which are half way between the shapes of the two directions. So it has half a lag.
+The lag is what the tails lose or gain while they turn over (`sim.model.response`). The first dwell starts from
+rest and has a lag of its own. The two directions have their own numbers, so left and right turns may differ.
 
-Between the dwells of the table the lag is interpolated; at a flip it is zero. For longer dwells than the longest
-one of the table it is constant, because the tails have turned over long before. Poses are those of the head's
-centre. Lengths are in l, times in μ0 l⁴/EI.
+Lags are kept at equal steps of T up to SETTLED; after that they are constant. From FORGOTTEN on they do not
+depend on the dwell before. Below that, a cubic spline in ln S joins the lengths at which the memory was
+simulated. Poses are those of the head's centre. A current moves the robot in the lab: it adds to the pose at the
+end of a dwell. Lengths are in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
 
 from sim.arrays import Floats
-from sim.io.errors import InputError
 from sim.mechanics import planar
-from sim.model.robot import Robot
-from surrogate.table import LookupTable
+from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED
 
 TURN_OVER = 0.7  # time units that the tails need after a flip
-FROM_REST = 0.5  # share of a lag in the first dwell: straight tails are half way
-_TABLE = 25  # number of dwells for which the look-up table is asked
+SHORTEST = float(DWELLS[0])  # shortest dwell whose response is known
+STEP = 0.02  # between the dwells at which lags are kept
+TIMES = np.arange(0.0, SETTLED + STEP / 2, STEP)
+BEFORE_KNOTS = np.geomspace(BEFORE[0], FORGOTTEN, 33)  # lengths of the dwell before at which lags are kept
 
 
 @dataclass(frozen=True)
 class Vehicle:
-    """Twists and lags of both directions; index 0 is σ = +1, index 1 is σ = −1."""
+    """Twists and lags of both directions; index 0 is σ = +1, index 1 is σ = −1. See the module."""
 
     twist: Floats  # (2, 3): forward, left, yaw rate
-    dwells: Floats  # (D,)
-    lag: Floats  # (2, D, 3): x forward, y left, heading
-    relative_error: Mapping[str, float]  # one-sigma errors of the look-up table
-    tail_gap: float
+    lag: Floats  # (2, K, T, 3) after dwells of BEFORE_KNOTS: forward, left, heading
+    rest: Floats  # (2, T, 3), of a first dwell
+    spread: Floats  # (2, T, 3), one-sigma of the lag, over the unknown phase of the disc at the flip
+    modes: tuple[Mode, ...] = ()  # what is uncertain, each by one standard deviation
+    current: Floats = field(default_factory=lambda: np.zeros(2))  # in the lab
+    tail_gap: float = 10.0  # in diameters
 
-    def lag_at(self, sense: int, time: Floats) -> Floats:
-        """Lag of direction `sense` after `time` (...), (..., 3)."""
-        table = self.lag[0 if sense > 0 else 1]
-        parts = [np.interp(time, self.dwells, table[:, i]) for i in range(3)]
-        return np.stack(parts, -1)
+    def lag_of(self, sense: int, before: ArrayLike | None, time: ArrayLike) -> Floats:
+        """Lag (..., 3) after `time` (...), where the dwell before had length `before` (...); None: from rest."""
+        side = 0 if sense > 0 else 1
+        time = np.asarray(time, dtype=float)
+        place = np.minimum(np.maximum(time, 0.0) / STEP, len(TIMES) - 1)
+        i = np.minimum(place.astype(int), len(TIMES) - 2)
+        share = (place - i)[..., None]
+        if before is None:
+            table = self.rest[side]
+            return np.asarray((1 - share) * table[i] + share * table[i + 1])
+        before = np.clip(np.broadcast_to(before, time.shape), BEFORE_KNOTS[0], BEFORE_KNOTS[-1])
+        k = np.clip(np.searchsorted(BEFORE_KNOTS, before, side="right") - 1, 0, len(BEFORE_KNOTS) - 2)
+        part = ((before - BEFORE_KNOTS[k]) / (BEFORE_KNOTS[k + 1] - BEFORE_KNOTS[k]))[..., None]
+        table = self.lag[side]
+        near = (1 - share) * table[k, i] + share * table[k, i + 1]
+        far = (1 - share) * table[k + 1, i] + share * table[k + 1, i + 1]
+        return np.asarray((1 - part) * near + part * far)
 
-    def motion(self, sense: int, time: Floats, *, share: float = 1.0) -> Floats:
-        """Pose change E_σ after `time` (...); `share` of the lag (½ from rest)."""
+    def motion(self, sense: int, before: ArrayLike | None, time: ArrayLike) -> Floats:
+        """Pose change E_σ(time | before), (..., 3), without the current."""
         twist = self.twist[0 if sense > 0 else 1]
-        return planar.compose(share * self.lag_at(sense, time), planar.arc(twist, time))
+        return planar.compose(self.lag_of(sense, before, time), planar.arc(twist, time))
+
+    def noise_of(self, sense: int, time: ArrayLike) -> Floats:
+        """One standard deviation (..., 3) of the lag after `time`, over the phase of the disc at the flip."""
+        table = self.spread[0 if sense > 0 else 1]
+        time = np.asarray(time, dtype=float)
+        parts = [np.interp(time, TIMES, table[:, i]) for i in range(3)]
+        return np.stack(parts, -1)
 
     @property
     def yaw_rate(self) -> float:
@@ -59,12 +82,15 @@ class Vehicle:
 
     @property
     def pivot_distance(self) -> float:
-        """a = R sin θ: distance from the pivot to the head's centre."""
-        return float((self.twist[:, 1] / self.twist[:, 2]).mean())
+        """a = R sin θ: distance from the pivot to the head's centre.
+
+        Where the two directions differ: with this a, the drift of the pivot is the same on curves of any radius.
+        """
+        return float(np.abs(self.twist[:, 1]).sum() / np.abs(self.twist[:, 2]).sum())
 
     @property
     def pivot_radius(self) -> float:
-        """R cos θ: turn radius of the pivot."""
+        """R cos θ: turn radius of the pivot, the larger of the two."""
         return float(np.abs(self.twist[:, 0] / self.twist[:, 2]).max())
 
     @property
@@ -72,47 +98,34 @@ class Vehicle:
         """R_yr/l of the head's centre, the larger of the two."""
         return float((np.hypot(self.twist[:, 0], self.twist[:, 1]) / np.abs(self.twist[:, 2])).max())
 
-    def net_speed(self, dwell: float) -> float:
-        """Speed along a straight line with equal dwells."""
-        one = self.motion(1, np.array(dwell))
-        pair = planar.compose(one, self.motion(-1, np.array(dwell)))
-        return float(np.hypot(pair[0], pair[1]) / (2 * dwell))
-
-    def perturbed(self, rng: np.random.Generator) -> Vehicle:
-        """The vehicle with random errors that are as large as the held-out errors of the table."""
-        e = self.relative_error
-        speed = float(np.hypot(self.twist[0, 0], self.twist[0, 1]))
-        yaw = abs(float(self.twist[0, 2]))
-        twist = self.twist.copy()
-        twist[:, 1:] *= 1 + rng.normal(size=2) * [e["v_x"], e["omega_yr_bar"]]
-        twist[:, 0] += rng.normal() * e["v_z"] * speed
-        offset = rng.normal(size=3) * [e["lag_z"] * speed, e["lag_x"] * speed, e["lag_psi_rad"] * yaw]
-        lag = self.lag + np.stack([offset, offset * planar.MIRROR])[:, None]
-        return replace(self, twist=twist, lag=lag)
+    @property
+    def speed(self) -> float:
+        """Largest speed of the head's centre at constant motor."""
+        return float(np.hypot(self.twist[:, 0], self.twist[:, 1]).max())
 
 
-def vehicle_of(robot: Robot, lookup: LookupTable) -> Vehicle:
-    """The vehicle that the look-up table predicts for a robot.
+@dataclass(frozen=True)
+class Mode:
+    """One independent cause of error: what it adds to a vehicle at one standard deviation."""
 
-    Raises:
-        InputError: the robot is outside the table's domain, or moves backwards on average.
+    name: str
+    twist: Floats  # (2, 3)
+    lag: Floats  # (2, 3), to all lags after a flip
+    current: Floats = field(default_factory=lambda: np.zeros(2))
+
+
+def resampled(curve: Floats) -> Floats:
+    """Curves (..., D, 3) over DWELLS at TIMES, (..., T, 3): a cubic spline in ln T; constant after SETTLED.
+
+    Below the shortest dwell it is a straight line to zero.
     """
-    low, high = lookup.domain["dwell_bar"]
-    dwells = np.geomspace(low, high, _TABLE)
-    values = {k: np.full(_TABLE, v) for k, v in robot.group_values().items()}
-    found = lookup.query({**values, "dwell_bar": dwells})
-    twist = np.array([found[k][0] for k in ("v_z", "v_x", "omega_yr_bar")])
-    if twist[0] <= 0:
-        raise InputError(
-            f"robot {robot.name!r} does not move forward (v_z = {twist[0]:.3g}); turn its motor slower"
-        )
-    lag = np.stack([found["lag_z"], found["lag_x"], found["lag_psi_rad"]], -1)
-    lag = np.concatenate([np.zeros((1, 3)), lag])
-    dwells = np.concatenate([[0.0], dwells])
-    return Vehicle(
-        twist=np.stack([twist, twist * planar.MIRROR]),
-        dwells=dwells,
-        lag=np.stack([lag, lag * planar.MIRROR]),
-        relative_error={name: error["rms"] for name, error in lookup.errors.items()},
-        tail_gap=float(found["tail_gap"][0]),
-    )
+    spline = CubicSpline(np.log(DWELLS), curve, axis=-2)(np.log(np.maximum(TIMES, DWELLS[0])))
+    return np.asarray(spline * np.minimum(TIMES / DWELLS[0], 1.0)[:, None])
+
+
+def lags_of(lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
+    """Lags (K, T, 3) after dwells of BEFORE_KNOTS, from curves of `sim.model.response`."""
+    knots = np.log(np.append(before, FORGOTTEN))
+    known = np.concatenate([memory, np.zeros_like(memory[:1])])
+    fine = CubicSpline(knots, known, bc_type=("not-a-knot", "clamped"))(np.log(BEFORE_KNOTS))
+    return resampled(lag + fine)

@@ -84,6 +84,7 @@ def load_robot(source: str | Path) -> Robot:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as broken:
         raise InputError(f"{path} is not TOML: {broken}") from None
     name = tables.pop("name", path.stem)
+    tables.pop("calibration", None)  # read by planner.knowledge
     effects = tables.pop("effects", {})
     if not isinstance(effects, dict):
         raise InputError(f"{path}: effects = {effects!r}; write a table [effects] with lines name = size")

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from planner.export import write_plan
     from planner.path import Path2D, circle, polygon
     from planner.plan import Plan, plan
+    from planner.tracker import Tracker
     from sim.effects import catalogue as effects
     from sim.inputs import load_robot, save_robot
     from sim.io.errors import InputError
@@ -67,15 +68,16 @@ _HOMES = {
     "sweep": "softflagella.sweeping",
     "switch_response": "softflagella.simulating",
     "tabulate": "surrogate.tabulate",
+    "Tracker": "planner.tracker",
     "train": "surrogate.train",
     "write_plan": "planner.export",
 }
 
 __all__ = [
-    "Effect", "InputError", "LookupTable", "Path2D", "Plan", "Robot", "Schedule", "Verdict", "__version__",
-    "calibrate", "circle", "effects", "load_robot", "load_schedule", "load_table", "make_table", "plan", "polygon",
-    "read_path", "read_sweep", "replay", "response", "save_robot", "sensitivities", "steady", "sweep",
-    "switch_response", "tabulate", "train", "write_plan",
+    "Effect", "InputError", "LookupTable", "Path2D", "Plan", "Robot", "Schedule", "Tracker", "Verdict",
+    "__version__", "calibrate", "circle", "effects", "load_robot", "load_schedule", "load_table",
+    "make_table", "plan", "polygon", "read_path", "read_sweep", "replay", "response", "save_robot",
+    "sensitivities", "steady", "sweep", "switch_response", "tabulate", "train", "write_plan",
 ]  # fmt: skip
 
 

@@ -37,8 +37,9 @@ from calibration.swimmer import Swimmer, corrected_robot
 from calibration.synthetic import make_table
 from dataset.report import draw_sweep, plain_logarithms
 from dataset.store import read
-from planner.check import TrackingError, draw_overlay, load_plan, tracking_error
+from planner.check import TrackingError, draw_overlay, tracking_error
 from planner.path import polygon
+from planner.record import load_plan
 from sim.inputs import robot_toml
 from sim.io.files import write_text
 from sim.io.pages import Page

@@ -90,7 +90,7 @@ def _robot(arguments: Namespace) -> None:
     table = tabulate(load_robot(arguments.robot))
     save_single(table, arguments.out)
     worst = max(error["rms"] for error in table.errors.values())
-    print(f"{len(table.dwells)} dwells, largest error {100 * worst:.2f} % -> {arguments.out}")
+    print(f"both directions of the motor, largest error {100 * worst:.2f} % -> {arguments.out}")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,8 @@
-"""A table of one robot: its response to a switch at some dwell times, simulated, for the planner.
+"""A table of one robot: its motion and its response to flips in both directions of the motor, simulated.
 
-The look-up table that comes with the package covers a domain of robots without effects. A corrected robot may lie
-outside this domain. For the planner, a few dozen simulated switches of that robot are enough
-(`surrogate.tabulate`, seconds). Between their dwell times lags are interpolated (monotone cubic in ln T̄).
-Planning simulates nothing.
+The look-up table that comes with the package covers a domain of robots without odd effects. A corrected robot may
+lie outside this domain, or turn left and right at different rates. For the planner, the curves of that one robot
+are enough (`surrogate.tabulate`). Planning simulates nothing.
 """
 
 from __future__ import annotations
@@ -16,77 +15,111 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.files import write_text
 from sim.mechanics import planar
-from sim.model.groups import DWELL
+from sim.model.response import DWELLS, Responses, at_equal_dwells
 
-LAGS = ("lag_z", "lag_x", "lag_psi_rad")
+FORMAT = 2
+_CURVES = {"lag": (2, len(DWELLS), 3), "memory": (2, -1, len(DWELLS), 3),
+           "rest": (2, len(DWELLS), 3), "spread": (2, len(DWELLS), 3)}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class SingleRobot:
-    """Steady motion and lags of one robot, with the interface of `surrogate.table.LookupTable`."""
+    """Motion and response of one robot, with the interface of `surrogate.table.LookupTable`.
+
+    Curves are those of `sim.model.response`; index 0 is the positive direction of the motor, index 1 the reversed
+    one.
+    """
 
     robot: dict[str, float]  # dimensionless groups, effects among them
-    steady: dict[str, float]  # columns of `sim steady`, positive motor
-    dwells: list[float]
-    lags: list[list[float]]  # (K, 3): Δz, Δx, Δψ
-    errors: dict[str, dict[str, float]]  # output -> {"rms"}, from dwells between those of the table
+    steady: dict[str, list[float]]  # columns of `sim steady`, both directions
+    lag: list[Any]  # (2, D, 3)
+    before: list[float]  # (K,), of `memory`
+    memory: list[Any]  # (2, K, D, 3)
+    rest: list[Any]  # (2, D, 3)
+    spread: list[Any]  # (2, D, 3)
+    slopes: dict[str, Any]  # d twist/d ln C by coefficient, (2, 3): forward, left, yaw rate
+    errors: dict[str, dict[str, float]]  # output -> {"rms"}, relative, see `surrogate.tabulate`
     provenance: dict[str, Any]
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
-        """Range of every input: a single value, except for the dwell."""
-        own = {name: (value, value) for name, value in self.robot.items()}
-        return {**own, DWELL: (self.dwells[0], self.dwells[-1])}
+        """Range of every input: a single value."""
+        return {name: (value, value) for name, value in self.robot.items()}
 
     @property
     def identity(self) -> str:
         """Hash of the numbers."""
-        return hashlib.sha256(json.dumps([self.robot, self.steady, self.lags]).encode()).hexdigest()[:16]
+        numbers = [self.robot, self.steady, self.lag, self.memory, self.rest]
+        return hashlib.sha256(json.dumps(numbers).encode()).hexdigest()[:16]
 
     def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Outputs (M,) of this robot; with a column `dwell_bar` also its response to a switch.
+        """Outputs (M,) of this robot; the sign of `omega_bar` is the direction of the motor.
 
         Raises:
-            InputError: the columns are another robot's, or a dwell is outside the table.
+            InputError: the columns are another robot's.
         """
+        side = self._side(columns)
+        return {name: np.array(values)[side] for name, values in self.steady.items()}
+
+    def response(self, columns: Mapping[str, Floats]) -> Responses:
+        """Response of this robot to a flip, for M rows; see `LookupTable.response`.
+
+        Raises:
+            InputError: the columns are another robot's.
+        """
+        side, before = self._side(columns), np.array(self.before)
+        lag, memory, rest, spread = (np.array(getattr(self, name))[side] for name in _CURVES)
+        found, sense = self.query(columns), np.where(side == 0, 1.0, -1.0)
+        twist = np.stack([found["v_z"], sense * found["v_x"], sense * found["omega_yr_bar"]], -1)
+        speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory, before), DWELLS)
+        none = np.zeros(len(side), dtype=bool)
+        return Responses(lag, memory, rest, spread, speed, none, none, before)
+
+    def _side(self, columns: Mapping[str, Floats]) -> Any:
+        """0 or 1 for every row, by the direction of its motor."""
         count = len(next(iter(columns.values())))
         for name, values in columns.items():
-            low, high = self.domain.get(name, (0.0, 0.0))
-            slack = 1e-9 * max(abs(low), abs(high), 1.0)
-            for value in values[(values < low - slack) | (values > high + slack)][:1]:
-                allowed = f"{low:g} to {high:g}" if high > low else f"{low:g} only"
+            own = self.robot.get(name, 0.0)
+            given = np.abs(values) if name == "omega_bar" else np.asarray(values, dtype=float)
+            for value in given[~(np.abs(given - own) <= 1e-9 * max(abs(own), 1.0))][:1]:
                 raise InputError(
-                    f"{name} = {value:g} is outside this robot's table ({allowed}); make its own table"
+                    f"{name} = {value:g} is outside this robot's table ({own:g} only); make its own table with "
+                    "python -m surrogate robot"
                 )
-        found = {name: np.full(count, value) for name, value in self.steady.items()}
-        if DWELL in columns:
-            lag = PchipInterpolator(np.log(self.dwells), np.array(self.lags))(np.log(columns[DWELL]))
-            found |= dict(zip(LAGS, lag.T, strict=True))
-            twist = np.stack([found["v_z"], found["v_x"], found["omega_yr_bar"]], -1)
-            found["net_speed_bar"] = planar.net_speed(twist, lag, np.asarray(columns[DWELL], dtype=float))
-        return found
+        omega = columns.get("omega_bar", np.ones(count))
+        return np.where(np.asarray(omega) < 0, 1, 0)
 
 
 def save_single(table: SingleRobot, path: str | Path) -> None:
     """Write a table of one robot as JSON."""
-    write_text(path, json.dumps(asdict(table), indent=1) + "\n")
+    write_text(path, json.dumps({"format": FORMAT, **asdict(table)}) + "\n")
 
 
 def load_single(path: str | Path) -> SingleRobot:
     """Read a table of one robot.
 
     Raises:
-        InputError: the file is not such a table.
+        InputError: the file is not such a table, or one of another version.
     """
+    remedy = "make one with python -m surrogate robot"
     try:
-        return SingleRobot(**json.loads(Path(path).read_text()))
-    except (json.JSONDecodeError, TypeError) as broken:
-        raise InputError(
-            f"{path} is no table of a robot: {broken}; make one with python -m surrogate robot"
-        ) from None
+        content = json.loads(Path(path).read_text())
+        version = content.pop("format", 1)
+        if version != FORMAT:
+            raise InputError(f"{path} has format {version}, this version reads {FORMAT}: {remedy}")
+        table = SingleRobot(**content)
+        for name, shape in _CURVES.items():
+            curves = np.array(getattr(table, name), dtype=float)
+            wanted = tuple(len(table.before) if size < 0 else size for size in shape)
+            if curves.shape != wanted or not np.isfinite(curves).all():
+                raise InputError(f"{path} has no curves {name!r} of shape {wanted} in finite numbers: {remedy}")
+    except OSError as missing:
+        raise InputError(f"{path} cannot be read ({missing.strerror}); {remedy}") from None
+    except (json.JSONDecodeError, UnicodeDecodeError, TypeError, ValueError, AttributeError) as broken:
+        raise InputError(f"{path} is no table of a robot: {broken}; {remedy}") from None
+    return table

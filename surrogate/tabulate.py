@@ -1,67 +1,120 @@
-"""Simulate the table of one robot, see `surrogate.single`.
+"""Simulate the table of one robot, see `surrogate.single`. Any robot: left and right turns may differ.
 
-Left out: robots whose left and right turns differ (odd effects).
+The table states its own error. A random schedule is replayed in time steps and compared, dwell by dwell, with what
+the table predicts. The mean difference over the dwells, with its standard error, is the table's error of a lag.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from sim.effects import catalogue
+from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.provenance import provenance
-from sim.model.groups import DWELL, Groups
+from sim.mechanics import planar
+from sim.model.groups import Groups
+from sim.model.response import DWELLS, memory_after
 from sim.model.robot import Robot
+from sim.model.schedule import Schedule
+from sim.motion.replay import replay
+from sim.motion.response import responses
 from sim.motion.steady import steady
-from sim.motion.switching import switch_response
-from surrogate.lookup import STEADY_OUTPUTS
-from surrogate.single import LAGS, SingleRobot
+from surrogate.single import SingleRobot
 
-DWELLS = (0.2, 8.0)  # range of the half-periods
-_POINTS, _HELD_OUT = 24, 6
+LAGS = ("lag_z", "lag_x", "lag_psi_rad")
+_OUTPUTS = (
+    "omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "tail_gap",
+)  # fmt: skip
+COEFFICIENTS = ("C_t", "C_r", "C_yr")
+_STEP = 0.02  # in ln C, for derivatives
+BEFORE = np.geomspace(0.2, 1.2, 16)  # lengths of the dwell before
+_CHECKED = 24  # dwells of the random schedule
+_RANGE = (0.35, 1.8)  # of their lengths
 
 
 def tabulate(robot: Robot) -> SingleRobot:
-    """Simulate one robot's steady motion and its response to switches.
+    """Simulate one robot's steady motion and its response to flips, in both directions of the motor.
 
-    Args:
-        robot: any robot, with or without effects.
+        Args:
+            robot: any robot, with or without effects.
 
-    Raises:
-        InputError: left and right turns of the robot differ, or its motion cannot be found.
+        Raises:
+            InputError: the robot's motion cannot be found, or a simulated flip breaks down.
 
-    Example:
-        >>> from dataclasses import replace
-        >>> from softflagella import circle, load_robot, plan, tabulate
-        >>> robot = replace(load_robot("paper-control"), effects={"end_over_end_drag": 5.0})
-        >>> plan(circle(2.0), robot, lookup=tabulate(robot)).predicted_rms < 0.03
-        True
+        Example:
+            >>> import math
+    from dataclasses import replace
+    from typing import Any
+            >>> from softflagella import circle, load_robot, plan, tabulate
+            >>> robot = replace(load_robot("paper-control"), effects={"left_right_bias": 0.2})
+            >>> plan(circle(2.0), robot, lookup=tabulate(robot)).predicted_rms < 0.03
+            True
     """
-    odd = [name for name in robot.effects if catalogue()[name].symmetry == "odd"]
-    if odd:
-        raise InputError(f"{odd[0]} makes left and right turns differ; the planner takes them for mirror images")
     values = robot.group_values()
-    knots = np.geomspace(*DWELLS, _POINTS)
-    between = np.sqrt(knots[:-1] * knots[1:])[:: _POINTS // _HELD_OUT]
-    dwells = np.concatenate([knots, between])
-    groups = Groups.from_columns({name: np.full(len(dwells), value) for name, value in values.items()})
+    both = {name: np.array([value, value]) for name, value in values.items()}
+    both["omega_bar"] = both["omega_bar"] * [1.0, -1.0]
+    groups = Groups.from_columns(both)
     motion = steady(groups)
     if not motion.converged.all():
         raise InputError(f"{robot.name} has no steady motion to tabulate: {motion.note[0]}")
-    response = switch_response(groups, dwells, motion)
-    if response.failed.any():
-        raise InputError(f"{robot.name}: a simulated switch broke down; a slower motor may help")
-    lags = np.stack([response.lag_z, response.lag_x, response.lag_psi], -1)
+    found = responses(groups, motion, before=BEFORE)
+    if found.failed.any():
+        raise InputError(f"{robot.name}: a simulated flip broke down; a slower motor may help")
     columns = motion.columns()
-    own = {name: float(columns[name][0]) for name in STEADY_OUTPUTS}
     table = SingleRobot(
-        values, own, knots.tolist(), lags[:_POINTS].tolist(), {}, provenance({"robot": robot.name})
+        robot=values,
+        steady={name: np.asarray(columns[name], dtype=float).tolist() for name in _OUTPUTS},
+        lag=found.lag.tolist(),
+        before=BEFORE.tolist(),
+        memory=found.memory.tolist(),
+        rest=found.rest.tolist(),
+        spread=found.spread.tolist(),
+        slopes=_slopes(values),
+        errors={},
+        provenance=provenance({"robot": robot.name}),
     )
+    errors = {name: {"rms": float(motion.error.max())} for name in ("v_x", "v_z", "omega_yr_bar")}
+    own = {name: values[0] for name, values in table.steady.items()}
     speed, yaw = float(np.hypot(own["v_x"], own["v_z"])), abs(own["omega_yr_bar"])
-    missed = lags[_POINTS:] - np.stack([table.query({DWELL: between})[k] for k in LAGS], -1)
-    rms = np.sqrt((missed**2).mean(0)) / [speed, speed, yaw]
-    errors = {name: {"rms": float(motion.error[0])} for name in ("v_x", "v_z", "omega_yr_bar")}
-    errors |= {name: {"rms": float(value)} for name, value in zip(LAGS, rms, strict=True)}
+    missed = _missed(table) / [speed, speed, yaw]
+    bias = np.sqrt(missed.mean(0) ** 2 + missed.var(0) / len(missed))
+    errors |= {name: {"rms": float(value)} for name, value in zip(LAGS, bias, strict=True)}
     return replace(table, errors=errors)
+
+
+def _slopes(values: dict[str, float]) -> dict[str, Any]:
+    """Derivatives (2, 3) of the twists in ln C of each coefficient, by differences."""
+    ends = [(name, sign) for name in COEFFICIENTS for sign in (1.0, -1.0)]
+    rows = [{**values, name: values[name] * math.exp(sign * _STEP)} for name, sign in ends for _ in (0, 1)]
+    columns = {name: np.array([row[name] for row in rows]) for name in values}
+    columns["omega_bar"] = columns["omega_bar"] * np.tile([1.0, -1.0], len(ends))
+    motion = steady(Groups.from_columns(columns))
+    twist = np.stack([motion.v_z, motion.v_x, motion.omega_yr], -1).reshape(len(COEFFICIENTS), 2, 2, 3)
+    slopes = (twist[:, 0] - twist[:, 1]) / (2 * _STEP)
+    found = dict(zip(COEFFICIENTS, slopes, strict=True))
+    return {name: slope.tolist() for name, slope in found.items() if np.isfinite(slope).all()}
+
+
+def _missed(table: SingleRobot) -> Floats:
+    """Differences (M, 3) of lags between a replay in time steps and the table, seen as for a positive motor."""
+    dwells = np.exp(np.random.default_rng(0).uniform(math.log(_RANGE[0]), math.log(_RANGE[1]), _CHECKED))
+    track = replay([Schedule(table.robot, 1, dwells, (0.0, 0.0, 0.0), 1.0)])[0]
+    flips = track.groupby("dwell").last()[["x_over_l", "y_over_l", "heading_rad"]].to_numpy()
+    poses = np.concatenate([np.zeros((1, 3)), flips])
+    moved = planar.between(poses[:-1], poses[1:])
+    missed = []
+    for i in range(1, len(dwells)):
+        side = i % 2
+        mirror = planar.MIRROR if side else np.ones(3)
+        twist = np.array([table.steady[name][side] for name in ("v_z", "v_x", "omega_yr_bar")]) * mirror
+        simulated = planar.compose(moved[i] * mirror, planar.inverse(planar.arc(twist, dwells[i])))
+        curve = np.array(table.lag[side]) + memory_after(
+            np.array(table.memory[side]), float(dwells[i - 1]), BEFORE
+        )
+        predicted = [np.interp(np.log(dwells[i]), np.log(DWELLS), column) for column in curve.T]
+        missed.append(simulated - predicted)
+    return np.array(missed)

@@ -19,7 +19,7 @@ data set, look-up table and planner share them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -43,19 +43,20 @@ class Responses:
     net_speed: Floats  # (B, D), of equal dwells
     failed: Flags  # (B,)
     stepped: Flags  # (B,): by time steps
+    before: Floats = field(default_factory=BEFORE.copy)  # (K,), T̄ of the dwell before, of `memory`
 
 
-def at_equal_dwells(memory: Floats) -> Floats:
+def at_equal_dwells(memory: Floats, knots: Floats = BEFORE) -> Floats:
     """Memory (..., K, D, 3) where the dwell before is as long as the dwell, (..., D, 3)."""
-    return np.stack([memory_after(memory, dwell)[..., i, :] for i, dwell in enumerate(DWELLS)], -2)
+    return np.stack([memory_after(memory, dwell, knots)[..., i, :] for i, dwell in enumerate(DWELLS)], -2)
 
 
-def memory_after(memory: Floats, before: float) -> Floats:
-    """Memory (..., K, D, 3) after a dwell of length `before`, (..., D, 3): linear between BEFORE and FORGOTTEN."""
+def memory_after(memory: Floats, before: float, knots: Floats = BEFORE) -> Floats:
+    """Memory (..., K, D, 3) after a dwell `before`, (..., D, 3): linear between `knots` and FORGOTTEN."""
     if before >= FORGOTTEN:
         return np.zeros_like(memory[..., 0, :, :])
-    k = max(int(np.searchsorted(BEFORE, before, side="right")) - 1, 0)
-    if k == len(BEFORE) - 1:
-        return (FORGOTTEN - before) / (FORGOTTEN - BEFORE[k]) * memory[..., k, :, :]
-    share = (before - BEFORE[k]) / (BEFORE[k + 1] - BEFORE[k])
+    k = max(int(np.searchsorted(knots, before, side="right")) - 1, 0)
+    if k == len(knots) - 1:
+        return (FORGOTTEN - before) / (FORGOTTEN - knots[k]) * memory[..., k, :, :]
+    share = (before - knots[k]) / (knots[k + 1] - knots[k])
     return (1 - share) * memory[..., k, :, :] + share * memory[..., k + 1, :, :]

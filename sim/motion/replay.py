@@ -19,7 +19,7 @@ from sim.model.groups import Groups
 from sim.model.schedule import Schedule
 from sim.motion.resolution import MOST_REPLAY_WORK, Resolution
 from sim.motion.run import Run
-from sim.solve.assembly import bodies
+from sim.solve.assembly import bodies, reversed_bodies
 from sim.solve.march import YAW, X, Y
 
 _SAMPLES = 12  # track points in a dwell, at most
@@ -50,10 +50,11 @@ def _replay(
 ) -> pd.DataFrame:
     values = check_columns({name: np.array([value]) for name, value in schedule.robot.items()})
     groups = Groups.from_columns(values)
-    body = bodies(groups)[0]
-    body = body._replace(omega=schedule.first_direction * abs(body.omega))
+    body, reverse = bodies(groups)[0], reversed_bodies(groups)[0]
+    if body.omega * schedule.first_direction < 0:
+        body, reverse = reverse, body
     chosen = resolution or Resolution.for_tracks(body.omega)
-    run = Run(body, groups.N, chosen, most_work=MOST_REPLAY_WORK)
+    run = Run(body, groups.N, chosen, reverse=reverse, most_work=MOST_REPLAY_WORK)
     if not run.can_afford(float(schedule.dwells.sum()), flips=len(schedule.dwells)):
         raise InputError(
             f"the schedule asks for more time steps than a replay may take ({len(schedule.dwells)} dwells, "

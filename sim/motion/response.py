@@ -1,8 +1,8 @@
 """Simulate the response of robots to a flip of the motor (`sim.model.response` says what the curves are).
 
 One flip from the steady motion in the other direction gives the response to every dwell. Flips from the shapes
-that it passes through give the response after short dwells. They are solved for directly (`sim.solve.transient`)
-where the steady motion is, on two meshes, and extrapolated; by time steps where it is not. Units: l, μ0 l⁴/EI.
+that it passes through give the response after short dwells. Solved for directly (`sim.solve.transient`) where the
+steady motion is, on two meshes, extrapolated; by time steps where it is not. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sim.model.response import BEFORE, DWELLS, SETTLED, Responses, at_equal_dwel
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady
 from sim.motion.stepped_response import stepped_response
-from sim.solve.assembly import bodies
+from sim.solve.assembly import bodies, reversed_bodies
 from sim.solve.orbit import mean_motion, solve_orbit
 from sim.solve.refinement import CORRECTION, orbit_on_mesh
 from sim.solve.transient import lag_at, transient
@@ -44,7 +44,9 @@ class Curves(NamedTuple):
 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
-def responses(groups: Groups, motion: Steady | None = None, *, history: bool = True) -> Responses:
+def responses(
+    groups: Groups, motion: Steady | None = None, *, history: bool = True, before: Floats = BEFORE
+) -> Responses:
     """Response of B robots of one N to a flip of the motor.
 
     Args:
@@ -52,36 +54,37 @@ def responses(groups: Groups, motion: Steady | None = None, *, history: bool = T
         motion: the robots' steady motion, if it is at hand.
         history: simulate memory and rest, too; it takes four times as long. Without, both are NaN, and so is the
             net speed of dwells shorter than FORGOTTEN.
+        before: T̄ of the dwell before, (K,), increasing, below FORGOTTEN.
     """
     check_groups(groups)
     motion = steady(groups) if motion is None else motion
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
     robots = bodies(groups)
     found, stepped = [], np.zeros(len(robots), dtype=bool)
-    for i, body in enumerate(robots):
-        curves = _solved(body, groups.N, even, history)
+    for i, (body, reverse) in enumerate(zip(robots, reversed_bodies(groups), strict=True)):
+        curves = _solved(body, reverse, groups.N, even, history, before)
         if curves is None:
             stepped[i] = True
-            curves = Curves(*stepped_response(body, groups.N, DWELLS, BEFORE))
+            curves = Curves(*stepped_response(body, groups.N, DWELLS, before, reverse=reverse))
         found.append(curves)
     lag, memory, rest, spread = (np.array(column) for column in zip(*found, strict=True))
     sense = np.sign([body.omega for body in robots])
     twist = np.stack([motion.v_z, sense * motion.v_x, sense * motion.omega_yr], -1)
     if not history:
         memory[:], rest[:] = np.nan, np.nan
-    speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory), DWELLS)
+    speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory, before), DWELLS)
     failed = ~np.isfinite(speed[:, -1])
     for array in (lag, memory, rest, spread, speed):
         array[failed] = np.nan
-    return Responses(lag, memory, rest, spread, speed, failed, stepped)
+    return Responses(lag, memory, rest, spread, speed, failed, stepped, before)
 
 
-def _solved(body: Body, tails: int, even: bool, history: bool) -> Curves | None:
+def _solved(body: Body, reverse: Body, tails: int, even: bool, history: bool, before: Floats) -> Curves | None:
     """Curves of one robot by transients; None where its motion, or a transient, cannot be solved for."""
-    coarse = _on_mesh(body, tails, even, _MESHES[0], history=False)
+    coarse = _on_mesh(body, reverse, tails, even, _MESHES[0], before, history=False)
     if coarse is None:
         return None
-    fine = _on_mesh(body, tails, even, _MESHES[1], history=history)
+    fine = _on_mesh(body, reverse, tails, even, _MESHES[1], before, history=history)
     if fine is None:
         return None
     a, b = _MESHES
@@ -90,7 +93,9 @@ def _solved(body: Body, tails: int, even: bool, history: bool) -> Curves | None:
     return Curves((fine.lag + change) * mirror, fine.memory * mirror, (fine.rest + change) * mirror, fine.spread)
 
 
-def _on_mesh(body: Body, tails: int, even: bool, edges: int, *, history: bool) -> Curves | None:
+def _on_mesh(
+    body: Body, reverse: Body, tails: int, even: bool, edges: int, before: Floats, *, history: bool
+) -> Curves | None:
     """Curves on one mesh; memory and rest only with `history`."""
     after = _orbit(body, tails, edges)
     if after is None:
@@ -99,26 +104,25 @@ def _on_mesh(body: Body, tails: int, even: bool, edges: int, *, history: bool) -
     if even:
         start, first = _mirrored(x), u
     else:
-        reverse = body._replace(omega=-body.omega)
-        before = _orbit(reverse, tails, edges, instants=u.shape[0])
-        if before is None:
+        came = _orbit(reverse, tails, edges, instants=u.shape[0])
+        if came is None:
             return None
-        other = before[2]
-        start, first = before[0], before[1] * _FLIPPED
-    main = transient(body, start.copy(), first.copy(), twist, SETTLED, BEFORE, _TOLERANCE)
+        other = came[2]
+        start, first = came[0], came[1] * _FLIPPED
+    main = transient(body, start.copy(), first.copy(), twist, SETTLED, before, _TOLERANCE)
     if not main.solved:
         return None
     dwells = np.minimum(DWELLS, SETTLED)
     fields = lag_at(main, dwells)
     lag, spread = fields.mean(1), fields.std(1)
-    memory, rest = np.zeros((len(BEFORE), *lag.shape)), np.zeros_like(lag)
+    memory, rest = np.zeros((len(before), *lag.shape)), np.zeros_like(lag)
     if not history:
         return Curves(lag, memory, rest, spread)
     shapes = main.shapes
     if even:
         shapes = np.array([_mirrored(shape) for shape in shapes])
     else:
-        back = transient(reverse, x.copy(), u * _FLIPPED, other, float(BEFORE[-1]), BEFORE, _TOLERANCE)
+        back = transient(reverse, x.copy(), u * _FLIPPED, other, float(before[-1]), before, _TOLERANCE)
         if not back.solved:
             return None
         shapes = back.shapes

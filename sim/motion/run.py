@@ -26,10 +26,16 @@ class Run:
         resolution: Resolution,
         state: State | None = None,
         *,
+        reverse: Body | None = None,
         most_work: float | None = None,
     ):
-        """Start from `state` (changed in place) or from rest; `most_work`: see `sim.motion.resolution`."""
+        """Start from `state` (changed in place) or from rest; `most_work`: see `sim.motion.resolution`.
+
+        `reverse` is the robot with its motor reversed. By default ω̄ changes its sign, and nothing else: that is
+        right without odd effects (`sim.solve.assembly.reversed_bodies`).
+        """
         self.body = body
+        self.reverse = body._replace(omega=-body.omega) if reverse is None else reverse
         self.state = new_state(tails, resolution.edges, body.offset) if state is None else state
         self.time_step = time_step(body.omega, resolution)
         self.failed = ""
@@ -89,7 +95,7 @@ class Run:
 
     def flip(self) -> None:
         """Reverse the motor: the shape stays, velocities become their mirror image."""
-        self.body = self.body._replace(omega=-self.body.omega)
+        self.body, self.reverse = self.reverse, self.body
         self.state.u[:] *= _REVERSED
         self.state.x_dot[:] = 0.0
         self._jumped = True

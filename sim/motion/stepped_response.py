@@ -20,7 +20,13 @@ from sim.motion.switching import steady_twist
 
 
 def stepped_response(
-    body: Body, tails: int, dwells: Floats, before: Floats, *, resolution: Resolution | None = None
+    body: Body,
+    tails: int,
+    dwells: Floats,
+    before: Floats,
+    *,
+    reverse: Body | None = None,
+    resolution: Resolution | None = None,
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Lag (D, 3), memory (K, D, 3), lag from rest (D, 3) and spread (D, 3) as in `sim.motion.response.Responses`.
 
@@ -28,6 +34,7 @@ def stepped_response(
         body: with the motor's speed after the flip.
         dwells: T̄, (D,), increasing; the last one long enough for the motion to settle.
         before: T̄ of the dwell before, (K,), increasing.
+        reverse: the robot before the flip; by default the same with another sign of ω̄, see `Run`.
         resolution: mesh and step; by default what the motor's speed needs.
 
     Returns:
@@ -36,14 +43,14 @@ def stepped_response(
     chosen = resolution or Resolution.fitting(body.omega)
     lost = tuple(np.full(shape, np.nan) for shape in ((len(dwells), 3), (len(before), len(dwells), 3)))
     failed = (lost[0], lost[1], lost[0].copy(), lost[0].copy())
-    reverse = body._replace(omega=-body.omega)
+    reverse = body._replace(omega=-body.omega) if reverse is None else reverse
     state = state_on_orbit(reverse, tails, chosen.edges, 0.0)
     if state is None:
         settled = settle_one(reverse, tails, chosen)
         if settled.failed:
             return failed
         state = settled.state
-    run = Run(reverse, tails, chosen, state)
+    run = Run(reverse, tails, chosen, state, reverse=body)
     sense = float(np.sign(body.omega))
     _, turn = steady_twist(run, tails, sense)
     changes, after_short = [], []

@@ -42,7 +42,7 @@ from sim.motion.settling import settle_one
 from sim.motion.shapes import state_on_orbit
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady
-from sim.solve.assembly import bodies
+from sim.solve.assembly import bodies, reversed_bodies
 from sim.solve.march import PHASE, SURGE, SWAY, YAW
 
 MEMORY = 1.2  # time units after which a flip is forgotten: the tails turn over in about 0.7
@@ -82,7 +82,8 @@ def switch_response(
     motion = steady(groups) if motion is None else motion
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
     robots = bodies(groups)
-    lag = np.array([_lag(body, groups.N, T, even, resolution) for body, T in zip(robots, dwell, strict=True)])
+    both = zip(robots, reversed_bodies(groups), dwell, strict=True)
+    lag = np.array([_lag(body, reverse, groups.N, T, even, resolution) for body, reverse, T in both])
     sense = np.sign([body.omega for body in robots])
     twist = np.stack([motion.v_z, sense * motion.v_x, sense * motion.omega_yr], -1)
     speed = planar.net_speed(twist, lag, dwell)
@@ -91,7 +92,7 @@ def switch_response(
     return SwitchResponse(dwell, speed, lag[:, 2], lag[:, 1], lag[:, 0], failed)
 
 
-def _lag(body: Body, tails: int, dwell: float, even: bool, resolution: Resolution | None) -> Floats:
+def _lag(body: Body, reverse: Body, tails: int, dwell: float, even: bool, resolution: Resolution | None) -> Floats:
     """(Δz, Δx, Δψ) of one robot; NaN where it breaks down."""
     chosen = resolution or Resolution.fitting(body.omega)
     state = state_on_orbit(body, tails, chosen.edges, 0.0)
@@ -100,7 +101,7 @@ def _lag(body: Body, tails: int, dwell: float, even: bool, resolution: Resolutio
         if settled.failed:
             return np.full(3, np.nan)
         state = settled.state
-    run = Run(body, tails, chosen, state)
+    run = Run(body, tails, chosen, state, reverse=reverse)
     sense = np.sign(body.omega)
     twist, turn = steady_twist(run, tails, sense)
     if run.failed:

@@ -7,6 +7,7 @@ Source of the base model: Du, Miller, Jawed (arXiv 2103.05712).
 from __future__ import annotations
 
 from collections import namedtuple
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,11 @@ def numbers(groups: Groups) -> Tensor:
 def bodies(groups: Groups) -> list[Body]:
     """The robots for the compiled loops, one by one."""
     return unpacked(numbers(groups).detach().cpu().numpy().T)
+
+
+def reversed_bodies(groups: Groups) -> list[Body]:
+    """The same robots with their motors reversed; an odd effect changes more than the sign of ω̄."""
+    return bodies(replace(groups, omega_bar=-groups.omega_bar))
 
 
 def unpacked(rows: Floats) -> list[Body]:

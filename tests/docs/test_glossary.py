@@ -14,7 +14,7 @@ from calibration.measurements import KNOWN_COLUMNS
 from calibration.tracks import COLUMNS
 from dataset.schema import FLAGS, INPUTS, OUTPUTS
 from planner.export import dwell_table
-from planner.plan import plan_record
+from planner.record import plan_record
 from sim.effects import catalogue
 from sim.model.body import Body
 from sim.model.groups import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS

@@ -14,12 +14,14 @@ import pytest
 
 from planner import Path2D, circle, plan, polygon
 from planner.corners import fillet
+from planner.distance import distance_to
 from planner.export import milliseconds, write_plan
-from planner.plan import distance_to, plan_record
-from planner.schedule import Switches, follow, trace
-from planner.stated_error import guaranteed, look_ahead, tube
+from planner.lookup import vehicle_of
+from planner.record import plan_record
+from planner.schedule import follow, trace
+from planner.stated_error import guaranteed, look_ahead
 from planner.tractrix import reference
-from planner.vehicle import TURN_OVER, vehicle_of
+from planner.zigzag import zigzag
 from sim.io.errors import InputError, run_command
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
@@ -49,7 +51,7 @@ def test_the_pivot_moves_as_a_slip_free_car(seed: int) -> None:
     for _ in range(10):
         sense = 1 if rng.random() < 0.5 else -1
         times = np.linspace(0, rng.uniform(0.5, 5), 2001)
-        poses = planar.compose(pose, car.motion(sense, times))
+        poses = planar.compose(pose, car.motion(sense, 1.0, times))
         q = planar.compose(poses, np.array([-car.pivot_distance, 0.0, 0.0]))
         velocity = np.diff(q[:, :2], axis=0)
         middle = (poses[1:, 2] + poses[:-1, 2]) / 2
@@ -59,7 +61,7 @@ def test_the_pivot_moves_as_a_slip_free_car(seed: int) -> None:
         pose = poses[-1]
 
 
-@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(i, marks=pytest.mark.slow) for i in range(4, 40))])
+@pytest.mark.parametrize("seed", range(40))
 def test_the_bound_holds_on_random_paths(seed: int) -> None:
     """Predicted track within the guaranteed error, for paths of many lengths and curvatures."""
     rng = np.random.default_rng(1000 + seed)
@@ -67,17 +69,17 @@ def test_the_bound_holds_on_random_paths(seed: int) -> None:
     path = random_smooth_path(seed, rng.uniform(5, 40), rng.uniform(0.05, 0.9))
     ref = reference(path, car.pivot_distance, 0.01)
     curvature = float(np.abs(ref.curvature).max())
-    assert curvature * car.pivot_radius < 0.9  # none is tighter than the robot can turn
-    dwell = rng.uniform(TURN_OVER, 2.0)
+    if curvature * car.pivot_radius > 0.9:
+        pytest.skip("this path is tighter than the robot can turn")
+    dwell = rng.uniform(0.3, 2.0)
     ahead = look_ahead(car, curvature)
     switches = follow(ref, car, pivot_distance=car.pivot_distance, ahead=ahead, dwell=dwell, offset=0.0)
     track = trace(car, switches, 0.0, samples=12)
     error = distance_to(ref.p, track[:-12])
-    assert error.max() <= guaranteed(car, car.pivot_distance, curvature, dwell)
+    assert error.max() <= guaranteed(car, car.pivot_distance, car.yaw_rate * dwell, ahead)
     assert switches.dwells.min() >= dwell * (1 - 1e-9)
 
 
-@pytest.mark.slow
 def test_error_does_not_grow_with_length() -> None:
     car = vehicle()
     worst = []
@@ -122,54 +124,40 @@ def test_paper_cases_are_planned_within_their_bound(name: str) -> None:
     path = {"circle": circle(1.5), "square": polygon(4, 3.0), "triangle": polygon(3, 4.0)}[name]
     robot = PRESETS["paper-triangle"] if name == "triangle" else CONTROL
     result = plan(path, robot)
-    assert result.predicted_rms < 0.05
-    assert result.predicted_max <= result.guaranteed
+    assert result.predicted_rms < 1.3 * result.zigzag_rms
+    assert result.drawn_rms < {"circle": 0.020, "square": 0.025, "triangle": 0.06}[name]
+    assert result.predicted_max <= min(result.guaranteed, result.stated_error)
     assert result.closure is not None
-    assert result.closure < 0.15
-    assert result.dwells.min() >= TURN_OVER * (1 - 1e-9)
+    assert result.closure < 0.05
+    assert result.dwells.min() >= result.minimum_dwell * (1 - 1e-9)
     again = plan(path, robot)
     assert np.array_equal(again.dwells, result.dwells)
 
 
 def test_planning_never_calls_the_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Orbits and time steps refuse: whatever simulates stops there, and a plan is made all the same."""
-    from dataset.sweep import simulate
-    from sim.motion import batches, replay, run, sensitivity, shapes, steady
-    from surrogate.tabulate import tabulate
+    import sim.motion.orbits
+    import sim.motion.run
+    import sim.motion.steady
+    import sim.motion.switching
 
     def refuse(*_: object, **__: object) -> None:
-        raise AssertionError("somebody simulated")
+        raise AssertionError("the planner simulated")
 
-    places = ((steady, "solve_orbits"), (sensitivity, "solve_orbits"), (shapes, "refined_orbit"), (run, "advance"))
-    for module, name in places:
+    for module, name in ((sim.motion.steady, "steady"), (sim.motion.switching, "switch_response"),
+                         (sim.motion.orbits, "refined_orbit"), (sim.motion.run, "advance")):  # fmt: skip
         monkeypatch.setattr(module, name, refuse)
-    row = {name: np.array([value]) for name, value in CONTROL.group_values().items()}
-    schedule = replay.Schedule(CONTROL.group_values(), 1, np.array([1.0]), (0.0, 0.0, 0.0), 1.0)
-    for simulating in (
-        lambda: tabulate(CONTROL),
-        lambda: simulate({**row, "dwell_bar": np.array([1.0])}),
-        lambda: batches.steady_columns(row, jobs=1, title=""),
-        lambda: batches.stepped_columns(row, jobs=1, title=""),
-        lambda: batches.sensitivity_columns(row, ["C_t"], jobs=1, title=""),
-        lambda: shapes.tails_over_a_revolution(CONTROL, 4),
-        lambda: replay.replay([schedule]),
-    ):
-        with pytest.raises(AssertionError, match="somebody simulated"):
-            simulating()
     assert len(plan(polygon(4, 3.0), CONTROL).dwells) > 50
 
 
 def test_planning_does_not_even_load_the_simulator() -> None:
+    simulator = ("sim.solve.newton", "sim.motion.steady", "sim.motion.replay", "sim.motion.run", "numba")
     code = (
         "import sys; from planner import plan, circle; from sim.model.presets import PRESETS;"
-        "assert len(plan(circle(2.0), PRESETS['paper-control']).dwells) > 50;"
-        "print(*sys.modules)"
+        "plan(circle(2.0), PRESETS['paper-control']);"
+        f"print([m for m in {simulator} if m in sys.modules])"
     )
-    root = Path(__file__).parents[2]
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root)
-    loaded = set(done.stdout.split())
-    assert {"planner.plan", "surrogate.lookup"} <= loaded
-    assert loaded & {"sim.linear", "sim.motion", "sim.solve", "dataset", "numba"} == set()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
 
 
 def test_other_points_of_the_axis() -> None:
@@ -180,14 +168,26 @@ def test_other_points_of_the_axis() -> None:
         assert result.offset != 0
 
 
-def test_tolerance_chooses_a_longer_dwell_and_says_when_it_cannot() -> None:
-    tight = plan(circle(2.0), CONTROL)
-    loose = plan(circle(2.0), CONTROL, tolerance=2 * tight.guaranteed)
-    assert loose.minimum_dwell > tight.minimum_dwell
-    assert loose.guaranteed <= 2 * tight.guaranteed
-    assert loose.duration < tight.duration
-    with pytest.raises(InputError, match="allow more"):
+def test_a_tolerance_shortens_the_dwell_and_says_when_it_cannot() -> None:
+    free = plan(circle(2.0), CONTROL, objective="flips")
+    tight = plan(circle(2.0), CONTROL, objective="flips", tolerance=0.6 * free.stated_error)
+    assert tight.minimum_dwell < free.minimum_dwell
+    assert tight.stated_error <= 0.6 * free.stated_error
+    assert len(tight.dwells) > len(free.dwells)
+    with pytest.raises(InputError, match="smallest stated error is"):
         plan(circle(2.0), CONTROL, tolerance=1e-3)
+
+
+def test_objectives_trade_error_for_time_and_flips() -> None:
+    found = {name: plan(circle(2.0), CONTROL, objective=name) for name in ("error", "time", "flips")}  # type: ignore[arg-type]
+    assert found["error"].predicted_rms < found["time"].predicted_rms
+    assert found["time"].duration < found["error"].duration
+    assert len(found["flips"].dwells) <= len(found["time"].dwells) < len(found["error"].dwells)
+
+
+def test_a_shortest_dwell_in_seconds() -> None:
+    result = plan(circle(2.0), CONTROL, minimum_seconds=4.0)
+    assert result.seconds[:-1].min() >= 4.0 * (1 - 1e-9)
 
 
 def refused(path: Any, expected: str, **options: Any) -> None:
@@ -206,20 +206,24 @@ def test_refusals() -> None:
     refused([[0, 0, 0], [1, 1, 1]], r"\(n, 2\)")
     refused([["a", "b"]], "no number")
     refused(circle(0.5), "too tight .* scale the path by")
-    refused(polygon(4, 0.4), "too tight .* scale the path by")
+    refused(polygon(4, 0.8), "too tight .* scale the path by")
+    refused(polygon(4, 0.1), "too small, the robot's circle has a radius")
+    refused([[0, 0], [8e4, 0]], "if you gave m and mean mm")
     refused(polygon(4, 3.0), "corner of 90 degrees", corner="error")
-    refused(circle(2.0), "turn-over", minimum_dwell=0.1)
+    refused(circle(2.0), "below 0.2 time units", minimum_dwell=0.1)
+    refused(circle(2.0), "objective", objective="speed")
     refused(circle(2.0), "omega_bar = 500 is outside", robot=CONTROL.with_motor(500.0))
     refused(circle(2.0), "N = 7 is outside", robot=replace(CONTROL, tails=7))
     refused(circle(2.0), "a_over_R = 0.5 is outside", robot=replace(CONTROL, disc_offset=0.008))
     refused(circle(2.0), "end_over_end_drag", robot=replace(CONTROL, effects={"end_over_end_drag": 5.0}))
 
 
-def test_a_tight_circle_is_refused_with_a_scale_that_works() -> None:
+@pytest.mark.parametrize("radius", [0.4, 0.5, 0.57])
+def test_a_tight_circle_is_refused_with_a_scale_that_works(radius: float) -> None:
     with pytest.raises(InputError) as caught:
-        plan(circle(0.8), CONTROL)
+        plan(circle(radius), CONTROL)
     factor = float(str(caught.value).rsplit(" ", 1)[1])
-    assert plan(circle(0.8 * factor), CONTROL).predicted_rms < 0.1
+    assert plan(circle(radius * factor), CONTROL).predicted_rms < 0.1
 
 
 @pytest.mark.parametrize(
@@ -275,11 +279,18 @@ def test_the_header_compiles(tmp_path: Path) -> None:
     header = write_plan(plan(circle(2.0), CONTROL), tmp_path)[2]
     (tmp_path / "main.c").write_text(
         '#include "schedule.h"\n#include <stdio.h>\nint main(void){long s=0;'
-        'for(int i=0;i<SCHEDULE_COUNT;i++)s+=schedule_ms[i];printf("%ld",s);return 0;}\n'
+        "for(int i=0;i<SCHEDULE_COUNT;i++)s+=schedule_ms[i];"
+        'printf("%ld %ld %f %f %ld",s,(long)SCHEDULE_TOTAL_MS,SCHEDULE_START_X,SCHEDULE_START_HEADING,'
+        "(long)schedule_checkpoints[SCHEDULE_CHECKPOINTS-1].ms);return 0;}"
     )
     subprocess.run([compiler, "-Wall", "-Werror", "-o", str(tmp_path / "a"), str(tmp_path / "main.c")], check=True)
-    total = int(subprocess.run([str(tmp_path / "a")], capture_output=True, text=True, check=True).stdout)
-    seconds = json.loads((header.parent / "plan.json").read_text())["dwell_s"]
+    words = subprocess.run([str(tmp_path / "a")], capture_output=True, text=True, check=True).stdout.split()
+    total = int(words[0])
+    content = json.loads((header.parent / "plan.json").read_text())
+    seconds = content["dwell_s"]
+    assert int(words[1]) == int(words[4]) == total
+    start = [content["start"]["x_over_l"], content["start"]["heading_rad"]]
+    assert [float(words[2]), float(words[3])] == pytest.approx(start, abs=1e-6)
     assert total == pytest.approx(1000 * sum(seconds), abs=1)
 
 
@@ -290,43 +301,8 @@ def test_milliseconds_carry_rounding_and_split_long_dwells() -> None:
         milliseconds(np.array([1.0, 0.0001]))
 
 
-def test_unequal_turns_are_planned_for() -> None:
-    """A vehicle that turns 5 % faster to one side still keeps to a line."""
-    from dataclasses import replace
-
-    car = vehicle()
-    twist = car.twist.copy()
-    twist[1] *= [1.0, 1.05, 1.05]
-    car = replace(car, twist=twist)
-    ref = reference(Path2D.of([[0, 0], [30, 0]]), car.pivot_distance, 0.01)
-    switches = follow(
-        ref, car, pivot_distance=car.pivot_distance, ahead=look_ahead(car, 0.0), dwell=1.0, offset=0.0
-    )
-    track = trace(car, switches, 0.0)
-    assert np.abs(track[:, 1]).max() < guaranteed(car, car.pivot_distance, 0.0, 1.0)
-
-
-def test_the_tube_grows_with_the_table_s_errors() -> None:
-    from dataclasses import replace
-
-    car = vehicle()
-    switches = Switches(1, np.full(60, 1.0), np.zeros((61, 3)))
-    small = tube(car, switches, 0.0)
-    large = tube(replace(car, relative_error={k: 3 * v for k, v in car.relative_error.items()}), switches, 0.0)
-    assert 2 < large / small < 4
-
-
 def test_vehicle_of_the_shipped_table_matches_the_reference_robot() -> None:
     """ω̄_yr, v_x, v_z of the control example from an independent solver."""
     car = vehicle_of(CONTROL, load())
     assert car.twist[0] == pytest.approx([0.0180, 0.0425, 0.0490], rel=0.02)
-    assert car.net_speed(2.0) == pytest.approx(0.0169, rel=0.02)
-
-
-@pytest.mark.parametrize(
-    ("radius", "expected"),
-    [(1e300, "give finite numbers, smaller than"), (1e3, "tail lengths long"), (1e-3, "too short for a")],
-)
-def test_paths_far_too_long_or_short_are_refused_at_once(radius: float, expected: str) -> None:
-    with pytest.raises(InputError, match=expected):
-        plan(circle(radius), CONTROL)
+    assert zigzag(car, 2.0).net_speed == pytest.approx(0.0169, rel=0.02)

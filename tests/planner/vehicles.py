@@ -4,28 +4,46 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.vehicle import Vehicle
+from planner.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
+from sim.arrays import Floats
 from sim.mechanics import planar
 
-ERRORS = {
-    "v_x": 0.003,
-    "v_z": 0.001,
-    "omega_yr_bar": 0.003,
-    "lag_x": 0.001,
-    "lag_z": 0.001,
-    "lag_psi_rad": 0.001,
-}
+ERRORS = (0.001, 0.003, 0.003)  # relative, of v_z, v_x and ω_yr
 
 
-def vehicle(*, yaw: float = 0.0489, sway: float = 0.0424, surge: float = 0.0179, lag: float = 1.0) -> Vehicle:
-    """A mirror-symmetric vehicle; `lag` scales the response to a switch (0: instantaneous circles)."""
-    twist = np.array([surge, sway, yaw])
-    dwells = np.array([0.0, 0.3, 0.7, 1.0, 4.0])
-    table = lag * np.array([0, 1, 1, 1, 1])[:, None] * np.array([-0.0018, -0.0009, 0.0013])
+def vehicle(*, yaw: float = 0.0489, sway: float = 0.0424, surge: float = 0.0179, lag: float = 1.0,
+            memory: float = 1.0, bias: float = 0.0, errors: float = 1.0) -> Vehicle:  # fmt: skip
+    """A vehicle with the control robot's numbers.
+
+    Args:
+        yaw, sway, surge: of the positive direction.
+        lag: scales the response to a flip (0: instantaneous circles).
+        memory: scales what the dwell before adds.
+        bias: by this share the positive direction turns faster, and the other one slower.
+        errors: scales what is uncertain.
+    """
+    one = np.array([surge, sway, yaw])
+    twist = np.stack([one, one * planar.MIRROR]) * np.array([[1, 1, 1 + bias], [1, 1, 1 - bias]])
+    both = np.stack([np.ones(3), planar.MIRROR])
+    rise = (1 - np.exp(-TIMES / 0.2))[:, None]
+    curve = lag * rise * np.array([-0.0018, -0.0009, 0.0013])
+    left = memory * lag * np.exp(-BEFORE_KNOTS / 0.25)[:, None, None] * rise * np.array([0.003, 0.001, -0.002])
+    left[-1] = 0.0
+    table = curve + left
     return Vehicle(
-        twist=np.stack([twist, twist * planar.MIRROR]),
-        dwells=dwells,
-        lag=np.stack([table, table * planar.MIRROR]),
-        relative_error=ERRORS,
+        twist=twist,
+        lag=table * both[:, None, None],
+        rest=0.5 * curve * both[:, None],
+        spread=np.zeros((2, len(TIMES), 3)),
+        modes=_modes(twist, errors),
         tail_gap=2.4,
     )
+
+
+def _modes(twist: Floats, errors: float) -> tuple[Mode, ...]:
+    found = []
+    for i, share in enumerate(ERRORS):
+        size = np.zeros((2, 3))
+        size[:, i] = errors * share * twist[:, i]
+        found.append(Mode(str(i), size, np.zeros((2, 3))))
+    return tuple(found)

@@ -10,11 +10,15 @@ import pytest
 
 from planner.check import tracking_error
 from planner.path import polygon
-from planner.plan import plan, plan_record
+from planner.plan import plan
+from planner.record import plan_record
 from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
+from sim.model.response import DWELLS
+from sim.model.robot import Robot
 from sim.motion.replay import replay
+from sim.motion.steady import steady
 from sim.motion.switching import switch_response
 from surrogate.export import load_table
 from surrogate.single import SingleRobot, save_single
@@ -28,13 +32,39 @@ def table() -> SingleRobot:
     return tabulate(ROBOT)
 
 
-def test_it_answers_like_the_simulator_between_its_dwells(table: SingleRobot) -> None:
-    dwells = np.array([0.47, 1.13, 3.3])
-    groups = Groups.from_columns({k: np.full(3, v) for k, v in ROBOT.group_values().items()})
-    expected = switch_response(groups, dwells)
-    found = table.query({**{k: np.full(3, v) for k, v in ROBOT.group_values().items()}, "dwell_bar": dwells})
-    assert found["net_speed_bar"] == pytest.approx(expected.net_speed, rel=2e-3)
-    assert found["lag_psi_rad"] == pytest.approx(expected.lag_psi, abs=2e-4)
+def columns(count: int = 1, robot: Robot = ROBOT) -> dict[str, np.ndarray]:
+    return {k: np.full(count, v) for k, v in robot.group_values().items()}
+
+
+def test_it_answers_like_the_simulator(table: SingleRobot) -> None:
+    """Net speed at equal dwells, against flips in time steps that go on until the motion repeats."""
+    dwells = np.array([0.5, 1.0, 3.0])
+    expected = switch_response(Groups.from_columns(columns(3)), dwells)
+    found = table.response(columns())
+    assert np.interp(dwells, DWELLS, found.net_speed[0]) == pytest.approx(expected.net_speed, rel=5e-3)
+    assert np.interp(dwells[2], DWELLS, found.lag[0, :, 2]) == pytest.approx(expected.lag_psi[2], abs=2e-4)
+
+
+def test_it_has_both_directions_of_a_robot_that_turns_unequally() -> None:
+    robot = replace(ROBOT, effects={"left_right_bias": 0.2})
+    table = tabulate(robot)
+    both = {k: np.repeat(v, 2) for k, v in columns(1, robot).items()}
+    both["omega_bar"] = both["omega_bar"] * [1.0, -1.0]
+    motion = steady(Groups.from_columns(both))
+    found = table.query(both)
+    assert found["omega_yr_bar"] == pytest.approx(motion.omega_yr)
+    assert found["v_x"] == pytest.approx(motion.v_x)
+    assert abs(found["omega_yr_bar"][0]) > 1.2 * abs(found["omega_yr_bar"][1])
+    curves = table.response(both)
+    assert np.abs(curves.lag[0] - curves.lag[1]).max() > 1e-5
+
+
+def test_a_robot_that_turns_unequally_is_planned_and_stays_within_the_stated_error() -> None:
+    robot = replace(PRESETS["paper-control"], effects={"left_right_bias": 0.2})
+    result = plan(polygon(4, 3.0), robot, lookup=tabulate(robot))
+    error = tracking_error(plan_record(result), replay([result.schedule()])[0])
+    assert error.largest < error.stated
+    assert error.rms < 1.5 * result.predicted_rms + 0.005
 
 
 def test_a_robot_with_an_effect_is_planned_and_stays_within_the_stated_error(
@@ -51,16 +81,30 @@ def test_a_robot_with_an_effect_is_planned_and_stays_within_the_stated_error(
 def test_another_robot_is_refused(table: SingleRobot) -> None:
     with pytest.raises(InputError, match="end_over_end_drag"):
         plan(polygon(4, 3.0), replace(ROBOT, effects={"end_over_end_drag": 4.0}), lookup=table)
-    with pytest.raises(InputError, match="dwell_bar"):
-        table.query({"dwell_bar": np.array([20.0])})
-
-
-def test_turns_that_are_no_mirror_images_are_refused() -> None:
-    with pytest.raises(InputError, match="left and right"):
-        tabulate(replace(ROBOT, effects={"natural_curvature": 0.1}))
+    with pytest.raises(InputError, match="C_t = 9"):
+        table.query({**columns(), "C_t": np.array([9.0])})
 
 
 def test_a_file_that_is_no_table_is_refused(tmp_path: Path) -> None:
     (tmp_path / "broken.json").write_text("{")
     with pytest.raises(InputError, match="no table"):
         load_table(tmp_path / "broken.json")
+    (tmp_path / "old.json").write_text('{"robot": {}, "dwells": [1.0]}')
+    with pytest.raises(InputError, match="has format 1, this version reads"):
+        load_table(tmp_path / "old.json")
+    with pytest.raises(InputError, match="cannot be read"):
+        load_table(tmp_path / "absent.json")
+
+
+def test_a_file_reads_back_to_the_same_table(table: SingleRobot, tmp_path: Path) -> None:
+    save_single(table, tmp_path / "robot.json")
+    again = load_table(tmp_path / "robot.json")
+    assert again.identity == table.identity
+    assert again.response(columns()).memory == pytest.approx(table.response(columns()).memory)
+
+
+def test_its_slopes_are_those_of_the_simulator(table: SingleRobot) -> None:
+    changed = replace(ROBOT, C_yr=ROBOT.C_yr * 1.01)
+    difference = tabulate(changed).steady["omega_yr_bar"][0] / table.steady["omega_yr_bar"][0] - 1
+    slope = np.array(table.slopes["C_yr"])[0, 2] / table.steady["omega_yr_bar"][0]
+    assert difference == pytest.approx(slope * np.log(1.01), rel=0.03)

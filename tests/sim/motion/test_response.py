@@ -17,6 +17,7 @@ from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.motion.stepped_response import stepped_response
 from sim.motion.switching import switch_response
+from sim.solve.assembly import reversed_bodies
 from tests.sim.robots import CONTROL_VALUES, body_of, control
 
 FINE = Resolution(24, 72)
@@ -32,7 +33,7 @@ def test_curves_agree_with_time_steps(omega_bar: float, changes: dict[str, float
     found = responses(groups)
     assert not found.stepped.any()
     lag, memory, rest, spread = stepped_response(
-        body_of(groups), groups.N, DWELLS[FEW], BEFORE[[1, 3]], resolution=FINE
+        body_of(groups), groups.N, DWELLS[FEW], BEFORE[[1, 3]], reverse=reversed_bodies(groups)[0], resolution=FINE
     )
     assert found.lag[0, FEW] == pytest.approx(lag, abs=2.5e-4)
     assert found.memory[0][[1, 3]][:, FEW] == pytest.approx(memory, abs=5e-4)
@@ -123,3 +124,14 @@ def test_a_robot_that_breaks_down_is_flagged_and_the_others_go_on() -> None:
     assert found.failed.tolist() == [False, True]
     assert np.isnan(found.lag[1]).all()
     assert np.isfinite(found.lag[0]).all()
+
+
+def test_a_replay_turns_at_the_rate_of_each_direction() -> None:
+    """With an odd effect the two directions differ; each flip must change the effect, too."""
+    values = {**CONTROL_VALUES, "omega_bar": 15.0, "left_right_bias": 0.3}
+    both = steady(control(2, omega_bar=np.array([15.0, -15.0]), left_right_bias=0.3))
+    track = replay([Schedule(values, 1, np.array([8.0, 8.0]), (0.0, 0.0, 0.0), 1.0)])[0]
+    for dwell, rate in enumerate(both.omega_yr):
+        late = track[(track["dwell"] == dwell) & (track["time_bar"] > 8.0 * dwell + 4.0)]
+        turned = np.diff(late["heading_rad"].to_numpy()[[0, -1]]) / np.diff(late["time_bar"].to_numpy()[[0, -1]])
+        assert turned[0] == pytest.approx(rate, rel=0.01)

@@ -1,0 +1,167 @@
+"""The declared path: what the robot can follow of the path as drawn.
+
+A path that the pivot can follow with some room is declared as it is. Otherwise the nearest path that it can follow
+is declared (`planner.nearest_path`), or corners are rounded by arcs (`planner.corners`), or the path is refused.
+How far the declared path is from the drawn one is told from both sides: a missed corner is a point of the drawn
+path that is far from the declared one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from planner.corners import CORNER, fillet, kinks, largest_fillet
+from planner.distance import two_sided
+from planner.nearest_path import nearest_path
+from planner.path import Path2D
+from planner.size import extent
+from planner.tractrix import Drift, Reference, reference
+from planner.vehicle import Vehicle
+from sim.io.errors import InputError
+
+Corner = Literal["nearest", "fillet", "error"]
+ROOMS = (0.85, 0.7, 0.55)  # shares of the pivot's largest curvature that the nearest path may use
+TIGHTEST = 0.95  # a reference that needs more than this share is refused
+LOST = 0.3  # declared paths further off than this share of the drawn one's extent are refused
+WARN = 0.1
+_FILLET_ROOM = 0.7
+_SPACING = 0.02  # of points on the reference, in l
+_MOST_POINTS = 150_000
+_MOST_SCALE = 50.0
+
+
+@dataclass(frozen=True)
+class Declared:
+    """The declared path with its tractrix, and its distances from the path as drawn [l]."""
+
+    reference: Reference
+    curvature: float  # largest of the pivot's reference
+    off_drawn: float  # largest distance of a declared point from the drawn path
+    missed: float  # largest distance of a drawn point from the declared path
+    warnings: tuple[str, ...]
+
+
+def declare(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drift: Drift) -> Declared:
+    """Choose what the robot will follow.
+
+    Args:
+        raw: the path as drawn.
+        vehicle: its pivot radius limits the curvature.
+        distance: from the pivot to the tracked point.
+        corner: what to do with places that are too tight.
+        drift: what carries the robot off its heading.
+
+    Raises:
+        InputError: the path is too tight; names the place, the radii and a scale that works.
+    """
+    if corner not in ("nearest", "fillet", "error"):
+        raise InputError(f"corner {corner!r}; allowed are nearest, fillet, error")
+    found = _try(raw, vehicle, distance, corner, drift)
+    if found is None:
+        raise InputError(_too_tight(raw, vehicle, distance, corner, drift))
+    limit = TIGHTEST / vehicle.pivot_radius
+    largest = max(extent(raw))
+    curvature = float(np.abs(found.curvature).max())
+    warnings = []
+    if curvature > limit:
+        raise InputError(_too_tight(raw, vehicle, distance, corner, drift))
+    off, missed = two_sided(found.p, raw.polyline())
+    if max(off, missed) > LOST * largest:
+        raise InputError(_too_tight(raw, vehicle, distance, corner, drift))
+    if max(off, missed) > WARN * largest:
+        warnings.append(
+            f"the shape is lost in part: the declared path is up to {max(off, missed):.2g} l from the drawn one, "
+            f"which is {largest:.3g} l across; draw it larger"
+        )
+    return Declared(found, curvature, off, missed, tuple(warnings))
+
+
+def _try(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drift: Drift) -> Reference | None:
+    """A reference that can be followed, or none."""
+    tight = 1 / vehicle.pivot_radius
+    own = reference(raw, distance, _spacing(raw), drift)
+    sharpest = np.abs(own.curvature).max() / tight
+    if sharpest <= ROOMS[0]:
+        return own
+    if corner == "error":
+        _refuse_corner(raw)
+        return own if sharpest <= TIGHTEST else None
+    if corner == "fillet":
+        path = _rounded(raw, vehicle, distance, drift)
+        found = reference(path, distance, _spacing(path), drift)
+        return found if np.abs(found.curvature).max() <= TIGHTEST * tight else None
+    for room in ROOMS:
+        path = nearest_path(raw, max(distance, 0.0), vehicle.pivot_radius / room, drift=drift)
+        found = reference(path, distance, _spacing(path), drift)
+        if np.abs(found.curvature).max() <= TIGHTEST * tight:
+            return found
+    return None
+
+
+def _spacing(path: Path2D) -> float:
+    return max(_SPACING, path.length / _MOST_POINTS)
+
+
+def _refuse_corner(raw: Path2D) -> None:
+    angle = np.abs(kinks(raw))
+    sharpest = int(angle.argmax())
+    if angle[sharpest] > CORNER:
+        x, y = raw.points[sharpest]
+        raise InputError(
+            f"corner of {math.degrees(angle[sharpest]):.0f} degrees at ({x:.3g}, {y:.3g}); "
+            "round it, or allow corner = nearest"
+        )
+
+
+def _rounded(raw: Path2D, vehicle: Vehicle, distance: float, drift: Drift) -> Path2D:
+    """Corners rounded by the smallest radius that leaves the pivot some room."""
+    limit = _FILLET_ROOM / vehicle.pivot_radius
+    low, high = 0.0, min(largest_fillet(raw), math.hypot(distance, 1 / limit))
+
+    def tightest(radius: float) -> float:
+        path = fillet(raw, radius)
+        return float(np.abs(reference(path, distance, _spacing(path), drift).curvature).max())
+
+    if tightest(high) > limit:
+        return fillet(raw, high)
+    for _ in range(12):
+        middle = (low + high) / 2
+        low, high = (low, middle) if tightest(middle) <= limit else (middle, high)
+    return fillet(raw, high)
+
+
+def _too_tight(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drift: Drift) -> str:
+    own = reference(raw, distance, _spacing(raw), drift)
+    curvature = np.abs(own.curvature)
+    worst = int(curvature.argmax())
+    x, y = own.p[worst]
+    scale = _working_scale(raw, vehicle, distance, corner, drift)
+    remedy = f"scale the path by {scale:.3g}" if scale else "smooth the path, with --smooth LENGTH"
+    return (
+        f"path too tight at ({x:.3g}, {y:.3g}) l: the pivot would turn with radius {1 / curvature[worst]:.3g} l, "
+        f"the robot can with {vehicle.pivot_radius / TIGHTEST:.3g} l (its circle has radius "
+        f"{vehicle.turn_radius:.3g} l), and the nearest path that it can follow has lost the shape; {remedy}"
+    )
+
+
+def _working_scale(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drift: Drift) -> float | None:
+    """A scale with three digits, tried, at which the path is accepted; none up to _MOST_SCALE."""
+
+    def works(factor: float) -> bool:
+        larger = raw.scaled(factor)
+        found = _try(larger, vehicle, distance, corner, drift)
+        if found is None or np.abs(found.curvature).max() > TIGHTEST / vehicle.pivot_radius:
+            return False
+        return max(two_sided(found.p, larger.polyline())) <= LOST * max(extent(larger))
+
+    factor = 1.25
+    while factor <= _MOST_SCALE:
+        rounded = float(f"{factor:.3g}")
+        if works(rounded):
+            return rounded
+        factor *= 1.25
+    return None

@@ -1,0 +1,74 @@
+"""What a calibration found besides the corrected robot: how sure its coefficients are, and a current in the tank.
+
+In a robot.toml it is the table
+
+    [calibration]
+    names = ["C_t", "C_r", "C_yr"]          # coefficients, as ln C, and effects, as sizes
+    covariance = [[...], [...], [...]]
+    current_m_s = [0.0, 0.0]                # along x and y of the lab
+    current_error_m_s = [0.0, 0.0]          # one standard deviation
+
+Every entry may be left out.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.effects import catalogue
+from sim.io.errors import InputError
+
+COEFFICIENTS = ("C_t", "C_r", "C_yr")
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """Covariance (p, p) of ln C and effect sizes, by name; current and its standard deviation [m/s]."""
+
+    names: tuple[str, ...] = ()
+    covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    current: tuple[float, float] = (0.0, 0.0)
+    current_error: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.names if name not in COEFFICIENTS and name not in catalogue()]
+        if unknown:
+            raise InputError(f"calibration: unknown name {unknown[0]!r}; give C_t, C_r, C_yr or an effect")
+        V = self.covariance
+        if V.shape != (len(self.names),) * 2 or not np.isfinite(V).all() or not np.allclose(V, V.T):
+            raise InputError(f"calibration: covariance must be symmetric, {len(self.names)} by {len(self.names)}")
+        if len(V) and np.linalg.eigvalsh(V).min() < -1e-9 * np.abs(V).max():
+            raise InputError("calibration: covariance has a negative eigenvalue; copy it from the calibration")
+        if not np.isfinite([*self.current, *self.current_error]).all() or min(self.current_error) < 0:
+            raise InputError(
+                "calibration: the current and its error must be finite numbers, the error not below 0"
+            )
+
+
+def read_knowledge(path: str | Path) -> Knowledge:
+    """The table [calibration] of a robot.toml; nothing is known where there is no such file or table.
+
+    Raises:
+        InputError: the table is not as described above.
+    """
+    if not Path(path).is_file():
+        return Knowledge()
+    try:
+        found: dict[str, Any] = tomllib.loads(Path(path).read_text()).get("calibration", {})
+        names = tuple(str(name) for name in found.get("names", ()))
+        covariance = np.array(found.get("covariance", []), dtype=float).reshape(len(names), len(names))
+        current, error = (_pair(found.get(key, (0.0, 0.0))) for key in ("current_m_s", "current_error_m_s"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, TypeError, ValueError, AttributeError) as broken:
+        raise InputError(f"{path}: [calibration] cannot be read: {broken}") from None
+    return Knowledge(names, covariance, current, error)
+
+
+def _pair(values: Any) -> tuple[float, float]:
+    x, y = values
+    return float(x), float(y)

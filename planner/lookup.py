@@ -1,0 +1,148 @@
+"""The vehicle that a look-up table gives for a robot: both directions, what is uncertain, and the current."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from planner.knowledge import Knowledge
+from planner.vehicle import Mode, Vehicle, lags_of, resampled
+from sim.arrays import Floats
+from sim.effects import catalogue
+from sim.io.errors import InputError
+from sim.mechanics import planar
+from sim.model.groups import DWELL
+from sim.model.response import BEFORE, DWELLS, Responses
+from sim.model.robot import Robot
+from surrogate.table import LookupTable
+
+_STEADY = ("v_z", "v_x", "omega_yr_bar")
+_ODD = 0.2  # share of a table's error that has opposite signs in the two directions
+_STEP = 0.02  # of a coefficient, for derivatives
+
+
+def vehicle_of(robot: Robot, lookup: LookupTable, knowledge: Knowledge | None = None) -> Vehicle:
+    """The vehicle that the look-up table predicts for a robot.
+
+    Args:
+        robot: the robot.
+        lookup: a trained table, or the table of this robot.
+        knowledge: what a calibration found besides the robot: covariance of its coefficients, a current.
+
+    Raises:
+        InputError: the robot is outside the table's domain, or moves backwards on average.
+    """
+    knowledge = knowledge or Knowledge()
+    twist, curves, gap = _asked(robot.group_values(), lookup)
+    slow = twist[:, 0].mean()
+    if slow <= 0:
+        raise InputError(f"robot {robot.name!r} does not move forward (v_z = {slow:.3g}); turn its motor slower")
+    if (twist[:, 2] * [1.0, -1.0] <= 0).any():
+        raise InputError(f"robot {robot.name!r} turns to the same side in both directions of its motor; it cannot "
+                         "follow a path")  # fmt: skip
+    mirror = np.stack([np.ones(3), planar.MIRROR])
+    lag = (
+        np.stack([lags_of(curves.lag[i], curves.memory[i], curves.before) for i in (0, 1)]) * mirror[:, None, None]
+    )
+    unit = robot.time_scale / robot.tail_length  # from m/s
+    return Vehicle(
+        twist=twist,
+        lag=lag,
+        rest=resampled(curves.rest) * mirror[:, None],
+        spread=resampled(curves.spread),
+        modes=(*_table_modes(twist, lookup), *_coefficient_modes(robot, lookup, twist, knowledge)),
+        current=np.asarray(knowledge.current) * unit,
+        tail_gap=gap,
+    )
+
+
+def _asked(values: dict[str, float], lookup: LookupTable) -> tuple[Floats, Responses, float]:
+    """Twists (2, 3), response curves of both directions, and the gap between tails."""
+    columns: dict[str, Floats] = {name: np.array([value, value]) for name, value in values.items()}
+    columns["omega_bar"] = columns["omega_bar"] * [1.0, -1.0]
+    found = lookup.query(columns)
+    twist = np.stack([found[name] for name in _STEADY], -1)
+    curves = _old_response(columns, lookup) if DWELL in lookup.domain else lookup.response(columns)
+    if curves.failed.any():
+        raise InputError("the response of this robot to a flip could not be found; turn its motor slower")
+    return twist, curves, float(np.min(found["tail_gap"]))
+
+
+def _old_response(columns: dict[str, Floats], lookup: Any) -> Responses:
+    """Curves from a table that knows lags under equal dwells only: no memory, half a lag from rest."""
+    low, high = lookup.domain[DWELL]
+    lags = []
+    for side in (0, 1):
+        rows = {name: np.full(len(DWELLS), values[side]) for name, values in columns.items()}
+        rows["omega_bar"] = np.abs(rows["omega_bar"])
+        found = lookup.query({**rows, DWELL: np.clip(DWELLS, low, high)})
+        lags.append(np.stack([found["lag_z"], found["lag_x"], found["lag_psi_rad"]], -1))
+    lag = np.array(lags)
+    memory = np.zeros((2, len(BEFORE), *lag.shape[1:]))
+    none = np.zeros(2, dtype=bool)
+    return Responses(lag, memory, lag / 2, np.zeros_like(lag), np.zeros(lag.shape[:2]), none, none)
+
+
+def _table_modes(twist: Floats, lookup: LookupTable) -> list[Mode]:
+    """The held-out errors of the table.
+
+    The two directions of a mirror-symmetric robot have the same errors. Those of other robots also have a part of
+    opposite signs.
+    """
+    error = {name: float(values["rms"]) for name, values in lookup.errors.items()}
+    speed, yaw = float(np.hypot(twist[0, 0], twist[0, 1])), abs(float(twist[0, 2]))
+    mirrored = np.allclose(twist[1], twist[0] * planar.MIRROR, rtol=1e-9, atol=0)
+    sides = [np.ones((2, 1))] if mirrored else [np.ones((2, 1)), _ODD * np.array([[1.0], [-1.0]])]
+    modes = []
+    for side in sides:
+        for i, name in enumerate(_STEADY):
+            size = np.zeros((2, 3))
+            size[:, i] = twist[:, i] * error[name] if i else error[name] * speed
+            modes.append(Mode(f"table: {name}", side * size, np.zeros((2, 3))))
+        for i, (name, scale) in enumerate((("lag_z", speed), ("lag_x", speed), ("lag_psi_rad", yaw))):
+            one = np.zeros(3)
+            one[i] = error[name] * scale
+            lag = np.stack([one, one * planar.MIRROR])
+            modes.append(Mode(f"table: {name}", np.zeros((2, 3)), side * lag))
+    return modes
+
+
+def _coefficient_modes(robot: Robot, lookup: LookupTable, twist: Floats, knowledge: Knowledge) -> list[Mode]:
+    """What the covariance of the robot's coefficients does to its twists, and that of the current."""
+    modes: list[Mode] = []
+    if knowledge.names:
+        slopes = np.array([_slope(robot, lookup, twist, name) for name in knowledge.names])  # (p, 2, 3)
+        root = np.linalg.cholesky(knowledge.covariance + 1e-15 * np.eye(len(knowledge.names)))
+        for k, column in enumerate(root.T):
+            move = np.tensordot(column, slopes, 1)
+            modes.append(Mode(f"coefficients: {k + 1}", move, np.zeros((2, 3))))
+    unit = robot.time_scale / robot.tail_length
+    for i, sigma in enumerate(knowledge.current_error):
+        if sigma > 0:
+            along = np.zeros(2)
+            along[i] = sigma * unit
+            modes.append(Mode(f"current {'xy'[i]}", np.zeros((2, 3)), np.zeros((2, 3)), along))
+    return modes
+
+
+def _slope(robot: Robot, lookup: LookupTable, twist: Floats, name: str) -> Floats:
+    """Derivative (2, 3) of the twists in ln C of a coefficient, or in the size of an effect."""
+    values = robot.group_values()
+    stored = getattr(lookup, "slopes", {})
+    if name in stored:
+        return np.asarray(stored[name])
+    effect = name in catalogue()
+    step = _STEP * catalogue()[name].typical if effect else _STEP
+    ends = []
+    for sign in (1.0, -1.0):
+        value = values.get(name, 0.0) + sign * step if effect else values[name] * np.exp(sign * step)
+        try:
+            ends.append((_asked({**values, name: value}, lookup)[0], sign * step))
+        except InputError:  # at the edge of the table
+            ends.append((twist, 0.0))
+    (one, at), (two, to) = ends
+    if at == to:
+        raise InputError(f"the table does not say what {name} changes; make the robot's own table, with "
+                         "python -m surrogate robot")  # fmt: skip
+    return np.asarray((one - two) / (at - to))

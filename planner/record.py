@@ -1,0 +1,95 @@
+"""plan.json: a plan as plain content, with a format version that is checked when it is read."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planner.plan import FEEDBACK_EVERY, Plan
+from sim.io.errors import InputError
+
+FORMAT = 2
+_NUMBERS = ("stated_error_over_l", "feedback_error_over_l", "guaranteed_error_over_l", "predicted_rms_over_l",
+            "predicted_max_over_l", "offset_over_l", "minimum_dwell_bar")  # fmt: skip
+_TABLES = {"reference": 2, "raw_path": 2, "predicted_poses": 3}
+FASTEST = 1e4  # ω̄ from which a plan.json is taken for edited
+
+
+def plan_record(result: Plan) -> dict[str, Any]:
+    """The plan as JSON-like content; `sim.model.schedule.load_schedule` reads its schedule."""
+    robot, schedule = result.robot, result.schedule()
+    x, y, heading = schedule.start
+    return {
+        "format": FORMAT,
+        "robot": {
+            "name": robot.name,
+            "groups": schedule.robot,
+            "tail_length_m": robot.tail_length,
+            "motor_speed_rad_s": robot.motor_speed,
+            "time_scale_s": robot.time_scale,
+        },
+        "point": result.point,
+        "offset_over_l": result.offset,
+        "first_direction": result.first_direction,
+        "start": {"x_over_l": x, "y_over_l": y, "heading_rad": heading},
+        "dwell_bar": result.dwells.tolist(),
+        "dwell_s": result.seconds.tolist(),
+        "predicted_poses": result.poses.tolist(),
+        "reference": result.reference.tolist(),
+        "raw_path": result.raw.tolist(),
+        "closed": result.closed,
+        "objective": result.objective,
+        "minimum_dwell_bar": result.minimum_dwell,
+        "off_drawn_over_l": result.off_drawn,
+        "missed_over_l": result.missed,
+        "zigzag_rms_over_l": result.zigzag_rms,
+        "guaranteed_error_over_l": result.guaranteed,
+        "stated_error_over_l": result.stated_error,
+        "feedback_error_over_l": result.feedback_error,
+        "feedback_every": FEEDBACK_EVERY,
+        "predicted_rms_over_l": result.predicted_rms,
+        "predicted_max_over_l": result.predicted_max,
+        "drawn_rms_over_l": result.drawn_rms,
+        "drawn_max_over_l": result.drawn_max,
+        "closure_over_l": result.closure,
+        "model": result.model,
+        "warnings": list(result.warnings),
+    }
+
+
+def load_plan(path: str | Path) -> dict[str, Any]:
+    """The content of a plan.json, checked.
+
+    Raises:
+        InputError: the file is no plan.json of this version, or it has a value that cannot be.
+    """
+    try:
+        content = json.loads(Path(path).read_text())
+    except OSError as missing:
+        raise InputError(f"{path} cannot be read ({missing.strerror}); give a plan.json of the planner") from None
+    except (json.JSONDecodeError, UnicodeDecodeError) as broken:
+        raise InputError(f"{path} is not a plan.json of the planner ({broken}); plan again") from None
+    if not isinstance(content, dict) or "format" not in content:
+        raise InputError(f"{path} is not a plan.json of the planner (it has no format); plan again")
+    if content["format"] != FORMAT:
+        raise InputError(f"{path} has format {content['format']}, this version reads {FORMAT}: plan again")
+    try:
+        for name in _NUMBERS:
+            if not math.isfinite(float(content[name])):
+                raise InputError(f"{path}: {name} = {content[name]} is no finite number; plan again")
+        for name, width in _TABLES.items():
+            table = np.array(content[name], dtype=float)
+            if table.ndim != 2 or table.shape[1] != width or len(table) < 2 or not np.isfinite(table).all():
+                raise InputError(
+                    f"{path}: {name} must have two or more rows of {width} finite numbers; plan again"
+                )
+        if not 0 < abs(float(content["robot"]["groups"]["omega_bar"])) <= FASTEST:
+            raise InputError(f"{path}: omega_bar is not between 0 and {FASTEST:g}; plan again")
+        content["point"]
+    except (KeyError, TypeError, ValueError) as broken:
+        raise InputError(f"{path} is not a plan.json of the planner ({broken}); plan again") from None
+    return content

@@ -1,0 +1,69 @@
+"""A made-up robot that swims under a tracker's orders, watched by a camera with delays, gaps and wrong poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from planner.distance import distance_to
+from planner.plan import Plan
+from planner.tracker import Tracker
+from planner.vehicle import Vehicle
+from sim.mechanics import planar
+
+
+@dataclass
+class Camera:
+    """Standard deviations of poses [l, rad], time between poses, delay, and shares of gaps and of wrong poses."""
+
+    noise: tuple[float, float] = (0.01, 0.01)
+    every: float = 1.0
+    delay: float = 0.0
+    gaps: float = 0.0
+    wrong: float = 0.0
+    rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
+
+    def sees(self, pose: np.ndarray) -> Any:
+        if self.rng.random() < self.gaps:
+            return None
+        if self.rng.random() < self.wrong:
+            return (float(self.rng.normal(0, 5)), float(self.rng.normal(0, 5)), float(self.rng.uniform(-3, 3)))
+        x, y, heading = (pose + self.rng.normal(size=3) * [self.noise[0], self.noise[0], self.noise[1]]).tolist()
+        return x, y, (heading + np.pi) % (2 * np.pi) - np.pi
+
+
+def _moved(car: Vehicle, pose: np.ndarray, sense: int, before: float | None, start: float, time: float) -> Any:
+    moved = planar.compose(pose, car.motion(sense, before, time - start))
+    return moved + np.append(car.current * (time - start), 0.0)
+
+
+def swim(tracker: Tracker, plan: Plan, truth: Vehicle, camera: Camera, *, changes_to: Vehicle | None = None,
+         most: int = 5000) -> tuple[np.ndarray, list[float]]:  # fmt: skip
+    """Distances from the declared path at many instants, and the dwells that were ordered."""
+    pose, before, start, seen, waiting = np.array(plan.start), None, 0.0, 0.0, []
+    advice, dwells, track = tracker.feed(0.0), [], []
+    half = len(plan.dwells) // 2
+    while not advice.finished and len(dwells) < most:
+        sense, known = advice.direction, advice.flip_at
+        car = changes_to if changes_to is not None and len(dwells) > half else truth
+
+        at = partial(_moved, car, pose, sense, before, start)
+        while seen + camera.every <= known or (waiting and waiting[0][0] <= known):
+            if waiting and waiting[0][0] <= min(known, seen + camera.every):
+                when, found, taken = waiting.pop(0)
+                advice = tracker.feed(when, found, taken)
+            else:
+                seen += camera.every
+                found = camera.sees(at(seen))
+                if found is not None:
+                    waiting.append((seen + camera.delay, found, seen))
+                    waiting.sort(key=lambda item: item[0])
+            known = advice.flip_at
+        track += [at(start + share * (known - start)) for share in np.linspace(0.2, 1, 5)]
+        dwells.append(known - start)
+        pose, before, start = at(known), known - start, known
+        advice = tracker.feed(known)
+    return distance_to(plan.reference, np.array(track)[:, :2]), dwells

@@ -1,0 +1,46 @@
+"""Distances against a comparison of all with all, and that they take time linear in the length."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.distance import distance_to, nearest, two_sided
+
+
+def all_with_all(polyline: np.ndarray, points: np.ndarray) -> np.ndarray:
+    start, along = polyline[:-1], np.diff(polyline, axis=0)
+    away = points[:, None] - start
+    share = np.clip((away * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-300), 0, 1)
+    return np.asarray(np.hypot(*np.moveaxis(away - share[..., None] * along, -1, 0)).min(1))
+
+
+@given(st.integers(0, 10_000), st.integers(2, 60), st.floats(0.01, 30.0))
+@settings(max_examples=150, deadline=None)
+def test_distances_are_exact(seed: int, count: int, spread: float) -> None:
+    """Any polyline: short and long steps, crossings, hairpins, points near and far."""
+    rng = np.random.default_rng(seed)
+    polyline = np.cumsum(rng.normal(size=(count, 2)) * 10 ** rng.uniform(-2, 1, (count, 1)), 0)
+    if seed % 3 == 0:
+        polyline = np.concatenate([polyline, polyline[::-1]])
+    points = polyline[rng.integers(count, size=30)] + spread * rng.normal(size=(30, 2))
+    assert distance_to(polyline, points) == pytest.approx(all_with_all(polyline, points), rel=1e-9, abs=1e-9)
+
+
+def test_the_nearest_place_is_on_the_polyline() -> None:
+    polyline = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 3.0]])
+    distance, segment, share = nearest(polyline, np.array([[0.5, 0.4], [2.5, 1.5]]))
+    assert distance == pytest.approx([0.4, 0.5])
+    assert segment.tolist() == [0, 1]
+    assert share == pytest.approx([0.25, 0.5])
+
+
+def test_a_missed_corner_is_seen_from_the_other_side() -> None:
+    square = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [0, 0]], dtype=float)
+    angle = np.linspace(0, 2 * np.pi, 400)
+    inscribed = 1 + np.stack([np.cos(angle), np.sin(angle)], 1)
+    off, missed = two_sided(inscribed, square)
+    assert off == pytest.approx(1 - np.sqrt(0.5), rel=1e-2)
+    assert missed == pytest.approx(np.sqrt(2) - 1, rel=1e-2)

@@ -1,0 +1,95 @@
+"""What a calibration knows: read from the robot's file, and used in the plan."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.knowledge import COEFFICIENTS, Knowledge, read_knowledge
+from planner.lookup import vehicle_of
+from planner.path import Path2D, circle, smoothed
+from planner.plan import plan
+from sim.inputs import load_robot, robot_toml
+from sim.io.errors import InputError
+from sim.model.presets import PRESETS
+from surrogate.export import load
+
+CONTROL = PRESETS["paper-control"]
+TABLE = """
+[calibration]
+names = ["C_t", "C_r", "C_yr"]
+covariance = [[1e-4, 0.0, 0.0], [0.0, 1e-4, 5e-5], [0.0, 5e-5, 1e-4]]
+current_m_s = [2e-5, 0.0]
+"""
+
+
+def test_the_table_is_read_from_the_robots_file(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text(robot_toml(CONTROL) + TABLE)
+    found = read_knowledge(tmp_path / "robot.toml")
+    assert found.names == COEFFICIENTS
+    assert found.covariance[1, 2] == 5e-5
+    assert found.current == (2e-5, 0.0)
+    assert load_robot(tmp_path / "robot.toml") == load_robot(CONTROL.name)
+    assert read_knowledge("paper-control").names == ()
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ('names = ["C_q"]\ncovariance = [[1.0]]', "unknown name"),
+        ('names = ["C_t"]\ncovariance = [[1.0, 2.0]]', "cannot be read"),
+        ('names = ["C_t", "C_r"]\ncovariance = [[1.0, 2.0], [2.0, 1.0]]', "negative eigenvalue"),
+        ("current_m_s = [1.0]", "cannot be read"),
+        ("current_m_s = [nan, 0.0]", "finite"),
+    ],
+)
+def test_wrong_tables_are_refused(tmp_path: Path, line: str, expected: str) -> None:
+    (tmp_path / "robot.toml").write_text("[calibration]\n" + line)
+    with pytest.raises(InputError, match=expected):
+        read_knowledge(tmp_path / "robot.toml")
+
+
+def test_the_covariance_widens_the_stated_error_by_what_the_table_says() -> None:
+    """One standard deviation of C_yr moves the twist as the table moves between two robots."""
+    lookup = load()
+    sure = Knowledge(("C_yr",), np.array([[1e-4]]))
+    (mode,) = [m for m in vehicle_of(CONTROL, lookup, sure).modes if m.name.startswith("coefficients")]
+    groups = {k: np.array([v]) for k, v in CONTROL.group_values().items()}
+    ends = [lookup.query({**groups, "C_yr": groups["C_yr"] * np.exp(s)}) for s in (0.01, -0.01)]
+    expected = (ends[0]["omega_yr_bar"] - ends[1]["omega_yr_bar"]) / 2
+    assert mode.twist[0, 2] == pytest.approx(expected[0], rel=0.05)
+    one, other = plan(circle(2.0), CONTROL), plan(circle(2.0), CONTROL, knowledge=sure)
+    assert other.stated_error > 1.5 * one.stated_error
+
+
+def test_a_current_is_steered_against() -> None:
+    """Across a line: the robot looks upstream, and its track stays on the line."""
+    unit = CONTROL.tail_length / CONTROL.time_scale
+    flow = Knowledge(current=(0.0, 0.004 * unit))
+    result = plan(Path2D.of([[0, 0], [12, 0]]), CONTROL, knowledge=flow)
+    assert result.predicted_rms < 1.4 * result.zigzag_rms
+    assert result.poses[len(result.poses) // 2 :, 2].mean() == pytest.approx(
+        -math.asin(0.004 / result.net_speed), abs=0.01
+    )
+    with pytest.raises(InputError, match="as fast as the robot"):
+        plan(circle(3.0), CONTROL, knowledge=Knowledge(current=(0.0, 0.5 * unit)))
+
+
+def test_smoothing_takes_camera_noise_out_and_says_what_it_moves() -> None:
+    rng = np.random.default_rng(0)
+    clean = circle(2.0)
+    noisy = Path2D.of(clean.points + 0.02 * rng.normal(size=clean.points.shape), closed=True)
+    found, moved = smoothed(noisy, 0.5)
+    assert np.abs(np.hypot(*found.points.T) - 2.0).max() < 0.03
+    assert 0.01 < moved < 0.15
+    assert plan(found, CONTROL).missed < 0.05
+    with pytest.raises(InputError, match="smoothing over"):
+        smoothed(noisy, -1.0)
+
+
+def test_an_open_path_keeps_its_ends() -> None:
+    found, _ = smoothed(Path2D.of([[0, 0], [2, 0], [2, 3]]), 0.4)
+    assert found.points[[0, -1]] == pytest.approx(np.array([[0.0, 0.0], [2.0, 3.0]]))

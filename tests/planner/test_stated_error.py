@@ -1,0 +1,66 @@
+"""The stated error: against vehicles drawn and carried through one by one, and its parts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.distance import distance_to
+from planner.path import Path2D, circle
+from planner.schedule import Switches, follow, trace
+from planner.stated_error import look_ahead, predicted_error, stated_error
+from planner.tractrix import Reference, reference
+from planner.vehicle import TIMES, Vehicle
+from tests.planner.vehicles import vehicle
+
+
+def planned(car: Vehicle, path: Path2D) -> tuple[Switches, Reference, np.ndarray]:
+    ref = reference(path, car.pivot_distance, 0.02)
+    ahead = look_ahead(car, float(np.abs(ref.curvature).max()))
+    switches = follow(ref, car, pivot_distance=car.pivot_distance, ahead=ahead, dwell=0.8, offset=0.0)
+    return switches, ref, trace(car, switches, 0.0)
+
+
+@pytest.mark.parametrize("path", [circle(2.0), Path2D.of([[0, 0], [25, 0]])], ids=["circle", "line"])
+@pytest.mark.parametrize("errors", [1.0, 4.0])
+def test_it_is_the_quantile_over_drawn_vehicles(path: Path2D, errors: float) -> None:
+    car = vehicle(errors=errors)
+    switches, ref, track = planned(car, path)
+    stated = stated_error(car, switches, track, predicted_error(ref.p, track, closed=path.closed))
+    rng = np.random.default_rng(5)
+    worst = []
+    for _ in range(300):
+        twist = car.twist + sum(rng.normal() * mode.twist for mode in car.modes)
+        drawn = trace(replace(car, twist=twist), switches, 0.0)
+        worst.append(distance_to(ref.p, drawn).max())
+    assert np.mean(np.array(worst) <= stated) == pytest.approx(0.95, abs=0.035)
+
+
+def test_without_uncertainty_it_is_the_predicted_error() -> None:
+    car = replace(vehicle(), modes=())
+    switches, ref, track = planned(car, circle(2.0))
+    error = predicted_error(ref.p, track, closed=True)
+    assert stated_error(car, switches, track, error) == pytest.approx(error.largest)
+
+
+def test_random_phases_add_as_a_walk() -> None:
+    """On a line, a heading that jitters by s at each of M flips leads s √(M³/3) steps aside."""
+    car = replace(vehicle(errors=0.0), spread=np.tile([0.0, 0.0, 1e-3], (2, len(TIMES), 1)))
+    switches, ref, track = planned(car, Path2D.of([[0, 0], [30, 0]]))
+    error = predicted_error(ref.p, track, closed=False)
+    stated = stated_error(car, switches, track, error)
+    count = len(switches.dwells)
+    expected = 1.96 * 1e-3 * np.sqrt(count**3 / 3) * 30 / count
+    assert stated - error.largest == pytest.approx(expected, rel=0.2)
+
+
+def test_feedback_stops_the_growth() -> None:
+    car = vehicle(errors=4.0)
+    for length, path in ((15.0, Path2D.of([[0, 0], [15, 0]])), (60.0, Path2D.of([[0, 0], [60, 0]]))):
+        switches, ref, track = planned(car, path)
+        error = predicted_error(ref.p, track, closed=False)
+        held = stated_error(car, switches, track, error, every=20)
+        assert held <= stated_error(car, switches, track, error) + 1e-3
+        assert held < error.largest + 0.02, length

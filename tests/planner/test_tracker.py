@@ -1,0 +1,122 @@
+"""Tracker: robots that differ from the model stay on the path, and no input makes it flip too early."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.path import circle
+from planner.plan import Plan, plan
+from planner.tracker import Tracker
+from planner.vehicle import Vehicle
+from sim.model.presets import PRESETS
+from tests.planner.swimming import Camera, swim
+
+
+@cache
+def planned() -> Plan:
+    return plan(circle(2.0), PRESETS["paper-control"], minimum_dwell=0.7)
+
+
+def changed(*, left: float = 1.0, right: float = 1.0, speed: float = 1.0, current: float = 0.0) -> Vehicle:
+    car = planned().vehicle
+    twist = car.twist * np.array([[speed, speed, left], [speed, speed, right]])
+    return replace(car, twist=twist, current=np.array([current, 0.0]))
+
+
+def rms(distance: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(distance**2)))
+
+
+ROBOTS = {
+    "as planned": changed(),
+    "5 % faster turns": changed(left=1.05, right=1.05),
+    "5 % slower": changed(speed=0.95),
+    "3 % asymmetry": changed(left=1.03, right=0.97),
+    "current": changed(current=0.0006),
+}
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_robots_that_differ_stay_on_the_path(name: str) -> None:
+    distance, dwells = swim(Tracker(planned()), planned(), ROBOTS[name], Camera())
+    assert rms(distance) < 0.026
+    assert min(dwells) >= planned().minimum_dwell * (1 - 1e-9)
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [Camera(delay=2.0), Camera(gaps=0.2), Camera(wrong=0.1), Camera(every=0.3, delay=1.0, gaps=0.5, wrong=0.05)],
+    ids=["late", "gaps", "wrong", "all"],
+)
+def test_bad_cameras_do_little_harm(camera: Camera) -> None:
+    distance, _ = swim(Tracker(planned()), planned(), ROBOTS["3 % asymmetry"], camera)
+    assert rms(distance) < 0.03
+
+
+def test_without_the_tracker_the_same_robot_is_lost() -> None:
+    """The independent side of the tests above: what feedback is worth."""
+    distance, _ = swim(Tracker(planned()), planned(), ROBOTS["3 % asymmetry"], Camera(gaps=1.0))
+    assert rms(distance) > 0.2
+
+
+def test_an_effect_that_starts_halfway_is_learned() -> None:
+    tracker = Tracker(planned())
+    distance, _ = swim(tracker, planned(), changed(), Camera(), changes_to=changed(left=1.06, right=0.94))
+    assert rms(distance) < 0.05
+    assert tracker.learned["yaw rate, left"] - tracker.learned["yaw rate, right"] > 0.03
+
+
+def test_it_learns_the_robot() -> None:
+    tracker = Tracker(planned())
+    swim(tracker, planned(), changed(left=1.04, right=0.99, speed=0.97), Camera())
+    assert tracker.learned["yaw rate, left"] == pytest.approx(0.04, abs=0.01)
+    assert tracker.learned["yaw rate, right"] == pytest.approx(-0.01, abs=0.01)
+    assert tracker.learned["speed"] == pytest.approx(-0.03, abs=0.015)
+
+
+def test_alarms_are_rare_for_a_robot_of_the_model_and_come_for_another() -> None:
+    def alarmed(car: Vehicle, seed: int) -> bool:
+        tracker, rang = Tracker(planned()), False
+        judge = tracker._judge
+
+        def spy(size: float) -> None:
+            nonlocal rang
+            judge(size)
+            rang |= tracker.alarm
+
+        tracker._judge = spy  # type: ignore[method-assign]
+        swim(tracker, planned(), car, Camera(rng=np.random.default_rng(seed)))
+        return rang
+
+    assert sum(alarmed(changed(left=1.02), seed) for seed in range(4)) == 0
+    jerky = replace(changed(), lag=changed().lag + np.array([0.03, 0.0, 0.0]), twist=1.3 * changed().twist)
+    assert alarmed(jerky, 0)
+
+
+VALUES = st.one_of(st.floats(-1e3, 1e3), st.sampled_from([math.nan, math.inf, -math.inf, 1e300, -1e300, 0.0]))
+
+
+@given(st.lists(st.tuples(st.one_of(st.floats(-5, 20), VALUES), VALUES, VALUES, VALUES, VALUES), max_size=60))
+@settings(max_examples=200, deadline=None)
+def test_it_never_flips_before_the_shortest_dwell(events: list[tuple[float, float, float, float, float]]) -> None:
+    """Any numbers: times that jump and go back, poses from anywhere."""
+    tracker = Tracker(planned())
+    now, last, direction, began = 0.0, tracker.advice, tracker.advice.direction, 0.0
+    for step, x, y, heading, seen in events:
+        now += step if math.isfinite(step) else 0.0
+        advice = tracker.feed(step if not math.isfinite(step) else now, (x, y, heading), seen)
+        if advice.finished:
+            break
+        if advice.direction != direction:  # the flip that was announced has happened
+            assert last.flip_at - began >= planned().minimum_dwell * (1 - 1e-12)
+            direction, began = advice.direction, last.flip_at
+        assert math.isfinite(advice.flip_at)
+        assert advice.flip_at - began >= planned().minimum_dwell * (1 - 1e-12)
+        last = advice

@@ -1,0 +1,32 @@
+"""The pipe: the same orders as from Python, in seconds; lines that cannot be read do no harm."""
+
+from __future__ import annotations
+
+import pytest
+
+from planner.path import circle
+from planner.plan import plan
+from planner.tracker import Tracker
+from planner.tracker_pipe import answers
+from sim.model.presets import PRESETS
+
+
+def test_it_answers_like_the_tracker_in_seconds() -> None:
+    result = plan(circle(2.0), PRESETS["paper-control"])
+    scale = result.robot.time_scale
+    one, other = Tracker(result), Tracker(result)
+    lines = [
+        "0",
+        f"1.0 {result.start[0]} {result.start[1]} {result.start[2]}",
+        "nonsense",
+        "",
+        "2.5 nan 0 0",
+        "3 1",
+    ]
+    found = [line.split() for line in answers(one, lines, scale)]
+    expected = [other.feed(0.0), other.feed(1.0 / scale, result.start)]
+    expected += [other.feed(other._now), other.feed(other._now), other.feed(2.5 / scale), other.feed(3 / scale)]
+    assert len(found) == len(lines)
+    for words, advice in zip(found, expected, strict=True):
+        assert int(words[0]) == advice.direction
+        assert float(words[1]) == pytest.approx(advice.flip_at * scale, abs=1e-5)
