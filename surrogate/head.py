@@ -13,7 +13,7 @@ Units: l, μ0 l⁴/EI, EI/l².
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import NamedTuple
 
 import torch
@@ -51,8 +51,12 @@ def at(heads: Heads, rows: Tensor) -> Heads:
     return Heads(*[part[rows] for part in heads])
 
 
-def robots_of(columns: Mapping[str, Floats | Tensor]) -> tuple[Heads, Tails]:
-    """Heads and tails of robots by column name, each (M,), a_over_R and effects included.
+def robots_of(columns: Mapping[str, Floats | Tensor], keep: Collection[str] = ()) -> tuple[Heads, Tails]:
+    """Heads and tails of robots by column name, each (M,), a_over_R and effects included; differentiable.
+
+    Args:
+        columns: robots.
+        keep: effects to keep even if no robot has them.
 
     Raises:
         InputError: an effect changes the tails themselves.
@@ -60,7 +64,7 @@ def robots_of(columns: Mapping[str, Floats | Tensor]) -> tuple[Heads, Tails]:
     tensors = {name: torch.as_tensor(values, dtype=torch.float64) for name, values in columns.items()}
     count = tensors.pop("N")
     own = {name: tensors.pop(name) for name in Groups.__dataclass_fields__ if name in tensors}
-    effects = {name: size for name, size in tensors.items() if bool((size != 0).any())}
+    effects = {name: size for name, size in tensors.items() if name in keep or bool((size != 0).any())}
     for name in effects:
         if not is_of_head(name):
             raise InputError(

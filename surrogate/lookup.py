@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -128,6 +128,26 @@ class Lookup:
         found = self.motions(values, flag=flag)
         return self._responses(found, steady_outputs(found, self.tails), values)
 
+    def jacobian(
+        self, columns: Mapping[str, Floats], parameters: Sequence[str], *, flag: bool = False
+    ) -> dict[str, dict[str, Floats]]:
+        """∂(output)/∂(parameter) of STEADY_OUTPUTS, by output and parameter, each (M,).
+
+        Exact derivatives of the table: those of one more step of Newton's method at the solution.
+
+        Args:
+            columns: robots by column name, each (M,).
+            parameters: names of groups, without N, or of effects on the head.
+            flag: answer outside the domain as well.
+
+        Raises:
+            InputError: a robot that cannot be, or one outside the domain.
+        """
+        from surrogate.derivatives import slopes
+
+        values = check_columns({**columns, **{n: columns.get(n, 0.0 * columns["N"]) for n in parameters}})
+        return slopes(self.tails, values, self.motions(values, flag=flag).motion, parameters)
+
     def motions(self, values: Mapping[str, Floats], *, flag: bool = False) -> Motions:
         """Motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
         heads, tails = head.robots_of(values)
@@ -214,13 +234,7 @@ class Lookup:
 
 def steady_outputs(found: Motions, tails: TailTable) -> dict[str, Floats]:
     """STEADY_OUTPUTS of motions."""
-    motion, sense = found.motion, found.heads.sense
-    yaw, surge = sense * motion[:, 2], motion[:, 1]
-    sway = sense * (motion[:, 0] + motion[:, 2] * found.heads.length / 2)
-    gap = tails.tail_gap(found.tails, motion)
-    angle = torch.rad2deg(torch.atan2(sway.abs(), surge))
-    spins = sense * motion[:, 4], sense * motion[:, 3]
-    values = (*spins, yaw, sway, surge, torch.hypot(sway, surge) / yaw.abs(), angle, gap)
+    values = tails.outputs(found.heads, found.tails, found.motion)
     return {name: np.asarray(value.numpy()) for name, value in zip(STEADY_OUTPUTS, values, strict=True)}
 
 

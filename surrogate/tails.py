@@ -62,6 +62,15 @@ class TailTable:
                 motion[rows], converged[rows] = head.solve(head.at(heads, rows), tail.at(tails, rows), numbers)
         return motion, converged
 
+    def outputs(self, heads: Heads, tails: Tails, motion: Tensor) -> tuple[Tensor, ...]:
+        """ω_t, ω_h, ω_yr, v_x and v_z of the head's centre, R_yr, θ in degrees, and the gap, each (M,)."""
+        yaw, surge = heads.sense * motion[:, 2], motion[:, 1]
+        sway = heads.sense * (motion[:, 0] + motion[:, 2] * heads.length / 2)
+        radius = torch.sqrt(sway**2 + surge**2) / yaw.abs()
+        angle = torch.rad2deg(torch.atan2(sway.abs(), surge))
+        spins = heads.sense * motion[:, 4], heads.sense * motion[:, 3]
+        return (*spins, yaw, sway, surge, radius, angle, self.tail_gap(tails, motion))
+
     def tail_gap(self, tails: Tails, motion: Tensor) -> Tensor:
         """Smallest distance between tails over 2 r0, (M,); infinite for one tail."""
         share = self.gap(_gap_inputs(tails, motion))[:, 0]
