@@ -2,8 +2,8 @@
 
     certified error = largest relative difference between table and simulator + the simulator's own error
 
-of the spins, the yaw rate and the velocities (these relative to the speed). The simulator takes about a millisecond a
-robot, and longer for one and two tails.
+of the spins, the yaw rate and the velocities (these relative to the speed). The simulator takes about a
+millisecond a robot, and longer for one and two tails.
 """
 
 from __future__ import annotations

@@ -1,16 +1,16 @@
 """The table of the response to a flip: curves over the dwell (`sim.model.response`), learned from simulated flips.
 
-The curves are lengths and angles. Over the speeds of the steady motion they are times, which vary little from robot to
-robot:
+The curves are lengths and angles. Over the speeds of the steady motion they are times, which vary little from
+robot to robot:
 
     Δz/w, Δx/v_x, Δψ/ω_yr,   w² = v_z² + (v_x/10)²
 
-(w and not v_z, because v_z may vanish). Lag, memory, rest and spread are each written in the principal components of
-the rows that were learned. A network gives the components. A robot's inputs are those of its tails in steady motion
-(`surrogate.tail`), how the drag of its head compares with that of its tails, and N.
+(w and not v_z, because v_z may vanish). Lag, memory, rest and spread are each written in the principal
+components of the rows that were learned. A network gives the components. A robot's inputs are those of its tails
+in steady motion (`surrogate.tail`), how the drag of its head compares with that of its tails, and N.
 
 The components are curves of the simulator. So the curves of the table are smooth, and constant for long dwells.
-Left out: robots whose left and right turns differ. Units: l, μ0 l⁴/EI.
+Left out: robots with one tail, and robots whose left and right turns differ. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class CurveTable:
 
 
 def inputs_of(heads: Heads, tails: Tails, motion: Tensor) -> Tensor:
-    """Inputs of the network, (M, 13)."""
+    """Inputs of the network, (M, 12)."""
     across = tails.count * tails.zeta_perp
     resistance = heads.resistance
     extra = [
@@ -81,7 +81,6 @@ def inputs_of(heads: Heads, tails: Tails, motion: Tensor) -> Tensor:
         torch.log(resistance[:, 1, 1] / across),
         torch.log(resistance[:, 2, 2] / across),
         torch.log(tails.count),
-        (tails.count == 1).double(),
         (tails.count == 2).double(),
     ]
     return torch.cat([tail.inputs_of(tails, motion), torch.stack(extra, -1)], -1)

@@ -1,7 +1,7 @@
 """Derivatives of the table's steady motion in the inputs of a robot.
 
-At a solution u of F(u; p) = 0, one more step of Newton's method, u(p) = u − F_u⁻¹ F(u; p) with F_u held, has the exact
-derivative du/dp = −F_u⁻¹ F_p. So the outputs are differentiated through that step (forward mode).
+At a solution u of F(u; p) = 0, one more step of Newton's method, u(p) = u − F_u⁻¹ F(u; p) with F_u held, has the
+exact derivative du/dp = −F_u⁻¹ F_p. So the outputs are differentiated through that step (forward mode).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from torch import Tensor
 
 from sim.arrays import Floats
 from surrogate import head
+from surrogate.network import Ensemble
 from surrogate.tails import TailTable, class_of
 
 OUTPUTS = (
@@ -37,29 +38,33 @@ def slopes(
     kind = class_of(columns["N"])
     for k, network in enumerate(table.wrench):
         rows = torch.nonzero(kind == k)[:, 0]
-        if not len(rows) or network is None:
-            continue
-        own = {name: array[rows] for name, array in columns.items()}
-        u = motion[rows, :4]
-        _, slope = head.value_and_slope(_unbalanced(own, parameters, network), u)
-        inverse = torch.linalg.inv_ex(slope)[0]
-        for parameter in parameters:
-
-            def outputs(size: Tensor, name: str = parameter) -> tuple[Tensor, ...]:
-                moved = {**own, name: size}
-                heads, tails = head.robots_of(moved, keep=parameters)
-                left = head.unbalanced(heads, tails, u, network)
-                now = head.full_motion(heads, u - (inverse @ left[..., None])[..., 0])
-                return table.outputs(heads, tails, now)
-
-            _, changes = torch.func.jvp(outputs, (own[parameter],), (torch.ones_like(own[parameter]),))
-            for name, change in zip(OUTPUTS, changes, strict=True):
-                found[name][parameter][rows.numpy()] = change.numpy()
+        if len(rows) and network is not None:
+            own = {name: array[rows] for name, array in columns.items()}
+            for parameter, changes in _changes(table, network, own, motion[rows, :4], parameters).items():
+                for name, change in zip(OUTPUTS, changes, strict=True):
+                    found[name][parameter][rows.numpy()] = change.numpy()
     return found
 
 
-def _unbalanced(columns: dict[str, Tensor], keep: Sequence[str], network: head.Numbers):  # type: ignore[no-untyped-def]
-    heads, tails = head.robots_of(columns, keep=keep)
-    return lambda u: head.unbalanced(heads, tails, u, network)
+def _changes(
+    table: TailTable, network: Ensemble, columns: dict[str, Tensor], u: Tensor, parameters: Sequence[str]
+) -> dict[str, tuple[Tensor, ...]]:
+    """Derivatives of OUTPUTS by parameter, of robots with one network and the solution u (M, 4)."""
+    heads, tails = head.robots_of(columns, keep=parameters)
+    _, slope = head.value_and_slope(lambda v: head.unbalanced(heads, tails, v, network), u)
+    inverse = torch.linalg.inv_ex(slope)[0]
 
+    def outputs(moved: dict[str, Tensor]) -> tuple[Tensor, ...]:
+        heads, tails = head.robots_of(moved, keep=parameters)
+        left = head.unbalanced(heads, tails, u, network)
+        return table.outputs(heads, tails, head.full_motion(heads, u - (inverse @ left[..., None])[..., 0]))
 
+    found = {}
+    for parameter in parameters:
+        size = columns[parameter]
+
+        def along(value: Tensor, name: str = parameter) -> tuple[Tensor, ...]:
+            return outputs({**columns, name: value})
+
+        found[parameter] = torch.func.jvp(along, (size,), (torch.ones_like(size),))[1]
+    return found

@@ -1,10 +1,10 @@
 """Held-out error of the look-up table, per output.
 
-For outputs that keep their sign, the error is relative. For θ it is in degrees. For v_z and for the response to a flip
-it is relative to the distance (or turn) of the robot in one unit of time. For the net speed it is relative to v_z,
-its limit for long dwells. Reported are the root mean square, the median, the 95th percentile and the largest error over
-rows whose tails do not touch, where the model is valid, and the same over all rows. `coverage` is the share of rows
-inside their interval.
+For outputs that keep their sign, the error is relative. For θ it is in degrees. For v_z and for the response to
+a flip it is relative to the distance (or turn) of the robot in one unit of time. For the net speed it is
+relative to v_z, its limit for long dwells. Reported are the root mean square, the median, the 95th percentile
+and the largest error over rows whose tails do not touch, where the model is valid, and the same over all rows.
+`coverage` is the share of rows inside their interval.
 """
 
 from __future__ import annotations
@@ -100,5 +100,7 @@ def error_table(lookup: Lookup) -> str:
         percent = 1 if name == "theta_deg" else 100
         figures = "".join(f"{percent * error[k]:9.4f}" for k in ("rms", "median", "p95"))
         figures += f"{percent * error['largest']:9.2f}{percent * error['p95_with_touching']:11.4f}"
-        lines.append(f"{name:16}{figures}  {_UNITS.get(name, '%') if percent == 1 else '% ' + _UNITS.get(name, '')}")
+        lines.append(
+            f"{name:16}{figures}  {_UNITS.get(name, '%') if percent == 1 else '% ' + _UNITS.get(name, '')}"
+        )
     return "\n".join(line.rstrip() for line in lines)

@@ -1,9 +1,9 @@
 """Model files: everything that a query needs in one file. Reading a file runs no code from it.
 
-A model is a torch file of tensors and plain values (loaded with weights_only). It holds a hash over everything in it,
-domain and errors included; a file that was changed is refused. The identity of a table is the start of this hash, and
-every plan stores the identity of the table that made it. One model comes with the package (`SHIPPED`), so that planning
-works without training.
+A model is a torch file of tensors and plain values (loaded with weights_only). It holds a hash over everything
+in it, domain and errors included; a file that was changed is refused. The identity of a table is the start of
+this hash, and every plan stores the identity of the table that made it. One model comes with the package
+(`SHIPPED`), so that planning works without training.
 """
 
 from __future__ import annotations
@@ -98,7 +98,9 @@ def load_table(path: str | Path | None = None) -> LookupTable:
 def _lookup(content: dict[str, Any]) -> Lookup:
     intervals = content["intervals"]
     table = Lookup(
-        tails=TailTable(tuple(None if part is None else _network(part) for part in content["wrench"]), _network(content["gap"])),
+        tails=TailTable(
+            tuple(None if part is None else _network(part) for part in content["wrench"]), _network(content["gap"])
+        ),
         curves=CurveTable(
             _network(content["curves"]), {name: Basis(**part) for name, part in content["bases"].items()}
         ),
@@ -109,7 +111,9 @@ def _lookup(content: dict[str, Any]) -> Lookup:
         provenance=content["provenance"],
     )
     for network in (*table.tails.wrench, table.tails.gap, table.curves.network):
-        if network is not None and not all(bool(torch.isfinite(part).all()) for part in network.state_dict().values()):
+        if network is not None and not all(
+            bool(torch.isfinite(part).all()) for part in network.state_dict().values()
+        ):
             raise ValueError("weights are not finite")
     return table
 

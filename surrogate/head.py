@@ -2,13 +2,14 @@
 
     W(v_x, v_z, ω_yr, ω_t) = R (v_x, v_z, ω_yr, ω_h, ω_t),    ω_t = ω + gain ω_h
 
-R is the resistance of head and disc about J and the gain is that of the motor (`sim.mechanics.balance`), both with the
-effects of the robot. W is the tails' mean wrench (`surrogate.tail`). These are four equations for (v_x, v_z, ω_yr,
-ω_h), solved for many robots at once by Newton's method. Forces are in balance exactly, whatever the table says.
+R is the resistance of head and disc about J and the gain is that of the motor (`sim.mechanics.balance`), both
+with the effects of the robot. W is the tails' mean wrench (`surrogate.tail`). These are four equations for (v_x,
+v_z, ω_yr, ω_h), solved for many robots at once by Broyden's method. Forces are in balance exactly, whatever the
+table says.
 
-A reversed motor is solved for as a positive one in the mirror image. So effects that make left and right turns differ
-are right in both directions. Left out: several motions of one robot; the solution next to linear theory is found.
-Units: l, μ0 l⁴/EI, EI/l².
+A reversed motor is solved for as a positive one in the mirror image. So effects that make left and right turns
+differ are right in both directions. Left out: several motions of one robot; the solution next to linear theory
+is found. Units: l, μ0 l⁴/EI, EI/l².
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ import torch
 from torch import Tensor
 
 from sim.arrays import Floats
-from sim.io.errors import InputError
 from sim.effects import catalogue
+from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.solve.assembly import assemble
 from surrogate import tail
@@ -29,7 +30,9 @@ from surrogate.tail import Tails
 
 Numbers = Callable[[Tensor], Tensor]  # inputs (M, 7) -> y (M, 6) of `surrogate.tail`
 
-STEPS, CORRECTION = 25, 1e-10  # of Newton's method; the correction is relative
+STEPS, CORRECTION = 40, 1e-9  # of Broyden's method; the correction is relative
+_RENEWED = 8  # steps after which the derivative is found again
+_DIFFERENCE, _LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
 _ON_TAILS = ("tail_sag",)  # local, but on the tails
 _FIRST_SPIN = 0.6  # ω_t/ω in the first guess
 _LONGEST = 0.5  # relative change of ω_t in one step
@@ -76,9 +79,7 @@ def robots_of(columns: Mapping[str, Floats | Tensor], keep: Collection[str] = ()
     mirror = torch.where(sense[:, None] < 0, torch.tensor(_SENSES, dtype=torch.float64), 1.0)
     resistance = body.resistance.permute(2, 0, 1) * mirror[:, :4, None] * mirror[:, None, :]
     heads = Heads(body.omega.abs(), 1 + body.droop * resistance[:, 3, 3], resistance, body.head_length, sense)
-    tails = Tails(
-        body.zeta_perp, body.zeta_parallel, body.offset, body.tail_radius, count, resistance[:, 3, 3]
-    )
+    tails = Tails(body.zeta_perp, body.zeta_parallel, body.offset, body.tail_radius, count, resistance[:, 3, 3])
     return heads, tails
 
 
@@ -137,24 +138,51 @@ def solve(heads: Heads, tails: Tails, numbers: Numbers, start: Tensor | None = N
     """
     u = linear_guess(heads, tails) if start is None else start.clone()
     waiting = torch.arange(len(u))
-    for _ in range(STEPS):
-        step = newton_step(at(heads, waiting), tail.at(tails, waiting), u[waiting], numbers)
-        u[waiting] -= step
-        size = _relative(step, u[waiting])
-        waiting = waiting[~(size < CORRECTION)]
+    own, inverse = (heads, tails), torch.zeros(len(u), 4, 4, dtype=u.dtype)
+    left = torch.zeros_like(u)
+    for count in range(STEPS):
+        now = u[waiting]
+        if count % _RENEWED == 0:
+            left, inverse = _left_and_inverse(*own, now, numbers)
+        step = _shortened(*own, now, (inverse @ left[..., None])[..., 0])
+        u[waiting] = now - step
+        more = ~(_relative(step, u[waiting]) < CORRECTION)
+        waiting = waiting[more]
         if not len(waiting):
             break
+        own = at(own[0], more), tail.at(own[1], more)
+        step, inverse, before = step[more], inverse[more], left[more]
+        left = unbalanced(*own, u[waiting], numbers)
+        inverse = _updated(inverse, -step, left - before)
     converged = torch.ones(len(u), dtype=torch.bool)
     converged[waiting] = False
-    return full_motion(heads, u), converged & torch.isfinite(u).all(1)
+    motion = full_motion(heads, u)
+    return motion, converged & torch.isfinite(u).all(1) & (motion[:, 4] > 0)
 
 
-def newton_step(heads: Heads, tails: Tails, u: Tensor, numbers: Numbers) -> Tensor:
-    """Step δ (M, 4) with u − δ nearer to balance; shortened where ω_t would change by more than _LONGEST."""
-    value, slope = value_and_slope(lambda v: unbalanced(heads, tails, v, numbers), u)
-    step = torch.linalg.solve_ex(slope, value)[0]
-    spin = heads.speed + heads.gain * u[:, 3]
-    change = (heads.gain * step[:, 3]).abs() / spin
+def _left_and_inverse(heads: Heads, tails: Tails, u: Tensor, numbers: Numbers) -> tuple[Tensor, Tensor]:
+    """What is unbalanced (M, 4), and the inverse of its derivative (M, 4, 4), by differences."""
+    width = _DIFFERENCE * (u.abs() + _LEAST_SHARE * u.abs().amax(1, keepdim=True))
+    moved = torch.cat([u, *[u + width * unit for unit in torch.eye(4, dtype=u.dtype)]])
+    five = [Heads(*[part.repeat(5, *[1] * (part.dim() - 1)) for part in heads]),
+            Tails(*[part.repeat(5) for part in tails])]  # fmt: skip
+    left = unbalanced(*five, moved, numbers).reshape(5, -1, 4)
+    slope = ((left[1:] - left[0]) / width.T[:, :, None]).permute(1, 2, 0)
+    return left[0], torch.linalg.inv_ex(slope)[0]
+
+
+def _updated(inverse: Tensor, step: Tensor, change: Tensor) -> Tensor:
+    """The inverse after a step that changed the balance so (Broyden's good update)."""
+    predicted = (inverse @ change[..., None])[..., 0]
+    along = (step[:, None, :] @ inverse)[:, 0]
+    size = (along * change).sum(1)[:, None, None]
+    update = (step - predicted)[:, :, None] * along[:, None, :] / size
+    return inverse + torch.nan_to_num(update, nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def _shortened(heads: Heads, tails: Tails, u: Tensor, step: Tensor) -> Tensor:
+    """The step, shortened where ω_t would change by more than _LONGEST of itself."""
+    change = (heads.gain * step[:, 3]).abs() / (heads.speed + heads.gain * u[:, 3])
     return step * torch.clamp(_LONGEST / change, max=1.0)[:, None]
 
 

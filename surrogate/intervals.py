@@ -1,11 +1,14 @@
-"""Intervals for the answers of the table: split-conformal, each output for itself, wider where the table is less sure.
+"""Intervals for the answers of the table: split-conformal, each output for itself, wider where the table is less
+sure.
 
-    answer ± q s(x),   s(x) = exp(c · features(x)),   q: quantile of |error|/s over robots that training did not see
+    answer ± q s(x),   s(x) = exp(c · features(x)),   q: quantile of |error|/s over robots that training did not
+    see
 
-s is fitted to the logarithm of errors by least squares. Its features are the inputs of the tails and their squares,
-how far the robot is from the middle of what was learned, how much the members differ, and N. q makes the intervals
-cover 90 % whether or not s is any good; s makes them cover 90 % in most parts of the domain as well. Robots for s and
-robots for q are different ones. Source: Lei et al., J. Am. Stat. Assoc. 113, 1094 (2018), section 5.2.
+s is fitted to the logarithm of errors by least squares. Its features are the inputs of the tails and their
+squares, how far the robot is from the middle of what was learned, how much the members differ, and N. q makes
+the intervals cover 90 % whether or not s is any good; s makes them cover 90 % in most parts of the domain as
+well. Robots for s and robots for q are different ones. Source: Lei et al., J. Am. Stat. Assoc. 113, 1094 (2018),
+section 5.2.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The table backwards: which robots have a wanted motion, and which of the allowed robots is best.
 
-`inverse` solves for the free inputs by damped least squares (Levenberg and Marquardt) from many starts at once, with the
-derivatives of the table. Several solutions are all returned. `design` maximises one output under limits on others, by
-Sobol points that close in on the best allowed one.
+`inverse` solves for the free inputs by damped least squares (Levenberg and Marquardt) from many starts at once,
+with the derivatives of the table. Several solutions are all returned. `design` maximises one output under limits
+on others, by Sobol points that close in on the best allowed one.
 
 Free inputs are varied as logarithms within their bounds. Left out: N, which is not continuous.
 """
@@ -61,7 +61,9 @@ def inverse(
     """
     names, wanted = list(bounds), list(targets)
     if len(wanted) < len(names):
-        raise InputError(f"{len(wanted)} targets for {len(names)} free inputs; give as many targets, or free fewer")
+        raise InputError(
+            f"{len(wanted)} targets for {len(names)} free inputs; give as many targets, or free fewer"
+        )
     count = len(next(iter(targets.values())))
     low, high = (np.log([bounds[name][i] for name in names]) for i in (0, 1))
     starts = low + (high - low) * qmc.Sobol(len(names), rng=np.random.default_rng(0)).random(_STARTS)
@@ -76,7 +78,9 @@ def inverse(
         found = lookup.query(columns, flag=True)
         slopes = lookup.jacobian(columns, names, flag=True)
         left = np.stack([(found[name] - aim[name]) / size[name] for name in wanted], -1)
-        J = np.stack([np.stack([slopes[o][n] * columns[n] for n in names], -1) / size[o][:, None] for o in wanted], 1)
+        J = np.stack(
+            [np.stack([slopes[o][n] * columns[n] for n in names], -1) / size[o][:, None] for o in wanted], 1
+        )
         return left, J, found[OUTSIDE]
 
     p, left, outside = _least_squares(misfits, p, low, high)

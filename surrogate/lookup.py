@@ -1,13 +1,13 @@
 """The look-up table: the tails' wrench is learned, the head's balance is solved for at each query.
 
-A query finds the motion in which the tails' mean wrench (`surrogate.tails`) is in balance with head, disc and motor
-(`surrogate.head`). So it answers for every head, every number of tails and every effect on head, disc and motor. Its
-response to a flip comes from learned curves (`surrogate.curves`). Every output can have an interval
+A query finds the motion in which the tails' mean wrench (`surrogate.tails`) is in balance with head, disc and
+motor (`surrogate.head`). So it answers for every head, every number of tails and every effect on head, disc and
+motor. Its response to a flip comes from learned curves (`surrogate.curves`). Every output can have an interval
 (`surrogate.intervals`).
 
 Refused, or flagged on request: robots whose tails move as none of the learned ones do (`surrogate.support`), and
-robots that yaw more than BRANCHES times as fast as their tails turn, which may have several motions. Refused always:
-effects on the tails themselves. The table does not extrapolate.
+robots that yaw more than BRANCHES times as fast as their tails turn, which may have several motions. Refused
+always: effects on the tails themselves. The table does not extrapolate.
 """
 
 from __future__ import annotations
@@ -224,6 +224,11 @@ class Lookup:
                     f"{name} makes left and right turns differ, which the look-up table has not learned; make the "
                     "robot a table of its own: python -m surrogate robot ROBOT.toml --out TABLE.json"
                 )
+        if bool((found.tails.count < 2).any()):
+            raise InputError(
+                "N = 1: the response of one tail depends too much on the phase of the disc at the flip, so the look-up "
+                "table has not learned it; simulate it (python -m sim replay)"
+            )
         curves = self.curves.curves(found.heads, found.tails, found.motion)
         sense = found.heads.sense.numpy()
         twist = np.stack([steady["v_z"], sense * steady["v_x"], sense * steady["omega_yr_bar"]], -1)

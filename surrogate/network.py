@@ -2,9 +2,9 @@
 
     h_0 = x,   h_i = tanh(W_i h_{i−1} + b_i),   y = W h + b + A x
 
-K members are evaluated side by side; their mean is the answer. Inputs are shifted and scaled first. A scale larger
-than the spread says that the output changes slowly along this input; the first weights are then small. This is prior
-knowledge of the problem, and training gains much from it (docs/explanation/lookup.md).
+K members are evaluated side by side; their mean is the answer. Inputs are shifted and scaled first. A scale
+larger than the spread says that the output changes slowly along this input; the first weights are then small.
+This is prior knowledge of the problem, and training gains much from it (docs/explanation/lookup.md).
 """
 
 from __future__ import annotations

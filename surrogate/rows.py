@@ -1,8 +1,8 @@
 """Simulated robots as the look-up table learns them: from a data set's folder, or drawn and simulated here.
 
-The tails' wrench follows from a robot's own motion, whatever its head is. So robots with heads far wider than those of
-real robots make the best rows: `drawn` gives them. Columns have the names of the data set. Curves of the response to a
-flip are those of `sim.model.response`; rows without them have NaN.
+The tails' wrench follows from a robot's own motion, whatever its head is. So robots with heads far wider than
+those of real robots make the best rows: `drawn` gives them. Columns have the names of the data set. Curves of
+the response to a flip are those of `sim.model.response`; rows without them have NaN.
 """
 
 from __future__ import annotations
@@ -108,9 +108,8 @@ def drawn(count: int, seed: int, *, wide: bool) -> dict[str, Floats]:
     """Robots of a scrambled Sobol sequence, even in the logarithms of DOMAIN.
 
     Args:
-        count: number of robots.
-        seed: of the scrambling.
-        wide: from WIDE, half of them with effects on the head, a quarter each with one and two tails; else robots of
+        count: number of robots. seed: of the scrambling. wide: from WIDE, half of them with effects on the head,
+        a quarter each with one and two tails; else robots of
             DOMAIN, every N alike, without effects.
     """
     share = qmc.Sobol(len(DOMAIN) + 5, scramble=True, rng=np.random.default_rng(seed)).random(count)

@@ -2,9 +2,9 @@
 
     q(x) = φ(x)ᵀ M⁻¹ φ(x)/F,   M = mean of φ φᵀ over the rows,   φ: the F monomials up to degree 3
 
-1/q is the Christoffel function of the rows. q is about 1 inside their support and grows with a high power outside of
-it, in every direction, also where each input alone looks harmless. Its limit is its largest value over almost all
-rows. Source: Lasserre and Pauwels, Adv. Comput. Math. 45, 1439 (2019).
+1/q is the Christoffel function of the rows. q is about 1 inside their support and grows with a high power
+outside of it, in every direction, also where each input alone looks harmless. Its limit is its largest value
+over almost all rows. Source: Lasserre and Pauwels, Adv. Comput. Math. 45, 1439 (2019).
 """
 
 from __future__ import annotations

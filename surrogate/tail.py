@@ -10,8 +10,9 @@ wrench of one tail over a turn. In the units of the simulator it depends on
     v_z/(a ω_t)             forward motion
 
 The network sees m as the deflection δ = m a S/(S + 12) that this motion makes. With three or more tails the
-velocities hardly change over a turn, and the wrench of one tail does not depend on N. With one or two tails they do.
-So N = 1 and N = 2 have networks of their own, with one more input: the head's spin drag over that of the tails.
+velocities hardly change over a turn, and the wrench of one tail does not depend on N. With one or two tails they
+do. So N = 1 and N = 2 have networks of their own, with one more input: the head's spin drag over that of the
+tails.
 
 The network gives six numbers y, near (0, 1, 0, 1, 0, 0):
 
@@ -23,8 +24,8 @@ The network gives six numbers y, near (0, 1, 0, 1, 0, 0):
 The terms without y are the drag of straight tails. T and Q are simple fits to thrust and torque in linear theory
 (`sim.reference.linear_theory`). The network learns what is left.
 
-Frame: body axes at the centre J of the disc, motor positive; a reversed motor mirrors the motion. Left out: effects
-on the tails themselves. Units: l, μ0 l⁴/EI, EI/l². Source: the paper's model (arXiv 2103.05712).
+Frame: body axes at the centre J of the disc, motor positive; a reversed motor mirrors the motion. Left out:
+effects on the tails themselves. Units: l, μ0 l⁴/EI, EI/l². Source: the paper's model (arXiv 2103.05712).
 """
 
 from __future__ import annotations

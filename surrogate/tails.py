@@ -1,7 +1,9 @@
-"""The table of the tails: networks for the mean wrench and for the gap between tails, learned from simulated robots.
+"""The table of the tails: networks for the mean wrench and for the gap between tails, learned from simulated
+robots.
 
-Rows are steady motions of robots with any heads. The wrench needs no simulation of its own: the head's balance gives
-it from the robot's own motion, W = R (v_x, v_z, ω_yr, ω_h, ω_t). So heads may be drawn far wider than robots are.
+Rows are steady motions of robots with any heads. The wrench needs no simulation of its own: the head's balance
+gives it from the robot's own motion, W = R (v_x, v_z, ω_yr, ω_h, ω_t). So heads may be drawn far wider than
+robots are.
 
 The residual of a row is the change of the robot's motion that a wrong wrench makes,
 
@@ -106,7 +108,13 @@ def rows_of(robots: Mapping[str, Floats], motion: Mapping[str, Floats]) -> Rows:
              ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap")}  # fmt: skip
     sense, yaw = heads.sense, found["omega_yr_bar"]
     at_disc = found["v_x"] - yaw * heads.length / 2
-    parts = [sense * at_disc, found["v_z"], sense * yaw, sense * found["omega_h_bar"], sense * found["omega_t_bar"]]
+    parts = [
+        sense * at_disc,
+        found["v_z"],
+        sense * yaw,
+        sense * found["omega_h_bar"],
+        sense * found["omega_t_bar"],
+    ]
     return Rows(heads, tails, torch.stack(parts, -1), found["tail_gap"])
 
 
