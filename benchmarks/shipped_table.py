@@ -23,7 +23,7 @@ from surrogate.lookup import Lookup
 from surrogate.rows import Simulated, as_reached, drawn, simulated
 from surrogate.train import learn, with_radius
 
-TAILS = Settings(width=64, depth=3, members=2, epochs=200, iterations=800)
+TAILS = Settings(width=64, depth=3, members=1, epochs=150, iterations=300)
 ROWS = {"tails": (32768, 101), "widths": (4096, 202), "held_out": (4096, 402), "locked": (4096, 20261121)}
 FLIPS = {"flips": (2800, 301), "locked_flips": (400, 20261122)}
 _FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated

@@ -107,7 +107,7 @@ def learn_curves(
         bases[name] = Basis(mean, vectors)
         targets.append((flat - mean) @ vectors.T)
     wanted = torch.cat(targets, -1)
-    weights = torch.cat([torch.full((COMPONENTS[n],), (3 / np.prod(s)) ** 0.5) for n, s in SHAPES.items()])
+    weights = torch.cat([torch.full((len(bases[n].vectors),), (3 / np.prod(s)) ** 0.5) for n, s in SHAPES.items()])
     network = Ensemble(
         inputs.shape[1], wanted.shape[1], width=settings.width, depth=settings.depth, members=settings.members,
         seed=settings.seed,

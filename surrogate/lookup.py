@@ -103,11 +103,13 @@ class Lookup:
             InputError: a robot that cannot be, or one outside the domain.
         """
         values = check_columns({name: array for name, array in columns.items() if name != DWELL})
+        if DWELL in columns:
+            _check_flips(values)
         found = self.motions(values, flag=flag)
         result: dict[str, Any] = steady_outputs(found, self.tails)
         if DWELL in columns:
             dwells = _checked_dwells(columns[DWELL])
-            result |= _at_dwells(self._responses(found, result, values), result, dwells, found.heads.sense.numpy())
+            result |= _at_dwells(self._responses(found, result), result, dwells, found.heads.sense.numpy())
         if intervals:
             result |= self._intervals(found, result)
         if flag:
@@ -125,8 +127,9 @@ class Lookup:
             InputError: a robot that cannot be, one outside the domain, or one whose left and right turns differ.
         """
         values = check_columns(columns)
+        _check_flips(values)
         found = self.motions(values, flag=flag)
-        return self._responses(found, steady_outputs(found, self.tails), values)
+        return self._responses(found, steady_outputs(found, self.tails))
 
     def jacobian(
         self, columns: Mapping[str, Floats], parameters: Sequence[str], *, flag: bool = False
@@ -217,24 +220,28 @@ class Lookup:
             "(python -m sim steady, python -m surrogate robot)"
         )
 
-    def _responses(self, found: Motions, steady: Mapping[str, Floats], values: Mapping[str, Floats]) -> Responses:
-        for name, size in values.items():
-            if name in catalogue() and catalogue()[name].symmetry == "odd" and size.any():
-                raise InputError(
-                    f"{name} makes left and right turns differ, which the look-up table has not learned; make the "
-                    "robot a table of its own: python -m surrogate robot ROBOT.toml --out TABLE.json"
-                )
-        if bool((found.tails.count < 2).any()):
-            raise InputError(
-                "N = 1: the response of one tail depends too much on the phase of the disc at the flip, so the look-up "
-                "table has not learned it; simulate it (python -m sim replay)"
-            )
+    def _responses(self, found: Motions, steady: Mapping[str, Floats]) -> Responses:
         curves = self.curves.curves(found.heads, found.tails, found.motion)
         sense = found.heads.sense.numpy()
         twist = np.stack([steady["v_z"], sense * steady["v_x"], sense * steady["omega_yr_bar"]], -1)
         speed = planar.net_speed(twist[:, None], curves["lag"] + at_equal_dwells(curves["memory"]), DWELLS)
         none = np.zeros(len(sense), dtype=bool)
         return Responses(**curves, net_speed=speed, failed=none, stepped=none)
+
+
+def _check_flips(values: Mapping[str, Floats]) -> None:
+    """Refuse robots whose response to a flip was not learned."""
+    for name, size in values.items():
+        if name in catalogue() and catalogue()[name].symmetry == "odd" and size.any():
+            raise InputError(
+                f"{name} makes left and right turns differ, which the look-up table has not learned; make the "
+                "robot a table of its own: python -m surrogate robot ROBOT.toml --out TABLE.json"
+            )
+    if (values["N"] < 2).any():
+        raise InputError(
+            "N = 1: the response of one tail depends too much on the phase of the disc, so the look-up table "
+            "has not learned it; simulate it (python -m sim replay)"
+        )
 
 
 def steady_outputs(found: Motions, tails: TailTable) -> dict[str, Floats]:

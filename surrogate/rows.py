@@ -7,6 +7,7 @@ the response to a flip are those of `sim.model.response`; rows without them have
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -112,7 +113,8 @@ def drawn(count: int, seed: int, *, wide: bool) -> dict[str, Floats]:
         a quarter each with one and two tails; else robots of
             DOMAIN, every N alike, without effects.
     """
-    share = qmc.Sobol(len(DOMAIN) + 5, scramble=True, rng=np.random.default_rng(seed)).random(count)
+    sampler = qmc.Sobol(len(DOMAIN) + 5, scramble=True, rng=np.random.default_rng(seed))
+    share = sampler.random_base2(math.ceil(math.log2(max(count, 2))))[:count]
     ranges = WIDE if wide else DOMAIN
     robots = {n: low * (high / low) ** share[:, i] for i, (n, (low, high)) in enumerate(ranges.items())}
     eighth, more, turning, along, disc = share[:, len(DOMAIN) :].T

@@ -40,7 +40,12 @@ def split(rows: Integers) -> Integers:
 
 
 def train(
-    folder: str, settings: Settings | None = None, curve_settings: Settings | None = None, *, title: str = "train"
+    folder: str,
+    settings: Settings | None = None,
+    curve_settings: Settings | None = None,
+    *,
+    flips: int = 256,
+    title: str = "train",
 ) -> Lookup:
     """A look-up table from a finished data set.
 
