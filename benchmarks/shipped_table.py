@@ -1,6 +1,7 @@
 """Make the look-up table that comes with the package, and open its locked test.
 
 Usage: python -m benchmarks.shipped_table WORK --out MODEL    simulate (kept in the folder WORK) and train
+       python -m benchmarks.shipped_table WORK --out MODEL --more MODEL --iterations 500    train on
        python -m benchmarks.shipped_table WORK --test MODEL   errors and coverage on the locked robots
 
 Robots are drawn from Sobol sequences with the seeds below. The locked robots led to no choice of any kind.
@@ -11,6 +12,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,8 +39,8 @@ def robots(name: str) -> dict[str, Floats]:
             return drawn(count, seed, wide=False)
         tails = 1.0 + np.arange(_FLIPS_DRAWN) % 8
         np.random.default_rng(seed).shuffle(tails)
-        every = drawn(_FLIPS_DRAWN, seed, wide=True) | {"N": tails}
-        return {n: values[:count] for n, values in every.items()}
+        every = {**drawn(_FLIPS_DRAWN, seed, wide=True), "N": tails}
+        return {n: np.asarray(values[:count]) for n, values in every.items()}
     count, seed = ROWS[name]
     return drawn(count, seed, wide=name == "tails")
 
@@ -55,8 +57,8 @@ def kept(work: Path, name: str) -> Simulated:
     found = make(robots(name), title=name, **({"curves": True} if name in FLIPS else {}))
     print(f"{name}: {len(found)} rows, {time.process_time() - began:.0f} s")
     work.mkdir(parents=True, exist_ok=True)
-    parts = enumerate(vars(found).values())  # type: ignore[assignment]
-    np.savez(path, **{f"{i}/{k}": values for i, part in parts for k, values in part.items()})  # type: ignore
+    named = {f"{i}/{k}": values for i, part in enumerate(vars(found).values()) for k, values in part.items()}
+    np.savez(path, allow_pickle=False, **named)
     return found
 
 
@@ -90,11 +92,16 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("work", type=Path)
     parser.add_argument("--out")
+    parser.add_argument("--more")
+    parser.add_argument("--iterations", type=int, default=500)
     parser.add_argument("--test")
     given = parser.parse_args()
     if given.out:
-        sets = [kept(given.work, name) for name in ("tails", "widths", "held_out", "flips")]
-        lookup = learn(*sets[:3], sets[3], TAILS, source={"seeds": {**ROWS, **FLIPS}})
+        tails, widths, held_out, flips = (kept(given.work, n) for n in ("tails", "widths", "held_out", "flips"))
+        start = load(given.more) if given.more else None
+        settings = replace(TAILS, epochs=0, iterations=given.iterations) if start else TAILS
+        source = {"seeds": {**ROWS, **FLIPS}, "started_from": start.identity if start else None}
+        lookup = learn(tails, widths, held_out, flips, settings, start=start, source=source)
         save(lookup, given.out)
         print(error_table(lookup))
     if given.test:

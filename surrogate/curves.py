@@ -38,7 +38,7 @@ SHAPES = {
     "spread": (len(DWELLS), 3),
 }
 COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 20}
-SETTINGS = Settings(width=96, depth=3, members=2, epochs=300, iterations=600)
+SETTINGS = Settings(width=96, depth=2, members=2, epochs=400, iterations=600)
 _SMALL_SURGE = 0.1  # of v_x
 _SMOOTH = 2.0  # standard deviations over which the components change
 
@@ -74,14 +74,14 @@ class CurveTable:
 
 def inputs_of(heads: Heads, tails: Tails, motion: Tensor) -> Tensor:
     """Inputs of the network, (M, 12)."""
-    across = tails.count * tails.zeta_perp
+    across = tails.number * tails.zeta_perp
     resistance = heads.resistance
     extra = [
         torch.log(resistance[:, 0, 0] / across),
         torch.log(resistance[:, 1, 1] / across),
         torch.log(resistance[:, 2, 2] / across),
-        torch.log(tails.count),
-        (tails.count == 2).double(),
+        torch.log(tails.number),
+        (tails.number == 2).double(),
     ]
     return torch.cat([tail.inputs_of(tails, motion), torch.stack(extra, -1)], -1)
 

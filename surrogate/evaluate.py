@@ -54,11 +54,11 @@ def curve_errors(response: Any, truth: Columns) -> dict[str, Floats]:
         response: of the table.
         truth: columns of the steady motion; `lag` (M, D, 3) and `net_speed` (M, D) of the simulator.
     """
-    apart = response.lag - truth["lag"]
-    found = {name: apart[..., i] / scale_of(name, truth)[:, None] for i, name in
-             enumerate(("lag_z", "lag_x", "lag_psi_rad"))}  # type: ignore[index]  # fmt: skip
-    found["net_speed_bar"] = (response.net_speed - truth["net_speed"]) / scale_of("net_speed_bar", truth)[:, None]  # type: ignore[index]
-    return found
+    found = {}
+    for i, name in enumerate(("lag_z", "lag_x", "lag_psi_rad")):
+        found[name] = (response.lag - truth["lag"])[..., i] / np.asarray(scale_of(name, truth))[:, None]
+    speed = np.asarray(scale_of("net_speed_bar", truth))[:, None]
+    return found | {"net_speed_bar": (response.net_speed - truth["net_speed"]) / speed}
 
 
 def summary(errors: Mapping[str, Floats], valid: Flags) -> dict[str, dict[str, float]]:

@@ -51,12 +51,14 @@ def fit(network: Ensemble, inputs: Tensor, residual: Residual, settings: Setting
         residual: what is to be small.
         title: of the progress bar, which shows the median of |r|; empty for none.
     """
+    for parameter in network.parameters():
+        parameter.requires_grad_(True)
     x = (inputs - network.shift) / network.scale
     everything = torch.arange(len(x))
     batches = -(-len(x) // settings.batch)
     generator = torch.Generator().manual_seed(settings.seed)
     adam = torch.optim.Adam(network.parameters(), lr=settings.learning_rate)
-    steps = max(settings.epochs * batches, 1)
+    steps = max(settings.epochs * batches, 10)
     schedule = torch.optim.lr_scheduler.OneCycleLR(adam, settings.learning_rate, total_steps=steps, pct_start=0.1)
     stages = -(-settings.iterations // _STAGE)
 
@@ -78,7 +80,7 @@ def fit(network: Ensemble, inputs: Tensor, residual: Residual, settings: Setting
             soft = _SOFTEST * (_HARDEST / _SOFTEST) ** (epoch / settings.epochs)
             for rows in torch.randperm(len(x), generator=generator).chunk(batches):
                 adam.zero_grad(set_to_none=True)
-                loss(rows, soft).backward()
+                loss(rows, soft).backward()  # type: ignore[no-untyped-call]
                 adam.step()
                 schedule.step()
             look(bar)
@@ -90,11 +92,11 @@ def fit(network: Ensemble, inputs: Tensor, residual: Residual, settings: Setting
         def closure() -> Tensor:
             polish.zero_grad(set_to_none=True)
             value = loss(everything, _HARDEST)
-            value.backward()
+            value.backward()  # type: ignore[no-untyped-call]
             return value
 
         for _ in range(stages):
-            polish.step(closure)
+            polish.step(closure)  # type: ignore[no-untyped-call]
             look(bar)
     for parameter in network.parameters():
         parameter.requires_grad_(False)

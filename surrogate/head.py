@@ -105,7 +105,7 @@ def linear_guess(heads: Heads, tails: Tails) -> Tensor:
     """Velocities u (M, 4) with the torque of linear theory and the side forces of straight tails."""
     spin = _FIRST_SPIN * heads.speed
     for _ in range(3):
-        torque = tails.count * tails.zeta_perp * tails.offset**2 * tail.torque_of(tails.zeta_perp * spin)
+        torque = tails.number * tails.zeta_perp * tails.offset**2 * tail.torque_of(tails.zeta_perp * spin)
         head, disc = heads.resistance[:, 3, 3], heads.resistance[:, 3, 4]
         spin = heads.speed * head / (head + heads.gain * (torque + disc))
     head_spin = (spin - heads.speed) / heads.gain
@@ -113,14 +113,14 @@ def linear_guess(heads: Heads, tails: Tails) -> Tensor:
     matrix = matrix + straight_resistance(tails)
     push = -heads.resistance[:, :3, 3] * head_spin[:, None] - heads.resistance[:, :3, 4] * spin[:, None]
     thrust = (tails.zeta_perp - tails.zeta_parallel) * spin * tails.offset**2
-    thrust = tails.count * thrust * tail.thrust_of(tails.zeta_perp * spin)
+    thrust = tails.number * thrust * tail.thrust_of(tails.zeta_perp * spin)
     push = push + torch.stack([torch.zeros_like(thrust), thrust, torch.zeros_like(thrust)], -1)
     return torch.cat([torch.linalg.solve(matrix, push), head_spin[:, None]], 1)
 
 
 def straight_resistance(tails: Tails) -> Tensor:
     """Resistance of straight tails to (v_x, v_z, ω_yr), (M, 3, 3)."""
-    across, along = tails.count * tails.zeta_perp, tails.count * tails.zeta_parallel
+    across, along = tails.number * tails.zeta_perp, tails.number * tails.zeta_parallel
     none = torch.zeros_like(across)
     rows = [[across, none, -across / 2], [none, along, none], [-across / 2, none, across / 3]]
     return torch.stack([torch.stack(row, -1) for row in rows], -2)
@@ -164,9 +164,9 @@ def _left_and_inverse(heads: Heads, tails: Tails, u: Tensor, numbers: Numbers) -
     """What is unbalanced (M, 4), and the inverse of its derivative (M, 4, 4), by differences."""
     width = _DIFFERENCE * (u.abs() + _LEAST_SHARE * u.abs().amax(1, keepdim=True))
     moved = torch.cat([u, *[u + width * unit for unit in torch.eye(4, dtype=u.dtype)]])
-    five = [Heads(*[part.repeat(5, *[1] * (part.dim() - 1)) for part in heads]),
-            Tails(*[part.repeat(5) for part in tails])]  # fmt: skip
-    left = unbalanced(*five, moved, numbers).reshape(5, -1, 4)
+    heads = Heads(*[part.repeat(5, *[1] * (part.dim() - 1)) for part in heads])
+    tails = Tails(*[part.repeat(5) for part in tails])
+    left = unbalanced(heads, tails, moved, numbers).reshape(5, -1, 4)
     slope = ((left[1:] - left[0]) / width.T[:, :, None]).permute(1, 2, 0)
     return left[0], torch.linalg.inv_ex(slope)[0]
 
@@ -190,12 +190,12 @@ def value_and_slope(function: Callable[[Tensor], Tensor], u: Tensor) -> tuple[Te
     """f(u) (M, 4) and ∂f/∂u (M, 4, 4) of a function that takes every row alone."""
     unit = torch.eye(u.shape[1], dtype=u.dtype)
 
-    def along(direction: Tensor) -> tuple[Tensor, Tensor]:
-        value, change = torch.func.jvp(function, (u,), (direction.expand_as(u),))
-        return value, change
+    def along(direction: Tensor) -> Tensor:
+        change: Tensor = torch.func.jvp(function, (u,), (direction.expand_as(u),))[1]
+        return change
 
-    value, slope = torch.func.vmap(along, out_dims=(None, -1))(unit)
-    return value, slope
+    slope = torch.func.vmap(along, out_dims=-1)(unit)
+    return function(u), slope
 
 
 def _relative(step: Tensor, u: Tensor) -> Tensor:

@@ -167,7 +167,7 @@ class Lookup:
         inputs = tail.inputs_of(tails, motion)
         remote, spread = torch.zeros(len(motion)).double(), torch.zeros(len(motion)).double()
         weight = sensitivity_of(heads, tails, motion) @ tail.units_of(tails, motion)
-        kind = class_of(tails.count)
+        kind = class_of(tails.number)
         for k, network in enumerate(self.tails.wrench):
             rows = torch.nonzero(kind == k)[:, 0]
             support = self.support[k]
@@ -176,7 +176,12 @@ class Lookup:
                 members = network.members_at(inputs[rows])
                 apart = (weight[rows] @ (members - members.mean(0))[..., None])[..., 0]
                 spread[rows] = apart.norm(dim=-1).mean(0)
-        extra = [torch.log(remote + 1e-12), torch.log(spread + 1e-9), torch.log(tails.count), (kind == 0).double()]
+        extra = [
+            torch.log(remote + 1e-12),
+            torch.log(spread + 1e-9),
+            torch.log(tails.number),
+            (kind == 0).double(),
+        ]
         return torch.nan_to_num(torch.cat([inputs, torch.stack(extra, -1)], -1))
 
     def _intervals(self, found: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -193,7 +198,7 @@ class Lookup:
         return added
 
     def _reasons(self, tails: Tails, motion: Tensor, converged: Flags) -> list[str]:
-        inputs, kind = tail.inputs_of(tails, motion), class_of(tails.count)
+        inputs, kind = tail.inputs_of(tails, motion), class_of(tails.number)
         remote = torch.full((len(motion),), torch.nan, dtype=torch.float64)
         for k, support in enumerate(self.support):
             rows = torch.nonzero(kind == k)[:, 0]

@@ -50,7 +50,7 @@ class Tails(NamedTuple):
     zeta_parallel: Tensor
     offset: Tensor  # a
     radius: Tensor  # r0
-    count: Tensor  # N
+    number: Tensor  # N
     head_spin_drag: Tensor  # moment on the head per ω_h
 
 
@@ -86,7 +86,7 @@ def inputs_of(tails: Tails, motion: Tensor) -> Tensor:
             torch.asinh(deflection / _SMALL_DEFLECTION),
             torch.atan2(v_x, yaw),
             torch.asinh(v_z / clamp / _SMALL_SURGE),
-            torch.log(tails.head_spin_drag / (tails.count * tails.zeta_perp * tails.offset**2)),
+            torch.log(tails.head_spin_drag / (tails.number * tails.zeta_perp * tails.offset**2)),
         ],
         -1,
     )
@@ -95,9 +95,9 @@ def inputs_of(tails: Tails, motion: Tensor) -> Tensor:
 def straight_wrench(tails: Tails, motion: Tensor) -> Tensor:
     """(F_x, F_z, M_y, M_z) about J of straight tails at zero spin, (M, 4)."""
     v_x, v_z, yaw, _, _ = motion.unbind(-1)
-    across = tails.count * tails.zeta_perp
+    across = tails.number * tails.zeta_perp
     side, turn = across * (yaw / 2 - v_x), across * (v_x / 2 - yaw / 3)
-    return torch.stack([side, -tails.count * tails.zeta_parallel * v_z, turn, torch.zeros_like(side)], -1)
+    return torch.stack([side, -tails.number * tails.zeta_parallel * v_z, turn, torch.zeros_like(side)], -1)
 
 
 def units_of(tails: Tails, motion: Tensor) -> Tensor:
@@ -106,8 +106,8 @@ def units_of(tails: Tails, motion: Tensor) -> Tensor:
     drag_number = tails.zeta_perp * spin
     sideways = torch.sqrt(v_x**2 + yaw**2 + _TINY)
     squared = (sideways / (tails.offset * spin)) ** 2
-    couple = tails.count * spin * tails.offset**2
-    force = tails.count * tails.zeta_perp * sideways
+    couple = tails.number * spin * tails.offset**2
+    force = tails.number * tails.zeta_perp * sideways
     thrust = (tails.zeta_perp - tails.zeta_parallel) * couple * thrust_of(drag_number)
     torque = -tails.zeta_perp * couple * torque_of(drag_number)
     none = torch.zeros_like(force)

@@ -54,9 +54,9 @@ class TailTable:
         Args:
             member: of the ensembles; by default their mean.
         """
-        motion = torch.full((len(tails.count), 5), torch.nan, dtype=torch.float64)
+        motion = torch.full((len(tails.number), 5), torch.nan, dtype=torch.float64)
         converged = torch.zeros(len(motion), dtype=torch.bool)
-        kind = class_of(tails.count)
+        kind = class_of(tails.number)
         for k, network in enumerate(self.wrench):
             rows = torch.nonzero(kind == k)[:, 0]
             if len(rows) and network is not None:
@@ -76,7 +76,7 @@ class TailTable:
     def tail_gap(self, tails: Tails, motion: Tensor) -> Tensor:
         """Smallest distance between tails over 2 r0, (M,); infinite for one tail."""
         share = self.gap(_gap_inputs(tails, motion))[:, 0]
-        return torch.where(tails.count > 1, share * _clamp_distance(tails) / (2 * tails.radius), torch.inf)
+        return torch.where(tails.number > 1, share * _clamp_distance(tails) / (2 * tails.radius), torch.inf)
 
 
 def _member(network: Ensemble, member: int) -> head.Numbers:
@@ -130,7 +130,7 @@ def sensitivity_of(heads: Heads, tails: Tails, motion: Tensor) -> Tensor:
     matrix[:, :, 3] += heads.gain[:, None] * heads.resistance[:, :, 4]
     matrix[:, :3, :3] += head.straight_resistance(tails)
     drag_number = tails.zeta_perp * motion[:, 4]
-    torque = tails.count * tails.zeta_perp * tails.offset**2 * tail.torque_of(drag_number)
+    torque = tails.number * tails.zeta_perp * tails.offset**2 * tail.torque_of(drag_number)
     matrix[:, 3, 3] += heads.gain * torque
     v_x, v_z, yaw, head_spin, spin = motion.unbind(-1)
     speed = torch.hypot(v_x, v_z)
@@ -146,20 +146,23 @@ def sensitivity_of(heads: Heads, tails: Tails, motion: Tensor) -> Tensor:
     return torch.linalg.inv_ex(matrix)[0] / size[:, :, None]
 
 
-def learn_tails(rows: Rows, settings: Settings, title: str) -> TailTable:
-    """Networks of all CLASSES from rows that are `learnable`."""
-    kind = class_of(rows.tails.count)
+def learn_tails(rows: Rows, settings: Settings, title: str, start: TailTable | None = None) -> TailTable:
+    """Networks of all CLASSES from rows that are `learnable`; those of `start`, if given, learn on."""
+    kind = class_of(rows.tails.number)
     networks: list[Ensemble | None] = []
     for k, count in enumerate(CLASSES):
         name = f"{title}: tails of N = {count}{' and more' if count == CLASSES[-1] else ''}" if title else ""
         some = rows.at(kind == k)
         known = len(some.motion) > 0
-        networks.append(_learn_wrench(some, settings, name, several=count == CLASSES[-1]) if known else None)
-    several = rows.at(rows.tails.count > 1)
-    return TailTable(tuple(networks), _learn_gap(several, _GAP, f"{title}: gap" if title else ""))
+        before = start.wrench[k] if start else None
+        several = count == CLASSES[-1]
+        networks.append(_learn_wrench(some, settings, name, several, before) if known else None)
+    many = rows.at(rows.tails.number > 1)
+    gap = start.gap if start else _learn_gap(many, _GAP, f"{title}: gap" if title else "")
+    return TailTable(tuple(networks), gap)
 
 
-def _learn_wrench(rows: Rows, settings: Settings, title: str, *, several: bool) -> Ensemble:
+def _learn_wrench(rows: Rows, settings: Settings, title: str, several: bool, start: Ensemble | None) -> Ensemble:
     inputs = tail.inputs_of(rows.tails, rows.motion)
     weight = sensitivity_of(rows.heads, rows.tails, rows.motion)
     matrix = weight @ tail.units_of(rows.tails, rows.motion)
@@ -169,18 +172,23 @@ def _learn_wrench(rows: Rows, settings: Settings, title: str, *, several: bool) 
     size = torch.linalg.matrix_norm(matrix * spread)
     share = torch.clamp(_OUTLIER * size.median() / size, max=1.0)
     matrix, wanted = matrix * share[:, None, None], wanted * share[:, None]
-    network = _new(settings, inputs, outputs=len(mean))
-    network.mean.copy_(mean)
-    network.spread.copy_(spread)
-    network.scale.mul_(torch.tensor(tail.SMOOTHNESS, dtype=torch.float64) / 1.5)
-    if several:
-        network.scale[-1] = 1e9  # the head's spin drag plays no part
+    network = start or _new(settings, inputs, outputs=len(mean))
+    if start is None:
+        _prepare(network, mean, spread, several)
 
     def residual(y: Tensor, at: Tensor) -> Tensor:
         return (matrix[at] @ y[..., None])[..., 0] - wanted[at]
 
     fit(network, inputs, residual, settings, title)
     return network
+
+
+def _prepare(network: Ensemble, mean: Tensor, spread: Tensor, several: bool) -> None:
+    network.mean.copy_(mean)
+    network.spread.copy_(spread)
+    network.scale.mul_(torch.tensor(tail.SMOOTHNESS, dtype=torch.float64) / 1.5)
+    if several:
+        network.scale[-1] = 1e9  # the head's spin drag plays no part
 
 
 def _new(settings: Settings, inputs: Tensor, outputs: int) -> Ensemble:
@@ -194,11 +202,11 @@ def _new(settings: Settings, inputs: Tensor, outputs: int) -> Ensemble:
 
 
 def _clamp_distance(tails: Tails) -> Tensor:
-    return 2 * tails.offset * torch.sin(torch.pi / torch.clamp(tails.count, min=2.0))
+    return 2 * tails.offset * torch.sin(torch.pi / torch.clamp(tails.number, min=2.0))
 
 
 def _gap_inputs(tails: Tails, motion: Tensor) -> Tensor:
-    return torch.cat([tail.inputs_of(tails, motion), torch.log(tails.count)[:, None]], -1)
+    return torch.cat([tail.inputs_of(tails, motion), torch.log(tails.number)[:, None]], -1)
 
 
 def _learn_gap(rows: Rows, settings: Settings, title: str) -> Ensemble:

@@ -74,7 +74,8 @@ def train(
         some = sets[0].at(np.flatnonzero(sets[0].robots["N"] > 1)[:flips])
         flipped = simulated(some.robots, curves=True, title=title and f"{title}: flips simulated")
     source = {"data_hash": manifest["config_hash"], "data_code_version": manifest["code_version"]}
-    return learn(*sets, flipped, settings, curve_settings, source=source, title=title)
+    learned, widths, held_out = sets
+    return learn(learned, widths, held_out, flipped, settings, curve_settings, source=source, title=title)
 
 
 def learn(
@@ -86,6 +87,7 @@ def learn(
     curve_settings: Settings | None = None,
     *,
     flips_held_out: Simulated | None = None,
+    start: Lookup | None = None,
     source: dict[str, Any] | None = None,
     title: str = "train",
 ) -> Lookup:
@@ -97,6 +99,7 @@ def learn(
         held_out: robots for the errors and the factor of the intervals.
         flipped: robots with response curves.
         flips_held_out: robots with curves for the errors of the response; by default a tenth of `flipped`.
+        start: a table whose networks of the wrench learn on; its other networks are kept.
         source: more provenance.
     """
     chosen, curves_chosen = settings or Settings(), curve_settings or curves.SETTINGS
@@ -104,14 +107,18 @@ def learn(
         tenth = np.arange(len(flipped)) % 10 == 9
         flipped, flips_held_out = flipped.at(~tenth), flipped.at(tenth)
     rows = _learnable(learned)
-    table = learn_tails(rows, chosen, title)
-    kind = class_of(rows.tails.count)
+    table = learn_tails(rows, chosen, title, start.tails if start else None)
+    kind = class_of(rows.tails.number)
     inputs = tail.inputs_of(rows.tails, rows.motion)
     flipped, flips_held_out = _several_tails(flipped), _several_tails(flips_held_out)
     own = _learnable(flipped)
     usable = np.flatnonzero(learnable(rows_of(flipped.robots, flipped.motion)))
-    response = learn_curves(
-        own.heads, own.tails, own.motion, flipped.at(usable).curves, curves_chosen, title and f"{title}: flips"
+    response = (
+        start.curves
+        if start
+        else learn_curves(
+            own.heads, own.tails, own.motion, flipped.at(usable).curves, curves_chosen, title and f"{title}: flips"
+        )
     )
     counts = {"train": len(rows.motion), "widths": len(widths), "held_out": len(held_out), "flips": len(usable)}
     made = provenance({"tails": asdict(chosen), "curves": asdict(curves_chosen)})
@@ -171,7 +178,7 @@ def _learnable(rows: Simulated) -> tails.Rows:
     found = rows_of(rows.robots, rows.motion)
     good = learnable(found)
     kept = found.at(torch.as_tensor(np.flatnonzero(good)))
-    counts = [int((class_of(kept.tails.count) == k).sum()) for k in range(len(CLASSES))]
+    counts = [int((class_of(kept.tails.number) == k).sum()) for k in range(len(CLASSES))]
     for count, number in zip(counts, ("N = 1", "N = 2", "N = 3 and more"), strict=True):
         if 0 < count < _FEWEST_OF_A_CLASS:
             raise InputError(f"{count} usable rows with {number}; training needs {_FEWEST_OF_A_CLASS} or none")

@@ -30,7 +30,7 @@ def test_straight_tails_have_the_drag_of_their_nodes() -> None:
     z = torch.linspace(-1, 0, 4001).double()
     side = 0.3 + 0.5 * z
     force, moment = -torch.trapezoid(side, z), -torch.trapezoid(z * side, z)
-    found = tail.straight_wrench(tails, motion) / tails.count[:, None]
+    found = tail.straight_wrench(tails, motion) / tails.number[:, None]
     assert torch.allclose(found[:, 0], force * tails.zeta_perp, rtol=1e-6)
     assert torch.allclose(found[:, 2], moment * tails.zeta_perp, rtol=1e-6)
     assert torch.allclose(found[:, 1], -0.2 * tails.zeta_parallel)
