@@ -1,9 +1,10 @@
 """Command line of the look-up table.
 
-python -m surrogate train DIR --out MODEL            learn a data set
-python -m surrogate query POINTS.csv --out OUT.csv   predict rows, without simulating
-python -m surrogate errors [--model MODEL]           the stored held-out errors
-python -m surrogate robot ROBOT.toml --out T.json    the table of one robot with its effects, for the planner
+python -m surrogate train DIR --out MODEL              learn a data set
+python -m surrogate query POINTS.csv --out OUT.csv     predict rows, with intervals, without simulating
+python -m surrogate inverse TARGETS.csv --out OUT.csv  which robots have these motions
+python -m surrogate errors [--model MODEL]             the stored held-out errors
+python -m surrogate robot ROBOT.toml --out T.json      the table of one robot with its effects, for the planner
 """
 
 from __future__ import annotations
@@ -22,21 +23,23 @@ main = program.main
     "learn a data set",
     argument("data", help="folder made by python -m dataset build"),
     out("model file"),
-    argument("--epochs", type=int, help="at most this many epochs"),
+    argument("--epochs", type=int, help="this many epochs, and as many iterations after them"),
 )
 def _train(arguments: Namespace) -> None:
     from dataclasses import replace
 
+    from surrogate.curves import SETTINGS
     from surrogate.evaluate import error_table
     from surrogate.export import save
-    from surrogate.train import Settings, train
+    from surrogate.fit import Settings
+    from surrogate.train import train
 
-    settings = Settings()
+    tails, curves = Settings(), SETTINGS
     if arguments.epochs is not None:
         if arguments.epochs < 1:
             raise InputError(f"--epochs {arguments.epochs}; give a whole number from 1")
-        settings = replace(settings, epochs=arguments.epochs)
-    lookup = train(arguments.data, settings)
+        tails, curves = (replace(s, epochs=arguments.epochs, iterations=arguments.epochs) for s in (tails, curves))
+    lookup = train(arguments.data, tails, curves)
     save(lookup, arguments.out)
     rows = lookup.provenance["rows"]
     print(f"model {lookup.identity}: {rows['train']} rows, held-out error on {rows['held_out']}")
@@ -46,10 +49,14 @@ def _train(arguments: Namespace) -> None:
 
 @program.command(
     "query",
-    "predict rows without simulating",
+    "predict rows, with intervals, without simulating",
     argument("points", help="CSV like that of python -m sim steady; dwell_bar optional"),
     out("CSV"),
     MODEL,
+    argument(
+        "--flag", action="store_true", help="answer outside the domain, too; the column `outside` says where"
+    ),
+    argument("--certify", action="store_true", help="simulate each row as well: the column `certified_error`"),
 )
 def _query(arguments: Namespace) -> None:
     import pandas as pd
@@ -57,13 +64,55 @@ def _query(arguments: Namespace) -> None:
     from sim.io.files import whole_file
     from sim.io.tables import read_table
     from surrogate.export import load_table
+    from surrogate.lookup import Lookup
 
     points = read_table(arguments.points)
-    result = load_table(arguments.model).query({str(c): points[c].to_numpy() for c in points})
-    table = pd.concat([points, pd.DataFrame(result)], axis=1)
+    table = load_table(arguments.model)
+    columns = {str(c): points[c].to_numpy() for c in points}
+    if isinstance(table, Lookup):
+        result = table.query(columns, intervals=True, flag=arguments.flag, certify=arguments.certify)
+    else:
+        result = table.query(columns)
+    found = pd.concat([points, pd.DataFrame(result)], axis=1)
+    with whole_file(arguments.out) as part:
+        found.to_csv(part, index=False, float_format="%.8g")
+    print(f"{len(found)} rows -> {arguments.out}")
+
+
+@program.command(
+    "inverse",
+    "find robots that have given motions",
+    argument("targets", help="CSV: the given inputs of the robots, and outputs that they shall have"),
+    out("CSV: a row for each solution"),
+    MODEL,
+    argument("--free", default="C_t,C_r,C_yr", help="inputs to find, with commas (default: C_t,C_r,C_yr)"),
+)
+def _inverse(arguments: Namespace) -> None:
+    import pandas as pd
+
+    from sim.io.files import whole_file
+    from sim.io.tables import read_table
+    from surrogate.export import load
+    from surrogate.inverse import BOUNDS, inverse
+    from surrogate.lookup import STEADY_OUTPUTS
+
+    points = read_table(arguments.targets)
+    names = [name.strip() for name in arguments.free.split(",")]
+    for name in names:
+        if name not in BOUNDS:
+            raise InputError(f"--free {name}; allowed are {', '.join(BOUNDS)}")
+    columns = {str(c): points[c].to_numpy() for c in points}
+    targets = {name: array for name, array in columns.items() if name in STEADY_OUTPUTS}
+    if not targets:
+        raise InputError(f"{arguments.targets} has no outputs; give at least one of {', '.join(STEADY_OUTPUTS)}")
+    robots = {name: array for name, array in columns.items() if name not in targets}
+    found = inverse(load(arguments.model), robots, targets, {name: BOUNDS[name] for name in names})
+    table = pd.DataFrame(
+        {"target": found.target + 1, **found.inputs, "misfit": found.misfit, "outside": found.outside}
+    )
     with whole_file(arguments.out) as part:
         table.to_csv(part, index=False, float_format="%.8g")
-    print(f"{len(table)} rows -> {arguments.out}")
+    print(f"{len(table)} solutions of {len(points)} targets -> {arguments.out}")
 
 
 @program.command("errors", "print the stored held-out errors", MODEL)
@@ -72,7 +121,8 @@ def _errors(arguments: Namespace) -> None:
     from surrogate.export import load
 
     lookup = load(arguments.model)
-    print(f"model {lookup.identity}, trained on data of code {lookup.provenance['data_code_version']}")
+    rows = lookup.provenance["rows"]
+    print(f"model {lookup.identity}: {rows['train']} rows, held-out error on {rows['held_out']}")
     print(error_table(lookup))
 
 

@@ -1,133 +1,311 @@
-"""The look-up table: a trained model, for robots inside the domain that it was trained on.
+"""The look-up table: the tails' wrench is learned, the head's balance is solved for at each query.
 
-A query returns the mean of the ensemble for every output of the data set. It can also return the outputs of every
-member. Robots outside the domain are refused, with the input and its range; the table never extrapolates.
+A query finds the motion in which the tails' mean wrench (`surrogate.tails`) is in balance with head, disc and
+motor (`surrogate.head`). So it answers for every head, every number of tails and every effect on head, disc and
+motor. Its response to a flip comes from learned curves (`surrogate.curves`). Every output can have an interval
+(`surrogate.intervals`).
+
+Refused, or flagged on request: robots whose tails move as none of the learned ones do (`surrogate.support`), and
+robots that yaw more than BRANCHES times as fast as their tails turn, which may have several motions. Refused
+always: effects on the tails themselves. The table does not extrapolate.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import torch
+from torch import Tensor
 
-from sim.arrays import Floats
+from sim.arrays import Flags, Floats
+from sim.effects import catalogue
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.groups import DWELL
-from surrogate.network import Ensemble, features
+from sim.model.response import DWELLS, Responses, at_equal_dwells
+from surrogate import head, tail
+from surrogate.curves import CurveTable
+from surrogate.head import Heads
+from surrogate.intervals import Intervals
+from surrogate.support import Support
+from surrogate.tail import Tails
+from surrogate.tails import TailTable, class_of, sensitivity_of
 
 STEADY_OUTPUTS = (
     "omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "tail_gap",
 )  # fmt: skip
 RESPONSE_OUTPUTS = ("net_speed_bar", "lag_psi_rad", "lag_x", "lag_z")
-_SLACK = 1e-9
+OUTSIDE = "outside"  # flag of robots that the table does not know
+BRANCHES = 0.6  # |ω_yr/ω_t| from which a robot may have several motions
+CERTIFIED = "certified_error"
+
+
+class Motions(NamedTuple):
+    """What a query works with, for M robots."""
+
+    heads: Heads
+    tails: Tails
+    motion: Tensor  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor
+    reason: list[str]  # why a robot is outside; else empty
 
 
 @dataclass(frozen=True)
 class Lookup:
-    """A trained table with its domain and its held-out errors."""
+    """A trained table with its domain, its intervals and its held-out errors."""
 
-    steady: Ensemble
-    response: Ensemble
-    tail_counts: list[int]
-    effects: list[str]
-    domain: dict[str, tuple[float, float]]
+    tails: TailTable
+    curves: CurveTable
+    support: tuple[Support | None, ...]  # for each of the classes of `surrogate.tails`
+    intervals: Intervals | None
+    ranges: dict[str, tuple[float, float]]  # of the robots that were learned, by input
     errors: dict[str, dict[str, float]]  # output -> held-out error, see `surrogate.evaluate`
     provenance: dict[str, Any]
 
     @property
+    def domain(self) -> dict[str, tuple[float, float]]:
+        """Range of every input among the learned robots, and of the effects that need no learning.
+
+        What is refused is decided by the joint support, not by these ranges.
+        """
+        effects = {name: effect.bounds for name, effect in catalogue().items() if head.is_of_head(name)}
+        return {**self.ranges, **effects}
+
+    @property
     def identity(self) -> str:
-        """Hash of the weights."""
-        digest = hashlib.sha256()
-        for network in (self.steady, self.response):
-            for key, value in sorted(network.state_dict().items()):
-                digest.update(key.encode())
-                digest.update(value.numpy().tobytes())
-        return digest.hexdigest()[:16]
+        """Hash of all numbers."""
+        from surrogate.export import content_of
+
+        return digest(content_of(self))[:16]
 
     def with_errors(self, errors: dict[str, dict[str, float]]) -> Lookup:
+        """The same table with other held-out errors."""
         return replace(self, errors=errors)
 
-    def check_domain(self, columns: Mapping[str, Floats]) -> None:
-        """Refuse robots outside the domain; for ω̄ the magnitude counts.
+    def query(
+        self, columns: Mapping[str, Floats], *, intervals: bool = False, flag: bool = False, certify: bool = False
+    ) -> dict[str, Any]:
+        """Predicted outputs, each (M,); with a column `dwell_bar` also RESPONSE_OUTPUTS for equal dwells.
+
+        Args:
+            columns: robots by column name, each (M,).
+            intervals: add `<name>_low` and `<name>_high`, which hold the simulator's value in 90 of 100 cases.
+            flag: answer for robots outside the domain as well; the column OUTSIDE says which.
+            certify: simulate each robot as well; the column CERTIFIED is the largest relative error of the spins,
+                the yaw rate and the velocities (these relative to the speed), with the simulator's own error.
 
         Raises:
-            InputError: names the input, its value and its range.
+            InputError: a robot that cannot be, or one outside the domain.
         """
-        for name, values in columns.items():
-            low, high = self.domain.get(name, (0.0, 0.0))
-            magnitude = np.abs(values) if name == "omega_bar" else values
-            slack = _SLACK * max(abs(low), abs(high), 1.0)
-            for value in magnitude[(magnitude < low - slack) | (magnitude > high + slack)][:1]:
-                allowed = f"{low:g} to {high:g}" if high > low else f"{low:g} only"
-                raise InputError(
-                    f"{name} = {value:g} is outside the look-up table ({allowed}); "
-                    "change the robot, or train a table that covers it"
-                )
-
-    def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Predicted outputs, each (M,): the steady ones, and the response if `dwell_bar` is given.
-
-        Raises:
-            InputError: a robot is not possible, or it is outside the domain.
-        """
-        members = self.query_members(columns)
-        return {name: values.mean(0) for name, values in members.items()}
-
-    def query_members(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Outputs of every ensemble member, each (K, M)."""
-        values = check_columns({k: v for k, v in columns.items() if k != DWELL})
-        for name in self.effects:
-            values.setdefault(name, np.zeros_like(values["N"]))
+        values = check_columns({name: array for name, array in columns.items() if name != DWELL})
         if DWELL in columns:
-            try:
-                values[DWELL] = np.asarray(columns[DWELL], dtype=float)
-            except (TypeError, ValueError):
-                raise InputError(f"{DWELL} has a value that is no number; give numbers") from None
-            if not np.isfinite(values[DWELL]).all():
-                raise InputError(f"{DWELL} has a value that is not a finite number; give numbers")
-        self.check_domain(values)
-        table = features(values, self.tail_counts, self.effects, dwell=False)
-        raw = self.steady.predict(table).double().numpy()
-        result = _steady_outputs(raw, values["omega_bar"])
-        if DWELL in values:
-            table = features(values, self.tail_counts, self.effects, dwell=True)
-            response = self.response.predict(table).double().numpy()
-            result |= _response_outputs(response, result, values)
+            _check_flips(values)
+        found = self.motions(values, flag=flag)
+        result: dict[str, Any] = steady_outputs(found, self.tails)
+        if DWELL in columns:
+            dwells = _checked_dwells(columns[DWELL])
+            result |= _at_dwells(self._responses(found, result), result, dwells, found.heads.sense.numpy())
+        if intervals:
+            result |= self._intervals(found, result)
+        if flag:
+            result[OUTSIDE] = np.array([bool(reason) for reason in found.reason])
+        if certify:
+            from surrogate.certify import certified_error
+
+            result[CERTIFIED] = certified_error(values, result)
         return result
 
+    def response(self, columns: Mapping[str, Floats], *, flag: bool = False) -> Responses:
+        """Response to a flip of the motor, see `surrogate.table.LookupTable.response`.
 
-def _steady_outputs(raw: Floats, omega: Floats) -> dict[str, Floats]:
-    log_yaw, log_sway, log_cotangent, logit, log_gap = np.moveaxis(raw, -1, 0)
-    sense = np.sign(omega)
-    sway = np.exp(log_sway)
-    surge = np.exp(log_cotangent) * sway
-    share = 1 / (1 + np.exp(-logit))
-    values = (
-        omega * (1 - share),
-        -omega * share,
-        sense * np.exp(log_yaw),
-        sense * sway,
-        surge,
-        np.hypot(sway, surge) / np.exp(log_yaw),
-        np.degrees(np.arctan2(sway, surge)),
-        np.exp(log_gap),
-    )
-    return dict(zip(STEADY_OUTPUTS, values, strict=True))
+        Raises:
+            InputError: a robot that cannot be, one outside the domain, or one whose left and right turns differ.
+        """
+        values = check_columns(columns)
+        _check_flips(values)
+        found = self.motions(values, flag=flag)
+        return self._responses(found, steady_outputs(found, self.tails))
+
+    def jacobian(
+        self, columns: Mapping[str, Floats], parameters: Sequence[str], *, flag: bool = False
+    ) -> dict[str, dict[str, Floats]]:
+        """∂(output)/∂(parameter) of STEADY_OUTPUTS, by output and parameter, each (M,).
+
+        Exact derivatives of the table: those of one more step of Newton's method at the solution.
+
+        Args:
+            columns: robots by column name, each (M,).
+            parameters: names of groups, without N, or of effects on the head.
+            flag: answer outside the domain as well.
+
+        Raises:
+            InputError: a robot that cannot be, or one outside the domain.
+        """
+        from surrogate.derivatives import slopes
+
+        values = check_columns({**columns, **{n: columns.get(n, 0.0 * columns["N"]) for n in parameters}})
+        return slopes(self.tails, values, self.motions(values, flag=flag).motion, parameters)
+
+    def motions(self, values: Mapping[str, Floats], *, flag: bool = False) -> Motions:
+        """Motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
+        heads, tails = head.robots_of(values)
+        motion, converged = self.tails.solve(heads, tails)
+        found = Motions(heads, tails, motion, self._reasons(tails, motion, np.asarray(converged.numpy())))
+        for row, reason in enumerate(found.reason):
+            if reason and not flag:
+                raise InputError(self._refusal(values, row, reason))
+        return found
+
+    def hints(self, found: Motions) -> Tensor:
+        """What the width of an interval may depend on, (M, 11)."""
+        heads, tails, motion = found.heads, found.tails, found.motion
+        inputs = tail.inputs_of(tails, motion)
+        remote, spread = torch.zeros(len(motion)).double(), torch.zeros(len(motion)).double()
+        weight = sensitivity_of(heads, tails, motion) @ tail.units_of(tails, motion)
+        kind = class_of(tails.number)
+        for k, network in enumerate(self.tails.wrench):
+            rows = torch.nonzero(kind == k)[:, 0]
+            support = self.support[k]
+            if len(rows) and network is not None and support is not None:
+                remote[rows] = support.remoteness(inputs[rows])
+                members = network.members_at(inputs[rows])
+                apart = (weight[rows] @ (members - members.mean(0))[..., None])[..., 0]
+                spread[rows] = apart.norm(dim=-1).mean(0)
+        extra = [
+            torch.log(remote + 1e-12),
+            torch.log(spread + 1e-9),
+            torch.log(tails.number),
+            (kind == 0).double(),
+        ]
+        return torch.nan_to_num(torch.cat([inputs, torch.stack(extra, -1)], -1))
+
+    def _intervals(self, found: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
+        from surrogate.evaluate import scale_of
+
+        if self.intervals is None:
+            raise InputError("this look-up table has no intervals; train it again")
+        hints, added = self.hints(found), {}
+        for name in [name for name in result if name in self.intervals.factor]:
+            size = torch.tensor(np.broadcast_to(scale_of(name, result), result[name].shape))
+            half = self.intervals.half_widths(name, hints, size).numpy()
+            half = np.where(np.isfinite(result[name]), half, 0.0)
+            added[f"{name}_low"], added[f"{name}_high"] = result[name] - half, result[name] + half
+        return added
+
+    def _reasons(self, tails: Tails, motion: Tensor, converged: Flags) -> list[str]:
+        inputs, kind = tail.inputs_of(tails, motion), class_of(tails.number)
+        remote = torch.full((len(motion),), torch.nan, dtype=torch.float64)
+        for k, support in enumerate(self.support):
+            rows = torch.nonzero(kind == k)[:, 0]
+            if len(rows) and support is not None:
+                remote[rows] = support.remoteness(inputs[rows])
+        quick = (motion[:, 2] / motion[:, 4]).abs().numpy()
+        reasons = np.full(len(motion), "", dtype=object)
+        reasons[quick > BRANCHES] = "it yaws nearly as fast as its tails turn, and may have several motions"
+        reasons[~(remote.numpy() <= 1)] = "its tails move as none of the learned ones do"
+        reasons[~converged] = "no motion was found for it"
+        for k, support in enumerate(self.support):
+            if support is None:
+                reasons[(kind == k).numpy()] = "none with as many tails were learned"
+        return [str(reason) for reason in reasons]
+
+    def _refusal(self, values: Mapping[str, Floats], row: int, reason: str) -> str:
+        for name, (low, high) in self.ranges.items():
+            value = abs(float(values[name][row]))
+            if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
+                reason += f"; {name} = {value:g}, learned were {low:g} to {high:g}"
+                break
+        return (
+            f"the robot in row {row + 1} is outside the look-up table: {reason}; change the robot, or simulate it "
+            "(python -m sim steady, python -m surrogate robot)"
+        )
+
+    def _responses(self, found: Motions, steady: Mapping[str, Floats]) -> Responses:
+        curves = self.curves.curves(found.heads, found.tails, found.motion)
+        sense = found.heads.sense.numpy()
+        twist = np.stack([steady["v_z"], sense * steady["v_x"], sense * steady["omega_yr_bar"]], -1)
+        speed = planar.net_speed(twist[:, None], curves["lag"] + at_equal_dwells(curves["memory"]), DWELLS)
+        none = np.zeros(len(sense), dtype=bool)
+        return Responses(**curves, net_speed=speed, failed=none, stepped=none)
 
 
-def _response_outputs(
-    raw: Floats,
-    steady: dict[str, Floats],
-    values: Mapping[str, Floats],
+def _check_flips(values: Mapping[str, Floats]) -> None:
+    """Refuse robots whose response to a flip was not learned."""
+    for name, size in values.items():
+        if name in catalogue() and catalogue()[name].symmetry == "odd" and size.any():
+            raise InputError(
+                f"{name} makes left and right turns differ, which the look-up table has not learned; make the "
+                "robot a table of its own: python -m surrogate robot ROBOT.toml --out TABLE.json"
+            )
+    if (values["N"] < 2).any():
+        raise InputError(
+            "N = 1: the response of one tail depends too much on the phase of the disc, so the look-up table "
+            "has not learned it; simulate it (python -m sim replay)"
+        )
+
+
+def steady_outputs(found: Motions, tails: TailTable) -> dict[str, Floats]:
+    """STEADY_OUTPUTS of motions."""
+    values = tails.outputs(found.heads, found.tails, found.motion)
+    return {name: np.asarray(value.numpy()) for name, value in zip(STEADY_OUTPUTS, values, strict=True)}
+
+
+def _checked_dwells(dwells: Floats) -> Floats:
+    dwells = np.asarray(dwells, dtype=float)
+    for value in dwells[~(np.isfinite(dwells) & (dwells >= DWELLS[0] * (1 - 1e-9)))][:1]:
+        raise InputError(f"{DWELL} = {value:g}; give a dwell from {DWELLS[0]:g} on")
+    return dwells
+
+
+def _at_dwells(
+    response: Responses, steady: Mapping[str, Floats], dwells: Floats, sense: Floats
 ) -> dict[str, Floats]:
-    """Lags for the positive direction of the motor, and the net speed that follows from them."""
-    yaw, sway = np.abs(steady["omega_yr_bar"]), np.abs(steady["v_x"])
-    psi, x, z = raw[..., 0] * yaw, raw[..., 1] * sway, raw[..., 2] * sway
-    twist = np.stack([steady["v_z"], sway, yaw], -1)
-    speed = planar.net_speed(twist, np.stack([z, x, psi], -1), values[DWELL])
-    return dict(zip(RESPONSE_OUTPUTS, (speed, psi, x, z), strict=True))
+    """RESPONSE_OUTPUTS at one dwell for each robot, when all dwells are equal."""
+    curves = response.lag + at_equal_dwells(response.memory)
+    lag = between_dwells(curves, dwells)
+    twist = np.stack([steady["v_z"], sense * steady["v_x"], sense * steady["omega_yr_bar"]], -1)
+    speed = planar.net_speed(twist, lag, dwells)
+    return dict(zip(RESPONSE_OUTPUTS, (speed, lag[:, 2], lag[:, 1], lag[:, 0]), strict=True))
+
+
+def between_dwells(curves: Floats, dwells: Floats) -> Floats:
+    """Curves (M, D, 3) at one dwell for each row (M,): cubic in ln T̄ through four neighbours, then constant."""
+    knots = np.log(DWELLS)
+    place = np.log(np.minimum(dwells, DWELLS[-1]))
+    first = np.clip(np.searchsorted(knots, place) - 2, 0, len(knots) - 4)
+    rows, total = np.arange(len(dwells)), np.zeros((len(dwells), 3))
+    for i in range(4):
+        weight = np.ones(len(dwells))
+        for j in range(4):
+            if j != i:
+                weight *= (place - knots[first + j]) / (knots[first + i] - knots[first + j])
+        total += weight[:, None] * curves[rows, first + i]
+    return total
+
+
+def digest(content: Any) -> str:
+    """Hash of nested dictionaries and lists of tensors and plain values."""
+    found = hashlib.sha256()
+
+    def take(part: Any) -> None:
+        if isinstance(part, Tensor):
+            found.update(str((part.dtype, tuple(part.shape))).encode())
+            found.update(part.detach().contiguous().numpy().tobytes())
+        elif isinstance(part, Mapping):
+            for key in sorted(part):
+                found.update(json.dumps(key).encode())
+                take(part[key])
+        elif isinstance(part, list | tuple):
+            found.update(f"[{len(part)}".encode())
+            for item in part:
+                take(item)
+        else:
+            found.update(json.dumps(part).encode())
+
+    take(content)
+    return found.hexdigest()

@@ -1,63 +1,59 @@
-"""Train the look-up table on a data set.
+"""Train a look-up table: networks, domain, intervals and held-out errors.
 
-A fixed hash of a row's number puts it into one of three sets: training (80 %), validation (10 %, for early
-stopping) and held-out (10 %, never used in training; the errors on these rows are printed and stored). The loss is
-the mean square of the standardised targets. The optimiser is Adam with a cosine step size. Every member keeps the
-weights of its best validation epoch. Rows that failed or did not converge, and the few robots that move backwards,
-are left out. Rows whose tails touch are used.
+Rows of a data set are put into three sets by a fixed hash of their number: 80 % are learned, on 10 % the local
+widths of the intervals are fitted, and 10 % are held out. The held-out rows give the stated errors and the last
+factor of the intervals. Rows that failed or did not converge are left out. Rows whose tails touch are used.
+
+A data set need not have response curves. Then the flips of a part of its robots are simulated here.
 """
 
 from __future__ import annotations
 
-import copy
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import torch
-from torch import Tensor
-from tqdm import tqdm
 
-from dataset.schema import INPUTS
-from dataset.store import read, read_manifest, usable
+from dataset.store import read_manifest
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 from sim.io.provenance import provenance
-from surrogate.evaluate import held_out_errors
-from surrogate.lookup import Lookup
-from surrogate.network import Ensemble, features, response_targets, steady_targets
+from surrogate import curves, tail, tails
+from surrogate.curves import learn_curves
+from surrogate.evaluate import curve_errors, relative_errors, summary
+from surrogate.fit import Settings
+from surrogate.intervals import Intervals
+from surrogate.lookup import BRANCHES, Lookup, steady_outputs
+from surrogate.rows import ROBOT, Simulated, read_rows, simulated
+from surrogate.support import Support
+from surrogate.tails import CLASSES, class_of, learn_tails, learnable, rows_of
 
-_FEWEST_ROWS = 64
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How to train; the seeds make it repeatable."""
-
-    width: int = 128
-    depth: int = 3
-    members: int = 4
-    epochs: int = 1200
-    patience: int = 250  # epochs without a better validation loss
-    batch: int = 512
-    learning_rate: float = 4e-3
-    seed: int = 1
+_FEWEST_ROWS, _FEWEST_OF_A_CLASS = 64, 16
 
 
 def split(rows: Integers) -> Integers:
-    """0 training, 1 validation, 2 held out: a fixed pseudo-random split by row number."""
+    """0 learned, 1 for the widths of intervals, 2 held out: a fixed pseudo-random split by row number."""
     mixed = (rows.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(40)
     tenth = mixed % np.uint64(10)
     return np.where(tenth == 8, 1, np.where(tenth == 9, 2, 0))
 
 
-def train(folder: str, settings: Settings | None = None, *, title: str = "train") -> Lookup:
+def train(
+    folder: str,
+    settings: Settings | None = None,
+    curve_settings: Settings | None = None,
+    *,
+    flips: int = 256,
+    title: str = "train",
+) -> Lookup:
     """A look-up table from a finished data set.
 
     Args:
         folder: data set written by `python -m dataset build`.
-        settings: network and optimiser.
+        settings: networks of the tails and their optimiser.
+        curve_settings: the same for the response to a flip.
+        flips: robots whose flips are simulated if the data set has no curves.
         title: of the progress bars; empty for none.
 
     Raises:
@@ -67,104 +63,127 @@ def train(folder: str, settings: Settings | None = None, *, title: str = "train"
         >>> from softflagella import train
         >>> table = train("data/sweep")  # doctest: +SKIP
     """
-    chosen = settings or Settings()
     manifest = read_manifest(folder)
-    rows = usable(read(folder)).drop(columns="reason")  # the one column of words
-    positive = rows[["v_x", "v_z", "omega_yr_bar", "tail_gap"]].to_numpy() > 0
-    rows = rows[positive.all(1) & (rows["omega_h_bar"].to_numpy() < 0)]
+    rows, numbers = read_rows(folder)
+    part = split(numbers)
     if len(rows) < _FEWEST_ROWS:
         raise InputError(f"{folder} has {len(rows)} usable rows; training needs {_FEWEST_ROWS}")
-    columns = {str(name): rows[name].to_numpy(dtype=float) for name in rows}
-    part = split(rows["row"].to_numpy())
-    tail_counts = sorted({int(n) for n in columns["N"]})
-    effects = list(manifest["effects"])
-    steady = _fit(
-        features(columns, tail_counts, effects, dwell=False),
-        steady_targets(columns),
-        part,
-        chosen,
-        f"{title} steady" if title else "",
+    sets = [rows.at(part == i) for i in range(3)]
+    flipped = sets[0].with_curves()
+    if not len(flipped):
+        some = sets[0].at(np.flatnonzero(sets[0].robots["N"] > 1)[:flips])
+        flipped = simulated(some.robots, curves=True, title=title and f"{title}: flips simulated")
+    source = {"data_hash": manifest["config_hash"], "data_code_version": manifest["code_version"]}
+    learned, widths, held_out = sets
+    return learn(learned, widths, held_out, flipped, settings, curve_settings, source=source, title=title)
+
+
+def learn(
+    learned: Simulated,
+    widths: Simulated,
+    held_out: Simulated,
+    flipped: Simulated,
+    settings: Settings | None = None,
+    curve_settings: Settings | None = None,
+    *,
+    flips_held_out: Simulated | None = None,
+    start: Lookup | None = None,
+    source: dict[str, Any] | None = None,
+    title: str = "train",
+) -> Lookup:
+    """A look-up table from simulated robots.
+
+    Args:
+        learned: steady motions for the tails.
+        widths: robots for the local widths of the intervals.
+        held_out: robots for the errors and the factor of the intervals.
+        flipped: robots with response curves.
+        flips_held_out: robots with curves for the errors of the response; by default a tenth of `flipped`.
+        start: a table whose networks of the wrench learn on; its other networks are kept.
+        source: more provenance.
+    """
+    chosen, curves_chosen = settings or Settings(), curve_settings or curves.SETTINGS
+    if flips_held_out is None:
+        tenth = np.arange(len(flipped)) % 10 == 9
+        flipped, flips_held_out = flipped.at(~tenth), flipped.at(tenth)
+    rows = _learnable(learned)
+    table = learn_tails(rows, chosen, title, start.tails if start else None)
+    kind = class_of(rows.tails.number)
+    inputs = tail.inputs_of(rows.tails, rows.motion)
+    flipped, flips_held_out = _several_tails(flipped), _several_tails(flips_held_out)
+    own = _learnable(flipped)
+    usable = np.flatnonzero(learnable(rows_of(flipped.robots, flipped.motion)))
+    response = (
+        start.curves
+        if start
+        else learn_curves(
+            own.heads, own.tails, own.motion, flipped.at(usable).curves, curves_chosen, title and f"{title}: flips"
+        )
     )
-    response = _fit(
-        features(columns, tail_counts, effects, dwell=True),
-        response_targets(columns),
-        part,
-        chosen,
-        f"{title} response" if title else "",
-    )
+    counts = {"train": len(rows.motion), "widths": len(widths), "held_out": len(held_out), "flips": len(usable)}
+    made = provenance({"tails": asdict(chosen), "curves": asdict(curves_chosen)})
     lookup = Lookup(
-        steady=steady,
-        response=response,
-        tail_counts=tail_counts,
-        effects=effects,
-        domain=_domain(rows, manifest),
+        tails=table,
+        curves=response,
+        support=tuple(
+            Support.of(inputs[kind == k]) if bool((kind == k).any()) else None for k in range(len(CLASSES))
+        ),
+        intervals=None,
+        ranges={name: _range(learned.robots[name]) for name in learned.robots if name in ROBOT},
         errors={},
-        provenance={
-            **provenance(asdict(chosen)),
-            "data_hash": manifest["config_hash"],
-            "data_code_version": manifest["code_version"],
-            "rows": {n: int((part == i).sum()) for i, n in enumerate(("train", "validate", "held_out"))},
-        },
+        provenance={**made, **(source or {}), "rows": counts},
     )
-    held = rows[part == 2]
-    return lookup.with_errors(held_out_errors(lookup, held))
+    return _judged(lookup, widths, held_out, flips_held_out)
 
 
-def _domain(rows: pd.DataFrame, manifest: dict[str, Any]) -> dict[str, tuple[float, float]]:
-    swept = manifest["config"]["inputs"]
-    names = [c.name for c in INPUTS] + list(manifest["effects"])
-    table = {n: rows[n].to_numpy(dtype=float) for n in names}
-    fixed = {n: (float(v.min()), float(v.max())) for n, v in table.items()}
-    return {n: tuple(swept[n]["range"]) if n in swept else fixed[n] for n in names}
+def _judged(lookup: Lookup, widths: Simulated, held_out: Simulated, flips: Simulated) -> Lookup:
+    """The table with its intervals and held-out errors."""
+    (first_hints, first, _), (hints, errors, inside) = (_errors(lookup, rows) for rows in (widths, held_out))
+    intervals = Intervals.learned(first_hints, first, hints, errors)
+    apart = held_out.motion["tail_gap"][inside] >= 1
+    report = summary({name: error.numpy() for name, error in errors.items()}, apart)
+    flips = flips.at(np.abs(flips.motion["omega_yr_bar"]) < BRANCHES * np.abs(flips.motion["omega_t_bar"]))
+    found = lookup.response(flips.robots, flag=True)
+    truth = {**flips.motion, **flips.curves}
+    report |= summary(curve_errors(found, truth), flips.motion["tail_gap"] >= 1)
+    return replace(lookup, intervals=intervals).with_errors(report)
 
 
-def _fit(inputs: Tensor, targets: Floats, part: Integers, settings: Settings, title: str) -> Ensemble:
-    outputs = torch.tensor(targets, dtype=torch.float32)
-    learn, check = torch.from_numpy(part == 0), torch.from_numpy(part == 1)
-    network = Ensemble(
-        inputs.shape[1],
-        outputs.shape[1],
-        width=settings.width,
-        depth=settings.depth,
-        members=settings.members,
-        seed=settings.seed,
+def _errors(lookup: Lookup, rows: Simulated) -> tuple[torch.Tensor, dict[str, torch.Tensor], Floats]:
+    """Hints and relative errors of rows inside the domain, and which those are."""
+    found = lookup.motions(rows.robots, flag=True)
+    inside = np.array([not reason for reason in found.reason])
+    truth = with_radius(rows.motion)
+    errors = relative_errors(steady_outputs(found, lookup.tails), truth)
+    return (
+        lookup.hints(found)[torch.as_tensor(inside)],
+        {name: torch.as_tensor(error[inside]) for name, error in errors.items()},
+        inside,
     )
-    network.standardise(inputs[learn], outputs[learn])
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    network.to(device)
-    inputs = inputs.to(device)
-    wanted = ((outputs - network.output_mean.cpu()) / network.output_scale.cpu()).to(device)
-    x, y, x_check, y_check = inputs[learn], wanted[learn], inputs[check], wanted[check]
-    optimiser = torch.optim.AdamW(network.parameters(), lr=settings.learning_rate, weight_decay=1e-5)
-    batches = -(-len(x) // settings.batch)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, settings.epochs * batches)
-    generator = torch.Generator().manual_seed(settings.seed)
-    best = torch.full((settings.members,), torch.inf, device=device)
-    kept = copy.deepcopy(network.state_dict())
-    stale = 0
-    with tqdm(total=settings.epochs, desc=title, unit="epoch", delay=1.0, disable=not title) as bar:
-        for _ in range(settings.epochs):
-            for rows in torch.randperm(len(x), generator=generator).to(device).chunk(batches):
-                optimiser.zero_grad(set_to_none=True)
-                (network(x[rows]) - y[rows]).square().mean((1, 2)).sum().backward()
-                optimiser.step()
-                schedule.step()
-            with torch.no_grad():
-                loss = (network(x_check) - y_check).square().mean((1, 2))
-            better = loss < best
-            stale = 0 if bool(better.any()) else stale + 1
-            best = torch.minimum(loss, best)
-            _keep(kept, network, better)
-            bar.set_postfix_str(f"validation rms {best.mean().sqrt():.4f}", refresh=False)
-            bar.update()
-            if stale >= settings.patience:
-                break
-    network.load_state_dict(kept)
-    return network.cpu()
 
 
-def _keep(kept: dict[str, Tensor], network: Ensemble, members: Tensor) -> None:
-    """Copy the weights of the chosen members."""
-    for name, value in network.state_dict().items():
-        if name.startswith(("weights", "biases")):
-            kept[name][members] = value[members]
+def _several_tails(rows: Simulated) -> Simulated:
+    """Rows with two or more tails: the response of one tail depends too much on the phase of the disc."""
+    return rows.at(rows.robots["N"] > 1)
+
+
+def with_radius(motion: dict[str, Floats]) -> dict[str, Floats]:
+    """The motion with turn radius and slip angle."""
+    speed = np.hypot(motion["v_x"], motion["v_z"])
+    angle = np.degrees(np.arctan2(np.abs(motion["v_x"]), motion["v_z"]))
+    return {**motion, "R_yr_over_l": speed / np.abs(motion["omega_yr_bar"]), "theta_deg": angle}
+
+
+def _learnable(rows: Simulated) -> tails.Rows:
+    found = rows_of(rows.robots, rows.motion)
+    good = learnable(found)
+    kept = found.at(torch.as_tensor(np.flatnonzero(good)))
+    counts = [int((class_of(kept.tails.number) == k).sum()) for k in range(len(CLASSES))]
+    for count, number in zip(counts, ("N = 1", "N = 2", "N = 3 and more"), strict=True):
+        if 0 < count < _FEWEST_OF_A_CLASS:
+            raise InputError(f"{count} usable rows with {number}; training needs {_FEWEST_OF_A_CLASS} or none")
+    return kept
+
+
+def _range(values: Floats) -> tuple[float, float]:
+    return float(np.abs(values).min()), float(np.abs(values).max())

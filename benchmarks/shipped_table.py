@@ -1,0 +1,112 @@
+"""Make the look-up table that comes with the package, and open its locked test.
+
+Usage: python -m benchmarks.shipped_table WORK --out MODEL    simulate (kept in the folder WORK) and train
+       python -m benchmarks.shipped_table WORK --out MODEL --more MODEL --iterations 500    train on
+       python -m benchmarks.shipped_table WORK --test MODEL   errors and coverage on the locked robots
+
+Robots are drawn from Sobol sequences with the seeds below. The locked robots led to no choice of any kind.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from sim.arrays import Floats
+from surrogate.evaluate import coverage, curve_errors, error_table, relative_errors, summary
+from surrogate.export import load, save
+from surrogate.fit import Settings
+from surrogate.lookup import Lookup
+from surrogate.rows import Simulated, as_reached, drawn, simulated
+from surrogate.train import learn, with_radius
+
+TAILS = Settings(width=64, depth=3, members=1, epochs=150, iterations=300)
+ROWS = {"tails": (32768, 101), "widths": (4096, 202), "held_out": (4096, 402), "locked": (4096, 20261121)}
+FLIPS = {"flips": (2800, 301), "locked_flips": (400, 20261122)}
+_FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated
+
+
+def robots(name: str) -> dict[str, Floats]:
+    """The robots of one set."""
+    if name in FLIPS:
+        count, seed = FLIPS[name]
+        if name == "locked_flips":
+            return drawn(count, seed, wide=False)
+        tails = 1.0 + np.arange(_FLIPS_DRAWN) % 8
+        np.random.default_rng(seed).shuffle(tails)
+        every = {**drawn(_FLIPS_DRAWN, seed, wide=True), "N": tails}
+        return {n: np.asarray(values[:count]) for n, values in every.items()}
+    count, seed = ROWS[name]
+    return drawn(count, seed, wide=name == "tails")
+
+
+def kept(work: Path, name: str) -> Simulated:
+    """One set, simulated, or read from the folder if it is there."""
+    path = work / f"{name}.npz"
+    if path.exists():
+        with np.load(path) as file:
+            parts = [{k.split("/")[1]: file[k] for k in file if k.startswith(f"{i}/")} for i in range(3)]
+        return Simulated(*parts)
+    began = time.process_time()
+    make: Callable[..., Simulated] = simulated if name == "tails" or name in FLIPS else as_reached
+    found = make(robots(name), title=name, **({"curves": True} if name in FLIPS else {}))
+    print(f"{name}: {len(found)} rows, {time.process_time() - began:.0f} s")
+    work.mkdir(parents=True, exist_ok=True)
+    named = {f"{i}/{k}": values for i, part in enumerate(vars(found).values()) for k, values in part.items()}
+    np.savez(path, allow_pickle=False, **named)
+    return found
+
+
+def test(lookup: Lookup, rows: Simulated, flips: Simulated) -> None:
+    """Print errors and coverage on robots that were never used."""
+    began = time.process_time()
+    answer = lookup.query(rows.robots, intervals=True, flag=True)
+    seconds = time.process_time() - began
+    inside = ~answer["outside"]
+    truth = with_radius(rows.motion)
+    apart = rows.motion["tail_gap"] >= 1
+    print(f"\n{len(rows)} locked robots, {1e6 * seconds / len(rows):.0f} µs each with intervals; outside: "
+          f"{np.count_nonzero(~inside)}")  # fmt: skip
+    errors = {name: error[inside] for name, error in relative_errors(answer, truth).items()}
+    errors["v_z of itself"] = (answer["v_z"] / truth["v_z"] - 1)[inside]
+    for name, figures in summary(errors, apart[inside]).items():
+        print(f"  {name:16}" + "".join(f"  {k} {100 * v:.4f}" for k, v in figures.items()))
+    own = {name: values[inside] for name, values in answer.items()}
+    print("coverage:", coverage(own, {name: values[inside] for name, values in truth.items()}))
+    flips = flips.at(flips.robots["N"] > 1)
+    found = lookup.response(flips.robots, flag=True)
+    known = ~lookup.query(flips.robots, flag=True)["outside"]
+    report = curve_errors(found, {**flips.motion, **flips.curves})
+    print(f"response to a flip, {np.count_nonzero(known)} robots:")
+    valid = flips.motion["tail_gap"] >= 1
+    for name, figures in summary({n: e[known] for n, e in report.items()}, valid[known]).items():
+        print(f"  {name:16}" + "".join(f"  {k} {100 * v:.3f}" for k, v in figures.items()))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("work", type=Path)
+    parser.add_argument("--out")
+    parser.add_argument("--more")
+    parser.add_argument("--iterations", type=int, default=500)
+    parser.add_argument("--test")
+    given = parser.parse_args()
+    if given.out:
+        tails, widths, held_out, flips = (kept(given.work, n) for n in ("tails", "widths", "held_out", "flips"))
+        start = load(given.more) if given.more else None
+        settings = replace(TAILS, epochs=0, iterations=given.iterations) if start else TAILS
+        source = {"seeds": {**ROWS, **FLIPS}, "started_from": start.identity if start else None}
+        lookup = learn(tails, widths, held_out, flips, settings, start=start, source=source)
+        save(lookup, given.out)
+        print(error_table(lookup))
+    if given.test:
+        test(load(given.test), kept(given.work, "locked"), kept(given.work, "locked_flips"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,29 @@
+"""Certify answers of the look-up table with the simulator: the error that an answer has, not one to expect.
+
+    certified error = largest relative difference between table and simulator + the simulator's own error
+
+of the spins, the yaw rate and the velocities (these relative to the speed). The simulator takes about a
+millisecond a robot, and longer for one and two tails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.motion.batches import steady_columns
+
+_RATES = ("omega_t_bar", "omega_h_bar", "omega_yr_bar")
+
+
+def certified_error(robots: Mapping[str, Floats], answer: Mapping[str, Any]) -> Floats:
+    """Certified relative error of each robot's answer, (M,); NaN where the simulator finds no steady motion."""
+    found = steady_columns(robots, title="certify")
+    speed = np.hypot(found["v_x"], found["v_z"])
+    apart = [np.abs(answer[name] / found[name] - 1) for name in _RATES]
+    apart += [np.abs(answer[name] - found[name]) / speed for name in ("v_x", "v_z")]
+    error = np.max(apart, axis=0) + found["error"]
+    return np.where(found["converged"], error, np.nan)

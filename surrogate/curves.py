@@ -1,0 +1,140 @@
+"""The table of the response to a flip: curves over the dwell (`sim.model.response`), learned from simulated flips.
+
+The curves are lengths and angles. Over the speeds of the steady motion they are times, which vary little from
+robot to robot:
+
+    Δz/w, Δx/v_x, Δψ/ω_yr,   w² = v_z² + (v_x/10)²
+
+(w and not v_z, because v_z may vanish). Lag, memory, rest and spread are each written in the principal
+components of the rows that were learned. A network gives the components. A robot's inputs are those of its tails
+in steady motion (`surrogate.tail`), how the drag of its head compares with that of its tails, and N.
+
+The components are curves of the simulator. So the curves of the table are smooth, and constant for long dwells.
+Left out: robots with one tail, and robots whose left and right turns differ. Units: l, μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from sim.arrays import Floats
+from sim.model.response import BEFORE, DWELLS
+from surrogate import tail
+from surrogate.fit import Settings, fit
+from surrogate.head import Heads
+from surrogate.network import Ensemble
+from surrogate.tail import Tails
+
+SHAPES = {
+    "lag": (len(DWELLS), 3),
+    "memory": (len(BEFORE), len(DWELLS), 3),
+    "rest": (len(DWELLS), 3),
+    "spread": (len(DWELLS), 3),
+}
+COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 20}
+SETTINGS = Settings(width=96, depth=2, members=2, epochs=400, iterations=600)
+_SMALL_SURGE = 0.1  # of v_x
+_SMOOTH = 2.0  # standard deviations over which the components change
+
+
+class Basis(NamedTuple):
+    """Principal components of one kind of curve, flattened: curve = mean + c · vectors."""
+
+    mean: Tensor  # (D,)
+    vectors: Tensor  # (C, D)
+
+
+@dataclass(frozen=True)
+class CurveTable:
+    """Response curves of robots from their steady motion."""
+
+    network: Ensemble
+    bases: Mapping[str, Basis]
+
+    def curves(self, heads: Heads, tails: Tails, motion: Tensor) -> dict[str, Floats]:
+        """Lag, memory, rest and spread, each (M, …, 3) as in SHAPES, in l, l, rad, for a positive motor."""
+        components = self.network(inputs_of(heads, tails, motion))
+        speeds = speeds_of(heads, motion)
+        found, start = {}, 0
+        for name, basis in self.bases.items():
+            stop = start + len(basis.vectors)
+            curve = basis.mean + components[:, start:stop] @ basis.vectors
+            scaled = curve.reshape(-1, *SHAPES[name]) * _along(speeds, SHAPES[name])
+            found[name] = np.asarray(scaled.numpy())
+            start = stop
+        found["spread"] = np.maximum(found["spread"], 0.0)
+        return found
+
+
+def inputs_of(heads: Heads, tails: Tails, motion: Tensor) -> Tensor:
+    """Inputs of the network, (M, 12)."""
+    across = tails.number * tails.zeta_perp
+    resistance = heads.resistance
+    extra = [
+        torch.log(resistance[:, 0, 0] / across),
+        torch.log(resistance[:, 1, 1] / across),
+        torch.log(resistance[:, 2, 2] / across),
+        torch.log(tails.number),
+        (tails.number == 2).double(),
+    ]
+    return torch.cat([tail.inputs_of(tails, motion), torch.stack(extra, -1)], -1)
+
+
+def speeds_of(heads: Heads, motion: Tensor) -> Tensor:
+    """(w, v_x, ω_yr) of the head's centre, (M, 3): what the curves are divided by."""
+    v_x, v_z, yaw = motion[:, 0], motion[:, 1], motion[:, 2]
+    sway = v_x + yaw * heads.length / 2
+    return torch.stack([torch.hypot(v_z, _SMALL_SURGE * sway), sway, yaw], -1)
+
+
+def learn_curves(
+    heads: Heads, tails: Tails, motion: Tensor, curves: Mapping[str, Floats], settings: Settings, title: str
+) -> CurveTable:
+    """A table from the curves of robots, by name as in SHAPES, each (M, …, 3)."""
+    inputs, speeds = inputs_of(heads, tails, motion), speeds_of(heads, motion)
+    bases, targets = {}, []
+    for name, shape in SHAPES.items():
+        scaled = torch.as_tensor(curves[name]) / _along(speeds, shape)
+        flat = scaled.reshape(len(scaled), -1)
+        mean = flat.median(0).values
+        vectors = torch.linalg.svd(_without_outliers(flat - mean), full_matrices=False)[2][: COMPONENTS[name]]
+        bases[name] = Basis(mean, vectors)
+        targets.append((flat - mean) @ vectors.T)
+    wanted = torch.cat(targets, -1)
+    weights = torch.cat([torch.full((len(bases[n].vectors),), (3 / np.prod(s)) ** 0.5) for n, s in SHAPES.items()])
+    network = Ensemble(
+        inputs.shape[1], wanted.shape[1], width=settings.width, depth=settings.depth, members=settings.members,
+        seed=settings.seed,
+    )  # fmt: skip
+    network.shift.copy_(inputs.mean(0))
+    network.scale.copy_(torch.clamp(inputs.std(0), min=1e-6) * _SMOOTH)
+    network.spread.copy_(_spread(wanted))
+
+    def residual(y: Tensor, at: Tensor) -> Tensor:
+        return (y - wanted[at]) * weights
+
+    fit(network, inputs, residual, settings, title)
+    return CurveTable(network, bases)
+
+
+def _along(speeds: Tensor, shape: tuple[int, ...]) -> Tensor:
+    """Speeds (M, 3) with axes of length 1 between, to multiply curves (M, *shape)."""
+    return speeds.reshape(len(speeds), *[1] * (len(shape) - 1), 3)
+
+
+def _without_outliers(flat: Tensor) -> Tensor:
+    """Rows (M, D) with their size limited, so that a few of them do not choose the components."""
+    size = flat.norm(dim=1, keepdim=True)
+    return flat * torch.clamp(5 * size.median() / torch.clamp(size, min=1e-12), max=1.0)
+
+
+def _spread(wanted: Tensor) -> Tensor:
+    """Half the range between the 16th and the 84th percentile, (C,)."""
+    low, high = wanted.quantile(torch.tensor([0.16, 0.84], dtype=wanted.dtype), dim=0)
+    return torch.clamp((high - low) / 2, min=1e-8)

@@ -1,0 +1,171 @@
+"""Simulated robots as the look-up table learns them: from a data set's folder, or drawn and simulated here.
+
+The tails' wrench follows from a robot's own motion, whatever its head is. So robots with heads far wider than
+those of real robots make the best rows: `drawn` gives them. Columns have the names of the data set. Curves of
+the response to a flip are those of `sim.model.response`; rows without them have NaN.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.stats import qmc
+
+from dataset.store import read, read_manifest, usable
+from sim.arrays import Flags, Floats, Integers
+from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, Groups
+from sim.model.response import BEFORE, DWELLS
+from sim.motion.batches import run_batches, split, steady_columns
+from sim.motion.response import responses
+from sim.motion.steady import orbits
+
+ROBOT = (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)
+MOTION = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap", "error")
+COMPONENTS = ("z", "x", "psi_rad")  # of a lag
+DOMAIN = {
+    "C_t": (0.5, 8.0), "C_r": (0.5, 6.0), "C_yr": (0.2, 12.0), "l_over_R": (2.0, 12.0), "L_over_R": (1.5, 8.0),
+    "l_over_r0": (12.0, 80.0), "omega_bar": (0.5, 150.0), "a_over_R": (0.5, 1.2),
+}  # fmt: skip
+MOST_TAILS = 8
+WIDE = {
+    "C_t": (0.3, 12.0), "C_r": (0.3, 9.0), "C_yr": (0.1, 18.0), "l_over_R": (1.85, 13.0), "L_over_R": (1.2, 10.0),
+    "l_over_r0": (11.0, 88.0), "omega_bar": (0.42, 165.0), "a_over_R": (0.46, 1.3),
+}  # fmt: skip
+_TAILS = (1, 1, 2, 2, 3, 4, 5, 7)  # N of eighths of the wide robots; half of the last two have one tail more
+_PHASES = {1: 8, 2: 12}  # to begin with, by N: with one or two tails the motion depends more on the disc's phase
+_BATCH, _CURVE_BATCH = 64, 8
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """M robots with their motion, and with their response curves if they were simulated."""
+
+    robots: dict[str, Floats]  # groups and effects, each (M,)
+    motion: dict[str, Floats]  # MOTION, each (M,)
+    curves: dict[str, Floats]  # lag, memory, rest, spread as in `sim.model.response`, net_speed; may be empty
+
+    def __len__(self) -> int:
+        return len(self.robots["N"])
+
+    def at(self, rows: Flags | Integers) -> Simulated:
+        """The robots at indices or flags."""
+        parts = [{name: array[rows] for name, array in part.items()} for part in vars(self).values()]
+        return Simulated(*parts)
+
+    def with_curves(self) -> Simulated:
+        """The robots whose response was simulated."""
+        if not self.curves:
+            return self.at(np.zeros(len(self), dtype=bool))
+        finite = [np.isfinite(array.reshape(len(array), -1)).all(1) for array in self.curves.values()]
+        return self.at(np.all(finite, axis=0))
+
+    def plus(self, other: Simulated) -> Simulated:
+        """These robots and others, both with curves or both without."""
+        joined = [
+            {name: np.concatenate([mine[name], theirs[name]]) for name in mine}
+            for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True)
+        ]
+        return Simulated(*joined)
+
+
+def read_rows(folder: str) -> tuple[Simulated, Integers]:
+    """Usable rows of a data set's folder, and their numbers.
+
+    Raises:
+        InputError: there is no finished data set.
+    """
+    table = read(folder)
+    effects = list(read_manifest(folder)["effects"])
+    plain = table.select_dtypes(["number", "bool"])
+    table = table.loc[usable(plain).index]
+    robots = {name: table[name].to_numpy(dtype=float) for name in (*ROBOT, *effects)}
+    motion = {name: table[name].to_numpy(dtype=float) for name in MOTION}
+    return Simulated(robots, motion, _curves_in(table)), table["row"].to_numpy(dtype=np.int64)
+
+
+def _curves_in(table: pd.DataFrame) -> dict[str, Floats]:
+    """Response curves from lists in columns `lag_z`, …, `memory_psi_rad`; empty if there are none."""
+    if "memory_z" not in table:
+        return {}
+    dwells, before = len(DWELLS), len(BEFORE)
+    shapes = {"lag": (dwells,), "memory": (before, dwells), "rest": (dwells,), "spread": (dwells,)}
+    return {
+        name: np.stack([_lists(table[f"{name}_{part}"], shape) for part in COMPONENTS], -1)
+        for name, shape in shapes.items()
+    }
+
+
+def _lists(column: Any, shape: Sequence[int]) -> Floats:
+    empty = np.full(shape, np.nan)
+    return np.array([empty if row is None else np.asarray(row, dtype=float).reshape(shape) for row in column])
+
+
+def drawn(count: int, seed: int, *, wide: bool) -> dict[str, Floats]:
+    """Robots of a scrambled Sobol sequence, even in the logarithms of DOMAIN.
+
+    Args:
+        count: number of robots. seed: of the scrambling. wide: from WIDE, half of them with effects on the head,
+        a quarter each with one and two tails; else robots of
+            DOMAIN, every N alike, without effects.
+    """
+    sampler = qmc.Sobol(len(DOMAIN) + 5, scramble=True, rng=np.random.default_rng(seed))
+    share = sampler.random_base2(math.ceil(math.log2(max(count, 2))))[:count]
+    ranges = WIDE if wide else DOMAIN
+    robots = {n: low * (high / low) ** share[:, i] for i, (n, (low, high)) in enumerate(ranges.items())}
+    eighth, more, turning, along, disc = share[:, len(DOMAIN) :].T
+    if not wide:
+        return robots | {"N": 1 + np.floor(MOST_TAILS * eighth)}
+    tails = np.array(_TAILS, dtype=float)[(8 * eighth).astype(int)]
+    robots["N"] = tails + (tails >= 5) * (more > 0.5)
+    robots["end_over_end_drag"] = np.where(turning < 0.5, 0.0, 0.1 * 150 ** (2 * turning - 1))
+    robots["anisotropic_head_drag"] = np.where(along < 0.5, 0.0, -0.5 + 1.5 * (2 * along - 1))
+    robots["disc_drag"] = np.where(disc < 0.6, 0.0, 3 * (disc - 0.6) / 0.4)
+    return robots
+
+
+def simulated(robots: Mapping[str, Floats], *, curves: bool = False, title: str = "") -> Simulated:
+    """Simulate robots; those without a direct solution are left out.
+
+    Args:
+        robots: groups and effects, each (M,).
+        curves: simulate the response to a flip, too; it takes a hundred times as long.
+        title: of the progress bar; empty for none.
+    """
+    batches = split(np.asarray(robots["N"]), _CURVE_BATCH if curves else _BATCH)
+    parts = [{name: array[rows] for name, array in robots.items()} for rows in batches]
+    work = _with_curves if curves else _motion
+    done = run_batches(work, parts, sizes=[len(b) for b in batches], title=title, threads=True)
+    order = np.argsort(np.concatenate(batches))
+    found = {name: np.concatenate([part[name] for part in done])[order] for name in done[0]}
+    motion = {name: found[name] for name in MOTION}
+    kept = {name: found[name] for name in found if name not in (*MOTION, "solved")}
+    everything = Simulated({name: np.asarray(array) for name, array in robots.items()}, motion, kept)
+    return everything.at(found["solved"])
+
+
+def as_reached(robots: Mapping[str, Floats], *, title: str = "") -> Simulated:
+    """Simulate robots as the data set does: the motion that straight tails reach, if it is steady."""
+    found = steady_columns(robots, title=title)
+    whole = Simulated(dict(robots), {name: found[name] for name in MOTION}, {})
+    return whole.at(np.asarray(found["converged"], dtype=bool))
+
+
+def _motion(robots: dict[str, Floats]) -> dict[str, Any]:
+    groups = Groups.from_columns(robots)
+    motion = orbits(groups, phases=_PHASES.get(groups.N, 3))
+    columns = motion.columns()
+    return {name: columns[name] for name in MOTION} | {"solved": motion.converged}
+
+
+def _with_curves(robots: dict[str, Floats]) -> dict[str, Any]:
+    groups = Groups.from_columns(robots)
+    motion = orbits(groups)
+    found = responses(groups, motion)
+    columns = _motion(robots)
+    curves = {name: getattr(found, name) for name in ("lag", "memory", "rest", "spread", "net_speed")}
+    return columns | curves | {"solved": columns["solved"] & ~found.failed & ~found.stepped}

@@ -1,0 +1,73 @@
+"""Domain and intervals: joint support, refusals, coverage."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from sim.io.errors import InputError
+from surrogate.intervals import Intervals
+from surrogate.support import Support
+from tests.surrogate.small import rows, table
+
+
+def test_the_support_is_joint() -> None:
+    """Two inputs that always move together: one high and one low is outside, though each alone is in range."""
+    generator = torch.Generator().manual_seed(1)
+    x = torch.randn(4000, 1, generator=generator).double()
+    noise = 0.05 * torch.randn(4000, 2, generator=generator).double()
+    support = Support.of(torch.cat([x, x], 1) + noise)
+    points = torch.tensor([[0.0, 0.0], [1.5, 1.5], [-1.0, -1.05], [1.0, -1.0], [6.0, 6.0]]).double()
+    assert (support.remoteness(points) <= 1).tolist() == [True, True, True, False, False]
+
+
+def test_intervals_cover_as_they_say() -> None:
+    """Errors whose size depends on an input: 90 % are covered, on the loud side and on the quiet side."""
+    generator = torch.Generator().manual_seed(2)
+
+    def sample(count: int) -> tuple[torch.Tensor, torch.Tensor]:
+        x = torch.rand(count, 2, generator=generator).double()
+        return x, torch.exp(3 * x[:, 0]) * torch.randn(count, generator=generator).double()
+
+    (x, error), (more, other), (test, last) = sample(3000), sample(3000), sample(20000)
+    found = Intervals.learned(x, {"v": error}, more, {"v": other})
+    inside = last.abs() <= found.half_widths("v", test, torch.ones(len(test)).double())
+    assert float(inside.double().mean()) == pytest.approx(0.9, abs=0.02)
+    for side in (test[:, 0] < 0.3, test[:, 0] > 0.7):
+        assert 0.86 < float(inside[side].double().mean()) < 0.94
+
+
+def test_a_query_gives_intervals_around_its_answer() -> None:
+    robots = rows(256, 13, wide=False).robots
+    found = table().query(robots, intervals=True, flag=True)
+    for name in ("omega_yr_bar", "v_z", "theta_deg"):
+        assert (found[f"{name}_low"] < found[name]).all()
+        assert (found[f"{name}_high"] > found[name]).all()
+    assert found["outside"].mean() < 0.2
+
+
+def one_robot(**changes: float) -> dict[str, np.ndarray]:
+    robot = {"C_t": 3.0, "C_r": 2.8, "C_yr": 2.0, "l_over_R": 6.875, "L_over_R": 3.75, "l_over_r0": 34.375,
+             "omega_bar": 10.0, "N": 3.0, "a_over_R": 1.0}  # fmt: skip
+    return {name: np.array([value]) for name, value in (robot | changes).items()}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"omega_bar": 2000.0}, "row 1 is outside the look-up table.*omega_bar = 2000, learned were"),
+        ({"l_over_r0": 500.0}, "l_over_r0 = 500"),
+        ({"N": 2.0}, "none with as many tails"),
+        ({"C_yr": 900.0, "C_t": 0.01}, "outside the look-up table"),
+    ],
+)
+def test_robots_outside_are_refused_or_flagged(changes: dict[str, float], message: str) -> None:
+    robot = one_robot(**changes)
+    with pytest.raises(InputError, match=message):
+        table().query(robot)
+    assert table().query(robot, flag=True)["outside"].tolist() == [True]
+
+
+def test_a_robot_inside_is_answered() -> None:
+    assert table().query(one_robot(), flag=True)["outside"].tolist() == [False]

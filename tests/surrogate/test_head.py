@@ -1,0 +1,71 @@
+"""The head's balance: solved exactly, in both directions, with effects by algebra."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from sim.effects import catalogue
+from sim.io.errors import InputError
+from sim.motion.batches import steady_columns
+from surrogate import head
+from surrogate.export import load
+from surrogate.tails import rows_of
+from tests.surrogate.small import rows, table
+
+
+def test_forces_are_in_balance() -> None:
+    robots = rows(256, 13, wide=False).robots
+    heads, tails = head.robots_of(robots)
+    motion, converged = table().tails.solve(heads, tails)
+    assert float(converged.double().mean()) > 0.97
+    network = table().tails.wrench[2]
+    assert network is not None
+    left = head.unbalanced(heads, tails, motion[:, :4], network)
+    size = (heads.resistance.abs() @ motion.abs()[..., None])[..., 0]
+    assert float((left / size)[converged].abs().max()) < 1e-6
+
+
+def test_linear_theory_is_a_good_start() -> None:
+    some = rows(256, 13, wide=False)
+    found = rows_of(some.robots, some.motion)
+    guess = head.linear_guess(found.heads, found.tails)
+    assert float((guess[:, 3] / found.motion[:, 3] - 1).abs().median()) < 0.1
+    assert float((guess[:, 2] / found.motion[:, 2] - 1).abs().median()) < 0.3
+
+
+@pytest.mark.parametrize("effect", [name for name in catalogue() if head.is_of_head(name)])
+def test_effects_on_head_disc_and_motor_need_no_learning(effect: str) -> None:
+    """The shipped table is right with the effect, in both directions of the motor."""
+    robot = {"C_t": 3.0, "C_r": 2.8, "C_yr": 2.0, "l_over_R": 6.875, "L_over_R": 3.75, "l_over_r0": 34.375,
+             "omega_bar": 10.0, "N": 4.0}  # fmt: skip
+    both = {name: np.array([value, value]) for name, value in robot.items()}
+    both["omega_bar"] = both["omega_bar"] * [1.0, -1.0]
+    both[effect] = np.full(2, catalogue()[effect].typical)
+    truth, answer = steady_columns(both, title="", jobs=1), load().query(both)
+    for name in ("omega_yr_bar", "omega_t_bar", "v_x", "R_yr_over_l"):
+        assert answer[name] == pytest.approx(truth[name], rel=0.005), name
+    if catalogue()[effect].symmetry == "odd":
+        assert abs(truth["omega_yr_bar"].sum()) > 1e-3 * abs(truth["omega_yr_bar"][0])
+
+
+def test_effects_on_the_tails_are_refused() -> None:
+    robots = {name: values[:2] for name, values in rows().robots.items()}
+    for effect in ("tail_sag", "tail_interaction", "natural_curvature"):
+        with pytest.raises(InputError, match=f"{effect} changes more.*surrogate robot"):
+            head.robots_of({**robots, effect: np.full(2, 0.1)})
+        head.robots_of({**robots, effect: np.zeros(2)})
+
+
+def test_the_derivative_is_that_of_differences() -> None:
+    robots = {name: values[:5] for name, values in rows().robots.items()}
+    heads, tails = head.robots_of(robots)
+    network = table().tails.wrench[2]
+    assert network is not None
+    u = head.linear_guess(heads, tails)
+    value, slope = head.value_and_slope(lambda v: head.unbalanced(heads, tails, v, network), u)
+    direction = torch.tensor([0.3, -0.2, 0.5, 0.1]).double() * u
+    moved = head.unbalanced(heads, tails, u + 1e-6 * direction, network)
+    wanted = (slope @ direction[..., None])[..., 0]
+    assert torch.allclose((moved - value) / 1e-6, wanted, rtol=1e-3, atol=1e-4 * float(wanted.abs().max()))

@@ -1,0 +1,112 @@
+"""The table that ships: near the independent solver, honest about its errors, and the commands that use it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sim.io.errors import InputError, run_command
+from sim.motion.batches import steady_columns
+from surrogate.__main__ import main
+from surrogate.evaluate import coverage, relative_errors
+from surrogate.export import SHIPPED, load
+from surrogate.rows import drawn
+from surrogate.train import train, with_radius
+from tests.reference.cases import CONTROL, STEADY_INPUTS, STEADY_POINTS
+
+
+def columns_of(points: tuple[tuple[float, ...], ...]) -> dict[str, np.ndarray]:
+    return dict(zip(STEADY_INPUTS, np.array(points).T, strict=True))
+
+
+def test_the_shipped_table_matches_the_independent_solver() -> None:
+    table = load()
+    found = table.query(columns_of(tuple(p[0] for p in STEADY_POINTS)))
+    truth = np.array([p[1] for p in STEADY_POINTS]).T
+    names = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l")
+    for name, values in zip(names, truth, strict=False):
+        assert found[name] == pytest.approx(values, rel=0.01), name
+    assert found["theta_deg"] == pytest.approx(truth[6], abs=0.25)
+    control = {"C_t": 3.0, "C_r": 2.8, "C_yr": 2.0, "l_over_R": 6.875, "L_over_R": 3.75, "l_over_r0": 34.375,
+               "omega_bar": 10.0, "N": 2.0}  # fmt: skip
+    one = table.query({k: np.array([v]) for k, v in control.items()})
+    for name in ("omega_t_bar", "omega_yr_bar", "v_x", "R_yr_over_l"):
+        assert one[name][0] == pytest.approx(CONTROL[name], rel=0.005)
+
+
+def test_the_shipped_table_states_its_errors() -> None:
+    table = load()
+    assert SHIPPED.stat().st_size < 3e6
+    assert table.provenance["rows"]["held_out"] > 500
+    for name in ("omega_t_bar", "omega_yr_bar", "R_yr_over_l", "v_x"):
+        assert 0 < table.errors[name]["median"] <= table.errors[name]["rms"]
+        assert table.errors[name]["median"] < 0.001
+
+
+def test_fresh_robots_are_near_the_simulator_and_inside_their_intervals() -> None:
+    """Robots of the whole domain with two tails and more; what the table states holds for them."""
+    robots = {name: values[::2] for name, values in drawn(512, 77, wide=False).items()}
+    robots = {name: values[robots["N"] > 1] for name, values in robots.items()}
+    simulated = steady_columns(robots, title="")
+    truth = with_radius({name: np.asarray(simulated[name], dtype=float) for name in
+                         ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap")})  # fmt: skip
+    answer = load().query(robots, intervals=True, flag=True)
+    good = simulated["converged"] & ~answer["outside"]
+    assert good.mean() > 0.95
+    errors = relative_errors(answer, truth)
+    for name, limit in (("omega_t_bar", 2e-4), ("omega_yr_bar", 1e-3), ("R_yr_over_l", 1e-3), ("v_z", 5e-4)):
+        assert np.median(np.abs(errors[name][good])) < limit, name
+    covered = coverage({n: v[good] for n, v in answer.items()}, {n: v[good] for n, v in truth.items()})
+    assert 0.82 < np.mean([*covered.values()]) < 0.98
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"omega_bar": 3000.0}, "omega_bar = 3000"),
+        ({"N": 2.5}, "N = 2.5"),
+        ({"C_t": -1.0}, "C_t = -1"),
+        ({"C_t": float("nan")}, "C_t = nan"),
+        ({"colour": 1.0}, "unknown column"),
+        ({"dwell_bar": 0.001}, "dwell_bar = 0.001"),
+        ({"tail_sag": 0.1}, "tail_sag changes more than head, disc and motor"),
+    ],
+)
+def test_the_command_refuses_and_writes_nothing(
+    change: dict[str, float], expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    values = {k: v[0] for k, v in columns_of(tuple(p[0] for p in STEADY_POINTS)).items()} | change
+    pd.DataFrame([values]).to_csv(tmp_path / "p.csv", index=False)
+    assert run_command(main, ["query", str(tmp_path / "p.csv"), "--out", str(tmp_path / "o.csv")]) == 2
+    error = capsys.readouterr().err
+    assert expected in error
+    assert len(error.splitlines()) == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["p.csv"]
+
+
+def test_query_and_inverse_commands(tmp_path: Path) -> None:
+    """What `query` answers, `inverse` leads back to the coefficients."""
+    robots = pd.DataFrame(columns_of(tuple(p[0] for p in STEADY_POINTS[:2])))
+    robots.to_csv(tmp_path / "p.csv", index=False)
+    assert run_command(main, ["query", str(tmp_path / "p.csv"), "--out", str(tmp_path / "o.csv")]) == 0
+    found = pd.read_csv(tmp_path / "o.csv")
+    assert {"omega_yr_bar", "omega_yr_bar_low", "theta_deg_high"} <= set(found)
+    targets = robots.drop(columns=["C_t", "C_r", "C_yr"]).join(found[["omega_t_bar", "omega_yr_bar", "v_z"]])
+    targets.to_csv(tmp_path / "t.csv", index=False)
+    assert run_command(main, ["inverse", str(tmp_path / "t.csv"), "--out", str(tmp_path / "i.csv")]) == 0
+    solved = pd.read_csv(tmp_path / "i.csv")
+    for i in range(len(robots)):
+        own = solved[solved["target"] == i + 1]
+        assert (own["C_t"] / robots["C_t"][i] - 1).abs().min() < 1e-3
+        assert (own["C_yr"] / robots["C_yr"][i] - 1).abs().min() < 1e-3
+
+
+def test_training_refuses_what_is_no_data_set(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(main, ["train", str(tmp_path), "--out", str(tmp_path / "m.pt")]) == 2
+    assert "no finished data set" in capsys.readouterr().err
+    with pytest.raises(InputError, match="no finished data set"):
+        train(str(tmp_path), title="")
+    assert not (tmp_path / "m.pt").exists()
