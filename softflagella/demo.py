@@ -35,7 +35,8 @@ from calibration.report import draw_residuals
 from calibration.steer import Steered, draw_steered, gap_closed, steer
 from calibration.swimmer import Swimmer, corrected_robot
 from calibration.synthetic import make_table
-from dataset.report import draw_sweep, plain_logarithms
+from dataset.figures import draw_responses, draw_trends, plain_logarithms
+from dataset.report import usable_rows
 from dataset.store import read
 from planner.check import TrackingError, draw_overlay, tracking_error
 from planner.path import polygon
@@ -44,6 +45,7 @@ from sim.inputs import robot_toml
 from sim.io.files import write_text
 from sim.io.pages import Page
 from sim.io.provenance import code_version
+from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.motion.batches import available_jobs
@@ -227,12 +229,17 @@ def _write_page(
     )  # fmt: skip
     page.section("The sweep at a glance")
     page.text(f"{len(rows)} robots of the demo's small sweep; the shipped table learned from a full one.")
-    page.figure(draw_sweep(rows), "six outputs against motor speed")
+    good = usable_rows(rows)
+    page.figure(
+        draw_trends(good, "omega_yr_bar", ("omega_bar", "C_yr", "l_over_R", "C_t")), "yaw rate over inputs"
+    )
+    page.text("After a flip the tails turn over, and the robot lags its new circle:")
+    page.figure(draw_responses(good), "lags and net speed over the dwell")
     page.section("Look-up table against simulator")
     page.figure(_draw_parity(rows), "shipped look-up table against simulated rows")
     shipped = load()
     page.text("Relative rms error on rows that training did not see (slip angle in degrees):")
-    shown = ("omega_t_bar", "omega_yr_bar", "R_yr_over_l", "theta_deg", "net_speed_bar")
+    shown = ("omega_t_bar", "omega_yr_bar", "R_yr_over_l", "theta_deg", "v_z")
     page.table(
         ("look-up table", *shown),
         [
@@ -318,12 +325,12 @@ def _draw_plans(errors: dict[str, tuple[dict[str, Any], TrackingError]]) -> Figu
 
 
 def _draw_parity(rows: pd.DataFrame) -> Figure:
-    lookup = load()
-    truth = {str(c): rows[c].to_numpy(dtype=float) for c in rows}
-    found = lookup.query({name: truth[name] for name in lookup.domain})
+    names = (("omega_yr_bar", "yaw rate"), ("v_z", "surge"), ("R_yr_over_l", "turn radius / l"),
+             ("theta_deg", "slip angle [deg]"))  # fmt: skip
+    good = usable_rows(rows)
+    found = load().query({name: good[name].to_numpy(float) for name in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)})
+    truth = {name: good[name].to_numpy(float) for name in ("v_x", *(name for name, _ in names))}
     figure = Figure(figsize=(12, 3.4))
-    names = (("omega_yr_bar", "yaw rate"), ("R_yr_over_l", "turn radius / l"), ("theta_deg", "slip angle [deg]"),
-             ("net_speed_bar", "net speed"))  # fmt: skip
     for place, (name, label) in enumerate(names):
         axes = figure.add_subplot(1, 4, place + 1)
         axes.plot(truth[name], found[name], ".", ms=4, color="#2a7fba", alpha=0.7)
@@ -334,7 +341,7 @@ def _draw_parity(rows: pd.DataFrame) -> Figure:
         axes.set_title(f"{label}: median error {text}", fontsize=9)
         axes.set_xlabel("simulated", fontsize=8)
         axes.tick_params(labelsize=7)
-        if name in ("omega_yr_bar", "net_speed_bar"):
+        if name in ("omega_yr_bar", "v_z"):
             axes.set_xscale("log")
             axes.set_yscale("log")
             plain_logarithms(axes.xaxis)
