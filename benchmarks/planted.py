@@ -36,13 +36,15 @@ LEVELS = (2.0, 4.0, 8.0, 16.0)
 
 @dataclass(frozen=True)
 class Linear:
-    """The swimmer near one robot: prediction + J (ln C − ln C0) + D (ε − null)."""
+    """The swimmer near one robot: prediction + J (ln C − ln C0) + G x + D (ε − null), x: numbers as given."""
 
     runs: Runs
     coefficients: tuple[Parameter, ...]
+    given: tuple[Parameter, ...]
     effects: tuple[Parameter, ...]
     prediction: Floats  # (n, k)
     J: Floats  # (n, k, 3)
+    G: Floats  # (n, k, g)
     D: Floats  # (n, k, e)
     untestable: Mapping[str, str]
 
@@ -52,15 +54,16 @@ class Linear:
         for p in sets:
             c = np.array([np.log(p[q.name] / q.start) for q in self.coefficients])
             e = np.array([p[q.name] - q.start for q in self.effects])
-            found.append(self.prediction + self.J @ c + self.D @ e)
+            x = np.array([np.log(p[q.name] / q.start) if q.logarithmic else p[q.name] for q in self.given])
+            found.append(self.prediction + self.J @ c + self.D @ e + (self.G @ x if self.given else 0.0))
         return np.array(found)
 
     def derivatives(
         self, parameters: Parameters, names: Sequence[str], *, title: str = ""
     ) -> tuple[Floats, Floats]:
         """Prediction (n, k) and derivatives (n, k, p)."""
-        order = [p.name for p in (*self.coefficients, *self.effects)]
-        table = np.concatenate([self.J, self.D], -1)
+        order = [p.name for p in (*self.coefficients, *self.given, *self.effects)]
+        table = np.concatenate([self.J, self.G, self.D], -1)
         return self.predict([parameters])[0], table[..., [order.index(n) for n in names]]
 
     def check(self, prediction: Floats) -> None:
@@ -120,12 +123,10 @@ def design(which: Design) -> Measurements:
 def stand_in(which: Design = PAPER) -> Linear:
     """Derivatives of the simulator at ROBOT."""
     model = Swimmer(ROBOT, design(which))
-    names = [p.name for p in (*model.coefficients, *model.effects)]
+    names = [p.name for p in (*model.coefficients, *model.given, *model.effects)]
     prediction, table = model.derivatives(start_values(model), names)
-    count = len(model.coefficients)
-    return Linear(
-        model.runs, model.coefficients, model.effects, prediction, table[..., :count], table[..., count:], {}
-    )
+    J, G, D = np.split(table, np.cumsum([len(model.coefficients), len(model.given)]), -1)
+    return Linear(model.runs, model.coefficients, model.given, model.effects, prediction, J, G, D, {})
 
 
 def scatter(runs: Runs, outputs: int, seed: int, *, heavy: bool = False) -> Floats:

@@ -6,7 +6,8 @@ Steps of Levenberg (1944) with the model's own derivatives:
 
 D is 1 for ln C and a typical size for ε. λ is 0, unless the step is too long or does not improve the fit. A
 parameter at a bound stays there if the step would lead out. The covariance of the parameters is V = A⁻¹, times a
-factor because S is estimated (`_inflation`). Intervals are 95 %, by Student's t. The scatter ρ of a few sessions
+factor because S is estimated (`_inflation`). Numbers as given have priors, which are rows of their own
+(`calibration.prior`): they are in A, in the residual and in the deviance. Intervals are 95 %, by Student's t. The scatter ρ of a few sessions
 is uncertain, which limits the degrees of freedom (Satterthwaite 1946):
 
     ν = 2 V² / (V′² Var ρ),   Var ρ ≈ 2 (ρ + 1/n)² / (k (s − 1)),   n runs in each of s sessions.
@@ -15,15 +16,19 @@ is uncertain, which limits the degrees of freedom (Satterthwaite 1946):
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
 
 from calibration.model import Model, Parameter, Parameters, parameter, stepped
 from calibration.noise import Noise, Sums, inverse_root, least_squares, repeat_covariance, sums
+from calibration.prior import with_prior
 from sim.arrays import Flags, Floats, Integers
+
+if TYPE_CHECKING:
+    from calibration.prior import Pull
 
 _MOST_STEPS = 25
 _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
@@ -48,6 +53,7 @@ class Fit:
     noise: Noise
     deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
     arrived: bool  # the fit is at a minimum, or at one within the bounds
+    wrong: tuple[tuple[Pull, ...], ...] = ()  # numbers whose priors were taken away, each with those like it
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -78,16 +84,22 @@ def fit(
     names: tuple[str, ...],
     used: Flags,
     *,
+    free: tuple[str, ...] = (),
     title: str = "fit",
 ) -> Fit:
-    """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay."""
+    """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay.
+
+    Args:
+        free: numbers as given whose priors are taken away.
+    """
     data = model.runs
+    fitted = tuple(parameter(model, name) for name in names)
+    fitted = tuple(replace(one, sigma=None) if one.name in free else one for one in fitted)
     run = repeat_covariance(data.y[used], data.condition[used])
-    point = _descend(_Task(model, names, used, inverse_root(run), title), dict(start))
+    point = _descend(_Task(model, fitted, used, inverse_root(run), title), dict(start))
     linear = least_squares(point.products, passes=_PASSES)
     share = float(linear.share)
     whole = point.products.at(linear.share)
-    fitted = tuple(parameter(model, name) for name in names)
     inflation = _inflation(data.condition[used], len(run))
     return Fit(
         parameters=point.parameters,
@@ -115,10 +127,10 @@ class _Point:
 
 @dataclass(frozen=True)
 class _Task:
-    """The model, the runs, and the names of the parameters to fit."""
+    """The model, the runs, and the parameters to fit."""
 
     model: Model
-    names: tuple[str, ...]
+    fitted: tuple[Parameter, ...]
     used: Flags
     root: Floats
     title: str
@@ -127,13 +139,15 @@ class _Task:
         """The model at `parameters`; its derivatives are computed if none are given."""
         title = f"{self.title}, step {count}" if self.title else ""
         if derivative is None:
-            prediction, derivative = self.model.derivatives(parameters, self.names, title=title)
+            prediction, derivative = self.model.derivatives(
+                parameters, [one.name for one in self.fitted], title=title
+            )
         else:
             prediction = self.model.predict([parameters], title=title)[0]
         data = self.model.runs
         table = np.concatenate([derivative, (data.y - prediction)[..., None]], -1)[self.used]
         products = sums(self.root @ table, data.session[self.used], len(self.root))
-        return _Point(parameters, prediction, derivative, products)
+        return _Point(parameters, prediction, derivative, with_prior(products, self.fitted, parameters))
 
 
 class _Step(NamedTuple):
@@ -145,7 +159,7 @@ class _Step(NamedTuple):
 
 def _descend(task: _Task, start: dict[str, float]) -> _Point:
     """The least rᵀ Σ⁻¹ r from `start`."""
-    fitted = tuple(parameter(task.model, name) for name in task.names)
+    fitted = task.fitted
     point = task.at(start, None, 1)
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
     for count in range(1, _MOST_STEPS + 1):

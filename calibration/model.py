@@ -23,7 +23,7 @@ _LARGEST = 100.0  # change of ln C, so that C stays a number
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number to fit: a coefficient, which the model always has, or the size of an effect, which it may lack."""
+    """A number to fit: a coefficient, a number as given, or the size of an effect, which the model may lack."""
 
     name: str
     title: str
@@ -32,6 +32,8 @@ class Parameter:
     typical: float  # a typical size; it sets the finite-difference step
     logarithmic: bool = False  # fitted as its logarithm
     unit: str = "1"
+    sigma: float | None = None  # of a number as given: one standard deviation on its own scale; None: free
+    shown: float = 1.0  # factor to the unit in which a change is shown
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,11 @@ class Model(Protocol):
     @property
     def coefficients(self) -> tuple[Parameter, ...]:
         """Always fitted."""
+        ...
+
+    @property
+    def given(self) -> tuple[Parameter, ...]:
+        """Numbers as given that are not exact: always fitted, with their priors."""
         ...
 
     @property
@@ -108,12 +115,12 @@ class Model(Protocol):
 
 def start_values(model: Model) -> dict[str, float]:
     """Every parameter as given: effects at their null."""
-    return {p.name: p.start for p in (*model.coefficients, *model.effects)}
+    return {p.name: p.start for p in (*model.coefficients, *model.given, *model.effects)}
 
 
 def parameter(model: Model, name: str) -> Parameter:
-    """The coefficient or effect called `name`."""
-    return next(p for p in (*model.coefficients, *model.effects) if p.name == name)
+    """The coefficient, number or effect called `name`."""
+    return next(p for p in (*model.coefficients, *model.given, *model.effects) if p.name == name)
 
 
 def moved(one: Parameter, value: float, by: float) -> float:

@@ -1,6 +1,6 @@
 """The verdict on a table of runs: its contents, in one sentence, and as verdict.json.
 
-"none": no departure beyond noise. "effect": one effect, or one pair, explains it. "ambiguous": several do, and the
+"none": no departure beyond noise. "number": a number as given is wrong, and explains it. "effect": one effect, or one pair, explains it. "ambiguous": several do, and the
 runs cannot tell them apart. "unexplained": there is a departure, and nothing in the catalogue explains it.
 """
 
@@ -14,9 +14,11 @@ from calibration.discriminate import NextRun
 from calibration.fit import Fit
 from calibration.generic import Generic
 from calibration.misfit import DRAWS, Misfit
+from calibration.prior import Pull, likeliest, rivals
 from sim.arrays import Flags, Floats
 from sim.io.provenance import provenance
 
+_NOTABLE = 2.0  # pull of a number as given beyond which the sentence says so
 _NEAR = 0.5  # if no effect explains the residual, the best one is named if it removes at least this share
 
 
@@ -30,7 +32,7 @@ class Verdict:
         'No effect is missing that these runs can show (p = 0.43).'
     """
 
-    verdict: str  # "none", "effect", "ambiguous", "unexplained"
+    verdict: str  # "none", "number", "effect", "ambiguous", "unexplained"
     effects: tuple[str, ...]
     explaining: tuple[Candidate, ...]  # what explains the residual, best first; more than one: not told apart
     base: Fit  # calibrated, without effects
@@ -39,6 +41,7 @@ class Verdict:
     final_intervals: dict[str, tuple[float, float]]
     misfit: Misfit
     candidates: tuple[Candidate, ...]
+    numbers: tuple[Pull, ...]  # every number as given in the final model, the farthest first
     generic: Generic  # correction of the calibrated model
     next_runs: tuple[NextRun, ...]  # where two effects cannot be told apart
     error_uncalibrated: float
@@ -59,8 +62,34 @@ class Verdict:
     limits: tuple[str, ...]
 
     @property
+    def wrong_numbers(self) -> tuple[tuple[Pull, ...], ...]:
+        """Numbers as given that the runs contradict; each with those that may be wrong in its place."""
+        freed = {p.parameter.name: p for p in self.numbers if p.freed}
+        found = tuple((freed[alike[0].parameter.name], *alike[1:]) for alike in self.final.wrong)
+        far = [p for p in self.numbers if not p.freed]
+        worst = likeliest(far)
+        return found if worst is None else (*found, rivals(far, worst))
+
+    @property
     def sentence(self) -> str:
-        """The verdict in one sentence with its certainty."""
+        """The verdict in one sentence with its certainty; a second one for a number as given that is wrong."""
+        words = self._number_words
+        if self.verdict == "number":
+            return f"{words} No effect is claimed."
+        return f"{words} {self._effect_words}" if words else self._effect_words
+
+    @property
+    def _number_words(self) -> str:
+        """The numbers that are wrong, or the one that is farthest off if it is notable."""
+        if self.wrong_numbers:
+            said = "; and ".join(", or ".join(p.words for p in alike) for alike in self.wrong_numbers)
+            return f"A number as given is wrong: {said}."
+        if self.numbers and self.numbers[0].learnt and abs(self.numbers[0].z) > _NOTABLE:
+            return f"{self.numbers[0].words}."
+        return ""
+
+    @property
+    def _effect_words(self) -> str:
         # The bootstrap resolves no smaller p than 2/(draws + 1).
         relation = "≤" if self.misfit.p_value <= 2.01 / (DRAWS + 1) else "="
         p = f"p {relation} {self.misfit.p_value:.2g}"
@@ -114,6 +143,8 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "effects": list(result.effects),
         "sentence": result.sentence,
         "parameters": parameters,
+        "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
+        "numbers_as_given": [_number_record(p) for p in result.numbers],
         "error_uncalibrated": result.error_uncalibrated,
         "error_before": result.error_before,
         "error_after": result.error_after,
@@ -131,6 +162,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
                 "z": c.z,
                 "survived_share": c.survived,
                 "smallest_detectable": c.detectable,
+                "smallest_detectable_if_numbers_were_exact": c.detectable_exact,
                 "size": c.refit.parameters[c.effect.name] if c.refit else None,
                 "deviance": c.refit.deviance if c.refit else None,
                 "session_gain": [c.gain, c.gain_error],
@@ -148,4 +180,21 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "limits": list(result.limits),
         "table": table,
         "provenance": provenance({"table": table}),
+    }
+
+
+def _number_record(pull: Pull) -> dict[str, Any]:
+    one = pull.parameter
+    return {
+        "name": one.name,
+        "title": one.title,
+        "given": one.start,
+        "sigma": one.sigma,
+        "scale": "logarithm" if one.logarithmic else "as it is",
+        "change": pull.change,
+        "change_error": pull.error,
+        "change_by_the_runs_alone": pull.alone,
+        "change_by_the_runs_alone_error": pull.alone_error,
+        "pull": pull.z,
+        "words": pull.words,
     }

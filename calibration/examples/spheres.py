@@ -39,6 +39,7 @@ class Spheres:
     coefficients: tuple[Parameter, ...] = (
         Parameter("viscosity", "viscosity", 1.0, (0.01, 100.0), 1.0, logarithmic=True, unit="Pa s"),
     )
+    given: tuple[Parameter, ...] = ()
     effects: tuple[Parameter, ...] = (
         Parameter("wall", "wall of the vessel", 0.0, (0.0, 2.0), 1.0, unit="Faxén's correction"),
         Parameter("inertia", "inertia of the fluid", 0.0, (0.0, 20.0), 1.0, unit="Oseen's correction"),
