@@ -25,9 +25,9 @@ import numpy as np
 from tqdm import tqdm
 
 from calibration.fit import Fit, fit
+from calibration.freed import free_numbers
 from calibration.misfit import TESTABLE, Misfit, check_misfit
 from calibration.model import Model, Parameter, Parameters
-from calibration.freed import free_numbers
 from calibration.prior import likeliest, prior_rows, pulls
 from calibration.sessions import groups
 from sim.arrays import Flags, Floats, Integers

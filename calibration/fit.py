@@ -7,8 +7,8 @@ Steps of Levenberg (1944) with the model's own derivatives:
 D is 1 for ln C and a typical size for ε. λ is 0, unless the step is too long or does not improve the fit. A
 parameter at a bound stays there if the step would lead out. The covariance of the parameters is V = A⁻¹, times a
 factor because S is estimated (`_inflation`). Numbers as given have priors, which are rows of their own
-(`calibration.prior`): they are in A, in the residual and in the deviance. Intervals are 95 %, by Student's t. The scatter ρ of a few sessions
-is uncertain, which limits the degrees of freedom (Satterthwaite 1946):
+(`calibration.prior`): they are in A, in the residual and in the deviance. Intervals are 95 %, by Student's t.
+The scatter ρ of a few sessions is uncertain, which limits the degrees of freedom (Satterthwaite 1946):
 
     ν = 2 V² / (V′² Var ρ),   Var ρ ≈ 2 (ρ + 1/n)² / (k (s − 1)),   n runs in each of s sessions.
 """

@@ -1,9 +1,9 @@
 """A number as given that is wrong: the fit with its prior taken away.
 
-If the runs pull a number beyond `prior.WRONG`, the fit is made again with this number free. Of several that the runs
-cannot tell apart, the one is freed that is off by the fewest of its own standard deviations. If what is left is no
-more than noise, the number explains the residual, and no effect is claimed for it. An effect is claimed only if it
-fits better than a free number by more than one parameter can gain by chance.
+If the runs pull a number beyond `prior.WRONG`, the fit is made again with this number free. Of several that the
+runs cannot tell apart, the one is freed that is off by the fewest of its own standard deviations. If what is
+left is no more than noise, the number explains the residual, and no effect is claimed for it. An effect is
+claimed only if it fits better than a free number by more than one parameter can gain by chance.
 """
 
 from __future__ import annotations

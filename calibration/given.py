@@ -19,8 +19,8 @@ CAMERA, HEADING, TACHOMETER = "camera_scale", "heading_zero", "tachometer"
 LENGTH = "tail_length_offset"
 TABLE_DEFAULTS = {CAMERA: 0.01, HEADING: math.radians(1.0), TACHOMETER: 0.005}
 
-# Powers of the groups, and of "time", "length" (l) and "ahead" (L/l), in each number. The offset of the tail length
-# changes ln l by 1/l for each metre.
+# Powers of the groups, and of "time", "length" (l) and "ahead" (L/l), in each number. The offset of the tail
+# length changes ln l by 1/l for each metre.
 POWERS: dict[str, dict[str, float]] = {
     "youngs_modulus": {"omega_bar": -1, "time": -1},
     "viscosity": {"omega_bar": 1, "time": 1},

@@ -8,7 +8,8 @@
    freed, and comes ahead of every effect (`calibration.freed`).
 4. Lack of fit, kernel score and projected scores (`calibration.misfit`).
 5. Refit with each effect that passes; keep what explains (`calibration.attribute`).
-6. Verdict: "none" (no departure beyond noise), "number" (a number as given is wrong), "effect" (one explains it), "ambiguous" (several do and the runs
+6. Verdict: "none" (no departure beyond noise), "number" (a number as given is wrong), "effect" (one explains
+it), "ambiguous" (several do and the runs
    cannot tell them apart), "unexplained" (there is a departure, and no effect in the catalogue explains it).
 7. If no single effect explains it, pairs are tried. If several explain it, next runs that would tell them apart.
 8. Errors on the locked runs: as given, calibrated, with the effect, with a generic correction of the calibrated

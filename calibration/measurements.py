@@ -52,7 +52,16 @@ _SIGMAS = {  # column -> number as given, factor
 }
 _INPUTS = ("N", "l_cm", "omega_rpm")
 _NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm", "heading_deg")
-KNOWN_COLUMNS = {*_INPUTS, *(c for c, _, _ in OUTPUTS.values()), "run", "trial", "session", *_NOTED, *_ERRORS, *_SIGMAS}
+KNOWN_COLUMNS = {
+    *_INPUTS,
+    *(c for c, _, _ in OUTPUTS.values()),
+    "run",
+    "trial",
+    "session",
+    *_NOTED,
+    *_ERRORS,
+    *_SIGMAS,
+}
 _FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
 _OWN = 1e-3  # share of an output's scatter that must be independent of the other outputs
 

@@ -33,7 +33,7 @@ from scipy.stats import rankdata
 from calibration.features import features
 from calibration.fit import Fit
 from calibration.model import Runs
-from calibration.noise import Sums, inverse_root, least_squares, repeat_covariance, sums
+from calibration.noise import Sums, inverse, inverse_root, least_squares, repeat_covariance, root_diagonal, sums
 from calibration.prior import changes, precisions
 from sim.arrays import Flags, Floats
 
@@ -89,7 +89,9 @@ class _Tester:
         self.sessions = (np.arange(sessions.max() + 1)[:, None] == sessions).astype(float)  # (s, n)
 
     def scores(self, residual: Floats) -> Scores:
-        """Statistics of residuals (B, n, k) from the numbers as given, after a linear refit, each in its own noise."""
+        """Statistics of residuals (B, n, k) from the numbers as given, after a linear refit, each in its own
+        noise.
+        """
         p, e = self.J.shape[-1], self.D.shape[-1]
         root = inverse_root(repeat_covariance(residual, self.condition))  # (B, k, k)
         table = np.broadcast_to(np.concatenate([self.J, self.D], -1), (*residual.shape, p + e))
@@ -111,10 +113,11 @@ class _Tester:
         own = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
         part = products.take(own)
         whole = part.at(least_squares(part, passes=_PASSES).share)  # (B, e, p + 2, p + 2)
-        inverse = np.linalg.pinv(whole[..., :p, :p], rcond=1e-12, hermitian=True)
-        weights = np.einsum("bepq,beq->bep", inverse, whole[..., :p, p])
-        score = whole[..., p, p + 1] - np.einsum("bep,bep->be", weights, whole[..., :p, p + 1])
-        square = whole[..., p, p] - np.einsum("bep,bep->be", weights, whole[..., :p, p])
+        scale = root_diagonal(whole[..., :p, :p])
+        known = inverse(whole[..., :p, :p] / scale[..., :, None] / scale[..., None, :])
+        weights = (known @ (whole[..., :p, p] / scale)[..., None])[..., 0] / scale
+        score = whole[..., p, p + 1] - (weights * whole[..., :p, p + 1]).sum(-1)
+        square = whole[..., p, p] - (weights * whole[..., :p, p]).sum(-1)
         length = np.sqrt(np.maximum(square, 1e-300))
         survived = length / np.sqrt(np.maximum(whole[..., p, p], 1e-300))
         return np.where(survived > 1e-6, score / length, 0.0), survived, length
@@ -164,7 +167,9 @@ def check_misfit(
     left = (data.y - fitted.prediction)[used]
     residual = left + tester.J @ changes(fitted.fitted, fitted.parameters)
     observed = tester.scores(residual[None])
-    exact = _Tester(data, used, tester.J[..., precision == 0], tester.D, precision[precision == 0]).scores(left[None])
+    exact = _Tester(data, used, tester.J[..., precision == 0], tester.D, precision[precision == 0]).scores(
+        left[None]
+    )
     testable = observed.survived[0] >= TESTABLE
     rng = np.random.default_rng(seed)
     root = np.linalg.cholesky(repeat_covariance(left, data.condition[used]))
@@ -201,7 +206,8 @@ def check_misfit(
 def _decided(null: Floats, own: Floats, level: float) -> bool:
     """Whether so many draws tell a p-value from `level` (Besag and Clifford 1991)."""
     p = _p_value(null, own)
-    return p < level / 2 and len(null) > 2 / level or p > 8 * level and len(null) * p > 10
+    far = p < level / 2 and len(null) > 2 / level
+    return far or (p > 8 * level and len(null) * p > 10)
 
 
 def _largest(z: Floats, testable: Flags) -> Floats:

@@ -1,8 +1,9 @@
 """Numbers as given are in doubt: Gaussian priors of parameters, and how far the runs move them.
 
 A parameter with σ was given before the runs were made. It counts as one more measurement of itself: a row with
-derivative 1/σ and residual −x/σ, where x is its change from the value as given, on its own scale. With such rows in
-every least-squares fit, the covariance of the runs is Σ + J P Jᵀ in every test (P = diag σ²), without being formed.
+derivative 1/σ and residual −x/σ, where x is its change from the value as given, on its own scale. With such rows
+in every least-squares fit, the covariance of the runs is Σ + J P Jᵀ in every test (P = diag σ²), without being
+formed.
 
 The pull of such a parameter is
 
@@ -10,8 +11,8 @@ The pull of such a parameter is
 
 which is standard normal if the number was drawn from its prior. Numbers that the runs cannot tell apart (E and μ0)
 have the same pull. What the runs alone say of it, with its own prior taken away and the others kept, is
-x σ²/(σ² − V), with variance V σ²/(σ² − V). Source: pulls of nuisance parameters as in particle physics, e.g. Demortier
-and Lyons (2002); priors as rows, e.g. Gelman et al. (2013), section 14.8.
+x σ²/(σ² − V), with variance V σ²/(σ² − V). Source: pulls of nuisance parameters as in particle physics, e.g.
+Demortier and Lyons (2002); priors as rows, e.g. Gelman et al. (2013), section 14.8.
 """
 
 from __future__ import annotations
@@ -98,7 +99,9 @@ def with_prior(products: Sums, fitted: Sequence[Parameter], parameters: Paramete
 
 
 def pulls(fitted: Fit, given: Sequence[Parameter]) -> tuple[Pull, ...]:
-    """Every number as given, the farthest first; a number whose prior was taken away has its value from the runs."""
+    """Every number as given, the farthest first; a number whose prior was taken away has its value from the
+    runs.
+    """
     found = []
     for one in given:
         if one.sigma is None or one.name not in fitted.names:
@@ -127,7 +130,9 @@ def rivals(found: Sequence[Pull], one: Pull) -> tuple[Pull, ...]:
 
 
 def likeliest(found: Sequence[Pull]) -> Pull | None:
-    """Of the numbers that are wrong and as far out as the farthest, the one that is off by the fewest of its own σ."""
+    """Of the numbers that are wrong and as far out as the farthest, the one that is off by the fewest of its
+    own σ.
+    """
     wrong = [p for p in found if p.wrong]
     if not wrong:
         return None

@@ -23,7 +23,9 @@ _LEAST = 0.05  # share of the expected rise; if the rise is smaller, the devianc
 def profile_intervals(
     model: Model, fitted: Fit, used: Flags, *, title: str = ""
 ) -> dict[str, tuple[float, float]]:
-    """95 % intervals of every fitted parameter, by their profile deviances; of numbers as given by the covariance."""
+    """95 % intervals of every fitted parameter, by their profile deviances; of numbers as given by the
+    covariance.
+    """
     data, count = model.runs, len(fitted.names)
     root = inverse_root(fitted.noise.run)
     sets, ends = [], []

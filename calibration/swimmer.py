@@ -166,20 +166,18 @@ class Swimmer:
         """Derivatives (m, k) along a number as given, on its own scale."""
         by = np.array([1 / run.robot.tail_length if name == LENGTH else 1.0 for run in runs])
         powers = POWERS[name]
-        motion = {
-            key: sum(
-                (power * by * columns[group] * table[:, found.parameters.index(group)])
-                for group, power in powers.items()
-                if group in GROUPS
-            )
-            for key, table in found.derivatives.items()
-            if any(group in GROUPS for group in powers)
-        }
-        scales = {key: powers[key] * by for key in ("time", "length", "ahead") if key in powers}
+        motion = {key: np.zeros(len(runs)) for key in found.derivatives}
+        for group in (group for group in powers if group in GROUPS):
+            at = found.parameters.index(group)
+            for key, table in found.derivatives.items():
+                motion[key] += powers[group] * by * columns[group] * table[:, at]
+        scales: dict[str, Floats] = {k: powers[k] * by for k in ("time", "length", "ahead") if k in powers}
         return view.slopes(found.values, motion, camera=float(name == CAMERA), scales=scales)
 
     def _turned(self, zero: float) -> Floats:
-        """Change (n, k) of the outputs if the zero of the heading is off: θ grows in one direction of the motor."""
+        """Change (n, k) of the outputs if the zero of the heading is off: θ grows in one direction of the
+        motor.
+        """
         found = np.zeros(self.runs.y.shape)
         if "theta" in self.runs.outputs:
             found[:, self.runs.outputs.index("theta")] = zero * np.sign(self.runs.omega)
@@ -344,7 +342,9 @@ def robot_numbers(robot: Robot, parameters: Parameters) -> dict[str, Any]:
 
 
 def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
-    """`robot` with fitted coefficients, numbers and effects; drift between runs and the observation are left out."""
+    """`robot` with fitted coefficients, numbers and effects; drift between runs and the observation are left
+    out.
+    """
     own = robot_numbers(robot, parameters)
     own["tail_length"] = robot.tail_length + parameters.get(LENGTH, 0.0)
     sizes = {

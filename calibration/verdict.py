@@ -1,7 +1,8 @@
 """The verdict on a table of runs: its contents, in one sentence, and as verdict.json.
 
-"none": no departure beyond noise. "number": a number as given is wrong, and explains it. "effect": one effect, or one pair, explains it. "ambiguous": several do, and the
-runs cannot tell them apart. "unexplained": there is a departure, and nothing in the catalogue explains it.
+"none": no departure beyond noise. "number": a number as given is wrong, and explains it. "effect": one effect,
+or one pair, explains it. "ambiguous": several do, and the runs cannot tell them apart. "unexplained": there is a
+departure, and nothing in the catalogue explains it.
 """
 
 from __future__ import annotations

@@ -98,7 +98,9 @@ def load_robot(source: str | Path) -> Robot:
 
 
 def _sigmas(values: Mapping[str, Any], stated: Mapping[str, tuple[str, object]]) -> dict[str, Sigma]:
-    """Standard deviations by field; that of the disc offset needs no offset, because the head's radius stands in."""
+    """Standard deviations by field; that of the disc offset needs no offset, because the head's radius stands
+    in.
+    """
     own = {**values, "disc_offset": values.get("disc_offset", values["head_radius"])}
     return {name: read_sigma(given, own[name], entry) for name, (entry, given) in stated.items()}
 

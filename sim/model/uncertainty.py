@@ -1,7 +1,7 @@
 """How well the numbers of a robot are known: one standard deviation for each of them.
 
-A robot.toml may state them; where it does not, `DEFAULTS` hold. They are what a careful lab can expect of a bending
-test, a viscometer, a caliper and a ruler. A number with σ = 0 is taken to be exact.
+A robot.toml may state them; where it does not, `DEFAULTS` hold. They are what a careful lab can expect of a
+bending test, a viscometer, a caliper and a ruler. A number with σ = 0 is taken to be exact.
 """
 
 from __future__ import annotations
@@ -49,7 +49,9 @@ def read_sigma(given: object, value: float, entry: str) -> Sigma:
         else:
             raise ValueError
     except ValueError:
-        raise InputError(f'{entry} = {given!r}; give a number in the unit of its key, or a text like "10 %"') from None
+        raise InputError(
+            f'{entry} = {given!r}; give a number in the unit of its key, or a text like "10 %"'
+        ) from None
     if not (math.isfinite(found.size) and 0 <= found.of(value) <= _LARGEST * abs(value)):
         raise InputError(f"{entry} = {given!r}; a standard deviation lies from 0 to half of the number itself")
     return found
