@@ -19,6 +19,7 @@ same way (`pairs`).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +27,7 @@ from tqdm import tqdm
 
 from calibration.fit import Fit, fit
 from calibration.freed import free_numbers
+from calibration.imitation import absorbable_shares, imitability
 from calibration.misfit import TESTABLE, Misfit, check_misfit
 from calibration.model import Model, Parameter, Parameters
 from calibration.prior import likeliest, prior_rows, pulls
@@ -52,10 +54,16 @@ class Candidate:
     gain: float  # predictive gain summed over left-out sessions, in log likelihood
     gain_error: float
     verdict: str  # why it was kept or not
+    imitable: float = 0.0  # imitability index of the claim (`calibration.imitation`), where it is kept
 
     @property
     def kept(self) -> bool:
         return self.verdict == "kept"
+
+    @property
+    def claimed(self) -> tuple[Parameter, ...]:
+        """All effects of its refit."""
+        return (*self.beside, self.effect)
 
 
 def examine(
@@ -205,11 +213,35 @@ def pairs(
             progress=progress,
         )
     unique: dict[frozenset[str], Candidate] = {}
+    single = min(ebic(c.refit, 1, model, used) for c in refitted if c.refit) if refitted else np.inf
     for candidate in second:
-        names = frozenset((candidate.effect.name, *(e.name for e in candidate.beside)))
-        if candidate.kept and names not in unique:
+        names = frozenset(e.name for e in candidate.claimed)
+        pays = candidate.refit is not None and ebic(candidate.refit, 2, model, used) < single
+        if candidate.kept and pays and names not in unique:
             unique[names] = candidate
     return list(unique.values())
+
+
+def ebic(refit: Fit, count: int, model: Model, used: Flags) -> float:
+    """Deviance of a fit with `count` effects, and what they cost: k ln n + 2 ln (number of such sets).
+
+    Source: Chen and Chen (2008), γ = 1.
+    """
+    values = int(used.sum()) * refit.prediction.shape[1]
+    sets = math.comb(len(model.effects), count)
+    return refit.deviance + len(refit.names) * math.log(values) + 2 * math.log(sets)
+
+
+def with_imitability(model: Model, best: list[Candidate], base: Fit, used: Flags, seed: int) -> list[Candidate]:
+    """Claims with their imitability index; their strength is what they take from the deviance of `base`."""
+    found = []
+    for one in best:
+        assert one.refit is not None
+        strength = math.sqrt(max(base.deviance - one.refit.deviance, 0.0))
+        names = tuple(e.name for e in one.claimed)
+        shares = absorbable_shares(one.refit, model.runs, used, names, seed=seed)
+        found.append(replace(one, imitable=imitability(shares, strength)))
+    return found
 
 
 def inside(model: Model, fitted: Parameters) -> bool:

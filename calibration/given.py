@@ -72,7 +72,9 @@ def given_numbers(robot: Robot, table: Mapping[str, float], outputs: Sequence[st
     length = robot.sigma("tail_length")
     size = length.of(robot.tail_length)
     found.append(
-        Parameter(LENGTH, "l (tail length, all tails alike)", 0.0, (-0.02, 0.02), 1e-3, False, "mm", size, 1e3)
+        Parameter(
+            LENGTH, "l (tail length, all tails alike)", 0.0, (-0.02, 0.02), 1e-3, False, "mm", size, shown=1e3
+        )
     )
     own = {**TABLE_DEFAULTS, **table}
     if {"R_yr", "v"} & set(outputs):
@@ -80,7 +82,15 @@ def given_numbers(robot: Robot, table: Mapping[str, float], outputs: Sequence[st
     if "theta" in outputs:
         found.append(
             Parameter(
-                HEADING, "zero of the heading", 0.0, (-0.5, 0.5), 0.02, False, "°", own[HEADING], 180 / math.pi
+                HEADING,
+                "zero of the heading",
+                0.0,
+                (-0.5, 0.5),
+                0.02,
+                False,
+                "°",
+                own[HEADING],
+                shown=180 / math.pi,
             )
         )
     found.append(Parameter(TACHOMETER, "ω (tachometer)", 1.0, (0.5, 2.0), 1.0, True, "1", own[TACHOMETER]))

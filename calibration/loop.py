@@ -33,6 +33,7 @@ from calibration.attribute import (
     explaining,
     inside,
     pairs,
+    with_imitability,
 )
 from calibration.discriminate import NextRun, next_runs
 from calibration.fit import Fit, fit
@@ -215,6 +216,7 @@ def _explain(task: _Task) -> _Explained:
     if not best:
         found_pairs = pairs(model, found, used, task.start, level=level, seed=seed, progress=task.progress)
         best = explaining(found_pairs)
+    best = with_imitability(model, best, base, used, seed)
     return _Explained(base, misfit, tuple(found) or _unexamined(misfit, model.effects), tuple(best))
 
 

@@ -33,6 +33,7 @@ class Parameter:
     logarithmic: bool = False  # fitted as its logarithm
     unit: str = "1"
     sigma: float | None = None  # of a number as given: one standard deviation on its own scale; None: free
+    plausible: tuple[float, float] | None = None  # sizes of an effect that its source allows; None: all
     shown: float = 1.0  # factor to the unit in which a change is shown
 
 

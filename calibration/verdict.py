@@ -14,6 +14,7 @@ from calibration.attribute import Candidate
 from calibration.discriminate import NextRun
 from calibration.fit import Fit
 from calibration.generic import Generic
+from calibration.imitation import DOUBT
 from calibration.misfit import DRAWS, Misfit
 from calibration.prior import Pull, likeliest, rivals
 from sim.arrays import Flags, Floats
@@ -100,19 +101,38 @@ class Verdict:
             best = self.explaining[0]
             assert best.refit is not None
             sizes = []
-            for effect in (*best.beside, best.effect):
+            for effect in best.claimed:
                 low, high = self.final_intervals[effect.name]
-                sizes.append(
-                    f"{effect.title}, size {best.refit.parameters[effect.name]:.3g} ({low:.3g} to {high:.3g})"
-                )
+                like = "something in form like " if effect.name in self.in_form_only else ""
+                size = best.refit.parameters[effect.name]
+                sizes.append(f"{like}{effect.title}, size {size:.3g} ({low:.3g} to {high:.3g})")
             other = "other effect" if len(sizes) == 1 else "single effect or other pair"
-            said = " and ".join(sizes)
+            said = " and ".join(sizes) + self._outside
             return f"The residual ({p}) is consistent with {said}, and with no {other} of the catalogue."
         if self.verdict == "ambiguous":
-            names = " or ".join(" and ".join(e.title for e in (*c.beside, c.effect)) for c in self.explaining)
+            names = " or ".join(" and ".join(e.title for e in c.claimed) for c in self.explaining)
+            names += self._outside
             return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart."
         none = "no effect and no pair of effects of the catalogue explains"
         return f"There is a residual ({p}) that {none}{self._nearest}."
+
+    @property
+    def in_form_only(self) -> tuple[str, ...]:
+        """Named effects whose whole interval is outside the sizes that their source allows."""
+        found = []
+        for effect in self.explaining[0].claimed if self.explaining else ():
+            low, high = self.final_intervals[effect.name]
+            if effect.plausible and (high < effect.plausible[0] or low > effect.plausible[1]):
+                found.append(effect.name)
+        return tuple(found)
+
+    @property
+    def _outside(self) -> str:
+        """A claim that something outside the catalogue could imitate says so."""
+        if all(c.imitable <= DOUBT for c in self.explaining):
+            return ""
+        many = len(self.explaining) > 1 or len(self.explaining[0].claimed) > 1
+        return f", or something outside the catalogue that looks like {'them' if many else 'it'}"
 
     @property
     def _nearest(self) -> str:
@@ -144,6 +164,9 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "effects": list(result.effects),
         "sentence": result.sentence,
         "parameters": parameters,
+        "in_form_only": list(result.in_form_only),
+        "imitability": [c.imitable for c in result.explaining],
+        "imitable": any(c.imitable > DOUBT for c in result.explaining),
         "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
         "numbers_as_given": [_number_record(p) for p in result.numbers],
         "error_uncalibrated": result.error_uncalibrated,
