@@ -59,7 +59,7 @@ class Linear:
         return np.array(found)
 
     def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = ""
+        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
     ) -> tuple[Floats, Floats]:
         """Prediction (n, k) and derivatives (n, k, p)."""
         order = [p.name for p in (*self.coefficients, *self.given, *self.effects)]

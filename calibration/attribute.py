@@ -34,6 +34,9 @@ from calibration.prior import likeliest, prior_rows, pulls
 from calibration.sessions import groups
 from sim.arrays import Flags, Floats, Integers
 
+_CURVED = 0.3  # share of the best score's z² below which an effect is not refitted if it leaves too much
+_FAR = 6.0  # standard deviations of χ²
+_LEAVES_MORE = "leaves far more than noise, by its score"
 _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
 _FIRST = 3  # number of single effects to which a second one is added
 INDISTINGUISHABLE = 6.63  # χ² with one degree of freedom, 99 %
@@ -109,6 +112,11 @@ def examine(
         if reason:
             found.append(Candidate(effect, beside, z, survived, detectable, exact, None, None, 0.0, 0.0, reason))
             continue
+        if local and _hopeless(model, base, misfit, z, used):
+            found.append(
+                Candidate(effect, beside, z, survived, detectable, exact, None, None, 0.0, 0.0, _LEAVES_MORE)
+            )
+            continue
         guess = min(max(guess, low), high)
         refit = fit(
             model,
@@ -123,6 +131,17 @@ def examine(
         one = Candidate(effect, beside, z, survived, detectable, exact, refit, None, 0.0, 0.0, "")
         found.append(_judged(model, one, base, refit, used, others, level, seed))
     return found
+
+
+def _hopeless(model: Model, base: Fit, misfit: Misfit, z: float, used: Flags) -> bool:
+    """Whether an effect takes a small share of the residual and leaves far more than noise, by its score.
+
+    A refit takes z² from the deviance if the model is linear. `_CURVED` allows for its curvature.
+    """
+    freedom = int(used.sum()) * base.prediction.shape[1] - len(base.names)
+    left = base.deviance - z**2 / _CURVED - freedom
+    best = float(np.max(np.where(misfit.scores.survived >= TESTABLE, misfit.scores.z**2, 0.0)))
+    return z**2 < _CURVED * best and left > _FAR * math.sqrt(2 * freedom)
 
 
 def detectable_sizes(misfit: Misfit, place: int) -> tuple[float, float]:

@@ -36,6 +36,7 @@ _SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ
 _LARGEST = 0.7  # change of ln C in one step
 _PASSES = 3  # iterations for the scatter of the sessions
 _DAMPING = (0.0, *(10.0**e for e in range(-3, 9)))  # λ
+_NEARER = 5  # starts that are tried
 _UNSETTLED = 1.0  # a fit has not arrived if one more step is expected to reduce rᵀ Σ⁻¹ r by more
 
 
@@ -96,7 +97,8 @@ def fit(
     fitted = tuple(parameter(model, name) for name in names)
     fitted = tuple(replace(one, sigma=None) if one.name in free else one for one in fitted)
     run = repeat_covariance(data.y[used], data.condition[used])
-    point = _descend(_Task(model, fitted, used, inverse_root(run), title), dict(start))
+    task = _Task(model, fitted, used, inverse_root(run), title)
+    point = _descend(task, task.first(dict(start)))
     linear = least_squares(point.products, passes=_PASSES)
     share = float(linear.share)
     whole = point.products.at(linear.share)
@@ -124,6 +126,10 @@ class _Point:
     derivative: Floats  # (n, k, p), at these parameters or near them
     products: Sums  # of the derivatives and the residual
 
+    @property
+    def solved(self) -> bool:
+        return bool(np.isfinite(self.prediction).all() and np.isfinite(self.derivative).all())
+
 
 @dataclass(frozen=True)
 class _Task:
@@ -135,12 +141,25 @@ class _Task:
     root: Floats
     title: str
 
-    def at(self, parameters: dict[str, float], derivative: Floats | None, count: int) -> _Point:
+    def first(self, parameters: dict[str, float]) -> _Point:
+        """The model at the start; effects move towards their null while it cannot be solved quickly there."""
+        effects = [one for one in self.fitted if one.name in {e.name for e in self.model.effects}]
+        tried = dict(parameters)
+        for _ in range(_NEARER if effects else 1):
+            point = self.at(tried, None, 1)
+            if point.solved:
+                return point
+            tried.update({one.name: (tried[one.name] + one.start) / 2 for one in effects})
+        return self.at(parameters, None, 1, quick=False)
+
+    def at(
+        self, parameters: dict[str, float], derivative: Floats | None, count: int, *, quick: bool = True
+    ) -> _Point:
         """The model at `parameters`; its derivatives are computed if none are given."""
         title = f"{self.title}, step {count}" if self.title else ""
         if derivative is None:
             prediction, derivative = self.model.derivatives(
-                parameters, [one.name for one in self.fitted], title=title
+                parameters, [one.name for one in self.fitted], title=title, quick=quick
             )
         else:
             prediction = self.model.predict([parameters], title=title)[0]
@@ -157,10 +176,9 @@ class _Step(NamedTuple):
     damping: int  # place of its λ in _DAMPING
 
 
-def _descend(task: _Task, start: dict[str, float]) -> _Point:
-    """The least rᵀ Σ⁻¹ r from `start`."""
+def _descend(task: _Task, point: _Point) -> _Point:
+    """The least rᵀ Σ⁻¹ r from `point`; steps to where the model cannot be solved quickly are too long."""
     fitted = task.fitted
-    point = task.at(start, None, 1)
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
     for count in range(1, _MOST_STEPS + 1):
         # The scatter of the sessions comes from the residuals of the fit, but only near the solution. Far from it
@@ -170,10 +188,10 @@ def _descend(task: _Task, start: dict[str, float]) -> _Point:
         if step.promise < _SMALL and count > 1:
             break
         tried = task.at(step.parameters, None if step.size > _SHORT else point.derivative, count + 1)
-        if tried.products.at(share)[-1, -1] < point.products.at(share)[-1, -1] + _SMALL:
+        if tried.solved and tried.products.at(share)[-1, -1] < point.products.at(share)[-1, -1] + _SMALL:
             point, least, kept = tried, max(least - 2, 0), step.size <= _SHORT
         elif kept:
-            point, kept = task.at(point.parameters, None, count + 1), False
+            point, kept = task.at(point.parameters, None, count + 1, quick=False), False
         else:
             least = max(step.damping + 1, 2)
             if least >= len(_DAMPING):

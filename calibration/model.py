@@ -92,9 +92,12 @@ class Model(Protocol):
         ...
 
     def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = ""
+        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
     ) -> tuple[Floats, Floats]:
-        """Prediction (n, k) and its derivatives (n, k, p) on the scales of the parameters `names`."""
+        """Prediction (n, k) and its derivatives (n, k, p) on the scales of the parameters `names`.
+
+        With `quick` they may be NaN where they would take long.
+        """
         ...
 
     def check(self, prediction: Floats) -> None:

@@ -65,7 +65,12 @@ class Verdict:
 
     @property
     def wrong_numbers(self) -> tuple[tuple[Pull, ...], ...]:
-        """Numbers as given that the runs contradict; each with those that may be wrong in its place."""
+        """Numbers as given that the runs contradict; each with those that may be wrong in its place.
+
+        Where nothing explains the residual there are none: what is missing pulls at the numbers, too.
+        """
+        if self.verdict == "unexplained":
+            return ()
         freed = {p.parameter.name: p for p in self.numbers if p.freed}
         found = tuple((freed[alike[0].parameter.name], *alike[1:]) for alike in self.final.wrong)
         far = [p for p in self.numbers if not p.freed]
@@ -86,7 +91,12 @@ class Verdict:
         if self.wrong_numbers:
             said = "; and ".join(", or ".join(p.words for p in alike) for alike in self.wrong_numbers)
             return f"A number as given is wrong: {said}."
-        if self.numbers and self.numbers[0].learnt and abs(self.numbers[0].z) > _NOTABLE:
+        if (
+            self.verdict != "unexplained"
+            and self.numbers
+            and self.numbers[0].learnt
+            and abs(self.numbers[0].z) > _NOTABLE
+        ):
             return f"{self.numbers[0].words}."
         return ""
 

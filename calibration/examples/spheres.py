@@ -60,7 +60,7 @@ class Spheres:
         return np.asarray(2 * stokes / (1 + np.sqrt(1 + 4 * slope * stokes)))
 
     def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = ""
+        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
     ) -> tuple[Floats, Floats]:
         """Prediction and derivatives, by differences."""
         return by_differences(self, parameters, names)
