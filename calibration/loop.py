@@ -107,6 +107,7 @@ class _Explained:
     candidates: tuple[Candidate, ...]
     best: tuple[Candidate, ...]
     freed: Freed | None = None  # a number as given is wrong; it is freed in the final model
+    instead: tuple[Candidate, ...] = ()  # effects that explain as much as the wrong number does
 
     @property
     def final(self) -> Fit:
@@ -159,6 +160,7 @@ def calibrate(
         misfit=found.misfit,
         candidates=found.candidates,
         numbers=pulls(final, model.given),
+        instead=found.instead,
         generic=generic,
         next_runs=_next_runs(task, found),
         error_uncalibrated=error["uncalibrated"][0],
@@ -210,7 +212,8 @@ def _explain(task: _Task) -> _Explained:
     )
     best = explaining(found)
     if without is not None and without.misfit.p_value >= level and not _better(best, without.fit):
-        return _Explained(base, misfit, tuple(found), (), without)
+        near = [c for c in best if c.refit and c.refit.deviance < without.fit.deviance + INDISTINGUISHABLE]
+        return _Explained(base, misfit, tuple(found), (), without, tuple(near))
     if not best:
         best = explaining(beside_wrong_numbers(model, base, found, used, along, level=level, seed=seed))
     if not best:
@@ -239,9 +242,9 @@ def _errors(task: _Task, found: _Explained, generic: Floats) -> dict[str, tuple[
 
 def _next_runs(task: _Task, found: _Explained) -> tuple[NextRun, ...]:
     """Runs that would tell the two best explanations apart, where there are two."""
-    if len(found.best) < 2:
-        return ()
-    first, second = found.best[0].refit, found.best[1].refit
+    first, second = (*(c.refit for c in (*found.best, *found.instead)), None, None)[:2]
+    if found.freed and found.instead:
+        first, second = found.freed.fit, found.instead[0].refit
     if first is None or second is None:
         return ()
     return tuple(next_runs(task.model, first, second, seed=task.seed))

@@ -44,6 +44,7 @@ class Verdict:
     misfit: Misfit
     candidates: tuple[Candidate, ...]
     numbers: tuple[Pull, ...]  # every number as given in the final model, the farthest first
+    instead: tuple[Candidate, ...]  # effects that explain as much as the number that is wrong
     generic: Generic  # correction of the calibrated model
     next_runs: tuple[NextRun, ...]  # where two effects cannot be told apart
     error_uncalibrated: float
@@ -82,7 +83,10 @@ class Verdict:
         """The verdict in one sentence with its certainty; a second one for a number as given that is wrong."""
         words = self._number_words
         if self.verdict == "number":
-            return f"{words} No effect is claimed."
+            if not self.instead:
+                return f"{words} No effect is claimed."
+            names = " or ".join(" and ".join(e.title for e in c.claimed) for c in self.instead)
+            return f"{words} No effect is claimed. If the number is right, {names} would explain as much."
         return f"{words} {self._effect_words}" if words else self._effect_words
 
     @property
@@ -177,6 +181,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "in_form_only": list(result.in_form_only),
         "imitability": [c.imitable for c in result.explaining],
         "imitable": any(c.imitable > DOUBT for c in result.explaining),
+        "effects_instead": [[e.name for e in c.claimed] for c in result.instead],
         "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
         "numbers_as_given": [_number_record(p) for p in result.numbers],
         "error_uncalibrated": result.error_uncalibrated,
