@@ -73,8 +73,8 @@ def _add_numbers(page: Page, result: Verdict) -> None:
     wrong = [" or ".join(p.parameter.title for p in alike) for alike in result.wrong_numbers]
     page.text(
         "What was given is known to a tolerance only. So these numbers are fitted, too, each with the tolerance "
-        "that was stated for it. The pull is how far the runs move a number, in standard deviations of what chance "
-        f"does. Beyond {WRONG:g} the number is taken to be wrong: {'; '.join(wrong) if wrong else 'none is'}.",
+        "that was stated for it. The pull is how far the runs move a number, in standard deviations of "
+        f"what chance does. Beyond {WRONG:g} the number is taken to be wrong: {'; '.join(wrong) if wrong else 'none is'}.",
         tone="bad" if wrong else "good",
     )
     rows = []
