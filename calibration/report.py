@@ -71,10 +71,11 @@ def _add_numbers(page: Page, result: Verdict) -> None:
         return
     page.section("Numbers as given")
     wrong = [" or ".join(p.parameter.title for p in alike) for alike in result.wrong_numbers]
+    said = "; ".join(wrong) if wrong else "none is"
     page.text(
         "What was given is known to a tolerance only. So these numbers are fitted, too, each with the tolerance "
-        "that was stated for it. The pull is how far the runs move a number, in standard deviations of "
-        f"what chance does. Beyond {WRONG:g} the number is taken to be wrong: {'; '.join(wrong) if wrong else 'none is'}.",
+        "that was stated for it. The pull is how far the runs move a number, in standard deviations of what "
+        f"chance would do. Beyond {WRONG:g} the number is taken to be wrong: {said}.",
         tone="bad" if wrong else "good",
     )
     rows = []
