@@ -19,20 +19,27 @@ same way (`pairs`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 from tqdm import tqdm
 
 from calibration.fit import Fit, fit
+from calibration.freed import free_numbers
+from calibration.imitation import absorbable_shares, imitability
 from calibration.misfit import TESTABLE, Misfit, check_misfit
 from calibration.model import Model, Parameter, Parameters
+from calibration.prior import likeliest, prior_rows, pulls
 from calibration.sessions import groups
 from sim.arrays import Flags, Floats, Integers
 
+_CURVED = 0.3  # share of the best score's z² below which an effect is not refitted if it leaves too much
+_FAR = 6.0  # standard deviations of χ²
+_LEAVES_MORE = "leaves far more than noise, by its score"
 _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
 _FIRST = 3  # number of single effects to which a second one is added
-_INDISTINGUISHABLE = 6.63  # χ² with one degree of freedom, 99 %
+INDISTINGUISHABLE = 6.63  # χ² with one degree of freedom, 99 %
 
 
 @dataclass(frozen=True)
@@ -44,15 +51,22 @@ class Candidate:
     z: float
     survived: float
     detectable: float  # size that is found half of the time: critical |z| / signal per unit
+    detectable_exact: float  # the same if every number as given were exact
     refit: Fit | None
     refit_misfit: Misfit | None
     gain: float  # predictive gain summed over left-out sessions, in log likelihood
     gain_error: float
     verdict: str  # why it was kept or not
+    imitable: float = 0.0  # imitability index of the claim (`calibration.imitation`), where it is kept
 
     @property
     def kept(self) -> bool:
         return self.verdict == "kept"
+
+    @property
+    def claimed(self) -> tuple[Parameter, ...]:
+        """All effects of its refit."""
+        return (*self.beside, self.effect)
 
 
 def examine(
@@ -77,12 +91,13 @@ def examine(
     """
     found = []
     local = inside(model, base.parameters)
+    free = tuple(alike[0].parameter.name for alike in base.wrong)
     order = np.argsort(-np.abs(misfit.scores.z)).tolist()
     title = " ".join(("effects", *(f"beside {e.title}" for e in beside)))
     for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not progress):
         effect = effects[j]
         z, survived = float(misfit.scores.z[j]), float(misfit.scores.survived[j])
-        detectable = misfit.critical_z / max(float(misfit.scores.length[j]), 1e-300)
+        detectable, exact = detectable_sizes(misfit, j)
         guess = base.parameters[effect.name] + z / max(float(misfit.scores.length[j]), 1e-300)
         low, high = effect.bounds
         reason = ""
@@ -95,7 +110,12 @@ def examine(
         elif not low <= guess <= high and (guess < low) == (effect.start == low):
             reason = "its score has a sign that the effect cannot have"
         if reason:
-            found.append(Candidate(effect, beside, z, survived, detectable, None, None, 0.0, 0.0, reason))
+            found.append(Candidate(effect, beside, z, survived, detectable, exact, None, None, 0.0, 0.0, reason))
+            continue
+        if local and _hopeless(model, base, misfit, z, used):
+            found.append(
+                Candidate(effect, beside, z, survived, detectable, exact, None, None, 0.0, 0.0, _LEAVES_MORE)
+            )
             continue
         guess = min(max(guess, low), high)
         refit = fit(
@@ -103,25 +123,80 @@ def examine(
             {**(base.parameters if local else given), effect.name: guess},
             (*base.names, effect.name),
             used,
+            free=free,
             title="",
         )
-        after = check_misfit(
-            refit, model.runs, used, np.delete(along, j, -1), level=level, seed=seed + 1, draws=_DRAWS
-        )
-        gain, error = _session_gain(model, base, refit, used)
-        ends = refit.interval(effect.name)
-        if not refit.arrived:
-            reason = "its fit does not arrive at a minimum"
-        elif after.p_value < level / 2:
-            reason = f"leaves a residual (p = {after.p_value:.2g})"
-        elif ends[0] <= effect.start <= ends[1]:
-            reason = "its interval includes the null"
-        elif gain <= error:
-            reason = "does not predict left-out sessions better"
-        found.append(
-            Candidate(effect, beside, z, survived, detectable, refit, after, gain, error, reason or "kept")
-        )
+        refit = replace(refit, wrong=base.wrong)
+        others = np.delete(along, j, -1)
+        one = Candidate(effect, beside, z, survived, detectable, exact, refit, None, 0.0, 0.0, "")
+        found.append(_judged(model, one, base, refit, used, others, level, seed))
     return found
+
+
+def _hopeless(model: Model, base: Fit, misfit: Misfit, z: float, used: Flags) -> bool:
+    """Whether an effect takes a small share of the residual and leaves far more than noise, by its score.
+
+    A refit takes z² from the deviance if the model is linear. `_CURVED` allows for its curvature.
+    """
+    freedom = int(used.sum()) * base.prediction.shape[1] - len(base.names)
+    left = base.deviance - z**2 / _CURVED - freedom
+    best = float(np.max(np.where(misfit.scores.survived >= TESTABLE, misfit.scores.z**2, 0.0)))
+    return z**2 < _CURVED * best and left > _FAR * math.sqrt(2 * freedom)
+
+
+def detectable_sizes(misfit: Misfit, place: int) -> tuple[float, float]:
+    """Size of an effect that is found half of the time; the same if every number as given were exact."""
+    lengths = float(misfit.scores.length[place]), float(misfit.exact_length[place])
+    return misfit.critical_z / max(lengths[0], 1e-300), misfit.critical_z / max(lengths[1], 1e-300)
+
+
+def _judged(
+    model: Model, one: Candidate, base: Fit, refit: Fit, used: Flags, others: Floats, level: float, seed: int
+) -> Candidate:
+    """The candidate with a refit, and the reason why that is kept or not.
+
+    Args:
+        others: ∂f/∂ε of all other effects, (n, k, e).
+    """
+    after = check_misfit(
+        refit, model.runs, used, others, level=level, seed=seed + 1, draws=_DRAWS, decide=level / 2
+    )
+    gain, error = _session_gain(model, base, refit, used)
+    ends = refit.interval(one.effect.name)
+    reason = "kept"
+    if not refit.arrived:
+        reason = "its fit does not arrive at a minimum"
+    elif after.p_value < level / 2:
+        reason = f"leaves a residual (p ≤ {after.p_value:.1g})"
+    elif ends[0] <= one.effect.start <= ends[1]:
+        reason = "its interval includes the null"
+    elif gain <= error:
+        reason = "does not predict left-out sessions better"
+    return replace(one, refit=refit, refit_misfit=after, gain=gain, gain_error=error, verdict=reason)
+
+
+def beside_wrong_numbers(
+    model: Model, base: Fit, found: list[Candidate], used: Flags, along: Floats, *, level: float, seed: int
+) -> list[Candidate]:
+    """The best few refits once more, without the priors of numbers that they contradict.
+
+    Args:
+        along: ∂f/∂ε of `model.effects`, (n, k, e).
+    """
+    reach = []
+    names = [e.name for e in model.effects]
+    for one in found:
+        if one.refit is not None:
+            worst = likeliest(pulls(one.refit, model.given))
+            if worst is not None:
+                reach.append((one.refit.deviance - worst.z**2, one.effect.name, one))
+    again = []
+    for _, name, one in sorted(reach, key=lambda r: r[:2])[:_FIRST]:
+        assert one.refit is not None
+        refit = free_numbers(model, one.refit, used)
+        others = np.delete(along, names.index(name), -1)
+        again.append(_judged(model, one, base, refit, used, others, level, seed))
+    return again
 
 
 def pairs(
@@ -157,11 +232,35 @@ def pairs(
             progress=progress,
         )
     unique: dict[frozenset[str], Candidate] = {}
+    single = min(ebic(c.refit, 1, model, used) for c in refitted if c.refit) if refitted else np.inf
     for candidate in second:
-        names = frozenset((candidate.effect.name, *(e.name for e in candidate.beside)))
-        if candidate.kept and names not in unique:
+        names = frozenset(e.name for e in candidate.claimed)
+        pays = candidate.refit is not None and ebic(candidate.refit, 2, model, used) < single
+        if candidate.kept and pays and names not in unique:
             unique[names] = candidate
     return list(unique.values())
+
+
+def ebic(refit: Fit, count: int, model: Model, used: Flags) -> float:
+    """Deviance of a fit with `count` effects, and what they cost: k ln n + 2 ln (number of such sets).
+
+    Source: Chen and Chen (2008), γ = 1.
+    """
+    values = int(used.sum()) * refit.prediction.shape[1]
+    sets = math.comb(len(model.effects), count)
+    return refit.deviance + len(refit.names) * math.log(values) + 2 * math.log(sets)
+
+
+def with_imitability(model: Model, best: list[Candidate], base: Fit, used: Flags, seed: int) -> list[Candidate]:
+    """Claims with their imitability index; their strength is what they take from the deviance of `base`."""
+    found = []
+    for one in best:
+        assert one.refit is not None
+        strength = math.sqrt(max(base.deviance - one.refit.deviance, 0.0))
+        names = tuple(e.name for e in one.claimed)
+        shares = absorbable_shares(one.refit, model.runs, used, names, seed=seed)
+        found.append(replace(one, imitable=imitability(shares, strength)))
+    return found
 
 
 def inside(model: Model, fitted: Parameters) -> bool:
@@ -172,7 +271,7 @@ def inside(model: Model, fitted: Parameters) -> bool:
 def explaining(found: list[Candidate]) -> list[Candidate]:
     """Kept effects that the runs cannot tell from the best one, best first."""
     kept = sorted((c for c in found if c.kept and c.refit), key=lambda c: _deviance(c))
-    return [c for c in kept if _deviance(c) - _deviance(kept[0]) < _INDISTINGUISHABLE]
+    return [c for c in kept if _deviance(c) - _deviance(kept[0]) < INDISTINGUISHABLE]
 
 
 def _deviance(candidate: Candidate) -> float:
@@ -207,6 +306,8 @@ def _left_out(
     """Whitened residuals of a left-out session for a model fitted to the others, in the noise of `judge`."""
     white = judge.noise.whitener(session[learn])
     residual = y - fitted.prediction
-    step = np.linalg.lstsq(white(fitted.jacobian[learn]), white(residual[learn]), rcond=None)[0]
+    rows, prior = prior_rows(fitted.fitted, fitted.parameters)
+    derivative = np.concatenate([white(fitted.jacobian[learn]), rows])
+    step = np.linalg.lstsq(derivative, np.concatenate([white(residual[learn]), prior]), rcond=None)[0]
     left = residual[out] - fitted.jacobian[out] @ step
     return np.asarray(judge.noise.whitener(session[out])(left))

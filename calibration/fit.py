@@ -6,8 +6,9 @@ Steps of Levenberg (1944) with the model's own derivatives:
 
 D is 1 for ln C and a typical size for ε. λ is 0, unless the step is too long or does not improve the fit. A
 parameter at a bound stays there if the step would lead out. The covariance of the parameters is V = A⁻¹, times a
-factor because S is estimated (`_inflation`). Intervals are 95 %, by Student's t. The scatter ρ of a few sessions
-is uncertain, which limits the degrees of freedom (Satterthwaite 1946):
+factor because S is estimated (`_inflation`). Numbers as given have priors, which are rows of their own
+(`calibration.prior`): they are in A, in the residual and in the deviance. Intervals are 95 %, by Student's t.
+The scatter ρ of a few sessions is uncertain, which limits the degrees of freedom (Satterthwaite 1946):
 
     ν = 2 V² / (V′² Var ρ),   Var ρ ≈ 2 (ρ + 1/n)² / (k (s − 1)),   n runs in each of s sessions.
 """
@@ -15,15 +16,19 @@ is uncertain, which limits the degrees of freedom (Satterthwaite 1946):
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
 
 from calibration.model import Model, Parameter, Parameters, parameter, stepped
 from calibration.noise import Noise, Sums, inverse_root, least_squares, repeat_covariance, sums
+from calibration.prior import with_prior
 from sim.arrays import Flags, Floats, Integers
+
+if TYPE_CHECKING:
+    from calibration.prior import Pull
 
 _MOST_STEPS = 25
 _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
@@ -31,6 +36,7 @@ _SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ
 _LARGEST = 0.7  # change of ln C in one step
 _PASSES = 3  # iterations for the scatter of the sessions
 _DAMPING = (0.0, *(10.0**e for e in range(-3, 9)))  # λ
+_NEARER = 5  # starts that are tried
 _UNSETTLED = 1.0  # a fit has not arrived if one more step is expected to reduce rᵀ Σ⁻¹ r by more
 
 
@@ -48,6 +54,7 @@ class Fit:
     noise: Noise
     deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
     arrived: bool  # the fit is at a minimum, or at one within the bounds
+    wrong: tuple[tuple[Pull, ...], ...] = ()  # numbers whose priors were taken away, each with those like it
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -78,16 +85,23 @@ def fit(
     names: tuple[str, ...],
     used: Flags,
     *,
+    free: tuple[str, ...] = (),
     title: str = "fit",
 ) -> Fit:
-    """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay."""
+    """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay.
+
+    Args:
+        free: numbers as given whose priors are taken away.
+    """
     data = model.runs
+    fitted = tuple(parameter(model, name) for name in names)
+    fitted = tuple(replace(one, sigma=None) if one.name in free else one for one in fitted)
     run = repeat_covariance(data.y[used], data.condition[used])
-    point = _descend(_Task(model, names, used, inverse_root(run), title), dict(start))
+    task = _Task(model, fitted, used, inverse_root(run), title)
+    point = _descend(task, task.first(dict(start)))
     linear = least_squares(point.products, passes=_PASSES)
     share = float(linear.share)
     whole = point.products.at(linear.share)
-    fitted = tuple(parameter(model, name) for name in names)
     inflation = _inflation(data.condition[used], len(run))
     return Fit(
         parameters=point.parameters,
@@ -112,28 +126,47 @@ class _Point:
     derivative: Floats  # (n, k, p), at these parameters or near them
     products: Sums  # of the derivatives and the residual
 
+    @property
+    def solved(self) -> bool:
+        return bool(np.isfinite(self.prediction).all() and np.isfinite(self.derivative).all())
+
 
 @dataclass(frozen=True)
 class _Task:
-    """The model, the runs, and the names of the parameters to fit."""
+    """The model, the runs, and the parameters to fit."""
 
     model: Model
-    names: tuple[str, ...]
+    fitted: tuple[Parameter, ...]
     used: Flags
     root: Floats
     title: str
 
-    def at(self, parameters: dict[str, float], derivative: Floats | None, count: int) -> _Point:
+    def first(self, parameters: dict[str, float]) -> _Point:
+        """The model at the start; effects move towards their null while it cannot be solved quickly there."""
+        effects = [one for one in self.fitted if one.name in {e.name for e in self.model.effects}]
+        tried = dict(parameters)
+        for _ in range(_NEARER if effects else 1):
+            point = self.at(tried, None, 1)
+            if point.solved:
+                return point
+            tried.update({one.name: (tried[one.name] + one.start) / 2 for one in effects})
+        return self.at(parameters, None, 1, quick=False)
+
+    def at(
+        self, parameters: dict[str, float], derivative: Floats | None, count: int, *, quick: bool = True
+    ) -> _Point:
         """The model at `parameters`; its derivatives are computed if none are given."""
         title = f"{self.title}, step {count}" if self.title else ""
         if derivative is None:
-            prediction, derivative = self.model.derivatives(parameters, self.names, title=title)
+            prediction, derivative = self.model.derivatives(
+                parameters, [one.name for one in self.fitted], title=title, quick=quick
+            )
         else:
             prediction = self.model.predict([parameters], title=title)[0]
         data = self.model.runs
         table = np.concatenate([derivative, (data.y - prediction)[..., None]], -1)[self.used]
         products = sums(self.root @ table, data.session[self.used], len(self.root))
-        return _Point(parameters, prediction, derivative, products)
+        return _Point(parameters, prediction, derivative, with_prior(products, self.fitted, parameters))
 
 
 class _Step(NamedTuple):
@@ -143,10 +176,9 @@ class _Step(NamedTuple):
     damping: int  # place of its λ in _DAMPING
 
 
-def _descend(task: _Task, start: dict[str, float]) -> _Point:
-    """The least rᵀ Σ⁻¹ r from `start`."""
-    fitted = tuple(parameter(task.model, name) for name in task.names)
-    point = task.at(start, None, 1)
+def _descend(task: _Task, point: _Point) -> _Point:
+    """The least rᵀ Σ⁻¹ r from `point`; steps to where the model cannot be solved quickly are too long."""
+    fitted = task.fitted
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
     for count in range(1, _MOST_STEPS + 1):
         # The scatter of the sessions comes from the residuals of the fit, but only near the solution. Far from it
@@ -156,10 +188,10 @@ def _descend(task: _Task, start: dict[str, float]) -> _Point:
         if step.promise < _SMALL and count > 1:
             break
         tried = task.at(step.parameters, None if step.size > _SHORT else point.derivative, count + 1)
-        if tried.products.at(share)[-1, -1] < point.products.at(share)[-1, -1] + _SMALL:
+        if tried.solved and tried.products.at(share)[-1, -1] < point.products.at(share)[-1, -1] + _SMALL:
             point, least, kept = tried, max(least - 2, 0), step.size <= _SHORT
         elif kept:
-            point, kept = task.at(point.parameters, None, count + 1), False
+            point, kept = task.at(point.parameters, None, count + 1, quick=False), False
         else:
             least = max(step.damping + 1, 2)
             if least >= len(_DAMPING):

@@ -39,14 +39,28 @@ def influences() -> dict[str, Influence]:
         if not effect.drivers and not effect.beside:
             found[effect.name] = _plain(effect)
         for driver in effect.drivers:
-            parameter = Parameter(driver.name, driver.title, 0.0, driver.bounds, driver.typical, unit=driver.unit)
+            parameter = Parameter(
+                driver.name, driver.title, 0.0, driver.bounds, driver.typical, unit=driver.unit,
+                plausible=driver.plausible,
+            )  # fmt: skip
             found[driver.name] = Influence(parameter, effect.name, driver.column, effect.symmetry == "odd")
-    slip = Parameter(SLIP, "slip of the motor", 0.0, (-0.3, 0.3), 0.02, unit="share of its speed")
-    point = Parameter(
-        TRACKED_POINT, "tracked point off the head's centre", 0.0, (-2.0, 2.0), 0.1, unit="L, forward"
+    slip = Parameter(
+        SLIP, "slip of the motor", 0.0, (-0.3, 0.3), 0.02, unit="share of its speed", plausible=(-0.1, 0.1)
     )
+    point = Parameter(
+        TRACKED_POINT, "tracked point off the head's centre", 0.0, (-2.0, 2.0), 0.1, unit="L, forward",
+        plausible=(-0.6, 0.6),
+    )  # fmt: skip
     for name, axis in zip(CURRENT, "xy", strict=True):
-        current = Parameter(name, f"current in the tank along {axis}", 0.0, (-0.05, 0.05), 0.001, unit="m/s")
+        current = Parameter(
+            name,
+            f"current in the tank along {axis}",
+            0.0,
+            (-0.05, 0.05),
+            0.001,
+            unit="m/s",
+            plausible=(-0.02, 0.02),
+        )
         found[name] = Influence(current, None, f"heading_{axis}", False)
     found[SLIP] = Influence(slip, None, None, False)
     found[TRACKED_POINT] = Influence(point, None, None, False)
@@ -55,8 +69,9 @@ def influences() -> dict[str, Influence]:
 
 def _plain(effect: Effect) -> Influence:
     parameter = Parameter(
-        effect.name, effect.title, effect.null, effect.bounds, effect.typical - effect.null, unit=effect.unit
-    )
+        effect.name, effect.title, effect.null, effect.bounds, effect.typical - effect.null, unit=effect.unit,
+        plausible=effect.plausible,
+    )  # fmt: skip
     return Influence(parameter, effect.name, None, effect.symmetry == "odd")
 
 

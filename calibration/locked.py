@@ -7,6 +7,7 @@ import numpy as np
 from calibration.fit import Fit
 from calibration.model import Model, Runs, stepped
 from calibration.noise import inverse_root, least_squares, sums
+from calibration.prior import with_prior
 from calibration.sessions import groups
 from sim.arrays import Flags, Floats
 
@@ -67,5 +68,6 @@ def fitted_to_all(model: Model, fitted: Fit, rows: Flags) -> dict[str, float]:
     data = model.runs
     table = np.concatenate([fitted.jacobian, (data.y - fitted.prediction)[..., None]], -1)
     products = sums(inverse_root(fitted.noise.run) @ table[rows], data.session[rows], len(fitted.noise.run))
+    products = with_prior(products, fitted.fitted, fitted.parameters)
     step = least_squares(products, passes=3).step
     return stepped(fitted.fitted, fitted.parameters, step)

@@ -4,9 +4,12 @@
    Runs with gross errors are set aside (`calibration.gross`).
 2. Covariance from the repeats and the sessions (`calibration.noise`).
 3. Fit of the coefficients to the other sessions (`calibration.fit`).
+   Numbers as given are fitted with them, within their priors (`calibration.prior`); one that leaves its prior is
+   freed, and comes ahead of every effect (`calibration.freed`).
 4. Lack of fit, kernel score and projected scores (`calibration.misfit`).
 5. Refit with each effect that passes; keep what explains (`calibration.attribute`).
-6. Verdict: "none" (no departure beyond noise), "effect" (one explains it), "ambiguous" (several do and the runs
+6. Verdict: "none" (no departure beyond noise), "number" (a number as given is wrong), "effect" (one explains
+it), "ambiguous" (several do and the runs
    cannot tell them apart), "unexplained" (there is a departure, and no effect in the catalogue explains it).
 7. If no single effect explains it, pairs are tried. If several explain it, next runs that would tell them apart.
 8. Errors on the locked runs: as given, calibrated, with the effect, with a generic correction of the calibrated
@@ -21,14 +24,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.attribute import Candidate, examine, explaining, inside, pairs
+from calibration.attribute import (
+    INDISTINGUISHABLE,
+    Candidate,
+    beside_wrong_numbers,
+    detectable_sizes,
+    examine,
+    explaining,
+    inside,
+    pairs,
+    with_imitability,
+)
 from calibration.discriminate import NextRun, next_runs
 from calibration.fit import Fit, fit
+from calibration.freed import Freed, freed
 from calibration.generic import correct
 from calibration.gross import gross_errors
 from calibration.locked import error_interval, errors, fitted_to_all, locked_p_value, middle_session
-from calibration.misfit import Misfit, check_misfit
+from calibration.misfit import DRAWS, Misfit, check_misfit
 from calibration.model import Model, Parameter, Runs, start_values
+from calibration.prior import pulls
 from calibration.profile import profile_intervals
 from calibration.sessions import divided, groups, limits
 from calibration.verdict import Verdict, verdict_record
@@ -91,11 +106,15 @@ class _Explained:
     misfit: Misfit
     candidates: tuple[Candidate, ...]
     best: tuple[Candidate, ...]
+    freed: Freed | None = None  # a number as given is wrong; it is freed in the final model
+    instead: tuple[Candidate, ...] = ()  # effects that explain as much as the wrong number does
 
     @property
     def final(self) -> Fit:
         """The model with the effects of the verdict, or without any."""
-        return self.best[0].refit if self.best and self.best[0].refit else self.base
+        if self.best and self.best[0].refit:
+            return self.best[0].refit
+        return self.freed.fit if self.freed else self.base
 
 
 def calibrate(
@@ -126,7 +145,9 @@ def calibrate(
     error = _errors(task, found, found.base.prediction + generic.correction)
     noise = found.base.noise.run
     verdict = "none"
-    if found.misfit.p_value < level:
+    if found.freed and not found.best:
+        verdict = "number"
+    elif found.misfit.p_value < level:
         verdict = ("unexplained", "effect", "ambiguous")[min(len(found.best), 2)]
     return Verdict(
         verdict=verdict,
@@ -138,6 +159,8 @@ def calibrate(
         final_intervals=final_intervals,
         misfit=found.misfit,
         candidates=found.candidates,
+        numbers=pulls(final, model.given),
+        instead=found.instead,
         generic=generic,
         next_runs=_next_runs(task, found),
         error_uncalibrated=error["uncalibrated"][0],
@@ -176,21 +199,34 @@ def _explain(task: _Task) -> _Explained:
     """Fit the coefficients and test the residual. If it is more than noise, examine single effects, then pairs."""
     model, used, level, seed = task.model, task.used, task.level, task.seed
     guess = model.guess(dict(task.start), used)
-    coefficients = tuple(p.name for p in model.coefficients)
+    coefficients = tuple(p.name for p in (*model.coefficients, *model.given))
     base = fit(model, guess, coefficients, used, title=task.title("fit"))
     names = [e.name for e in model.effects]
     along = model.derivatives(base.parameters, names, title=task.title("derivatives"))[1]
     misfit = check_misfit(base, task.runs, used, along, level=level, seed=seed)
+    without = freed(model, base, used, along, level=level, seed=seed, draws=DRAWS)
     if misfit.p_value >= level:
-        return _Explained(base, misfit, _unexamined(misfit, model.effects), ())
+        return _Explained(base, misfit, _unexamined(misfit, model.effects), (), without)
     found = examine(
         model, base, misfit, model.effects, along, used, task.start, level=level, seed=seed, progress=task.progress
     )
     best = explaining(found)
+    if without is not None and without.misfit.p_value >= level and not _better(best, without.fit):
+        near = [c for c in best if c.refit and c.refit.deviance < without.fit.deviance + INDISTINGUISHABLE]
+        return _Explained(base, misfit, tuple(found), (), without, tuple(near))
+    if not best:
+        best = explaining(beside_wrong_numbers(model, base, found, used, along, level=level, seed=seed))
     if not best:
         found_pairs = pairs(model, found, used, task.start, level=level, seed=seed, progress=task.progress)
         best = explaining(found_pairs)
+    best = with_imitability(model, best, base, used, seed)
     return _Explained(base, misfit, tuple(found) or _unexamined(misfit, model.effects), tuple(best))
+
+
+def _better(best: list[Candidate], number: Fit) -> bool:
+    """Whether the best effect fits better than a wrong number by more than chance."""
+    refit = best[0].refit if best else None
+    return refit is not None and refit.deviance < number.deviance - INDISTINGUISHABLE
 
 
 def _errors(task: _Task, found: _Explained, generic: Floats) -> dict[str, tuple[float, dict[str, float]]]:
@@ -206,9 +242,9 @@ def _errors(task: _Task, found: _Explained, generic: Floats) -> dict[str, tuple[
 
 def _next_runs(task: _Task, found: _Explained) -> tuple[NextRun, ...]:
     """Runs that would tell the two best explanations apart, where there are two."""
-    if len(found.best) < 2:
-        return ()
-    first, second = found.best[0].refit, found.best[1].refit
+    first, second = (*(c.refit for c in (*found.best, *found.instead)), None, None)[:2]
+    if found.freed and found.instead:
+        first, second = found.freed.fit, found.instead[0].refit
     if first is None or second is None:
         return ()
     return tuple(next_runs(task.model, first, second, seed=task.seed))
@@ -230,7 +266,6 @@ def _unfinished(model: Model, base: Fit, final: Fit) -> tuple[str, ...]:
 def _unexamined(misfit: Misfit, effects: tuple[Parameter, ...]) -> tuple[Candidate, ...]:
     scores = misfit.scores
     return tuple(
-        Candidate(e, (), float(z), float(s), misfit.critical_z / max(float(n), 1e-300), None, None, 0.0, 0.0,
-                  "not needed")
-        for e, z, s, n in zip(effects, scores.z, scores.survived, scores.length, strict=True)
+        Candidate(e, (), float(z), float(s), *detectable_sizes(misfit, j), None, None, 0.0, 0.0, "not needed")
+        for j, (e, z, s) in enumerate(zip(effects, scores.z, scores.survived, strict=True))
     )  # fmt: skip

@@ -18,12 +18,14 @@ from __future__ import annotations
 
 import difflib
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from calibration.given import CAMERA, HEADING, TACHOMETER
 from calibration.model import Runs
 from calibration.noise import repeat_covariance
 from sim.arrays import Floats, Integers
@@ -43,9 +45,23 @@ OUTPUTS = {
 _ERRORS = (  # of `calibration.tracks`; not used, since repeats give the noise
     "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
 )  # fmt: skip
+_SIGMAS = {  # column -> number as given, factor
+    "camera_scale_sigma_percent": (CAMERA, 0.01),
+    "heading_zero_sigma_deg": (HEADING, math.pi / 180),
+    "tachometer_sigma_percent": (TACHOMETER, 0.01),
+}
 _INPUTS = ("N", "l_cm", "omega_rpm")
 _NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm", "heading_deg")
-KNOWN_COLUMNS = {*_INPUTS, *(c for c, _, _ in OUTPUTS.values()), "run", "trial", "session", *_NOTED, *_ERRORS}
+KNOWN_COLUMNS = {
+    *_INPUTS,
+    *(c for c, _, _ in OUTPUTS.values()),
+    "run",
+    "trial",
+    "session",
+    *_NOTED,
+    *_ERRORS,
+    *_SIGMAS,
+}
 _FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
 _OWN = 1e-3  # share of an output's scatter that must be independent of the other outputs
 
@@ -58,6 +74,7 @@ class Measurements(Runs):
     length: Floats  # (n,) tail length [m]
     omega: Floats  # (n,) motor speed, signed [rad/s]
     noted: Floats  # (n, c) what was noted and differs between the runs, by `noted_names`
+    sigmas: Mapping[str, float]  # σ of camera scale, zero of the heading [rad] and tachometer, where stated
     noted_names: tuple[str, ...]  # elapsed_h, temperature_K (above the mean), tank_diameter, heading_x, heading_y
 
 
@@ -126,6 +143,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         length=length,
         omega=omega,
         noted=np.stack(list(noted.values()), 1) if noted else np.empty((len(good), 0)),
+        sigmas=_sigmas(good),
         noted_names=tuple(noted),
     )
 
@@ -155,6 +173,22 @@ def _independent(
         else:
             kept.append(i)
     return y[:, kept], tuple(outputs[i] for i in kept), tuple(follows)
+
+
+def _sigmas(good: pd.DataFrame) -> dict[str, float]:
+    """Standard deviations of the way of measuring, the same in all rows.
+
+    Raises:
+        InputError: a column has no number, two different ones, or one that is below 0 or too large.
+    """
+    found = {}
+    for column, (name, factor) in _SIGMAS.items():
+        if column in good:
+            values = np.unique(good[column].to_numpy(dtype=float))
+            if len(values) != 1 or not 0 <= values[0] * factor <= 0.5:
+                raise InputError(f"{column} must be one number, the same in all rows, at least 0 and not large")
+            found[name] = float(values[0] * factor)
+    return found
 
 
 def _limits(tails: Floats, length: Floats, omega: Floats) -> tuple[str, ...]:

@@ -12,7 +12,10 @@ Four statistics:
     score    max |z_j| over the catalogue. The scatter of the sessions is estimated with effect j in the model,
              because otherwise a shift of all runs would look like scatter.
 
-Their null distribution comes from data drawn with the fitted noise (repeats and sessions). Each draw goes through
+Numbers as given have priors of covariance P (`calibration.prior`), so Σ is Σ + J P Jᵀ in all of them.
+
+Their null distribution comes from data drawn with the fitted noise (repeats and sessions) and with numbers drawn
+from their priors. Each draw goes through
 the same steps: S and ρ are estimated, and the coefficients are refitted (linearised). So the p-values take into
 account the fit, the estimated noise, and correlated candidates. Several statistics are judged together by the
 smallest of their p-values. Its null distribution comes from the same draws (Westfall and Young 1993).
@@ -30,7 +33,8 @@ from scipy.stats import rankdata
 from calibration.features import features
 from calibration.fit import Fit
 from calibration.model import Runs
-from calibration.noise import Sums, inverse_root, least_squares, repeat_covariance, sums
+from calibration.noise import Sums, inverse, inverse_root, least_squares, repeat_covariance, root_diagonal, sums
+from calibration.prior import changes, precisions
 from sim.arrays import Flags, Floats
 
 DRAWS = 1000
@@ -62,14 +66,15 @@ class Misfit:
     p_value: float  # any departure: general tests and scores together
     critical_z: float  # quantile of max |z_j| at the level
     features: tuple[str, ...]
+    exact_length: Floats  # (e,) `Scores.length` if the numbers as given were exact
 
 
 class _Tester:
     """The design of the runs used, which is fixed, and the statistics of any residual."""
 
-    def __init__(self, data: Runs, used: Flags, J: Floats, D: Floats):
+    def __init__(self, data: Runs, used: Flags, J: Floats, D: Floats, precision: Floats):
         self.session, self.condition = data.session[used], data.condition[used]
-        self.J, self.D = J, D
+        self.J, self.D, self.precision = J, D, precision
         inputs = data.inputs[used]
         spread = inputs.std(0)
         inputs = (inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
@@ -84,13 +89,16 @@ class _Tester:
         self.sessions = (np.arange(sessions.max() + 1)[:, None] == sessions).astype(float)  # (s, n)
 
     def scores(self, residual: Floats) -> Scores:
-        """Statistics of residuals (B, n, k) after a linear refit, each in its own noise."""
+        """Statistics of residuals (B, n, k) from the numbers as given, after a linear refit, each in its own
+        noise.
+        """
         p, e = self.J.shape[-1], self.D.shape[-1]
         root = inverse_root(repeat_covariance(residual, self.condition))  # (B, k, k)
         table = np.broadcast_to(np.concatenate([self.J, self.D], -1), (*residual.shape, p + e))
         table = np.concatenate([table, residual[..., None]], -1)
         columns = np.asarray(np.einsum("bij,bnjm->bnim", root, table, optimize=True))
         products = sums(columns, self.session, residual.shape[-1])
+        products.within[..., range(p), range(p)] += self.precision
         base = least_squares(products.take(np.r_[np.arange(p), p + e][None]), passes=_PASSES)
         share, step = base.share[:, 0], base.step[:, 0]
         left = self._shrunk(columns[..., -1] - np.einsum("bnkp,bp->bnk", columns[..., :p], step), share)
@@ -105,10 +113,11 @@ class _Tester:
         own = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
         part = products.take(own)
         whole = part.at(least_squares(part, passes=_PASSES).share)  # (B, e, p + 2, p + 2)
-        inverse = np.linalg.pinv(whole[..., :p, :p], rcond=1e-12, hermitian=True)
-        weights = np.einsum("bepq,beq->bep", inverse, whole[..., :p, p])
-        score = whole[..., p, p + 1] - np.einsum("bep,bep->be", weights, whole[..., :p, p + 1])
-        square = whole[..., p, p] - np.einsum("bep,bep->be", weights, whole[..., :p, p])
+        scale = root_diagonal(whole[..., :p, :p])
+        known = inverse(whole[..., :p, :p] / scale[..., :, None] / scale[..., None, :])
+        weights = (known @ (whole[..., :p, p] / scale)[..., None])[..., 0] / scale
+        score = whole[..., p, p + 1] - (weights * whole[..., :p, p + 1]).sum(-1)
+        square = whole[..., p, p] - (weights * whole[..., :p, p]).sum(-1)
         length = np.sqrt(np.maximum(square, 1e-300))
         survived = length / np.sqrt(np.maximum(whole[..., p, p], 1e-300))
         return np.where(survived > 1e-6, score / length, 0.0), survived, length
@@ -142,6 +151,7 @@ def check_misfit(
     level: float,
     seed: int,
     draws: int = DRAWS,
+    decide: float | None = None,
 ) -> Misfit:
     """Test the residual of a fit.
 
@@ -150,23 +160,33 @@ def check_misfit(
         directions: ∂f/∂ε of the candidates, (n, k, e), at their null; e may be 0.
         level: α of the critical |z|.
         seed: of the bootstrap.
+        decide: stop drawing as soon as it is clear whether the p-value is below this.
     """
-    tester = _Tester(data, used, fitted.jacobian[used], directions[used])
-    residual = (data.y - fitted.prediction)[used]
+    precision = precisions(fitted.fitted)
+    tester = _Tester(data, used, fitted.jacobian[used], directions[used], precision)
+    left = (data.y - fitted.prediction)[used]
+    residual = left + tester.J @ changes(fitted.fitted, fitted.parameters)
     observed = tester.scores(residual[None])
+    exact = _Tester(data, used, tester.J[..., precision == 0], tester.D, precision[precision == 0]).scores(
+        left[None]
+    )
     testable = observed.survived[0] >= TESTABLE
     rng = np.random.default_rng(seed)
-    root = np.linalg.cholesky(repeat_covariance(residual, data.condition[used]))
+    root = np.linalg.cholesky(repeat_covariance(left, data.condition[used]))
     scatter = float(np.sqrt(observed.share[0]))
+    prior = np.where(precision > 0, 1 / np.sqrt(np.where(precision > 0, precision, 1.0)), 0.0)
+    own = np.append(observed.general[0], _largest(observed.z, testable))
     found = []
     for start in range(0, draws, _AT_ONCE):
         count = min(_AT_ONCE, draws - start)
         drawn = rng.normal(size=(count, *residual.shape))
         drawn += scatter * tester.sessions.T @ rng.normal(size=(count, len(tester.sessions), residual.shape[-1]))
-        null = tester.scores(drawn @ root.T)
+        numbers = rng.normal(size=(count, len(prior))) * prior
+        null = tester.scores(drawn @ root.T + np.einsum("nkp,bp->bnk", tester.J, numbers))
         found.append(np.column_stack([null.general, _largest(null.z, testable)]))
+        if decide is not None and _decided(np.concatenate(found), own, decide):
+            break
     null_table = np.concatenate(found)
-    own = np.append(observed.general[0], _largest(observed.z, testable))
     columns = range(len(GENERAL) + 1)
     one = Scores(*(getattr(observed, name)[0] for name in Scores.__dataclass_fields__))
     return Misfit(
@@ -179,7 +199,15 @@ def check_misfit(
         p_value=_p_value(null_table, own) if testable.any() else _p_value(null_table[:, :-1], own[:-1]),
         critical_z=float(np.quantile(null_table[:, -1], 1 - level)),
         features=tester.names,
+        exact_length=exact.length[0],
     )
+
+
+def _decided(null: Floats, own: Floats, level: float) -> bool:
+    """Whether so many draws tell a p-value from `level` (Besag and Clifford 1991)."""
+    p = _p_value(null, own)
+    far = p < level / 2 and len(null) > 2 / level
+    return far or (p > 8 * level and len(null) * p > 10)
 
 
 def _largest(z: Floats, testable: Flags) -> Floats:

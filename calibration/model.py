@@ -23,7 +23,7 @@ _LARGEST = 100.0  # change of ln C, so that C stays a number
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number to fit: a coefficient, which the model always has, or the size of an effect, which it may lack."""
+    """A number to fit: a coefficient, a number as given, or the size of an effect, which the model may lack."""
 
     name: str
     title: str
@@ -32,6 +32,9 @@ class Parameter:
     typical: float  # a typical size; it sets the finite-difference step
     logarithmic: bool = False  # fitted as its logarithm
     unit: str = "1"
+    sigma: float | None = None  # of a number as given: one standard deviation on its own scale; None: free
+    plausible: tuple[float, float] | None = None  # sizes of an effect that its source allows; None: all
+    shown: float = 1.0  # factor to the unit in which a change is shown
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,11 @@ class Model(Protocol):
         ...
 
     @property
+    def given(self) -> tuple[Parameter, ...]:
+        """Numbers as given that are not exact: always fitted, with their priors."""
+        ...
+
+    @property
     def effects(self) -> tuple[Parameter, ...]:
         """What the model may lack and these runs can test."""
         ...
@@ -84,9 +92,12 @@ class Model(Protocol):
         ...
 
     def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = ""
+        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
     ) -> tuple[Floats, Floats]:
-        """Prediction (n, k) and its derivatives (n, k, p) on the scales of the parameters `names`."""
+        """Prediction (n, k) and its derivatives (n, k, p) on the scales of the parameters `names`.
+
+        With `quick` they may be NaN where they would take long.
+        """
         ...
 
     def check(self, prediction: Floats) -> None:
@@ -108,12 +119,12 @@ class Model(Protocol):
 
 def start_values(model: Model) -> dict[str, float]:
     """Every parameter as given: effects at their null."""
-    return {p.name: p.start for p in (*model.coefficients, *model.effects)}
+    return {p.name: p.start for p in (*model.coefficients, *model.given, *model.effects)}
 
 
 def parameter(model: Model, name: str) -> Parameter:
-    """The coefficient or effect called `name`."""
-    return next(p for p in (*model.coefficients, *model.effects) if p.name == name)
+    """The coefficient, number or effect called `name`."""
+    return next(p for p in (*model.coefficients, *model.given, *model.effects) if p.name == name)
 
 
 def moved(one: Parameter, value: float, by: float) -> float:

@@ -23,6 +23,7 @@ import numpy as np
 from sim.arrays import Floats, Integers
 
 SESSION_SHARE = 1.0  # largest ρ
+_RIDGE = 1e-11
 
 Labels = Integers
 
@@ -66,7 +67,9 @@ class Sums:
     def at(self, share: Floats) -> Floats:
         """Columnᵀ Σ⁻¹ column, (..., m, m), for ρ (...)."""
         weight = 1 / (1 + share[..., None] * self.sizes)
-        return np.asarray(self.within + np.einsum("...s,...sij->...ij", weight, self.between))
+        flat = self.between.reshape(*self.between.shape[:-2], -1)
+        between = (weight[..., None, :] @ flat).reshape(*weight.shape[:-1], *self.between.shape[-2:])
+        return np.asarray(self.within + between)
 
     def take(self, columns: Integers) -> Sums:
         """The same for choices of columns (c, q), (..., c, q, q)."""
@@ -82,6 +85,19 @@ class Linear:
     step: Floats  # (..., p)
     covariance: Floats  # (..., p, p)
     share: Floats  # (...) ρ
+
+
+def root_diagonal(whole: Floats) -> Floats:
+    """Roots of the diagonals of (..., p, p), 1 where there is nothing."""
+    diagonal = np.diagonal(whole, axis1=-2, axis2=-1)
+    return np.where(diagonal > 1e-280, np.sqrt(np.maximum(diagonal, 1e-280)), 1.0)
+
+
+def inverse(scaled: Floats) -> Floats:
+    """Inverse of positive semidefinite matrices (..., p, p) with ones on the diagonal; large where there is
+    none.
+    """
+    return np.asarray(np.linalg.inv(scaled + _RIDGE * np.eye(scaled.shape[-1])))
 
 
 def inverse_root(run: Floats) -> Floats:
@@ -112,19 +128,20 @@ def least_squares(products: Sums, *, passes: int) -> Linear:
     share = np.zeros(products.within.shape[:-2])
     for again in range(passes + 1):
         whole = products.at(share)
-        scale = np.sqrt(np.maximum(np.diagonal(whole, axis1=-2, axis2=-1)[..., :p], 1e-300))
+        scale = root_diagonal(whole[..., :p, :p])
         own = whole[..., :p, :p] / scale[..., :, None] / scale[..., None, :]
-        covariance = np.linalg.pinv(own, rcond=1e-12, hermitian=True) / scale[..., :, None] / scale[..., None, :]
-        step = np.einsum("...ij,...j->...i", covariance, whole[..., :p, p])
+        covariance = inverse(own) / scale[..., :, None] / scale[..., None, :]
+        step = (covariance @ whole[..., :p, p, None])[..., 0]
         if again == passes:
             break
         if count == 1:
             share = np.full_like(share, SESSION_SHARE)
             continue
         left = np.concatenate([-step, np.ones((*share.shape, 1))], -1)
-        between = np.einsum("...i,...sij,...j->...", left, products.between, left)
+        each = products.between @ left[..., None, :, None]
+        between = (each[..., 0] * left[..., None, :]).sum((-1, -2))
         means = whole[..., :p, :p] - products.within[..., :p, :p]
-        freedom = products.outputs - np.einsum("...ij,...ji->...", covariance, means) / count
+        freedom = products.outputs - (covariance * np.swapaxes(means, -1, -2)).sum((-1, -2)) / count
         excess = between / np.maximum(freedom, 0.1 * products.outputs) - count
         share = np.clip(excess / products.sizes.sum(), 0.0, SESSION_SHARE)
     return Linear(step, covariance, share)

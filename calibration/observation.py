@@ -26,6 +26,7 @@ class Observation:
     ahead: Floats  # (m,) L/l
     point: Floats  # (m,) p
     current: Floats  # (m,) U along the path [m/s]
+    camera: Floats  # (m,) lengths and speeds as seen over the true ones
 
     def see(self, motion: Mapping[str, Floats]) -> Floats:
         """Outputs (m, k) of motions (m,) in the simulator's units."""
@@ -37,9 +38,9 @@ class Observation:
                 "omega_h": np.log(np.abs(motion["omega_h_bar"]) / self.time),
                 "omega_t": np.log(np.abs(motion["omega_t_bar"]) / self.time),
                 "omega_yr": np.log(np.abs(yaw) / self.time),
-                "R_yr": np.log(speed / np.abs(yaw) * self.length),
+                "R_yr": np.log(self.camera * speed / np.abs(yaw) * self.length),
                 "theta": np.arctan2(np.abs(sway), surge),
-                "v": np.log(speed * self.length / self.time + self.current),
+                "v": np.log(self.camera * (speed * self.length / self.time + self.current)),
             }
         return np.stack([values[name] for name in self.outputs], 1)
 
@@ -50,22 +51,30 @@ class Observation:
         *,
         point: float = 0.0,
         current: float = 0.0,
+        camera: float = 0.0,
+        scales: Mapping[str, Floats] | None = None,
     ) -> Floats:
-        """Derivatives (m, k) along a change of the motion, of the tracked point and of the current."""
+        """Derivatives (m, k) along a change of the motion, of the tracked point, of the current and of the scales.
+
+        Args:
+            camera: change of ln of the camera's scale.
+            scales: changes (m,) of ln "time", ln "length" and ln "ahead".
+        """
         none = np.zeros(len(self.time))
+        slower, longer, further = (dict(scales or {}).get(name, none) for name in ("time", "length", "ahead"))
         yaw, surge = motion["omega_yr_bar"], motion["v_z"]
         sway = motion["v_x"] + yaw * self.point * self.ahead
         turn, rise = change.get("omega_yr_bar", none), change.get("v_z", none)
-        side = change.get("v_x", none) + (turn * self.point + yaw * point) * self.ahead
+        side = change.get("v_x", none) + (turn * self.point + yaw * (point + self.point * further)) * self.ahead
         speed = np.hypot(sway, surge)
         faster = (sway * side + surge * rise) / speed
         seen = speed * self.length / self.time + self.current
         values = {
-            "omega_h": change.get("omega_h_bar", none) / motion["omega_h_bar"],
-            "omega_t": change.get("omega_t_bar", none) / motion["omega_t_bar"],
-            "omega_yr": turn / yaw,
-            "R_yr": faster / speed - turn / yaw,
+            "omega_h": change.get("omega_h_bar", none) / motion["omega_h_bar"] - slower,
+            "omega_t": change.get("omega_t_bar", none) / motion["omega_t_bar"] - slower,
+            "omega_yr": turn / yaw - slower,
+            "R_yr": faster / speed - turn / yaw + longer + camera,
             "theta": np.sign(sway) * (surge * side - sway * rise) / speed**2,
-            "v": (faster * self.length / self.time + current) / seen,
+            "v": ((faster + speed * (longer - slower)) * self.length / self.time + current) / seen + camera,
         }
         return np.stack([values[name] for name in self.outputs], 1)

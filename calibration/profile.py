@@ -12,8 +12,9 @@ import math
 import numpy as np
 
 from calibration.fit import Fit
-from calibration.model import Model, moved, stepped
+from calibration.model import Model, Parameters, moved, stepped
 from calibration.noise import inverse_root, sums
+from calibration.prior import with_prior
 from sim.arrays import Flags, Floats, Integers
 
 _LEAST = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
@@ -22,11 +23,15 @@ _LEAST = 0.05  # share of the expected rise; if the rise is smaller, the devianc
 def profile_intervals(
     model: Model, fitted: Fit, used: Flags, *, title: str = ""
 ) -> dict[str, tuple[float, float]]:
-    """95 % intervals of every fitted parameter, by their profile deviances."""
+    """95 % intervals of every fitted parameter, by their profile deviances; of numbers as given by the
+    covariance.
+    """
     data, count = model.runs, len(fitted.names)
     root = inverse_root(fitted.noise.run)
     sets, ends = [], []
     for i, one in enumerate(fitted.fitted):
+        if one.sigma is not None:
+            continue
         half = fitted.half_width(i)
         for side in (-1, 1):
             end = moved(one, fitted.parameters[one.name], side * half)
@@ -39,29 +44,35 @@ def profile_intervals(
             sets.append(stepped(fitted.fitted, fitted.parameters, along))
             ends.append((i, own))
     found = model.predict(sets, title=title)
-    here = _deviance(fitted, root, data.y - fitted.prediction, data.session, used, list(range(count)))
-    intervals: dict[str, list[float]] = {name: [] for name in fitted.names}
-    for (i, own), prediction in zip(ends, found, strict=True):
+    here = _deviance(
+        fitted, fitted.parameters, root, data.y - fitted.prediction, data.session, used, list(range(count))
+    )
+    intervals: dict[str, list[float]] = {one.name: [] for one in fitted.fitted if one.sigma is None}
+    for (i, own), at, prediction in zip(ends, sets, found, strict=True):
         others = [j for j in range(count) if j != i]
-        rise = _deviance(fitted, root, data.y - prediction, data.session, used, others) - here
+        rise = _deviance(fitted, at, root, data.y - prediction, data.session, used, others) - here
         expected = own**2 / (fitted.covariance[i, i] / fitted.inflation)
         scale = math.sqrt(expected / rise) if rise > _LEAST * expected > 0 else 1.0
         one = fitted.fitted[i]
         intervals[one.name].append(moved(one, fitted.parameters[one.name], own * scale))
-    return {name: (low, high) for name, (low, high) in intervals.items()}
+    given = {one.name: fitted.interval(one.name) for one in fitted.fitted if one.sigma is not None}
+    return {**{name: (low, high) for name, (low, high) in intervals.items()}, **given}
 
 
 def _deviance(
     fitted: Fit,
+    at: Parameters,
     root: Floats,
     residual: Floats,
     session: Integers,
     used: Flags,
     others: list[int],
 ) -> float:
-    """rᵀ Σ⁻¹ r with the parameters `others` refitted (linearised), in the noise of the fit."""
-    table = np.concatenate([fitted.jacobian[..., others], residual[..., None]], -1)[used]
-    whole = sums(root @ table, session[used], len(root)).at(np.array(fitted.noise.share))
+    """rᵀ Σ⁻¹ r at parameters `at` with those of `others` refitted (linearised), in the noise of the fit."""
+    table = np.concatenate([fitted.jacobian, residual[..., None]], -1)[used]
+    products = with_prior(sums(root @ table, session[used], len(root)), fitted.fitted, at)
+    columns = [*others, len(fitted.fitted)]
+    whole = products.at(np.array(fitted.noise.share))[np.ix_(columns, columns)]
     p = len(others)
     absorbed = whole[:p, p] @ np.linalg.pinv(whole[:p, :p], hermitian=True) @ whole[:p, p] if p else 0.0
     return float(whole[p, p] - absorbed)
@@ -69,7 +80,7 @@ def _deviance(
 
 def least_determined(fitted: Fit) -> tuple[str, float]:
     """The combination of logarithmic parameters that the runs determine worst, and its standard error (of ln)."""
-    own = [i for i, p in enumerate(fitted.fitted) if p.logarithmic]
+    own = [i for i, p in enumerate(fitted.fitted) if p.logarithmic and p.sigma is None]
     values, vectors = np.linalg.eigh(fitted.covariance[np.ix_(own, own)])
     vector = vectors[:, -1] * np.sign(vectors[np.argmax(np.abs(vectors[:, -1])), -1])
     parts = [

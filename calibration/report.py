@@ -8,20 +8,23 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from calibration.imitation import DOUBT
 from calibration.loop import Verdict
 from calibration.measurements import Measurements
+from calibration.prior import WRONG
 from calibration.profile import least_determined
 from sim.io.pages import Page
 from sim.io.provenance import code_version
 
 _LABELS = {
-    "omega_h": "head spin",
-    "omega_t": "tail spin",
-    "omega_yr": "yaw rate",
-    "R_yr": "turn radius",
-    "theta": "slip angle [rad]",
-    "v": "speed",
+    "omega_h": "ω_h, head spin",
+    "omega_t": "ω_t, tail spin",
+    "omega_yr": "ω_yr, yaw rate",
+    "R_yr": "R_yr, turn radius",
+    "theta": "θ, slip angle [rad]",
+    "v": "v, speed",
 }
+_SETTINGS = {"l_cm": "l [cm]", "omega_rpm": "ω [rpm]"}
 _DISAGREES = 0.01  # p of the locked runs below which the report says so
 _TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes", "score": "effects"}
 
@@ -29,12 +32,14 @@ _TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes"
 def write_report(result: Verdict, data: Measurements, out: str | Path, *, title: str) -> None:
     """Write report.html."""
     page = Page(f"Calibration: {title}", result.sentence)
+    page.figure(draw_summary(result, data), "residual of each output before and after, beside the noise")
     add_sections(page, result, data)
     page.write(out, f"code {code_version()}; fixed before the data was looked at: {result.plan_hash}")
 
 
 def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
     """The sections of the report."""
+    _add_numbers(page, result)
     _add_data(page, result, data)
     _add_fit(page, result)
     page.section("Residuals on the runs that were fitted, before and after")
@@ -53,12 +58,43 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
         )
         settings = list(result.next_runs[0].settings)
         page.table(
-            (*settings, "repeats", "separation", "decides"),
+            (*(_SETTINGS.get(s, s) for s in settings), "repeats", "separation", "decides"),
             [
                 (*map(str, r.settings.values()), str(r.repeats), f"{r.separation:.1f}", f"{100 * r.decides:.0f} %")
                 for r in result.next_runs
             ],
         )
+
+
+def _add_numbers(page: Page, result: Verdict) -> None:
+    if not result.numbers:
+        return
+    page.section("Numbers as given")
+    wrong = [" or ".join(p.parameter.title for p in alike) for alike in result.wrong_numbers]
+    said = "; ".join(wrong) if wrong else "none is"
+    page.text(
+        "What was given is known to a tolerance only. So these numbers are fitted, too, each with the tolerance "
+        "that was stated for it. The pull is how far the runs move a number, in standard deviations of what "
+        f"chance would do. Beyond {WRONG:g} the number is taken to be wrong: {said}.",
+        tone="bad" if wrong else "good",
+    )
+    rows = []
+    for p in result.numbers:
+        one = p.parameter
+        assert one.sigma is not None
+        scale, unit = (100.0, "%") if one.logarithmic else (one.shown, one.unit)
+        runs = f"{p.off(p.alone)}, ± {scale * p.alone_error:.2g} {unit}" if p.learnt else "nothing"
+        rows.append(
+            (
+                one.title,
+                f"{one.start:.4g}" if one.unit != one.title and one.start not in (0.0, 1.0) else "",
+                f"± {scale * one.sigma:.2g} {unit}",
+                f"{p.off(p.change)}, ± {scale * p.error:.2g} {unit}",
+                runs,
+                f"{p.z:+.1f}" if p.learnt else "",
+            )
+        )
+    page.table(("number", "given [SI]", "tolerance (σ)", "fitted", "what the runs alone say", "pull"), rows)
 
 
 def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
@@ -80,12 +116,13 @@ def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
 
 def _add_fit(page: Page, result: Verdict) -> None:
     page.section("Fit")
+    given = {p.parameter.name for p in result.numbers}
     rows = []
     for fitted, intervals, name in (
         (result.base, result.base_intervals, "without effects"),
         (result.final, result.final_intervals, "with the verdict's effects"),
     ):
-        for parameter in fitted.names:
+        for parameter in (one.name for one in fitted.fitted if one.name not in given):
             low, high = intervals[parameter]
             rows.append(
                 (f"{parameter}, {name}", f"{fitted.parameters[parameter]:.4g}", f"{low:.4g} to {high:.4g}")
@@ -97,7 +134,7 @@ def _add_fit(page: Page, result: Verdict) -> None:
     page.text(
         f"The runs determine {combination} worst: {100 * error:.1f} %. corrected.toml has the model fitted once "
         "more to all runs, with the locked ones: "
-        + ", ".join(f"{name} {result.delivered[name]:.4g}" for name in result.final.names)
+        + ", ".join(f"{name} {result.delivered[name]:.4g}" for name in result.final.names if name not in given)
         + "."
     )
 
@@ -107,17 +144,31 @@ def _add_evidence(page: Page, result: Verdict) -> None:
     each = ", ".join(f"{_TESTS[name]} {p:.2g}" for name, p in result.misfit.p.items())
     page.text(
         f"Is there more than noise? p = {result.misfit.p_value:.2g} by all tests together ({each}). Below: score "
-        "of each effect, without the part that the coefficients can absorb; claims need more than "
-        f"{result.misfit.critical_z:.2f}."
+        "of each effect, without the part that the coefficients and the numbers as given can absorb; claims need "
+        f"more than {result.misfit.critical_z:.2f}. The smallest detectable size is found half of the time. The "
+        "column beside it is that size if every number as given were exact."
     )
     page.figure(draw_evidence(result), "score of each effect against what a claim needs")
     page.table(
-        ("effect", "score z", "survived share", "smallest detectable size", "judgement"),
+        ("effect", "score z", "survived share", "smallest detectable size", "numbers exact", "judgement"),
         [
-            (c.effect.title, f"{c.z:+.1f}", f"{c.survived:.2f}", f"{c.detectable:.2g}", c.verdict)
+            (
+                c.effect.title,
+                f"{c.z:+.1f}",
+                f"{c.survived:.2f}",
+                f"{c.detectable:.2g}",
+                f"{c.detectable_exact:.2g}",
+                c.verdict,
+            )
             for c in result.candidates
         ],
     )
+    for c in result.explaining:
+        said = " and ".join(e.title for e in c.claimed)
+        page.text(
+            f"{said}: {100 * c.imitable:.0f} % of the departures from outside the catalogue that were drawn for "
+            f"comparison would have passed for it; above {100 * DOUBT:.0f} % the verdict says so."
+        )
     if result.untestable:
         page.text(
             "Not tested, because data are missing: "
@@ -151,12 +202,36 @@ def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
     )
 
 
+def draw_summary(result: Verdict, data: Measurements) -> Figure:
+    """The residual of each output before and after, as rms over the fitted runs, and the noise of a run."""
+    bars = [
+        ("calibrated, without effects", result.base.prediction, "#e08a1e"),
+        ("final model", result.final.prediction, "#3d9a5f"),
+    ]
+    noise = 100 * np.sqrt(np.diag(result.base.noise.run))
+    figure = Figure(figsize=(9, 2.6))
+    axes = figure.add_subplot()
+    place = np.arange(len(data.outputs))
+    for i, (label, prediction, colour) in enumerate(bars):
+        rms = 100 * np.sqrt(((data.y - prediction)[result.used] ** 2).mean(0))
+        axes.bar(place + 0.32 * (i - 0.5), rms, width=0.3, color=colour, label=label)
+    for i, height in enumerate(noise.tolist()):
+        said = "noise of a run" if i == 0 else None
+        axes.plot([i - 0.38, i + 0.38], [height] * 2, color="#1c2733", lw=1.6, label=said)
+    axes.set_xticks(place, [_LABELS[o] for o in data.outputs], fontsize=8)
+    axes.set_ylabel("measured − model, rms [%]", fontsize=8)
+    axes.tick_params(axis="y", labelsize=8)
+    axes.legend(fontsize=7, frameon=False)
+    figure.tight_layout()
+    return figure
+
+
 def draw_map(result: Verdict, data: Measurements) -> Figure:
     """z of every output along every feature of the inputs, before and after."""
     maps = [("calibrated", result.misfit)]
     if result.explaining and result.explaining[0].refit_misfit is not None:
         maps.append(("with the verdict's effects", result.explaining[0].refit_misfit))
-    names = result.misfit.features
+    names = [name.replace("omega", "ω") for name in result.misfit.features]
     height = 0.32 * len(data.outputs) + 0.5
     figure = Figure(figsize=(11, len(maps) * height + 1.6))
     limit = max(4.0, float(np.abs(result.misfit.scores.shapes).max(initial=0.0)))

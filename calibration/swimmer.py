@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from calibration.given import CAMERA, GROUPS, HEADING, LENGTH, POWERS, TACHOMETER, given_numbers, robot_number
 from calibration.influences import CURRENT, SLIP, TRACKED_POINT, Influence, influences, reason_untestable
 from calibration.measurements import Measurements
 from calibration.model import Parameter, Parameters, by_differences
@@ -77,6 +78,10 @@ class Swimmer:
         return tuple(Parameter(n, n, float(getattr(self.robot, n)), SANE, 1.0, True) for n in COEFFICIENTS)
 
     @cached_property
+    def given(self) -> tuple[Parameter, ...]:
+        return given_numbers(self.robot, self.runs.sigmas, self.runs.outputs)
+
+    @cached_property
     def effects(self) -> tuple[Parameter, ...]:
         own = self.robot.effects
         return tuple(
@@ -105,36 +110,43 @@ class Swimmer:
         parts = [self._conditions(parameters) for parameters in sets]
         runs = [run for own, _ in parts for run in own]
         columns = self._columns(runs, sets)
+        camera = np.repeat([p.get(CAMERA, 1.0) for p in sets], [len(own) for own, _ in parts])
         if lookup is not None:
             found: Mapping[str, Floats] = lookup.query(columns)
         else:
             found = self.solver.steady(columns, jobs=self.jobs, title=title)
-        table = self._observation(runs).see(found)
+        table = self._observation(runs, camera).see(found)
         if not np.isfinite(table).all():
             raise InputError("the simulation of a run broke down; check the robot and the run's motor speed")
         ends = np.cumsum([len(own) for own, _ in parts])
-        return np.array([table[end - len(own) + place] for end, (own, place) in zip(ends, parts, strict=True)])
+        whole = np.array([table[end - len(own) + place] for end, (own, place) in zip(ends, parts, strict=True)])
+        return whole + np.array([self._turned(parameters.get(HEADING, 0.0)) for parameters in sets])
 
     def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = ""
+        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
     ) -> tuple[Floats, Floats]:
         """Prediction (n, k) and derivatives (n, k, p), by the simulator's own sensitivities.
 
-        By differences where a run has no direct solution.
+        If a run has no direct solution: by differences of motions that are stepped in time, or NaN if `quick`.
         """
         influences = {name: self._influences.get(name) for name in names}
         odd = any(i is not None and i.odd for i in influences.values())
         runs, place = self._conditions(parameters, signed=odd)
         columns = self._columns(runs, [parameters])
         moves = {name: _moves(name, influence) for name, influence in influences.items()}
-        wanted = tuple(dict.fromkeys(move for move in moves.values() if move))
+        wanted = tuple(dict.fromkeys(move for group in moves.values() for move in group))
         # Effects at their null may need more phases than the motion; effects that are present have them already.
         phases = FEW if any(i.effect for i in self._at_work(parameters)) else MANY
         found = self.solver.slopes(columns, wanted, phases=phases, jobs=self.jobs, title=title)
-        view = self._observation(runs)
+        view = self._observation(runs, np.array(parameters.get(CAMERA, 1.0)))
         J = np.empty((len(self.runs), len(self.runs.outputs), len(names)))
         for j, (name, influence) in enumerate(influences.items()):
-            at = wanted.index(moves[name]) if moves[name] else None
+            if name in POWERS:
+                J[..., j] = self._slope_of_number(name, runs, columns, found, view)[place]
+                if name == HEADING:
+                    J[..., j] += self._turned(1.0)
+                continue
+            at = wanted.index(moves[name][0]) if moves[name] else None
             motion = {} if at is None else {key: table[:, at] for key, table in found.derivatives.items()}
             slope = view.slopes(
                 found.values, motion, point=float(name == TRACKED_POINT), current=float(name in CURRENT)
@@ -143,10 +155,33 @@ class Swimmer:
                 slope = slope * (-columns["omega_bar"] / (1 - parameters[SLIP]))[:, None]
             scale = self._drivers[influence.needs] if influence and influence.needs else np.ones(len(self.runs))
             J[..., j] = slope[place] * (scale if influence else parameters[name] * scale)[:, None]
-        seen = view.see(found.values)[place]
-        if not (np.isfinite(J).all() and np.isfinite(seen).all()):
+        seen = view.see(found.values)[place] + self._turned(parameters.get(HEADING, 0.0))
+        if not quick and not (np.isfinite(J).all() and np.isfinite(seen).all()):
             return by_differences(self, parameters, names, title=title)
         return seen, J
+
+    def _slope_of_number(
+        self, name: str, runs: list[_Run], columns: dict[str, Floats], found: Sensitivities, view: Observation
+    ) -> Floats:
+        """Derivatives (m, k) along a number as given, on its own scale."""
+        by = np.array([1 / run.robot.tail_length if name == LENGTH else 1.0 for run in runs])
+        powers = POWERS[name]
+        motion = {key: np.zeros(len(runs)) for key in found.derivatives}
+        for group in (group for group in powers if group in GROUPS):
+            at = found.parameters.index(group)
+            for key, table in found.derivatives.items():
+                motion[key] += powers[group] * by * columns[group] * table[:, at]
+        scales: dict[str, Floats] = {k: powers[k] * by for k in ("time", "length", "ahead") if k in powers}
+        return view.slopes(found.values, motion, camera=float(name == CAMERA), scales=scales)
+
+    def _turned(self, zero: float) -> Floats:
+        """Change (n, k) of the outputs if the zero of the heading is off: θ grows in one direction of the
+        motor.
+        """
+        found = np.zeros(self.runs.y.shape)
+        if "theta" in self.runs.outputs:
+            found[:, self.runs.outputs.index("theta")] = zero * np.sign(self.runs.omega)
+        return found
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """Coefficients fitted with the look-up table to the runs that it covers; `start` if those are too few.
@@ -257,10 +292,11 @@ class Swimmer:
                 effects[influence.effect] = before + by
             elif influence.name in CURRENT:
                 current += by
-        own: dict[str, Any] = {name: float(parameters[name]) for name in COEFFICIENTS}
         robot = replace(
-            self.robot, **own, tails=int(self.runs.tails[row]), tail_length=float(self.runs.length[row]),
-            motor_speed=abs(omega) * (1 - parameters.get(SLIP, 0.0)), effects=effects,
+            self.robot, **robot_numbers(self.robot, parameters), tails=int(self.runs.tails[row]),
+            tail_length=float(self.runs.length[row]) + parameters.get(LENGTH, 0.0),
+            motor_speed=abs(omega) * parameters.get(TACHOMETER, 1.0) * (1 - parameters.get(SLIP, 0.0)),
+            effects=effects,
         )  # fmt: skip
         return _Run(robot, math.copysign(1.0, omega), parameters.get(TRACKED_POINT, 0.0), current)
 
@@ -273,7 +309,7 @@ class Swimmer:
         columns["omega_bar"] = columns["omega_bar"] * np.array([run.sign for run in runs])
         return columns
 
-    def _observation(self, runs: list[_Run]) -> Observation:
+    def _observation(self, runs: list[_Run], camera: Floats) -> Observation:
         return Observation(
             self.runs.outputs,
             time=np.array([run.robot.time_scale for run in runs]),
@@ -281,19 +317,36 @@ class Swimmer:
             ahead=np.array([run.robot.head_length / run.robot.tail_length for run in runs]),
             point=np.array([run.point for run in runs]),
             current=np.array([run.current for run in runs]),
+            camera=camera,
         )
 
 
-def _moves(name: str, influence: Influence | None) -> str | None:
-    """The simulator's parameter that a parameter of the calibration changes; none if it acts on what is seen."""
+def _moves(name: str, influence: Influence | None) -> tuple[str, ...]:
+    """The simulator's parameters that a parameter of the calibration changes; none if it acts on what is seen."""
+    if name in POWERS:
+        return tuple(group for group in POWERS[name] if group in GROUPS)
     if influence is None:
-        return name
-    return "omega_bar" if name == SLIP else influence.effect
+        return (name,)
+    if name == SLIP:
+        return ("omega_bar",)
+    return (influence.effect,) if influence.effect else ()
+
+
+def robot_numbers(robot: Robot, parameters: Parameters) -> dict[str, Any]:
+    """Fitted coefficients and numbers of the robot, by field; a is kept where R changes."""
+    own: dict[str, Any] = {name: float(parameters[name]) for name in COEFFICIENTS}
+    for name in POWERS:
+        if hasattr(robot, name):
+            own[name] = float(parameters.get(name, robot_number(robot, name)))
+    return own
 
 
 def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
-    """`robot` with fitted coefficients and effects; drift between runs and the observation are left out."""
-    own: dict[str, Any] = {name: float(parameters[name]) for name in COEFFICIENTS}
+    """`robot` with fitted coefficients, numbers and effects; drift between runs and the observation are left
+    out.
+    """
+    own = robot_numbers(robot, parameters)
+    own["tail_length"] = robot.tail_length + parameters.get(LENGTH, 0.0)
     sizes = {
         name: float(value)
         for name, value in parameters.items()

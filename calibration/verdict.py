@@ -1,7 +1,8 @@
 """The verdict on a table of runs: its contents, in one sentence, and as verdict.json.
 
-"none": no departure beyond noise. "effect": one effect, or one pair, explains it. "ambiguous": several do, and the
-runs cannot tell them apart. "unexplained": there is a departure, and nothing in the catalogue explains it.
+"none": no departure beyond noise. "number": a number as given is wrong, and explains it. "effect": one effect,
+or one pair, explains it. "ambiguous": several do, and the runs cannot tell them apart. "unexplained": there is a
+departure, and nothing in the catalogue explains it.
 """
 
 from __future__ import annotations
@@ -13,10 +14,13 @@ from calibration.attribute import Candidate
 from calibration.discriminate import NextRun
 from calibration.fit import Fit
 from calibration.generic import Generic
+from calibration.imitation import DOUBT
 from calibration.misfit import DRAWS, Misfit
+from calibration.prior import Pull, likeliest, rivals
 from sim.arrays import Flags, Floats
 from sim.io.provenance import provenance
 
+_NOTABLE = 2.0  # pull of a number as given beyond which the sentence says so
 _NEAR = 0.5  # if no effect explains the residual, the best one is named if it removes at least this share
 
 
@@ -30,7 +34,7 @@ class Verdict:
         'No effect is missing that these runs can show (p = 0.43).'
     """
 
-    verdict: str  # "none", "effect", "ambiguous", "unexplained"
+    verdict: str  # "none", "number", "effect", "ambiguous", "unexplained"
     effects: tuple[str, ...]
     explaining: tuple[Candidate, ...]  # what explains the residual, best first; more than one: not told apart
     base: Fit  # calibrated, without effects
@@ -39,6 +43,8 @@ class Verdict:
     final_intervals: dict[str, tuple[float, float]]
     misfit: Misfit
     candidates: tuple[Candidate, ...]
+    numbers: tuple[Pull, ...]  # every number as given in the final model, the farthest first
+    instead: tuple[Candidate, ...]  # effects that explain as much as the number that is wrong
     generic: Generic  # correction of the calibrated model
     next_runs: tuple[NextRun, ...]  # where two effects cannot be told apart
     error_uncalibrated: float
@@ -59,8 +65,47 @@ class Verdict:
     limits: tuple[str, ...]
 
     @property
+    def wrong_numbers(self) -> tuple[tuple[Pull, ...], ...]:
+        """Numbers as given that the runs contradict; each with those that may be wrong in its place.
+
+        Where nothing explains the residual there are none: what is missing pulls at the numbers, too.
+        """
+        if self.verdict == "unexplained":
+            return ()
+        freed = {p.parameter.name: p for p in self.numbers if p.freed}
+        found = tuple((freed[alike[0].parameter.name], *alike[1:]) for alike in self.final.wrong)
+        far = [p for p in self.numbers if not p.freed]
+        worst = likeliest(far)
+        return found if worst is None else (*found, rivals(far, worst))
+
+    @property
     def sentence(self) -> str:
-        """The verdict in one sentence with its certainty."""
+        """The verdict in one sentence with its certainty; a second one for a number as given that is wrong."""
+        words = self._number_words
+        if self.verdict == "number":
+            if not self.instead:
+                return f"{words} No effect is claimed."
+            names = " or ".join(" and ".join(e.title for e in c.claimed) for c in self.instead)
+            return f"{words} No effect is claimed. If the number is right, {names} would explain as much."
+        return f"{words} {self._effect_words}" if words else self._effect_words
+
+    @property
+    def _number_words(self) -> str:
+        """The numbers that are wrong, or the one that is farthest off if it is notable."""
+        if self.wrong_numbers:
+            said = "; and ".join(", or ".join(p.words for p in alike) for alike in self.wrong_numbers)
+            return f"A number as given is wrong: {said}."
+        if (
+            self.verdict != "unexplained"
+            and self.numbers
+            and self.numbers[0].learnt
+            and abs(self.numbers[0].z) > _NOTABLE
+        ):
+            return f"{self.numbers[0].words}."
+        return ""
+
+    @property
+    def _effect_words(self) -> str:
         # The bootstrap resolves no smaller p than 2/(draws + 1).
         relation = "≤" if self.misfit.p_value <= 2.01 / (DRAWS + 1) else "="
         p = f"p {relation} {self.misfit.p_value:.2g}"
@@ -70,19 +115,38 @@ class Verdict:
             best = self.explaining[0]
             assert best.refit is not None
             sizes = []
-            for effect in (*best.beside, best.effect):
+            for effect in best.claimed:
                 low, high = self.final_intervals[effect.name]
-                sizes.append(
-                    f"{effect.title}, size {best.refit.parameters[effect.name]:.3g} ({low:.3g} to {high:.3g})"
-                )
+                like = "something in form like " if effect.name in self.in_form_only else ""
+                size = best.refit.parameters[effect.name]
+                sizes.append(f"{like}{effect.title}, size {size:.3g} ({low:.3g} to {high:.3g})")
             other = "other effect" if len(sizes) == 1 else "single effect or other pair"
-            said = " and ".join(sizes)
+            said = " and ".join(sizes) + self._outside
             return f"The residual ({p}) is consistent with {said}, and with no {other} of the catalogue."
         if self.verdict == "ambiguous":
-            names = " or ".join(" and ".join(e.title for e in (*c.beside, c.effect)) for c in self.explaining)
+            names = " or ".join(" and ".join(e.title for e in c.claimed) for c in self.explaining)
+            names += self._outside
             return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart."
         none = "no effect and no pair of effects of the catalogue explains"
         return f"There is a residual ({p}) that {none}{self._nearest}."
+
+    @property
+    def in_form_only(self) -> tuple[str, ...]:
+        """Named effects whose whole interval is outside the sizes that their source allows."""
+        found = []
+        for effect in self.explaining[0].claimed if self.explaining else ():
+            low, high = self.final_intervals[effect.name]
+            if effect.plausible and (high < effect.plausible[0] or low > effect.plausible[1]):
+                found.append(effect.name)
+        return tuple(found)
+
+    @property
+    def _outside(self) -> str:
+        """A claim that something outside the catalogue could imitate says so."""
+        if all(c.imitable <= DOUBT for c in self.explaining):
+            return ""
+        many = len(self.explaining) > 1 or len(self.explaining[0].claimed) > 1
+        return f", or something outside the catalogue that looks like {'them' if many else 'it'}"
 
     @property
     def _nearest(self) -> str:
@@ -114,6 +178,12 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "effects": list(result.effects),
         "sentence": result.sentence,
         "parameters": parameters,
+        "in_form_only": list(result.in_form_only),
+        "imitability": [c.imitable for c in result.explaining],
+        "imitable": any(c.imitable > DOUBT for c in result.explaining),
+        "effects_instead": [[e.name for e in c.claimed] for c in result.instead],
+        "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
+        "numbers_as_given": [_number_record(p) for p in result.numbers],
         "error_uncalibrated": result.error_uncalibrated,
         "error_before": result.error_before,
         "error_after": result.error_after,
@@ -131,6 +201,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
                 "z": c.z,
                 "survived_share": c.survived,
                 "smallest_detectable": c.detectable,
+                "smallest_detectable_if_numbers_were_exact": c.detectable_exact,
                 "size": c.refit.parameters[c.effect.name] if c.refit else None,
                 "deviance": c.refit.deviance if c.refit else None,
                 "session_gain": [c.gain, c.gain_error],
@@ -148,4 +219,21 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "limits": list(result.limits),
         "table": table,
         "provenance": provenance({"table": table}),
+    }
+
+
+def _number_record(pull: Pull) -> dict[str, Any]:
+    one = pull.parameter
+    return {
+        "name": one.name,
+        "title": one.title,
+        "given": one.start,
+        "sigma": one.sigma,
+        "scale": "logarithm" if one.logarithmic else "as it is",
+        "change": pull.change,
+        "change_error": pull.error,
+        "change_by_the_runs_alone": pull.alone,
+        "change_by_the_runs_alone_error": pull.alone_error,
+        "pull": pull.z,
+        "words": pull.words,
     }

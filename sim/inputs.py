@@ -1,7 +1,8 @@
 """Robots as users give them: robot.toml, names of presets, columns of a table. Checked here, with effects.
 
 A robot.toml has the tables [head], [tails], [fluid], [motor], [drag] and, if there are any, [effects]. The names
-of the keys say their units.
+of the keys say their units. Beside a number that was measured, KEY_sigma may state one standard deviation of it: a
+number in the same unit, or a text like "10 %".
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from sim.io.files import write_text
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
+from sim.model.uncertainty import DEFAULTS, Sigma, read_sigma, sigma_text
 
 # Table and key in robot.toml -> field of Robot; the key says the unit.
 _TOML = {
@@ -36,6 +38,8 @@ _TOML = {
     ("drag", "C_yr"): "C_yr",
 }
 _OPTIONAL_KEYS = {"disc_offset"}
+_SIGMA = "_sigma"  # a key with this ending holds one standard deviation of the number beside it
+_SIGMAS = {(table, key + _SIGMA): name for (table, key), name in _TOML.items() if name in DEFAULTS}
 
 
 def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
@@ -88,16 +92,28 @@ def load_robot(source: str | Path) -> Robot:
     effects = tables.pop("effects", {})
     if not isinstance(effects, dict):
         raise InputError(f"{path}: effects = {effects!r}; write a table [effects] with lines name = size")
-    values = _values(path, tables)
+    stated: dict[str, tuple[str, object]] = {}
+    values = _values(path, tables, stated)
     check_effects(effects)
-    return Robot(name=str(name), effects=dict(effects), **values)  # type: ignore[arg-type]
+    return Robot(name=str(name), effects=dict(effects), sigmas=_sigmas(values, stated), **values)  # type: ignore[arg-type]
 
 
-def _values(path: Path, tables: dict[str, Any]) -> dict[str, object]:
-    """Fields of `Robot` by name."""
+def _sigmas(values: Mapping[str, Any], stated: Mapping[str, tuple[str, object]]) -> dict[str, Sigma]:
+    """Standard deviations by field; that of the disc offset needs no offset, because the head's radius stands
+    in.
+    """
+    own = {**values, "disc_offset": values.get("disc_offset", values["head_radius"])}
+    return {name: read_sigma(given, own[name], entry) for name, (entry, given) in stated.items()}
+
+
+def _values(path: Path, tables: dict[str, Any], stated: dict[str, tuple[str, object]]) -> dict[str, object]:
+    """Fields of `Robot` by name; entries of standard deviations are collected in `stated`."""
     values: dict[str, object] = {}
     for table, content in tables.items():
         for key, value in content.items() if isinstance(content, dict) else [("", content)]:
+            if (table, key) in _SIGMAS:
+                stated[_SIGMAS[table, key]] = (f"{path}: [{table}] {key}", value)
+                continue
             if (table, key) not in _TOML:
                 allowed = ", ".join(f"[{t}] {k}" for t, k in _TOML)
                 raise InputError(f"{path}: unknown entry [{table}] {key}; allowed are {allowed}")
@@ -140,6 +156,8 @@ def robot_toml(robot: Robot) -> str:
         value = getattr(robot, attribute)
         if value is not None:
             tables.setdefault(table, []).append(f"{key} = {value!r}")
+        if attribute in robot.sigmas:
+            tables.setdefault(table, []).append(f"{key}{_SIGMA} = {sigma_text(robot.sigmas[attribute])}")
     if robot.effects:
         tables["effects"] = [f"{name} = {float(size)!r}" for name, size in robot.effects.items()]
     blocks = ["\n".join([f"[{table}]", *lines]) for table, lines in tables.items()]

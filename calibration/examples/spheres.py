@@ -39,6 +39,7 @@ class Spheres:
     coefficients: tuple[Parameter, ...] = (
         Parameter("viscosity", "viscosity", 1.0, (0.01, 100.0), 1.0, logarithmic=True, unit="Pa s"),
     )
+    given: tuple[Parameter, ...] = ()
     effects: tuple[Parameter, ...] = (
         Parameter("wall", "wall of the vessel", 0.0, (0.0, 2.0), 1.0, unit="Faxén's correction"),
         Parameter("inertia", "inertia of the fluid", 0.0, (0.0, 20.0), 1.0, unit="Oseen's correction"),
@@ -59,7 +60,7 @@ class Spheres:
         return np.asarray(2 * stokes / (1 + np.sqrt(1 + 4 * slope * stokes)))
 
     def derivatives(
-        self, parameters: Parameters, names: Sequence[str], *, title: str = ""
+        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
     ) -> tuple[Floats, Floats]:
         """Prediction and derivatives, by differences."""
         return by_differences(self, parameters, names)

@@ -37,6 +37,7 @@ EFFECT = AnisotropicHeadDrag(
     null=0.0,
     bounds=(-0.8, 2.0),
     typical=-0.2,
+    plausible=(-0.5, 0.5),
     symmetry="even",
     dissipative=True,
 )

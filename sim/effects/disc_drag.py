@@ -37,6 +37,7 @@ EFFECT = DiscDrag(
     null=0.0,
     bounds=(0.0, 10.0),
     typical=0.4,
+    plausible=(0.0, 4.0),
     symmetry="even",
     dissipative=True,
 )

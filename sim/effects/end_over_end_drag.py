@@ -37,6 +37,7 @@ EFFECT = EndOverEndDrag(
     null=0.0,
     bounds=(0.0, 20.0),
     typical=5.0,
+    plausible=(0.0, 12.0),
     symmetry="even",
     dissipative=True,
 )

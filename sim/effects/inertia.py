@@ -40,6 +40,7 @@ EFFECT = Inertia(
     null=0.0,
     bounds=(0.0, 2.0),
     typical=0.05,
+    plausible=(0.0, 0.3),
     symmetry="even",
     dissipative=True,
     similar=False,  # the control example's speed is a speed of its own

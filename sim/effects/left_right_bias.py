@@ -37,6 +37,7 @@ EFFECT = LeftRightBias(
     null=0.0,
     bounds=(-2.0, 2.0),
     typical=0.05,
+    plausible=(-0.5, 0.5),
     symmetry="odd",
     dissipative=False,
 )

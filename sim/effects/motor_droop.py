@@ -36,6 +36,7 @@ EFFECT = MotorDroop(
     null=0.0,
     bounds=(0.0, 20.0),
     typical=0.5,
+    plausible=(0.0, 5.0),
     symmetry="even",
     dissipative=True,
     similar=False,  # the motor's loss of speed per torque is its own

@@ -20,6 +20,7 @@ EFFECT = Effect(
     null=0.0,
     bounds=(-1.0, 1.0),
     typical=0.1,
+    plausible=(-0.5, 0.5),
     symmetry="odd",
     dissipative=False,
     reach="nonlocal",

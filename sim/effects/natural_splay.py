@@ -19,6 +19,7 @@ EFFECT = Effect(
     null=0.0,
     bounds=(-1.0, 1.0),
     typical=0.1,
+    plausible=(-0.5, 0.5),
     symmetry="even",
     dissipative=False,
     reach="nonlocal",

@@ -36,6 +36,7 @@ EFFECT = RateDependentModulus(
     null=0.0,
     bounds=(0.0, 0.5),
     typical=0.05,
+    plausible=(0.0, 0.2),
     symmetry="even",
     dissipative=True,
     similar=False,  # the rubber's time is its own

@@ -42,6 +42,7 @@ EFFECT = ShearThinning(
     null=0.0,
     bounds=(0.0, 100.0),
     typical=0.5,
+    plausible=(0.0, 20.0),
     symmetry="even",
     dissipative=True,
     similar=False,  # the relaxation time is a time of its own

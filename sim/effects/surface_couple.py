@@ -38,6 +38,7 @@ EFFECT = SurfaceCouple(
     null=0.0,
     bounds=(-3.0, 3.0),
     typical=0.1,
+    plausible=(-1.5, 1.5),
     symmetry="even",
     dissipative=False,
 )

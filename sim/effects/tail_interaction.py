@@ -20,6 +20,7 @@ EFFECT = Effect(
     null=0.0,
     bounds=(0.0, 1.1),
     typical=1.0,
+    plausible=(0.5, 1.1),
     symmetry="even",
     dissipative=False,
     reach="nonlocal",

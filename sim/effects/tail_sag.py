@@ -42,6 +42,7 @@ EFFECT = TailSag(
     null=0.0,
     bounds=(-0.4, 0.4),
     typical=0.1,
+    plausible=(-0.05, 0.2),
     symmetry="even",
     dissipative=False,
 )

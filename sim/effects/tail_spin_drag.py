@@ -36,6 +36,7 @@ EFFECT = TailSpinDrag(
     null=0.0,
     bounds=(0.0, 3.0),
     typical=1.0,
+    plausible=(0.5, 1.5),
     symmetry="even",
     dissipative=True,
     reach="nonlocal",

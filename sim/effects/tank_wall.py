@@ -53,6 +53,7 @@ EFFECT = TankWall(
             "of the correction for a sphere",
             (0.0, 2.0),
             1.0,
+            (0.3, 1.5),
         ),
     ),
 )

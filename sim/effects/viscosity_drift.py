@@ -38,7 +38,15 @@ EFFECT = ViscosityDrift(
     symmetry="even",
     dissipative=True,
     drivers=(
-        Driver("viscosity_with_time", "viscosity drifting with time", "elapsed_h", "1/h", (-0.3, 0.3), 0.02),
+        Driver(
+            "viscosity_with_time",
+            "viscosity drifting with time",
+            "elapsed_h",
+            "1/h",
+            (-0.3, 0.3),
+            0.02,
+            (-0.15, 0.15),
+        ),
         Driver(
             "viscosity_with_temperature",
             "viscosity falling with temperature",
@@ -46,6 +54,7 @@ EFFECT = ViscosityDrift(
             "1/K",
             (-0.3, 0.3),
             0.086,
+            (0.03, 0.15),
         ),
     ),
 )

@@ -7,8 +7,8 @@ So adding an effect is adding its file. An effect
 1. has one size ε per robot. At its `null` the model is exactly the base model;
 2. declares its equation, source, unit of ε, bounds, a `typical` size for tests and scores, its symmetry under
    ω → −ω ("even": left and right turns stay mirror images; "odd": they do not), whether it only dissipates,
-   whether it keeps dynamic similarity, what drives it from run to run, and the effect that it needs beside it to
-   be seen, if any;
+   whether it keeps dynamic similarity, the sizes that are plausible by its source (outside, a claim is "in form
+   like" the effect), what drives it from run to run, and the effect that it needs beside it to be seen, if any;
 3. acts in one of three ways, all differentiable in ε:
    - `adds` returns the body with terms added, which must not depend on what is there already;
    - `scales` returns factors on drag, which multiply;
@@ -48,6 +48,7 @@ class Driver:
     unit: str  # of ε
     bounds: tuple[float, float]
     typical: float
+    plausible: tuple[float, float]  # sizes that its source allows
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,7 @@ class Effect:
     reach: Literal["local", "nonlocal"] = "local"
     is_drag: bool = False  # of a non-local effect: its number grows with drag
     drivers: tuple[Driver, ...] = ()  # if any, the effect is seen through them alone
+    plausible: tuple[float, float] | None = None  # sizes that its source allows; None: all within the bounds
     beside: str = ""  # the effect without which this one shows nothing
 
     def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
+from sim.model.uncertainty import DEFAULTS, Sigma
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class Robot:
     C_yr: float
     disc_offset: float | None = None  # a; None: the head's radius
     effects: Mapping[str, float] = field(default_factory=dict)
+    sigmas: Mapping[str, Sigma] = field(default_factory=dict)  # of the fields that state one, see `sigma`
 
     def __post_init__(self) -> None:
         check_tails(self.tails)
@@ -56,6 +58,10 @@ class Robot:
             check_positive("disc_offset", self.disc_offset)
         check_finite("C_yr", self.C_yr)
         check_slenderness(self.tail_length / self.tail_radius)
+
+    def sigma(self, name: str) -> Sigma:
+        """One standard deviation of a field, as stated or by default (`sim.model.uncertainty`)."""
+        return self.sigmas.get(name, DEFAULTS[name])
 
     @property
     def bending_stiffness(self) -> float:

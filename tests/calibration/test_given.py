@@ -1,0 +1,158 @@
+"""Numbers as given that are off: no physics within their tolerance, a finding of their own beyond it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import binom
+
+from calibration.fit import fit
+from calibration.given import CAMERA, HEADING, LENGTH, TACHOMETER
+from calibration.loop import calibrate, verdict_record
+from calibration.measurements import read_measurements
+from calibration.model import by_differences, start_values
+from calibration.prior import pulls
+from calibration.swimmer import Swimmer, corrected_robot
+from calibration.synthetic import make_table
+from sim.io.errors import InputError
+from sim.model.robot import Robot
+from sim.model.uncertainty import Sigma
+from tests.calibration import toy
+from tests.calibration.toy_tables import START, TRUTH, toy_table
+
+EXACT = {
+    name: Sigma(0.0, False)
+    for name in ("viscosity", "tail_radius", "tail_length", "head_radius", "head_length", "disc_offset")
+}
+
+
+def table_of(robot: Robot, seed: int) -> pd.DataFrame:
+    return make_table(robot, seed=seed, lengths_cm=(5.0, 8.0, 11.0), title="")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_stiffness_that_was_given_too_high_is_no_inertia(seed: int) -> None:
+    """Tail drag 25 % above the formula is Young's modulus 20 % below; with the simulator on both sides."""
+    softer = replace(TRUTH, youngs_modulus=0.8 * TRUTH.youngs_modulus)
+    model = Swimmer(START, read_measurements(make_table(softer, seed=seed, title="")))
+    result = calibrate(model, progress=False)
+    assert result.verdict == "none"
+    assert result.effects == ()
+    stiffness = next(p for p in result.numbers if p.parameter.name == "youngs_modulus")
+    assert stiffness.alone == pytest.approx(math.log(0.8), abs=2 * stiffness.alone_error)
+    assert stiffness.z < -1
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("toy_model")
+def test_numbers_drawn_from_their_priors_are_no_effects() -> None:
+    """One claim in twenty is stated; more than `most` would come from that once in a hundred times (binomial)."""
+    rng = np.random.default_rng(2)
+    claimed, covered, count = 0, 0, 40
+    names = ("youngs_modulus", "viscosity", "tail_radius", "head_radius", "head_length", "disc_offset")
+    for seed in range(count):
+        values = {n: float(getattr(TRUTH, n) or TRUTH.head_radius) for n in names}
+        drawn = {n: v * math.exp(rng.normal() * START.sigma(n).of(v) / v) for n, v in values.items()}
+        table = table_of(replace(TRUTH, **drawn), seed)  # type: ignore[arg-type]
+        table["l_cm"] += rng.normal(scale=0.1)
+        table["R_yr_cm"] *= math.exp(rng.normal(scale=0.01))
+        table["theta_deg"] += rng.normal() * np.sign(table["omega_rpm"])
+        result = calibrate(Swimmer(START, read_measurements(table)), progress=False)
+        claimed += bool(result.effects) or result.verdict == "unexplained"
+        low, high = result.base.interval("youngs_modulus")
+        covered += low < drawn["youngs_modulus"] < high
+    most = binom.isf(0.01, count, 0.05)
+    assert claimed <= most
+    assert count - covered <= most
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("toy_model")
+def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
+    """A camera's scale off by six of its σ: said as such, freed, and ahead of every effect."""
+    table = toy_table(4)
+    table["R_yr_cm"] *= 1.06
+    result = calibrate(Swimmer(START, read_measurements(table)), progress=False)
+    assert result.verdict == "number"
+    assert result.effects == ()
+    assert CAMERA in {p.parameter.name for p in result.wrong_numbers[0]}
+    assert result.sentence.startswith("A number as given is wrong: ")
+    assert result.sentence.endswith("No effect is claimed.")
+    record = verdict_record(result, table="t")
+    assert record["wrong_numbers"][0] == [p.parameter.name for p in result.wrong_numbers[0]]
+    assert result.error_after < 1.25 * result.noise_ceiling
+
+
+@pytest.mark.slow
+def test_a_stiffness_far_off_is_named_with_what_looks_like_it() -> None:
+    """40 % with the default tolerances; 20 % where E is stated to 3 % and the other numbers to be exact."""
+    for share, sigmas in ((0.6, {}), (0.8, {"youngs_modulus": Sigma(0.03, True), **EXACT})):
+        softer = replace(TRUTH, youngs_modulus=share * TRUTH.youngs_modulus)
+        data = read_measurements(make_table(softer, seed=5, title=""))
+        result = calibrate(Swimmer(replace(START, sigmas=sigmas), data), progress=False)
+        assert result.verdict == "number"
+        assert result.wrong_numbers[0][0].parameter.name == "youngs_modulus"
+        given = result.delivered["youngs_modulus"] / START.youngs_modulus
+        assert given == pytest.approx(share, rel=0.1)
+        corrected = corrected_robot(START, result.delivered)
+        assert corrected.youngs_modulus == result.delivered["youngs_modulus"]
+
+
+def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
+    """By the powers of the groups, against differences of predictions; off the numbers as given."""
+    table = toy_table(6)
+    table["v_cm_s"] = (
+        table["R_yr_cm"] * table["omega_yr_rad_s"].abs() * np.random.default_rng(0).uniform(0.9, 1.1, len(table))
+    )
+    model = Swimmer(START, read_measurements(table), solver=toy.SOLVER)
+    at = {
+        **start_values(model),
+        "tracked_point": 0.2,
+        CAMERA: 1.03,
+        HEADING: 0.02,
+        LENGTH: 0.001,
+        TACHOMETER: 1.01,
+    }
+    names = [p.name for p in model.given]
+    assert len(names) == 10
+    ours, J = model.derivatives(at, names)
+    theirs, differences = by_differences(model, at, names)
+    assert ours == pytest.approx(theirs, abs=1e-9)
+    scale = np.maximum(np.abs(differences).max((0, 1)), 1e-9)
+    assert (np.abs(J - differences).max((0, 1)) / scale).max() < 0.06
+
+
+def test_pulls_are_those_of_the_textbook() -> None:
+    """One number, one measurement: x = y σ²/(σ² + s²), pull y/√(σ² + s²), alone y."""
+    model = Swimmer(START, read_measurements(toy_table(8)), solver=toy.SOLVER)
+    used = np.ones(len(model.runs), bool)
+    names = tuple(p.name for p in (*model.coefficients, *model.given))
+    bound = fit(model, start_values(model), names, used, title="")
+    for pull in pulls(bound, model.given):
+        if pull.learnt:
+            sigma = pull.parameter.sigma
+            assert sigma is not None
+            assert pull.z == pytest.approx(pull.alone / math.hypot(sigma, pull.alone_error), rel=1e-6)
+            assert pull.change == pytest.approx(
+                pull.alone * sigma**2 / (sigma**2 + pull.alone_error**2), rel=1e-6, abs=1e-12
+            )
+    free = fit(model, bound.parameters, names, used, free=(CAMERA,), title="")
+    own = {p.parameter.name: p for p in pulls(bound, model.given)}[CAMERA]
+    alone = {p.parameter.name: p for p in pulls(free, model.given)}[CAMERA]
+    assert alone.freed
+    assert alone.change == pytest.approx(own.alone, abs=0.1 * own.alone_error)
+
+
+def test_exact_numbers_are_not_fitted_and_the_table_states_its_own() -> None:
+    table = toy_table(9).assign(camera_scale_sigma_percent=2.0, heading_zero_sigma_deg=0.0)
+    model = Swimmer(replace(START, sigmas=EXACT), read_measurements(table), solver=toy.SOLVER)
+    sigmas = {p.name: p.sigma for p in model.given}
+    assert sigmas == {"youngs_modulus": pytest.approx(0.1), CAMERA: 0.02, TACHOMETER: 0.005}
+    for bad in (-1.0, np.arange(len(table), dtype=float)):
+        with pytest.raises(InputError, match="camera_scale_sigma_percent"):
+            read_measurements(table.assign(camera_scale_sigma_percent=bad))
