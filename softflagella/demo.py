@@ -43,6 +43,7 @@ from sim.inputs import robot_toml
 from sim.io.files import write_text
 from sim.io.pages import Page
 from sim.io.provenance import code_version
+from sim.model.groups import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.motion.batches import available_jobs
@@ -89,7 +90,7 @@ def run_demo(out: str | Path) -> None:
     data, model = folder / "sweep", folder / "model.pt"
     shutil.rmtree(data, ignore_errors=True)  # an earlier demo's rows, perhaps of another version
     _command("dataset", "build", "--config", "demo.toml", "--out", str(data))
-    _command("surrogate", "train", str(data), "--out", str(model), "--epochs", "300")
+    _command("surrogate", "train", str(data), "--out", str(model), "--epochs", "60")
     print("4/4 close the loop on two measured tables")
     loops = {name: _close(folder, name) for name in ("hidden effect", "nothing hidden")}
     steered = _steer(loops["hidden effect"][0])
@@ -319,7 +320,8 @@ def _draw_plans(errors: dict[str, tuple[dict[str, Any], TrackingError]]) -> Figu
 def _draw_parity(rows: pd.DataFrame) -> Figure:
     lookup = load()
     truth = {str(c): rows[c].to_numpy(dtype=float) for c in rows}
-    found = lookup.query({name: truth[name] for name in lookup.domain})
+    robots = {name: truth[name] for name in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS, DWELL)}
+    found = lookup.query(robots, flag=True)
     figure = Figure(figsize=(12, 3.4))
     names = (("omega_yr_bar", "yaw rate"), ("R_yr_over_l", "turn radius / l"), ("theta_deg", "slip angle [deg]"),
              ("net_speed_bar", "net speed"))  # fmt: skip
