@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import time
 
+import numpy as np
 import torch
 
-from dataset.design import load_design
 from sim.motion.batches import steady_columns
 from surrogate.evaluate import error_table
 from surrogate.export import load
+from surrogate.rows import drawn
 
-ROWS = 64
+ROWS, SIMULATED, REPEATS = 16384, 64, 20
 
 
 def main() -> None:
@@ -23,19 +24,26 @@ def main() -> None:
     rows = lookup.provenance["rows"]
     print(f"\nShipped look-up table: {rows['train']} rows learned, errors on {rows['held_out']} others")
     print(error_table(lookup))
-    points = load_design("sweep.toml").with_rows(ROWS).points()
-    robots = {k: v for k, v in points.items() if k != "dwell_bar"}
-    lookup.query(points)
-    steady_columns(robots, jobs=1, title="")
-    began = time.perf_counter()
-    lookup.query(points)
-    query = time.perf_counter() - began
-    began = time.perf_counter()
-    steady_columns(robots, jobs=1, title="simulate")
-    simulate = time.perf_counter() - began
-    count = len(robots["N"])
-    print(f"\n{count} robots of the sweep, one core: look-up {1e6 * query / count:.0f} µs a robot,")
-    print(f"steady motion solved for {1e3 * simulate / count:.2f} ms a robot: ratio {simulate / query:.0f}")
+    robots = drawn(ROWS, 5, wide=False)
+    few = {name: values[:SIMULATED] for name, values in robots.items()}
+    one = {name: values[:1] for name, values in robots.items()}
+    lookup.query(few, flag=True)
+    steady_columns(few, jobs=1, title="")
+    query = _seconds(lambda: lookup.query(robots, flag=True), 1) / ROWS
+    single = _seconds(lambda: lookup.query(one, flag=True), REPEATS)
+    simulate = _seconds(lambda: steady_columns(few, jobs=1, title="simulate"), 1) / SIMULATED
+    outside = np.mean(lookup.query(robots, flag=True)["outside"])
+    print(f"\nrobots of the domain, one core, processor time: {1e6 * query:.0f} µs each in a batch of {ROWS}, "
+          f"{1e3 * single:.1f} ms for one alone")  # fmt: skip
+    print(f"simulated: {1e3 * simulate:.2f} ms each, {simulate / query:.0f} times as long as in the batch")
+    print(f"outside the table's domain: {100 * outside:.1f} %")
+
+
+def _seconds(work, repeats: int) -> float:  # type: ignore[no-untyped-def]
+    began = time.process_time()
+    for _ in range(repeats):
+        work()
+    return (time.process_time() - began) / repeats
 
 
 if __name__ == "__main__":

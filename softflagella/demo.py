@@ -328,7 +328,7 @@ def _draw_parity(rows: pd.DataFrame) -> Figure:
     names = (("omega_yr_bar", "yaw rate"), ("v_z", "surge"), ("R_yr_over_l", "turn radius / l"),
              ("theta_deg", "slip angle [deg]"))  # fmt: skip
     good = usable_rows(rows)
-    found = load().query({name: good[name].to_numpy(float) for name in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)})
+    found = load().query({n: good[n].to_numpy(float) for n in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)}, flag=True)
     truth = {name: good[name].to_numpy(float) for name in ("v_x", *(name for name, _ in names))}
     figure = Figure(figsize=(12, 3.4))
     for place, (name, label) in enumerate(names):
