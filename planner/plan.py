@@ -186,8 +186,8 @@ def plan(
     if kept is None:
         raise InputError(
             f"tolerance {tolerance:g} l cannot be kept: the smallest stated error is {best.stated_error:.3g} l, "
-            f"with dwells from {best.minimum_dwell:.2g} time units; allow more, or make a table of this robot with "
-            "python -m surrogate robot"
+            f"with dwells from {best.minimum_dwell:.2g} time units; allow more, or make a table of this robot "
+            "with python -m surrogate robot"
         )
     return kept
 
