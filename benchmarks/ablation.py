@@ -21,7 +21,7 @@ import torch
 from torch import Tensor
 
 from benchmarks.shipped_table import kept
-from dataset.report import plain_logarithms
+from dataset.figures import plain_logarithms
 from surrogate import fit, head, tail, tails
 from surrogate.fit import Settings
 from surrogate.network import Ensemble

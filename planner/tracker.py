@@ -41,6 +41,7 @@ _GATE = float(chi2.ppf(0.9999, 3))
 _LOST = 10  # poses left out one after another, from which the pose is taken to be unknown
 _STEPS = (1e-4, 1e-4, 1e-4, 1e-5, 1e-6, 1e-6)  # for derivatives by the learned numbers
 _DOUBT = (0.03, 0.03, 0.03)  # standard deviations beside the plan's own: yaw rates, speed
+_CHANGES = (1.5e-3, 1.5e-3, 5e-4)  # yaw rates and speed: what a dwell adds to their standard deviation
 _WALK = 3e-4  # l and rad that a dwell adds to what is unknown of the pose
 
 
@@ -305,6 +306,7 @@ def _propagated(P: list[list[float]], F: list[list[float]]) -> list[list[float]]
             full[i][j] = sum(half[i][k] * F[j][k] for k in range(n))
     for i in range(3):
         full[i][i] += _WALK**2
+        full[3 + i][3 + i] += _CHANGES[i] ** 2
     return full
 
 

@@ -47,7 +47,7 @@ ROBOTS = {
 def test_robots_that_differ_stay_on_the_path(name: str) -> None:
     distance, dwells = swim(Tracker(planned()), planned(), ROBOTS[name], Camera())
     assert rms(distance) < 0.026
-    assert min(dwells) >= planned().minimum_dwell * (1 - 1e-9)
+    assert min(dwells[:-1]) >= planned().minimum_dwell * (1 - 1e-9)
 
 
 @pytest.mark.parametrize(
