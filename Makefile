@@ -11,6 +11,7 @@ MODEL ?= models/model.pt
 ROBOT ?= paper-control
 PLANPATH ?= square:3
 TABLE ?=
+ROWS ?=
 
 # Batches are the parallelism: one thread a process.
 export OMP_NUM_THREADS ?= 1
@@ -34,8 +35,11 @@ demo: reports/demo.html ## the whole pipeline on the paper's robot, ends with re
 reports/demo.html: $(STAMP) $(SOURCES) $(wildcard dataset/*.py surrogate/*.py surrogate/shipped/* planner/*.py calibration/*.py softflagella/*.py) demo.toml
 	$(RUN) -m softflagella demo --out $@
 
-test: $(STAMP) ## run the tests
+test: $(VENV)/.clusters ## run the tests, those of clusters included
 	$(RUN) -m pytest
+$(VENV)/.clusters: $(STAMP)
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[clusters]'
+	touch $@
 
 quick: $(STAMP) ## run the quick tests, under a minute
 	$(RUN) -m pytest -m "not slow"
@@ -52,9 +56,12 @@ $(VENV)/.docs: $(STAMP)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
 	touch $@
 
-dataset: $(DATA)/manifest.json ## simulate CONFIG into DATA (goes on where it stopped)
-$(DATA)/manifest.json: $(STAMP) $(CONFIG)
-	$(RUN) -m dataset build --config $(CONFIG) --out $(DATA)
+# The build itself knows its sources and what is missing, so it always runs. It leaves the manifest of a finished
+# data set alone, so that `make train` does not run again.
+dataset: $(STAMP) ## simulate CONFIG into DATA (goes on where it stopped; ROWS=… for more or fewer rows)
+	$(RUN) -m dataset build --config "$(CONFIG)" --out "$(DATA)" $(if $(ROWS),--rows $(ROWS))
+$(DATA)/manifest.json:
+	$(MAKE) dataset
 
 train: $(MODEL) ## train the look-up table MODEL on DATA
 $(MODEL): $(DATA)/manifest.json

@@ -1,8 +1,10 @@
 """Design of a sweep: which robots are simulated.
 
-A scrambled Sobol sequence over the inputs of `sweep.toml`: low discrepancy, so that every projection is
-covered evenly, and any number of rows from the same seed is the start of a longer sweep. A log scale spreads
-rows evenly over ratios; an integer scale gives each whole number of the range the same share.
+A scrambled Sobol sequence over the inputs of `sweep.toml`: low discrepancy, so that every projection is covered
+evenly. A row is an index of that sequence. What it is depends on the seed, the inputs and its index, not on how
+many rows are asked for: a longer sweep begins with the shorter one. A log scale spreads rows evenly over
+ratios; an integer scale gives each whole number of the range the same share; with `both_directions` half of the
+robots turn their motor the other way.
 Source: Sobol (1967); scrambling: Owen (1998), as in scipy.stats.qmc.
 """
 
@@ -10,20 +12,27 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
 from sim.arrays import Floats
 from sim.effects import catalogue
+from sim.inputs import check_columns
 from sim.io.errors import InputError
-from sim.model.groups import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS
+from sim.model.groups import DWELL, GROUP_COLUMNS, MOST_TAILS, OPTIONAL_COLUMNS
 
 _SCALES = ("linear", "log", "integer")
-_MOST_ROWS = 2**24
+MOST_ROWS = 2**30  # points of the sequence in double precision
+# Beyond these ends every robot would only be flagged.
+_LIMITS = {
+    "C_t": (1e-3, 1e3), "C_r": (1e-3, 1e3), "C_yr": (1e-3, 1e3), "l_over_R": (0.1, 100), "L_over_R": (0.1, 100),
+    "l_over_r0": (5, 1e4), "omega_bar": (1e-3, 1e3), "N": (1, MOST_TAILS), "a_over_R": (0.01, 10),
+    DWELL: (0.01, 100),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -33,14 +42,23 @@ class Axis:
     low: float
     high: float
     scale: str
+    both_directions: bool = False  # half of the rows are mirrored to -high … -low
 
     def at(self, share: Floats) -> Floats:
         """Values at shares in [0, 1)."""
+        if self.both_directions:
+            half = replace(self, both_directions=False)
+            return np.where(share < 0.5, -half.at(2 * share), half.at(2 * share - 1))
         if self.scale == "log":
             return np.asarray(self.low * (self.high / self.low) ** share)
         if self.scale == "integer":
             return np.asarray(self.low + np.floor(share * (self.high - self.low + 1)))
         return np.asarray(self.low + (self.high - self.low) * share)
+
+    def config(self) -> dict[str, Any]:
+        """As in sweep.toml."""
+        mirrored = {"both_directions": True} if self.both_directions else {}
+        return {"range": [self.low, self.high], "scale": self.scale, **mirrored}
 
 
 @dataclass(frozen=True)
@@ -51,20 +69,47 @@ class Design:
     rows: int
     seed: int
 
+    @staticmethod
+    def from_config(config: Mapping[str, Any], rows: int) -> Design:
+        """The design that `config` describes."""
+        axes = {
+            name: Axis(spec["range"][0], spec["range"][1], spec["scale"], spec.get("both_directions", False))
+            for name, spec in config["inputs"].items()
+        }
+        return Design(axes, rows, config["seed"])
+
     def config(self) -> dict[str, Any]:
         """What determines the robots, JSON-like (without the number of rows)."""
-        axes = {n: {"range": [a.low, a.high], "scale": a.scale} for n, a in self.axes.items()}
-        return {"seed": self.seed, "inputs": axes}
+        return {"seed": self.seed, "inputs": {name: axis.config() for name, axis in self.axes.items()}}
 
-    def points(self) -> dict[str, Floats]:
-        """Columns of the first `rows` robots of the sequence."""
-        sampler = qmc.Sobol(len(self.axes), scramble=True, rng=np.random.default_rng(self.seed))
-        share = sampler.random_base2(math.ceil(math.log2(max(self.rows, 2))))[: self.rows]
-        return {name: axis.at(share[:, i]) for i, (name, axis) in enumerate(self.axes.items())}
+    @property
+    def effects(self) -> list[str]:
+        """The effects among the inputs, in alphabetical order."""
+        return sorted(set(self.axes) & set(catalogue()))
+
+    def points(self, start: int = 0, stop: int | None = None) -> dict[str, Floats]:
+        """Columns of the robots `start` … `stop` − 1 of the sequence; by default the first `rows`."""
+        from scipy.stats import qmc  # slow to import, and only workers need points
+
+        end = self.rows if stop is None else stop
+        names = [name for name in _order() if name in self.axes]
+        sampler = qmc.Sobol(len(names), scramble=True, rng=np.random.default_rng(self.seed))
+        if start:
+            sampler.fast_forward(start)
+            share = sampler.random(end - start)
+        else:  # the first point alone: scipy warns of a first draw that is no power of two
+            share = np.concatenate([sampler.random(1), sampler.random(end - 1)]) if end > 1 else sampler.random(1)
+        columns = {name: self.axes[name].at(np.ascontiguousarray(share[:, i])) for i, name in enumerate(names)}
+        return {name: columns[name] for name in self.axes}
 
     def with_rows(self, rows: int | None) -> Design:
         """The same design, longer or shorter."""
         return self if rows is None else replace(self, rows=_check_rows(rows))
+
+
+def _order() -> tuple[str, ...]:
+    """Inputs in the order of the sequence's dimensions, whatever the order in sweep.toml."""
+    return (*GROUP_COLUMNS, *OPTIONAL_COLUMNS, DWELL, *catalogue())
 
 
 def load_design(path: str | Path) -> Design:
@@ -77,18 +122,24 @@ def load_design(path: str | Path) -> Design:
         content = tomllib.loads(Path(path).read_text())
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as broken:
         raise InputError(f"{path} is not TOML: {broken}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path} is a folder; give a sweep.toml") from None
+    for name in set(content) - {"rows", "seed", "inputs"}:
+        raise InputError(f"{path}: unknown entry {name!r}; allowed are rows, seed and [inputs]")
     required = (*GROUP_COLUMNS, DWELL)
     inputs = content.get("inputs", {})
-    known = {*required, *OPTIONAL_COLUMNS, *catalogue()}
+    if not isinstance(inputs, dict):
+        raise InputError(f"{path}: inputs = {inputs!r}; write a table [inputs]")
     for name in inputs:
-        if name not in known:
-            raise InputError(f"{path}: unknown input {name!r}; allowed are {', '.join(sorted(known))}")
+        if name not in _order():
+            raise InputError(f"{path}: unknown input {name!r}; allowed are {', '.join(sorted(_order()))}")
     for name in required:
         if name not in inputs:
             raise InputError(f"{path}: missing input {name!r} in [inputs]")
-    axes = {name: _axis(str(path), name, spec) for name, spec in inputs.items()}
+    axes = {name: _axis(str(path), name, inputs[name]) for name in _order() if name in inputs}
+    _check_ends(str(path), axes)
     seed = content.get("seed", 0)
-    if not isinstance(seed, int) or seed < 0:
+    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise InputError(f"{path}: seed = {seed!r}; give a whole number from 0")
     return Design(axes, _check_rows(content.get("rows", 1024)), seed)
 
@@ -96,25 +147,45 @@ def load_design(path: str | Path) -> Design:
 def _axis(path: str, name: str, spec: Any) -> Axis:
     try:
         low, high = (float(v) for v in spec["range"])
-        scale = spec.get("scale", "linear")
+        scale, mirrored = spec.get("scale", "linear"), spec.get("both_directions", False)
+        unknown = set(spec) - {"range", "scale", "both_directions"}
     except (KeyError, TypeError, ValueError, AttributeError):
         raise InputError(
             f'{path}: {name} = {spec!r}; write {name} = {{ range = [low, high], scale = "linear" }}'
         ) from None
+    for key in sorted(unknown):
+        raise InputError(f"{path}: {name} has an entry {key!r}; allowed are range, scale and both_directions")
     if scale not in _SCALES:
         raise InputError(f"{path}: {name} has scale {scale!r}; allowed are {', '.join(_SCALES)}")
+    if not isinstance(mirrored, bool) or (mirrored and name != "omega_bar"):
+        raise InputError(f"{path}: {name} has both_directions = {mirrored!r}; only omega_bar takes true or false")
     if not (math.isfinite(low) and math.isfinite(high) and low <= high):
         raise InputError(f"{path}: {name} has range [{low:g}, {high:g}]; it must be finite and ordered")
     if low <= 0 and name not in catalogue():
         raise InputError(f"{path}: {name} starts at {low:g}; it must be above 0")
     if scale == "log" and low <= 0:
         raise InputError(f"{path}: {name} starts at {low:g}; a log scale needs a low end above 0")
-    if name == "N" and (low != int(low) or high != int(high)):
-        raise InputError(f"{path}: N has range [{low:g}, {high:g}]; give whole numbers")
-    return Axis(low, high, "integer" if name == "N" else scale)
+    if (name == "N" or scale == "integer") and (low != int(low) or high != int(high)):
+        raise InputError(f"{path}: {name} has range [{low:g}, {high:g}]; give whole numbers")
+    return Axis(low, high, "integer" if name == "N" else scale, mirrored)
+
+
+def _check_ends(path: str, axes: dict[str, Axis]) -> None:
+    """Refuse ranges with robots that cannot be simulated."""
+    for name, (least, most) in _LIMITS.items():
+        if name in axes and not least <= axes[name].low <= axes[name].high <= most:
+            a = axes[name]
+            raise InputError(
+                f"{path}: {name} has range [{a.low:g}, {a.high:g}]; a sweep takes {least:g} to {most:g}"
+            )
+    for end in ("low", "high"):
+        try:
+            check_columns({name: np.array([getattr(a, end)]) for name, a in axes.items() if name != DWELL})
+        except InputError as refusal:
+            raise InputError(f"{path}: the {end} ends of the ranges make no robot: {refusal}") from None
 
 
 def _check_rows(rows: object) -> int:
-    if not isinstance(rows, int) or not 1 <= rows <= _MOST_ROWS:
-        raise InputError(f"rows = {rows}; give a whole number from 1 to {_MOST_ROWS}")
+    if not isinstance(rows, int) or isinstance(rows, bool) or not 1 <= rows <= MOST_ROWS:
+        raise InputError(f"rows = {rows}; give a whole number from 1 to {MOST_ROWS}")
     return rows

@@ -2,13 +2,17 @@
 
 Rows that failed or whose tails touch are kept and flagged: `failed` rows have NaN outputs; `touching` rows
 have numbers of a model without contact. `usable` rows are the ones to learn from.
+
+A column may hold a list of numbers a row, all rows equally many: values on a grid, which is stored with the field.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import NamedTuple
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
 
+import numpy as np
 import pyarrow as pa
 
 from sim.effects import catalogue
@@ -19,9 +23,11 @@ class Column(NamedTuple):
     type: pa.DataType
     unit: str
     meaning: str
+    grid: tuple[float, ...] = ()  # of a list: what its values are given at
 
 
 _real, _whole, _flag = pa.float64(), pa.int32(), pa.bool_()
+COST = "cost_s"  # how long a row took: the one column that differs when the row is simulated again
 
 INPUTS = (
     Column("C_t", _real, "1", "head's translational drag coefficient"),
@@ -57,15 +63,37 @@ FLAGS = (
     Column("touching", _flag, "1", "tails touch: outside the model's validity"),
     Column("edges", _whole, "1", "edges a tail in the response to a switch"),
     Column("steps", _whole, "1", "time steps a motor revolution in the response to a switch"),
+    Column("reason", pa.string(), "1", "why the row failed, did not converge or was stepped in time; else empty"),
+    Column(COST, pa.float32(), "s", "processor time that the row took"),
 )
 
 
 def schema(effects: Iterable[str] = ()) -> pa.Schema:
     """Schema of a data set that sweeps the named effects as well."""
     extra = tuple(Column(name, _real, catalogue()[name].unit, catalogue()[name].title) for name in sorted(effects))
-    return pa.schema(
-        [
-            pa.field(c.name, c.type, nullable=False, metadata={"unit": c.unit, "meaning": c.meaning})
-            for c in (*INPUTS, *extra, *OUTPUTS, *FLAGS)
-        ]
-    )
+    return pa.schema([field_of(column) for column in (*INPUTS, *extra, *OUTPUTS, *FLAGS)])
+
+
+def field_of(column: Column) -> pa.Field:
+    """The Parquet field of a column, with unit, meaning and grid."""
+    words = {"unit": column.unit, "meaning": column.meaning}
+    if column.grid:
+        words["grid"] = json.dumps(column.grid)
+    return pa.field(column.name, column.type, nullable=False, metadata=words)
+
+
+def table_of(columns: Mapping[str, Any], form: pa.Schema) -> pa.Table:
+    """The columns as a table; lists are given as arrays (rows, values)."""
+    return pa.table([_array(columns[field.name], field.type) for field in form], schema=form)
+
+
+def _array(values: Any, kind: pa.DataType) -> pa.Array:
+    if pa.types.is_fixed_size_list(kind):
+        rows = np.ascontiguousarray(values)
+        if rows.shape[1:] != (kind.list_size,):
+            raise ValueError(f"lists of {kind.list_size} values expected, given {rows.shape}")
+        inner = pa.array(rows.ravel(), type=kind.value_type, from_pandas=False)
+        return pa.FixedSizeListArray.from_arrays(inner, type=kind)
+    if pa.types.is_floating(kind):
+        values = np.asarray(values, dtype=kind.to_pandas_dtype())
+    return pa.array(values, type=kind, from_pandas=False)

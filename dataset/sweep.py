@@ -1,67 +1,42 @@
-"""Robots -> rows: simulate a design in parallel, chunk by chunk.
+"""Robots -> rows: simulate a design in chunks, on this machine or a cluster, into a folder.
 
-Each robot's steady motion is solved for (`sim.motion.steady`), and from there it is stepped through flips of the
-motor with its own half-period (`sim.motion.switching`). Rows are batched by N; every finished batch is stored at
-once, so an interruption loses one batch a worker.
+What is there already is kept and checked; only rows that are missing are simulated. More rows of the same
+design only add chunks. An interruption loses the chunks under way.
 """
 
 from __future__ import annotations
 
-from functools import partial
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from dataset import backends
+from dataset import engine
+from dataset.backends import Backend, check_backend, open_backend
 from dataset.design import Design
-from dataset.store import MANIFEST, part_hash, part_path, write_manifest, write_part
-from sim.arrays import Floats, Integers
-from sim.effects import catalogue
-from sim.inputs import check_columns
+from dataset.folder import Held, SweepFolder, load_sweep
+from dataset.interrupts import interruptible
+from dataset.lock import locked
+from dataset.pieces import Piece, piece_name
+from dataset.places import Place, place
+from dataset.store import MANIFEST, PENDING
+from dataset.work import Simulate, Task, rows_version
 from sim.io.errors import InputError
-from sim.io.provenance import code_version, fingerprint, provenance
-from sim.model.groups import DWELL, Groups
-from sim.motion.batches import run_batches, split
-from sim.motion.resolution import Resolution
-from sim.motion.steady import steady
-from sim.motion.steady_motion import STEADY_COLUMNS
-from sim.motion.switching import switch_response
 
-Columns = dict[str, Any]
-PART_ROWS = 64  # what an interruption loses, a worker
+_SECONDS = 20.0  # of processor time that a chunk should take
+_FEWEST, _MOST = 1024, 4096  # rows of a chunk, unless there are few rows for many workers
+_CHUNKS = 4  # a worker, where there are few rows
+_STANDARD = "dataset.simulate.simulate"
+_GUESS = 0.02  # seconds a row, until rows are there that tell
 
 
-def simulate(points: dict[str, Floats]) -> Columns:
-    """All columns of the schema for robots of one N, except `row`.
+class UnfinishedError(RuntimeError):
+    """A sweep ended before all rows were there; the message is one line, `status` the exit status."""
 
-    Args:
-        points: inputs by column name, `dwell_bar` included, each (B,).
-    """
-    values = check_columns({k: v for k, v in points.items() if k != DWELL})
-    groups = Groups.from_columns(values)
-    motion = steady(groups)
-    response = switch_response(groups, points[DWELL], motion)
-    resolutions = [Resolution.fitting(speed) for speed in values["omega_bar"].tolist()]
-    steady_values = motion.columns()
-    columns: Columns = {**values, DWELL: points[DWELL], **{k: steady_values[k] for k in STEADY_COLUMNS}}
-    failed = motion.failed | response.failed
-    columns |= {
-        "net_speed_bar": response.net_speed,
-        "lag_psi_rad": response.lag_psi,
-        "lag_x": response.lag_x,
-        "lag_z": response.lag_z,
-        "error": motion.error,
-        "failed": failed,
-        "converged": columns["converged"] & ~failed,
-        "touching": columns["tail_gap"] < 1,
-        "edges": np.array([r.edges for r in resolutions]),
-        "steps": np.array([r.steps for r in resolutions]),
-    }
-    for name in STEADY_COLUMNS[:7]:
-        columns[name] = np.where(failed, np.nan, columns[name])
-    columns["N"] = values["N"].astype(int)
-    return columns
+    status = 1
 
 
 def build(
@@ -70,73 +45,168 @@ def build(
     *,
     jobs: int | None = None,
     backend: str = "loky",
+    address: str | None = None,
     title: str = "sweep",
+    resume: str = "run the same build again",
+    simulate: Simulate | None = None,
 ) -> dict[str, Any]:
-    """Simulate a design into a folder; goes on where an interrupted build stopped.
+    """Simulate a design into a folder; goes on where an earlier build stopped.
+
+    Args:
+        design: which robots.
+        folder: a folder, or a URL that fsspec knows.
+        jobs: processes on this machine; default all processors.
+        backend: "loky", "dask" or "ray".
+        address: of a dask scheduler or ray cluster.
+        title: of the progress line; empty for none.
+        resume: what the last line of an interrupted build tells the user to do.
+        simulate: makes the rows; default `dataset.simulate.simulate`. Workers must be able to import it.
 
     Returns:
         The manifest.
 
     Raises:
-        InputError: the folder holds something else.
+        InputError: the folder holds something else or refuses, another process writes there, no such backend.
+        UnfinishedError: some chunks were set aside, or there were no workers.
     """
-    out = Path(folder)
-    effects = sorted(set(design.axes) & set(catalogue()))
-    config = {**design.config(), "rows": design.rows}
-    config_hash = fingerprint({**config, "code": code_version()})
-    _check_folder(out, config_hash)
-    points = design.points()
-    batches = split(points["N"], PART_ROWS)
-    waiting = [i for i in range(len(batches)) if not part_path(out, i).exists()]
-    out.mkdir(parents=True, exist_ok=True)
-    work = partial(_simulate_part, folder=out, effects=effects, config_hash=config_hash)
-    todo = [(i, batches[i], {k: v[batches[i]] for k, v in points.items()}) for i in waiting]
-    counts = {"rows": design.rows, "parts": len(batches)}
-    with backends.backend(backend):
-        run_batches(work, todo, sizes=[len(t[1]) for t in todo], jobs=jobs, title=title)
-    manifest = {**provenance(config), "config_hash": config_hash, "effects": effects, **counts}
-    manifest |= _count_flags(out, len(batches))
-    write_manifest(out, manifest)
-    return manifest
+    check_backend(backend, jobs)
+    there = place(folder)
+    begun = _Begun(there, resume)
+    with interruptible(begun.words), locked(there):
+        return _build(
+            design, there, simulate, begun, lambda: open_backend(backend, jobs=jobs, address=address), title
+        )
 
 
-def _simulate_part(
-    job: tuple[int, Integers, dict[str, Floats]],
+def mend(folder: str | Path, *, jobs: int | None = None, title: str = "mend") -> str:
+    """Repair a data set: remove what is damaged or doubled, simulate what is missing, write the manifest anew.
+
+    Returns:
+        One line that says what was done.
+
+    Raises:
+        InputError: no data set there, or its rows were made by another version of the code.
+        UnfinishedError: as for `build`.
+    """
+    there = place(folder)
+    if not there.names():
+        raise InputError(f"{there.address} is no data set; make it with python -m dataset build")
+    begun = _Begun(there, f"python -m dataset verify {there.address} --mend")
+    with interruptible(begun.words), locked(there):
+        design, source = load_sweep(there)
+        simulate = None if source == _STANDARD else _imported(source)
+        before = there.read(MANIFEST).to_pybytes() if there.size(MANIFEST) is not None else b""
+        manifest = _build(
+            design, there, simulate, begun, lambda: open_backend("loky", jobs=jobs), title, mending=True
+        )
+    line = begun.progress
+    again = f"{line.simulated} rows simulated again, " if line else "no row simulated again, "
+    same = json.dumps(manifest, indent=1).encode() == before.strip()
+    return f"{manifest['rows']} rows are whole: {again}manifest {'kept' if same else 'written anew'}"
+
+
+class _Begun:
+    """What an interrupted build can say for itself."""
+
+    def __init__(self, there: Place, resume: str):
+        self._there, self._resume, self.progress = there, resume, None
+
+    progress: engine.Progress | None
+
+    def words(self, why: str = "stopped") -> str:
+        """One line: what is done and how to go on."""
+        line = self.progress
+        done = f"{line.rows} of {line.total} rows are stored in {self._there.address}; " if line else ""
+        return f"{why}: {done}go on with: {self._resume}"
+
+
+def _build(
+    design: Design,
+    there: Place,
+    simulate: Simulate | None,
+    begun: _Begun,
+    opened: Callable[[], Backend],
+    title: str,
     *,
-    folder: Path,
-    effects: list[str],
-    config_hash: str,
-) -> None:
-    index, rows, points = job
-    columns = simulate(points)
-    columns["row"] = rows
-    write_part(folder, index, columns, effects, config_hash)
+    mending: bool = False,
+) -> dict[str, Any]:
+    code = rows_version()
+    source = f"{simulate.__module__}.{simulate.__qualname__}" if simulate else _STANDARD
+    folder = SweepFolder(there, design, code, source)
+    folder.claim(mending=mending)
+    rows = max(design.rows, folder.rows_there())
+    held = folder.holds(mending=mending)
+    gaps = folder.missing(held, rows)
+    if gaps:
+        if simulate is None:
+            _compile_first()
+        done = rows - sum(stop - start for start, stop in gaps)
+        begun.progress = engine.Progress(title, rows, done=done, failed=sum(c.failed for c in held.values()))
+        workers = opened()
+        try:
+            tasks = [
+                Task(there.address, folder.config, folder.key, code, simulate, start, stop)
+                for start, stop in chunks(gaps, workers.slots(), _cost(held))
+            ]
+            result = engine.run(tasks, workers, begun.progress)
+        except engine.NoWorkersError as nobody:
+            raise UnfinishedError(begun.words(str(nobody))) from None
+        finally:
+            begun.progress.close()
+            workers.stop()
+        if result.set_aside:
+            raise UnfinishedError(begun.words(_aside(result.set_aside)))
+        for receipt in result.receipts:
+            c = receipt.contents
+            held[Piece(piece_name(PENDING, c.start, c.stop), c.start, c.stop)] = c
+    return folder.complete(held, rows)
 
 
-def _check_folder(folder: Path, config_hash: str) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder} is a file; give a folder for the data set")
-    if not folder.exists():
+def chunks(gaps: Sequence[tuple[int, int]], workers: int, cost: float) -> Iterator[tuple[int, int]]:
+    """Cut runs of rows into chunks: _SECONDS of work each, within limits, but a few for every worker.
+
+    Args:
+        gaps: runs of rows, ends exclusive.
+        workers: that run at once.
+        cost: seconds a row.
+    """
+    rows = sum(stop - start for start, stop in gaps)
+    size = min(max(_FEWEST, int(_SECONDS / cost)), _MOST, -(-rows // (_CHUNKS * max(workers, 1))))
+    for start, stop in gaps:
+        for first in range(start, stop, size):
+            yield first, min(first + size, stop)
+
+
+def _cost(held: Held) -> float:
+    """Seconds a row, from the rows that are there."""
+    rows, cost = sum(p.stop - p.start for p in held), sum(c.cost_s for c in held.values())
+    return max(cost / rows, 1e-6) if rows else _GUESS
+
+
+def _imported(name: str) -> Simulate:
+    module, _, function = name.rpartition(".")
+    try:
+        found: Simulate = getattr(import_module(module), function)
+    except (ImportError, AttributeError):
+        raise InputError(f"its rows were made by {name}, which cannot be imported here") from None
+    return found
+
+
+def _compile_first() -> None:
+    """Compile the simulator's loops before there are workers, in a process that can be stopped at any time."""
+    from sim.compiling import all_compiled
+
+    if all_compiled():
         return
-    ours = {MANIFEST, *(p.name for p in folder.glob("part-*.parquet"))}
-    others = sorted(p.name for p in folder.iterdir() if p.name not in ours and p.name[0] != ".")
-    if others:
-        raise InputError(f"{folder} holds other files ({others[0]}); give an empty or a new folder")
-    for path in sorted(folder.glob("part-*.parquet")):
-        if part_hash(path) != config_hash:
-            raise InputError(
-                f"{folder} holds rows of another configuration or version ({path.name}); "
-                "give another folder or remove this one"
-            )
+    code = f"import sys; sys.path[:] = {sys.path!r}; from dataset.work import compile_on_this_host as c; c()"
+    compiling = subprocess.Popen([sys.executable, "-c", code])
+    try:
+        if compiling.wait():
+            raise InputError("the simulator's loops do not compile; python -m sim compile says why")
+    finally:
+        compiling.kill()
 
 
-def _count_flags(folder: Path, parts: int) -> dict[str, int]:
-    import pyarrow.parquet as pq
-
-    names = ("converged", "failed", "touching")
-    totals = dict.fromkeys(names, 0)
-    for index in range(parts):
-        table = pq.read_table(part_path(folder, index), columns=list(names))
-        for name in names:
-            totals[name] += int(np.count_nonzero(table[name].to_numpy()))
-    return totals
+def _aside(chunks: Sequence[tuple[Task, str]]) -> str:
+    parts = [f"rows {task.start} to {task.stop - 1} ({reason})" for task, reason in chunks]
+    return f"set aside: {', '.join(parts)}"

@@ -1,56 +1,107 @@
-"""Check a data set: files, schema, flags, and some rows simulated again.
+"""Check a data set: files, digests, inputs, flags, and some rows simulated again.
 
-A row solved again must give what it gave in its batch, and time stepping from rest must agree with it to the
+A row simulated again must give the same bits, and time stepping from rest must agree with its steady motion to the
 error of stepping (1 % in spins, 3 % in the rest).
 """
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 
-from dataset.schema import INPUTS
-from dataset.store import read, read_manifest
+from dataset.design import Design
+from dataset.places import place
+from dataset.schema import COST, schema, table_of
+from dataset.simulate import simulate
+from dataset.store import batches, read_manifest
+from dataset.work import rows_version
 from sim.io.errors import InputError
-from sim.motion.batches import steady_columns, stepped_columns
+from sim.model.groups import DWELL
+from sim.motion.batches import stepped_columns
 
 _SPINS = ("omega_t_bar", "omega_h_bar")
 _REST = ("omega_yr_bar", "v_x", "R_yr_over_l")
 _SPIN_ERROR, _REST_ERROR = 0.01, 0.03
 
 
-def verify(folder: str, *, rows: int = 8) -> str:
+def verify(folder: str | Path, *, rows: int = 8) -> str:
     """Verify a data set; returns a line that says what was checked.
 
     Raises:
         InputError: what is wrong with it.
     """
-    manifest = read_manifest(folder)
-    table = read(folder)
-    if not np.array_equal(table["row"], np.arange(manifest["rows"])):
-        raise InputError(f"{folder} has {len(table)} of {manifest['rows']} rows; run the build again")
-    outputs = table[[*_SPINS, *_REST, "net_speed_bar", "lag_psi_rad"]]
-    lost = int((outputs.isna().any(axis=1) & ~table["failed"]).sum())
-    if lost:
-        raise InputError(f"{folder} has {lost} rows with empty outputs that are not flagged as failed")
-    good = table[table["converged"]]
-    sample = good.sample(min(rows, len(good)), random_state=1)
-    worst = {}
-    names = [c.name for c in INPUTS if c.name != "dwell_bar"] + list(manifest["effects"])
-    points = {n: sample[n].to_numpy(dtype=float) for n in names}
-    for kind, solve in (("again", steady_columns), ("stepped", stepped_columns)):
-        again = solve(points, title=f"verify {kind}")
-        worst[kind] = max(_worst(sample, again, _SPINS) / _SPIN_ERROR, _worst(sample, again, _REST) / _REST_ERROR)
-    if worst["again"] > 1e-3 or worst["stepped"] > 1:
+    there = place(folder)
+    manifest = read_manifest(there)
+    if manifest["code_version"] != rows_version():
         raise InputError(
-            f"{folder}: rows solved again differ by {100 * worst['again'] * _REST_ERROR:.4f} %, "
-            f"stepped in time by {100 * worst['stepped'] * _REST_ERROR:.2f} %; build it anew"
+            f"{there.address} was made by version {manifest['code_version']}, this is {rows_version()}; "
+            "verify it with the version that made it"
         )
-    return (
-        f"{len(table)} rows as configured, flags consistent; {len(sample)} rows simulated again: "
-        f"largest difference {100 * worst['again'] * _REST_ERROR:.4f} % solved again, "
-        f"{100 * worst['stepped'] * _REST_ERROR:.2f} % stepped in time from rest"
-    )
+    design = Design.from_config(manifest["config"], manifest["rows"])
+    chosen = np.sort(np.random.default_rng(1).choice(design.rows, min(rows, design.rows), replace=False))
+    sample, start = [], 0
+    for batch in batches(there):
+        stop = start + batch.num_rows
+        _check_batch(there.address, design, batch, start)
+        sample.append(pa.Table.from_batches([batch]).take(chosen[(chosen >= start) & (chosen < stop)] - start))
+        start = stop
+    if start != manifest["rows"]:
+        raise InputError(f"{there.address} has {start} of {manifest['rows']} rows; mend it with --mend")
+    stored = pa.concat_tables(sample)
+    _check_again(there.address, design, stored, chosen)
+    line = f"{start} rows as configured, flags consistent; {len(chosen)} rows simulated again: the same bits"
+    stepped = _check_stepped(there.address, design, stored.to_pandas())
+    return f"{line}; stepped in time from rest: largest difference {100 * stepped * _REST_ERROR:.2f} %"
+
+
+def _check_batch(address: str, design: Design, batch: pa.RecordBatch, start: int) -> None:
+    stop = start + batch.num_rows
+    if not np.array_equal(batch["row"].to_numpy(), np.arange(start, stop)):
+        raise InputError(f"{address}: rows {start} to {stop - 1} are not in order; mend it with --mend")
+    for name, values in design.points(start, stop).items():
+        if not np.array_equal(batch[name].to_numpy(), values):
+            raise InputError(f"{address}: {name} in rows {start} to {stop - 1} is not that of its design")
+    outputs = [batch[n].to_numpy() for n in (*_SPINS, *_REST, "net_speed_bar", "lag_psi_rad")]
+    failed = batch["failed"].to_numpy(zero_copy_only=False)
+    lost = int((np.isnan(outputs).any(0) & ~failed).sum())
+    if lost:
+        raise InputError(f"{address} has {lost} rows with empty outputs that are not flagged as failed")
+
+
+def _check_again(address: str, design: Design, stored: pa.Table, chosen: np.ndarray) -> None:
+    points = {name: stored[name].to_numpy().astype(float) for name in design.axes}
+    again = table_of({**simulate(points), "row": chosen}, schema(design.effects))
+    for name in stored.schema.names:
+        one, other = (_bits(table[name]) for table in (stored, again))
+        if name != COST and one != other:
+            raise InputError(
+                f"{address}: {name} of rows simulated again differs; processors differ in last digits, so verify "
+                "on a machine of the kind that made it, or build it anew"
+            )
+
+
+def _bits(column: pa.ChunkedArray) -> object:
+    values = column.combine_chunks()
+    if pa.types.is_fixed_size_list(column.type):
+        values = values.flatten()
+    return values.to_pylist() if pa.types.is_string(values.type) else values.to_numpy(False).tobytes()
+
+
+def _check_stepped(address: str, design: Design, stored: pd.DataFrame) -> float:
+    """Largest difference, in units of the error of stepping."""
+    good = stored[stored["converged"]]
+    if good.empty:
+        return 0.0
+    again = stepped_columns({n: good[n].to_numpy(dtype=float) for n in design.axes if n != DWELL}, title="")
+    worst = max(_worst(good, again, _SPINS) / _SPIN_ERROR, _worst(good, again, _REST) / _REST_ERROR)
+    if worst > 1:
+        raise InputError(
+            f"{address}: rows stepped in time differ by {100 * worst * _REST_ERROR:.2f} %; build it anew"
+        )
+    return worst
 
 
 def _worst(rows: pd.DataFrame, again: dict[str, np.ndarray], names: tuple[str, ...]) -> float:

@@ -66,6 +66,12 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
     return Drawing(Path2D.of(table[["x", "y"]].to_numpy(), closed=closed), None)
 
 
+# What svgelements raises at a drawing that is none: a transform without numbers, a path that begins with a curve
+_BROKEN = (
+    ParseError, AttributeError, TypeError, UnicodeDecodeError, ValueError, ArithmeticError, LookupError,
+)  # fmt: skip
+
+
 def _read_svg(path: Path, closed: bool | None, shape: str | None) -> Drawing:
     from svgelements import SVG
 
@@ -75,8 +81,9 @@ def _read_svg(path: Path, closed: bool | None, shape: str | None) -> Drawing:
         elements = list(drawing.elements())
     except IsADirectoryError:
         raise InputError(f"{path} is a folder; give a CSV or SVG file") from None
-    except (ParseError, AttributeError, UnicodeDecodeError, ValueError, IndexError, ZeroDivisionError) as broken:
-        raise InputError(f"{path} is not SVG: {str(broken).splitlines()[0]}") from None
+    except _BROKEN as broken:
+        reason = next(iter(str(broken).splitlines()), type(broken).__name__)
+        raise InputError(f"{path} is not SVG: {reason}") from None
     found = _subpaths(elements)
     if not found:
         raise InputError(f"{path} has no path, line, polyline, polygon, rectangle, circle or ellipse; draw one")
@@ -137,6 +144,6 @@ def _enough(curve: Any) -> int:
     """Number of pieces of a curve such that none turns by more than _TURN."""
     probes = np.array([[p.x, p.y] for p in (curve.point(t) for t in np.linspace(0, 1, _PROBES + 1).tolist())])
     moves = np.diff(probes, axis=0)
-    moves = moves[np.linalg.norm(moves, axis=1) > 0]
+    moves = moves[np.hypot(moves[:, 0], moves[:, 1]) > 0]
     turns = np.diff(np.unwrap(np.arctan2(moves[:, 1], moves[:, 0])))
     return max(_PROBES, math.ceil(_PROBES * float(np.abs(turns).max(initial=0.0)) / _TURN))

@@ -15,6 +15,7 @@ from sim.arrays import Floats
 from sim.io.errors import InputError
 
 _CIRCLE_POINTS = 720
+_LARGEST = 1e100  # coordinate: squares of larger ones overflow
 
 
 @dataclass(frozen=True)
@@ -45,9 +46,12 @@ class Path2D:
             raise InputError("the path is empty; give at least two points")
         if table.ndim != 2 or table.shape[1] != 2:
             raise InputError(f"the path has shape {table.shape}; give (n, 2): x and y of each point")
-        bad = np.flatnonzero(~np.isfinite(table).all(1))
+        bad = np.flatnonzero(~(np.abs(table) < _LARGEST).all(1))
         if len(bad):
-            raise InputError(f"point {bad[0] + 1} of the path is {table[bad[0]].tolist()}; give finite numbers")
+            point = table[bad[0]].tolist()
+            raise InputError(
+                f"point {bad[0] + 1} of the path is {point}; give finite numbers, smaller than {_LARGEST:g}"
+            )
         moves = np.linalg.norm(np.diff(table, axis=0), axis=1)
         size = float(np.abs(table - table[0]).max())
         table = table[np.concatenate([[True], moves > 1e-12 * max(size, 1e-300)])]

@@ -39,6 +39,8 @@ ROOM = 0.7  # rounded corners need at most this share of the pivot's largest cur
 TIGHTEST = 0.9  # a path that needs more than this share of the pivot's largest curvature is refused
 _SPACING = 0.01  # of points on the reference, in l
 _MOST_POINTS = 60_000
+_LONGEST = 200.0  # path, in l: 8000 flips; time and memory grow with its square
+_SHORTEST = 1e-3  # path, in l: a flip alone moves the robot by more
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,7 @@ def plan(
     vehicle = vehicle_of(robot, lookup)
     raw = path if isinstance(path, Path2D) else Path2D.of(path)
     offset = _offset(point, robot, vehicle)
+    _check_length(raw)
     distance = vehicle.pivot_distance + offset
     shortest = _minimum_dwell(minimum_dwell, vehicle)
     declared, radius = _round_corners(raw, vehicle, distance, corner)
@@ -217,6 +220,17 @@ def _minimum_dwell(wanted: float | None, vehicle: Vehicle) -> float:
 def _flip_size(vehicle: Vehicle) -> float:
     lag = vehicle.lag_at(1, np.array(TURN_OVER))
     return float(np.hypot(lag[0], lag[1]))
+
+
+def _check_length(path: Path2D) -> None:
+    """Refuse a path that would ask for unbounded time and memory, or that is shorter than a flip."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        length = path.length
+    if not _SHORTEST <= length <= _LONGEST:
+        raise InputError(
+            f"the path is {length:.3g} tail lengths long; give between {_SHORTEST:g} and {_LONGEST:g}: scale it, "
+            "check its unit, or split it"
+        )
 
 
 def _spacing(path: Path2D) -> float:

@@ -97,6 +97,8 @@ def follow(
     dwells: list[float] = []
     poses = [pose]
     step = dwell / 6
+    if follower.finished:
+        raise InputError("the path is too short for a single flip; scale it, or check its unit")
     while not follower.finished:
         if len(dwells) >= _MOST_SWITCHES:
             raise InputError(f"the path needs more than {_MOST_SWITCHES} switches; split it")

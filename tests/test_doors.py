@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import sim.motion.run
-from dataset.sweep import simulate
+from dataset.simulate import simulate
 from sim.effects import catalogue
 from sim.inputs import load_robot, robot_toml
 from sim.io.errors import InputError, run_command

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.loop import calibrate as close
+from calibration.loop import calibrate
 from calibration.measurements import read_measurements
 from calibration.model import by_differences, start_values
 from calibration.swimmer import Swimmer
@@ -36,6 +36,7 @@ def table() -> pd.DataFrame:
     return found
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_the_prediction(table: pd.DataFrame) -> None:
     """The simulator's sensitivities, through drivers and camera, against differences of predictions."""
     rows = table.iloc[::6]
@@ -106,7 +107,7 @@ def test_a_current_shows_in_the_speed_along_its_heading(table: pd.DataFrame) -> 
 def test_wrong_units_are_refused(table: pd.DataFrame, column: str, factor: float, expected: str) -> None:
     rows = table.assign(**{column: table[column] * factor}).drop(columns="v_cm_s")
     with pytest.raises(InputError, match=expected):
-        close(Swimmer(START, read_measurements(rows), solver=toy.SOLVER), progress=False)
+        calibrate(Swimmer(START, read_measurements(rows), solver=toy.SOLVER), progress=False)
 
 
 def test_right_units_are_taken(table: pd.DataFrame) -> None:

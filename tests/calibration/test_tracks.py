@@ -7,27 +7,8 @@ import pandas as pd
 import pytest
 
 from calibration.tracks import measure_track, measure_tracks
-from sim.io.errors import InputError, run_command
-
-RATE, RADIUS, SLIP = -0.14, 10.0, 70.0
-
-
-def track(seed: int, *, rate: float = RATE, seconds: float = 60.0, wobble: float = 0.1) -> pd.DataFrame:
-    """A robot on a circle, wobbling with its disc, seen with noise."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(0, seconds, 0.2)
-    angle = 0.4 + rate * time
-    heading = angle + np.sign(rate) * np.pi / 2 + np.radians(SLIP)
-    swing = wobble * np.cos(1.7 * time + rng.uniform(0, 6))
-    return pd.DataFrame(
-        {
-            "run": 1,
-            "time_s": time,
-            "x_cm": 3 + (RADIUS + swing) * np.cos(angle) + rng.normal(scale=0.05, size=len(time)),
-            "y_cm": -2 + (RADIUS + swing) * np.sin(angle) + rng.normal(scale=0.05, size=len(time)),
-            "heading_deg": np.degrees(heading + rng.normal(scale=0.01, size=len(time))) % 360,
-        }
-    )
+from sim.io.errors import InputError
+from tests.calibration.track import RADIUS, RATE, SLIP, track
 
 
 def measured(table: pd.DataFrame) -> dict[str, float]:
@@ -81,23 +62,3 @@ def test_bad_samples_and_short_tracks_are_named() -> None:
     assert [line.split(":")[0] for line in aside] == ["run 1", "run 2"]
     with pytest.raises(InputError, match="heading_deg"):
         measure_tracks(samples.drop(columns="heading_deg"), runs)
-
-
-def test_the_command_writes_a_table(tmp_path: object, capsys: pytest.CaptureFixture[str]) -> None:
-    from pathlib import Path
-
-    from calibration.__main__ import main
-
-    folder = Path(str(tmp_path))
-    track(0).to_csv(folder / "tracks.csv", index=False)
-    pd.DataFrame({"run": [1], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0}).to_csv(folder / "runs.csv", index=False)
-    arguments = [
-        "tracks",
-        str(folder / "tracks.csv"),
-        str(folder / "runs.csv"),
-        "--out",
-        str(folder / "table.csv"),
-    ]
-    assert run_command(main, arguments) == 0
-    assert {"omega_yr_rad_s", "R_yr_cm", "theta_deg", "v_cm_s"} <= set(pd.read_csv(folder / "table.csv"))
-    assert "1 runs" in capsys.readouterr().out

@@ -1,7 +1,9 @@
 """A robot with rigid straight tails: the balance in closed form, for fast tests of the statistics.
 
-Tails are straight rods along the axis at radius a with a fixed thrust per tail spin; the head is that of the real
-model, effects included. Same columns as the simulator, no discretisation.
+Tails are straight rods along the axis at radius a. Their thrust and torque grow less than in proportion to the
+motor's speed, as if they bent. Head, drag on the tails and viscosity are those of the real model, effects
+included. In a thinner fluid it moves as with a slower motor, all rates scaled, as the real robot does. It has
+the columns of the simulator and no discretisation.
 """
 
 from __future__ import annotations
@@ -14,7 +16,6 @@ import numpy as np
 from calibration.swimmer import Solver
 from sim.effects import catalogue
 from sim.inputs import check_columns
-from sim.mechanics.drag import tail_coefficients
 from sim.model.groups import Groups
 from sim.motion.sensitivity import Sensitivities
 from sim.solve.assembly import assemble
@@ -54,18 +55,20 @@ def _robots(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Robots of one number of tails, (B,) each."""
     groups = Groups.from_columns(columns)
     R = 1 / groups.l_over_R
-    resistance = np.moveaxis(assemble(groups).resistance.numpy(), -1, 0)  # (B, 4, 5)
+    body = assemble(groups)
+    resistance = np.moveaxis(body.resistance.numpy(), -1, 0)  # (B, 4, 5)
     head = resistance[:, :, :4].copy()
     head[:, :, 3] += resistance[:, :, 4]
-    parallel, perp = (v.numpy() for v in tail_coefficients(groups.l_over_r0))
+    parallel, perp, viscosity = (v.numpy() for v in (body.zeta_parallel, body.zeta_perp, body.viscosity))
     a, n, omega = (groups.a_over_R * R).numpy(), groups.N, groups.omega_bar.numpy()
+    bent = 1 / (1 + 0.05 * viscosity * np.abs(omega))
     tails = np.zeros_like(head)
     tails[:, 0, 0] = n * perp
     tails[:, 0, 2] = tails[:, 2, 0] = -n * perp / 2
     tails[:, 2, 2] = n * perp / 3
     tails[:, 1, 1] = n * parallel
-    tails[:, 3, 3] = 3 * n * perp * a**2
-    thrust = 0.5 * n * (perp - parallel) * a**2 / (1 + 0.05 * np.abs(omega))
+    tails[:, 3, 3] = 3 * n * perp * a**2 * bent
+    thrust = 0.5 * n * (perp - parallel) * a**2 * bent
     tails[:, 1, 3] = -thrust * np.sign(omega)
     push = (tails[:, :, 3] + resistance[:, :, 4]) * omega[:, None]
     u = np.linalg.solve(head + tails, -push[..., None])[..., 0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from dataset.design import load_design
@@ -10,5 +12,5 @@ from sim.model.groups import DWELL
 
 def sweep_points(count: int) -> dict[str, np.ndarray]:
     """Columns of the first `count` robots of sweep.toml, without the dwell."""
-    points = load_design("sweep.toml").with_rows(count).points()
+    points = load_design(Path(__file__).parents[2] / "sweep.toml").with_rows(count).points()
     return {name: values for name, values in points.items() if name != DWELL}

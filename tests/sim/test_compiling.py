@@ -1,11 +1,19 @@
-"""Compiled loops on disk: old versions go, the newest stay."""
+"""Compiled loops on disk: a version for the sources that they are made of, old versions go, the newest stay."""
 
 from __future__ import annotations
 
+import ast
 import os
+import shutil
 from pathlib import Path
 
-from sim.compiling import CACHE, prune
+import pytest
+
+import sim
+from sim.compiling import CACHE, digest_of, prune
+
+SIM = Path(sim.__file__).parent
+MARKS = {"compiled", "formula"}
 
 
 def test_only_the_newest_versions_are_kept(tmp_path: Path) -> None:
@@ -18,6 +26,75 @@ def test_only_the_newest_versions_are_kept(tmp_path: Path) -> None:
     prune(tmp_path / "nowhere", 2)
 
 
-def test_the_folder_is_named_by_the_code() -> None:
-    assert CACHE.name.startswith("compiled-")
-    assert len(CACHE.name) == len("compiled-") + 12
+def has_loops(file: Path) -> bool:
+    """Whether a function of the file is compiled, or inlined in functions that are."""
+    functions = (node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.FunctionDef))
+    return any(isinstance(mark, ast.Name) and mark.id in MARKS for f in functions for mark in f.decorator_list)
+
+
+def imported(file: Path) -> set[Path]:
+    """Files of the simulator that a file imports."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        found |= {SIM.parent / f"{name.replace('.', '/')}.py" for name in names if name.split(".")[0] == "sim"}
+    return {path for path in found if path.is_file()}
+
+
+def with_imports(files: set[Path]) -> set[Path]:
+    """`files`, what they import, and so on."""
+    whole: set[Path] = set()
+    while files - whole:
+        whole |= files
+        files = {path for file in whole for path in imported(file)}
+    return whole
+
+
+LOOPS = {file for file in SIM.rglob("*.py") if has_loops(file)}
+MADE_OF = sorted(str(path.relative_to(SIM)) for path in with_imports(LOOPS))
+ELSEWHERE = sorted(
+    str(p.relative_to(SIM)) for room in ("effects", "motion", "io") for p in (SIM / room).glob("*.py")
+)
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return Path(
+        shutil.copytree(SIM, tmp_path_factory.mktemp("code") / "sim", ignore=shutil.ignore_patterns("__pycache__"))
+    )
+
+
+def digest_with_a_change(root: Path, name: str) -> str:
+    """The digest while a file has one line more."""
+    text = (root / name).read_bytes()
+    (root / name).write_bytes(text + b"CHANGED = 1\n")
+    digest = digest_of(root)
+    (root / name).write_bytes(text)
+    return digest
+
+
+def test_the_folder_is_named_by_the_code(copied: Path) -> None:
+    assert CACHE.name == f"compiled-{digest_of(SIM)}"
+    assert digest_of(copied) == digest_of(SIM)
+
+
+def test_loops_are_found_where_they_are() -> None:
+    """The list of the tests below is no empty one."""
+    assert {SIM / "linear" / "gmres.py", SIM / "mechanics" / "drag.py", SIM / "solve" / "newton.py"} <= LOOPS
+    assert {"arrays.py", "compiling.py", "model/body.py", "mechanics/drag.py", "mechanics/rod.py"} <= set(MADE_OF)
+    assert {"effects/inertia.py", "motion/run.py"} <= set(ELSEWHERE)
+
+
+@pytest.mark.parametrize("name", MADE_OF)
+def test_a_change_of_what_loops_are_made_of_is_another_version(name: str, copied: Path) -> None:
+    assert digest_with_a_change(copied, name) != digest_of(copied)
+
+
+@pytest.mark.parametrize("name", ELSEWHERE)
+def test_a_change_elsewhere_is_the_same_version(name: str, copied: Path) -> None:
+    """An effect or a way to use the loops is no reason to compile them anew."""
+    assert digest_with_a_change(copied, name) == digest_of(copied)

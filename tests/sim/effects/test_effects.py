@@ -46,6 +46,7 @@ def test_the_folder_is_the_catalogue() -> None:
     assert list(catalogue()) == sorted(f.stem for f in FOLDER.glob("*.py") if f.stem != "__init__")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reach", ["local", "nonlocal"])
 def test_adding_an_effect_is_adding_a_file(reach: str, tmp_path: Path) -> None:
     """Columns, sizes, numbers of the body and candidates of the calibration follow from the file alone."""
@@ -157,6 +158,7 @@ def test_a_dissipative_effect_takes_power_and_gives_none(name: str, share: float
         assert R[3, 4] >= 0  # the disc's own drag
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(catalogue()))
 def test_finite_over_its_bounds_and_batch_equals_loop(name: str) -> None:
     low, high = catalogue()[name].bounds

@@ -67,7 +67,7 @@ def test_the_command_itself_exits_with_2(tmp_path: Path) -> None:
         "--out",
         str(tmp_path / "o.csv"),
     ]
-    done = subprocess.run(words, capture_output=True, text=True)
+    done = subprocess.run(words, capture_output=True, text=True, cwd=Path(__file__).parents[3])
     assert done.returncode == 2
     assert "none.csv" in done.stderr
     assert len(done.stderr.splitlines()) == 1
@@ -76,7 +76,7 @@ def test_the_command_itself_exits_with_2(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("", "no entry"),
+        ("", "not JSON"),
         ("{}", "no entry"),
         ('{"robot": {"groups": {}, "time_scale_s": 1}, "first_direction": 1, "dwell_bar": []}', "no entry"),
         ("not json", "not JSON"),
@@ -88,7 +88,9 @@ def test_replay_refuses(text: str, expected: str, tmp_path: Path, capsys: pytest
     plan = tmp_path / "plan.json"
     plan.write_text(text)
     assert run_command(main, ["replay", str(plan), "--out", str(tmp_path / "t.csv")]) == 2
-    assert (expected in capsys.readouterr().err) or text == ""
+    error = capsys.readouterr().err
+    assert expected in error
+    assert len(error.splitlines()) == 1
     assert [p.name for p in tmp_path.iterdir()] == ["plan.json"]
 
 

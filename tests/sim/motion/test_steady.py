@@ -86,6 +86,7 @@ def test_batch_equals_one_by_one() -> None:
                 assert getattr(alone, name)[0] == pytest.approx(getattr(together, name)[i], rel=close)
 
 
+@pytest.mark.slow
 def test_time_stepping_from_rest_reaches_the_same_motion() -> None:
     """Over the sweep's domain; the tolerance is the error of stepping on 24 edges."""
     points = sweep_points(32)
@@ -123,6 +124,7 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
     assert 0 < motion.error[0] < 0.01
 
 
+@pytest.mark.slow
 def test_a_quick_turn_is_followed_from_rest() -> None:
     """Both robots turn fast beside their discs; straight tails take one of them to another motion."""
     size = {"l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2, "omega_bar": 117.0}

@@ -75,12 +75,14 @@ def test_a_slow_tail_sags_like_a_cantilever_at_every_phase() -> None:
         assert abs(across) < 1e-6
 
 
+@pytest.mark.slow
 def test_time_stepping_reaches_the_same_loads() -> None:
     force, moment, _, _ = loads(EDGES, 8.0)
     assert force == pytest.approx(FILAMENT[8.0][0], rel=6e-3)
     assert moment == pytest.approx(FILAMENT[8.0][1], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_force_converges_at_second_order_in_edges() -> None:
     """Differences between successive meshes fall by four."""
     forces = [loads(edges, 8.0)[:2] for edges in (8, 16, 32)]
@@ -89,6 +91,7 @@ def test_force_converges_at_second_order_in_edges() -> None:
         assert order > 1.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drag_number", list(LINEAR_FILAMENT))
 def test_thrust_matches_linear_theory(drag_number: float) -> None:
     """A small offset a: thrust/[(ζ⊥ − ζ∥) ω a²] and tip offset/a depend on S = ζ⊥ ω alone."""

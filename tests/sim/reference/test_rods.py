@@ -94,6 +94,7 @@ def cantilever(alpha: float, n: int) -> tuple[float, float]:
     return float(tip[0]), float(1 + tip[2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alpha", list(ELASTICA))
 def test_elastica(alpha: float) -> None:
     w, u = cantilever(alpha, N_EDGES)
@@ -101,6 +102,7 @@ def test_elastica(alpha: float) -> None:
     assert u == pytest.approx(ELASTICA[alpha][1], rel=5e-3)
 
 
+@pytest.mark.slow
 def test_elastica_converges_at_second_order() -> None:
     exact = ELASTICA[2.0][0]
     errors = [abs(cantilever(2.0, n)[0] - exact) for n in (6, 12)]

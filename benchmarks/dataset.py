@@ -1,0 +1,170 @@
+"""Data sets: what the engine costs beside the simulation, what a row takes on disk, how fast rows are read.
+
+1. Rows a second of one core, and the engine's processor time over that of the bare simulation.
+2. Bytes a row by encoding: Parquet as it comes, without dictionaries, numbers split into streams of bytes.
+3. A million synthetic rows: stored, joined, opened, scanned, read.
+4. What 10⁶ and 10⁸ rows take on n cores, by the measured cost.
+
+Usage: python -m benchmarks.dataset [--rows N]
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from dataset.design import load_design
+from dataset.pieces import SEGMENT
+from dataset.store import batches, read, read_manifest
+from dataset.sweep import build
+from sim.motion.batches import available_jobs
+from tests.dataset import sweeps
+
+ROWS = 2048
+_BARE = """
+import sys
+from dataset.design import load_design
+from dataset.simulate import simulate
+from sim.motion.batches import one_thread
+with one_thread():
+    simulate(load_design("sweep.toml").points(0, int(sys.argv[1])))
+"""
+_ENGINE = """
+import sys
+from dataset.design import load_design
+from dataset.sweep import build
+build(load_design("sweep.toml").with_rows(int(sys.argv[1])), sys.argv[2], title="")
+"""
+
+
+def processor_seconds(code: str, *words: str) -> float:
+    """Processor time of a process and of all that it starts, however they are related."""
+    with TemporaryDirectory() as folder:
+        log = Path(folder, "spent")
+        # every process adds its own time to the file when it ends, workers included
+        environment = {**os.environ, "SPENT": str(log), "PYTHONPATH": os.pathsep.join([folder, *sys.path])}
+        Path(folder, "sitecustomize.py").write_text(_SPENT)
+        subprocess.run([sys.executable, "-c", code, *words], env=environment, check=True)
+        time.sleep(1.0)
+        last: dict[str, float] = {}
+        for line in log.read_text().splitlines():
+            process, seconds = line.split()
+            last[process] = float(seconds)
+        return sum(last.values())
+
+
+# Workers are killed in the end, so each writes what it has used so far, ten times a second.
+_SPENT = """
+import os, threading, time
+def _write():
+    while True:
+        with open(os.environ["SPENT"], "a") as log:
+            log.write(f"{os.getpid()} {time.process_time()}\\n")
+        time.sleep(0.1)
+def _start():
+    threading.Thread(target=_write, daemon=True).start()
+_start()
+os.register_at_fork(after_in_child=_start)
+"""
+
+
+def overhead(rows: int) -> float:
+    """Prints the engine's overhead; returns seconds a row of the bare simulation."""
+    bare = processor_seconds(_BARE, str(rows))
+    with TemporaryDirectory() as folder:
+        engine = processor_seconds(_ENGINE, str(rows), f"{folder}/out")
+        cost = float(read_manifest(f"{folder}/out")["cost_s"])
+    print(f"{rows} rows of sweep.toml, processor seconds, start and imports included")
+    print(f"  bare simulation in one process   {bare:8.1f}   {rows / bare:.1f} rows/s a core")
+    print(
+        f"  engine, {available_jobs()} workers                {engine:8.1f}   {100 * (engine / bare - 1):+.1f} %"
+    )
+    print(f"  … of which the rows themselves   {cost:8.1f}")
+    return cost / rows
+
+
+def encodings() -> None:
+    """Prints bytes a row of simulated and synthetic rows, by encoding."""
+    with TemporaryDirectory() as folder:
+        build(load_design("sweep.toml").with_rows(512), f"{folder}/out", title="")
+        rows = pa.Table.from_batches(list(batches(f"{folder}/out")))
+        whole = Path(folder, "out/rows").iterdir().__next__().stat().st_size
+    numbers = [field.name for field in rows.schema if pa.types.is_floating(field.type)]
+    print(f"\nBytes a row, {len(rows)} simulated rows ({whole / len(rows):.0f} with the footer)")
+    choices: dict[str, dict[str, Any]] = {
+        "as it comes (snappy)": {},
+        "zstd": {"compression": "zstd"},
+        "zstd, no dictionary": {"compression": "zstd", "use_dictionary": ["reason"]},
+        "zstd, numbers split": {
+            "compression": "zstd", "use_dictionary": ["reason"], "use_byte_stream_split": numbers,
+        },
+        "zstd 9, numbers split": {
+            "compression": "zstd", "compression_level": 9, "use_dictionary": ["reason"],
+            "use_byte_stream_split": numbers,
+        },
+    }  # fmt: skip
+    for name, options in choices.items():
+        sink = io.BytesIO()
+        pq.write_table(rows, sink, **options)
+        group = pq.ParquetFile(sink).metadata.row_group(0)
+        pages = sum(group.column(i).total_compressed_size for i in range(group.num_columns))
+        print(f"  {name:24} {pages / len(rows):6.1f}")
+
+
+def reading(rows: int) -> None:
+    """Prints times of storing and reading many synthetic rows."""
+    with TemporaryDirectory() as folder:
+        out = f"{folder}/out"
+        spent = _timed(lambda: build(sweeps.design(rows), out, title="", simulate=sweeps.invented))
+        files = sorted(Path(out, "rows").iterdir())
+        size = sum(path.stat().st_size for path in files)
+        print(f"\n{rows} synthetic rows: {len(files)} files, {size / rows:.1f} bytes a row")
+        print(f"  made, stored and joined          {spent:6.2f} s")
+        print(f"  manifest opened and checked      {_timed(lambda: read_manifest(out)):6.2f} s")
+        two = ["omega_bar", "omega_yr_bar"]
+        print(f"  two columns scanned, all checked {_timed(lambda: [None for _ in batches(out, two)]):6.2f} s")
+        print(f"  all rows read into pandas        {_timed(lambda: read(out)):6.2f} s")
+        print(f"  unchanged build                  {_timed(lambda: _again(rows, out)):6.2f} s")
+
+
+def _again(rows: int, out: str) -> None:
+    build(sweeps.design(rows), out, title="", simulate=sweeps.invented)
+
+
+def projection(cost: float) -> None:
+    """Prints what long sweeps take."""
+    print(f"\nProjected from {1e3 * cost:.1f} ms a row")
+    for rows in (10**6, 10**8):
+        hours = [f"{cost * rows / cores / 3600:.3g} h on {cores}" for cores in (2, 64, 1024)]
+        print(f"  {rows:.0e} rows: {-(-rows // SEGMENT)} files; {', '.join(hours)} cores")
+
+
+def _timed(work: Callable[[], object]) -> float:
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
+def main(words: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description="Benchmarks of data sets.")
+    parser.add_argument("--rows", type=int, default=ROWS, help=f"rows that are simulated (default: {ROWS})")
+    rows = parser.parse_args(words).rows
+    cost = overhead(rows)
+    encodings()
+    reading(SEGMENT)
+    projection(cost)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,12 @@
+"""The toy robot in place of the simulator, for the tests that ask for it."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.calibration.toy_tables import install_toy
+
+
+@pytest.fixture
+def toy_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    install_toy(monkeypatch)

@@ -1,0 +1,108 @@
+"""The engine on a model that is no robot: beads that fall in a vessel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calibration.examples.spheres import Spheres
+from calibration.fit import fit
+from calibration.loop import calibrate, verdict_record
+from calibration.model import Runs, start_values
+from calibration.noise import Noise
+from calibration.profile import profile_intervals
+
+
+def falls(diameter: np.ndarray, session: np.ndarray, truth: dict[str, float], seed: int, noise: float) -> Spheres:
+    """Falls of beads of `diameter` (n,) in glycerine in the rounds `session` (n,), drawn from a truth."""
+    runs = Runs(
+        outputs=("v",), y=np.zeros((len(diameter), 1)), condition=np.unique(diameter, return_inverse=True)[1],
+        session=session, session_names=tuple(f"round {i + 1}" for i in range(session.max() + 1)),
+        inputs=np.log(diameter)[:, None], input_names=("ln d",), rows=np.arange(len(diameter)),
+        set_aside=(), limits=(),
+    )  # fmt: skip
+    model = Spheres(runs, diameter)
+    speed = model.predict([{"viscosity": 1.3, "wall": 0.0, "inertia": 0.0, **truth}])[0]
+    drawn = speed + np.random.default_rng(seed).normal(scale=noise, size=speed.shape)
+    return replace(model, runs=replace(runs, y=drawn))
+
+
+def spheres(wall: float, inertia: float, seed: int, diameters: np.ndarray, *, noise: float = 0.02) -> Spheres:
+    """Five rounds of falls, a fall a bead."""
+    session = np.repeat(np.arange(5), len(diameters))
+    return falls(np.tile(diameters, 5), session, {"wall": wall, "inertia": inertia}, seed, noise)
+
+
+def with_more_falls(
+    model: Spheres, diameter: np.ndarray, truth: dict[str, float], seed: int, noise: float
+) -> Spheres:
+    """The measured falls and further ones (m,), spread over the five rounds."""
+    session = np.concatenate([model.runs.session, np.arange(len(diameter)) % 5])
+    both = falls(np.concatenate([model.diameter, diameter]), session, truth, seed, noise)
+    y = np.concatenate([model.runs.y, both.runs.y[len(model.runs) :]])
+    return replace(both, runs=replace(both.runs, y=y))
+
+
+@pytest.mark.slow
+def test_the_engine_closes_a_model_that_is_no_robot() -> None:
+    beads = np.array([1.5, 2.5, 3.5, 5.0, 7.0, 9.0]) / 1000
+    assert calibrate(spheres(0.0, 0.0, 0, beads), progress=False).verdict == "none"
+    results = [calibrate(spheres(1.0, 0.0, seed, beads), progress=False) for seed in range(1, 9)]
+    assert sum(r.effects == ("wall",) for r in results) >= 7
+    intervals = [r.final.interval("wall") for r in results if r.effects == ("wall",)]
+    assert sum(low < 1.0 < high for low, high in intervals) >= len(intervals) - 2
+    assert np.mean([r.error_after / r.noise_ceiling for r in results]) < 1.15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("truth", [{"wall": 1.0}, {"inertia": 5.0}], ids=["wall", "inertia"])
+def test_twins_are_called_ambiguous_and_the_next_runs_tell_them_apart(truth: dict[str, float]) -> None:
+    """Small beads alone do not tell the wall from inertia; the beads asked for do, more small ones do not."""
+    beads, noise = np.array([3.0, 4.0, 5.0, 5.5]) / 1000, 0.01
+    told_apart, still_twins = 0, 0
+    for seed in range(6):
+        model = spheres(truth.get("wall", 0.0), truth.get("inertia", 0.0), seed, beads, noise=noise)
+        result = calibrate(model, progress=False)
+        assert result.verdict == "ambiguous"
+        assert set(result.effects) == {"wall", "inertia"}
+        assert [len(c.beside) for c in result.explaining] == [0, 0]
+        assert "wall of the vessel" in result.sentence
+        assert "inertia of the fluid" in result.sentence
+        wanted = result.next_runs
+        assert [r.separation for r in wanted] == sorted((r.separation for r in wanted), reverse=True)
+        assert wanted[0].settings["d_mm"] > 5.5
+        assert all(0.5 < r.decides <= 1 for r in wanted)
+        assert verdict_record(result, table="t")["next_runs"] == [r.record() for r in wanted]
+        diameter = np.concatenate([np.full(r.repeats, r.settings["d_mm"] / 1000) for r in wanted])
+        after = calibrate(with_more_falls(model, diameter, truth, 100 + seed, noise), progress=False)
+        told_apart += after.effects == tuple(truth)
+        assert after.effects == tuple(truth) or after.verdict == "ambiguous"
+        assert (after.next_runs == ()) == (after.verdict != "ambiguous")
+        more = calibrate(
+            with_more_falls(model, np.resize(beads, len(diameter)), truth, 100 + seed, noise), progress=False
+        )
+        still_twins += more.verdict == "ambiguous"
+    assert told_apart >= 5
+    assert still_twins >= 4
+
+
+def test_a_profile_interval_sees_that_the_model_bends() -> None:
+    """Falling spheres: ln v against inertia is concave, so the upper side of its interval is the longer one."""
+    model = spheres(0.0, 1.0, 5, np.array([3.0, 5.0, 7.0, 9.0]) / 1000)
+    every = np.ones(20, bool)
+    fitted = fit(model, start_values(model), ("viscosity", "inertia"), every)
+    low, high = profile_intervals(model, fitted, every)["inertia"]
+    middle = fitted.parameters["inertia"]
+    assert high - middle > middle - low
+    # The deviance at the ends, by brute force over the viscosity, has risen alike on both sides.
+    white = Noise(fitted.noise.run, fitted.noise.share).whitener(model.runs.session)
+
+    def deviance(inertia: float) -> float:
+        grid = [{"viscosity": v, "wall": 0.0, "inertia": inertia} for v in np.linspace(0.8, 1.8, 2001)]
+        residual = model.runs.y - model.predict(grid)
+        return float(min((white(r) ** 2).sum() for r in residual))
+
+    rises = [deviance(end) - deviance(middle) for end in (low, high)]
+    assert rises[0] == pytest.approx(rises[1], rel=0.25)

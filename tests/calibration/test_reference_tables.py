@@ -1,0 +1,70 @@
+"""Tables that come with the tests: each closes with the verdict of what was hidden in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from calibration.loop import calibrate
+from calibration.measurements import read_measurements
+from calibration.report import write_report
+from calibration.swimmer import Swimmer
+from calibration.verdict import Verdict
+from sim.inputs import load_robot
+from tests.reference.make import GIVEN, HERE, TABLES
+
+pytestmark = pytest.mark.slow
+
+
+def closed(name: str) -> Verdict:
+    data = read_measurements(HERE / f"{name}.csv")
+    return calibrate(Swimmer(load_robot(HERE / "robot.toml"), data), progress=False)
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_the_files_are_what_make_writes(name: str) -> None:
+    assert load_robot(HERE / "robot.toml") == GIVEN
+    pd.testing.assert_frame_equal(pd.read_csv(HERE / f"{name}.csv"), TABLES[name](), rtol=1e-4, check_dtype=False)
+
+
+def test_nothing_is_missing() -> None:
+    result = closed("none")
+    assert result.verdict == "none"
+    assert result.effects == ()
+    for name, truth in {"C_t": 3.1, "C_r": 2.4, "C_yr": 4.4}.items():
+        assert result.final.parameters[name] == pytest.approx(truth, rel=0.1)
+
+
+def test_one_effect_is_named_and_sized() -> None:
+    result = closed("effect")
+    assert result.verdict == "effect"
+    assert result.effects == ("end_over_end_drag",)
+    low, high = result.final_intervals["end_over_end_drag"]
+    assert low < 5.0 < high
+    assert result.error_after < 1.25 * result.noise_ceiling < result.error_before
+
+
+def test_what_no_effect_does_is_left_unexplained() -> None:
+    result = closed("unexplained")
+    assert result.verdict == "unexplained"
+    assert result.effects == ()
+    assert "no effect and no pair" in result.sentence
+
+
+def test_rivals_are_all_named_with_the_runs_that_would_tell_them_apart(tmp_path: Path) -> None:
+    """The verdict, the first rival's size, and the page that a lab reads."""
+    data = read_measurements(HERE / "ambiguous.csv")
+    result = calibrate(Swimmer(load_robot(HERE / "robot.toml"), data), progress=False)
+    assert result.verdict == "ambiguous"
+    assert "tail_spin_drag" in result.effects
+    assert len(result.effects) > 1
+    assert result.next_runs
+    page = tmp_path / "report.html"
+    write_report(result, data, page, title="t")
+    text = page.read_text()
+    assert "Runs to make next" in text
+    for run in result.next_runs:
+        for value in run.settings.values():
+            assert str(value) in text

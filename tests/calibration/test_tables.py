@@ -1,0 +1,196 @@
+"""Tables as people bring them: refused, mended, or closed with a weaker conclusion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from calibration.locked import middle_session
+from calibration.loop import calibrate, verdict_record
+from calibration.measurements import read_measurements
+from calibration.noise import SESSION_SHARE
+from calibration.protocols import PROTOCOLS
+from calibration.swimmer import Swimmer
+from sim.io.errors import InputError, run_command
+from tests.calibration import toy
+from tests.calibration.toy_tables import START, closed, toy_table
+
+
+@pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda t: t.drop(columns="omega_rpm"), "no column 'omega_rpm'"),
+        (lambda t: t.assign(omega_h_rad_s=1), "unknown column 'omega_h_rad_s': is it '"),
+        (lambda t: t.drop(columns=["omega_yr_rad_s", "R_yr_cm", "theta_deg"]), "at least two outputs"),
+        (lambda t: t.drop(columns=["omega_h_rpm", "omega_t_rpm", "R_yr_cm", "theta_deg"]), "at least two outputs"),
+        (lambda t: t.head(10), "usable runs"),
+        (lambda t: t[t["trial"] == 1], "repeated runs|usable runs"),
+        (lambda t: t.assign(omega_h_rpm=-t["omega_h_rpm"]), "wrong sign"),
+        (lambda t: t.assign(omega_yr_rad_s=0.05 * np.sign(t["omega_rpm"])), "does not differ between repeats"),
+        (lambda t: t.assign(R_yr_cm=1000 * t["R_yr_cm"]), "check its unit"),
+        (lambda t: t.head(3), "3 usable runs"),
+        (lambda t: t.assign(R_yr_cm="far"), "0 usable runs"),
+    ],
+)
+def test_bad_tables_are_refused(
+    change: object, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import re
+
+    from calibration.__main__ import main
+
+    table = change(toy_table(1))  # type: ignore[operator]
+    table.to_csv(tmp_path / "t.csv", index=False)
+    words = ["calibrate", str(tmp_path / "t.csv"), "--robot", "paper-measured", "--out", str(tmp_path / "out")]
+    assert run_command(main, words) == 2
+    error = capsys.readouterr().err.splitlines()
+    assert len(error) == 1
+    assert re.search(expected, error[0])
+    assert not (tmp_path / "out").exists()
+
+
+def test_bad_rows_are_named_and_set_aside(toy_model: None) -> None:
+    table = toy_table(2).astype({"omega_yr_rad_s": object})
+    table.loc[0, "omega_yr_rad_s"] = "fast"
+    table.loc[1, "theta_deg"] = np.nan
+    table.loc[2, "omega_h_rpm"] *= -1
+    data = read_measurements(table)
+    assert len(data) == len(table) - 3
+    assert [line.split(":")[0] for line in data.set_aside] == ["row 1", "row 2", "row 3"]
+    assert read_measurements(table.assign(colour="red")).set_aside[-1] == "column colour: not known, left out"
+    with pytest.raises(InputError, match="unknown"):
+        read_measurements(table.rename(columns={"trial": "tri al"}))
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize("names", [("one",), ("one", "two")])
+def test_few_sessions_give_a_weaker_conclusion(names: tuple[str, ...]) -> None:
+    table = toy_table(5, end_over_end_drag=5.0)
+    table["session"] = [names[i % len(names)] for i in range(len(table))]
+    data = read_measurements(table)
+    locked = middle_session(data)
+    assert 0.15 < locked.mean() < 0.35
+    within = table["session"].to_numpy()
+    for condition in np.unique(data.condition):
+        for name in names:  # repeats of a session stay together
+            assert len(set(locked[(data.condition == condition) & (within == name)])) <= 1
+    result = closed(table)
+    assert result.effects == ("end_over_end_drag",)
+    assert any(f"{len(names)} session" in limit for limit in result.limits)
+    assert "block" in result.locked
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_two_sessions_kept_whole_are_not_called_blocks() -> None:
+    """The paper's protocol locks N = 2 and 5; where these are a session, none is divided."""
+    table = toy_table(5)
+    table["session"] = np.where(table["N"].isin((3, 4)), "inner", "outer")
+    data, locked = PROTOCOLS["paper"](read_measurements(table))
+    result = calibrate(Swimmer(START, data, solver=toy.SOLVER), locked=locked, progress=False)
+    assert result.locked == "outer"
+    assert not any("sessions only" in limit for limit in result.limits)
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_what_shifts_all_runs_of_a_single_session_is_no_evidence() -> None:
+    shifted = toy_table(5).assign(session="one")
+    shifted["R_yr_cm"] *= 1.03
+    shifted["omega_h_rpm"] *= 0.98
+    result = closed(shifted)
+    assert result.verdict == "none"
+    assert result.base.noise.share == SESSION_SHARE
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
+    table = pd.concat([t[t["N"] == 3] for t in (toy_table(5), toy_table(6))])
+    result = closed(table)
+    assert result.verdict == "none"
+    assert [("N = 3" in limit, "1 session only" in limit) for limit in result.limits] == [
+        (True, False),
+        (False, True),
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize(
+    "kept", [("omega_h_rpm", "omega_yr_rad_s"), ("R_yr_cm", "theta_deg"), ("omega_t_rpm", "omega_yr_rad_s")]
+)
+def test_any_two_outputs_are_enough(kept: tuple[str, str]) -> None:
+    table = toy_table(5, end_over_end_drag=5.0)
+    outputs = [
+        c for c in ("omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm", "theta_deg") if c not in kept
+    ]
+    result = closed(table.drop(columns=outputs))
+    assert result.verdict in {"effect", "ambiguous"}
+    assert "end_over_end_drag" in result.effects
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_a_slipped_decimal_point_is_named_and_set_aside() -> None:
+    """The run, not its repeat; and the verdict is that of the table without it."""
+    table = toy_table(12)
+    table.loc[17, "omega_yr_rad_s"] *= 10
+    result = closed(table)
+    assert [line.split(" is ")[0] for line in result.set_aside] == ["row 18: omega_yr"]
+    assert not result.used[17]
+    without = closed(table.drop(index=17))
+    assert result.verdict == without.verdict
+    assert result.noise_ceiling == pytest.approx(without.noise_ceiling, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("toy_model")
+def test_noise_and_missing_effects_are_no_gross_errors() -> None:
+    assert closed(toy_table(13, end_over_end_drag=5.0)).set_aside == ()
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_an_output_that_follows_from_others_is_counted_once() -> None:
+    table = toy_table(14)
+    table["v_cm_s"] = table["R_yr_cm"] * table["omega_yr_rad_s"].abs()
+    data = read_measurements(table)
+    assert "v" not in data.outputs
+    assert any("v_cm_s: follows from" in line for line in data.set_aside)
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_runs_of_one_robot_give_a_weaker_conclusion_that_is_stated() -> None:
+    table = toy_table(15)
+    table = pd.concat([table[table["N"] == 3]] * 2, ignore_index=True)
+    table["session"] = np.repeat(["a", "b", "c", "d"], len(table) // 4)
+    noise = np.random.default_rng(0).normal(scale=0.02, size=len(table))
+    table["omega_yr_rad_s"] *= np.exp(noise)
+    result = closed(table)
+    assert any("N = 3" in line for line in result.limits)
+    assert verdict_record(result, table="t")["limits"] == list(result.limits)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("toy_model")
+def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five() -> None:
+    data, locked = PROTOCOLS["paper"](read_measurements(toy_table(16, end_over_end_drag=5.0)))
+    assert data.outputs == ("omega_h", "omega_yr")
+    assert set(data.tails[locked]) == {2.0, 5.0}
+    result = calibrate(Swimmer(START, data, solver=toy.SOLVER), locked=locked, progress=False)
+    assert result.locked == "N=2, N=5"
+    assert "end_over_end_drag" in result.effects
+    assert result.error_after < 0.5 * result.error_before
+    with pytest.raises(InputError, match="N = 2, 3, 4 and 5"):
+        PROTOCOLS["paper"](read_measurements(toy_table(16).query("N != 5")))
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_a_table_may_be_parquet(tmp_path: Path) -> None:
+    table = toy_table(18)
+    table.to_parquet(tmp_path / "table.parquet")
+    assert read_measurements(tmp_path / "table.parquet").y == pytest.approx(read_measurements(table).y)
+    (tmp_path / "broken.parquet").write_text("no table")
+    with pytest.raises(InputError, match="no Parquet table"):
+        read_measurements(tmp_path / "broken.parquet")

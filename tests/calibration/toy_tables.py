@@ -1,0 +1,47 @@
+"""Tables by the toy robot, and their verdicts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+
+import calibration.synthetic
+import sim.motion.batches
+from calibration.loop import Verdict, calibrate
+from calibration.measurements import read_measurements
+from calibration.swimmer import DIRECT, Swimmer
+from calibration.synthetic import make_table
+from sim.model.presets import PRESETS
+from sim.model.robot import Robot
+from tests.calibration import toy
+
+START = PRESETS["paper-measured"]
+TRUTH = replace(START, C_t=3.1, C_r=2.4, C_yr=4.4)
+
+
+def install_toy(patch: pytest.MonkeyPatch) -> None:
+    """The toy in place of the simulator: for tables, and for every Swimmer that is not told otherwise."""
+    own = Swimmer.__init__.__defaults__
+    patch.setattr(Swimmer.__init__, "__defaults__", tuple(toy.SOLVER if d is DIRECT else d for d in own))
+    patch.setattr(calibration.synthetic, "stepped_columns", toy.steady_columns)
+    patch.setattr(Swimmer, "guess", lambda model, start, used: start)
+    for name in ("steady", "sensitivities", "settle"):  # what all of the simulator's batches call
+        patch.setattr(sim.motion.batches, name, refuse_to_simulate)
+
+
+def refuse_to_simulate(*_: object, **__: object) -> None:
+    raise AssertionError("a test on the toy simulated")
+
+
+def toy_table(seed: int, *, lengths_cm: tuple[float, ...] = (5.0, 8.0, 11.0), **effects: float) -> pd.DataFrame:
+    return make_table(replace(TRUTH, effects=effects), seed=seed, lengths_cm=lengths_cm, title="")
+
+
+def toy_swimmer(table: pd.DataFrame, robot: Robot = START) -> Swimmer:
+    return Swimmer(robot, read_measurements(table), solver=toy.SOLVER)
+
+
+def closed(table: pd.DataFrame, seed: int = 0) -> Verdict:
+    return calibrate(toy_swimmer(table), seed=seed, progress=False)

@@ -1,0 +1,230 @@
+"""dask and ray as separate processes: the rows are loky's, bit for bit, whatever is killed meanwhile."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dataset import engine
+from dataset.store import read
+from dataset.sweep import UnfinishedError, build
+from sim.io.errors import InputError
+from tests.dataset import sweeps
+from tests.dataset.sweeps import MARKS, ROOT, design, invented
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning"),
+]
+Head = tuple[str, Callable[[], None]]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
+
+
+@pytest.fixture(autouse=True)
+def _no_marks() -> None:
+    for mark in MARKS.iterdir():
+        mark.unlink()
+
+
+@pytest.fixture(scope="module")
+def calm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("calm") / "out"
+    build(design(200), folder, jobs=1, title="", simulate=invented)
+    return folder
+
+
+def free_port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
+def until(true: Callable[[], Any]) -> None:
+    while not true():
+        time.sleep(0.05)
+
+
+class Dask:
+    """A scheduler and two workers, each its own process."""
+
+    def __init__(self, folder: Path):
+        self.folder, self.port = folder, free_port()
+        self.address = f"tcp://127.0.0.1:{self.port}"
+        words = ("scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard")
+        self.scheduler = self._start(*words)
+        self.workers = [self.add_worker(), self.add_worker()]
+
+    def _start(self, *words: str) -> subprocess.Popen[bytes]:
+        with open(self.folder / "dask.log", "ab") as log:
+            command = [sys.executable, "-m", "distributed.cli.dask_" + words[0], *words[1:]]
+            return subprocess.Popen(
+                command, cwd=self.folder, env=ENVIRONMENT, stdout=log, stderr=log, start_new_session=True
+            )
+
+    def add_worker(self, *words: str) -> subprocess.Popen[bytes]:
+        """A worker under a nanny, which starts it again where it dies."""
+        return self._start("worker", self.address, "--nthreads", "1", "--no-dashboard", *words)
+
+    def stop(self) -> None:
+        for process in (*self.workers, self.scheduler):
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)  # with what it has started
+            process.wait()
+
+
+@pytest.fixture
+def dask(tmp_path: Path) -> Iterator[Dask]:
+    pytest.importorskip("distributed", reason="the extra dask is not installed")
+    cluster = Dask(tmp_path)
+    until(lambda: (tmp_path / "dask.log").read_bytes().count(b"Registered to") == 2)
+    yield cluster
+    cluster.stop()
+
+
+def test_dask_makes_the_same_rows(dask: Dask, calm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    build(design(200), "out", backend="dask", address=dask.address, title="", simulate=invented)
+    assert read(tmp_path / "out").equals(read(calm))
+    monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", dask.address)
+    build(design(200), "again", backend="dask", title="", simulate=sweeps.slow)
+    assert read(tmp_path / "again").equals(read(calm))
+    assert os.getpid() not in {int(mark.name.rsplit("-", 1)[1]) for mark in MARKS.iterdir()}
+
+
+def test_dask_replaces_killed_workers(dask: Dask, calm: Path, tmp_path: Path) -> None:
+    build(
+        design(200), tmp_path / "out", backend="dask", address=dask.address, title="", simulate=sweeps.killing_once
+    )
+    assert read(tmp_path / "out").equals(read(calm))
+    assert {mark.name.split("-")[-2] for mark in MARKS.iterdir()} >= {"0", "1"}
+
+
+def test_dask_sets_a_poisonous_chunk_aside(dask: Dask, tmp_path: Path) -> None:
+    with pytest.raises(UnfinishedError, match=r"rows \d+ to \d+ \(its worker died 3 times"):
+        build(
+            design(200), tmp_path / "out", backend="dask", address=dask.address, title="",
+            simulate=sweeps.poisonous,
+        )  # fmt: skip
+    assert len(list((tmp_path / "out" / "pending").iterdir())) == 7
+
+
+def test_dask_goes_on_when_a_nanny_is_killed(dask: Dask, calm: Path, tmp_path: Path) -> None:
+    process = build_apart(tmp_path / "out", "slow", "dask", dask.address)
+    until(lambda: len(list(MARKS.iterdir())) >= 2)
+    dask.workers[0].kill()
+    assert process.communicate()[1] == ""
+    assert process.returncode == 0
+    assert read(tmp_path / "out").equals(read(calm))
+
+
+def test_dask_ends_when_its_scheduler_is_killed(dask: Dask, calm: Path, tmp_path: Path) -> None:
+    process = build_apart(tmp_path / "out", "endless", "dask", dask.address, patience=2)
+    until(lambda: len(list(MARKS.iterdir())) >= 2)
+    dask.scheduler.kill()
+    line = process.communicate()[1]
+    assert process.returncode == 1
+    assert re.search(r"^unfinished: no workers for 2 s: 0 of 200 rows are stored .* go on with", line)
+    assert len(line.splitlines()) == 1
+
+
+def test_without_dask_workers_it_ends_with_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed", reason="the extra dask is not installed")
+    monkeypatch.setattr(engine, "PATIENCE", 1.0)
+    monkeypatch.setattr(Dask, "add_worker", lambda self: subprocess.Popen(["true"]))
+    cluster = Dask(tmp_path)
+    with pytest.raises(UnfinishedError, match="no workers for 1 s"):
+        build(design(9), tmp_path / "out", backend="dask", address=cluster.address, title="", simulate=invented)
+    cluster.stop()
+
+
+def test_no_scheduler_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cluster = pytest.importorskip("dataset.backends.dask_cluster", reason="the extra dask is not installed")
+    monkeypatch.setattr(cluster, "_ANSWERS", 1.0)
+    for address in (f"tcp://127.0.0.1:{free_port()}", "nonsense://x", "127.0.0.1:http"):
+        with pytest.raises(InputError, match="no dask scheduler"):
+            build(design(9), tmp_path / "out", backend="dask", address=address, title="", simulate=invented)
+
+
+def build_apart(
+    folder: Path, rows_by: str, backend: str, address: str, *, patience: float = 60
+) -> subprocess.Popen[str]:
+    code = (
+        "import sys, dataset.engine; from tests.dataset.sweeps import *; from dataset.sweep import *; "
+        f"from dataset.__main__ import _ended; dataset.engine.PATIENCE = {patience}; "
+        f"_ended(lambda: build(design(200), {str(folder)!r}, backend={backend!r}, address={address!r}, title='', "
+        f"simulate={rows_by}))"
+    )
+    return subprocess.Popen(
+        [sys.executable, "-c", code], env=ENVIRONMENT, cwd=ROOT, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def ray(tmp_path: Path) -> Iterator[Head]:
+    """Address of a ray head with two processors, and how to kill it with all that it has started."""
+    pytest.importorskip("ray", reason="the extra ray is not installed")
+    port, log = free_port(), tmp_path / "ray.log"
+    words = ["start", "--head", "--block", "--port", str(port), "--num-cpus", "2", "--include-dashboard", "false"]
+    code = "import sys; from ray.scripts.scripts import main; sys.exit(main())"
+    with open(log, "wb") as file:
+        head = subprocess.Popen(
+            [sys.executable, "-c", code, *words, "--object-store-memory", "100000000"],
+            env={**ENVIRONMENT, "RAY_USAGE_STATS_ENABLED": "0"}, stdout=file, stderr=file, start_new_session=True,
+        )  # fmt: skip
+    until(lambda: b"Ray runtime started" in log.read_bytes() or head.poll() is not None)
+    assert head.poll() is None, log.read_text()
+
+    def kill() -> None:
+        with suppress(ProcessLookupError):
+            os.killpg(head.pid, signal.SIGKILL)
+        head.wait()
+
+    yield f"127.0.0.1:{port}", kill
+    kill()
+
+
+def test_ray_ends_when_its_head_is_killed(ray: Head, tmp_path: Path) -> None:
+    process = build_apart(tmp_path / "out", "endless", "ray", ray[0], patience=2)
+    until(lambda: len(list(MARKS.iterdir())) >= 2)
+    ray[1]()
+    line = process.communicate()[1].strip().splitlines()[-1]
+    assert re.search(r"^unfinished: no workers for 2 s: 0 of 200 rows are stored .* go on with", line)
+    assert process.returncode == 1
+
+
+def test_ray_makes_the_same_rows(ray: Head, calm: Path, tmp_path: Path) -> None:
+    process = build_apart(tmp_path / "out", "killing_once", "ray", ray[0])
+    _, words = process.communicate()
+    assert process.returncode == 0, words
+    assert read(tmp_path / "out").equals(read(calm))
+    assert {mark.name.split("-")[-2] for mark in MARKS.iterdir()} >= {"0", "1"}
+
+
+def test_ray_sets_a_poisonous_chunk_aside_and_stops_when_told(ray: Head, tmp_path: Path) -> None:
+    process = build_apart(tmp_path / "out", "poisonous", "ray", ray[0])
+    line = process.communicate()[1].strip().splitlines()[-1]
+    assert re.search(r"rows \d+ to \d+ \(its worker died 3 times", line)
+    assert process.returncode == 1
+    stopped = build_apart(tmp_path / "stopped", "endless", "ray", ray[0])
+    until(lambda: any("endless" in mark.name for mark in MARKS.iterdir()))
+    stopped.send_signal(signal.SIGINT)
+    assert stopped.communicate()[1].strip().splitlines()[-1].startswith("stopped: 0 of 200 rows")
+    assert stopped.returncode == 130
+
+
+def test_no_ray_there(tmp_path: Path) -> None:
+    pytest.importorskip("ray", reason="the extra ray is not installed")
+    with pytest.raises(InputError, match="no ray cluster answers"):
+        build(design(9), tmp_path / "out", backend="ray", address=f"127.0.0.1:{free_port()}", title="")

@@ -1,0 +1,94 @@
+"""Rows: a row depends on nothing but itself, what fails says why, and nothing asks for more than a row may."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dataset.design import load_design
+from dataset.schema import COST
+from dataset.simulate import NO_RESPONSE, simulate
+from sim.model.presets import PRESETS
+
+CONTROL = {**PRESETS["paper-control"].group_values(), "dwell_bar": 1.2}
+
+
+def rows_of(*changes: dict[str, float]) -> dict[str, np.ndarray]:
+    return {
+        name: np.array([{**CONTROL, **change}[name] for change in changes]) for name in {**CONTROL, **changes[0]}
+    }
+
+
+def bits(columns: dict[str, np.ndarray], row: int) -> dict[str, object]:
+    return {name: values[row].tobytes() for name, values in columns.items() if name != COST}
+
+
+@pytest.mark.slow
+def test_any_batch_and_any_order_give_the_same_bits() -> None:
+    """Robots that fall back to time steps used to take their mesh from the fastest robot of their batch."""
+    points = load_design("sweep.toml").with_rows(24).points()
+    quick = {"C_t": 0.55, "C_r": 0.54, "C_yr": 4.1, "l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2,
+             "omega_bar": 117.0, "N": 6.0, "dwell_bar": 1.0}  # fmt: skip
+    points = {name: np.append(values, quick[name]) for name, values in points.items()}
+    whole = simulate(points)
+    assert whole["reason"][-1]  # it is stepped in time
+    order = np.random.default_rng(2).permutation(25)
+    mixed = simulate({name: values[order] for name, values in points.items()})
+    for place, row in enumerate(order.tolist()):
+        assert bits(mixed, place) == bits(whole, row), row
+    for row in (0, 7, 24):
+        alone = simulate({name: values[row : row + 1] for name, values in points.items()})
+        assert bits(alone, 0) == bits(whole, row), row
+
+
+def test_rows_beyond_their_budget_say_so() -> None:
+    """C_t = C_r = 1e-9 asked for 24 TiB, a dwell of 1e-9 for 1.2e9 flips, ω̄ = 1e-6 for days."""
+    found = simulate(
+        rows_of({"C_t": 1e-9, "C_r": 1e-9}, {"dwell_bar": 1e-9}, {"omega_bar": 1e-6}, {"dwell_bar": 1.2})
+    )
+    assert found["failed"].tolist() == [True, True, True, False]
+    assert all(found["reason"][:3])
+    assert found["reason"][1] == NO_RESPONSE
+    assert found["reason"][3] == ""
+    assert np.isnan(found["omega_yr_bar"][:3]).all()
+    assert found[COST].max() < 60
+
+
+def test_one_to_eight_tails_other_discs_and_a_reversed_motor() -> None:
+    found = simulate(
+        rows_of(
+            {"N": 1.0, "a_over_R": 1.0}, {"N": 8.0, "a_over_R": 1.0}, {"a_over_R": 0.5},
+            {"omega_bar": -10.0, "a_over_R": 1.0}, {"omega_bar": 150.0, "a_over_R": 1.0},
+            {"omega_bar": 10.0, "a_over_R": 1.0},
+        )
+    )  # fmt: skip
+    assert found["converged"].all()
+    assert found["omega_yr_bar"][3] == pytest.approx(-found["omega_yr_bar"][5], rel=1e-9)
+    assert found["net_speed_bar"][3] == pytest.approx(found["net_speed_bar"][5], rel=1e-9)
+
+
+def test_odd_effects_make_the_two_directions_differ() -> None:
+    found = simulate(rows_of(*({"omega_bar": speed, "left_right_bias": 0.05} for speed in (10.0, -10.0))))
+    assert found["converged"].all()
+    assert abs(found["omega_yr_bar"].sum() / found["omega_yr_bar"][0]) > 0.01
+
+
+def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither an orbit nor a time step can be solved."""
+    from sim.motion import run, steady, switching
+    from sim.motion.orbits import Orbits
+    from sim.solve.refinement import NO_START
+
+    def lost(rows: np.ndarray, *_: object, **__: object) -> Orbits:
+        count, none = len(rows), np.full(len(rows), np.nan)
+        return Orbits(np.full((count, 5), np.nan), np.empty((count, 0, 5)), none, np.full(count, NO_START), none)
+
+    monkeypatch.setattr(steady, "solve_orbits", lost)
+    monkeypatch.setattr(switching, "state_on_orbit", lambda *_: None)
+    monkeypatch.setattr(run, "advance", lambda *_: False)
+    columns = simulate(rows_of({"dwell_bar": 1.2}))
+    assert columns["failed"].tolist() == [True]
+    assert columns["converged"].tolist() == [False]
+    assert np.isnan(columns["omega_yr_bar"]).all()
+    assert np.isnan(columns["net_speed_bar"]).all()
+    assert columns["reason"][0]

@@ -1,0 +1,149 @@
+"""Data sets behind URLs: the same files as on a disk, the same refusals."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import dataset.sweep
+from dataset import lock
+from dataset.lock import locked
+from dataset.places import Remote, place
+from dataset.store import batches, read, read_manifest
+from dataset.sweep import build, mend
+from sim.io.errors import InputError
+from tests.dataset.dying import Here
+from tests.dataset.sweeps import ROOT, design, invented
+
+
+def files(address: str) -> dict[str, str]:
+    there = place(address)
+    names = [n for n in there.names() if "." in n] + [f"rows/{name}" for name in there.names("rows")]
+    return {name: hashlib.sha256(there.read(name)).hexdigest() for name in names if name != "card.md"}
+
+
+@pytest.fixture
+def calm(tmp_path: Path) -> Path:
+    build(design(200), tmp_path / "calm", jobs=1, title="", simulate=invented)
+    return tmp_path / "calm"
+
+
+@pytest.fixture
+def memory(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> str:
+    """A folder in the memory of this process, and workers in it."""
+    monkeypatch.setattr(dataset.sweep, "open_backend", lambda *_, **__: Here())
+    return f"memory://{re.sub(r'[^a-z_]', '', request.node.name)}"
+
+
+def test_a_url_holds_the_same_files(memory: str, calm: Path) -> None:
+    build(design(90), memory, title="", simulate=invented)
+    build(design(200), memory, title="", simulate=invented)
+    assert read(memory).equals(read(calm))
+    assert files(memory) == files(str(calm))
+    assert sum(batch.num_rows for batch in batches(memory, ["v_x"])) == 200
+
+
+def test_damage_behind_a_url_is_refused_and_mended(
+    memory: str, calm: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    build(design(200), memory, title="", simulate=invented)
+    there = place(memory)
+    (name,) = there.names("rows")
+    whole = bytes(there.read(f"rows/{name}"))
+    with there.writer(f"rows/{name}") as sink:
+        sink.write(whole[:5000] + bytes([whole[5000] ^ 4]) + whole[5001:])
+    with pytest.raises(InputError, match="digest"):
+        read(memory)
+    there.delete(f"rows/{name}")
+    with pytest.raises(InputError, match="missing"):
+        read(memory)
+    mend(memory, title="")
+    assert read(memory).equals(read(calm))
+
+
+def test_one_writer_behind_a_url(memory: str) -> None:
+    there = place(memory)
+    with locked(there), pytest.raises(InputError, match="is being written by process"):
+        build(design(9), memory, title="", simulate=invented)
+    old = {"host": "elsewhere", "pid": 1, "since": 0, "seen": time.time() - lock.STALE - 1, "token": "x"}
+    there.write(lock.LOCK, json.dumps(old))
+    build(design(9), memory, title="", simulate=invented)  # its owner has not been seen for too long
+    assert there.size(lock.LOCK) is None
+
+
+def test_unknown_urls_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="nonsense"):
+        build(design(9), "nonsense://x/y", title="", simulate=invented)
+
+
+@pytest.fixture
+def bucket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
+    """A bucket of an S3 server of this machine."""
+    pytest.importorskip("s3fs", reason="the extra s3 is not installed")
+    pytest.importorskip("moto", reason="moto is not installed")
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        port = one.getsockname()[1]
+    for name, value in {
+        "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}", "AWS_ACCESS_KEY_ID": "test",
+        "AWS_SECRET_ACCESS_KEY": "test", "AWS_DEFAULT_REGION": "us-east-1",
+    }.items():  # fmt: skip
+        monkeypatch.setenv(name, value)
+    with open(tmp_path / "moto.log", "wb") as log:
+        words = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
+        server = subprocess.Popen(words, stdout=log, stderr=log)
+    while True:
+        with socket.socket() as one:
+            if one.connect_ex(("127.0.0.1", port)) == 0:
+                break
+        assert server.poll() is None, (tmp_path / "moto.log").read_text()
+        time.sleep(0.05)
+    import s3fs
+
+    s3fs.S3FileSystem.clear_instance_cache()
+    s3fs.S3FileSystem().mkdir("sweeps")
+    yield "s3://sweeps/one"
+    server.kill()
+    server.wait()
+
+
+def break_off(there: Remote) -> None:
+    with there.writer("rows/x") as sink:
+        sink.write(b"half")
+        raise ZeroDivisionError
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
+def test_s3_holds_the_same_files(bucket: str, calm: Path) -> None:
+    code = (
+        "from tests.dataset.sweeps import *; from dataset.sweep import build; "
+        f"build(design(200), {bucket!r}, jobs=2, title='', simulate=invented)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, env=dict(os.environ), text=True, capture_output=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert read(bucket).equals(read(calm))
+    assert files(bucket) == files(str(calm))
+    assert read_manifest(bucket) == read_manifest(calm)
+    there = place(bucket)
+    assert isinstance(there, Remote)
+    with locked(there):
+        assert not there.create(lock.LOCK, "{}")
+    with pytest.raises(ZeroDivisionError):
+        break_off(there)
+    assert there.size("rows/x") is None
+    there.delete("manifest.json")
+    with pytest.raises(InputError, match="no finished data set"):
+        read(bucket)

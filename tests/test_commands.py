@@ -1,0 +1,207 @@
+"""Every command runs and writes what it says; a command without a run here makes a test fail."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from calibration.model import start_values
+from planner.check import load_plan
+from sim.inputs import load_robot
+from sim.io.errors import run_command
+from sim.model.presets import PRESETS
+from softflagella.__main__ import PACKAGES, main
+from surrogate.export import SHIPPED, load
+from tests.calibration.toy_tables import START, install_toy, toy_swimmer, toy_table
+from tests.calibration.track import RADIUS, track
+from tests.surrogate.invented import invented
+
+COMMANDS = [(package, name) for package in PACKAGES for name in import_module(f"{package}.__main__").program.names]
+SWEEP = """
+rows = 4
+seed = 3
+[inputs]
+C_t = { range = [2.0, 5.0] }
+C_r = { range = [1.5, 3.5] }
+C_yr = { range = [1.0, 7.0] }
+l_over_R = { range = [4.0, 9.0] }
+L_over_R = { range = [3.0, 5.0] }
+l_over_r0 = { range = [20.0, 45.0] }
+omega_bar = { range = [6.0, 12.0], scale = "log" }
+N = { range = [2, 3], scale = "integer" }
+dwell_bar = { range = [0.7, 1.5], scale = "log" }
+"""
+
+
+def done(*words: object) -> None:
+    """Run a command of `softflagella`; it must succeed."""
+    assert run_command(main, [str(word) for word in words]) == 0
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A robot, points, a plan with its replay, and a data set, all made by commands."""
+    folder = tmp_path_factory.mktemp("made")
+    done("sim", "robot", "paper-control", "--out", folder / "robot.toml")
+    groups = PRESETS["paper-control"].group_values()
+    pd.DataFrame([{**groups, "omega_bar": speed} for speed in (8.0, -12.0)]).to_csv(
+        folder / "points.csv", index=False
+    )
+    done("planner", "plan", "circle:1.5", "--robot", folder / "robot.toml", "--out", folder / "plan")
+    done("sim", "replay", folder / "plan" / "plan.json", "--out", folder / "track.csv")
+    (folder / "sweep.toml").write_text(SWEEP)
+    done("dataset", "build", "--config", folder / "sweep.toml", "--out", folder / "sweep", "--jobs", 1)
+    return folder
+
+
+def steady(made: Path, out: Path) -> str:
+    done("sim", "steady", made / "points.csv", "--out", out / "steady.csv", "--jobs", 1)
+    found = pd.read_csv(out / "steady.csv")
+    assert found["converged"].tolist() == [True, True]
+    assert (found["omega_t_bar"] - found["omega_h_bar"]).tolist() == pytest.approx([8.0, -12.0])
+    return "2 rows, 2 converged"
+
+
+def replay(made: Path, out: Path) -> str:
+    plan = json.loads((made / "plan" / "plan.json").read_text())
+    short = {**plan, "dwell_bar": plan["dwell_bar"][:2]}
+    (out / "short.json").write_text(json.dumps(short))
+    done("sim", "replay", out / "short.json", "--out", out / "track.csv")
+    track = pd.read_csv(out / "track.csv")
+    assert track["time_bar"].iloc[-1] == pytest.approx(sum(short["dwell_bar"]), rel=1e-6)
+    assert sorted(set(track["direction"])) == [-1, 1]
+    return "2 dwells"
+
+
+def robot(made: Path, out: Path) -> str:
+    done("sim", "robot", "paper-triangle", "--out", out / "robot.toml")
+    assert load_robot(out / "robot.toml") == PRESETS["paper-triangle"]
+    return "paper-triangle -> "
+
+
+def check_paper(made: Path, out: Path) -> str:
+    done("sim", "check")
+    return "this simulator, its fit     0.403"
+
+
+def compiled(made: Path, out: Path) -> str:
+    done("sim", "compile")
+    return "loops compiled in"
+
+
+def build(made: Path, out: Path) -> str:
+    done("dataset", "build", "--config", made / "sweep.toml", "--out", made / "sweep", "--jobs", 1)  # nothing left
+    assert json.loads((made / "sweep" / "manifest.json").read_text())["rows"] == 4
+    return "4 rows: "
+
+
+def report(made: Path, out: Path) -> str:
+    done("dataset", "report", made / "sweep", "--out", out / "page.html")
+    assert (out / "page.html").read_text().count("data:image/png;base64") == 1
+    return f"-> {out / 'page.html'}"
+
+
+def verify(made: Path, out: Path) -> str:
+    done("dataset", "verify", made / "sweep", "--rows", 1)
+    return "4 rows as configured, flags consistent; 1 rows simulated again"
+
+
+def train(made: Path, out: Path) -> str:
+    invented(out / "data")
+    done("surrogate", "train", out / "data", "--out", out / "model.pt", "--epochs", 2)
+    assert load(out / "model.pt").provenance["rows"]["train"] > 300
+    return "held-out error on"
+
+
+def query(made: Path, out: Path) -> str:
+    done("surrogate", "query", made / "points.csv", "--out", out / "found.csv")
+    found = pd.read_csv(out / "found.csv")
+    assert (found["omega_t_bar"] - found["omega_h_bar"]).tolist() == pytest.approx([8.0, -12.0], rel=1e-6)
+    return "2 rows -> "
+
+
+def errors(made: Path, out: Path) -> str:
+    done("surrogate", "errors", "--model", SHIPPED)
+    return f"model {load().identity}"
+
+
+def own_table(made: Path, out: Path) -> str:
+    done("surrogate", "robot", made / "robot.toml", "--out", out / "table.json")
+    done("planner", "plan", "circle:1.5", "--robot", made / "robot.toml", "--model", out / "table.json",
+         "--out", out / "plan")  # fmt: skip
+    assert len(load_plan(out / "plan" / "plan.json")["dwell_bar"]) > 20
+    return "largest error"
+
+
+def plan(made: Path, out: Path) -> str:
+    done("planner", "plan", "square:3", "--robot", made / "robot.toml", "--out", out / "plan")
+    written = {path.name for path in (out / "plan").iterdir()}
+    assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h"}
+    return "corners rounded to"
+
+
+def check(made: Path, out: Path) -> str:
+    done("planner", "check", made / "plan" / "plan.json", made / "track.csv", "--out", out / "overlay.png")
+    assert (out / "overlay.png").read_bytes().startswith(b"\x89PNG")
+    return "within the stated error"
+
+
+def calibrate(made: Path, out: Path) -> str:
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        toy_table(5, lengths_cm=(6.0, 9.0)).to_csv(out / "t.csv", index=False)
+        done("calibration", "calibrate", out / "t.csv", "--robot", "paper-measured", "--out", out / "out")
+        done("calibration", "close", out / "t.csv", "--robot", "paper-measured", "--out", out / "again")
+    one, two = ((out / name / "verdict.json").read_text() for name in ("out", "again"))
+    assert one == two
+    assert json.loads(one)["verdict"] == "none"
+    assert load_robot(out / "out" / "corrected.toml").C_t == pytest.approx(3.1, rel=0.1)
+    assert "data:image/png" in (out / "out" / "report.html").read_text()
+    return "No effect is missing that these runs can show"
+
+
+def simulate(made: Path, out: Path) -> str:
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        words = ["--robot", "paper-measured", "--out", out / "t.csv", "--seed", 4, "--effect", "disc_drag=0.5"]
+        done("calibration", "simulate", *words)
+        model = toy_swimmer(pd.read_csv(out / "t.csv"), START)
+        plain = model.predict([start_values(model)])[0] - model.runs.y
+        dragged = model.predict([{**start_values(model), "disc_drag": 0.5}])[0] - model.runs.y
+    assert (dragged**2).mean() < 0.03**2 < (plain**2).mean()
+    return "128 runs -> "
+
+
+def tracks(made: Path, out: Path) -> str:
+    track(0).to_csv(out / "tracks.csv", index=False)
+    pd.DataFrame({"run": [1], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0}).to_csv(out / "runs.csv", index=False)
+    done("calibration", "tracks", out / "tracks.csv", out / "runs.csv", "--out", out / "table.csv")
+    assert pd.read_csv(out / "table.csv")["R_yr_cm"][0] == pytest.approx(RADIUS, rel=5e-3)
+    return "1 runs -> "
+
+
+RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
+    ("sim", "steady"): steady, ("sim", "replay"): replay, ("sim", "robot"): robot, ("sim", "check"): check_paper,
+    ("sim", "compile"): compiled, ("dataset", "build"): build, ("dataset", "report"): report,
+    ("dataset", "verify"): verify, ("surrogate", "train"): train, ("surrogate", "query"): query,
+    ("surrogate", "errors"): errors, ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
+    ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
+    ("calibration", "tracks"): tracks,
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("package", "name"), COMMANDS, ids=[" ".join(command) for command in COMMANDS])
+def test_every_command_does_its_work(
+    package: str, name: str, made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    said = RUNS[package, name](made, tmp_path)
+    output = capsys.readouterr()
+    assert said in output.out
+    assert "Traceback" not in output.err
