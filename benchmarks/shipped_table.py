@@ -27,7 +27,7 @@ from surrogate.train import learn, with_radius
 
 TAILS = Settings(width=64, depth=3, members=1, epochs=150, iterations=300)
 ROWS = {"tails": (32768, 101), "widths": (4096, 202), "held_out": (4096, 402), "locked": (4096, 20261121)}
-FLIPS = {"flips": (2800, 301), "locked_flips": (400, 20261122)}
+FLIPS = {"flips": (2800, 301), "held_out_flips": (600, 302), "locked_flips": (400, 20261122)}
 _FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated
 
 
@@ -35,7 +35,7 @@ def robots(name: str) -> dict[str, Floats]:
     """The robots of one set."""
     if name in FLIPS:
         count, seed = FLIPS[name]
-        if name == "locked_flips":
+        if name != "flips":
             return drawn(count, seed, wide=False)
         tails = 1.0 + np.arange(_FLIPS_DRAWN) % 8
         np.random.default_rng(seed).shuffle(tails)
@@ -101,7 +101,10 @@ def main() -> None:
         start = load(given.more) if given.more else None
         settings = replace(TAILS, epochs=0, iterations=given.iterations) if start else TAILS
         source = {"seeds": {**ROWS, **FLIPS}, "started_from": start.identity if start else None}
-        lookup = learn(tails, widths, held_out, flips, settings, start=start, source=source)
+        lookup = learn(
+            tails, widths, held_out, flips, settings, flips_held_out=kept(given.work, "held_out_flips"), start=start,
+            source=source,
+        )  # fmt: skip
         save(lookup, given.out)
         print(error_table(lookup))
     if given.test:

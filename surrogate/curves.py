@@ -38,7 +38,7 @@ SHAPES = {
     "spread": (len(DWELLS), 3),
 }
 COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 20}
-SETTINGS = Settings(width=96, depth=2, members=2, epochs=400, iterations=600)
+SETTINGS = Settings(width=48, depth=2, members=2, epochs=200, iterations=150)
 _SMALL_SURGE = 0.1  # of v_x
 _SMOOTH = 2.0  # standard deviations over which the components change
 
@@ -73,13 +73,16 @@ class CurveTable:
 
 
 def inputs_of(heads: Heads, tails: Tails, motion: Tensor) -> Tensor:
-    """Inputs of the network, (M, 12)."""
+    """Inputs of the network, (M, 15)."""
     across = tails.number * tails.zeta_perp
     resistance = heads.resistance
     extra = [
         torch.log(resistance[:, 0, 0] / across),
         torch.log(resistance[:, 1, 1] / across),
         torch.log(resistance[:, 2, 2] / across),
+        torch.log(heads.length),
+        torch.log(resistance[:, 0, 3] / across),
+        resistance[:, 3, 4] / resistance[:, 3, 3],
         torch.log(tails.number),
         (tails.number == 2).double(),
     ]
@@ -103,7 +106,9 @@ def learn_curves(
         scaled = torch.as_tensor(curves[name]) / _along(speeds, shape)
         flat = scaled.reshape(len(scaled), -1)
         mean = flat.median(0).values
-        vectors = torch.linalg.svd(_without_outliers(flat - mean), full_matrices=False)[2][: COMPONENTS[name]]
+        vectors = torch.linalg.svd(_without_outliers(flat - mean), full_matrices=False)[2][
+            : COMPONENTS[name]
+        ].clone()
         bases[name] = Basis(mean, vectors)
         targets.append((flat - mean) @ vectors.T)
     wanted = torch.cat(targets, -1)

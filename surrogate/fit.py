@@ -58,7 +58,7 @@ def fit(network: Ensemble, inputs: Tensor, residual: Residual, settings: Setting
     batches = -(-len(x) // settings.batch)
     generator = torch.Generator().manual_seed(settings.seed)
     adam = torch.optim.Adam(network.parameters(), lr=settings.learning_rate)
-    steps = max(settings.epochs * batches, 10)
+    steps = max(settings.epochs * batches, 100)
     schedule = torch.optim.lr_scheduler.OneCycleLR(adam, settings.learning_rate, total_steps=steps, pct_start=0.1)
     stages = -(-settings.iterations // _STAGE)
 

@@ -256,7 +256,10 @@ def steady_outputs(found: Motions, tails: TailTable) -> dict[str, Floats]:
 
 
 def _checked_dwells(dwells: Floats) -> Floats:
-    dwells = np.asarray(dwells, dtype=float)
+    try:
+        dwells = np.asarray(dwells, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{DWELL} has a value that is no number; give numbers") from None
     for value in dwells[~(np.isfinite(dwells) & (dwells >= DWELLS[0] * (1 - 1e-9)))][:1]:
         raise InputError(f"{DWELL} = {value:g}; give a dwell from {DWELLS[0]:g} on")
     return dwells

@@ -137,11 +137,13 @@ def learn(
 
 
 def _judged(lookup: Lookup, widths: Simulated, held_out: Simulated, flips: Simulated) -> Lookup:
-    """The table with its intervals and held-out errors."""
+    """The table with its intervals and held-out errors; the errors are those of robots with two tails and more."""
     (first_hints, first, _), (hints, errors, inside) = (_errors(lookup, rows) for rows in (widths, held_out))
     intervals = Intervals.learned(first_hints, first, hints, errors)
     apart = held_out.motion["tail_gap"][inside] >= 1
-    report = summary({name: error.numpy() for name, error in errors.items()}, apart)
+    several = held_out.robots["N"][inside] > 1
+    several = several if several.any() else ~several
+    report = summary({name: error.numpy()[several] for name, error in errors.items()}, apart[several])
     flips = flips.at(np.abs(flips.motion["omega_yr_bar"]) < BRANCHES * np.abs(flips.motion["omega_t_bar"]))
     found = lookup.response(flips.robots, flag=True)
     truth = {**flips.motion, **flips.curves}
