@@ -17,8 +17,8 @@ import numpy as np
 from planner.corners import CORNER, fillet, kinks, largest_fillet
 from planner.distance import two_sided
 from planner.nearest_path import nearest_path
-from planner.path import Path2D
-from planner.size import extent
+from planner.path import Path2D, smoothed
+from planner.size import LONGEST, extent
 from planner.tractrix import Drift, Reference, reference
 from planner.vehicle import Vehicle
 from sim.io.errors import InputError
@@ -26,12 +26,14 @@ from sim.io.errors import InputError
 Corner = Literal["nearest", "fillet", "error"]
 ROOMS = (0.85, 0.7, 0.55)  # shares of the pivot's largest curvature that the nearest path may use
 TIGHTEST = 0.95  # a reference that needs more than this share is refused
-LOST = 0.3  # declared paths further off than this share of the drawn one's extent are refused
+LOST = 0.3  # declared paths further off than this share of the drawn one's extent, or than the radius of the
+# robot's circle, are refused
 WARN = 0.1
 _FILLET_ROOM = 0.7
 _SPACING = 0.02  # of points on the reference, in l
 _MOST_POINTS = 150_000
-_MOST_SCALE = 50.0
+_SCALES = (1.5, 2.0, 2.5, 3.5, 5.0, 7.5, 12.0, 20.0)  # tried for a message
+_NOISY = 1.5  # times as long as when it is smoothed
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def declare(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drif
     if curvature > limit:
         raise InputError(_too_tight(raw, vehicle, distance, corner, drift))
     off, missed = two_sided(found.p, raw.polyline())
-    if max(off, missed) > LOST * largest:
+    if max(off, missed) > _lost(raw, vehicle):
         raise InputError(_too_tight(raw, vehicle, distance, corner, drift))
     if max(off, missed) > WARN * largest:
         warnings.append(
@@ -90,6 +92,8 @@ def _try(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drift: 
     if corner == "error":
         _refuse_corner(raw)
         return own if sharpest <= TIGHTEST else None
+    if _smoothing(raw, vehicle.turn_radius / 4):
+        return None
     if corner == "fillet":
         path = _rounded(raw, vehicle, distance, drift)
         found = reference(path, distance, _spacing(path), drift)
@@ -100,6 +104,10 @@ def _try(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drift: 
         if np.abs(found.curvature).max() <= TIGHTEST * tight:
             return found
     return None
+
+
+def _lost(raw: Path2D, vehicle: Vehicle) -> float:
+    return min(LOST * max(extent(raw)), vehicle.turn_radius)
 
 
 def _spacing(path: Path2D) -> float:
@@ -139,8 +147,9 @@ def _too_tight(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, d
     curvature = np.abs(own.curvature)
     worst = int(curvature.argmax())
     x, y = own.p[worst]
-    scale = _working_scale(raw, vehicle, distance, corner, drift)
-    remedy = f"scale the path by {scale:.3g}" if scale else "smooth the path, with --smooth LENGTH"
+    remedy = _smoothing(raw, vehicle.turn_radius / 4)
+    scale = None if remedy else _working_scale(raw, vehicle, distance, corner, drift)
+    remedy = remedy or (f"scale the path by {scale:.3g}" if scale else "smooth the path, with --smooth LENGTH")
     return (
         f"path too tight at ({x:.3g}, {y:.3g}) l: the pivot would turn with radius {1 / curvature[worst]:.3g} l, "
         f"the robot can with {vehicle.pivot_radius / TIGHTEST:.3g} l (its circle has radius "
@@ -149,19 +158,30 @@ def _too_tight(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, d
 
 
 def _working_scale(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drift: Drift) -> float | None:
-    """A scale with three digits, tried, at which the path is accepted; none up to _MOST_SCALE."""
+    """The first of some scales at which the path is accepted, tried; or none."""
 
     def works(factor: float) -> bool:
         larger = raw.scaled(factor)
         found = _try(larger, vehicle, distance, corner, drift)
         if found is None or np.abs(found.curvature).max() > TIGHTEST / vehicle.pivot_radius:
             return False
-        return max(two_sided(found.p, larger.polyline())) <= LOST * max(extent(larger))
+        return max(two_sided(found.p, larger.polyline())) <= _lost(larger, vehicle)
 
-    factor = 1.25
-    while factor <= _MOST_SCALE:
-        rounded = float(f"{factor:.3g}")
-        if works(rounded):
-            return rounded
-        factor *= 1.25
+    for factor in _SCALES:
+        if raw.length * factor < LONGEST and works(factor):
+            return factor
     return None
+
+
+def _smoothing(raw: Path2D, radius: float) -> str:
+    """What to do with a path that is long beside its smoothed self: it is noisy, and no scale helps."""
+    length = float(f"{2 * radius:.2g}")
+    if not length < raw.length / 2:
+        return ""
+    smooth, moved = smoothed(raw, length)
+    if raw.length < _NOISY * smooth.length:
+        return ""
+    return (
+        f"it looks noisy: smoothed over {length:g} l it is {smooth.length:.3g} l long, not {raw.length:.3g} l, "
+        f"and moves by up to {moved:.2g} l; give --smooth {length:g}"
+    )

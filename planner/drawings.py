@@ -37,7 +37,7 @@ class Drawing:
 
 
 def read_path(source: str | Path, *, closed: bool | None = None, shape: str | None = None) -> Drawing:
-    """A path from a CSV with columns x, y, or from an SVG file.
+    """A path from a table with columns x, y, or from an SVG file.
 
     Args:
         source: the file.
@@ -60,10 +60,41 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
         return _read_svg(Path(source), closed, shape)
     if shape is not None:
         raise InputError(f"{source} is no SVG, so it has no shape {shape!r}; leave --shape out")
-    table = read_table(source)
-    if "x" not in table or "y" not in table:
-        raise InputError(f"{source} has columns {', '.join(map(str, table))}; give x and y")
-    return Drawing(Path2D.of(table[["x", "y"]].to_numpy(), closed=closed), None)
+    return Drawing(Path2D.of(_read_columns(Path(source)), closed=closed), None)
+
+
+def _read_columns(path: Path) -> Any:
+    """Columns x and y (n, 2) of a table: commas, semicolons, tabs or spaces; without a header the first two."""
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError):
+        lines = []
+    first = next((line for line in lines if line.strip()), "")
+    mark = next((mark for mark in ";\t," if mark in first), None)
+    names = [word.strip().strip('"').lower() for word in first.split(mark)]
+    if not first:
+        read_table(path)  # says what is wrong with the file
+    rows = [line.split(mark) for line in lines if line.strip()]
+    header = not all(map(_is_number, names))
+    if header and not {"x", "y"} <= set(names):
+        raise InputError(f"{path} has columns {', '.join(names)}; give x and y")
+    places = (names.index("x"), names.index("y")) if header else (0, 1)
+    rows = rows[1:] if header else rows
+    if not rows:
+        raise InputError(f"{path} has no rows; give at least two points")
+    decimal = mark == ";" and not any("." in word for row in rows for word in row)
+    try:
+        return [[float(row[i].strip().replace(",", ".") if decimal else row[i]) for i in places] for row in rows]
+    except (ValueError, IndexError):
+        raise InputError(f"{path} has a row whose x or y is no number; correct the file") from None
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word.replace(",", "."))
+    except ValueError:
+        return False
+    return True
 
 
 # What svgelements raises at a drawing that is none: a transform without numbers, a path that begins with a curve

@@ -34,6 +34,7 @@ from sim.io.errors import InputError
 from sim.mechanics import planar
 
 MOST_SWITCHES = 200_000
+_PATIENCE = 30.0  # ways of the size of the robot's motion that may be made without getting ahead
 _EVERY = 2_000  # switches between two calls of `progress`
 
 
@@ -97,6 +98,8 @@ def follow(
     pose, sense, before = start.pose, start.sense, start.before
     dwells: list[float] = []
     poses = [pose]
+    furthest, patience = follower.place, 0.0
+    allowed = _PATIENCE * (ahead + pivot_distance + vehicle.turn_radius) / max(vehicle.speed, 1e-300)
     while len(dwells) < most:
         time, ended = follower.next_dwell(pose, sense, before)
         if time > 0:
@@ -107,6 +110,14 @@ def follow(
             sense, before = -sense, time
         if ended:
             break
+        patience = 0.0 if follower.place > furthest else patience + time
+        furthest = max(furthest, follower.place)
+        if patience > allowed:
+            x, y = reference.p[furthest]
+            raise InputError(
+                f"the robot does not get past ({x:.3g}, {y:.3g}) l, where the path turns back too "
+                "sharply; split it there"
+            )
         if len(dwells) >= MOST_SWITCHES:
             raise InputError(f"the path needs more than {MOST_SWITCHES} switches; split it")
         if progress is not None and len(dwells) % _EVERY == 0:

@@ -7,7 +7,7 @@ from sim.io.errors import InputError
 from sim.model.robot import Robot
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-LONGEST = 3000.0  # l
+LONGEST = 1500.0  # l
 SMALLEST = 0.25  # of the radius of the robot's circle, largest extent of a path
 _SENSIBLE = (3.0, 300.0)  # length in l
 
