@@ -36,7 +36,7 @@ from calibration.attribute import (
     pairs,
     with_imitability,
 )
-from calibration.discriminate import NextRun, next_runs
+from calibration.discriminate import Batch, NextRun, next_runs
 from calibration.fit import Fit, fit
 from calibration.freed import Freed, freed
 from calibration.generic import correct
@@ -145,6 +145,7 @@ def calibrate(
     generic = correct(task.runs, found.base.prediction, task.used)
     error = _errors(task, found, found.base.prediction + generic.correction)
     noise = found.base.noise.run
+    wanted, batch = _next_runs(task, found)
     verdict = "none"
     if found.freed and not found.best:
         verdict = "number"
@@ -163,7 +164,8 @@ def calibrate(
         numbers=pulls(final, model.given),
         instead=found.instead,
         generic=generic,
-        next_runs=_next_runs(task, found),
+        next_runs=wanted,
+        next_batch=batch,
         error_uncalibrated=error["uncalibrated"][0],
         error_before=error["before"][0],
         error_generic=error["generic"][0],
@@ -256,14 +258,15 @@ def _errors(task: _Task, found: _Explained, generic: Floats) -> dict[str, tuple[
     return {name: errors(task.runs, prediction, task.test) for name, prediction in predictions.items()}
 
 
-def _next_runs(task: _Task, found: _Explained) -> tuple[NextRun, ...]:
+def _next_runs(task: _Task, found: _Explained) -> tuple[tuple[NextRun, ...], Batch | None]:
     """Runs that would tell the two best explanations apart, where there are two."""
     first, second = (*(c.refit for c in (*found.best, *found.instead)), None, None)[:2]
     if found.freed and found.instead:
         first, second = found.freed.fit, found.instead[0].refit
     if first is None or second is None:
-        return ()
-    return tuple(next_runs(task.model, first, second, seed=task.seed))
+        return (), None
+    single, batch = next_runs(task.model, first, second, seed=task.seed)
+    return tuple(single), batch
 
 
 def _unfinished(model: Model, base: Fit, final: Fit) -> tuple[str, ...]:
