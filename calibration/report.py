@@ -70,11 +70,13 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
 
 
 def _add_batch(page: Page, batch: Batch) -> None:
+    decides = f"{100 * batch.decides:.0f} %"
+    wrong = f"{100 / STOP:.0f} %"
     page.text(
-        f"Or these {len(batch.settings)} runs together. They would decide in {100 * batch.decides:.0f} % of cases. "
-        "Note what the two predict, make the runs, add them to the table and close it again. Stop when the deviances "
-        f"of the two predictions, summed over all new runs, differ by {batch.stop:.1f}. Then the wrong one is kept in "
-        f"about {100 / STOP:.0f} % of cases at most, however often one looks."
+        f"Or these {len(batch.settings)} runs together. They would decide in {decides} of cases. "
+        "Note what the two predict, make the runs, add them to the table and close it again. Stop when the "
+        "deviances of the two predictions, summed over all new runs, differ by "
+        f"{batch.stop:.1f}. Then the wrong one is kept in about {wrong} of cases at most, however often you look."
     )
     page.table(
         [_SETTINGS.get(s, s) for s in batch.settings[0]], [tuple(map(str, s.values())) for s in batch.settings]
