@@ -20,7 +20,8 @@ it), "ambiguous" (several do and the runs
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,7 +36,7 @@ from calibration.attribute import (
     pairs,
     with_imitability,
 )
-from calibration.discriminate import NextRun, next_runs
+from calibration.discriminate import Batch, NextRun, next_runs
 from calibration.fit import Fit, fit
 from calibration.freed import Freed, freed
 from calibration.generic import correct
@@ -144,6 +145,7 @@ def calibrate(
     generic = correct(task.runs, found.base.prediction, task.used)
     error = _errors(task, found, found.base.prediction + generic.correction)
     noise = found.base.noise.run
+    wanted, batch = _next_runs(task, found)
     verdict = "none"
     if found.freed and not found.best:
         verdict = "number"
@@ -162,7 +164,8 @@ def calibrate(
         numbers=pulls(final, model.given),
         instead=found.instead,
         generic=generic,
-        next_runs=_next_runs(task, found),
+        next_runs=wanted,
+        next_batch=batch,
         error_uncalibrated=error["uncalibrated"][0],
         error_before=error["before"][0],
         error_generic=error["generic"][0],
@@ -205,15 +208,19 @@ def _explain(task: _Task) -> _Explained:
     along = model.derivatives(base.parameters, names, title=task.title("derivatives"))[1]
     misfit = check_misfit(base, task.runs, used, along, level=level, seed=seed)
     without = freed(model, base, used, along, level=level, seed=seed, draws=DRAWS)
-    if misfit.p_value >= level:
-        return _Explained(base, misfit, _unexamined(misfit, model.effects), (), without)
+    if misfit.p_value >= level and without is None:
+        return _Explained(base, misfit, _unexamined(misfit, model.effects), ())
+    tested = misfit
+    if without is not None:  # every effect that may explain as much as the wrong number does
+        rivalling = math.sqrt(max(base.deviance - without.fit.deviance - INDISTINGUISHABLE, 1.0))
+        tested = replace(misfit, critical_z=min(misfit.critical_z, rivalling))
     found = examine(
-        model, base, misfit, model.effects, along, used, task.start, level=level, seed=seed, progress=task.progress
+        model, base, tested, model.effects, along, used, task.start, level=level, seed=seed, progress=task.progress
     )
     best = explaining(found)
-    if without is not None and without.misfit.p_value >= level and not _better(best, without.fit):
-        near = [c for c in best if c.refit and c.refit.deviance < without.fit.deviance + INDISTINGUISHABLE]
-        return _Explained(base, misfit, tuple(found), (), without, tuple(near))
+    number = without is not None and (misfit.p_value >= level or without.misfit.p_value >= level)
+    if without is not None and number and not _better(best, without.fit):
+        return _Explained(base, misfit, tuple(found), (), without, tuple(_as_good(found, without.fit, level)))
     if not best:
         best = explaining(beside_wrong_numbers(model, base, found, used, along, level=level, seed=seed))
     if not best:
@@ -229,6 +236,17 @@ def _better(best: list[Candidate], number: Fit) -> bool:
     return refit is not None and refit.deviance < number.deviance - INDISTINGUISHABLE
 
 
+def _as_good(found: list[Candidate], number: Fit, level: float) -> list[Candidate]:
+    """Effects that leave no more than noise and fit as well as a wrong number, best first."""
+    near = [
+        (c.refit.deviance, place)
+        for place, c in enumerate(found)
+        if c.refit and c.refit.arrived and c.refit.deviance < number.deviance + INDISTINGUISHABLE
+        if c.refit_misfit and c.refit_misfit.p_value >= level / 2
+    ]
+    return [found[place] for _, place in sorted(near)]
+
+
 def _errors(task: _Task, found: _Explained, generic: Floats) -> dict[str, tuple[float, dict[str, float]]]:
     """Errors of four models on the locked runs: all outputs together, and by output."""
     predictions = {
@@ -240,14 +258,15 @@ def _errors(task: _Task, found: _Explained, generic: Floats) -> dict[str, tuple[
     return {name: errors(task.runs, prediction, task.test) for name, prediction in predictions.items()}
 
 
-def _next_runs(task: _Task, found: _Explained) -> tuple[NextRun, ...]:
+def _next_runs(task: _Task, found: _Explained) -> tuple[tuple[NextRun, ...], Batch | None]:
     """Runs that would tell the two best explanations apart, where there are two."""
     first, second = (*(c.refit for c in (*found.best, *found.instead)), None, None)[:2]
     if found.freed and found.instead:
         first, second = found.freed.fit, found.instead[0].refit
     if first is None or second is None:
-        return ()
-    return tuple(next_runs(task.model, first, second, seed=task.seed))
+        return (), None
+    single, batch = next_runs(task.model, first, second, seed=task.seed)
+    return tuple(single), batch
 
 
 def _unfinished(model: Model, base: Fit, final: Fit) -> tuple[str, ...]:

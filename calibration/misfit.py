@@ -38,7 +38,7 @@ from calibration.prior import changes, precisions
 from sim.arrays import Flags, Floats
 
 DRAWS = 1000
-TESTABLE = 0.1  # an effect cannot be tested if less than this share of its signal survives the projection
+TESTABLE = 0.03  # an effect cannot be tested if less than this share of its signal survives the projection
 GENERAL = ("lack", "kernel", "shape")
 _PASSES = 3
 _AT_ONCE = 50  # draws

@@ -67,7 +67,8 @@ class Sums:
     def at(self, share: Floats) -> Floats:
         """Columnᵀ Σ⁻¹ column, (..., m, m), for ρ (...)."""
         weight = 1 / (1 + share[..., None] * self.sizes)
-        flat = self.between.reshape(*self.between.shape[:-2], -1)
+        columns = self.between.shape[-1]
+        flat = self.between.reshape(*self.between.shape[:-2], columns * columns)
         between = (weight[..., None, :] @ flat).reshape(*weight.shape[:-1], *self.between.shape[-2:])
         return np.asarray(self.within + between)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from calibration.discriminate import STOP, Batch
 from calibration.imitation import DOUBT
 from calibration.loop import Verdict
 from calibration.measurements import Measurements
@@ -64,6 +65,22 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
                 for r in result.next_runs
             ],
         )
+        if result.next_batch is not None:
+            _add_batch(page, result.next_batch)
+
+
+def _add_batch(page: Page, batch: Batch) -> None:
+    decides = f"{100 * batch.decides:.0f} %"
+    wrong = f"{100 / STOP:.0f} %"
+    page.text(
+        f"Or these {len(batch.settings)} runs together. They would decide in {decides} of cases. "
+        "Note what the two predict, make the runs, add them to the table and close it again. Stop when the "
+        "deviances of the two predictions, summed over all new runs, differ by "
+        f"{batch.stop:.1f}. Then the wrong one is kept in about {wrong} of cases at most, however often you look."
+    )
+    page.table(
+        [_SETTINGS.get(s, s) for s in batch.settings[0]], [tuple(map(str, s.values())) for s in batch.settings]
+    )
 
 
 def _add_numbers(page: Page, result: Verdict) -> None:

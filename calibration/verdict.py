@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from calibration.attribute import Candidate
-from calibration.discriminate import NextRun
+from calibration.discriminate import Batch, NextRun
 from calibration.fit import Fit
 from calibration.generic import Generic
 from calibration.imitation import DOUBT
@@ -47,6 +47,7 @@ class Verdict:
     instead: tuple[Candidate, ...]  # effects that explain as much as the number that is wrong
     generic: Generic  # correction of the calibrated model
     next_runs: tuple[NextRun, ...]  # where two effects cannot be told apart
+    next_batch: Batch | None  # the same, for several runs together
     error_uncalibrated: float
     error_generic: float
     error_before: float
@@ -212,6 +213,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "untestable": result.untestable,
         "generic_features": list(result.generic.features),
         "next_runs": [run.record() for run in result.next_runs],
+        "next_batch": result.next_batch.record() if result.next_batch else None,
         "locked_test": result.locked,
         "locked_p_value": result.locked_p,
         "fixed_before": result.plan_hash,

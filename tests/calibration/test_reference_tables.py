@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -13,6 +14,7 @@ from calibration.report import write_report
 from calibration.swimmer import Swimmer
 from calibration.verdict import Verdict
 from sim.inputs import load_robot
+from sim.model.uncertainty import DEFAULTS, Sigma
 from tests.reference.make import GIVEN, HERE, TABLES
 
 pytestmark = pytest.mark.slow
@@ -54,9 +56,10 @@ def test_what_no_effect_does_is_left_unexplained() -> None:
 
 
 def test_rivals_are_all_named_with_the_runs_that_would_tell_them_apart(tmp_path: Path) -> None:
-    """The verdict, the first rival's size, and the page that a lab reads."""
+    """The verdict, the first rival's size, and the page that a lab reads; the robot is as given."""
     data = read_measurements(HERE / "ambiguous.csv")
-    result = calibrate(Swimmer(load_robot(HERE / "robot.toml"), data), progress=False)
+    known = replace(load_robot(HERE / "robot.toml"), sigmas=dict.fromkeys(DEFAULTS, Sigma(0.0, False)))
+    result = calibrate(Swimmer(known, data), progress=False)
     assert result.verdict == "ambiguous"
     assert "tail_spin_drag" in result.effects
     assert len(result.effects) > 1
@@ -68,3 +71,12 @@ def test_rivals_are_all_named_with_the_runs_that_would_tell_them_apart(tmp_path:
     for run in result.next_runs:
         for value in run.settings.values():
             assert str(value) in text
+
+
+def test_where_tolerances_are_wide_a_wrong_number_comes_ahead_of_those_rivals() -> None:
+    """With default tolerances a stiffness 40 % off does what the spin drag does: these runs cannot say which."""
+    result = closed("ambiguous")
+    assert result.verdict == "number"
+    assert result.effects == ()
+    assert "tail_spin_drag" in {e.name for c in result.instead for e in c.claimed}
+    assert "If the number is right, " in result.sentence

@@ -1,0 +1,46 @@
+"""Batches of runs that tell two rivals apart: chosen for all runs together."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from calibration.discriminate import BATCH, STOP, _greedy, _together, next_runs
+from calibration.fit import fit
+from calibration.model import start_values
+from tests.calibration.toy_tables import TRUTH, toy_swimmer, toy_table
+
+
+def test_runs_add_up_where_nothing_is_fitted_and_repeat_where_one_is_best() -> None:
+    difference = np.array([[1.0], [3.0], [2.0]])
+    none = np.zeros((3, 1, 1))
+    chosen, strength = _greedy(difference, [(none, np.eye(1))], np.array([[0.5]]))
+    assert chosen == [1] * BATCH
+    assert strength == pytest.approx(BATCH * 9 / 0.5)
+
+
+def test_a_parameter_that_can_be_fitted_again_makes_runs_differ() -> None:
+    """The rival can shift all outputs alike, so one setting alone decides nothing however often it is repeated."""
+    difference = np.array([[1.0], [-1.0]])
+    shift, wide = np.ones((2, 1, 1)), np.array([[1e6]])
+    assert _together(difference, shift, wide, np.eye(1), [0] * 8) == pytest.approx(0, abs=1e-3)
+    chosen, strength = _greedy(difference, [(shift, wide)], np.eye(1))
+    assert chosen == [0] * 4 + [1] * 4
+    assert strength == pytest.approx(8, rel=1e-3)
+
+
+def test_a_batch_is_stated_with_its_settings_and_where_to_stop() -> None:
+    model = toy_swimmer(toy_table(2, end_over_end_drag=5.0), TRUTH)
+    used = np.ones(len(model.runs), bool)
+    common = tuple(p.name for p in (*model.coefficients, *model.given))
+    fits = [
+        fit(model, start_values(model), (*common, name), used, title="")
+        for name in ("end_over_end_drag", "disc_drag")
+    ]
+    batch = next_runs(model, *fits)[1]
+    assert len(batch.settings) == BATCH
+    assert batch.stop == pytest.approx(2 * math.log(STOP))
+    assert 0 <= batch.decides <= 1
+    assert {"N", "l_cm", "omega_rpm"} == set(batch.settings[0])
