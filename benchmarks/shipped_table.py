@@ -74,8 +74,11 @@ def test(lookup: Lookup, rows: Simulated, flips: Simulated) -> None:
           f"{np.count_nonzero(~inside)}")  # fmt: skip
     errors = {name: error[inside] for name, error in relative_errors(answer, truth).items()}
     errors["v_z of itself"] = (answer["v_z"] / truth["v_z"] - 1)[inside]
-    for name, figures in summary(errors, apart[inside]).items():
-        print(f"  {name:16}" + "".join(f"  {k} {100 * v:.4f}" for k, v in figures.items()))
+    several = rows.robots["N"][inside] > 1
+    for words, kind in (("two tails and more", several), ("one tail", ~several)):
+        print(words)
+        for name, figures in summary({n: e[kind] for n, e in errors.items()}, apart[inside][kind]).items():
+            print(f"  {name:16}" + "".join(f"  {k} {100 * v:.4f}" for k, v in figures.items()))
     own = {name: values[inside] for name, values in answer.items()}
     print("coverage:", coverage(own, {name: values[inside] for name, values in truth.items()}))
     flips = flips.at(flips.robots["N"] > 1)
@@ -102,8 +105,8 @@ def main() -> None:
         settings = replace(TAILS, epochs=0, iterations=given.iterations) if start else TAILS
         source = {"seeds": {**ROWS, **FLIPS}, "started_from": start.identity if start else None}
         lookup = learn(
-            tails, widths, held_out, flips, settings, flips_held_out=kept(given.work, "held_out_flips"), start=start,
-            source=source,
+            tails, widths, held_out, flips, settings, start=start, source=source,
+            flips_held_out=kept(given.work, "held_out_flips"),
         )  # fmt: skip
         save(lookup, given.out)
         print(error_table(lookup))

@@ -34,7 +34,7 @@ def slopes(
         parameters: names of columns.
     """
     found = {name: {p: np.full(len(motion), np.nan) for p in parameters} for name in OUTPUTS}
-    columns = {name: torch.as_tensor(array, dtype=torch.float64) for name, array in values.items()}
+    columns = {name: head.as_tensor(array) for name, array in values.items()}
     kind = class_of(columns["N"])
     for k, network in enumerate(table.wrench):
         rows = torch.nonzero(kind == k)[:, 0]

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -64,7 +65,7 @@ def robots_of(columns: Mapping[str, Floats | Tensor], keep: Collection[str] = ()
     Raises:
         InputError: an effect changes the tails themselves.
     """
-    tensors = {name: torch.as_tensor(values, dtype=torch.float64) for name, values in columns.items()}
+    tensors = {name: as_tensor(values) for name, values in columns.items()}
     count = tensors.pop("N")
     own = {name: tensors.pop(name) for name in Groups.__dataclass_fields__ if name in tensors}
     effects = {name: size for name, size in tensors.items() if name in keep or bool((size != 0).any())}
@@ -81,6 +82,11 @@ def robots_of(columns: Mapping[str, Floats | Tensor], keep: Collection[str] = ()
     heads = Heads(body.omega.abs(), 1 + body.droop * resistance[:, 3, 3], resistance, body.head_length, sense)
     tails = Tails(body.zeta_perp, body.zeta_parallel, body.offset, body.tail_radius, count, resistance[:, 3, 3])
     return heads, tails
+
+
+def as_tensor(values: Floats | Tensor) -> Tensor:
+    """Tensors as they are, arrays copied."""
+    return values if isinstance(values, Tensor) else torch.tensor(np.asarray(values), dtype=torch.float64)
 
 
 def is_of_head(effect: str) -> bool:

@@ -44,6 +44,7 @@ RESPONSE_OUTPUTS = ("net_speed_bar", "lag_psi_rad", "lag_x", "lag_z")
 OUTSIDE = "outside"  # flag of robots that the table does not know
 BRANCHES = 0.6  # |ω_yr/ω_t| from which a robot may have several motions
 CERTIFIED = "certified_error"
+_NOT_OF_HEAD = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 
 
 class Motions(NamedTuple):
@@ -155,7 +156,8 @@ class Lookup:
         """Motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
         heads, tails = head.robots_of(values)
         motion, converged = self.tails.solve(heads, tails)
-        found = Motions(heads, tails, motion, self._reasons(tails, motion, np.asarray(converged.numpy())))
+        known = np.asarray(converged.numpy()) & self._within_ranges(values)
+        found = Motions(heads, tails, motion, self._reasons(tails, motion, known))
         for row, reason in enumerate(found.reason):
             if reason and not flag:
                 raise InputError(self._refusal(values, row, reason))
@@ -197,7 +199,16 @@ class Lookup:
             added[f"{name}_low"], added[f"{name}_high"] = result[name] - half, result[name] + half
         return added
 
-    def _reasons(self, tails: Tails, motion: Tensor, converged: Flags) -> list[str]:
+    def _within_ranges(self, values: Mapping[str, Floats]) -> Flags:
+        """Whether tails and motor speed are within the learned ranges; heads may be any."""
+        within = np.ones(len(values["N"]), dtype=bool)
+        for name in _NOT_OF_HEAD:
+            low, high = self.ranges[name]
+            size = np.abs(values[name])
+            within &= (low * (1 - 1e-9) <= size) & (size <= high * (1 + 1e-9))
+        return within
+
+    def _reasons(self, tails: Tails, motion: Tensor, known: Flags) -> list[str]:
         inputs, kind = tail.inputs_of(tails, motion), class_of(tails.number)
         remote = torch.full((len(motion),), torch.nan, dtype=torch.float64)
         for k, support in enumerate(self.support):
@@ -208,7 +219,7 @@ class Lookup:
         reasons = np.full(len(motion), "", dtype=object)
         reasons[quick > BRANCHES] = "it yaws nearly as fast as its tails turn, and may have several motions"
         reasons[~(remote.numpy() <= 1)] = "its tails move as none of the learned ones do"
-        reasons[~converged] = "no motion was found for it"
+        reasons[~known] = "its tails or its motor were not learned, or no motion was found"
         for k, support in enumerate(self.support):
             if support is None:
                 reasons[(kind == k).numpy()] = "none with as many tails were learned"
