@@ -49,7 +49,7 @@ def main() -> None:
     found.append(_network("least squares", some, tested))
     fit._POWER = power
     found.append(_network("Adam alone", some, tested, replace(SMALL, iterations=0)))
-    smooth, tail.SMOOTHNESS = tail.SMOOTHNESS, (1.5,) * 7  # type: ignore[assignment]
+    smooth, tail.SMOOTHNESS = tail.SMOOTHNESS, (1.5,) * 7
     found.append(_network("inputs scaled alike", some, tested))
     tail.SMOOTHNESS = smooth
     found.append(_network("single precision", some, tested, single=True))
