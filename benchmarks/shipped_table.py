@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dataset.report import plain_logarithms
 from sim.arrays import Floats
 from surrogate.evaluate import coverage, curve_errors, error_table, relative_errors, summary
 from surrogate.export import load, save
@@ -91,6 +92,33 @@ def test(lookup: Lookup, rows: Simulated, flips: Simulated) -> None:
         print(f"  {name:16}" + "".join(f"  {k} {100 * v:.3f}" for k, v in figures.items()))
 
 
+def draw(lookup: Lookup, rows: Simulated, path: str) -> None:
+    """Error of the yaw rate against motor speed, of robots whose tails do not touch."""
+    from matplotlib.figure import Figure
+
+    answer = lookup.query(rows.robots, flag=True)
+    error = 100 * np.abs(answer["omega_yr_bar"] / rows.motion["omega_yr_bar"] - 1)
+    shown = ~answer["outside"] & (rows.motion["tail_gap"] >= 1)
+    figure = Figure(figsize=(7.5, 4.2), layout="constrained")
+    axes = figure.add_subplot()
+    kinds = (
+        ("one tail", rows.robots["N"] == 1, "#d9a441"),
+        ("two tails and more", rows.robots["N"] > 1, "#2a7fba"),
+    )
+    for label, kind, colour in kinds:
+        some = shown & kind
+        axes.plot(rows.robots["omega_bar"][some], error[some], ".", ms=3, color=colour, alpha=0.6, label=label)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_ylim(1e-4, 20)
+    plain_logarithms(axes.xaxis)
+    plain_logarithms(axes.yaxis)
+    axes.set_xlabel("motor speed ω̄")
+    axes.set_ylabel("error of the yaw rate [%]")
+    axes.legend(frameon=False, markerscale=4)
+    figure.savefig(path, dpi=100)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("work", type=Path)
@@ -98,6 +126,7 @@ def main() -> None:
     parser.add_argument("--more")
     parser.add_argument("--iterations", type=int, default=500)
     parser.add_argument("--test")
+    parser.add_argument("--picture", help="with --test: draw the errors of the locked robots")
     given = parser.parse_args()
     if given.out:
         tails, widths, held_out, flips = (kept(given.work, n) for n in ("tails", "widths", "held_out", "flips"))
@@ -111,7 +140,10 @@ def main() -> None:
         save(lookup, given.out)
         print(error_table(lookup))
     if given.test:
-        test(load(given.test), kept(given.work, "locked"), kept(given.work, "locked_flips"))
+        lookup, locked = load(given.test), kept(given.work, "locked")
+        test(lookup, locked, kept(given.work, "locked_flips"))
+        if given.picture:
+            draw(lookup, locked, given.picture)
 
 
 if __name__ == "__main__":
