@@ -206,7 +206,7 @@ def check_misfit(
 def _decided(null: Floats, own: Floats, level: float) -> bool:
     """Whether so many draws tell a p-value from `level` (Besag and Clifford 1991)."""
     p = _p_value(null, own)
-    far = p < level / 2 and len(null) > 2 / level
+    far = p < level / 4
     return far or (p > 8 * level and len(null) * p > 10)
 
 
