@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from planner.knowledge import Knowledge
@@ -12,8 +10,7 @@ from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.mechanics import planar
-from sim.model.groups import DWELL
-from sim.model.response import BEFORE, DWELLS, Responses
+from sim.model.response import Responses
 from sim.model.robot import Robot
 from surrogate.table import LookupTable
 
@@ -63,25 +60,10 @@ def _asked(values: dict[str, float], lookup: LookupTable) -> tuple[Floats, Respo
     columns["omega_bar"] = columns["omega_bar"] * [1.0, -1.0]
     found = lookup.query(columns)
     twist = np.stack([found[name] for name in _STEADY], -1)
-    curves = _old_response(columns, lookup) if DWELL in lookup.domain else lookup.response(columns)
+    curves = lookup.response(columns)
     if curves.failed.any():
         raise InputError("the response of this robot to a flip could not be found; turn its motor slower")
     return twist, curves, float(np.min(found["tail_gap"]))
-
-
-def _old_response(columns: dict[str, Floats], lookup: Any) -> Responses:
-    """Curves from a table that knows lags under equal dwells only: no memory, half a lag from rest."""
-    low, high = lookup.domain[DWELL]
-    lags = []
-    for side in (0, 1):
-        rows = {name: np.full(len(DWELLS), values[side]) for name, values in columns.items()}
-        rows["omega_bar"] = np.abs(rows["omega_bar"])
-        found = lookup.query({**rows, DWELL: np.clip(DWELLS, low, high)})
-        lags.append(np.stack([found["lag_z"], found["lag_x"], found["lag_psi_rad"]], -1))
-    lag = np.array(lags)
-    memory = np.zeros((2, len(BEFORE), *lag.shape[1:]))
-    none = np.zeros(2, dtype=bool)
-    return Responses(lag, memory, lag / 2, np.zeros_like(lag), np.zeros(lag.shape[:2]), none, none)
 
 
 def _table_modes(twist: Floats, lookup: LookupTable) -> list[Mode]:

@@ -19,7 +19,7 @@ class LookupTable(Protocol):
     Example:
         >>> from softflagella import load_table
         >>> load_table().domain["N"]
-        (2.0, 5.0)
+        (1.0, 8.0)
     """
 
     @property

@@ -39,20 +39,18 @@ _RANGE = (0.35, 1.8)  # of their lengths
 def tabulate(robot: Robot) -> SingleRobot:
     """Simulate one robot's steady motion and its response to flips, in both directions of the motor.
 
-        Args:
-            robot: any robot, with or without effects.
+    Args:
+        robot: any robot, with or without effects.
 
-        Raises:
-            InputError: the robot's motion cannot be found, or a simulated flip breaks down.
+    Raises:
+        InputError: the robot's motion cannot be found, or a simulated flip breaks down.
 
-        Example:
-            >>> import math
-    from dataclasses import replace
-    from typing import Any
-            >>> from softflagella import circle, load_robot, plan, tabulate
-            >>> robot = replace(load_robot("paper-control"), effects={"left_right_bias": 0.2})
-            >>> plan(circle(2.0), robot, lookup=tabulate(robot)).predicted_rms < 0.03
-            True
+    Example:
+        >>> from dataclasses import replace
+        >>> from softflagella import circle, load_robot, plan, tabulate
+        >>> robot = replace(load_robot("paper-control"), effects={"left_right_bias": 0.2})
+        >>> plan(circle(2.0), robot, lookup=tabulate(robot)).predicted_rms < 0.03
+        True
     """
     values = robot.group_values()
     both = {name: np.array([value, value]) for name, value in values.items()}

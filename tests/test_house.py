@@ -111,9 +111,9 @@ SIMULATOR = {"sim.linear", "sim.motion", "sim.reference", "sim.solve"}
     ("module", "may_load"),
     [
         *((package, set()) for package in ORDER if package != "planner"),
-        ("planner", {"numpy", "surrogate"}),  # its interface is the package itself
+        ("planner", {"numpy", "scipy", "surrogate"}),  # its interface is the package itself
         *((f"{package}.__main__", set()) for package in ORDER if package != "planner"),
-        ("planner.__main__", {"numpy", "surrogate"}),
+        ("planner.__main__", {"numpy", "scipy", "surrogate"}),
     ],
 )
 def test_importing_loads_only_what_is_used(module: str, may_load: set[str]) -> None:

@@ -150,7 +150,7 @@ def test_planning_never_calls_the_simulator(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_planning_does_not_even_load_the_simulator() -> None:
-    simulator = ("sim.solve.newton", "sim.motion.steady", "sim.motion.replay", "sim.motion.run", "numba")
+    simulator = ("sim.solve.newton", "sim.motion.steady", "sim.motion.replay", "sim.motion.run", "sim.solve.orbit")
     code = (
         "import sys; from planner import plan, circle; from sim.model.presets import PRESETS;"
         "plan(circle(2.0), PRESETS['paper-control']);"
@@ -170,9 +170,9 @@ def test_other_points_of_the_axis() -> None:
 
 def test_a_tolerance_shortens_the_dwell_and_says_when_it_cannot() -> None:
     free = plan(circle(2.0), CONTROL, objective="flips")
-    tight = plan(circle(2.0), CONTROL, objective="flips", tolerance=0.6 * free.stated_error)
+    tight = plan(circle(2.0), CONTROL, objective="flips", tolerance=0.75 * free.stated_error)
     assert tight.minimum_dwell < free.minimum_dwell
-    assert tight.stated_error <= 0.6 * free.stated_error
+    assert tight.stated_error <= 0.75 * free.stated_error
     assert len(tight.dwells) > len(free.dwells)
     with pytest.raises(InputError, match="smallest stated error is"):
         plan(circle(2.0), CONTROL, tolerance=1e-3)
@@ -212,10 +212,9 @@ def test_refusals() -> None:
     refused(polygon(4, 3.0), "corner of 90 degrees", corner="error")
     refused(circle(2.0), "below 0.2 time units", minimum_dwell=0.1)
     refused(circle(2.0), "objective", objective="speed")
-    refused(circle(2.0), "omega_bar = 500 is outside", robot=CONTROL.with_motor(500.0))
-    refused(circle(2.0), "N = 7 is outside", robot=replace(CONTROL, tails=7))
-    refused(circle(2.0), "a_over_R = 0.5 is outside", robot=replace(CONTROL, disc_offset=0.008))
-    refused(circle(2.0), "end_over_end_drag", robot=replace(CONTROL, effects={"end_over_end_drag": 5.0}))
+    refused(circle(2.0), "outside the look-up table.* omega_bar = 500", robot=CONTROL.with_motor(500.0))
+    refused(circle(2.0), "outside the look-up table.* a_over_R = 0.1", robot=replace(CONTROL, disc_offset=0.0016))
+    refused(circle(2.0), "tail_sag .*surrogate robot", robot=replace(CONTROL, effects={"tail_sag": 0.1}))
 
 
 @pytest.mark.parametrize("radius", [0.4, 0.5, 0.57])
