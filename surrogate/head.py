@@ -15,7 +15,7 @@ is found. Units: l, μ0 l⁴/EI, EI/l².
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -76,7 +76,8 @@ def robots_of(columns: Mapping[str, Floats | Tensor], keep: Collection[str] = ()
                 f"{name} changes more than head, disc and motor, so the look-up table does not know it; make the "
                 "robot a table of its own: python -m surrogate robot ROBOT.toml --out TABLE.json"
             )
-    body = assemble(Groups(**own, N=1, effects=effects))  # N does not enter the numbers of a robot
+    tails_of_each: Any = count  # a batch of the simulator has one N, formulas take N by row as well
+    body = assemble(Groups(**own, N=tails_of_each, effects=effects))
     sense = torch.sign(body.omega)
     mirror = torch.where(sense[:, None] < 0, torch.tensor(_SENSES, dtype=torch.float64), 1.0)
     resistance = body.resistance.permute(2, 0, 1) * mirror[:, :4, None] * mirror[:, None, :]
