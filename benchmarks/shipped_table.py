@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dataset.report import plain_logarithms
+from dataset.figures import plain_logarithms
 from sim.arrays import Floats
 from surrogate.evaluate import coverage, curve_errors, error_table, relative_errors, summary
 from surrogate.export import load, save

@@ -34,8 +34,7 @@ Numbers = Callable[[Tensor], Tensor]  # inputs (M, 7) -> y (M, 6) of `surrogate.
 STEPS, CORRECTION = 40, 1e-9  # of Broyden's method; the correction is relative
 _RENEWED = 8  # steps after which the derivative is found again
 _DIFFERENCE, _LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
-# Local, but on the tails, or so strong on the yaw that the tails move as no learned ones do (12 % off).
-_ON_TAILS = ("tail_sag", "surface_couple")
+_ON_TAILS = ("tail_sag",)  # local, but on the tails
 _FIRST_SPIN = 0.6  # ω_t/ω in the first guess
 _LONGEST = 0.5  # relative change of ω_t in one step
 _SENSES = (-1.0, 1.0, -1.0, -1.0, -1.0)  # mirror image of (v_x, v_z, ω_yr, ω_h, ω_t)
