@@ -92,7 +92,7 @@ def run_demo(out: str | Path) -> None:
     data, model = folder / "sweep", folder / "model.pt"
     shutil.rmtree(data, ignore_errors=True)  # an earlier demo's rows, perhaps of another version
     _command("dataset", "build", "--config", "demo.toml", "--out", str(data))
-    _command("surrogate", "train", str(data), "--out", str(model), "--epochs", "300")
+    _command("surrogate", "train", str(data), "--out", str(model), "--epochs", "60")
     print("4/4 close the loop on two measured tables")
     loops = {name: _close(folder, name) for name in ("hidden effect", "nothing hidden")}
     steered = _steer(loops["hidden effect"][0])

@@ -13,6 +13,7 @@ section 5.2.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -58,6 +59,10 @@ class Intervals:
         weights, bounds, factor = {}, {}, {}
         for name, error in errors.items():
             known = torch.isfinite(error)
+            if not known.any():  # nothing to learn from: the interval is infinite
+                weights[name] = torch.zeros(design.shape[1], dtype=design.dtype)
+                bounds[name] = (0.0, 0.0)
+                continue
             logs, rows = torch.log(error[known].abs() + _TINY), design[known]
             matrix = rows.T @ rows + _RIDGE * len(rows) * torch.eye(rows.shape[1], dtype=rows.dtype)
             weights[name] = torch.linalg.solve(matrix, rows.T @ logs)
@@ -81,5 +86,7 @@ def _design(x: Tensor) -> Tensor:
 def _conformal_quantile(scores: Tensor) -> float:
     """The smallest score that covers a new row with a probability of at least COVERAGE."""
     count = len(scores)
+    if not count:
+        return math.inf
     rank = min(int(torch.ceil(torch.tensor((count + 1) * COVERAGE))), count)
     return float(scores.sort().values[rank - 1])

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from calibration.model import start_values
-from planner.check import load_plan
+from planner.record import load_plan
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from sim.model.presets import PRESETS
