@@ -94,10 +94,11 @@ def _curves_in(table: pd.DataFrame) -> dict[str, Floats]:
         return {}
     dwells, before = len(DWELLS), len(BEFORE)
     shapes = {"lag": (dwells,), "memory": (before, dwells), "rest": (dwells,), "spread": (dwells,)}
-    return {
+    curves = {
         name: np.stack([_lists(table[f"{name}_{part}"], shape) for part in COMPONENTS], -1)
         for name, shape in shapes.items()
     }
+    return curves | {"net_speed": _lists(table["net_speed_bar"], (dwells,))}
 
 
 def _lists(column: Any, shape: Sequence[int]) -> Floats:

@@ -29,6 +29,7 @@ from surrogate.rows import ROBOT, Simulated, read_rows, simulated
 from surrogate.support import Support
 from surrogate.tails import CLASSES, class_of, learn_tails, learnable, rows_of
 
+_FEWEST_INSIDE = 10
 _FEWEST_ROWS, _FEWEST_OF_A_CLASS = 64, 16
 
 
@@ -155,6 +156,8 @@ def _errors(lookup: Lookup, rows: Simulated) -> tuple[torch.Tensor, dict[str, to
     """Hints and relative errors of rows inside the domain, and which those are."""
     found = lookup.motions(rows.robots, flag=True)
     inside = np.array([not reason for reason in found.reason])
+    if inside.sum() < _FEWEST_INSIDE:  # a table of few rows has a domain that holds hardly any others: all count
+        inside[:] = True
     truth = with_radius(rows.motion)
     errors = relative_errors(steady_outputs(found, lookup.tails), truth)
     return (

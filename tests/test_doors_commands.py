@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -32,12 +31,6 @@ cell = st.one_of(number, st.sampled_from(WORDS))
 few = settings(
     max_examples=25, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-
-
-@pytest.fixture(autouse=True)
-def _short_paths(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Paths that take more than about a second are refused, so that the tests stay short."""
-    monkeypatch.setattr(import_module("planner.plan"), "_LONGEST", 20.0)
 
 
 def answered(words: list[object], capsys: pytest.CaptureFixture[str]) -> bool:
