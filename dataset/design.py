@@ -79,7 +79,7 @@ class Design:
             name: Axis(spec["range"][0], spec["range"][1], spec["scale"], spec.get("both_directions", False))
             for name, spec in config["inputs"].items()
         }
-        return Design(axes, rows, config["seed"], config["history_every"], config["sensitivities"])
+        return Design(axes, rows, config["seed"], config["history_every"], config.get("sensitivities", False))
 
     def config(self) -> dict[str, Any]:
         """What determines the robots, JSON-like (without the number of rows)."""

@@ -143,7 +143,7 @@ def batches(
     """
     there = place(folder)
     manifest = read_manifest(there)
-    form = schema(manifest["effects"], manifest["config"]["sensitivities"])
+    form = schema(manifest["effects"], manifest["config"].get("sensitivities", False))
     unknown = sorted(set(columns or ()) - set(form.names))
     if unknown:
         raise InputError(f"no column {unknown[0]!r} in a data set; there are {', '.join(form.names)}")

@@ -204,8 +204,8 @@ def _write_page(
     page.section("Three paths, planned without simulating")
     page.text(
         "The planner asks the look-up table only. The schedule is then replayed, open loop, in the simulator. "
-        "Errors are from the declared path: the one nearest to the path as given that the robot can follow. It cannot "
-        "turn on the spot."
+        "Errors are from the declared path: the one nearest to the path as given that the robot can follow. The "
+        "robot cannot turn on the spot."
     )
     plans = _draw_plans(tracks)
     plans.savefig(out.parent / "demo" / "plans.png", dpi=90, bbox_inches="tight")
