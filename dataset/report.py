@@ -133,7 +133,7 @@ def _add_linear_theory(page: Page, usable: pd.DataFrame, names: list[str]) -> No
             if np.nanmax(np.abs(one.value)) > _SMALL:
                 verdict = "power law" if one.holds else "changes"
                 table.append((_plain(output), one.input, *_cells(one), verdict, *_plain_cells(other)))
-    thirds = ("lower third", "middle", "upper third")
+    thirds = ("lower", "middle", "upper")
     page.table(("output", "input", *thirds, "", *(f"linear: {third}" for third in thirds)), table)
     page.section("Against linear theory")
     page.text(
