@@ -42,9 +42,8 @@ def slopes(columns: Mapping[str, Any], parameters: tuple[str, ...], **_: object)
         at = np.asarray(columns.get(name, np.full(len(values["v_x"]), null)), float)
         width = 1e-5 * np.abs(at)
         if name in catalogue():  # towards the inside
-            width = (
-                1e-5 * abs(catalogue()[name].typical - null) * np.where(at < catalogue()[name].bounds[1], 1, -1)
-            )
+            step, most = 1e-5 * abs(catalogue()[name].typical - null), catalogue()[name].bounds[1]
+            width = step * np.where(at + step <= most, 1, -1)
         ends = [steady_columns({**columns, name: at + sign * width}) for sign in (0, 1)]
         for key in found:
             found[key].append((ends[1][key] - ends[0][key]) / width)
