@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -19,7 +22,6 @@ from softflagella.__main__ import PACKAGES, main
 from surrogate.export import SHIPPED, load
 from tests.calibration.toy_tables import START, install_toy, toy_swimmer, toy_table
 from tests.calibration.track import RADIUS, track
-from tests.surrogate.invented import invented
 
 COMMANDS = [(package, name) for package in PACKAGES for name in import_module(f"{package}.__main__").program.names]
 SWEEP = """
@@ -111,9 +113,11 @@ def verify(made: Path, out: Path) -> str:
 
 
 def train(made: Path, out: Path) -> str:
-    invented(out / "data")
+    wide = (made / "sweep.toml").read_text().replace("rows = 4", "rows = 256")
+    (out / "sweep.toml").write_text(wide)
+    done("dataset", "build", "--config", out / "sweep.toml", "--out", out / "data", "--jobs", 1)
     done("surrogate", "train", out / "data", "--out", out / "model.pt", "--epochs", 2)
-    assert load(out / "model.pt").provenance["rows"]["train"] > 300
+    assert load(out / "model.pt").provenance["rows"]["train"] > 150
     return "held-out error on"
 
 
@@ -122,6 +126,17 @@ def query(made: Path, out: Path) -> str:
     found = pd.read_csv(out / "found.csv")
     assert (found["omega_t_bar"] - found["omega_h_bar"]).tolist() == pytest.approx([8.0, -12.0], rel=1e-6)
     return "2 rows -> "
+
+
+def inverse(made: Path, out: Path) -> str:
+    """The coefficient behind a yaw rate that the table gives itself."""
+    robot = {name: np.array([value]) for name, value in PRESETS["paper-control"].group_values().items()}
+    found = load().query(robot)
+    targets = {**{k: v for k, v in robot.items() if k != "C_yr"}, "omega_yr_bar": found["omega_yr_bar"]}
+    pd.DataFrame(targets).to_csv(out / "targets.csv", index=False)
+    done("surrogate", "inverse", out / "targets.csv", "--out", out / "robots.csv", "--free", "C_yr")
+    assert pd.read_csv(out / "robots.csv")["C_yr"].min() == pytest.approx(robot["C_yr"][0], rel=1e-3)
+    return "robots.csv"
 
 
 def errors(made: Path, out: Path) -> str:
@@ -141,7 +156,20 @@ def plan(made: Path, out: Path) -> str:
     done("planner", "plan", "square:3", "--robot", made / "robot.toml", "--out", out / "plan")
     written = {path.name for path in (out / "plan").iterdir()}
     assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h"}
-    return "corners rounded to"
+    return "of the declared path"
+
+
+def follow(made: Path, out: Path) -> str:
+    words = ["planner", "track", "circle:1.5", "--robot", made / "robot.toml"]
+    answer = subprocess.run(
+        [sys.executable, "-m", "softflagella", *map(str, words)],
+        input="0\n0.5 0 0 0\n", capture_output=True, text=True, check=True, cwd=Path(__file__).parents[1],
+    )  # fmt: skip
+    print(answer.stdout)
+    direction, flip_at, error, alarm = answer.stdout.splitlines()[0].split()
+    assert (abs(int(direction)), int(alarm)) == (1, 0)
+    assert float(flip_at) > 0 < float(error)
+    return f"{direction} {flip_at}"
 
 
 def check(made: Path, out: Path) -> str:
@@ -188,6 +216,7 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "steady"): steady, ("sim", "replay"): replay, ("sim", "robot"): robot, ("sim", "check"): check_paper,
     ("sim", "compile"): compiled, ("dataset", "build"): build, ("dataset", "report"): report,
     ("dataset", "verify"): verify, ("surrogate", "train"): train, ("surrogate", "query"): query,
+    ("surrogate", "inverse"): inverse, ("planner", "track"): follow,
     ("surrogate", "errors"): errors, ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
     ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
     ("calibration", "tracks"): tracks,

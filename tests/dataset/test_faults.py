@@ -181,7 +181,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     """A disk of 400 kB."""
     disk = tmp_path / "disk"
     disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=400k", "tmpfs", str(disk)]
+    mount = ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(disk)]
     if os.getuid() != 0 or not shutil.which("mount") or subprocess.run(mount, capture_output=True).returncode:
         pytest.skip("this user may not mount a small disk")
     yield disk
@@ -193,7 +193,7 @@ def test_a_full_disk(small_disk: Path, tmp_path: Path) -> None:
     before = read(small_disk / "out")
     assert "No space left on device" in refused(small_disk / "out", 8000)
     assert read(small_disk / "out").equals(before)
-    subprocess.run(["mount", "-o", "remount,size=8m", str(small_disk)], check=True)
+    subprocess.run(["mount", "-o", "remount,size=32m", str(small_disk)], check=True)
     goes_on_to_the_same_rows(small_disk / "out", 8000, tmp_path / "calm")
 
 
