@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -11,9 +12,10 @@ from sim.motion import warm
 
 
 def test_compiling_a_loop_is_announced(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The bar appears at once here; its text names the number of loops."""
+    """The bar appears at once here; its text names the number of loops. The loop is never in the cache."""
+    monkeypatch.setattr(compiling, "CACHE", tmp_path)
     shown = compiling.tqdm
     monkeypatch.setattr(compiling, "tqdm", lambda **options: shown(**{**options, "delay": 0, "mininterval": 0}))
 
