@@ -80,7 +80,7 @@ def _simulate(arguments: Namespace) -> None:
     from calibration.synthetic import make_table
     from sim.effects import check_effects
     from sim.inputs import load_robot
-    from sim.io.files import whole_file
+    from sim.io.files import write_csv
 
     robot = load_robot(arguments.robot)
     effects = dict(robot.effects)
@@ -92,8 +92,7 @@ def _simulate(arguments: Namespace) -> None:
             raise InputError(f"--effect {entry!r}; write NAME=SIZE") from None
     check_effects(effects)
     table = make_table(replace(robot, effects=effects), seed=arguments.seed, jobs=arguments.jobs)
-    with whole_file(arguments.out) as part:
-        table.to_csv(part, index=False, float_format="%.6g")
+    write_csv(table, arguments.out, digits=6)
     print(f"{len(table)} runs -> {arguments.out}")
 
 
@@ -106,13 +105,12 @@ def _simulate(arguments: Namespace) -> None:
 )
 def _tracks(arguments: Namespace) -> None:
     from calibration.tracks import measure_tracks
-    from sim.io.files import whole_file
+    from sim.io.files import write_csv
 
     table, aside = measure_tracks(arguments.tracks, arguments.runs)
     for line in aside:
         print(f"set aside: {line}", file=sys.stderr)
-    with whole_file(arguments.out) as part:
-        table.to_csv(part, index=False, float_format="%.6g")
+    write_csv(table, arguments.out, digits=6)
     print(f"{len(table)} runs -> {arguments.out}")
 
 

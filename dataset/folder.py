@@ -8,7 +8,7 @@ next build goes on: it sorts pieces by what they hold, not by what a journal say
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import pyarrow as pa
@@ -149,7 +149,7 @@ class SweepFolder:
             at = max(at, piece.stop)
         return gaps
 
-    def complete(self, held: Held, rows: int, say: Callable[[str], None] = lambda _: None) -> dict[str, Any]:
+    def complete(self, held: Held, rows: int) -> dict[str, Any]:
         """Bring the first `rows` rows into rows/ and write the manifest, unless it is so already; returns it.
 
         A piece that goes on beyond `rows` is taken whole.
@@ -164,7 +164,6 @@ class SweepFolder:
             if len(group) == 1:
                 final[group[0]] = held[group[0]]
                 continue
-            say(f"joining rows {start} to {stop - 1}")
             name = piece_name(PENDING, start, stop)
             final[Piece(name, start, stop)] = join(self.place, group, name, self.form, self.key)
             for piece in group:

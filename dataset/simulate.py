@@ -16,6 +16,7 @@ from dataset.schema import SLOPE_INPUTS
 from sim.arrays import Floats
 from sim.inputs import check_columns
 from sim.model.groups import Groups
+from sim.model.response import LAG_PARTS
 from sim.motion.response import responses
 from sim.motion.sensitivity import sensitivities as derivatives
 from sim.motion.steady import steady
@@ -65,7 +66,7 @@ def _row(values: dict[str, Floats], history: bool, sensitivities: bool) -> Colum
     }
     curves = {"lag": response.lag, "spread": response.spread, "rest": response.rest, "memory": response.memory}
     for name, curve in curves.items():
-        for i, axis in enumerate(("z", "x", "psi_rad")):
+        for i, axis in enumerate(LAG_PARTS):
             columns[f"{name}_{axis}"] = curve[..., i].reshape(1, -1)
     for name in STEADY_COLUMNS[:7]:
         columns[name] = np.where(failed, np.nan, columns[name])

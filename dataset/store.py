@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from dataset.pieces import BadPieceError, Contents, Piece, piece_name, pieces, tables, write_piece
+from dataset.pieces import BadPieceError, Contents, Piece, piece_name, tables, write_piece
 from dataset.places import Place, place
 from dataset.schema import schema, table_of
 from sim.io.errors import InputError
@@ -188,11 +188,6 @@ def read(folder: str | Path, columns: Sequence[str] | None = None) -> pd.DataFra
     """
     found = list(batches(folder, columns, rows=2**20))
     return pa.Table.from_batches(found).replace_schema_metadata(None).to_pandas()
-
-
-def unfinished(there: Place) -> list[Piece]:
-    """Pieces of an interrupted build."""
-    return pieces(there, PENDING)
 
 
 def usable(rows: pd.DataFrame) -> pd.DataFrame:

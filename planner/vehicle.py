@@ -26,7 +26,6 @@ from sim.arrays import Floats
 from sim.mechanics import planar
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED
 
-TURN_OVER = 0.7  # time units that the tails need after a flip
 SHORTEST = float(DWELLS[0])  # shortest dwell whose response is known
 STEP = 0.02  # between the dwells at which lags are kept
 TIMES = np.arange(0.0, SETTLED + STEP / 2, STEP)

@@ -31,7 +31,7 @@ def _steady(arguments: Namespace) -> None:
     import numpy as np
     import pandas as pd
 
-    from sim.io.files import whole_file
+    from sim.io.files import write_csv
     from sim.io.tables import read_table
     from sim.motion.batches import steady_columns
     from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS
@@ -45,8 +45,7 @@ def _steady(arguments: Namespace) -> None:
         points = points.drop(columns=replaced)
     result = steady_columns({str(c): points[c].to_numpy() for c in points}, jobs=arguments.jobs)
     table = pd.concat([points, pd.DataFrame(result)], axis=1)
-    with whole_file(arguments.out) as part:
-        table.to_csv(part, index=False, float_format="%.8g")
+    write_csv(table, arguments.out)
     ended = table["converged"].to_numpy()
     touching = int(np.count_nonzero(table["tail_gap"] < 1))
     direct = int(np.count_nonzero(table["method"] == "direct"))
@@ -62,15 +61,14 @@ def _steady(arguments: Namespace) -> None:
 def _replay(arguments: Namespace) -> None:
     from tqdm import tqdm
 
-    from sim.io.files import whole_file
+    from sim.io.files import write_csv
     from sim.model.schedule import load_schedule
     from sim.motion.replay import replay
 
     schedule = load_schedule(arguments.plan)
     with tqdm(total=len(schedule.dwells), desc="replay", unit="dwell", delay=1.0) as bar:
         track = replay([schedule], progress=bar.update)[0]
-    with whole_file(arguments.out) as part:
-        track.to_csv(part, index=False, float_format="%.8g")
+    write_csv(track, arguments.out)
     end = track.iloc[-1]
     print(
         f"{len(schedule.dwells)} dwells, {end.time_s:.1f} s, "

@@ -61,7 +61,7 @@ def _train(arguments: Namespace) -> None:
 def _query(arguments: Namespace) -> None:
     import pandas as pd
 
-    from sim.io.files import whole_file
+    from sim.io.files import write_csv
     from sim.io.tables import read_table
     from surrogate.export import load_table
     from surrogate.lookup import Lookup
@@ -74,8 +74,7 @@ def _query(arguments: Namespace) -> None:
     else:
         result = table.query(columns)
     found = pd.concat([points, pd.DataFrame(result)], axis=1)
-    with whole_file(arguments.out) as part:
-        found.to_csv(part, index=False, float_format="%.8g")
+    write_csv(found, arguments.out)
     print(f"{len(found)} rows -> {arguments.out}")
 
 
@@ -90,11 +89,11 @@ def _query(arguments: Namespace) -> None:
 def _inverse(arguments: Namespace) -> None:
     import pandas as pd
 
-    from sim.io.files import whole_file
+    from sim.io.files import write_csv
     from sim.io.tables import read_table
+    from sim.motion.steady_motion import STEADY_OUTPUTS
     from surrogate.export import load
     from surrogate.inverse import BOUNDS, inverse
-    from surrogate.lookup import STEADY_OUTPUTS
 
     points = read_table(arguments.targets)
     names = [name.strip() for name in arguments.free.split(",")]
@@ -110,8 +109,7 @@ def _inverse(arguments: Namespace) -> None:
     table = pd.DataFrame(
         {"target": found.target + 1, **found.inputs, "misfit": found.misfit, "outside": found.outside}
     )
-    with whole_file(arguments.out) as part:
-        table.to_csv(part, index=False, float_format="%.8g")
+    write_csv(table, arguments.out)
     print(f"{len(table)} solutions of {len(points)} targets -> {arguments.out}")
 
 

@@ -13,13 +13,10 @@ import torch
 from torch import Tensor
 
 from sim.arrays import Floats
+from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate import head
 from surrogate.network import Ensemble
 from surrogate.tails import TailTable, class_of
-
-OUTPUTS = (
-    "omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "tail_gap",
-)  # fmt: skip
 
 
 def slopes(
@@ -33,7 +30,7 @@ def slopes(
         motion: their motion, (M, 5).
         parameters: names of columns.
     """
-    found = {name: {p: np.full(len(motion), np.nan) for p in parameters} for name in OUTPUTS}
+    found = {name: {p: np.full(len(motion), np.nan) for p in parameters} for name in STEADY_OUTPUTS}
     columns = {name: head.as_tensor(array) for name, array in values.items()}
     kind = class_of(columns["N"])
     for k, network in enumerate(table.wrench):
@@ -41,7 +38,7 @@ def slopes(
         if len(rows) and network is not None:
             own = {name: array[rows] for name, array in columns.items()}
             for parameter, changes in _changes(table, network, own, motion[rows, :4], parameters).items():
-                for name, change in zip(OUTPUTS, changes, strict=True):
+                for name, change in zip(STEADY_OUTPUTS, changes, strict=True):
                     found[name][parameter][rows.numpy()] = change.numpy()
     return found
 
@@ -49,7 +46,7 @@ def slopes(
 def _changes(
     table: TailTable, network: Ensemble, columns: dict[str, Tensor], u: Tensor, parameters: Sequence[str]
 ) -> dict[str, tuple[Tensor, ...]]:
-    """Derivatives of OUTPUTS by parameter, of robots with one network and the solution u (M, 4)."""
+    """Derivatives of STEADY_OUTPUTS by parameter, of robots with one network and the solution u (M, 4)."""
     heads, tails = head.robots_of(columns, keep=parameters)
     _, slope = head.value_and_slope(lambda v: head.unbalanced(heads, tails, v, network), u)
     inverse = torch.linalg.inv_ex(slope)[0]

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sim.arrays import Flags, Floats
+from sim.model.response import LAGS
 
 if TYPE_CHECKING:
     from surrogate.lookup import Lookup
@@ -24,7 +25,6 @@ Columns = Mapping[str, Any]
 
 RELATIVE = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "R_yr_over_l", "tail_gap")
 COMPARED = (*RELATIVE, "v_z", "theta_deg")
-RESPONSES = ("lag_psi_rad", "lag_x", "lag_z", "net_speed_bar")
 _UNITS = {"theta_deg": "deg", "lag_psi_rad": "of turn/unit", "v_z": "of speed", "lag_x": "of speed",
           "lag_z": "of speed", "net_speed_bar": "of v_z"}  # fmt: skip
 
@@ -56,7 +56,7 @@ def curve_errors(response: Any, truth: Columns) -> dict[str, Floats]:
         truth: columns of the steady motion; `lag` (M, D, 3) and `net_speed` (M, D) of the simulator.
     """
     found = {}
-    for i, name in enumerate(("lag_z", "lag_x", "lag_psi_rad")):
+    for i, name in enumerate(LAGS):
         found[name] = (response.lag - truth["lag"])[..., i] / np.asarray(scale_of(name, truth))[:, None]
     speed = np.asarray(scale_of("net_speed_bar", truth))[:, None]
     return found | {"net_speed_bar": (response.net_speed - truth["net_speed"]) / speed}

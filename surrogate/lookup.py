@@ -15,7 +15,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,7 +28,9 @@ from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.groups import DWELL
-from sim.model.response import DWELLS, Responses, at_equal_dwells
+from sim.model.response import DWELLS, LAGS, Responses, at_equal_dwells
+from sim.motion.net_speed import net_speeds, twists
+from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate import head, tail
 from surrogate.curves import CurveTable
 from surrogate.head import Heads
@@ -37,10 +39,7 @@ from surrogate.support import Support
 from surrogate.tail import Tails
 from surrogate.tails import TailTable, class_of, sensitivity_of
 
-STEADY_OUTPUTS = (
-    "omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "tail_gap",
-)  # fmt: skip
-RESPONSE_OUTPUTS = ("net_speed_bar", "lag_psi_rad", "lag_x", "lag_z")
+RESPONSE_OUTPUTS = ("net_speed_bar", *LAGS[::-1])
 OUTSIDE = "outside"  # flag of robots that the table does not know
 BRANCHES = 0.6  # |ω_yr/ω_t| from which a robot may have several motions
 CERTIFIED = "certified_error"
@@ -83,10 +82,6 @@ class Lookup:
         from surrogate.export import content_of
 
         return digest(content_of(self))[:16]
-
-    def with_errors(self, errors: dict[str, dict[str, float]]) -> Lookup:
-        """The same table with other held-out errors."""
-        return replace(self, errors=errors)
 
     def query(
         self, columns: Mapping[str, Floats], *, intervals: bool = False, flag: bool = False, certify: bool = False
@@ -239,8 +234,8 @@ class Lookup:
     def _responses(self, found: Motions, steady: Mapping[str, Floats]) -> Responses:
         curves = self.curves.curves(found.heads, found.tails, found.motion)
         sense = found.heads.sense.numpy()
-        twist = np.stack([steady["v_z"], sense * steady["v_x"], sense * steady["omega_yr_bar"]], -1)
-        speed = planar.net_speed(twist[:, None], curves["lag"] + at_equal_dwells(curves["memory"]), DWELLS)
+        twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
+        speed = net_speeds(twist, curves["lag"], curves["memory"])
         none = np.zeros(len(sense), dtype=bool)
         return Responses(**curves, net_speed=speed, failed=none, stepped=none)
 
@@ -282,9 +277,9 @@ def _at_dwells(
     """RESPONSE_OUTPUTS at one dwell for each robot, when all dwells are equal."""
     curves = response.lag + at_equal_dwells(response.memory)
     lag = between_dwells(curves, dwells)
-    twist = np.stack([steady["v_z"], sense * steady["v_x"], sense * steady["omega_yr_bar"]], -1)
+    twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
     speed = planar.net_speed(twist, lag, dwells)
-    return dict(zip(RESPONSE_OUTPUTS, (speed, lag[:, 2], lag[:, 1], lag[:, 0]), strict=True))
+    return dict(zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True))
 
 
 def between_dwells(curves: Floats, dwells: Floats) -> Floats:

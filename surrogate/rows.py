@@ -19,14 +19,13 @@ from scipy.stats import qmc
 from dataset.store import read, read_manifest, usable
 from sim.arrays import Flags, Floats, Integers
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, Groups
-from sim.model.response import BEFORE, DWELLS
+from sim.model.response import BEFORE, DWELLS, LAG_PARTS
 from sim.motion.batches import run_batches, split, steady_columns
 from sim.motion.response import responses
 from sim.motion.steady import orbits
 
 ROBOT = (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)
 MOTION = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap", "error")
-COMPONENTS = ("z", "x", "psi_rad")  # of a lag
 DOMAIN = {
     "C_t": (0.5, 8.0), "C_r": (0.5, 6.0), "C_yr": (0.2, 12.0), "l_over_R": (2.0, 12.0), "L_over_R": (1.5, 8.0),
     "l_over_r0": (12.0, 80.0), "omega_bar": (0.5, 150.0), "a_over_R": (0.5, 1.2),
@@ -64,14 +63,6 @@ class Simulated:
         finite = [np.isfinite(array.reshape(len(array), -1)).all(1) for array in self.curves.values()]
         return self.at(np.all(finite, axis=0))
 
-    def plus(self, other: Simulated) -> Simulated:
-        """These robots and others, both with curves or both without."""
-        joined = [
-            {name: np.concatenate([mine[name], theirs[name]]) for name in mine}
-            for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True)
-        ]
-        return Simulated(*joined)
-
 
 def read_rows(folder: str) -> tuple[Simulated, Integers]:
     """Usable rows of a data set's folder, and their numbers.
@@ -95,7 +86,7 @@ def _curves_in(table: pd.DataFrame) -> dict[str, Floats]:
     dwells, before = len(DWELLS), len(BEFORE)
     shapes = {"lag": (dwells,), "memory": (before, dwells), "rest": (dwells,), "spread": (dwells,)}
     curves = {
-        name: np.stack([_lists(table[f"{name}_{part}"], shape) for part in COMPONENTS], -1)
+        name: np.stack([_lists(table[f"{name}_{part}"], shape) for part in LAG_PARTS], -1)
         for name, shape in shapes.items()
     }
     return curves | {"net_speed": _lists(table["net_speed_bar"], (dwells,))}

@@ -19,8 +19,8 @@ import numpy as np
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.files import write_text
-from sim.mechanics import planar
-from sim.model.response import DWELLS, Responses, at_equal_dwells
+from sim.model.response import DWELLS, Responses
+from sim.motion.net_speed import net_speeds, twists
 
 FORMAT = 2
 _CURVES = {"lag": (2, len(DWELLS), 3), "memory": (2, -1, len(DWELLS), 3),
@@ -75,8 +75,8 @@ class SingleRobot:
         side, before = self._side(columns), np.array(self.before)
         lag, memory, rest, spread = (np.array(getattr(self, name))[side] for name in _CURVES)
         found, sense = self.query(columns), np.where(side == 0, 1.0, -1.0)
-        twist = np.stack([found["v_z"], sense * found["v_x"], sense * found["omega_yr_bar"]], -1)
-        speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory, before), DWELLS)
+        twist = twists(found["v_z"], found["v_x"], found["omega_yr_bar"], sense)
+        speed = net_speeds(twist, lag, memory, before)
         none = np.zeros(len(side), dtype=bool)
         return Responses(lag, memory, rest, spread, speed, none, none, before)
 

@@ -17,18 +17,15 @@ from sim.io.errors import InputError
 from sim.io.provenance import provenance
 from sim.mechanics import planar
 from sim.model.groups import Groups
-from sim.model.response import DWELLS, memory_after
+from sim.model.response import DWELLS, LAGS, memory_after
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
 from sim.motion.response import responses
 from sim.motion.steady import steady
+from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.single import SingleRobot
 
-LAGS = ("lag_z", "lag_x", "lag_psi_rad")
-_OUTPUTS = (
-    "omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "tail_gap",
-)  # fmt: skip
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
 _STEP = 0.02  # in ln C, for derivatives
 BEFORE = np.geomspace(0.2, 1.2, 16)  # lengths of the dwell before
@@ -65,7 +62,7 @@ def tabulate(robot: Robot) -> SingleRobot:
     columns = motion.columns()
     table = SingleRobot(
         robot=values,
-        steady={name: np.asarray(columns[name], dtype=float).tolist() for name in _OUTPUTS},
+        steady={name: np.asarray(columns[name], dtype=float).tolist() for name in STEADY_OUTPUTS},
         lag=found.lag.tolist(),
         before=BEFORE.tolist(),
         memory=found.memory.tolist(),

@@ -149,7 +149,7 @@ def _judged(lookup: Lookup, widths: Simulated, held_out: Simulated, flips: Simul
     found = lookup.response(flips.robots, flag=True)
     truth = {**flips.motion, **flips.curves}
     report |= summary(curve_errors(found, truth), flips.motion["tail_gap"] >= 1)
-    return replace(lookup, intervals=intervals).with_errors(report)
+    return replace(lookup, intervals=intervals, errors=report)
 
 
 def _errors(lookup: Lookup, rows: Simulated) -> tuple[torch.Tensor, dict[str, torch.Tensor], Floats]:

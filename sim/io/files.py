@@ -10,8 +10,12 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sim.io.errors import InputError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 @contextmanager
@@ -30,6 +34,12 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         os.replace(part, target)
     finally:
         part.unlink(missing_ok=True)
+
+
+def write_csv(table: DataFrame, path: str | Path, *, digits: int = 8) -> None:
+    """Write a table as CSV with so many digits, completely or not at all."""
+    with whole_file(path) as part:
+        table.to_csv(part, index=False, float_format=f"%.{digits}g")
 
 
 def write_text(path: str | Path, text: str) -> None:

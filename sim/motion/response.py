@@ -18,7 +18,9 @@ from sim.mechanics import planar
 from sim.mechanics.geometry import straight
 from sim.model.body import Body
 from sim.model.groups import Groups
-from sim.model.response import BEFORE, DWELLS, SETTLED, Responses, at_equal_dwells
+from sim.model.response import BEFORE, DWELLS, SETTLED, Responses
+from sim.motion.net_speed import net_speeds, twists
+from sim.motion.run import REVERSED
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady
 from sim.motion.stepped_response import stepped_response
@@ -30,7 +32,6 @@ from sim.solve.transient import lag_at, transient
 _SAME = 1.2  # time units from which the memory is constant
 _MESHES = (6, 9)  # edges; errors go as 1/n², extrapolated
 _TOLERANCE = 1e-3  # of a time step, in l: see `sim.solve.transient`
-_FLIPPED = np.array([-1.0, 1.0, -1.0, -1.0])  # of (v_x, v_z, ω_yr, ω_h)
 _LEAST_INSTANTS = {1: 3, 2: 3}  # by N; with more tails the phase at the flip hardly matters
 
 
@@ -69,10 +70,10 @@ def responses(
         found.append(curves)
     lag, memory, rest, spread = (np.array(column) for column in zip(*found, strict=True))
     sense = np.sign([body.omega for body in robots])
-    twist = np.stack([motion.v_z, sense * motion.v_x, sense * motion.omega_yr], -1)
+    twist = twists(motion.v_z, motion.v_x, motion.omega_yr, sense)
     if not history:
         memory[:], rest[:] = np.nan, np.nan
-    speed = planar.net_speed(twist[:, None], lag + at_equal_dwells(memory, before), DWELLS)
+    speed = net_speeds(twist, lag, memory, before)
     failed = ~np.isfinite(speed[:, -1])
     for array in (lag, memory, rest, spread, speed):
         array[failed] = np.nan
@@ -108,7 +109,7 @@ def _on_mesh(
         if came is None:
             return None
         other = came[2]
-        start, first = came[0], came[1] * _FLIPPED
+        start, first = came[0], came[1] * REVERSED
     main = transient(body, start.copy(), first.copy(), twist, SETTLED, before, _TOLERANCE)
     if not main.solved:
         return None
@@ -122,7 +123,7 @@ def _on_mesh(
     if even:
         shapes = np.array([_mirrored(shape) for shape in shapes])
     else:
-        back = transient(reverse, x.copy(), u * _FLIPPED, other, float(before[-1]), before, _TOLERANCE)
+        back = transient(reverse, x.copy(), u * REVERSED, other, float(before[-1]), before, _TOLERANCE)
         if not back.solved:
             return None
         shapes = back.shapes

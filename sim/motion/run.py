@@ -13,7 +13,7 @@ from sim.solve.march import TOLERANCE, YAW, State, X, Y, advance, new_state
 BROKE_DOWN = "Newton's method did not converge in a time step"
 TOO_MUCH = "it would take more time steps than a row may ask for"
 _GRADES = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2)  # parts of a step, two of each, after a jump of the motor's speed
-_REVERSED = np.array([-1.0, 1.0, -1.0, -1.0])  # signs of (v_x, v_z, ω_yr, ω_h) after a flip
+REVERSED = np.array([-1.0, 1.0, -1.0, -1.0])  # signs of (v_x, v_z, ω_yr, ω_h) after a flip
 
 
 class Run:
@@ -96,7 +96,7 @@ class Run:
     def flip(self) -> None:
         """Reverse the motor: the shape stays, velocities become their mirror image."""
         self.body, self.reverse = self.reverse, self.body
-        self.state.u[:] *= _REVERSED
+        self.state.u[:] *= REVERSED
         self.state.x_dot[:] = 0.0
         self._jumped = True
 

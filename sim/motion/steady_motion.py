@@ -17,10 +17,10 @@ import numpy as np
 from sim.arrays import Flags, Floats, Integers, Words
 
 DIRECT, STEPPING = "direct", "stepping"
-STEADY_COLUMNS = (
-    "omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z",
-    "R_yr_over_l", "theta_deg", "converged", "tail_gap",
+STEADY_OUTPUTS = (
+    "omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "tail_gap",
 )  # fmt: skip
+STEADY_COLUMNS = (*STEADY_OUTPUTS[:-1], "converged", STEADY_OUTPUTS[-1])
 QUALITY_COLUMNS = ("error", "method", "note")  # how good a row is, beside its numbers
 
 

@@ -36,6 +36,7 @@ from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.body import Body
 from sim.model.groups import DWELL, Groups
+from sim.motion.net_speed import twists
 from sim.motion.resolution import Resolution
 from sim.motion.run import Run
 from sim.motion.settling import settle_one
@@ -85,7 +86,7 @@ def switch_response(
     both = zip(robots, reversed_bodies(groups), dwell, strict=True)
     lag = np.array([_lag(body, reverse, groups.N, T, even, resolution) for body, reverse, T in both])
     sense = np.sign([body.omega for body in robots])
-    twist = np.stack([motion.v_z, sense * motion.v_x, sense * motion.omega_yr], -1)
+    twist = twists(motion.v_z, motion.v_x, motion.omega_yr, sense)
     speed = planar.net_speed(twist, lag, dwell)
     failed = ~np.isfinite(speed)
     lag[failed] = np.nan
