@@ -17,7 +17,7 @@ from sim.io.errors import InputError
 from sim.io.provenance import provenance
 from sim.mechanics import planar
 from sim.model.groups import Groups
-from sim.model.response import DWELLS, LAGS, memory_after
+from sim.model.response import BEFORE, DWELLS, LAGS, memory_after
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
@@ -28,7 +28,6 @@ from surrogate.single import SingleRobot
 
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
 _STEP = 0.02  # in ln C, for derivatives
-BEFORE = np.geomspace(0.2, 1.2, 16)  # lengths of the dwell before
 _CHECKED = 24  # dwells of the random schedule
 _RANGE = (0.35, 1.8)  # of their lengths
 
@@ -56,7 +55,7 @@ def tabulate(robot: Robot) -> SingleRobot:
     motion = steady(groups)
     if not motion.converged.all():
         raise InputError(f"{robot.name} has no steady motion to tabulate: {motion.note[0]}")
-    found = responses(groups, motion, before=BEFORE)
+    found = responses(groups, motion)
     if found.failed.any():
         raise InputError(f"{robot.name}: a simulated flip broke down; a slower motor may help")
     columns = motion.columns()
@@ -101,15 +100,14 @@ def _missed(table: SingleRobot) -> Floats:
     flips = track.groupby("dwell").last()[["x_over_l", "y_over_l", "heading_rad"]].to_numpy()
     poses = np.concatenate([np.zeros((1, 3)), flips])
     moved = planar.between(poses[:-1], poses[1:])
+    lag, memory = np.array(table.lag), np.array(table.memory)
     missed = []
     for i in range(1, len(dwells)):
         side = i % 2
         mirror = planar.MIRROR if side else np.ones(3)
         twist = np.array([table.steady[name][side] for name in ("v_z", "v_x", "omega_yr_bar")]) * mirror
         simulated = planar.compose(moved[i] * mirror, planar.inverse(planar.arc(twist, dwells[i])))
-        curve = np.array(table.lag[side]) + memory_after(
-            np.array(table.memory[side]), float(dwells[i - 1]), BEFORE
-        )
+        curve = lag[side] + memory_after(memory[side], float(dwells[i - 1]))
         predicted = [np.interp(np.log(dwells[i]), np.log(DWELLS), column) for column in curve.T]
         missed.append(simulated - predicted)
     return np.array(missed)

@@ -26,7 +26,7 @@ import numpy as np
 from sim.arrays import Flags, Floats
 
 DWELLS = np.geomspace(0.2, 4.0, 25)  # T̄ of the curves
-BEFORE = np.array([0.2, 0.25, 0.32, 0.42, 0.6, 0.9])  # T̄ of the dwell before
+BEFORE = np.geomspace(0.2, 1.2, 16)  # T̄ of the dwell before
 FORGOTTEN = 1.4  # T̄ of the dwell before from which on the response is that after a long one
 LAG_PARTS = ("z", "x", "psi_rad")  # of a lag: forward, to the side of the new turn, heading
 LAGS = tuple(f"lag_{part}" for part in LAG_PARTS)  # columns

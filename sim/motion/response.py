@@ -66,7 +66,10 @@ def responses(
         curves = _solved(body, reverse, groups.N, even, history, before)
         if curves is None:
             stepped[i] = True
-            curves = Curves(*stepped_response(body, groups.N, DWELLS, before, reverse=reverse))
+            values = stepped_response(
+                body, groups.N, DWELLS, before, reverse=reverse, history=history, settled=SETTLED
+            )
+            curves = Curves(*values)
         found.append(curves)
     lag, memory, rest, spread = (np.array(column) for column in zip(*found, strict=True))
     sense = np.sign([body.omega for body in robots])

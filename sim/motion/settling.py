@@ -26,6 +26,7 @@ from sim.model.body import Body
 from sim.model.groups import Groups
 from sim.motion.resolution import Resolution, steps_in
 from sim.motion.run import BROKE_DOWN, Run
+from sim.motion.shapes import state_on_orbit
 from sim.motion.steady_motion import STEPPING, Steady
 from sim.solve.assembly import bodies
 from sim.solve.march import PHASE, SURGE, SWAY, YAW, State
@@ -118,6 +119,15 @@ def settle_one(body: Body, tails: int, resolution: Resolution) -> Settled:
         return lost()
     gap = _smallest_gap(run, 2 * np.pi / abs(means[0]))
     return lost() if run.failed else Settled(means, drift, converged, "", gap, run.state)
+
+
+def steady_state(body: Body, tails: int, resolution: Resolution) -> State | None:
+    """A state of the steady motion: on the orbit, or settled from rest; None where the robot breaks down."""
+    state = state_on_orbit(body, tails, resolution.edges, 0.0)
+    if state is not None:
+        return state
+    settled = settle_one(body, tails, resolution)
+    return None if settled.failed else settled.state
 
 
 def _smallest_gap(run: Run, revolution: float) -> float:

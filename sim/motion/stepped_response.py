@@ -14,8 +14,7 @@ from sim.mechanics import planar
 from sim.model.body import Body
 from sim.motion.resolution import Resolution
 from sim.motion.run import Run
-from sim.motion.settling import settle_one
-from sim.motion.shapes import state_on_orbit
+from sim.motion.settling import steady_state
 from sim.motion.switching import steady_twist
 
 
@@ -27,6 +26,8 @@ def stepped_response(
     *,
     reverse: Body | None = None,
     resolution: Resolution | None = None,
+    history: bool = True,
+    settled: float = np.inf,
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Lag (D, 3), memory (K, D, 3), lag from rest (D, 3) and spread (D, 3) as in `sim.motion.response.Responses`.
 
@@ -36,42 +37,50 @@ def stepped_response(
         before: T̄ of the dwell before, (K,), increasing.
         reverse: the robot before the flip; by default the same with another sign of ω̄, see `Run`.
         resolution: mesh and step; by default what the motor's speed needs.
+        history: step memory and rest, too; else they are NaN.
+        settled: T̄ from which the lag is taken to be constant.
 
     Returns:
         NaN where the robot breaks down.
     """
     chosen = resolution or Resolution.fitting(body.omega)
-    lost = tuple(np.full(shape, np.nan) for shape in ((len(dwells), 3), (len(before), len(dwells), 3)))
-    failed = (lost[0], lost[1], lost[0].copy(), lost[0].copy())
     reverse = body._replace(omega=-body.omega) if reverse is None else reverse
-    state = state_on_orbit(reverse, tails, chosen.edges, 0.0)
+    count = len(dwells)
+    lag, memory, rest, spread = (
+        np.full(size, np.nan) for size in ((count, 3), (len(before), count, 3), (count, 3), (count, 3))
+    )
+    lost = lag, memory, rest, spread
+    state = steady_state(reverse, tails, chosen)
     if state is None:
-        settled = settle_one(reverse, tails, chosen)
-        if settled.failed:
-            return failed
-        state = settled.state
+        return lost
     run = Run(reverse, tails, chosen, state, reverse=body)
     sense = float(np.sign(body.omega))
+    times, place = np.unique(np.minimum(dwells, settled), return_inverse=True)
     _, turn = steady_twist(run, tails, sense)
     changes, after_short = [], []
     for share in (0.0, 0.5):
         if run.failed:
-            return failed
+            return lost
         copy = run.copy()
         if share:
             copy.go(share * turn)
-        changes.append(_flipped_poses(copy, dwells, sense))
-        after_short.append(_after_short_dwells(copy, before, dwells, sense))
+        changes.append(_flipped_poses(copy, times, sense))
+        if history:
+            after_short.append(_after_short_dwells(copy, before, times, sense))
     twist, _ = steady_twist(copy, tails, sense)
-    rest = Run(body, tails, chosen)
-    from_rest = _poses(rest, dwells, sense)
-    if run.failed or copy.failed or rest.failed:
-        return failed
-    circle = planar.inverse(planar.arc(twist, dwells))
+    if run.failed or copy.failed:
+        return lost
+    circle = planar.inverse(planar.arc(twist, times))
     each = planar.compose(np.array(changes), circle)
-    lag = each.mean(0)
-    memory = planar.compose(np.mean(after_short, 0), circle) - lag
-    return lag, memory, planar.compose(from_rest, circle), each.std(0)
+    lag, spread = each.mean(0), each.std(0)
+    if history:
+        from_rest = Run(body, tails, chosen)
+        rest = planar.compose(_poses(from_rest, times, sense), circle)
+        memory = planar.compose(np.mean(after_short, 0), circle) - lag
+        if from_rest.failed:
+            return lost
+        rest, memory = rest[place], memory[:, place]
+    return lag[place], memory, rest, spread[place]
 
 
 def _after_short_dwells(run: Run, before: Floats, dwells: Floats, sense: float) -> Floats:

@@ -39,8 +39,7 @@ from sim.model.groups import DWELL, Groups
 from sim.motion.net_speed import twists
 from sim.motion.resolution import Resolution
 from sim.motion.run import Run
-from sim.motion.settling import settle_one
-from sim.motion.shapes import state_on_orbit
+from sim.motion.settling import steady_state
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady
 from sim.solve.assembly import bodies, reversed_bodies
@@ -96,12 +95,9 @@ def switch_response(
 def _lag(body: Body, reverse: Body, tails: int, dwell: float, even: bool, resolution: Resolution | None) -> Floats:
     """(Δz, Δx, Δψ) of one robot; NaN where it breaks down."""
     chosen = resolution or Resolution.fitting(body.omega)
-    state = state_on_orbit(body, tails, chosen.edges, 0.0)
+    state = steady_state(body, tails, chosen)
     if state is None:
-        settled = settle_one(body, tails, chosen)
-        if settled.failed:
-            return np.full(3, np.nan)
-        state = settled.state
+        return np.full(3, np.nan)
     run = Run(body, tails, chosen, state, reverse=reverse)
     sense = np.sign(body.omega)
     twist, turn = steady_twist(run, tails, sense)

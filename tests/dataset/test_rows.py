@@ -97,7 +97,7 @@ def test_odd_effects_make_the_two_directions_differ() -> None:
 
 def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither an orbit nor a time step can be solved."""
-    from sim.motion import response, run, steady, stepped_response
+    from sim.motion import response, run, settling, steady
     from sim.motion.orbits import Orbits
     from sim.solve.refinement import NO_START
 
@@ -107,7 +107,7 @@ def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr(steady, "solve_orbits", lost)
     monkeypatch.setattr(response, "orbit_on_mesh", lambda *_: (False, None, None))
-    monkeypatch.setattr(stepped_response, "state_on_orbit", lambda *_: None)
+    monkeypatch.setattr(settling, "state_on_orbit", lambda *_: None)
     monkeypatch.setattr(run, "advance", lambda *_: False)
     columns = simulate(rows_of({}))
     assert columns["failed"].tolist() == [True]
