@@ -21,7 +21,8 @@ from tests.planner.vehicles import vehicle
 def test_lags_are_those_of_the_curves() -> None:
     """At the dwells of the table exactly; between lengths of the dwell before, as `memory_after` says."""
     rng = np.random.default_rng(0)
-    lag, memory = rng.normal(size=(len(DWELLS), 3)), rng.normal(size=(len(BEFORE), len(DWELLS), 3))
+    lag = rng.normal(size=(len(DWELLS), 3))
+    memory = np.exp(-BEFORE / 0.3)[:, None, None] * rng.normal(size=(len(DWELLS), 3))
     table = lags_of(lag, memory)
     car = replace(vehicle(), lag=np.stack([table, table * planar.MIRROR]))
     at = DWELLS[TIMES[-1] > DWELLS][-1]
