@@ -6,8 +6,9 @@ robot to robot:
     Δz/w, Δx/v_x, Δψ/ω_yr,   w² = v_z² + (v_x/10)²
 
 (w and not v_z, because v_z may vanish). Lag, memory, rest and spread are each written in the principal
-components of the rows that were learned. A network gives the components. A robot's inputs are those of its tails
-in steady motion (`surrogate.tail`), how the drag of its head compares with that of its tails, and N.
+components of the rows that were learned. Two networks give the components: one for lag and spread, one for memory
+and rest, which data sets hold for a part of their robots. A robot's inputs are those of its tails in steady motion
+(`surrogate.tail`), how the drag of its head compares with that of its tails, and N.
 
 The components are curves of the simulator. So the curves of the table are smooth, and constant for long dwells.
 Left out: robots with one tail, and robots whose left and right turns differ. Units: l, μ0 l⁴/EI.
@@ -37,6 +38,7 @@ SHAPES = {
     "rest": (len(DWELLS), 3),
     "spread": (len(DWELLS), 3),
 }
+PARTS = (("lag", "spread"), ("memory", "rest"))  # what each network gives
 COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 20}
 SETTINGS = Settings(width=48, depth=2, members=2, epochs=200, iterations=150)
 _SMALL_SURGE = 0.1  # of v_x
@@ -54,20 +56,19 @@ class Basis(NamedTuple):
 class CurveTable:
     """Response curves of robots from their steady motion."""
 
-    network: Ensemble
+    networks: tuple[Ensemble, ...]  # one for each of PARTS
     bases: Mapping[str, Basis]
 
     def curves(self, heads: Heads, tails: Tails, motion: Tensor) -> dict[str, Floats]:
         """Lag, memory, rest and spread, each (M, …, 3) as in SHAPES, in l, l, rad, for a positive motor."""
-        components = self.network(inputs_of(heads, tails, motion))
-        speeds = speeds_of(heads, motion)
-        found, start = {}, 0
-        for name, basis in self.bases.items():
-            stop = start + len(basis.vectors)
-            curve = basis.mean + components[:, start:stop] @ basis.vectors
-            scaled = curve.reshape(-1, *SHAPES[name]) * _along(speeds, SHAPES[name])
-            found[name] = np.asarray(scaled.numpy())
-            start = stop
+        inputs, speeds = inputs_of(heads, tails, motion), speeds_of(heads, motion)
+        found = {}
+        for names, network in zip(PARTS, self.networks, strict=True):
+            sizes = [len(self.bases[name].vectors) for name in names]
+            for name, components in zip(names, network(inputs).split(sizes, -1), strict=True):
+                curve = self.bases[name].mean + components @ self.bases[name].vectors
+                scaled = curve.reshape(-1, *SHAPES[name]) * _along(speeds, SHAPES[name])
+                found[name] = np.asarray(scaled.numpy())
         found["spread"] = np.maximum(found["spread"], 0.0)
         return found
 
@@ -99,20 +100,33 @@ def speeds_of(heads: Heads, motion: Tensor) -> Tensor:
 def learn_curves(
     heads: Heads, tails: Tails, motion: Tensor, curves: Mapping[str, Floats], settings: Settings, title: str
 ) -> CurveTable:
-    """A table from the curves of robots, by name as in SHAPES, each (M, …, 3)."""
+    """A table from the curves of robots, by name as in SHAPES, each (M, …, 3); NaN where one was not simulated."""
     inputs, speeds = inputs_of(heads, tails, motion), speeds_of(heads, motion)
-    bases, targets = {}, []
-    for name, shape in SHAPES.items():
-        scaled = torch.as_tensor(curves[name]) / _along(speeds, shape)
-        flat = scaled.reshape(len(scaled), -1)
-        mean = flat.median(0).values
-        vectors = torch.linalg.svd(_without_outliers(flat - mean), full_matrices=False)[2][
-            : COMPONENTS[name]
-        ].clone()
-        bases[name] = Basis(mean, vectors)
-        targets.append((flat - mean) @ vectors.T)
-    wanted = torch.cat(targets, -1)
-    weights = torch.cat([torch.full((len(bases[n].vectors),), (3 / np.prod(s)) ** 0.5) for n, s in SHAPES.items()])
+    networks: list[Ensemble] = []
+    bases: dict[str, Basis] = {}
+    for names in PARTS:
+        known = torch.stack([torch.as_tensor(np.isfinite(curves[n])).flatten(1).all(1) for n in names]).all(0)
+        targets = []
+        for name in names:
+            scaled = torch.as_tensor(curves[name])[known] / _along(speeds[known], SHAPES[name])
+            bases[name] = _basis(scaled.reshape(len(scaled), -1), COMPONENTS[name])
+            targets.append((scaled.reshape(len(scaled), -1) - bases[name].mean) @ bases[name].vectors.T)
+        sizes = [(len(bases[name].vectors), (3 / np.prod(SHAPES[name])) ** 0.5) for name in names]
+        weights = torch.cat([torch.full((count,), weight, dtype=torch.float64) for count, weight in sizes])
+        words = f"{title}: {' and '.join(names)}" if title else ""
+        networks.append(_learned(inputs[known], torch.cat(targets, -1), weights, settings, words))
+    return CurveTable(tuple(networks), bases)
+
+
+def _basis(flat: Tensor, count: int) -> Basis:
+    """Mean and the first components of curves (M, D)."""
+    mean = flat.median(0).values
+    vectors = torch.linalg.svd(_without_outliers(flat - mean), full_matrices=False)[2]
+    return Basis(mean, vectors[:count].clone())
+
+
+def _learned(inputs: Tensor, wanted: Tensor, weights: Tensor, settings: Settings, title: str) -> Ensemble:
+    """A network that gives components (M, C)."""
     network = Ensemble(
         inputs.shape[1], wanted.shape[1], width=settings.width, depth=settings.depth, members=settings.members,
         seed=settings.seed,
@@ -125,7 +139,7 @@ def learn_curves(
         return (y - wanted[at]) * weights
 
     fit(network, inputs, residual, settings, title)
-    return CurveTable(network, bases)
+    return network
 
 
 def _along(speeds: Tensor, shape: tuple[int, ...]) -> Tensor:

@@ -27,7 +27,7 @@ from surrogate.table import LookupTable
 from surrogate.tails import TailTable
 
 SHIPPED = Path(__file__).parent / "shipped" / "model.pt"
-_FORMAT = 3
+_FORMAT = 4
 
 
 def content_of(lookup: Lookup) -> dict[str, Any]:
@@ -36,7 +36,7 @@ def content_of(lookup: Lookup) -> dict[str, Any]:
     return {
         "wrench": [None if network is None else _stored(network) for network in lookup.tails.wrench],
         "gap": _stored(lookup.tails.gap),
-        "curves": _stored(lookup.curves.network),
+        "curves": [_stored(network) for network in lookup.curves.networks],
         "bases": {name: {"mean": b.mean, "vectors": b.vectors} for name, b in lookup.curves.bases.items()},
         "support": [None if support is None else vars(support) for support in lookup.support],
         "intervals": None if intervals is None else {k: _plain(v) for k, v in vars(intervals).items()},
@@ -102,7 +102,8 @@ def _lookup(content: dict[str, Any]) -> Lookup:
             tuple(None if part is None else _network(part) for part in content["wrench"]), _network(content["gap"])
         ),
         curves=CurveTable(
-            _network(content["curves"]), {name: Basis(**part) for name, part in content["bases"].items()}
+            tuple(_network(part) for part in content["curves"]),
+            {name: Basis(**part) for name, part in content["bases"].items()},
         ),
         support=tuple(None if part is None else Support(**part) for part in content["support"]),
         intervals=None if intervals is None else Intervals(**intervals),
@@ -110,7 +111,7 @@ def _lookup(content: dict[str, Any]) -> Lookup:
         errors=content["errors"],
         provenance=content["provenance"],
     )
-    for network in (*table.tails.wrench, table.tails.gap, table.curves.network):
+    for network in (*table.tails.wrench, table.tails.gap, *table.curves.networks):
         if network is not None and not all(
             bool(torch.isfinite(part).all()) for part in network.state_dict().values()
         ):

@@ -53,6 +53,20 @@ class Ensemble(nn.Module):
             "members": self.bypass.shape[0],
         }
 
+    def member(self, k: int) -> Ensemble:
+        """A network of one member: a copy of member k."""
+        alone = Ensemble(**{**self.shape, "members": 1}, seed=0)
+        state = self.state_dict()
+        own = {name for name, _ in self.named_parameters()}
+        alone.load_state_dict({name: part[k : k + 1] if name in own else part for name, part in state.items()})
+        return alone
+
+    def replace_member(self, k: int, alone: Ensemble) -> None:
+        """Take the numbers of a network of one member as member k."""
+        with torch.no_grad():
+            for mine, other in zip(self.parameters(), alone.parameters(), strict=True):
+                mine[k] = other[0]
+
     def standardised(self, x: Tensor) -> Tensor:
         """Outputs of every member before `mean` and `spread`, (K, M, O), for standardised inputs (M, F)."""
         first = x.expand(self.bypass.shape[0], -1, -1)

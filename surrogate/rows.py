@@ -60,8 +60,7 @@ class Simulated:
         """The robots whose response was simulated."""
         if not self.curves:
             return self.at(np.zeros(len(self), dtype=bool))
-        finite = [np.isfinite(array.reshape(len(array), -1)).all(1) for array in self.curves.values()]
-        return self.at(np.all(finite, axis=0))
+        return self.at(np.flatnonzero(np.isfinite(self.curves["lag"]).all((1, 2))))
 
 
 def read_rows(folder: str) -> tuple[Simulated, Integers]:

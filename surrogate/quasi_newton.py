@@ -1,0 +1,106 @@
+"""Minimise a smooth function of some thousand numbers: the BFGS method with its whole matrix, self-scaled.
+
+L-BFGS keeps the last steps only. On the loss of a look-up table it then needs many times as many iterations: the
+matrix of all steps knows the narrow valleys of this loss. The matrix has n² numbers (0.7 GB for n = 9,000), and an
+iteration reads it once and writes it once, which takes about as long as the loss and its gradient.
+
+Where the curvature along a step is smaller than the matrix says, the matrix is scaled before it is updated.
+Source: Oren and Luenberger (1974); Al-Baali (1998); for networks Urbán, Stefanou and Pons (2025). The line search
+is scipy's, for the strong Wolfe conditions.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from scipy.optimize import line_search
+from torch import Tensor
+
+from sim.arrays import Floats
+
+ValueAndGradient = Callable[[Tensor], tuple[float, Tensor]]
+_CURVATURE = 0.9  # of the Wolfe conditions
+_SEARCHES = 15  # trial steps of a line search
+
+
+class Minimiser:
+    """The state of a minimisation: the point `x` (n,), its value and the inverse Hessian, as estimated so far."""
+
+    def __init__(self, function: ValueAndGradient, x: Tensor):
+        self.function = function
+        self.x = x
+        self.value, self.gradient = function(x)
+        self._matrix: Tensor | None = None  # (n, n); None: steepest descent
+        self._direction = -self.gradient / self.gradient.abs().sum().clamp(min=1e-300)
+
+    def step(self) -> bool:
+        """One iteration; False where no step along the gradient makes the value smaller."""
+        found = self._search()
+        if found is None and self._matrix is not None:
+            self._forget()
+            found = self._search()
+        if found is None:
+            return False
+        length, value, gradient = found
+        self._update(length * self._direction, gradient, length)
+        self.value, self.gradient = value, gradient
+        return True
+
+    def _search(self) -> tuple[float, float, Tensor] | None:
+        """Step length, value and gradient there; None where there is none."""
+        if not float(self.gradient @ self._direction) < 0:
+            return None
+        tried: dict[bytes, tuple[float, Tensor]] = {}
+
+        def at(point: Floats) -> tuple[float, Tensor]:
+            key = point.tobytes()
+            if key not in tried:
+                tried[key] = self.function(torch.as_tensor(point, device=self.x.device))
+            return tried[key]
+
+        def value(point: Floats) -> float:
+            return at(point)[0]
+
+        def gradient(point: Floats) -> Floats:
+            return np.asarray(at(point)[1].cpu().numpy())
+
+        start, direction, slope = (part.cpu().numpy() for part in (self.x, self._direction, self.gradient))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # no step found: said by the answer
+            length = line_search(
+                value, gradient, start, direction, slope, self.value, c2=_CURVATURE, maxiter=_SEARCHES
+            )[0]
+        return None if length is None else (float(length), *at(start + length * direction))
+
+    def _forget(self) -> None:
+        self._matrix = None
+        self._direction = -self.gradient / self.gradient.abs().sum().clamp(min=1e-300)
+
+    def _update(self, step: Tensor, gradient: Tensor, length: float) -> None:
+        """The matrix after a step, and the next direction."""
+        self.x = self.x + step
+        change = gradient - self.gradient
+        curvature = float(step @ change)
+        if not curvature > 0:
+            self._direction = -gradient / gradient.abs().sum().clamp(min=1e-300)
+            self._matrix = None
+            return
+        if self._matrix is None:
+            size = curvature / float(change @ change)
+            self._matrix = torch.eye(len(step), dtype=step.dtype, device=step.device) * size
+            moved, expected = size * gradient, curvature
+            carried = size * change
+        else:
+            moved = self._matrix @ gradient
+            carried = moved + self._direction  # the matrix times `change`
+            expected = -length * float(step @ self.gradient)  # curvature of the matrix along the step
+        scale = max(expected / curvature, 1.0)
+        outer = -scale / curvature * carried
+        outer += 0.5 * (scale * float(change @ carried) / curvature + 1) / curvature * step
+        columns = torch.stack([step, outer], 1)
+        rows = torch.stack([outer, step])
+        self._matrix.addmm_(columns, rows, beta=scale)
+        self._direction = -(scale * moved + step * (outer @ gradient) + outer * (step @ gradient))
