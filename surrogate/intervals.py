@@ -6,16 +6,18 @@ sure.
 
 s is fitted to the logarithm of errors by least squares. Its features are the inputs of the tails and their
 squares, how far the robot is from the middle of what was learned, how much the members differ, and N. q makes
-the intervals cover 90 % whether or not s is any good; s makes them cover 90 % in most parts of the domain as
-well. Robots for s and robots for q are different ones. Source: Lei et al., J. Am. Stat. Assoc. 113, 1094 (2018),
-section 5.2.
+the intervals cover 90 % whether or not s is any good. There is one q for robots with one tail, and one for each
+octant of the others: low or high drag number, deflection and forward motion. So the intervals cover 90 % in each
+of these parts. s makes them cover about 90 % in smaller parts as well. Robots for s and robots for q are different
+ones. Sources: Lei et al., J. Am. Stat. Assoc. 113, 1094 (2018), section 5.2; Vovk, Gammerman and Shafer,
+Algorithmic Learning in a Random World (2005), section 4.5, for the parts.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -23,6 +25,10 @@ from torch import Tensor
 COVERAGE = 0.90
 _TINY = 1e-9  # of the scale of an output
 _RIDGE = 1e-3
+_HALVED = (0, 3, 5)  # hints whose halves make the octants: drag number, deflection, forward motion
+_ONE_TAIL = -1  # the hint that is 1 for one tail
+PARTS = 2 ** len(_HALVED) + 1
+_FEWEST = 40  # robots in a part, for a q of its own
 _FIRMEST, _SOFTEST = 0.002, 0.998  # s is held between these quantiles of itself
 
 
@@ -34,7 +40,8 @@ class Intervals:
     scale: Tensor  # (F,)
     weights: Mapping[str, Tensor]  # output -> (P,)
     bounds: Mapping[str, tuple[float, float]]  # output -> smallest and largest ln s
-    factor: Mapping[str, float]  # output -> q
+    middle: Tensor  # (3,), the halves meet here
+    factor: Mapping[str, Tensor]  # output -> q of each part, (PARTS,)
 
     def half_widths(self, name: str, hints: Tensor, sizes: Tensor) -> Tensor:
         """Half of the width of the interval of one output, (M,).
@@ -43,7 +50,13 @@ class Intervals:
             hints: (M, F), see `surrogate.lookup`.
             sizes: (M,), what errors of this output are relative to.
         """
-        return self.factor[name] * self._local(name, hints) * sizes
+        return self.factor[name][self.part_of(hints)] * self._local(name, hints) * sizes
+
+    def part_of(self, hints: Tensor) -> Tensor:
+        """Which part each robot belongs to, (M,): 0 to 7 for octants, 8 for one tail."""
+        high = (hints[:, list(_HALVED)] > self.middle).long()
+        octant = (high * 2 ** torch.arange(len(_HALVED))).sum(1)
+        return torch.where(hints[:, _ONE_TAIL] > 0.5, PARTS - 1, octant)
 
     def _local(self, name: str, hints: Tensor) -> Tensor:
         low, high = self.bounds[name]
@@ -68,12 +81,18 @@ class Intervals:
             weights[name] = torch.linalg.solve(matrix, rows.T @ logs)
             low, high = (rows @ weights[name]).quantile(torch.tensor([_FIRMEST, _SOFTEST], dtype=rows.dtype))
             bounds[name] = (float(low), float(high))
-        plain = Intervals(shift, scale, weights, bounds, dict.fromkeys(errors, 1.0))
+        several = hints[hints[:, _ONE_TAIL] < 0.5]
+        middle = (several if len(several) else hints)[:, list(_HALVED)].median(0).values
+        plain = Intervals(shift, scale, weights, bounds, middle, {})
+        part = plain.part_of(more_hints)
         for name, error in more_errors.items():
             known = torch.isfinite(error)
             scores = error[known].abs() / plain._local(name, more_hints[known])
-            factor[name] = _conformal_quantile(scores)
-        return Intervals(shift, scale, weights, bounds, factor)
+            each = [scores[part[known] == k] for k in range(PARTS)]
+            factor[name] = torch.tensor(
+                [_conformal_quantile(own if len(own) >= _FEWEST else scores) for own in each], dtype=torch.float64
+            )
+        return replace(plain, factor=factor)
 
 
 def _design(x: Tensor) -> Tensor:
