@@ -22,21 +22,9 @@ from softflagella.__main__ import PACKAGES, main
 from surrogate.export import SHIPPED, load
 from tests.calibration.toy_tables import START, install_toy, toy_swimmer, toy_table
 from tests.calibration.track import RADIUS, track
+from tests.dataset.sweeps import SMALL
 
 COMMANDS = [(package, name) for package in PACKAGES for name in import_module(f"{package}.__main__").program.names]
-SWEEP = """
-rows = 4
-seed = 3
-[inputs]
-C_t = { range = [2.0, 5.0] }
-C_r = { range = [1.5, 3.5] }
-C_yr = { range = [1.0, 7.0] }
-l_over_R = { range = [4.0, 9.0] }
-L_over_R = { range = [3.0, 5.0] }
-l_over_r0 = { range = [20.0, 45.0] }
-omega_bar = { range = [6.0, 12.0], scale = "log" }
-N = { range = [2, 3], scale = "integer" }
-"""
 
 
 def done(*words: object) -> None:
@@ -55,7 +43,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     done("planner", "plan", "circle:1.5", "--robot", folder / "robot.toml", "--out", folder / "plan")
     done("sim", "replay", folder / "plan" / "plan.json", "--out", folder / "track.csv")
-    (folder / "sweep.toml").write_text(SWEEP)
+    (folder / "sweep.toml").write_text(SMALL)
     done("dataset", "build", "--config", folder / "sweep.toml", "--out", folder / "sweep", "--jobs", 1)
     return folder
 
