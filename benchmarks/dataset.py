@@ -38,7 +38,8 @@ from dataset.design import load_design
 from dataset.simulate import simulate
 from sim.motion.batches import one_thread
 with one_thread():
-    simulate(load_design("sweep.toml").points(0, int(sys.argv[1])))
+    design = load_design("sweep.toml").with_rows(int(sys.argv[1]))
+    simulate({**design.points(), "history": design.history()})
 """
 _ENGINE = """
 import sys

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from dataset.pieces import plain
 from dataset.places import Place
 from dataset.schema import COST
 from dataset.store import CARD, batches, read_manifest
@@ -25,7 +26,7 @@ def write_card(place: Place) -> None:
     inputs = manifest["config"]["inputs"]
     seen = _Seen(inputs)
     for batch in batches(place, [*inputs, *({"N", "omega_bar"} - set(inputs)), "failed", "reason", COST]):
-        seen.add({name: batch[name].to_numpy(zero_copy_only=False) for name in batch.schema.names})
+        seen.add({name: plain(batch[name]) for name in batch.schema.names})
     place.write(CARD, "\n\n".join(_parts(place, manifest, seen)) + "\n")
 
 

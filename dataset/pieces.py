@@ -94,7 +94,7 @@ def contents_of(place: Place, piece: Piece, form: pa.Schema, key: str) -> Conten
     data = place.read(piece.name)
     count, start = _Count(), piece.start
     for table in tables(data, piece, form, key):
-        rows = table["row"].to_numpy()
+        rows = plain(table["row"])
         if not np.array_equal(rows, np.arange(start, start + len(rows))):
             raise BadPieceError("its rows are not those of its name")
         start += len(rows)
@@ -127,6 +127,19 @@ def tables(
         if isinstance(broken, BadPieceError):
             raise
         raise BadPieceError(f"it is damaged ({str(broken).splitlines()[0]})") from None
+
+
+def plain(column: pa.Array | pa.ChunkedArray) -> np.ndarray:
+    """A column of numbers, flags or words, none of them null; pyarrow's own `to_numpy` would load pandas."""
+    array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
+    if isinstance(array, pa.ChunkedArray):  # without rows
+        return np.empty(0)
+    if pa.types.is_boolean(array.type):
+        bits = np.unpackbits(np.frombuffer(array.buffers()[1], np.uint8), bitorder="little")
+        return bits[array.offset : array.offset + len(array)].view(bool)
+    if pa.types.is_string(array.type):
+        return np.array(array.to_pylist(), dtype=object)
+    return np.from_dlpack(array)
 
 
 def _tables(place: Place, sources: Sequence[Piece], form: pa.Schema, key: str) -> Iterator[pa.Table]:
@@ -192,11 +205,11 @@ class _Count:
     def add(self, table: pa.Table) -> None:
         """Count a table's rows."""
         for name in self._flags:
-            self._flags[name] += int(np.count_nonzero(table[name].to_numpy()))
-        failed = table["failed"].to_numpy()
+            self._flags[name] += int(np.count_nonzero(plain(table[name])))
+        failed = plain(table["failed"])
         if failed.any():
-            self._reasons.update(table["reason"].to_numpy()[failed].tolist())
-        self._costs.append(table[COST].to_numpy())
+            self._reasons.update(plain(table["reason"])[failed].tolist())
+        self._costs.append(plain(table[COST]))
 
     def contents(self, start: int, stop: int, size: int, sha256: str) -> Contents:
         """What has been counted; the costs are added in one go, so that tables may be cut anyhow."""
