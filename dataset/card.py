@@ -90,8 +90,9 @@ def _parts(place: Place, manifest: dict[str, Any], seen: _Seen) -> Iterable[str]
     yield "## How to read it"
     yield _reading(place)
     yield "## Inputs"
+    which = "row i is its point i" if manifest.get("chosen") is None else "chosen ones, the column row says which"
     yield (
-        f"Points of a scrambled Sobol sequence, seed {manifest['config']['seed']}; row i is its point i. "
+        f"Points of a scrambled Sobol sequence, seed {manifest['config']['seed']}; {which}. "
         f"Coverage: rows in the emptiest and the fullest of {_BINS} equal parts of the range, over their mean."
     )
     yield _table(("input", "range", "scale", "smallest", "largest", "coverage"), _inputs(seen))

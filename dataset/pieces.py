@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,8 +85,13 @@ def key_in(place: Place, name: str) -> str | None:
         return None
 
 
-def contents_of(place: Place, piece: Piece, form: pa.Schema, key: str) -> Contents:
+def contents_of(
+    place: Place, piece: Piece, form: pa.Schema, key: str, indices: Callable[[int, int], Any] = np.arange
+) -> Contents:
     """What is in a piece; every page of it is read and checked.
+
+    Args:
+        indices: the column `row` of the rows start … stop − 1.
 
     Raises:
         BadPieceError: the file is damaged, or holds something else.
@@ -95,7 +100,7 @@ def contents_of(place: Place, piece: Piece, form: pa.Schema, key: str) -> Conten
     count, start = _Count(), piece.start
     for table in tables(data, piece, form, key):
         rows = plain(table["row"])
-        if not np.array_equal(rows, np.arange(start, start + len(rows))):
+        if not np.array_equal(rows, indices(start, start + len(rows))):
             raise BadPieceError("its rows are not those of its name")
         start += len(rows)
         count.add(table)
