@@ -1,8 +1,8 @@
 """What chosen rows save: errors of look-up tables against rows, drawn evenly and chosen where a table is unsure.
 
 Steady motion over the whole domain of the shipped table. A table learns the first rows of a sweep. Then as many
-rows are added again, once the next ones of the sequence, once chosen ones (`surrogate.refine`). Errors are those of
-other robots, drawn evenly. Networks are smaller than the shipped ones, and trained for a shorter time.
+rows are added again, once the next ones of the sequence, once chosen ones (`surrogate.refine`). Errors are those
+of other robots, drawn evenly. Networks are smaller than the shipped ones, and trained for a shorter time.
 
 Usage: python -m benchmarks.refine [--rows N]
 """

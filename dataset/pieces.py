@@ -177,7 +177,7 @@ def _write(place: Place, name: str, parts: Any, form: pa.Schema, key: str) -> Co
             form.with_metadata({KEY: key}),
             compression="zstd",
             write_page_checksum=True,
-            **_encodings(form),
+            **encodings(form),
         ) as writer:
             for part in parts:
                 writer.write_table(part.combine_chunks(), row_group_size=ROW_GROUP)
@@ -188,7 +188,8 @@ def _write(place: Place, name: str, parts: Any, form: pa.Schema, key: str) -> Co
     return count.contents(int(match[1]), int(match[2]), sink.size, sink.sha256)
 
 
-def _encodings(form: pa.Schema) -> dict[str, Any]:
+def encodings(form: pa.Schema) -> dict[str, Any]:
+    """Options of pyarrow's writer: a dictionary for words, numbers split into streams of bytes."""
     words = [field.name for field in form if pa.types.is_string(field.type)]
     numbers = [
         f"{field.name}.list.element" if pa.types.is_fixed_size_list(field.type) else field.name

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dataset.design import Axis
 from dataset.store import read, read_manifest
 from dataset.sweep import UnfinishedError, build, mend
 from dataset.verify import verify
@@ -54,7 +55,7 @@ def test_more_rows_are_added_and_the_first_ones_stay(base: Path) -> None:
 
 
 def test_points_are_chosen_where_the_table_is_unsure() -> None:
-    table, sweep = load(), design(FIRST)
+    table, sweep = load(), replace(design(FIRST), axes={**design(FIRST).axes, "N": Axis(1, 5, "integer")})
     chosen = choose(table, sweep, 64, FIRST)
     assert chosen == choose(table, sweep, 64, FIRST)
     points = replace(sweep, rows=64, chosen=chosen).points()
