@@ -10,21 +10,16 @@ from __future__ import annotations
 
 import os
 import shlex
-import sys
-import threading
 from argparse import Namespace
-from collections.abc import Callable
-from typing import TypeVar
 
 from dataset.backends import BACKENDS
-from dataset.interrupts import Interrupted
+from dataset.exits import ended
 from sim.io.commands import JOBS, Program, argument, out
 
 program = Program("dataset", "Simulate sweeps of robots into data sets.")
 main = program.main
 _DATA = argument("data", help="folder or URL of a data set")
 _SCHEDULER = "DASK_SCHEDULER_ADDRESS"
-T = TypeVar("T")
 
 
 @program.command(
@@ -51,7 +46,7 @@ def _build(arguments: Namespace) -> None:
     design = load_design(arguments.config).with_rows(arguments.rows)
     known = arguments.scheduler or os.environ.get(_SCHEDULER)
     backend = arguments.backend or ("dask" if known else "loky")
-    manifest = _ended(
+    manifest = ended(
         lambda: build(
             design,
             arguments.out,
@@ -75,25 +70,6 @@ def _command(arguments: Namespace) -> str:
     return shlex.join(words)
 
 
-def _ended(work: Callable[[], T]) -> T:
-    """The result of long work; where it ends early, one line and its exit status."""
-    try:
-        from dataset.sweep import UnfinishedError
-
-        return work()
-    except Interrupted as stop:  # its line has been printed
-        emergency = threading.Timer(1.0, os._exit, (stop.status,))  # for libraries that wait at an ordinary exit
-        emergency.daemon = True
-        emergency.start()
-        sys.exit(stop.status)
-    except KeyboardInterrupt:
-        print("\nstopped before it began", file=sys.stderr)
-        sys.exit(130)
-    except UnfinishedError as ended:
-        print(f"unfinished: {ended}", file=sys.stderr)
-        sys.exit(ended.status)
-
-
 @program.command("report", "the sweep at a glance, one page", _DATA, out("page", default="reports/dataset.html"))
 def _report(arguments: Namespace) -> None:
     from dataset.report import write_report
@@ -114,7 +90,7 @@ def _verify(arguments: Namespace) -> None:
     if arguments.mend:
         from dataset.sweep import mend
 
-        print(_ended(lambda: mend(arguments.data, jobs=arguments.jobs)))
+        print(ended(lambda: mend(arguments.data, jobs=arguments.jobs)))
     from dataset.verify import verify
 
     print(verify(arguments.data, rows=arguments.rows))

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from dataset.pieces import plain
 from dataset.places import Place
 from dataset.schema import COST
 from dataset.store import CARD, batches, read_manifest
@@ -25,7 +26,7 @@ def write_card(place: Place) -> None:
     inputs = manifest["config"]["inputs"]
     seen = _Seen(inputs)
     for batch in batches(place, [*inputs, *({"N", "omega_bar"} - set(inputs)), "failed", "reason", COST]):
-        seen.add({name: batch[name].to_numpy(zero_copy_only=False) for name in batch.schema.names})
+        seen.add({name: plain(batch[name]) for name in batch.schema.names})
     place.write(CARD, "\n\n".join(_parts(place, manifest, seen)) + "\n")
 
 
@@ -89,8 +90,9 @@ def _parts(place: Place, manifest: dict[str, Any], seen: _Seen) -> Iterable[str]
     yield "## How to read it"
     yield _reading(place)
     yield "## Inputs"
+    which = "row i is its point i" if manifest.get("chosen") is None else "chosen ones, the column row says which"
     yield (
-        f"Points of a scrambled Sobol sequence, seed {manifest['config']['seed']}; row i is its point i. "
+        f"Points of a scrambled Sobol sequence, seed {manifest['config']['seed']}; {which}. "
         f"Coverage: rows in the emptiest and the fullest of {_BINS} equal parts of the range, over their mean."
     )
     yield _table(("input", "range", "scale", "smallest", "largest", "coverage"), _inputs(seen))

@@ -12,14 +12,14 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from sim.arrays import Floats, Integers
 from sim.effects import catalogue
 from sim.inputs import check_columns
 from sim.io.errors import InputError
@@ -64,25 +64,32 @@ class Axis:
 
 @dataclass(frozen=True)
 class Design:
-    """A sweep: axes by column name, number of rows, seed, and the share of rows with memory and rest."""
+    """A sweep: axes by column name, number of rows, seed, and the share of rows with memory and rest.
+
+    Its rows are the first points of the sequence, or those with the indices `chosen`, in that order.
+    """
 
     axes: dict[str, Axis]
     rows: int
     seed: int
     history_every: int = 4  # one block of HISTORY_BLOCK rows in so many has them; 0: none
     sensitivities: bool = False  # derivatives of the steady motion in the inputs, as columns
+    chosen: tuple[int, ...] | None = None
 
     @staticmethod
-    def from_config(config: Mapping[str, Any], rows: int) -> Design:
+    def from_config(config: Mapping[str, Any], rows: int, chosen: Sequence[int] | None = None) -> Design:
         """The design that `config` describes."""
         axes = {
             name: Axis(spec["range"][0], spec["range"][1], spec["scale"], spec.get("both_directions", False))
             for name, spec in config["inputs"].items()
         }
-        return Design(axes, rows, config["seed"], config["history_every"], config.get("sensitivities", False))
+        given = None if chosen is None else tuple(chosen)
+        return Design(
+            axes, rows, config["seed"], config["history_every"], config.get("sensitivities", False), given
+        )
 
     def config(self) -> dict[str, Any]:
-        """What determines the robots, JSON-like (without the number of rows)."""
+        """What determines the robot of each index, JSON-like: without the number of rows and the chosen ones."""
         inputs = {name: axis.config() for name, axis in self.axes.items()}
         extra = {"history_every": self.history_every, "sensitivities": self.sensitivities}
         return {"seed": self.seed, **extra, "inputs": inputs}
@@ -92,27 +99,41 @@ class Design:
         """The effects among the inputs, in alphabetical order."""
         return sorted(set(self.axes) & set(catalogue()))
 
+    def indices(self, start: int = 0, stop: int | None = None) -> Integers:
+        """Which points of the sequence the rows `start` … `stop` − 1 are; by default all `rows`."""
+        end = self.rows if stop is None else stop
+        if self.chosen is None:
+            return np.arange(start, end)
+        return np.array(self.chosen[start:end], dtype=int)
+
     def points(self, start: int = 0, stop: int | None = None) -> dict[str, Floats]:
-        """Columns of the robots `start` … `stop` − 1 of the sequence; by default the first `rows`."""
+        """Columns of the robots in the rows `start` … `stop` − 1; by default all `rows`."""
         from scipy.stats import qmc  # slow to import, and only workers need points
 
-        end = self.rows if stop is None else stop
+        indices = self.indices(start, stop)
+        order = np.argsort(indices, kind="stable")
         names = [name for name in _order() if name in self.axes]
         sampler = qmc.Sobol(len(names), scramble=True, rng=np.random.default_rng(self.seed))
-        if start:
-            sampler.fast_forward(start)
-            share = sampler.random(end - start)
-        else:  # the first point alone: scipy warns of a first draw that is no power of two
-            share = np.concatenate([sampler.random(1), sampler.random(end - 1)]) if end > 1 else sampler.random(1)
+        share = np.empty((len(indices), len(names)))
+        for place in np.split(order, np.flatnonzero(np.diff(indices[order]) != 1) + 1):
+            if not len(place):
+                continue
+            skipped = int(indices[place[0]]) - sampler.num_generated
+            if skipped:
+                sampler.fast_forward(skipped)
+            if sampler.num_generated == 0:  # alone: scipy warns of a first draw that is no power of two
+                share[place[:1]], place = sampler.random(1), place[1:]
+            if len(place):
+                share[place] = sampler.random(len(place))
         columns = {name: self.axes[name].at(np.ascontiguousarray(share[:, i])) for i, name in enumerate(names)}
         return {name: columns[name] for name in self.axes}
 
     def history(self, start: int = 0, stop: int | None = None) -> np.ndarray:
-        """Whether memory and rest are simulated for the robots `start` … `stop` − 1.
+        """Whether memory and rest are simulated for the robots in the rows `start` … `stop` − 1.
 
         Whole blocks of the sequence are, since each block covers the inputs evenly.
         """
-        block = np.arange(start, self.rows if stop is None else stop) // HISTORY_BLOCK
+        block = self.indices(start, stop) // HISTORY_BLOCK
         return block % self.history_every == 0 if self.history_every else np.zeros(len(block), dtype=bool)
 
     def with_rows(self, rows: int | None) -> Design:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter, deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from dataset.backends import GONE, KILLER, LOST, Backend
 from dataset.places import StorageError
-from dataset.work import Receipt, Refusal, Task
+from dataset.work import Receipt, Refusal, Work
 from sim.io.errors import InputError
 
 KILLS = 3  # dead workers after which a chunk is set aside
@@ -34,7 +34,7 @@ class Result:
     """What came of a sweep's chunks."""
 
     receipts: list[Receipt] = field(default_factory=list)
-    set_aside: list[tuple[Task, str]] = field(default_factory=list)  # with the reason
+    set_aside: list[tuple[Work, str]] = field(default_factory=list)  # with the reason
 
 
 class Progress:
@@ -92,8 +92,17 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
-def run(tasks: Sequence[Task], backend: Backend, progress: Progress) -> Result:
+def run(
+    tasks: Sequence[Work],
+    backend: Backend,
+    progress: Progress,
+    *,
+    then: Callable[[Work, Receipt], None] = lambda *_: None,
+) -> Result:
     """Run all tasks.
+
+    Args:
+        then: called with each task as soon as it is done.
 
     Raises:
         NoWorkersError: nobody works for PATIENCE seconds.
@@ -118,6 +127,7 @@ def run(tasks: Sequence[Task], backend: Backend, progress: Progress) -> Result:
             if isinstance(outcome, Receipt):
                 result.receipts.append(outcome)
                 progress.add(outcome)
+                then(tasks[number], outcome)
             elif isinstance(outcome, Refusal):
                 if outcome.kind == "error":
                     result.set_aside.append((tasks[number], outcome.message))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -23,6 +24,7 @@ LABELS = {
     "theta_deg": "slip angle $\\theta$ [deg]",
 }  # fmt: skip
 _LOGARITHMIC = ("omega_yr_bar", "v_z", "R_yr_over_l")
+_Along = Literal["both", "x", "y"]
 _BINS = 10
 _FEWEST = 12  # rows in a bin that is drawn
 
@@ -39,15 +41,12 @@ def draw_trends(rows: pd.DataFrame, output: str, inputs: Sequence[str]) -> Figur
         axes = figure.add_subplot(-(-len(inputs) // columns), columns, place + 1)
         for tails, part in rows.groupby("N"):
             _draw_band(axes, part[name].to_numpy(float), part[output].to_numpy(float), colour(float(str(tails))))
-        if output in _LOGARITHMIC:
-            _logarithmic(axes.yaxis, axes, "y")
-        if name == "omega_bar":
-            _logarithmic(axes.xaxis, axes, "x")
-        axes.set_xlabel(LABELS.get(name, name), fontsize=9)
-        axes.tick_params(labelsize=7)
-        axes.grid(alpha=0.25, lw=0.5)
-        if place % columns == 0:
-            axes.set_ylabel(LABELS.get(output, output), fontsize=9)
+        _style(
+            axes,
+            x=LABELS.get(name, name),
+            y=LABELS.get(output, output) if place % columns == 0 else "",
+            logarithmic=("x" if name == "omega_bar" else "") + ("y" if output in _LOGARITHMIC else ""),
+        )
     handles = [figure.axes[0].plot([], [], color=colour(n), label=f"N = {n}")[0] for n in sorted(set(rows["N"]))]
     figure.legend(handles=handles, ncols=len(handles), fontsize=8, frameon=False, loc="upper center")
     figure.tight_layout(rect=(0, 0, 1, 0.95))
@@ -83,12 +82,8 @@ def draw_indices(found: Mapping[str, Indices]) -> Figure:
         axes.errorbar(one.total, y, xerr=spread, fmt="none", ecolor="#1c2733", elinewidth=0.8, capsize=2)
         axes.set_yticks(y, [LABELS.get(name, name) for name in one.inputs], fontsize=9)
         axes.set_xlim(0, 1)
-        axes.set_title(LABELS.get(output, output), fontsize=10)
-        axes.tick_params(axis="x", labelsize=7)
-        axes.grid(axis="x", alpha=0.25, lw=0.5)
-    figure.axes[0].legend(fontsize=7, frameon=False, loc="lower right")
-    figure.tight_layout()
-    return figure
+        _style(axes, title=LABELS.get(output, output), along="x")
+    return _finished(figure, loc="lower right")
 
 
 def draw_collapse(rows: pd.DataFrame, linear: Mapping[str, Floats], outputs: Sequence[str]) -> Figure:
@@ -102,16 +97,11 @@ def draw_collapse(rows: pd.DataFrame, linear: Mapping[str, Floats], outputs: Seq
             some = (tails == n) & np.isfinite(ratio)
             axes.plot(linear["S"][some], ratio[some], ".", ms=2.5, alpha=0.5, color=colour(n), label=f"N = {n}")
         axes.axhline(1, color="#1c2733", lw=0.8)
-        _logarithmic(axes.xaxis, axes, "x")
         low, high = np.nanquantile(ratio, [0.005, 0.995])
         axes.set_ylim(low - 0.1 * (high - low), high + 0.1 * (high - low))
-        axes.set_xlabel("$S = \\zeta_\\perp\\omega_t l^4/EI$", fontsize=9)
-        axes.set_title(f"{LABELS.get(output, output)} / linear theory", fontsize=9)
-        axes.tick_params(labelsize=7)
-        axes.grid(alpha=0.25, lw=0.5)
-    figure.axes[0].legend(fontsize=7, frameon=False, markerscale=3)
-    figure.tight_layout()
-    return figure
+        title = f"{LABELS.get(output, output)} / linear theory"
+        _style(axes, x="$S = \\zeta_\\perp\\omega_t l^4/EI$", title=title, logarithmic="x")
+    return _finished(figure, markerscale=3)
 
 
 def draw_responses(rows: pd.DataFrame) -> Figure:
@@ -134,14 +124,8 @@ def draw_responses(rows: pd.DataFrame) -> Figure:
             low, middle, high = np.nanquantile(some[:, known], [0.25, 0.5, 0.75], axis=0)
             axes.plot(DWELLS[known], middle, color=shade, lw=1.4, label=f"{which} motors")
             axes.fill_between(DWELLS[known], low, high, color=shade, alpha=0.15, lw=0)
-        _logarithmic(axes.xaxis, axes, "x")
-        axes.set_xlabel("dwell $\\bar T$", fontsize=9)
-        axes.set_title(label, fontsize=9)
-        axes.tick_params(labelsize=7)
-        axes.grid(alpha=0.25, lw=0.5)
-    figure.axes[0].legend(fontsize=7, frameon=False)
-    figure.tight_layout()
-    return figure
+        _style(axes, x="dwell $\\bar T$", title=label, logarithmic="x")
+    return _finished(figure)
 
 
 def draw_where(rows: pd.DataFrame) -> Figure:
@@ -155,21 +139,39 @@ def draw_where(rows: pd.DataFrame) -> Figure:
             speed = [float(np.median(part["omega_bar"].to_numpy()[b])) for b in bins]
             share = [100 * float(np.mean(part[name].to_numpy()[b])) for b in bins]
             axes.plot(speed, share, "-o", ms=3, lw=1.2, color=colour(float(str(tails))), label=f"N = {tails}")
-        _logarithmic(axes.xaxis, axes, "x")
         axes.set_ylim(bottom=0)
-        axes.set_xlabel(LABELS["omega_bar"], fontsize=9)
-        axes.set_ylabel("share of rows [%]", fontsize=9)
-        axes.set_title(label, fontsize=10)
-        axes.tick_params(labelsize=7)
-        axes.grid(alpha=0.25, lw=0.5)
-    figure.axes[0].legend(fontsize=7, frameon=False)
+        _style(axes, x=LABELS["omega_bar"], y="share of rows [%]", title=label, logarithmic="x")
+    return _finished(figure)
+
+
+def _style(
+    axes: Axes, *, x: str = "", y: str = "", title: str = "", logarithmic: str = "", along: _Along = "both"
+) -> None:
+    """What all pictures have in common: labels, scales, small ticks and a pale grid.
+
+    Args:
+        x, y, title: labels.
+        logarithmic: the axes with a logarithmic scale: "", "x", "y" or "xy".
+        along: the axes with numbers, and with lines of the grid.
+    """
+    axes.set_xlabel(x, fontsize=9)
+    axes.set_ylabel(y, fontsize=9)
+    axes.set_title(title, fontsize=9)
+    if "x" in logarithmic:
+        axes.set_xscale("log")
+        plain_logarithms(axes.xaxis)
+    if "y" in logarithmic:
+        axes.set_yscale("log")
+        plain_logarithms(axes.yaxis)
+    axes.tick_params(axis=along, labelsize=7)
+    axes.grid(axis=along, alpha=0.25, lw=0.5)
+
+
+def _finished(figure: Figure, **legend: Any) -> Figure:
+    """The figure with a legend in its first panel."""
+    figure.axes[0].legend(fontsize=7, frameon=False, **legend)
     figure.tight_layout()
     return figure
-
-
-def _logarithmic(axis: Axis, axes: Axes, which: str) -> None:
-    (axes.set_xscale if which == "x" else axes.set_yscale)("log")
-    plain_logarithms(axis)
 
 
 def plain_logarithms(axis: Axis) -> None:

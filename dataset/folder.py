@@ -8,27 +8,36 @@ next build goes on: it sorts pieces by what they hold, not by what a journal say
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import pyarrow as pa
 
 from dataset.card import write_card
 from dataset.design import Design
-from dataset.pieces import SEGMENT, BadPieceError, Contents, Piece, contents_of, join, key_in, piece_name, pieces
+from dataset.pieces import SEGMENT, BadPieceError, Contents, Piece, contents_of, key_in, piece_name, pieces
 from dataset.places import Place
 from dataset.schema import schema
 from dataset.store import CARD, MANIFEST, PENDING, ROWS, SWEEP, manifest_of, read_manifest, write_manifest
+from dataset.work import Joining, Receipt, Work
 from sim.io.errors import InputError
 from sim.io.provenance import fingerprint
 
 _KNOWN = {MANIFEST, SWEEP, CARD, ROWS, PENDING}
+_CHOSEN, _DIGEST = "chosen", "chosen_digest"  # in sweep.json; the manifest has the digest under the first name
 Held = dict[Piece, Contents]
+Joiner = Callable[[Sequence[Joining], Callable[[Work, Receipt], None]], None]
 
 
 def key_of(config: dict[str, Any], code: str, source: str) -> str:
     """What names the rows of a sweep: its inputs and all that makes rows of them."""
     return fingerprint({"config": config, "code": code, "rows_by": source})
+
+
+def chosen_digest(design: Design, rows: int) -> str | None:
+    """What the manifest says of the first `rows` chosen points; None where the rows are the first ones."""
+    return None if design.chosen is None else fingerprint(list(design.chosen[:rows]))
 
 
 class SweepFolder:
@@ -39,7 +48,7 @@ class SweepFolder:
         self.config = design.config()
         self.key = key_of(self.config, code, source)
         self.form: pa.Schema = schema(design.effects, design.sensitivities)
-        self._sweep = {"config": self.config, "code": code, "rows_by": source, "key": self.key}
+        self._rest = {"config": self.config, "code": code, "rows_by": source, "key": self.key}
 
     def claim(self, *, mending: bool = False) -> None:
         """Write what the folder is for, unless that is there.
@@ -57,11 +66,40 @@ class SweepFolder:
             raise InputError(f"{self.place.address} holds other files ({other}); give an empty or a new folder")
         self._refuse_strangers()
         if SWEEP in names:
-            self._compare(_loaded(self.place))
-        elif MANIFEST in names and not mending and read_manifest(self.place)["config_hash"] != self.key:
-            raise self._other("rows of another configuration or version")
-        if SWEEP not in names:
-            self.place.write(SWEEP, json.dumps(self._sweep, indent=1) + "\n")
+            there = _loaded(self.place)
+            self._compare(there)
+            self._go_on(there.get(_CHOSEN))
+        elif MANIFEST in names and not mending:
+            manifest = read_manifest(self.place)
+            if manifest["config_hash"] != self.key:
+                raise self._other("rows of another configuration or version")
+            if manifest.get(_CHOSEN) != chosen_digest(self.design, manifest["rows"]):
+                raise self._other("other rows of this sweep")
+            self._write_sweep()
+        else:
+            self._write_sweep()
+
+    def _go_on(self, there: list[int] | None) -> None:
+        """Compare the chosen points; the longer list counts, and begins with the shorter one."""
+        ours = self.design.chosen
+        if (there is None) != (ours is None):
+            other = "chosen rows of this sweep" if ours is None else "the first rows of this sweep, none chosen"
+            raise self._other(other)
+        if there is None or ours is None:
+            return
+        common = min(len(there), len(ours))
+        if tuple(there[:common]) != ours[:common]:
+            raise self._other("other chosen rows of this sweep")
+        if len(there) >= len(ours):
+            self.design = replace(self.design, chosen=tuple(there))
+        else:
+            self._write_sweep()
+
+    def _write_sweep(self) -> None:
+        content: dict[str, Any] = dict(self._rest)
+        if self.design.chosen is not None:
+            content |= {_CHOSEN: list(self.design.chosen), _DIGEST: fingerprint(list(self.design.chosen))}
+        self.place.write(SWEEP, json.dumps(content, indent=None if self.design.chosen else 1) + "\n")
 
     def _refuse_strangers(self) -> None:
         """Refuse files in rows/ that no reader could tell from rows; a copy of one of our pieces is removed."""
@@ -74,7 +112,7 @@ class SweepFolder:
                 self.place.delete(path)
 
     def _compare(self, there: dict[str, Any]) -> None:
-        if there == self._sweep:
+        if {name: there[name] for name in self._rest} == self._rest:
             return
         theirs, ours = there["config"], self.config
         if theirs["seed"] != ours["seed"]:
@@ -110,7 +148,7 @@ class SweepFolder:
         whole: Held = {}
         for piece in [*pieces(self.place, ROWS), *pieces(self.place, PENDING)]:
             try:
-                contents = contents_of(self.place, piece, self.form, self.key)
+                contents = contents_of(self.place, piece, self.form, self.key, self.design.indices)
                 if contents.sha256 != listed.get(piece.name, contents.sha256):
                     raise BadPieceError("it does not have the digest that the manifest states")
             except BadPieceError:
@@ -149,26 +187,37 @@ class SweepFolder:
             at = max(at, piece.stop)
         return gaps
 
-    def complete(self, held: Held, rows: int) -> dict[str, Any]:
+    def complete(self, held: Held, rows: int, joined: Joiner) -> dict[str, Any]:
         """Bring the first `rows` rows into rows/ and write the manifest, unless it is so already; returns it.
 
         A piece that goes on beyond `rows` is taken whole.
+
+        Args:
+            joined: does the joining; calls its second argument for each one that is done.
         """
         groups: dict[int, list[Piece]] = {}
         for piece in sorted(held, key=lambda p: p.start):
             if piece.start < rows:
                 groups.setdefault(piece.start // SEGMENT, []).append(piece)
-        final: Held = {}
-        for group in groups.values():
-            start, stop = group[0].start, group[-1].stop
-            if len(group) == 1:
-                final[group[0]] = held[group[0]]
-                continue
-            name = piece_name(PENDING, start, stop)
-            final[Piece(name, start, stop)] = join(self.place, group, name, self.form, self.key)
-            for piece in group:
+        final: Held = {group[0]: held[group[0]] for group in groups.values() if len(group) == 1}
+
+        def then(work: Work, receipt: Receipt) -> None:
+            contents = receipt.contents
+            name = piece_name(PENDING, contents.start, contents.stop)
+            final[Piece(name, contents.start, contents.stop)] = contents
+            for piece in groups[contents.start // SEGMENT]:
                 if piece.name.startswith(PENDING):
                     self.place.delete(piece.name)
+
+        joined(
+            [
+                Joining(self.place.address, self.config, self.key, self.code, tuple(group))
+                for group in groups.values()
+                if len(group) > 1
+            ],
+            then,
+        )
+        final = dict(sorted(final.items(), key=lambda item: item[0].start))
         for piece in final:
             if piece.name.startswith(PENDING):
                 self.place.move(piece.name, piece_name(ROWS, piece.start, piece.stop))
@@ -191,6 +240,8 @@ class SweepFolder:
             except InputError:
                 pass  # edited or damaged: written anew
         content = manifest_of(self.config, self.key, self.code, self.design.effects, parts)
+        if self.design.chosen is not None:
+            content[_CHOSEN] = chosen_digest(self.design, content["rows"])
         return write_manifest(self.place, content)
 
     def _tidy(self) -> None:
@@ -212,13 +263,14 @@ def load_sweep(place: Place) -> tuple[Design, str]:
     if place.size(SWEEP) is None:
         raise InputError(f"{place.address} is no data set (no {SWEEP}); make it with python -m dataset build")
     there = _loaded(place)
-    return Design.from_config(there["config"], 1), there["rows_by"]
+    return Design.from_config(there["config"], 1, there.get(_CHOSEN)), there["rows_by"]
 
 
 def _loaded(place: Place) -> dict[str, Any]:
     try:
         there = json.loads(_text(place, SWEEP))
         sound = there["key"] == key_of(there["config"], there["code"], there["rows_by"])
+        sound = sound and (_CHOSEN not in there or there[_DIGEST] == fingerprint(there[_CHOSEN]))
     except (ValueError, KeyError, TypeError):
         sound = False
     if not sound:

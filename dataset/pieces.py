@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,8 +85,13 @@ def key_in(place: Place, name: str) -> str | None:
         return None
 
 
-def contents_of(place: Place, piece: Piece, form: pa.Schema, key: str) -> Contents:
+def contents_of(
+    place: Place, piece: Piece, form: pa.Schema, key: str, indices: Callable[[int, int], Any] = np.arange
+) -> Contents:
     """What is in a piece; every page of it is read and checked.
+
+    Args:
+        indices: the column `row` of the rows start … stop − 1.
 
     Raises:
         BadPieceError: the file is damaged, or holds something else.
@@ -94,8 +99,8 @@ def contents_of(place: Place, piece: Piece, form: pa.Schema, key: str) -> Conten
     data = place.read(piece.name)
     count, start = _Count(), piece.start
     for table in tables(data, piece, form, key):
-        rows = table["row"].to_numpy()
-        if not np.array_equal(rows, np.arange(start, start + len(rows))):
+        rows = plain(table["row"])
+        if not np.array_equal(rows, indices(start, start + len(rows))):
             raise BadPieceError("its rows are not those of its name")
         start += len(rows)
         count.add(table)
@@ -129,6 +134,19 @@ def tables(
         raise BadPieceError(f"it is damaged ({str(broken).splitlines()[0]})") from None
 
 
+def plain(column: pa.Array | pa.ChunkedArray) -> np.ndarray:
+    """A column of numbers, flags or words, none of them null; pyarrow's own `to_numpy` would load pandas."""
+    array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
+    if isinstance(array, pa.ChunkedArray):  # without rows
+        return np.empty(0)
+    if pa.types.is_boolean(array.type):
+        bits = np.unpackbits(np.frombuffer(array.buffers()[1], np.uint8), bitorder="little")
+        return bits[array.offset : array.offset + len(array)].view(bool)
+    if pa.types.is_string(array.type):
+        return np.array(array.to_pylist(), dtype=object)
+    return np.from_dlpack(array)
+
+
 def _tables(place: Place, sources: Sequence[Piece], form: pa.Schema, key: str) -> Iterator[pa.Table]:
     for piece in sources:
         yield from tables(place.read(piece.name), piece, form, key)
@@ -159,7 +177,7 @@ def _write(place: Place, name: str, parts: Any, form: pa.Schema, key: str) -> Co
             form.with_metadata({KEY: key}),
             compression="zstd",
             write_page_checksum=True,
-            **_encodings(form),
+            **encodings(form),
         ) as writer:
             for part in parts:
                 writer.write_table(part.combine_chunks(), row_group_size=ROW_GROUP)
@@ -170,7 +188,8 @@ def _write(place: Place, name: str, parts: Any, form: pa.Schema, key: str) -> Co
     return count.contents(int(match[1]), int(match[2]), sink.size, sink.sha256)
 
 
-def _encodings(form: pa.Schema) -> dict[str, Any]:
+def encodings(form: pa.Schema) -> dict[str, Any]:
+    """Options of pyarrow's writer: a dictionary for words, numbers split into streams of bytes."""
     words = [field.name for field in form if pa.types.is_string(field.type)]
     numbers = [
         f"{field.name}.list.element" if pa.types.is_fixed_size_list(field.type) else field.name
@@ -192,11 +211,11 @@ class _Count:
     def add(self, table: pa.Table) -> None:
         """Count a table's rows."""
         for name in self._flags:
-            self._flags[name] += int(np.count_nonzero(table[name].to_numpy()))
-        failed = table["failed"].to_numpy()
+            self._flags[name] += int(np.count_nonzero(plain(table[name])))
+        failed = plain(table["failed"])
         if failed.any():
-            self._reasons.update(table["reason"].to_numpy()[failed].tolist())
-        self._costs.append(table[COST].to_numpy())
+            self._reasons.update(plain(table["reason"])[failed].tolist())
+        self._costs.append(plain(table[COST]))
 
     def contents(self, start: int, stop: int, size: int, sha256: str) -> Contents:
         """What has been counted; the costs are added in one go, so that tables may be cut anyhow."""

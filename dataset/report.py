@@ -25,6 +25,11 @@ def write_report(folder: str, out: str | Path) -> None:
     """Write the page of a finished data set."""
     manifest, rows = read_manifest(folder), read(folder)
     page = Page("Sweep report", _lead(rows))
+    if manifest.get("chosen") is not None:
+        page.text(
+            "These robots were chosen where a look-up table was unsure. Shares, medians and indices below are of "
+            "the chosen robots, not of the whole sweep."
+        )
     add_sections(page, rows)
     page.write(out, f"configuration {manifest['config_hash']}, code {manifest['code_version']}")
 

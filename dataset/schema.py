@@ -19,6 +19,7 @@ import pyarrow as pa
 
 from sim.effects import catalogue
 from sim.model.response import BEFORE, DWELLS
+from sim.model.slopes import SLOPE_INPUTS, SLOPE_OUTPUTS
 
 
 class Column(NamedTuple):
@@ -32,9 +33,6 @@ class Column(NamedTuple):
 
 
 _real, _whole, _flag = pa.float64(), pa.int32(), pa.bool_()
-# Names as in `sim.motion.sensitivity`, which loads the simulator; a test compares them.
-SLOPE_INPUTS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "a_over_R")
-SLOPE_OUTPUTS = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_rad")
 _LAG = (("z", "l", "forward"), ("x", "l", "to the new turn's side"), ("psi_rad", "radian", "of the heading"))
 COST = "cost_s"  # how long a row took: the one column that differs when the row is simulated again
 

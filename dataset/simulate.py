@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from dataset.schema import SLOPE_INPUTS
 from sim.arrays import Floats
 from sim.inputs import check_columns
 from sim.model.groups import Groups
 from sim.model.response import LAG_PARTS
+from sim.model.slopes import SLOPE_INPUTS
 from sim.motion.response import responses
 from sim.motion.sensitivity import sensitivities as derivatives
 from sim.motion.steady import steady

@@ -23,7 +23,7 @@ from dataset.lock import locked
 from dataset.pieces import Piece, piece_name
 from dataset.places import Place, place
 from dataset.store import MANIFEST, PENDING
-from dataset.work import Simulate, Task, rows_version
+from dataset.work import Joining, Receipt, Simulate, Task, Work, rows_version
 from sim.io.errors import InputError
 
 _SECONDS = 20.0  # of processor time that a chunk should take
@@ -136,30 +136,88 @@ def _build(
     folder.claim(mending=mending)
     rows = max(design.rows, folder.rows_there())
     held = folder.holds(mending=mending)
+    crew = _Crew(opened, begun)
+    try:
+        return _complete(folder, held, rows, simulate, begun, crew, title)
+    finally:
+        crew.stop()
+
+
+def _complete(
+    folder: SweepFolder,
+    held: Held,
+    rows: int,
+    simulate: Simulate | None,
+    begun: _Begun,
+    crew: _Crew,
+    title: str,
+) -> dict[str, Any]:
     gaps = folder.missing(held, rows)
     if gaps:
         if simulate is None:
             _compile_first()
         done = rows - sum(stop - start for start, stop in gaps)
         begun.progress = engine.Progress(title, rows, done=done, failed=sum(c.failed for c in held.values()))
-        workers = opened()
-        try:
-            tasks = [
-                Task(there.address, folder.config, folder.key, code, simulate, start, stop)
-                for start, stop in chunks(gaps, workers.slots(), _cost(held))
-            ]
-            result = engine.run(tasks, workers, begun.progress)
-        except engine.NoWorkersError as nobody:
-            raise UnfinishedError(begun.words(str(nobody))) from None
-        finally:
-            begun.progress.close()
-            workers.stop()
-        if result.set_aside:
-            raise UnfinishedError(begun.words(_aside(result.set_aside)))
-        for receipt in result.receipts:
+        workers = crew.workers()
+        chosen = folder.design.chosen
+        tasks = [
+            Task(
+                folder.place.address, folder.config, folder.key, folder.code, simulate, start, stop,
+                None if chosen is None else chosen[start:stop],
+            )
+            for start, stop in chunks(gaps, workers.slots(), _cost(held))
+        ]  # fmt: skip
+        for receipt in crew.run(tasks, begun.progress):
             c = receipt.contents
             held[Piece(piece_name(PENDING, c.start, c.stop), c.start, c.stop)] = c
-    return folder.complete(held, rows)
+
+    def joined(tasks: Sequence[Joining], then: Callable[[Work, Receipt], None]) -> None:
+        size = sum(task.stop - task.start for task in tasks)
+        line = engine.Progress(title and f"{title}: joining files", size, done=0, failed=0)
+        crew.run(tasks, line, then)
+
+    return folder.complete(held, rows, joined)
+
+
+class _Crew:
+    """The workers of a build; they start when they are needed."""
+
+    def __init__(self, opened: Callable[[], Backend], begun: _Begun):
+        self._opened, self._begun, self._backend = opened, begun, None
+
+    _backend: Backend | None
+
+    def workers(self) -> Backend:
+        """The workers."""
+        if self._backend is None:
+            self._backend = self._opened()
+        return self._backend
+
+    def run(
+        self,
+        tasks: Sequence[Work],
+        progress: engine.Progress,
+        then: Callable[[Work, Receipt], None] = lambda *_: None,
+    ) -> list[Receipt]:
+        """Run tasks to their end.
+
+        Raises:
+            UnfinishedError: some were set aside, or there are no workers.
+        """
+        try:
+            result = engine.run(tasks, self.workers(), progress, then=then) if tasks else engine.Result()
+        except engine.NoWorkersError as nobody:
+            raise UnfinishedError(self._begun.words(str(nobody))) from None
+        finally:
+            progress.close()
+        if result.set_aside:
+            raise UnfinishedError(self._begun.words(_aside(result.set_aside)))
+        return result.receipts
+
+    def stop(self) -> None:
+        """Let go of the workers."""
+        if self._backend is not None:
+            self._backend.stop()
 
 
 def chunks(gaps: Sequence[tuple[int, int]], workers: int, cost: float) -> Iterator[tuple[int, int]]:
@@ -207,6 +265,6 @@ def _compile_first() -> None:
         compiling.kill()
 
 
-def _aside(chunks: Sequence[tuple[Task, str]]) -> str:
+def _aside(chunks: Sequence[tuple[Work, str]]) -> str:
     parts = [f"rows {task.start} to {task.stop - 1} ({reason})" for task, reason in chunks]
     return f"set aside: {', '.join(parts)}"

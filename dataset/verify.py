@@ -13,6 +13,7 @@ import pandas as pd
 import pyarrow as pa
 
 from dataset.design import Design
+from dataset.folder import chosen_digest, load_sweep
 from dataset.places import place
 from dataset.schema import COST, schema, table_of
 from dataset.simulate import HISTORY, simulate
@@ -39,7 +40,9 @@ def verify(folder: str | Path, *, rows: int = 8) -> str:
             f"{there.address} was made by version {manifest['code_version']}, this is {rows_version()}; "
             "verify it with the version that made it"
         )
-    design = Design.from_config(manifest["config"], manifest["rows"])
+    design = load_sweep(there)[0].with_rows(manifest["rows"])
+    if design.config() != manifest["config"] or manifest.get("chosen") != chosen_digest(design, design.rows):
+        raise InputError(f"{there.address}: sweep.json is not that of the manifest; mend it with --mend")
     chosen = np.sort(np.random.default_rng(1).choice(design.rows, min(rows, design.rows), replace=False))
     sample, start = [], 0
     for batch in batches(there):
@@ -58,7 +61,7 @@ def verify(folder: str | Path, *, rows: int = 8) -> str:
 
 def _check_batch(address: str, design: Design, batch: pa.RecordBatch, start: int) -> None:
     stop = start + batch.num_rows
-    if not np.array_equal(batch["row"].to_numpy(), np.arange(start, stop)):
+    if not np.array_equal(batch["row"].to_numpy(), design.indices(start, stop)):
         raise InputError(f"{address}: rows {start} to {stop - 1} are not in order; mend it with --mend")
     for name, values in design.points(start, stop).items():
         if not np.array_equal(batch[name].to_numpy(), values):
@@ -74,7 +77,7 @@ def _check_again(address: str, design: Design, stored: pa.Table, chosen: np.ndar
     points = {name: stored[name].to_numpy().astype(float) for name in design.axes}
     points[HISTORY] = stored[HISTORY].to_numpy()
     again = table_of(
-        {**simulate(points, sensitivities=design.sensitivities), "row": chosen},
+        {**simulate(points, sensitivities=design.sensitivities), "row": design.indices()[chosen]},
         schema(design.effects, design.sensitivities),
     )
     for name in stored.schema.names:

@@ -1,4 +1,4 @@
-"""What a worker does: simulate one chunk of rows and store it as a piece.
+"""What a worker does: simulate one chunk of rows and store it as a piece, or join pieces.
 
 A worker may be another process or another machine. It needs this package and the folder, and gives back a
 receipt, or the reason why it has none. It never raises: a reason travels through any backend.
@@ -18,11 +18,9 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from dataset.design import Design
-from dataset.pieces import Contents, piece_name, write_piece
-from dataset.places import StorageError, place
+from dataset.pieces import Contents, Piece, join, piece_name, write_piece
+from dataset.places import Place, StorageError, place
 from dataset.schema import schema, table_of
 from dataset.store import PENDING, SWEEP
 from sim.io.provenance import code_version
@@ -41,10 +39,47 @@ class Task(NamedTuple):
     simulate: Simulate | None  # None: `dataset.simulate.simulate`, which only workers import
     start: int
     stop: int
+    chosen: tuple[int, ...] | None = None  # points of the sequence that these rows are, where they were chosen
+
+    def done(self, there: Place) -> Contents:
+        """Simulate the rows and store them."""
+        design = Design.from_config(self.config, self.stop - self.start, self.chosen)
+        columns = _simulated(self, design, *((0, None) if self.chosen else (self.start, self.stop)))
+        table = table_of(columns, schema(design.effects, design.sensitivities))
+        return write_piece(there, piece_name(PENDING, self.start, self.stop), table, self.key)
+
+
+class Joining(NamedTuple):
+    """Pieces that follow each other, to be joined to one."""
+
+    address: str
+    config: dict[str, Any]
+    key: str
+    code: str
+    sources: tuple[Piece, ...]
+
+    @property
+    def start(self) -> int:
+        """The first row."""
+        return self.sources[0].start
+
+    @property
+    def stop(self) -> int:
+        """The row after the last one."""
+        return self.sources[-1].stop
+
+    def done(self, there: Place) -> Contents:
+        """Write the joined piece, beside its sources."""
+        design = Design.from_config(self.config, 1)
+        form = schema(design.effects, design.sensitivities)
+        return join(there, self.sources, piece_name(PENDING, self.start, self.stop), form, self.key)
+
+
+Work = Task | Joining
 
 
 class Receipt(NamedTuple):
-    """A chunk that is stored."""
+    """A piece that is stored."""
 
     contents: Contents
     seconds: float  # of its worker's time
@@ -52,7 +87,7 @@ class Receipt(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """A chunk that is not: `kind` is "code", "storage" or "error"."""
+    """A piece that is not: `kind` is "code", "storage" or "error"."""
 
     kind: str
     message: str
@@ -74,8 +109,8 @@ def worker_name() -> str:
     return f"{socket.gethostname()}:{os.getpid()}"
 
 
-def run_task(task: Task) -> Outcome:
-    """Simulate the rows of a task and store them."""
+def run_task(task: Work) -> Outcome:
+    """Do a task."""
     here = worker_name()
     if rows_version() != task.code:
         words = f"worker {here} has version {rows_version()} of the code, the build has {task.code}"
@@ -87,11 +122,7 @@ def run_task(task: Task) -> Outcome:
                 "storage", f"worker {here} does not see {there.address}; give a folder that it sees", here
             )
         began = time.perf_counter()
-        columns = _simulate(task)
-        design = Design.from_config(task.config, 1)
-        form = schema(design.effects, design.sensitivities)
-        name = piece_name(PENDING, task.start, task.stop)
-        contents = write_piece(there, name, table_of(columns, form), task.key)
+        contents = task.done(there)
         return Receipt(contents, time.perf_counter() - began, here)
     except StorageError as refusal:
         return Refusal("storage", str(refusal), here)
@@ -99,10 +130,8 @@ def run_task(task: Task) -> Outcome:
         return Refusal("error", f"{type(error).__name__}: {' '.join(str(error).split())[:300]}", here)
 
 
-def _simulate(task: Task) -> dict[str, Any]:
-    design = Design.from_config(task.config, task.stop)
-    points: dict[str, Any] = design.points(task.start, task.stop)
-    points["history"] = design.history(task.start, task.stop)
+def _simulated(task: Task, design: Design, start: int, stop: int | None) -> dict[str, Any]:
+    points: dict[str, Any] = {**design.points(start, stop), "history": design.history(start, stop)}
     if task.simulate is not None:
         columns = task.simulate(points)
     else:
@@ -110,7 +139,7 @@ def _simulate(task: Task) -> dict[str, Any]:
             from dataset.simulate import simulate
 
             columns = simulate(points, sensitivities=design.sensitivities)
-    return {**columns, "row": np.arange(task.start, task.stop)}
+    return {**columns, "row": design.indices(start, stop)}
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from scipy.stats import qmc
 
 from dataset.store import read, read_manifest, usable
 from sim.arrays import Flags, Floats, Integers
+from sim.effects import catalogue
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, Groups
 from sim.model.response import BEFORE, DWELLS, LAG_PARTS
 from sim.motion.batches import run_batches, split, steady_columns
@@ -76,6 +77,18 @@ def read_rows(folder: str) -> tuple[Simulated, Integers]:
     robots = {name: table[name].to_numpy(dtype=float) for name in (*ROBOT, *effects)}
     motion = {name: table[name].to_numpy(dtype=float) for name in MOTION}
     return Simulated(robots, motion, _curves_in(table)), table["row"].to_numpy(dtype=np.int64)
+
+
+def joined(parts: Sequence[Simulated]) -> Simulated:
+    """The robots of all parts; effects that some do not have are at their null there."""
+    effects = {name for part in parts for name in part.robots if name in catalogue()}
+    full = [
+        {**{name: np.full(len(part), catalogue()[name].null) for name in sorted(effects)}, **part.robots}
+        for part in parts
+    ]
+    curves = [part.curves for part in parts] if all(part.curves for part in parts) else [{} for _ in parts]
+    together = (full, [part.motion for part in parts], curves)
+    return Simulated(*({name: np.concatenate([p[name] for p in kind]) for name in kind[0]} for kind in together))
 
 
 def _curves_in(table: pd.DataFrame) -> dict[str, Floats]:

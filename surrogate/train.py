@@ -9,6 +9,7 @@ A data set need not have response curves. Then the flips of a part of its robots
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -18,14 +19,14 @@ import torch
 from dataset.store import read_manifest
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
-from sim.io.provenance import provenance
+from sim.io.provenance import fingerprint, provenance
 from surrogate import curves, tail, tails
 from surrogate.curves import learn_curves
 from surrogate.evaluate import curve_errors, relative_errors, summary
 from surrogate.fit import Settings
 from surrogate.intervals import Intervals
 from surrogate.lookup import BRANCHES, Lookup, steady_outputs
-from surrogate.rows import ROBOT, Simulated, read_rows, simulated
+from surrogate.rows import ROBOT, Simulated, joined, read_rows, simulated
 from surrogate.support import Support
 from surrogate.tails import CLASSES, class_of, learn_tails, learnable, rows_of
 
@@ -41,17 +42,18 @@ def split(rows: Integers) -> Integers:
 
 
 def train(
-    folder: str,
+    folder: str | Sequence[str],
     settings: Settings | None = None,
     curve_settings: Settings | None = None,
     *,
     flips: int = 256,
     title: str = "train",
 ) -> Lookup:
-    """A look-up table from a finished data set.
+    """A look-up table from a finished data set, or from several.
 
     Args:
-        folder: data set written by `python -m dataset build`.
+        folder: data set written by `python -m dataset build` or `python -m surrogate refine`, or several. A row
+            that is in two of them counts once.
         settings: networks of the tails and their optimiser.
         curve_settings: the same for the response to a flip.
         flips: robots whose flips are simulated if the data set has no curves.
@@ -64,19 +66,35 @@ def train(
         >>> from softflagella import train
         >>> table = train("data/sweep")  # doctest: +SKIP
     """
-    manifest = read_manifest(folder)
-    rows, numbers = read_rows(folder)
+    folders = [folder] if isinstance(folder, str) else list(folder)
+    manifests = [read_manifest(one) for one in folders]
+    rows, numbers = _together(folders, manifests)
     part = split(numbers)
     if len(rows) < _FEWEST_ROWS:
-        raise InputError(f"{folder} has {len(rows)} usable rows; training needs {_FEWEST_ROWS}")
+        raise InputError(f"{', '.join(folders)} has {len(rows)} usable rows; training needs {_FEWEST_ROWS}")
     sets = [rows.at(part == i) for i in range(3)]
     flipped = sets[0].with_curves()
     if not len(flipped):
         some = sets[0].at(np.flatnonzero(sets[0].robots["N"] > 1)[:flips])
         flipped = simulated(some.robots, curves=True, title=title and f"{title}: flips simulated")
-    source = {"data_hash": manifest["config_hash"], "data_code_version": manifest["code_version"]}
+    kept = {"data_hash": "config_hash", "data_code_version": "code_version", "data_chosen": "chosen"}
+    source = {name: "+".join(str(m.get(key, "")) for m in manifests) for name, key in kept.items()}
     learned, widths, held_out = sets
     return learn(learned, widths, held_out, flipped, settings, curve_settings, source=source, title=title)
+
+
+def _together(folders: Sequence[str], manifests: Sequence[dict[str, Any]]) -> tuple[Simulated, Integers]:
+    """Rows of several data sets and their numbers; the same point of the same sequence counts once."""
+    parts, numbers, seen = [], [], dict[str, Integers]()
+    for folder, manifest in zip(folders, manifests, strict=True):
+        part, number = read_rows(folder)
+        sequence = fingerprint(manifest["config"])
+        before = seen.get(sequence, np.empty(0, dtype=number.dtype))
+        fresh = ~np.isin(number, before)
+        parts.append(part.at(fresh))
+        numbers.append(number[fresh])
+        seen[sequence] = np.concatenate([before, number])
+    return joined(parts), np.concatenate(numbers)
 
 
 def learn(

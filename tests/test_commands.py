@@ -22,21 +22,9 @@ from softflagella.__main__ import PACKAGES, main
 from surrogate.export import SHIPPED, load
 from tests.calibration.toy_tables import START, install_toy, toy_swimmer, toy_table
 from tests.calibration.track import RADIUS, track
+from tests.dataset.sweeps import SMALL
 
 COMMANDS = [(package, name) for package in PACKAGES for name in import_module(f"{package}.__main__").program.names]
-SWEEP = """
-rows = 4
-seed = 3
-[inputs]
-C_t = { range = [2.0, 5.0] }
-C_r = { range = [1.5, 3.5] }
-C_yr = { range = [1.0, 7.0] }
-l_over_R = { range = [4.0, 9.0] }
-L_over_R = { range = [3.0, 5.0] }
-l_over_r0 = { range = [20.0, 45.0] }
-omega_bar = { range = [6.0, 12.0], scale = "log" }
-N = { range = [2, 3], scale = "integer" }
-"""
 
 
 def done(*words: object) -> None:
@@ -55,7 +43,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     done("planner", "plan", "circle:1.5", "--robot", folder / "robot.toml", "--out", folder / "plan")
     done("sim", "replay", folder / "plan" / "plan.json", "--out", folder / "track.csv")
-    (folder / "sweep.toml").write_text(SWEEP)
+    (folder / "sweep.toml").write_text(SMALL)
     done("dataset", "build", "--config", folder / "sweep.toml", "--out", folder / "sweep", "--jobs", 1)
     return folder
 
@@ -119,6 +107,16 @@ def train(made: Path, out: Path) -> str:
     done("surrogate", "train", out / "data", "--out", out / "model.pt", "--epochs", 2)
     assert load(out / "model.pt").provenance["rows"]["train"] > 150
     return "held-out error on"
+
+
+def refine(made: Path, out: Path) -> str:
+    done(
+        "surrogate", "refine", made / "sweep", "--model", SHIPPED, "--out", out / "more", "--rows", 3, "--jobs", 1
+    )
+    done("dataset", "verify", out / "more", "--rows", 1)
+    done("dataset", "report", out / "more", "--out", out / "page.html")
+    assert "chosen where a look-up table was unsure" in (out / "page.html").read_text()
+    return "3 chosen rows: 3 converged"
 
 
 def query(made: Path, out: Path) -> str:
@@ -216,7 +214,7 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "steady"): steady, ("sim", "replay"): replay, ("sim", "robot"): robot, ("sim", "check"): check_paper,
     ("sim", "compile"): compiled, ("dataset", "build"): build, ("dataset", "report"): report,
     ("dataset", "verify"): verify, ("surrogate", "train"): train, ("surrogate", "query"): query,
-    ("surrogate", "inverse"): inverse, ("planner", "track"): follow,
+    ("surrogate", "inverse"): inverse, ("surrogate", "refine"): refine, ("planner", "track"): follow,
     ("surrogate", "errors"): errors, ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
     ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
     ("calibration", "tracks"): tracks,

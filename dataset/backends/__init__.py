@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 from sim.io.errors import InputError
 
 if TYPE_CHECKING:
-    from dataset.work import Outcome, Task
+    from dataset.work import Outcome, Work
 
 BACKENDS = ("loky", "dask", "ray")
 Lost = Literal["lost", "killer", "gone"]
@@ -28,7 +28,7 @@ class Backend(Protocol):
     def slots(self) -> int:
         """Tasks that can run at once; 0 while there are no workers."""
 
-    def submit(self, number: int, task: Task) -> None:
+    def submit(self, number: int, task: Work) -> None:
         """Hand over a task; at most `slots` are under way."""
 
     def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:

@@ -12,7 +12,7 @@ import dask
 from distributed import Client, Future, KilledWorker, LocalCluster
 
 from dataset.backends import GONE, KILLER, Lost
-from dataset.work import Outcome, Refusal, Task, run_task
+from dataset.work import Outcome, Refusal, Work, run_task
 from sim.io.errors import InputError
 
 ADDRESS = "DASK_SCHEDULER_ADDRESS"
@@ -58,7 +58,7 @@ class DaskCluster:
             self._looked = time.monotonic()
         return self._slots
 
-    def submit(self, number: int, task: Task) -> None:
+    def submit(self, number: int, task: Work) -> None:
         """Hand a task to the scheduler."""
         self._busy[self._client.submit(run_task, task, pure=False)] = number
 

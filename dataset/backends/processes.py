@@ -23,7 +23,7 @@ from typing import Any
 from joblib.externals.loky import ProcessPoolExecutor
 
 from dataset.backends import LOST, Lost
-from dataset.work import Outcome, Task, run_task
+from dataset.work import Outcome, Work, run_task
 
 
 class Processes:
@@ -40,7 +40,7 @@ class Processes:
         """Workers; a dead one is replaced."""
         return self._count
 
-    def submit(self, number: int, task: Task) -> None:
+    def submit(self, number: int, task: Work) -> None:
         """Hand a task to a free worker."""
         executor = self._free.pop()
         with _apart():

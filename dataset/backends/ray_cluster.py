@@ -11,7 +11,7 @@ import ray
 from ray import exceptions
 
 from dataset.backends import GONE, LOST, Lost
-from dataset.work import Outcome, Refusal, Task, run_task
+from dataset.work import Outcome, Refusal, Work, run_task
 from sim.io.errors import InputError
 
 ADDRESS = "RAY_ADDRESS"
@@ -46,7 +46,7 @@ class RayCluster:
             self._looked = time.monotonic()
         return self._slots
 
-    def submit(self, number: int, task: Task) -> None:
+    def submit(self, number: int, task: Work) -> None:
         """Hand a task to the cluster."""
         self._busy[self._run.remote(task)] = number
 

@@ -19,12 +19,10 @@ from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.model.groups import Groups
+from sim.model.slopes import SLOPE_INPUTS, SLOPE_OUTPUTS
 from sim.motion.orbits import solve_orbits
 from sim.solve.assembly import numbers
 from sim.solve.refinement import MANY
-
-INPUTS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "a_over_R")
-OUTPUTS = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_rad")
 
 _FORWARD = threading.Lock()  # torch has one level of forward differentiation for all threads together
 
@@ -34,8 +32,8 @@ class Sensitivities:
     """Steady outputs of B robots and their derivatives in K parameters; NaN where there is no orbit."""
 
     parameters: tuple[str, ...]
-    values: dict[str, Floats]  # OUTPUTS -> (B,)
-    derivatives: dict[str, Floats]  # OUTPUTS -> (B, K), per unit of the parameter
+    values: dict[str, Floats]  # SLOPE_OUTPUTS -> (B,)
+    derivatives: dict[str, Floats]  # SLOPE_OUTPUTS -> (B, K), per unit of the parameter
 
 
 def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MANY) -> Sensitivities:
@@ -43,8 +41,8 @@ def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MA
 
     Args:
         groups: robots of one N.
-        parameters: names out of INPUTS and `sim.effects.catalogue()`; an effect that the robots do not carry is
-            differentiated at its null.
+        parameters: names out of SLOPE_INPUTS and `sim.effects.catalogue()`; an effect that the robots do not carry
+            is differentiated at its null.
         phases: number of phases to begin with; an effect at its null may need more phases than the motion.
 
     Raises:
@@ -52,8 +50,8 @@ def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MA
     """
     names = tuple(parameters)
     for name in names:
-        if name not in INPUTS and name not in catalogue():
-            allowed = ", ".join((*INPUTS, *catalogue()))
+        if name not in SLOPE_INPUTS and name not in catalogue():
+            allowed = ", ".join((*SLOPE_INPUTS, *catalogue()))
             raise InputError(f"no parameter {name!r} to differentiate in; there are {allowed}")
     rows = np.ascontiguousarray(numbers(groups).detach().numpy().T)
     moved = [_direction(groups, name) for name in names]
@@ -61,8 +59,8 @@ def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MA
     directions = np.stack([d for d, _ in moved], 1) if names else np.empty((len(groups), 0, rows.shape[1]))
     found = solve_orbits(rows, groups.N, directions, phases=phases)
     slopes = found.slopes / scales[:, :, None]  # (B, K, 5)
-    values = dict(zip(OUTPUTS, found.means.T, strict=False))
-    derivatives = {name: slopes[:, :, i] for i, name in enumerate(OUTPUTS[:5])}
+    values = dict(zip(SLOPE_OUTPUTS, found.means.T, strict=False))
+    derivatives = {name: slopes[:, :, i] for i, name in enumerate(SLOPE_OUTPUTS[:5])}
     sway, surge, yaw = values["v_x"], values["v_z"], values["omega_yr_bar"]
     speed = np.hypot(sway, surge)
     values["R_yr_over_l"] = speed / np.abs(yaw)
@@ -77,7 +75,7 @@ def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MA
 
 def _direction(groups: Groups, name: str) -> tuple[Floats, Floats]:
     """Derivative of the robots' numbers in parameter/scale, (B, K'), and the scale, (B,)."""
-    if name in INPUTS:
+    if name in SLOPE_INPUTS:
         value = getattr(groups, name)
         size = value.abs()
 

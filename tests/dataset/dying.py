@@ -21,7 +21,7 @@ import dataset.pieces
 import dataset.sweep
 from dataset.backends import Lost
 from dataset.store import read
-from dataset.work import Outcome, Task, run_task
+from dataset.work import Outcome, Work, rows_version, run_task
 from sim.io.errors import InputError
 from tests.dataset.sweeps import design, invented
 
@@ -38,7 +38,7 @@ class Here:
     def slots(self) -> int:
         return 1
 
-    def submit(self, number: int, task: Task) -> None:
+    def submit(self, number: int, task: Work) -> None:
         self._ended.append((number, run_task(task)))
 
     def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
@@ -94,6 +94,8 @@ def files(folder: Path) -> dict[str, bytes]:
 def main(place: Path) -> None:
     dataset.sweep.open_backend = lambda *_, **__: Here()  # type: ignore[assignment]
     dataset.folder.SEGMENT, dataset.pieces.SEGMENT, dataset.pieces.ROW_GROUP = 128, 128, 32
+    invented(design(2).points())  # loads what all children need
+    rows_version()
     base, calm, folder = place / "base", place / "calm", place / "folder"
     assert in_a_child(lambda: build(base, FEWER)) == 0
     shutil.copytree(base, calm)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -112,3 +113,14 @@ def test_bad_configurations(
     assert expected in error
     assert len(error.splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_chosen_points_are_those_of_the_sequence() -> None:
+    whole = design(3000)
+    chosen = (2999, 0, 7, 8, 9, 1024, 1, 2000)
+    some = replace(whole, rows=len(chosen), chosen=chosen)
+    assert some.indices().tolist() == list(chosen)
+    for name, values in whole.points().items():
+        assert some.points()[name].tobytes() == values[list(chosen)].tobytes()
+        assert some.points(2, 5)[name].tobytes() == values[[7, 8, 9]].tobytes()
+    assert some.history().tolist() == whole.history()[list(chosen)].tolist()

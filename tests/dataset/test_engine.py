@@ -14,7 +14,7 @@ from dataset.lock import locked
 from dataset.places import place
 from dataset.store import read, read_manifest
 from dataset.sweep import UnfinishedError, build, chunks
-from dataset.work import Outcome, Task, rows_version, run_task
+from dataset.work import Joining, Outcome, Task, Work, rows_version, run_task
 from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import design, invented
@@ -143,20 +143,23 @@ class Forgetful:
     """A backend in this process that forgets every task once, and has no workers for a while."""
 
     def __init__(self, absent: int = 0):
-        self.absent, self.forgotten, self.waiting = absent, set[int](), list[tuple[int, Task]]()
+        self.absent, self.forgotten, self.waiting = absent, set[tuple[type, int]](), list[tuple[int, Work]]()
+        self.seen = list[Work]()
 
     def slots(self) -> int:
         self.absent -= 1
         return 0 if self.absent >= 0 else 2
 
-    def submit(self, number: int, task: Task) -> None:
+    def submit(self, number: int, task: Work) -> None:
+        self.seen.append(task)
         self.waiting.append((number, task))
 
     def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
         ended: list[tuple[int, Outcome | Lost]] = []
         for number, task in self.waiting:
-            ended.append((number, run_task(task) if number in self.forgotten else GONE))
-            self.forgotten.add(number)
+            span = (type(task), task.start)
+            ended.append((number, run_task(task) if span in self.forgotten else GONE))
+            self.forgotten.add(span)
         self.waiting = []
         return ended
 
@@ -168,6 +171,36 @@ def test_what_a_cluster_forgets_is_asked_again(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr("dataset.sweep.open_backend", lambda *_, **__: Forgetful(absent=3))
     build(design(50), tmp_path / "out", title="", simulate=invented)
     assert read_manifest(tmp_path / "out")["rows"] == 50
+
+
+def test_files_are_joined_by_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dataset.folder.SEGMENT", 64)
+    crew = Forgetful()
+    monkeypatch.setattr("dataset.sweep.open_backend", lambda *_, **__: crew)
+    build(design(200), tmp_path / "out", title="", simulate=invented)
+    joined = [(task.start, task.stop) for task in crew.seen if isinstance(task, Joining)]
+    assert sorted(joined) == sorted(2 * [(0, 64), (64, 128), (128, 192)])  # each of them forgotten once
+    assert len(list((tmp_path / "out" / "rows").iterdir())) == 4
+    monkeypatch.undo()
+    build(design(200), tmp_path / "calm", jobs=1, title="", simulate=invented)
+    assert read(tmp_path / "out").equals(read(tmp_path / "calm"))
+
+
+def test_a_piece_that_is_damaged_before_it_is_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Damaging(Forgetful):
+        def submit(self, number: int, task: Work) -> None:
+            if isinstance(task, Joining):
+                path = tmp_path / "out" / task.sources[0].name
+                path.write_bytes(path.read_bytes()[:-50])
+            super().submit(number, task)
+
+    monkeypatch.setattr("dataset.sweep.open_backend", lambda *_, **__: Damaging())
+    with pytest.raises(UnfinishedError, match=r"set aside: rows 0 to 199 \(BadPieceError: it is damaged"):
+        build(design(200), tmp_path / "out", title="", simulate=invented)
+    monkeypatch.setattr("dataset.sweep.open_backend", lambda *_, **__: Forgetful())
+    build(design(200), tmp_path / "out", title="", simulate=invented)
+    build(design(200), tmp_path / "calm", title="", simulate=invented)
+    assert read(tmp_path / "out").equals(read(tmp_path / "calm"))
 
 
 def test_without_workers_it_ends_with_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

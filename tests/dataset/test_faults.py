@@ -50,9 +50,9 @@ def started(code: str, *, limit: int | None = None) -> subprocess.Popen[str]:
 def building(folder: Path, rows: int, rows_by: str, jobs: int = 2) -> str:
     """Code that builds as the command line does."""
     return (
-        "import sys; from dataset.__main__ import _ended; "
+        "import sys; from dataset.exits import ended; "
         "from sim.io.errors import run_command; "
-        f"sys.exit(run_command(lambda _: _ended(lambda: build(design({rows}), {str(folder)!r}, jobs={jobs}, "
+        f"sys.exit(run_command(lambda _: ended(lambda: build(design({rows}), {str(folder)!r}, jobs={jobs}, "
         f"title='', simulate={rows_by}, resume='the same words'))))"
     )
 

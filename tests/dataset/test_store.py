@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from dataset.pieces import BadPieceError, Piece, contents_of, join, pieces, write_piece
+from dataset.pieces import BadPieceError, Piece, contents_of, join, pieces, plain, write_piece
 from dataset.places import place
 from dataset.schema import FLAGS, INPUTS, OUTPUTS, Column, field_of, schema, table_of
 from dataset.store import batches, read, read_manifest, usable
@@ -62,6 +62,15 @@ def test_columns_types_and_units(original: Path) -> None:
         assert field.type == column.type
         assert field.metadata[b"unit"].decode() == column.unit
         assert not field.nullable
+
+
+def test_columns_as_plain_arrays() -> None:
+    flags = pa.array([True, False, True, True, False] * 7)
+    assert plain(flags.slice(3, 20)).tolist() == flags.slice(3, 20).to_pylist()
+    assert plain(pa.chunked_array([flags, flags.slice(1)])).tolist() == flags.to_pylist() + flags.to_pylist()[1:]
+    assert plain(pa.array([1, 2, 3], pa.int32()).slice(1)).tolist() == [2, 3]
+    assert plain(pa.chunked_array([["a", ""], ["b"]])).tolist() == ["a", "", "b"]
+    assert len(plain(pa.chunked_array([], type=pa.bool_()))) == 0
 
 
 def test_rows_and_provenance(original: Path) -> None:

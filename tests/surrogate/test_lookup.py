@@ -153,7 +153,9 @@ def test_odd_effects_and_single_tails_have_no_learned_response() -> None:
 def test_training_is_repeatable_and_reads_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     some = simulated(drawn(256, 11, wide=False) | {"N": np.full(256, 3.0)})
     monkeypatch.setattr(training, "read_rows", lambda folder: (some, np.arange(len(some))))
-    monkeypatch.setattr(training, "read_manifest", lambda folder: {"config_hash": "h", "code_version": "c"})
+    monkeypatch.setattr(
+        training, "read_manifest", lambda folder: {"config_hash": "h", "code_version": "c", "config": {}}
+    )
     monkeypatch.setattr(training, "simulated", lambda robots, **kind: flips())
     first, again = (training.train("folder", TAILS, CURVES, title="") for _ in range(2))
     assert first.identity == again.identity

@@ -11,7 +11,8 @@ import torch
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.model.groups import Groups
-from sim.motion.sensitivity import INPUTS, OUTPUTS, sensitivities
+from sim.model.slopes import SLOPE_INPUTS, SLOPE_OUTPUTS
+from sim.motion.sensitivity import sensitivities
 from sim.motion.steady import orbits
 from sim.solve.refinement import MANY
 from tests.sim.points import sweep_points
@@ -24,11 +25,11 @@ def values_of(groups: Groups) -> dict[str, np.ndarray]:
     motion = orbits(groups, phases=MANY)
     assert motion.converged.all()
     values = (motion.omega_t, motion.omega_h, motion.omega_yr, motion.v_x, motion.v_z, motion.turn_radius)
-    return dict(zip(OUTPUTS, (*values, motion.slip_angle), strict=True))
+    return dict(zip(SLOPE_OUTPUTS, (*values, motion.slip_angle), strict=True))
 
 
 def moved(groups: Groups, name: str, by: float) -> Groups:
-    if name in INPUTS:
+    if name in SLOPE_INPUTS:
         return replace(groups, **{name: getattr(groups, name) + by})
     size = groups.effects.get(name, torch.full_like(groups.omega_bar, catalogue()[name].null))
     return replace(groups, effects={**groups.effects, name: size + by})
@@ -43,16 +44,18 @@ def test_derivatives_equal_differences_of_solutions(tails: int) -> None:
     columns["omega_bar"][1] *= -1
     effects = {name: np.full(len(own), 0.5 * effect.typical) for name, effect in LOCAL.items()}
     groups = Groups.from_columns({**columns, **effects})
-    names = (*INPUTS, *LOCAL)
+    names = (*SLOPE_INPUTS, *LOCAL)
     found = sensitivities(groups, names)
     plain = values_of(groups)
-    for output in OUTPUTS:
+    for output in SLOPE_OUTPUTS:
         assert found.values[output] == pytest.approx(plain[output], rel=1e-12)
     for k, name in enumerate(names):
-        size = float(getattr(groups, name).abs().mean()) if name in INPUTS else abs(catalogue()[name].typical)
+        size = (
+            float(getattr(groups, name).abs().mean()) if name in SLOPE_INPUTS else abs(catalogue()[name].typical)
+        )
         width = 1e-3 * size
         before, after = values_of(moved(groups, name, -width)), values_of(moved(groups, name, width))
-        for output in OUTPUTS:
+        for output in SLOPE_OUTPUTS:
             slope = (after[output] - before[output]) / (2 * width)
             # The differences carry the error of Newton's tolerance and of their own width.
             close = 3e-5 * np.abs(plain[output]) / size + 2e-3 * np.abs(slope)
