@@ -1,10 +1,12 @@
 """Make the look-up table that comes with the package, and open its locked test.
 
-Usage: python -m benchmarks.shipped_table WORK --out MODEL    simulate (kept in the folder WORK) and train
-       python -m benchmarks.shipped_table WORK --out MODEL --more MODEL --iterations 500    train on
+Usage: python -m dataset build --config sweeps/domain.toml --out SWEEP
+       python -m benchmarks.shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
        python -m benchmarks.shipped_table WORK --test MODEL   errors and coverage on the locked robots
 
-Robots are drawn from Sobol sequences with the seeds below. The locked robots led to no choice of any kind.
+The tails are learned from robots with heads far wider than those of the sweep. The response to a flip is learned
+from the sweep, and from some of these wide robots. All robots are drawn from Sobol sequences with the seeds below.
+The locked robots led to no choice of any kind.
 """
 
 from __future__ import annotations
@@ -12,23 +14,25 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from dataset.figures import plain_logarithms
+from dataset.store import read_manifest
 from sim.arrays import Floats
 from surrogate.evaluate import coverage, curve_errors, error_table, relative_errors, summary
 from surrogate.export import load, save
 from surrogate.fit import Settings
 from surrogate.lookup import Lookup
-from surrogate.rows import Simulated, as_reached, drawn, simulated
-from surrogate.train import learn, with_radius
+from surrogate.rows import Simulated, as_reached, drawn, joined, read_rows, simulated
+from surrogate.train import learn, split, with_radius
 
-TAILS = Settings(width=64, depth=3, members=1, epochs=150, iterations=300)
-ROWS = {"tails": (32768, 101), "widths": (4096, 202), "held_out": (4096, 402), "locked": (4096, 20261121)}
-FLIPS = {"flips": (2800, 301), "held_out_flips": (600, 302), "locked_flips": (400, 20261122)}
+TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=3000)
+CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)
+ROWS = {"tails": (32768, 101), "widths": (4096, 202), "held_out": (4096, 402), "locked": (4096, 20261130)}
+FLIPS = {"flips": (1400, 301), "locked_flips": (400, 20261131)}
+_SWEPT = 16384  # rows of the sweep without history whose lags are learned
 _FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated
 
 
@@ -61,6 +65,15 @@ def kept(work: Path, name: str) -> Simulated:
     named = {f"{i}/{k}": values for i, part in enumerate(vars(found).values()) for k, values in part.items()}
     np.savez(path, allow_pickle=False, **named)
     return found
+
+
+def swept(folder: str) -> tuple[Simulated, Simulated]:
+    """Rows of a sweep with response curves: to learn (with memory and rest, and _SWEPT without), and held out."""
+    rows, numbers = read_rows(folder)
+    part, history = split(numbers), np.isfinite(rows.curves["rest"]).all((1, 2))
+    lags = np.flatnonzero((part == 0) & ~history & (rows.robots["N"] > 1))[:_SWEPT]
+    learned = np.union1d(lags, np.flatnonzero((part == 0) & history))
+    return rows.at(learned), rows.at(np.flatnonzero((part > 0) & history))
 
 
 def test(lookup: Lookup, rows: Simulated, flips: Simulated) -> None:
@@ -123,20 +136,19 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("work", type=Path)
     parser.add_argument("--out")
-    parser.add_argument("--more")
-    parser.add_argument("--iterations", type=int, default=500)
+    parser.add_argument("--sweep", help="data set built from sweeps/domain.toml")
     parser.add_argument("--test")
     parser.add_argument("--picture", help="with --test: draw the errors of the locked robots")
     given = parser.parse_args()
     if given.out:
+        if not given.sweep:
+            parser.error("--out needs --sweep")
         tails, widths, held_out, flips = (kept(given.work, n) for n in ("tails", "widths", "held_out", "flips"))
-        start = load(given.more) if given.more else None
-        settings = replace(TAILS, epochs=0, iterations=given.iterations) if start else TAILS
-        source = {"seeds": {**ROWS, **FLIPS}, "started_from": start.identity if start else None}
+        source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(given.sweep)["config_hash"]}
+        learned, others = swept(given.sweep)
         lookup = learn(
-            tails, widths, held_out, flips, settings, start=start, source=source,
-            flips_held_out=kept(given.work, "held_out_flips"),
-        )  # fmt: skip
+            tails, widths, held_out, joined([flips, learned]), TAILS, CURVES, source=source, flips_held_out=others
+        )
         save(lookup, given.out)
         print(error_table(lookup))
     if given.test:

@@ -12,7 +12,9 @@ python -m surrogate robot ROBOT.toml --out T.json      the table of one robot wi
 from __future__ import annotations
 
 import shlex
+import sys
 from argparse import Namespace
+from pathlib import Path
 
 from sim.io.commands import JOBS, MODEL, Program, argument, out
 from sim.io.errors import InputError
@@ -31,11 +33,13 @@ main = program.main
 def _train(arguments: Namespace) -> None:
     from dataclasses import replace
 
+    from sim.io.files import write_text
+    from surrogate.card import card_of
     from surrogate.curves import SETTINGS
-    from surrogate.evaluate import error_table
+    from surrogate.evaluate import error_table, shortcomings
     from surrogate.export import save
     from surrogate.fit import Settings
-    from surrogate.train import train
+    from surrogate.train import held_out, train
 
     tails, curves = Settings(), SETTINGS
     if arguments.epochs is not None:
@@ -44,10 +48,14 @@ def _train(arguments: Namespace) -> None:
         tails, curves = (replace(s, epochs=arguments.epochs, iterations=arguments.epochs) for s in (tails, curves))
     lookup = train(arguments.data, tails, curves)
     save(lookup, arguments.out)
+    card = Path(arguments.out).with_suffix(".md")
+    write_text(card, card_of(lookup, held_out(arguments.data)))
     rows = lookup.provenance["rows"]
     print(f"model {lookup.identity}: {rows['train']} rows, held-out error on {rows['held_out']}")
     print(error_table(lookup))
-    print(f"-> {arguments.out}")
+    for words in shortcomings(lookup):
+        print(f"warning: {words}", file=sys.stderr)
+    print(f"-> {arguments.out}, {card}")
 
 
 @program.command(

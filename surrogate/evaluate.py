@@ -25,6 +25,7 @@ Columns = Mapping[str, Any]
 
 RELATIVE = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "R_yr_over_l", "tail_gap")
 COMPARED = (*RELATIVE, "v_z", "theta_deg")
+_POOR = 0.05  # a 95th percentile from which on `shortcomings` speaks
 _UNITS = {"theta_deg": "deg", "lag_psi_rad": "of turn/unit", "v_z": "of speed", "lag_x": "of speed",
           "lag_z": "of speed", "net_speed_bar": "of v_z"}  # fmt: skip
 
@@ -91,6 +92,19 @@ def coverage(answer: Columns, truth: Columns) -> dict[str, float]:
             known = np.isfinite(truth[name])
             inside = (truth[name] >= answer[f"{name}_low"]) & (truth[name] <= answer[f"{name}_high"])
             found[name] = float(np.mean(inside[known]))
+    return found
+
+
+def shortcomings(lookup: Lookup) -> list[str]:
+    """What is poor about a table, in words; nothing where it is good enough to plan with."""
+    found = []
+    for name, words in (("omega_yr_bar", "the yaw rate"), ("net_speed_bar", "the net speed")):
+        error = lookup.errors.get(name)
+        if error and error["p95"] > _POOR:
+            found.append(
+                f"{words} is off by {100 * error['p95']:.0f} % at 95 % of the held-out rows; learn more rows, or "
+                "give robots tables of their own (python -m surrogate robot)"
+            )
     return found
 
 

@@ -83,6 +83,13 @@ def train(
     return learn(learned, widths, held_out, flipped, settings, curve_settings, source=source, title=title)
 
 
+def held_out(folder: str | Sequence[str]) -> Simulated:
+    """The rows of data sets that `train` holds out."""
+    folders = [folder] if isinstance(folder, str) else list(folder)
+    rows, numbers = _together(folders, [read_manifest(one) for one in folders])
+    return rows.at(split(numbers) == 2)
+
+
 def _together(folders: Sequence[str], manifests: Sequence[dict[str, Any]]) -> tuple[Simulated, Integers]:
     """Rows of several data sets and their numbers; the same point of the same sequence counts once."""
     parts, numbers, seen = [], [], dict[str, Integers]()
