@@ -17,13 +17,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planner.choice import QUICK, Objective, dwells_for
-from planner.declared import Corner, declare
+from planner.declared import Corner, Declared, declare
 from planner.distance import distance_to
 from planner.knowledge import Knowledge
 from planner.lookup import vehicle_of
@@ -166,8 +167,13 @@ def plan(
     offset = _offset(point, robot, vehicle)
     dwells = dwells_for(vehicle, objective, _least(minimum_dwell, minimum_seconds, robot))
 
+
+    @cache
+    def declared(drift: Drift) -> Declared:
+        return declare(raw, vehicle, vehicle.pivot_distance + offset, corner, drift)
+
     def made(dwell: float) -> Plan:
-        return _plan(raw, robot, vehicle, lookup, point, offset, corner, objective, dwell, seed, progress)
+        return _plan(raw, robot, vehicle, lookup, point, offset, declared, objective, dwell, seed, progress)
 
     best = made(dwells[0])
     if tolerance is None or best.stated_error <= tolerance:
@@ -199,7 +205,7 @@ def _plan(
     lookup: LookupTable,
     point: Point,
     offset: float,
-    corner: Corner,
+    declare_for: Callable[[Drift], Declared],
     objective: Objective,
     dwell: float,
     seed: int,
@@ -211,7 +217,7 @@ def _plan(
         raise InputError(f"with dwells of {dwell:.2g} time units the robot does not get ahead; allow longer ones")
     drift = Drift(_clean(straight.drift / straight.speed), _shares(vehicle.current, straight.speed))
     distance = vehicle.pivot_distance + offset
-    declared = declare(raw, vehicle, distance, corner, drift)
+    declared = declare_for(drift)
     guide = declared.reference
     ahead = look_ahead(vehicle, declared.curvature, straight)
     swing = straight.hysteresis(ahead)
