@@ -167,7 +167,6 @@ def plan(
     offset = _offset(point, robot, vehicle)
     dwells = dwells_for(vehicle, objective, _least(minimum_dwell, minimum_seconds, robot))
 
-
     @cache
     def declared(drift: Drift) -> Declared:
         return declare(raw, vehicle, vehicle.pivot_distance + offset, corner, drift)
