@@ -19,7 +19,7 @@ from scipy.optimize import minimize
 from planner.choice import QUICK
 from planner.dubins import TURNS, words
 from planner.goal import to_goal
-from planner.last_dwells import end_poses
+from planner.last_dwells import flips_after
 from planner.schedule import Switches
 from planner.vehicle import Vehicle
 from sim.arrays import Floats
@@ -81,10 +81,10 @@ def _optimum(vehicle: Vehicle, first: int, dwells: Floats, target: Floats) -> fl
     none = Switches(first, dwells, np.zeros((1, 3)))
 
     def end(x: Floats) -> Floats:
-        return np.asarray(end_poses(vehicle, none, 0, x[None])[0] - target)
+        return np.asarray(flips_after(vehicle, none, 0, x[None])[0, -1] - target)
 
     def slopes(x: Floats) -> Floats:
-        moved = end_poses(vehicle, none, 0, np.concatenate([x[None], x + _STEP * np.eye(len(x))]))
+        moved = flips_after(vehicle, none, 0, np.concatenate([x[None], x + _STEP * np.eye(len(x))]))[:, -1]
         return np.asarray((moved[1:] - moved[0]).T / _STEP)
 
     scale = 100.0

@@ -14,13 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.choice import Objective, dwells_for
-from planner.declared import TIGHTEST, Declared
+from planner.choice import Objective, check_least, dwells_for
+from planner.declared import Declared
 from planner.keep_out import Body, Circle, Polygon, Room
 from planner.knowledge import Knowledge
 from planner.last_dwells import ending_at
@@ -40,6 +40,7 @@ from surrogate.table import LookupTable
 
 Pose = tuple[float, float, float]
 _SPACING = 0.02  # l
+_SHORTER = 0.4  # of the dwell that was chosen: dwells near the end may be that short
 _MARGINS = 6  # tried for each dwell
 _MORE = 1.05  # times the stated error is the next margin
 _DWELLS = 5  # shortest dwells that are tried
@@ -126,9 +127,10 @@ def to_goal(
     room = Room(regions, outline)
     swimmer = swimmer_of(robot, lookup, "head_centre", knowledge)
     vehicle = swimmer.vehicle
-    dwells = dwells_for(vehicle, objective, least_dwell(minimum_dwell, minimum_seconds, robot))
+    least = least_dwell(minimum_dwell, minimum_seconds, robot)
+    dwells = dwells_for(vehicle, objective, least)
     tried = [dwells[i] for i in np.unique(np.linspace(0, len(dwells) - 1, _DWELLS).astype(int))]
-    trip = _Trip(swimmer, first, last, places, room, objective, feedback, seed)
+    trip = _Trip(swimmer, first, last, places, room, objective, check_least(least), feedback, seed)
     refusal: InputError | None = None
     for dwell in tried:
         try:
@@ -168,9 +170,9 @@ class _Trip:
     """What is asked for, with the lattices that were made for it."""
 
     def __init__(self, swimmer: Swimmer, start: Pose, goal: Pose, via: tuple[tuple[float, float], ...], room: Room,
-                 objective: Objective, feedback: bool, seed: int):  # fmt: skip
+                 objective: Objective, least: float, feedback: bool, seed: int):  # fmt: skip
         self.swimmer, self.start, self.goal, self.via, self.room = swimmer, start, goal, via, room
-        self.objective, self.feedback, self.seed = objective, feedback, seed
+        self.objective, self.least, self.feedback, self.seed = objective, least, feedback, seed
         self.body = Body.of(swimmer.robot, -swimmer.vehicle.pivot_distance)
         self._lattices: dict[Drift, Lattices] = {}
 
@@ -178,7 +180,7 @@ class _Trip:
         """The voyage with one shortest dwell; the margin is raised to what its plan states."""
         straight = zigzag(self.swimmer.vehicle, dwell)
         drift = drift_of(self.swimmer.vehicle, straight, dwell)
-        ground = Ground(self.swimmer.vehicle.pivot_radius / TIGHTEST, self.body, self.room, drift)
+        ground = Ground(self.swimmer.vehicle.pivot_radius, self.body, self.room, drift)
         margin = 0.0 if self.room.empty else 1.5 * straight.largest
         for _ in range(_MARGINS):
             way = route(self._stops(drift), ground, margin, self._lattices.setdefault(drift, {}))
@@ -231,8 +233,9 @@ class _Trip:
             dwell,
             seed=self.seed,
             start=lambda _: Start(self.start, 0, sense),
-            finish=ending_at(self.goal, vehicle, dwell),
+            finish=ending_at(self.goal, vehicle, min(dwell, max(self.least, _SHORTER * dwell)), q),
         )
+        plan = replace(plan, minimum_dwell=min(dwell, float(plan.dwells.min())))
         x, y, angle = plan.poses[-1].tolist()
         clearance = math.inf
         if not self.room.empty:
