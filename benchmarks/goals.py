@@ -1,7 +1,7 @@
 """Plans from pose to pose against a brute-force optimum of the same vehicle, without obstacles.
 
-The optimum: the sum of all dwells is minimised with the end pose as a constraint (SLSQP). It starts from every one of
-Dubins' words, with short and long dwells on its straight pieces, in both directions. The best of all is taken.
+The optimum: the sum of all dwells is minimised with the end pose as a constraint (SLSQP). It starts from every one
+of Dubins' words, with short and long dwells on its straight pieces, in both directions. The best of all is taken.
 
 Usage: python -m benchmarks.goals [CASES] [FIRST SEED]
 """
@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 import time
 from itertools import product
+from typing import Any
 
 import numpy as np
 import torch
@@ -57,7 +58,7 @@ def brute_force(vehicle: Vehicle, goal: tuple[float, float, float]) -> float:
 
 
 def _schedules(vehicle: Vehicle, turns: Floats, pieces: Floats, dwell: float) -> list[tuple[int, Floats]]:
-    """Dwells that carry out a word: arcs in one go, straight pieces by zigzags of an odd or even number of dwells."""
+    """Dwells that carry out a word: arcs in one go, straight pieces by zigzags of an odd or an even number."""
     found: list[tuple[int, list[float]]] = [(1, []), (-1, [])]
     speed = float(vehicle.twist[0, 0])
     for turn, piece in zip(turns.tolist(), pieces.tolist(), strict=True):
@@ -88,15 +89,16 @@ def _optimum(vehicle: Vehicle, first: int, dwells: Floats, target: Floats) -> fl
         return np.asarray((moved[1:] - moved[0]).T / _STEP)
 
     scale = 100.0
-    found = minimize(
-        lambda x: x.sum() / scale,
-        dwells,
-        jac=lambda x: np.ones_like(x) / scale,
-        bounds=[(QUICK, None)] * len(dwells),
-        constraints={"type": "eq", "fun": end, "jac": slopes},
-        method="SLSQP",
-        options={"maxiter": 150, "ftol": 1e-6},
-    )
+
+    def cost(x: Floats) -> float:
+        return float(x.sum()) / scale
+
+    def even(x: Floats) -> Floats:
+        return np.full(len(x), 1 / scale)
+
+    bounds, met = [(QUICK, np.inf)] * len(dwells), {"type": "eq", "fun": end, "jac": slopes}
+    options: Any = {"maxiter": 150, "ftol": 1e-6}
+    found: Any = minimize(cost, dwells, jac=even, bounds=bounds, constraints=met, method="SLSQP", options=options)
     return float(found.x.sum()) if np.abs(end(found.x)).max() < 1e-4 else np.inf
 
 

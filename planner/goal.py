@@ -140,8 +140,10 @@ def to_goal(
             continue
         if tolerance is None or found.plan.stated_error <= tolerance:
             return found
-        refusal = InputError(f"tolerance {tolerance:g} l cannot be kept: with dwells of {dwell:.2g} time units the "
-                             f"stated error is {found.plan.stated_error:.3g} l; allow more")  # fmt: skip
+        refusal = InputError(
+            f"tolerance {tolerance:g} l cannot be kept: with dwells of {dwell:.2g} time units the stated error is "
+            f"{found.plan.stated_error:.3g} l; allow more"
+        )
     assert refusal is not None
     raise refusal
 
@@ -169,8 +171,8 @@ def _finite(values: Sequence[float], count: int, wanted: str) -> list[float]:
 class _Trip:
     """What is asked for, with the lattices that were made for it."""
 
-    def __init__(self, swimmer: Swimmer, start: Pose, goal: Pose, via: tuple[tuple[float, float], ...], room: Room,
-                 objective: Objective, least: float, feedback: bool, seed: int):  # fmt: skip
+    def __init__(self, swimmer: Swimmer, start: Pose, goal: Pose, via: tuple[tuple[float, float], ...],
+                 room: Room, objective: Objective, least: float, feedback: bool, seed: int):  # fmt: skip
         self.swimmer, self.start, self.goal, self.via, self.room = swimmer, start, goal, via, room
         self.objective, self.least, self.feedback, self.seed = objective, least, feedback, seed
         self.body = Body.of(swimmer.robot, -swimmer.vehicle.pivot_distance)

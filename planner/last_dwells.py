@@ -1,8 +1,8 @@
 """The last dwells of a schedule are changed, so that the motion ends at a given pose.
 
-Of all last dwells that end there, those are sought that take the least time and keep the pivot near its track. Three
-numbers must be met, so a few dwells are enough. Some may be left out. Time, distances from the track and the distance
-from the goal enter as least squares.
+Of all last dwells that end there, those are sought that take the least time and keep the pivot near its track.
+Three numbers must be met, so a few dwells are enough. Some may be left out. Time, distances from the track and the
+distance from the goal enter as least squares.
 """
 
 from __future__ import annotations
@@ -69,9 +69,9 @@ class _Ending:
         """The changed schedule, and its cost."""
         own = np.maximum(self._switches.dwells[self._kept :], self._least * (1 + 1e-6))
         found = least_squares(
-            lambda x: self._at(x)[0],
+            self._residuals,
             own,
-            lambda x: self._at(x)[1],
+            self._slopes,
             bounds=(self._least, np.inf),
             x_scale=self._least,
             max_nfev=_EVALUATIONS,
@@ -83,6 +83,12 @@ class _Ending:
         poses = poses_at_flips(self._vehicle, changed)
         cost = float((self._at(found)[0] ** 2).sum() + self._switches.dwells[: self._kept].sum())
         return Switches(self._switches.first_direction, dwells, poses), cost + 1e6 * max(missed - _REACHED, 0.0)
+
+    def _residuals(self, last: Floats) -> Floats:
+        return self._at(last)[0]
+
+    def _slopes(self, last: Floats) -> Floats:
+        return self._at(last)[1]
 
     def _at(self, last: Floats) -> tuple[Floats, Floats]:
         """Residuals (3 + 2 K,), the squares of which are times, and their derivatives."""

@@ -23,8 +23,8 @@ from sim.arrays import Flags, Floats, Integers
 
 _RANGE = 3  # of the joints between poses, in spacings
 _DETOUR = 1.15  # joints that are longer than this, beside the straight way or the turn, are left out
-_LINK = 4.0  # radii: poses within this distance are joined to start and goal
-_LONGEST_LINK = 6.5  # radii
+_LINK = 2.5  # radii: poses within this distance are joined to start and goal
+_LONGEST_LINK = 4.0  # radii
 _STEP = 0.05  # l, between the places where a track is checked
 _BLOCK = 200_000  # poses that are checked at once
 _CELLS = 12  # of the map, for each spacing

@@ -25,6 +25,9 @@ LEVELS = ((0.6, 16), (0.3, 32))  # spacing of the lattice, in radii, and number 
 _FINER = 4  # times that the courses of stops are chosen again, among finer ones
 _ROUNDS = 3  # of looking for shorter joints
 _PLACES = 40  # on a way, between which shorter joints are sought
+_ENOUGH = 1.005  # a chain of words that is so near the shortest one without obstacles needs no lattice
+_THIN = 3  # of the courses at a stop, every third one is joined to the lattice
+_MOST_CHECKS = 300  # chains of words
 _AROUND = 6.0  # radii that the lattice reaches beyond stops and obstacles
 
 
@@ -76,7 +79,7 @@ def route(stops: list[Floats], ground: Ground, margin: float, lattices: Lattices
     if ground.room.empty and direct is not None:
         return direct
     shortest = _direct(stops, replace(ground, room=Room()), margin)
-    if direct is not None and shortest is not None and direct.length < shortest.length + 1e-6:
+    if direct is not None and shortest is not None and direct.length < _ENOUGH * shortest.length:
         return direct
     for spacing, courses in LEVELS:
         if (spacing, courses) not in lattices:
@@ -141,46 +144,37 @@ def _ends(found: Route) -> list[Floats]:
 
 
 def _chosen(stops: list[Floats], ground: Ground, margin: float) -> Route | None:
-    """The shortest chain of one word between each two stops, among all their poses."""
-    costs = np.zeros(len(stops[0]))
-    back = []
-    for one, other in pairwise(stops):
-        starts, goals = np.repeat(one, len(other), 0), np.tile(other, (len(one), 1))
-        if ground.room.empty:
-            tracks = shots(starts, goals, ground.radius)
-            length = tracks.length
-        else:
-            tracks, length = _free_words(starts, goals, ground, margin)
-        total = costs[:, None] + length.reshape(len(one), len(other))
-        before = total.argmin(0)
-        back.append((before, tracks, len(other)))
-        costs = total.min(0)
-    at = int(costs.argmin())
-    if not np.isfinite(costs[at]):
-        return None
-    rows = []
-    for before, tracks, width in reversed(back):
-        rows.append(tracks.take(np.array([before[at] * width + at])))
-        at = int(before[at])
-    return _chain(rows[::-1], ground.radius)
+    """The shortest chain of one word between each two stops, among all their poses.
 
-
-def _free_words(starts: Floats, goals: Floats, ground: Ground, margin: float) -> tuple[Shots, Floats]:
-    """The shortest free word of each pair of poses, and its length, infinite where none is free."""
-    pieces = words(starts, goals, ground.radius)
-    length = pieces.sum(-1)
-    order = np.argsort(length, 1)
-    rows = np.arange(len(starts))
-    best, cost = order[:, 0].copy(), np.full(len(starts), np.inf)
-    for rank in range(order.shape[1]):
-        word = order[:, rank]
-        open_ = np.flatnonzero(np.isinf(cost) & np.isfinite(length[rows, word]))
-        if not len(open_):
-            break
-        tracks = Shots(starts[open_], TURNS[word[open_]], pieces[open_, word[open_]])
-        good = open_[ground.free(tracks, margin)]
-        best[good], cost[good] = word[good], length[good, word[good]]
-    return Shots(starts, TURNS[best], pieces[rows, best]), cost
+    Words are checked when they are on the shortest chain. Those that are not free are taken out.
+    """
+    legs = [words(one[:, None], other[None], ground.radius) for one, other in pairwise(stops)]
+    lengths = [leg.sum(-1) for leg in legs]
+    for _ in range(_MOST_CHECKS):
+        costs, back = np.zeros(len(stops[0])), []
+        for length in lengths:
+            total = costs[:, None] + length.min(-1)
+            back.append(total.argmin(0))
+            costs = total.min(0)
+        at = int(costs.argmin())
+        if not np.isfinite(costs[at]):
+            return None
+        chain = []
+        for leg, length, before, one in zip(reversed(legs), reversed(lengths), reversed(back), stops[-2::-1],
+                                            strict=True):  # fmt: skip
+            came = int(before[at])
+            word = int(length[came, at].argmin())
+            track = Shots(one[came : came + 1], TURNS[word : word + 1], leg[came, at, word][None])
+            chain.append((track, length, (came, at, word)))
+            at = came
+        found = _chain([track for track, _, _ in chain[::-1]], ground.radius)
+        free = np.ones(len(chain), dtype=bool) if ground.room.empty else ground.free(found.tracks, margin)[::-1]
+        if free.all():
+            return found
+        for (_, length, place), good in zip(chain, free.tolist(), strict=True):
+            if not good:
+                length[place] = np.inf
+    return None
 
 
 def _chain(parts: list[Shots], radius: float) -> Route:
@@ -201,6 +195,7 @@ def _lattice(stops: list[Floats], ground: Ground, spacing: float, courses: int) 
 def _around(stops: list[Floats], lattice: Lattice, margin: float) -> Route | None:
     """A route over a lattice, made shorter; None where there is none on this lattice."""
     ground = lattice.ground
+    stops = [stop[::_THIN] if len(stop) == COURSES else stop for stop in stops]
     costs, chains = np.zeros(len(stops[0])), []
     for one, other in pairwise(stops):
         costs, found = lattice.ways(one, costs, other, margin)
