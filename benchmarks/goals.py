@@ -96,9 +96,10 @@ def _optimum(vehicle: Vehicle, first: int, dwells: Floats, target: Floats) -> fl
     def even(x: Floats) -> Floats:
         return np.full(len(x), 1 / scale)
 
-    bounds, met = [(QUICK, np.inf)] * len(dwells), {"type": "eq", "fun": end, "jac": slopes}
+    bounds: Any = [(QUICK, np.inf)] * len(dwells)
+    met: Any = {"type": "eq", "fun": end, "jac": slopes}
     options: Any = {"maxiter": 150, "ftol": 1e-6}
-    found: Any = minimize(cost, dwells, jac=even, bounds=bounds, constraints=met, method="SLSQP", options=options)
+    found = minimize(cost, dwells, jac=even, bounds=bounds, constraints=met, method="SLSQP", options=options)
     return float(found.x.sum()) if np.abs(end(found.x)).max() < 1e-4 else np.inf
 
 

@@ -192,8 +192,8 @@ class _Trip:
                 return found
             margin = max(_MORE * needed, margin * 1.02)
         raise NoWayError(
-            f"there is no way that leaves the plan's stated error around the robot: it is {needed:.3g} l; plan with "
-            "feedback, make a table of this robot (python -m surrogate robot), or move the goal or the obstacles"
+            f"there is no way that leaves the plan's stated error around the robot: it is {needed:.3g} l; plan "
+            "with feedback, make a table of this robot (python -m surrogate robot), or move goal or obstacles"
         )
 
     def _stops(self, drift: Drift) -> list[Floats]:

@@ -34,6 +34,8 @@ _AROUND = 6.0  # radii that the lattice reaches beyond stops and obstacles
 class NoWayError(InputError):
     """There is no way to the goal."""
 
+    status = 3
+
 
 @dataclass(frozen=True)
 class Route:

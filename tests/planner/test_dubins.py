@@ -35,7 +35,7 @@ def test_every_word_ends_at_its_goal(word: int) -> None:
 
 
 def test_no_random_track_is_shorter() -> None:
-    """Many random tracks of arcs and straight lines; their ends are reached at least as quickly by the best word."""
+    """Random tracks of arcs and straight lines: the best word reaches their ends at least as soon."""
     rng = np.random.default_rng(7)
     start = poses(rng, 3000)
     end, length = start, np.zeros(3000)
@@ -107,5 +107,5 @@ def test_a_wall_without_a_gap_leaves_no_way() -> None:
 
 def test_a_goal_inside_a_region_is_refused_with_the_distance() -> None:
     ground = Ground(RADIUS, BODY, Room((Circle(5, 0, 1),)), STILL)
-    with pytest.raises(NoWayError, match="at the goal, .* inside what it must keep out of; it needs 0.1 l"):
+    with pytest.raises(NoWayError, match=r"at the goal, .* inside what it must keep out of; it needs 0.1 l"):
         route([stop(0, 0, 0), stop(5, 0, 0)], ground, 0.1, {})
