@@ -13,7 +13,8 @@ import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from planner.size import UNITS
 from sim.io.commands import MODEL, ROBOT, Program, argument, out
@@ -53,7 +54,13 @@ _PLANNING = (
 )  # fmt: skip
 
 
-@program.command("plan", "plan the switching times for a path", *_PLANNING, out("folder"))
+@program.command(
+    "plan",
+    "plan the switching times for a path",
+    *_PLANNING,
+    argument("--trade-off", action="store_true", help="draw error against time and flips, for ten dwells"),
+    out("folder"),
+)
 def _plan(arguments: Namespace) -> None:
     from planner.export import write_plan
 
@@ -64,7 +71,23 @@ def _plan(arguments: Namespace) -> None:
         f"from the path as drawn {result.drawn_rms:.4f} l rms, {result.drawn_max:.3f} l at most; every drawn "
         f"point is within {result.missed:.3f} l of the declared path"
     )
+    if arguments.trade_off:
+        paths.append(_trade_off(arguments, result))
     print(f"-> {', '.join(map(str, paths))}")
+
+
+def _trade_off(arguments: Namespace, result: Plan) -> Path:
+    """trade_off.svg in the folder of the plan."""
+    from planner.plan import plan
+    from planner.trade_off import draw_trade_off, trade_off
+    from sim.io.files import whole_file
+
+    path, robot, options = _task(arguments, say=False)
+    found = trade_off(result, lambda dwell: plan(path, robot, **{**options, "dwell": dwell, "tolerance": None}))
+    target = Path(arguments.out) / "trade_off.svg"
+    with whole_file(target) as part:
+        draw_trade_off(found).savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})
+    return target
 
 
 def _say(result: Plan) -> None:
@@ -181,29 +204,34 @@ def _track(arguments: Namespace) -> None:
 
 def _planned(arguments: Namespace) -> Plan:
     """The plan that the command asks for."""
-    from planner.knowledge import read_knowledge
     from planner.plan import plan
+
+    path, robot, options = _task(arguments)
+    with _progress() as progress:
+        return plan(path, robot, **options, progress=progress)
+
+
+def _task(arguments: Namespace, *, say: bool = True) -> tuple[Path2D, Robot, dict[str, Any]]:
+    """Path, robot and options of a plan."""
+    from planner.knowledge import read_knowledge
     from planner.size import describe
     from sim.inputs import load_robot
     from surrogate.export import load_table
 
     robot = load_robot(arguments.robot)
-    path = _path(arguments, robot)
-    print(f"path: {describe(path, robot)}")
-    with _progress() as progress:
-        return plan(
-            path,
-            robot,
-            lookup=load_table(arguments.model),
-            point=arguments.point,
-            corner=arguments.corner,
-            objective=arguments.objective,
-            minimum_dwell=arguments.min_dwell,
-            minimum_seconds=arguments.min_dwell_s,
-            tolerance=arguments.tolerance,
-            knowledge=read_knowledge(arguments.robot),
-            progress=progress,
-        )
+    path = _path(arguments, robot, say=say)
+    if say:
+        print(f"path: {describe(path, robot)}")
+    return path, robot, {
+        "lookup": load_table(arguments.model),
+        "point": arguments.point,
+        "corner": arguments.corner,
+        "objective": arguments.objective,
+        "minimum_dwell": arguments.min_dwell,
+        "minimum_seconds": arguments.min_dwell_s,
+        "tolerance": arguments.tolerance,
+        "knowledge": read_knowledge(arguments.robot),
+    }  # fmt: skip
 
 
 @contextmanager
@@ -215,7 +243,7 @@ def _progress() -> Iterator[Callable[[float], object]]:
         yield lambda share: bar.update(100 * share - bar.n)
 
 
-def _path(arguments: Namespace, robot: Robot) -> Path2D:
+def _path(arguments: Namespace, robot: Robot, *, say: bool = True) -> Path2D:
     """The path that the command asks for, in tail lengths."""
     from planner.drawings import Drawing, read_path
     from planner.path import circle, polygon, smoothed
@@ -240,7 +268,8 @@ def _path(arguments: Namespace, robot: Robot) -> Path2D:
     if arguments.smooth is None:
         return path
     smooth, moved = smoothed(path, arguments.smooth)
-    print(f"smoothed over {arguments.smooth:g} l, which moves the path by up to {moved:.3g} l")
+    if say:
+        print(f"smoothed over {arguments.smooth:g} l, which moves the path by up to {moved:.3g} l")
     return smooth
 
 

@@ -61,7 +61,7 @@ def draw_voyage(voyage: Voyage) -> Figure:
         f"way {voyage.length:.2f} l, stated error {voyage.plan.stated_error:.2f} l",
         fontsize=10,
     )
-    axes.legend(loc="best", fontsize=8, frameon=False)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, fontsize=8, frameon=False)
     return figure
 
 

@@ -23,7 +23,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.choice import QUICK, Objective, dwells_for
+from planner.choice import QUICK, Objective, check_least, dwells_for
 from planner.declared import Corner, Declared, declare
 from planner.distance import distance_to
 from planner.knowledge import Knowledge
@@ -123,6 +123,7 @@ def plan(
     objective: Objective = "error",
     minimum_dwell: float | None = None,
     minimum_seconds: float | None = None,
+    dwell: float | None = None,
     tolerance: float | None = None,
     knowledge: Knowledge | None = None,
     seed: int = 0,
@@ -140,6 +141,7 @@ def plan(
         objective: what decides the dwell: small "error", short "time", or few "flips"; see `planner.choice`.
         minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
         minimum_seconds: the same in seconds; the larger one counts.
+        dwell: this shortest dwell, and not the one that the objective would choose.
         tolerance: largest acceptable stated error [l]. The dwell is shortened until it is kept.
         knowledge: what a calibration found besides the robot: covariance, current.
         seed: of the random robots from which the stated error is computed.
@@ -165,7 +167,8 @@ def plan(
     vehicle = swimmer.vehicle
     raw = path if isinstance(path, Path2D) else Path2D.of(path)
     check_size(raw, robot, vehicle.turn_radius)
-    dwells = dwells_for(vehicle, objective, least_dwell(minimum_dwell, minimum_seconds, robot))
+    least = least_dwell(minimum_dwell, minimum_seconds, robot)
+    dwells = dwells_for(vehicle, objective, least) if dwell is None else [check_least(dwell)]
 
     @cache
     def declared(drift: Drift) -> Declared:
