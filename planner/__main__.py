@@ -167,7 +167,7 @@ def _goal(arguments: Namespace) -> None:
     off, turned = voyage.end_error
     x, y, heading = voyage.end
     print(
-        f"end: ({x:.3f}, {y:.3f}) l, heading {math.degrees(heading):.1f} degrees; from the goal {off:.1g} l and "
+        f"end: ({x:.3f}, {y:.3f}) l, heading {math.degrees(math.remainder(heading, math.tau)):.1f} degrees; from the goal {off:.1g} l and "
         f"{math.degrees(turned):.1g} degrees as predicted"
     )
     if not voyage.room.empty:
