@@ -167,8 +167,8 @@ def _goal(arguments: Namespace) -> None:
     off, turned = voyage.end_error
     x, y, heading = voyage.end
     print(
-        f"end: ({x:.3f}, {y:.3f}) l, heading {math.degrees(math.remainder(heading, math.tau)):.1f} degrees; from the goal {off:.1g} l and "
-        f"{math.degrees(turned):.1g} degrees as predicted"
+        f"end: ({x:.3f}, {y:.3f}) l, heading {math.degrees(math.remainder(heading, math.tau)):.1f} degrees; "
+        f"from the goal {off:.1g} l and {math.degrees(turned):.1g} degrees as predicted"
     )
     if not voyage.room.empty:
         print(f"margin {voyage.margin:.3f} l around the body; predicted clearance {voyage.clearance:.3f} l")

@@ -229,7 +229,8 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("dataset", "verify"): verify, ("surrogate", "train"): train, ("surrogate", "query"): query,
     ("surrogate", "inverse"): inverse, ("planner", "track"): follow,
     ("surrogate", "errors"): errors, ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
-    ("planner", "goal"): goal, ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
+    ("planner", "goal"): goal,
+    ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
     ("calibration", "tracks"): tracks,
 }  # fmt: skip
 
