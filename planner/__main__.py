@@ -1,6 +1,7 @@
 """Command line of the planner.
 
 python -m planner plan PATH.{csv,svg} --robot robot.toml --out DIR     plan.json, plan.csv, schedule.h, plan.svg
+python -m planner goal --goal X Y DEGREES --robot robot.toml --out DIR  from a pose to a pose, around obstacles
 python -m planner track PATH --robot robot.toml                        poses on a pipe in, orders out
 python -m planner check PLAN.json TRACK.csv [--out OVERLAY.png]        tracking error of a replayed track
 """
@@ -12,7 +13,8 @@ import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from planner.size import UNITS
 from sim.io.commands import MODEL, ROBOT, Program, argument, out
@@ -28,6 +30,11 @@ main = program.main
 _SHAPES = {"circle": 0, "triangle": 3, "square": 4}  # number of corners
 
 
+_DWELLS = (
+    argument("--min-dwell", type=float, help="shortest dwell, in time units μ0 l⁴/EI"),
+    argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
+    argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
+)
 _PLANNING = (
     argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE"),
     ROBOT,
@@ -43,18 +50,48 @@ _PLANNING = (
              help="places that are too tight: the nearest path that can be followed, round corners, or refuse"),
     argument("--objective", default="error", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: error)"),
-    argument("--min-dwell", type=float, help="shortest dwell, in time units μ0 l⁴/EI"),
-    argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
-    argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
+    *_DWELLS,
 )  # fmt: skip
 
 
-@program.command("plan", "plan the switching times for a path", *_PLANNING, out("folder"))
+@program.command(
+    "plan",
+    "plan the switching times for a path",
+    *_PLANNING,
+    argument("--trade-off", action="store_true", help="draw error against time and flips, for ten dwells"),
+    out("folder"),
+)
 def _plan(arguments: Namespace) -> None:
     from planner.export import write_plan
 
     result = _planned(arguments)
     paths = write_plan(result, arguments.out)
+    _say(result)
+    print(
+        f"from the path as drawn {result.drawn_rms:.4f} l rms, {result.drawn_max:.3f} l at most; every drawn "
+        f"point is within {result.missed:.3f} l of the declared path"
+    )
+    if arguments.trade_off:
+        paths.append(_trade_off(arguments, result))
+    print(f"-> {', '.join(map(str, paths))}")
+
+
+def _trade_off(arguments: Namespace, result: Plan) -> Path:
+    """trade_off.svg in the folder of the plan."""
+    from planner.plan import plan
+    from planner.trade_off import draw_trade_off, trade_off
+    from sim.io.files import whole_file
+
+    path, robot, options = _task(arguments, say=False)
+    found = trade_off(result, lambda dwell: plan(path, robot, **{**options, "dwell": dwell, "tolerance": None}))
+    target = Path(arguments.out) / "trade_off.svg"
+    with whole_file(target) as part:
+        draw_trade_off(found).savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})
+    return target
+
+
+def _say(result: Plan) -> None:
+    """Warnings, start, dwells and errors."""
     for warning in result.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     x, y, heading = result.start
@@ -70,10 +107,71 @@ def _plan(arguments: Namespace) -> None:
         f"predicted error {result.predicted_rms:.4f} l rms, {result.predicted_max:.3f} l at most; stated error "
         f"{result.stated_error:.3f} l, with feedback {result.feedback_error:.3f} l"
     )
-    print(
-        f"from the path as drawn {result.drawn_rms:.4f} l rms, {result.drawn_max:.3f} l at most; every drawn "
-        f"point is within {result.missed:.3f} l of the declared path"
+
+
+@program.command(
+    "goal",
+    "plan the way from one pose to another, around obstacles; exit status 3 where there is none",
+    argument("--goal", nargs=3, type=float, required=True, metavar=("X", "Y", "DEGREES"),
+             help="of the head's centre at the end"),
+    argument("--start", nargs=3, type=float, default=(0.0, 0.0, 0.0), metavar=("X", "Y", "DEGREES"),
+             help="of the head's centre at the start, at rest (default: 0 0 0)"),
+    argument("--via", nargs=2, type=float, action="append", default=[], metavar=("X", "Y"),
+             help="a place that the pivot passes; may be given again"),
+    argument("--keep-out", action="append", default=[], metavar="REGION",
+             help="circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; may be given again"),
+    argument("--walls", metavar="REGION", help="what the robot must stay within: box:…, or a CSV or SVG outline"),
+    argument("--unit", choices=("l", *UNITS), default="l", help="unit of all lengths (default: tail lengths)"),
+    ROBOT,
+    MODEL,
+    argument("--objective", default="time", choices=("error", "time", "flips"),
+             help="what decides the dwell: small error, short time, or few flips (default: time)"),
+    argument("--feedback", action="store_true",
+             help="the pose will be measured every 20 flips: the margin is the stated error with feedback"),
+    *_DWELLS,
+    out("folder"),
+)  # fmt: skip
+def _goal(arguments: Namespace) -> None:
+    from planner.goal import to_goal
+    from planner.goal_files import read_region, unit_in_tails, write_voyage
+    from planner.keep_out import Polygon
+    from planner.knowledge import read_knowledge
+    from sim.inputs import load_robot
+    from surrogate.export import load_table
+
+    robot, unit = load_robot(arguments.robot), arguments.unit
+    scale = unit_in_tails(unit, robot)
+    start, goal = (
+        (scale * x, scale * y, math.radians(angle)) for x, y, angle in (arguments.start, arguments.goal)
     )
+    walls = None if arguments.walls is None else read_region(arguments.walls, unit, robot)
+    if walls is not None and not isinstance(walls, Polygon):
+        raise InputError(f"--walls {arguments.walls!r}; give a box or an outline")
+    voyage = to_goal(
+        start,
+        goal,
+        robot,
+        via=[(scale * x, scale * y) for x, y in arguments.via],
+        keep_out=[read_region(words, unit, robot) for words in arguments.keep_out],
+        walls=walls,
+        lookup=load_table(arguments.model),
+        objective=arguments.objective,
+        minimum_dwell=arguments.min_dwell,
+        minimum_seconds=arguments.min_dwell_s,
+        tolerance=arguments.tolerance,
+        feedback=arguments.feedback,
+        knowledge=read_knowledge(arguments.robot),
+    )
+    paths = write_voyage(voyage, arguments.out)
+    _say(voyage.plan)
+    off, turned = voyage.end_error
+    x, y, heading = voyage.end
+    print(
+        f"end: ({x:.3f}, {y:.3f}) l, heading {math.degrees(math.remainder(heading, math.tau)):.1f} degrees; "
+        f"from the goal {off:.1g} l and {math.degrees(turned):.1g} degrees as predicted"
+    )
+    if not voyage.room.empty:
+        print(f"margin {voyage.margin:.3f} l around the body; predicted clearance {voyage.clearance:.3f} l")
     print(f"-> {', '.join(map(str, paths))}")
 
 
@@ -106,29 +204,34 @@ def _track(arguments: Namespace) -> None:
 
 def _planned(arguments: Namespace) -> Plan:
     """The plan that the command asks for."""
-    from planner.knowledge import read_knowledge
     from planner.plan import plan
+
+    path, robot, options = _task(arguments)
+    with _progress() as progress:
+        return plan(path, robot, **options, progress=progress)
+
+
+def _task(arguments: Namespace, *, say: bool = True) -> tuple[Path2D, Robot, dict[str, Any]]:
+    """Path, robot and options of a plan."""
+    from planner.knowledge import read_knowledge
     from planner.size import describe
     from sim.inputs import load_robot
     from surrogate.export import load_table
 
     robot = load_robot(arguments.robot)
-    path = _path(arguments, robot)
-    print(f"path: {describe(path, robot)}")
-    with _progress() as progress:
-        return plan(
-            path,
-            robot,
-            lookup=load_table(arguments.model),
-            point=arguments.point,
-            corner=arguments.corner,
-            objective=arguments.objective,
-            minimum_dwell=arguments.min_dwell,
-            minimum_seconds=arguments.min_dwell_s,
-            tolerance=arguments.tolerance,
-            knowledge=read_knowledge(arguments.robot),
-            progress=progress,
-        )
+    path = _path(arguments, robot, say=say)
+    if say:
+        print(f"path: {describe(path, robot)}")
+    return path, robot, {
+        "lookup": load_table(arguments.model),
+        "point": arguments.point,
+        "corner": arguments.corner,
+        "objective": arguments.objective,
+        "minimum_dwell": arguments.min_dwell,
+        "minimum_seconds": arguments.min_dwell_s,
+        "tolerance": arguments.tolerance,
+        "knowledge": read_knowledge(arguments.robot),
+    }  # fmt: skip
 
 
 @contextmanager
@@ -140,7 +243,7 @@ def _progress() -> Iterator[Callable[[float], object]]:
         yield lambda share: bar.update(100 * share - bar.n)
 
 
-def _path(arguments: Namespace, robot: Robot) -> Path2D:
+def _path(arguments: Namespace, robot: Robot, *, say: bool = True) -> Path2D:
     """The path that the command asks for, in tail lengths."""
     from planner.drawings import Drawing, read_path
     from planner.path import circle, polygon, smoothed
@@ -165,7 +268,8 @@ def _path(arguments: Namespace, robot: Robot) -> Path2D:
     if arguments.smooth is None:
         return path
     smooth, moved = smoothed(path, arguments.smooth)
-    print(f"smoothed over {arguments.smooth:g} l, which moves the path by up to {moved:.3g} l")
+    if say:
+        print(f"smoothed over {arguments.smooth:g} l, which moves the path by up to {moved:.3g} l")
     return smooth
 
 

@@ -41,8 +41,7 @@ def dwells_for(vehicle: Vehicle, objective: Objective, least: float | None) -> l
     if objective not in get_args(Objective):
         raise InputError(f"objective {objective!r}; allowed are {', '.join(get_args(Objective))}")
     least = check_least(least)
-    rate = float(np.abs(vehicle.twist[:, 2]).max())
-    most = max(least, min(LONGEST, 2 * _WIDEST / rate))
+    most = longest_dwell(vehicle, least)
     if most == least:
         return [least]
     grid = np.geomspace(least, most, _COUNT)
@@ -51,6 +50,11 @@ def dwells_for(vehicle: Vehicle, objective: Objective, least: float | None) -> l
     first = int(good[-1 if objective == "flips" else 0])
     shorter = np.geomspace(least, grid[first], max(2, math.ceil(8 * math.log2(grid[first] / least)) + 1))
     return shorter[::-1].tolist() if first else [least]
+
+
+def longest_dwell(vehicle: Vehicle, least: float) -> float:
+    """The longest dwell that is considered; not below `least`."""
+    return max(least, min(LONGEST, 2 * _WIDEST / float(np.abs(vehicle.twist[:, 2]).max())))
 
 
 def net_speeds(vehicle: Vehicle, dwells: Floats) -> Floats:

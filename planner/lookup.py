@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from planner.knowledge import Knowledge
@@ -10,7 +12,6 @@ from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.mechanics import planar
-from sim.model.response import Responses
 from sim.model.robot import Robot
 from surrogate.table import LookupTable
 
@@ -31,7 +32,12 @@ def vehicle_of(robot: Robot, lookup: LookupTable, knowledge: Knowledge | None = 
         InputError: the robot is outside the table's domain, or moves backwards on average.
     """
     knowledge = knowledge or Knowledge()
-    twist, curves, gap = _asked(robot.group_values(), lookup)
+    columns = _both_directions(robot.group_values())
+    found = lookup.query(columns)
+    twist = _twists(found)
+    curves = lookup.response(columns)
+    if curves.failed.any():
+        raise InputError("the response of this robot to a flip could not be found; turn its motor slower")
     slow = twist[:, 0].mean()
     if slow <= 0:
         raise InputError(f"robot {robot.name!r} does not move forward (v_z = {slow:.3g}); turn its motor slower")
@@ -50,20 +56,20 @@ def vehicle_of(robot: Robot, lookup: LookupTable, knowledge: Knowledge | None = 
         spread=resampled(curves.spread),
         modes=(*_table_modes(twist, lookup), *_coefficient_modes(robot, lookup, twist, knowledge)),
         current=np.asarray(knowledge.current) * unit,
-        tail_gap=gap,
+        tail_gap=float(np.min(found["tail_gap"])),
     )
 
 
-def _asked(values: dict[str, float], lookup: LookupTable) -> tuple[Floats, Responses, float]:
-    """Twists (2, 3), response curves of both directions, and the gap between tails."""
+def _both_directions(values: dict[str, float]) -> dict[str, Floats]:
+    """The robot twice: with its motor forward, and reversed."""
     columns: dict[str, Floats] = {name: np.array([value, value]) for name, value in values.items()}
     columns["omega_bar"] = columns["omega_bar"] * [1.0, -1.0]
-    found = lookup.query(columns)
-    twist = np.stack([found[name] for name in _STEADY], -1)
-    curves = lookup.response(columns)
-    if curves.failed.any():
-        raise InputError("the response of this robot to a flip could not be found; turn its motor slower")
-    return twist, curves, float(np.min(found["tail_gap"]))
+    return columns
+
+
+def _twists(found: Mapping[str, Floats]) -> Floats:
+    """Twists (2, 3) of both directions, from what a table answers."""
+    return np.stack([found[name] for name in _STEADY], -1)
 
 
 def _table_modes(twist: Floats, lookup: LookupTable) -> list[Mode]:
@@ -120,7 +126,7 @@ def _slope(robot: Robot, lookup: LookupTable, twist: Floats, name: str) -> Float
     for sign in (1.0, -1.0):
         value = values.get(name, 0.0) + sign * step if effect else values[name] * np.exp(sign * step)
         try:
-            ends.append((_asked({**values, name: value}, lookup)[0], sign * step))
+            ends.append((_twists(lookup.query(_both_directions({**values, name: value}))), sign * step))
         except InputError:  # at the edge of the table
             ends.append((twist, 0.0))
     (one, at), (two, to) = ends

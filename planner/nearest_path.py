@@ -3,7 +3,7 @@
 A corner cannot be followed. Rounding it cuts it. It is better to swing out before the corner and to cut a little
 inside. So the pivot's poses (x_i, y_i, φ_i) are found that minimise
 
-    Σ |p_i − r_i|² + time,   p_i = q_i + a e(φ_i),
+    Σ |p_i − r_i|²,   p_i = q_i + a e(φ_i),
 
 with r_i points at equal distances on the path as drawn. Two things hold the poses to what the robot can do: a step
 has no sideways part, except for the drift; and it turns by at most κ times its length. Both enter as least squares
@@ -17,6 +17,7 @@ in l.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError, solveh_banded
@@ -36,9 +37,7 @@ _BAND = 5
 _PIECES = 4  # points of the path for each pose
 
 
-def nearest_path(
-    raw: Path2D, pivot_distance: float, radius: float, *, drift: Drift = STILL, time_weight: float = 0.0
-) -> Path2D:
+def nearest_path(raw: Path2D, pivot_distance: float, radius: float, *, drift: Drift = STILL) -> Path2D:
     """The path of the tracked point that is nearest to `raw` among those that the robot can follow.
 
     Args:
@@ -46,7 +45,6 @@ def nearest_path(
         pivot_distance: from the pivot to the tracked point; at least 0.
         radius: smallest radius of the pivot's track.
         drift: what carries the robot off its heading.
-        time_weight: 0 to 1; by this share the way should be shorter than the path as drawn.
     """
     spacing = max(_SPACING * radius, raw.length / _MOST_POSES)
     target = resample(raw.polyline(), spacing)
@@ -54,9 +52,10 @@ def nearest_path(
     if raw.closed:
         extra = min(lap, math.ceil(_OVERLAP * max(pivot_distance, radius) / spacing))
         target = np.concatenate([target[lap - extra : lap], target, target[1 : extra + 1]])
+    task = _Task(target, pivot_distance, radius, drift, spacing)
     poses = _start(target, pivot_distance)
     for weight in _WEIGHTS:
-        poses = _descend(poses, target, pivot_distance, radius, drift, spacing, weight, time_weight)
+        poses = _descend(poses, task, weight)
     if raw.closed:
         poses = poses[extra : extra + lap + 1]
     at = np.arange(_PIECES * (len(poses) - 1) + 1) / _PIECES
@@ -86,19 +85,20 @@ def _start(target: Floats, pivot_distance: float) -> Floats:
     return np.concatenate([q, heading[:, None]], 1)
 
 
-def _descend(
-    poses: Floats,
-    target: Floats,
-    distance: float,
-    radius: float,
-    drift: Drift,
-    spacing: float,
-    weight: float,
-    time_weight: float,
-) -> Floats:
+class _Task(NamedTuple):
+    """What stays the same while the poses are sought."""
+
+    target: Floats  # (m, 2), points on the path as drawn
+    distance: float  # from the pivot to the tracked point
+    radius: float  # smallest of the pivot's track
+    drift: Drift
+    spacing: float  # of the target's points
+
+
+def _descend(poses: Floats, task: _Task, weight: float) -> Floats:
     """Gauss-Newton with Levenberg's damping, for one weight of the constraints."""
     damping = 1e-3
-    residual, single, pair = _system(poses, target, distance, radius, drift, spacing, weight, time_weight)
+    residual, single, pair = _system(poses, task, weight)
     cost = float((residual[0] ** 2).sum() + (residual[1] ** 2).sum())
     for _ in range(_ITERATIONS):
         band, right = _normal(residual, single, pair)
@@ -111,7 +111,7 @@ def _descend(
                 damping *= 10
                 continue
             tried = poses - step
-            system = _system(tried, target, distance, radius, drift, spacing, weight, time_weight)
+            system = _system(tried, task, weight)
             new = float((system[0][0] ** 2).sum() + (system[0][1] ** 2).sum())
             if new < cost:
                 break
@@ -127,17 +127,9 @@ def _descend(
     return poses
 
 
-def _system(
-    poses: Floats,
-    target: Floats,
-    distance: float,
-    radius: float,
-    drift: Drift,
-    spacing: float,
-    weight: float,
-    time_weight: float,
-) -> tuple[tuple[Floats, Floats], Floats, Floats]:
+def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Floats], Floats, Floats]:
     """Residuals of poses (m, 2) and of steps (m − 1, 4); derivatives (m, 2, 3) and (m − 1, 4, 6)."""
+    target, distance, radius, drift, spacing = task
     count = len(poses)
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     own = poses[:, :2] + distance * np.stack([c, s], 1) - target
@@ -174,7 +166,7 @@ def _system(
     broken = np.asarray(10.0 * (short > 0), dtype=np.float64)
     steps[:, 2] = broken * short
     put(2, -broken * one, none, none)
-    steps[:, 3] = _EVEN * (forward - (1 - time_weight) * spacing)
+    steps[:, 3] = _EVEN * (forward - spacing)
     put(3, _EVEN * one, none, none)
     return (own, steps), single, pair
 

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle as Patch
 
+from planner.goal import Voyage
+from planner.keep_out import Body, Circle
 from planner.plan import Plan
 from sim.arrays import Floats
 
+KEEP_OUT = "#d8b365"
 RAW, DECLARED, PREDICTED, REPLAYED = "#b0b0b0", "#1a1a1a", "#2a7fba", "#c8452f"
 
 
@@ -26,6 +32,36 @@ def draw_plan(result: Plan) -> Figure:
         fontsize=10,
     )
     axes.legend(loc="center", fontsize=8, frameon=False)
+    return figure
+
+
+def draw_voyage(voyage: Voyage) -> Figure:
+    """One panel: a plan from pose to pose, with what the robot must keep out of."""
+    figure = draw_plan(voyage.plan)
+    axes = figure.axes[0]
+    for region in voyage.room.regions:
+        if isinstance(region, Circle):
+            axes.add_patch(Patch((region.x, region.y), region.radius, color=KEEP_OUT, lw=0))
+        else:
+            axes.fill(*region.corners.T, color=KEEP_OUT, lw=0)
+    if voyage.room.walls is not None:
+        corners = voyage.room.walls.corners
+        axes.plot(*np.concatenate([corners, corners[:1]]).T, color=KEEP_OUT, lw=3)
+    body = Body.of(voyage.plan.robot, 0.0)
+    for x, y, heading in (voyage.plan.start, voyage.goal):
+        along = np.array([body.places.min() - body.radius, body.places.max() + body.radius])
+        axes.plot(x + along * math.cos(heading), y + along * math.sin(heading), color=DECLARED, lw=3, alpha=0.3)
+        axes.plot(x, y, "o", color=DECLARED, ms=5)
+    for x, y in voyage.via:
+        axes.plot(x, y, "+", color=REPLAYED, ms=10)
+    axes.autoscale_view()
+    minutes = voyage.plan.seconds.sum() / 60
+    axes.set_title(
+        f"{voyage.plan.robot.name}: {len(voyage.plan.dwells)} dwells, {minutes:.1f} min\n"
+        f"way {voyage.length:.2f} l, stated error {voyage.plan.stated_error:.2f} l",
+        fontsize=10,
+    )
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, fontsize=8, frameon=False)
     return figure
 
 

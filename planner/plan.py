@@ -17,23 +17,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from functools import cache
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.choice import QUICK, Objective, dwells_for
-from planner.declared import Corner, declare
+from planner.choice import QUICK, Objective, check_least, dwells_for
+from planner.declared import Corner, Declared, declare
 from planner.distance import distance_to
 from planner.knowledge import Knowledge
 from planner.lookup import vehicle_of
 from planner.path import Path2D
-from planner.schedule import follow, trace
+from planner.schedule import Start, Switches, follow, trace
 from planner.size import check_size
 from planner.stated_error import guaranteed, look_ahead, predicted_error, stated_error
 from planner.tractrix import Drift, Reference
 from planner.vehicle import Vehicle
-from planner.zigzag import zigzag
+from planner.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.model.robot import Robot
@@ -122,6 +123,7 @@ def plan(
     objective: Objective = "error",
     minimum_dwell: float | None = None,
     minimum_seconds: float | None = None,
+    dwell: float | None = None,
     tolerance: float | None = None,
     knowledge: Knowledge | None = None,
     seed: int = 0,
@@ -139,6 +141,7 @@ def plan(
         objective: what decides the dwell: small "error", short "time", or few "flips"; see `planner.choice`.
         minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
         minimum_seconds: the same in seconds; the larger one counts.
+        dwell: this shortest dwell, and not the one that the objective would choose.
         tolerance: largest acceptable stated error [l]. The dwell is shortened until it is kept.
         knowledge: what a calibration found besides the robot: covariance, current.
         seed: of the random robots from which the stated error is computed.
@@ -160,14 +163,21 @@ def plan(
         lookup = load()
     if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0):
         raise InputError(f"tolerance {tolerance:g} l; give a number above 0")
-    vehicle = vehicle_of(robot, lookup, knowledge)
+    swimmer = swimmer_of(robot, lookup, point, knowledge)
+    vehicle = swimmer.vehicle
     raw = path if isinstance(path, Path2D) else Path2D.of(path)
     check_size(raw, robot, vehicle.turn_radius)
-    offset = _offset(point, robot, vehicle)
-    dwells = dwells_for(vehicle, objective, _least(minimum_dwell, minimum_seconds, robot))
+    least = least_dwell(minimum_dwell, minimum_seconds, robot)
+    dwells = dwells_for(vehicle, objective, least) if dwell is None else [check_least(dwell)]
+
+    @cache
+    def declared(drift: Drift) -> Declared:
+        return declare(raw, vehicle, swimmer.rod, corner, drift)
 
     def made(dwell: float) -> Plan:
-        return _plan(raw, robot, vehicle, lookup, point, offset, corner, objective, dwell, seed, progress)
+        straight = zigzag(vehicle, dwell, swimmer.offset)
+        found = declared(drift_of(vehicle, straight, dwell))
+        return scheduled(swimmer, raw, found, straight, objective, dwell, seed=seed, progress=progress)
 
     best = made(dwells[0])
     if tolerance is None or best.stated_error <= tolerance:
@@ -192,27 +202,67 @@ def plan(
     return kept
 
 
-def _plan(
-    raw: Path2D,
-    robot: Robot,
-    vehicle: Vehicle,
-    lookup: LookupTable,
-    point: Point,
-    offset: float,
-    corner: Corner,
-    objective: Objective,
-    dwell: float,
-    seed: int,
-    progress: Callable[[float], object] | None,
-) -> Plan:
-    """The plan with one shortest dwell."""
-    straight = zigzag(vehicle, dwell, offset)
+class Swimmer(NamedTuple):
+    """Who follows a path: the robot, its vehicle, and the point of its axis that must be on the path."""
+
+    robot: Robot
+    vehicle: Vehicle
+    point: Point
+    offset: float  # from the head's centre forward to the point
+    model: str  # hash of the look-up table
+
+    @property
+    def rod(self) -> float:
+        """Distance from the pivot to the point."""
+        return self.vehicle.pivot_distance + self.offset
+
+
+def swimmer_of(robot: Robot, lookup: LookupTable, point: Point, knowledge: Knowledge | None) -> Swimmer:
+    """The vehicle that a table gives for a robot, with the tracked point."""
+    vehicle = vehicle_of(robot, lookup, knowledge)
+    return Swimmer(robot, vehicle, point, _offset(point, robot, vehicle), lookup.identity)
+
+
+def drift_of(vehicle: Vehicle, straight: Zigzag, dwell: float) -> Drift:
+    """What carries the robot off its heading, with one shortest dwell.
+
+    Raises:
+        InputError: with such dwells the robot does not get ahead.
+    """
     if straight.speed <= 0:
         raise InputError(f"with dwells of {dwell:.2g} time units the robot does not get ahead; allow longer ones")
-    drift = Drift(_clean(straight.drift / straight.speed), _shares(vehicle.current, straight.speed))
-    distance = vehicle.pivot_distance + offset
-    declared = declare(raw, vehicle, distance, corner, drift)
-    guide = declared.reference
+    return Drift(_clean(straight.drift / straight.speed), _shares(vehicle.current, straight.speed))
+
+
+def scheduled(
+    swimmer: Swimmer,
+    raw: Path2D,
+    declared: Declared,
+    straight: Zigzag,
+    objective: Objective,
+    dwell: float,
+    *,
+    seed: int = 0,
+    progress: Callable[[float], object] | None = None,
+    start: Callable[[float], Start] | None = None,
+    finish: Callable[[Switches], Switches] | None = None,
+) -> Plan:
+    """The plan that follows a declared path with one shortest dwell.
+
+    Args:
+        swimmer: who follows.
+        raw: the path as drawn.
+        declared: the path that is followed, with the pivot's poses.
+        straight: the zigzag with this dwell.
+        objective: what decided the dwell.
+        dwell: the shortest one.
+        seed: of the random robots.
+        progress: called now and then with the share of the path that is done.
+        start: where the schedule begins, from the swing of the zigzag; default: as the path begins.
+        finish: changes the schedule before its errors are computed.
+    """
+    robot, vehicle, point, offset, model = swimmer
+    guide, distance = declared.reference, swimmer.rod
     ahead = look_ahead(vehicle, declared.curvature, straight)
     swing = straight.hysteresis(ahead)
     switches = follow(
@@ -223,8 +273,11 @@ def _plan(
         dwell=dwell,
         swing=swing,
         offset=offset,
+        start=None if start is None else start(swing),
         progress=progress,
     )
+    if finish is not None:
+        switches = finish(switches)
     track = trace(vehicle, switches, offset)
     error = predicted_error(guide.p, track, closed=raw.closed)
     drawn = distance_to(raw.polyline(), track)
@@ -252,7 +305,7 @@ def _plan(
         feedback_error=stated_error(vehicle, switches, track, error, every=FEEDBACK_EVERY, seed=seed),
         guaranteed=guaranteed(vehicle, distance, straight.swing, ahead),
         closure=float(np.linalg.norm(track[-1] - guide.p[0])) if raw.closed else None,
-        model=lookup.identity,
+        model=model,
         warnings=(*declared.warnings, *_warnings(vehicle)),
         vehicle=vehicle,
         guide=guide,
@@ -269,7 +322,7 @@ def _warnings(vehicle: Vehicle) -> tuple[str, ...]:
     return ()
 
 
-def _least(dwell: float | None, seconds: float | None, robot: Robot) -> float | None:
+def least_dwell(dwell: float | None, seconds: float | None, robot: Robot) -> float | None:
     """The shortest dwell that the motor allows, in time units."""
     if seconds is None:
         return dwell

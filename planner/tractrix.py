@@ -109,6 +109,18 @@ def _slip(direction: float, drift: Drift) -> float:
     return slip
 
 
+def slips(direction: Floats, drift: Drift) -> Floats:
+    """Angles (...) from the heading to straight paths in these directions (...)."""
+    slip = np.zeros_like(direction)
+    if drift.none:
+        return slip
+    cx, cy = drift.current
+    for _ in range(30):
+        c, s = np.cos(direction - slip), np.sin(direction - slip)
+        slip = np.arctan2(drift.sideways - cx * s + cy * c, 1 + cx * c + cy * s)
+    return slip
+
+
 def _ratio(heading: float, drift: Drift) -> float:
     """Sideways part of the motion by its forward part, (u + c·n)/(V + c·e)."""
     cx, cy = drift.current

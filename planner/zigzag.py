@@ -8,7 +8,7 @@ differ move at an angle to that middle: they drift sideways. Lengths in l, times
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,18 +43,18 @@ class Zigzag:
 
 def zigzag(vehicle: Vehicle, dwell: float, offset: float = 0.0) -> Zigzag:
     """The zigzag of a vehicle with shortest dwell `dwell`; the current is left out."""
+    still = replace(vehicle, current=np.zeros(2))
     fast = 0 if abs(vehicle.twist[0, 2]) >= abs(vehicle.twist[1, 2]) else 1
     ratio = abs(vehicle.twist[fast, 2] / vehicle.twist[1 - fast, 2])
     for _ in range(_TRIES):
         pair = [0.0, 0.0]
         pair[fast], pair[1 - fast] = dwell, dwell * ratio
-        switches, poses = _repeated(vehicle, pair)
+        switches, poses = _repeated(still, pair)
         left = float(poses[-1, 2] - poses[-3, 2])
         if abs(left) < 1e-10:
             break
         sign = 1 if fast == 1 else -1  # the slower direction turns to this side
         ratio = max(ratio - sign * left / (abs(vehicle.twist[1 - fast, 2]) * dwell), 1e-3)
-    still = Vehicle(vehicle.twist, vehicle.lag, vehicle.rest, vehicle.spread)
     middle = float(poses[-1, 2] + poses[-2, 2]) / 2
     move = poses[-1, :2] - poses[-3, :2]
     duration = sum(pair)
@@ -82,6 +82,5 @@ def _sway(vehicle: Vehicle, poses: Floats, along: Floats) -> float:
 
 
 def _repeated(vehicle: Vehicle, pair: list[float]) -> tuple[Switches, Floats]:
-    still = Vehicle(vehicle.twist, vehicle.lag, vehicle.rest, vehicle.spread)
     switches = Switches(1, np.tile(pair, _PAIRS), np.zeros((1, 3)))
-    return switches, poses_at_flips(still, switches)
+    return switches, poses_at_flips(vehicle, switches)

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from calibration.verdict import Verdict
     from planner.drawings import read_path
     from planner.export import write_plan
+    from planner.goal import Voyage, to_goal
+    from planner.keep_out import Circle
     from planner.path import Path2D, circle, polygon
     from planner.plan import Plan, plan
     from planner.tracker import Tracker
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from surrogate.train import train
 
 _HOMES = {
+    "Circle": "planner.keep_out",
     "Effect": "sim.model.effect",
     "InputError": "sim.io.errors",
     "LookupTable": "surrogate.table",
@@ -47,6 +50,7 @@ _HOMES = {
     "Plan": "planner.plan",
     "Robot": "sim.model.robot",
     "Schedule": "sim.model.schedule",
+    "Voyage": "planner.goal",
     "Verdict": "calibration.verdict",
     "__version__": "sim.io.provenance",
     "calibrate": "softflagella.calibrating",
@@ -69,15 +73,17 @@ _HOMES = {
     "switch_response": "softflagella.simulating",
     "tabulate": "surrogate.tabulate",
     "Tracker": "planner.tracker",
+    "to_goal": "planner.goal",
     "train": "surrogate.train",
     "write_plan": "planner.export",
 }
 
 __all__ = [
-    "Effect", "InputError", "LookupTable", "Path2D", "Plan", "Robot", "Schedule", "Tracker", "Verdict",
-    "__version__", "calibrate", "circle", "effects", "load_robot", "load_schedule", "load_table",
+    "Circle", "Effect", "InputError", "LookupTable", "Path2D", "Plan", "Robot", "Schedule", "Tracker", "Verdict",
+    "Voyage", "__version__", "calibrate", "circle", "effects", "load_robot", "load_schedule", "load_table",
     "make_table", "plan", "polygon", "read_path", "read_sweep", "replay", "response", "save_robot",
-    "sensitivities", "steady", "sweep", "switch_response", "tabulate", "train", "write_plan",
+    "sensitivities", "steady", "sweep", "switch_response", "tabulate", "to_goal", "train",
+    "write_plan",
 ]  # fmt: skip
 
 

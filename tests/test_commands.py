@@ -170,6 +170,17 @@ def follow(made: Path, out: Path) -> str:
     return f"{direction} {flip_at}"
 
 
+def goal(made: Path, out: Path) -> str:
+    words = ["--robot", made / "robot.toml", "--goal", 3, 1, 90, "--keep-out", "circle:1.5,3,0.5"]
+    done("planner", "goal", *words, "--out", out / "trip")
+    written = {path.name for path in (out / "trip").iterdir()}
+    assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h", "goal.json", "goal.svg"}
+    end = load_plan(out / "trip" / "plan.json")["predicted_poses"][-1]
+    assert end[:2] == pytest.approx([3, 1], abs=1e-3)
+    assert np.sin(end[2]) > 1 - 1e-6
+    return "end: (3.000, 1.000) l, heading 90.0 degrees"
+
+
 def check(made: Path, out: Path) -> str:
     done("planner", "check", made / "plan" / "plan.json", made / "track.csv", "--out", out / "overlay.png")
     assert (out / "overlay.png").read_bytes().startswith(b"\x89PNG")
@@ -216,6 +227,7 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("dataset", "verify"): verify, ("surrogate", "train"): train, ("surrogate", "query"): query,
     ("surrogate", "inverse"): inverse, ("surrogate", "refine"): refine, ("planner", "track"): follow,
     ("surrogate", "errors"): errors, ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
+    ("planner", "goal"): goal,
     ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
     ("calibration", "tracks"): tracks,
 }  # fmt: skip

@@ -22,14 +22,16 @@ class InputError(ValueError):
         no robot 'no-such-robot'; give a robot.toml or one of paper-control, paper-triangle, paper-measured
     """
 
+    status = 2  # of a command
+
 
 def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None = None) -> int:
-    """Run a command-line entry point. Returns 0; for bad input 2, after one line on stderr."""
+    """Run a command-line entry point. Returns 0; for bad input the error's status, after one line on stderr."""
     try:
         main(argv)
     except InputError as refusal:
         print(f"error: {' '.join(str(refusal).split())}", file=sys.stderr)
-        return 2
+        return refusal.status
     except FileNotFoundError as missing:
         print(f"error: no such file: {missing.filename}; check the path", file=sys.stderr)
         return 2

@@ -1,0 +1,129 @@
+"""Plans from pose to pose against a brute-force optimum of the same vehicle, without obstacles.
+
+The optimum: the sum of all dwells is minimised with the end pose as a constraint (SLSQP). It starts from every one
+of Dubins' words, with short and long dwells on its straight pieces, in both directions. The best of all is taken.
+
+Usage: python -m benchmarks.goals [CASES] [FIRST SEED]
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from itertools import product
+from typing import Any
+
+import numpy as np
+import torch
+from scipy.optimize import minimize
+
+from planner.choice import QUICK
+from planner.dubins import TURNS, words
+from planner.goal import to_goal
+from planner.last_dwells import flips_after
+from planner.schedule import Switches
+from planner.vehicle import Vehicle
+from sim.arrays import Floats
+from sim.model.presets import PRESETS
+from surrogate.export import load
+
+_STEP = 1e-4
+_LONGER = 1.6  # words longer than this, beside the shortest, are not tried
+_DWELLS = (3.0, 6.0)  # on straight pieces, time units
+
+
+def random_goal(rng: np.random.Generator) -> tuple[float, float, float]:
+    """Within 4 l of the start, any heading."""
+    x, y, heading = rng.uniform([-4, -4, -np.pi], [4, 4, np.pi]).tolist()
+    return x, y, heading
+
+
+def brute_force(vehicle: Vehicle, goal: tuple[float, float, float]) -> float:
+    """The least time from rest at the origin to the goal, over all starts of the optimisation."""
+    a = vehicle.pivot_distance
+    start = np.array([-a, 0.0, 0.0])
+    end = np.array([goal[0] - a * np.cos(goal[2]), goal[1] - a * np.sin(goal[2]), goal[2]])
+    radius = vehicle.pivot_radius
+    pieces = words(start, end, radius)
+    length = pieces.sum(-1)
+    best = np.inf
+    for word, dwell in product(range(6), _DWELLS):
+        if length[word] > _LONGER * length.min():
+            continue
+        turned = float((TURNS[word] * pieces[word]).sum() / radius)
+        target = np.array([*goal[:2], turned])
+        for first, dwells in _schedules(vehicle, TURNS[word], pieces[word], dwell):
+            best = min(best, _optimum(vehicle, first, dwells, target))
+    return best
+
+
+def _schedules(vehicle: Vehicle, turns: Floats, pieces: Floats, dwell: float) -> list[tuple[int, Floats]]:
+    """Dwells that carry out a word: arcs in one go, straight pieces by zigzags of an odd or an even number."""
+    found: list[tuple[int, list[float]]] = [(1, []), (-1, [])]
+    speed = float(vehicle.twist[0, 0])
+    for turn, piece in zip(turns.tolist(), pieces.tolist(), strict=True):
+        if piece < 1e-9:
+            continue
+        longer = []
+        for first, dwells in found:
+            sense = first * (-1) ** len(dwells)
+            if turn:
+                own = [] if sense == turn else [QUICK]
+                longer.append((first, [*dwells, *own, piece / speed]))
+            else:
+                count = max(1, round(piece / speed / dwell))
+                longer += [(first, [*dwells, *(n * [piece / speed / n])]) for n in (count, count + 1)]
+        found = longer
+    return [(first, np.maximum(dwells, QUICK)) for first, dwells in found]
+
+
+def _optimum(vehicle: Vehicle, first: int, dwells: Floats, target: Floats) -> float:
+    """Least sum of dwells whose motion ends at the target; infinite where none was found."""
+    none = Switches(first, dwells, np.zeros((1, 3)))
+
+    def end(x: Floats) -> Floats:
+        return np.asarray(flips_after(vehicle, none, 0, x[None])[0, -1] - target)
+
+    def slopes(x: Floats) -> Floats:
+        moved = flips_after(vehicle, none, 0, np.concatenate([x[None], x + _STEP * np.eye(len(x))]))[:, -1]
+        return np.asarray((moved[1:] - moved[0]).T / _STEP)
+
+    scale = 100.0
+
+    def cost(x: Floats) -> float:
+        return float(x.sum()) / scale
+
+    def even(x: Floats) -> Floats:
+        return np.full(len(x), 1 / scale)
+
+    bounds: Any = [(QUICK, np.inf)] * len(dwells)
+    met: Any = {"type": "eq", "fun": end, "jac": slopes}
+    options: Any = {"maxiter": 150, "ftol": 1e-6}
+    found = minimize(cost, dwells, jac=even, bounds=bounds, constraints=met, method="SLSQP", options=options)
+    return float(found.x.sum()) if np.abs(end(found.x)).max() < 1e-4 else np.inf
+
+
+def main() -> None:
+    torch.set_num_threads(1)
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    first = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    robot, lookup = PRESETS["paper-control"], load()
+    ratios = []
+    print(f"{'seed':>5}{'x':>7}{'y':>7}{'heading':>9}{'plan':>9}{'optimum':>9}{'/':>8}{'end':>10}{'s':>7}")
+    for seed in range(first, first + count):
+        goal = random_goal(np.random.default_rng(seed))
+        began = time.process_time()
+        voyage = to_goal((0.0, 0.0, 0.0), goal, robot, lookup=lookup)
+        spent = time.process_time() - began
+        least = brute_force(voyage.plan.vehicle, goal)
+        ratios.append(voyage.plan.duration / least)
+        print(f"{seed:5d}{goal[0]:7.2f}{goal[1]:7.2f}{goal[2]:9.2f}{voyage.plan.duration:9.1f}{least:9.1f}"
+              f"{ratios[-1]:8.3f}{max(voyage.end_error):10.1e}{spent:7.2f}", flush=True)  # fmt: skip
+    found = np.array(ratios)
+    print(f"\n{count} goals: time by the optimum's {np.median(found):.3f} at the median, "
+          f"{np.quantile(found, 0.95):.3f} at 95 %, {found.max():.3f} at most; within 5 %: "
+          f"{100 * np.mean(found <= 1.05):.0f} %")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

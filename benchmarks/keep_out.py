@@ -1,0 +1,70 @@
+"""Ways around obstacles, replayed in the simulator: does the robot's body ever touch what it must keep out of?
+
+Usage: python -m benchmarks.keep_out [CASES] [FIRST SEED]
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+import torch
+
+from planner.goal import Voyage, to_goal
+from planner.keep_out import Body, Circle, Polygon
+from planner.route import NoWayError
+from sim.model.presets import PRESETS
+from sim.motion.replay import replay
+from surrogate.export import load
+
+Pose = tuple[float, float, float]
+
+
+def random_case(rng: np.random.Generator) -> tuple[Pose, Pose, list[Circle], Polygon]:
+    """Three circles between a start and a goal, in a tank of 11 by 8 l."""
+    start = (0.0, float(rng.uniform(-1, 1)), float(rng.uniform(-1, 1)))
+    goal = (6.5, float(rng.uniform(-1, 1)), float(rng.uniform(-3, 3)))
+    circles = [Circle(*rng.uniform([1.8, -1.5, 0.3], [4.2, 1.5, 0.8]).tolist()) for _ in range(3)]
+    return start, goal, circles, Polygon.of([[-2.5, -4.0], [9.0, -4.0], [9.0, 4.0], [-2.5, 4.0]])
+
+
+def replayed_clearance(voyage: Voyage) -> tuple[float, float, float]:
+    """Of the replay: smallest room around the body [l], distance from the goal [l], error of the heading [rad]."""
+    track = replay([voyage.plan.schedule()])[0]
+    poses = np.stack([track[name].to_numpy(float) for name in ("x_over_l", "y_over_l", "heading_rad")], 1)
+    clearance = Body.of(voyage.plan.robot, 0.0).clearance(poses, voyage.room).min()
+    turn = (poses[-1, 2] - voyage.goal[2] + np.pi) % (2 * np.pi) - np.pi
+    return float(clearance), float(np.hypot(*(poses[-1, :2] - voyage.goal[:2]))), float(abs(turn))
+
+
+def main() -> None:
+    torch.set_num_threads(1)
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 12
+    first = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    robot, lookup = PRESETS["paper-control"], load()
+    rows = []
+    print(f"{'seed':>5}{'way':>8}{'flips':>7}{'margin':>8}{'stated':>8}{'predicted':>11}{'replayed':>10}"
+          f"{'off goal':>10}{'rad':>8}{'s':>7}")  # fmt: skip
+    for seed in range(first, first + count):
+        start, goal, circles, walls = random_case(np.random.default_rng(seed))
+        began = time.process_time()
+        try:
+            voyage = to_goal(start, goal, robot, keep_out=circles, walls=walls, lookup=lookup)
+        except NoWayError as none:
+            print(f"{seed:5d} {none} ({time.process_time() - began:.1f} s)")
+            continue
+        spent = time.process_time() - began
+        clearance, off, turned = replayed_clearance(voyage)
+        rows.append((clearance, off, turned))
+        print(f"{seed:5d}{voyage.length:8.2f}{len(voyage.plan.dwells):7d}{voyage.margin:8.3f}"
+              f"{voyage.plan.stated_error:8.3f}{voyage.clearance:11.3f}{clearance:10.3f}{off:10.4f}{turned:8.4f}"
+              f"{spent:7.1f}", flush=True)  # fmt: skip
+    found = np.array(rows)
+    print(f"\n{len(found)} replays: smallest room {found[:, 0].min():.3f} l; {np.sum(found[:, 0] <= 0)} touch; "
+          f"from the goal {np.median(found[:, 1]):.3f} l and {np.median(found[:, 2]):.3f} rad at the median, "
+          f"{found[:, 1].max():.3f} l and {found[:, 2].max():.3f} rad at most")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

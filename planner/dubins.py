@@ -1,0 +1,98 @@
+"""Shortest tracks of bounded curvature between poses: Dubins' words.
+
+A car that only drives forward, with least turn radius R, gets from one pose to another on the shortest way by one
+of six words of three pieces: LSL, RSR, LSR, RSL, RLR, LRL (L: left arc, R: right arc, S: straight). Source: Dubins
+(1957); formulas as in Shkel and Lumelsky, "Classification of the Dubins set" (2001). Poses are x, y, course. All
+functions take arrays of poses.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats, Integers
+
+TURNS = np.array([[1, 0, 1], [-1, 0, -1], [1, 0, -1], [-1, 0, 1], [-1, 1, -1], [1, -1, 1]])
+_CIRCLE = 2 * np.pi
+_ROUNDING = 1e-9
+
+
+class Shots(NamedTuple):
+    """M tracks: a start pose (M, 3), the turns (M, 3) of its pieces (+1 left, 0, −1) and their lengths (M, 3)."""
+
+    start: Floats
+    turns: Integers
+    pieces: Floats
+
+    @property
+    def length(self) -> Floats:
+        return np.asarray(self.pieces.sum(-1))
+
+    def take(self, rows: Integers) -> Shots:
+        return Shots(self.start[rows], self.turns[rows], self.pieces[rows])
+
+    def poses(self, way: Floats, radius: float) -> Floats:
+        """Poses (M, K, 3) after ways (M, K) along the tracks; beyond the end, that of the end."""
+        pose = np.repeat(self.start[:, None], way.shape[1], 1)
+        left = way
+        for i in range(3):
+            piece = self.pieces[:, i, None]
+            now = np.clip(left, 0.0, piece)
+            left = left - piece
+            pose = _moved(pose, self.turns[:, i, None] / radius, now)
+        return pose
+
+
+def words(start: Floats, goal: Floats, radius: float) -> Floats:
+    """Lengths (..., 6, 3) of the pieces of all words of TURNS; infinite where a word does not exist."""
+    move = (goal[..., :2] - start[..., :2]) / radius
+    d, direction = np.hypot(move[..., 0], move[..., 1]), np.arctan2(move[..., 1], move[..., 0])
+    a, b = start[..., 2] - direction, goal[..., 2] - direction
+    sa, sb, ca, cb, cab = np.sin(a), np.sin(b), np.cos(a), np.cos(b), np.cos(a - b)
+    found = np.full((*d.shape, 6, 3), np.inf)
+
+    def put(word: int, exists: Floats, t: Floats, p: Floats, q: Floats) -> None:
+        for i, part in enumerate((_turn(t), p, _turn(q))):
+            found[..., word, i] = np.where(exists, part, np.inf)
+
+    for word, side in ((0, 1.0), (1, -1.0)):
+        square = 2 + d**2 - 2 * cab + side * 2 * d * (sa - sb)
+        angle = np.arctan2(side * (cb - ca), d + side * (sa - sb))
+        p = np.sqrt(np.maximum(square, 0.0))
+        put(word, square >= -_ROUNDING, side * (angle - a), p, side * (b - angle))
+    for word, side in ((2, 1.0), (3, -1.0)):
+        square = d**2 - 2 + 2 * cab + side * 2 * d * (sa + sb)
+        p = np.sqrt(np.maximum(square, 0.0))
+        angle = np.arctan2(-side * (ca + cb), d + side * (sa + sb)) - np.arctan2(-side * 2.0, p)
+        put(word, square >= -_ROUNDING, side * (angle - a), p, side * (angle - b))
+    for word, side in ((4, 1.0), (5, -1.0)):
+        cosine = (6 - d**2 + 2 * cab + side * 2 * d * (sa - sb)) / 8
+        p = _CIRCLE - np.arccos(np.clip(cosine, -1.0, 1.0))
+        t = side * a - np.arctan2(ca - cb, d - side * (sa - sb)) + p / 2
+        q = side * (a - b) - t + p
+        put(word, np.abs(cosine) <= 1, t, p, q)
+    return found * radius
+
+
+def shots(start: Floats, goal: Floats, radius: float) -> Shots:
+    """The shortest tracks between M pairs of poses (M, 3)."""
+    pieces = words(start, goal, radius)
+    best = pieces.sum(-1).argmin(-1)
+    return Shots(start, TURNS[best], pieces[np.arange(len(best)), best])
+
+
+def _turn(angle: Floats) -> Floats:
+    """Angle within [0, 2π); a whole turn that comes from rounding is none."""
+    angle = angle % _CIRCLE
+    return np.asarray(np.where(angle > _CIRCLE - _ROUNDING, 0.0, angle))
+
+
+def _moved(pose: Floats, curvature: Floats, way: Floats) -> Floats:
+    angle = curvature * way
+    chord = way * np.sinc(angle / _CIRCLE)
+    course = pose[..., 2] + angle / 2
+    return np.stack(
+        [pose[..., 0] + chord * np.cos(course), pose[..., 1] + chord * np.sin(course), pose[..., 2] + angle], -1
+    )

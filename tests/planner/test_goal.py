@@ -1,0 +1,152 @@
+"""From a pose to a pose: it ends at the goal, in nearly the least time, and keeps out of what it must."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.goals import brute_force, random_goal
+from benchmarks.keep_out import random_case, replayed_clearance
+from planner.goal import Voyage, to_goal
+from planner.keep_out import Circle, Polygon
+from planner.knowledge import Knowledge
+from planner.route import NoWayError
+from planner.schedule import Switches, poses_at_flips
+from sim.io.errors import InputError, run_command
+from sim.mechanics import planar
+from sim.model.presets import PRESETS
+from surrogate.tabulate import tabulate
+
+CONTROL = PRESETS["paper-control"]
+BOX = [[-2, -4], [9, -4], [9, 4], [-2, 4]]
+
+
+def end_of(voyage: Voyage) -> np.ndarray:
+    """The end of the schedule from the start that was asked for, computed anew."""
+    plan = voyage.plan
+    return poses_at_flips(plan.vehicle, Switches(plan.first_direction, plan.dwells, np.array([plan.start])))[-1]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_motion_begins_and_ends_as_asked(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    start, goal = (rng.uniform([-2, -2, -3], [2, 2, 3]).tolist() for _ in range(2))
+    voyage = to_goal(start, goal, CONTROL, objective=("time", "error")[seed % 2])
+    assert voyage.plan.start == pytest.approx(tuple(start))
+    end = end_of(voyage)
+    assert end[:2] == pytest.approx(goal[:2], abs=1e-3)
+    assert math.cos(end[2] - goal[2]) > 1 - 1e-6
+    assert max(voyage.end_error) < 1e-3
+    assert voyage.plan.dwells.min() >= voyage.plan.minimum_dwell * (1 - 1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 6])
+def test_time_is_within_5_percent_of_brute_force(seed: int) -> None:
+    goal = random_goal(np.random.default_rng(seed))
+    voyage = to_goal((0, 0, 0), goal, CONTROL)
+    assert voyage.plan.duration < 1.05 * brute_force(voyage.plan.vehicle, goal)
+
+
+def test_moved_and_mirrored_tasks_give_moved_and_mirrored_plans() -> None:
+    one = to_goal((0, 0, 0), (2, 1.5, 2.0), CONTROL)
+    mirrored = to_goal((0, 0, 0), (2, -1.5, -2.0), CONTROL)
+    assert mirrored.plan.dwells == pytest.approx(one.plan.dwells, rel=1e-4)
+    assert mirrored.plan.first_direction == -one.plan.first_direction
+    frame = np.array([3.0, -1.0, 0.7])
+    moved = to_goal(frame.tolist(), planar.compose(frame, np.array([2, 1.5, 2.0])).tolist(), CONTROL)
+    assert moved.plan.duration == pytest.approx(one.plan.duration, rel=1e-3)
+
+
+def test_a_robot_that_turns_unequally_in_a_current_arrives() -> None:
+    robot = replace(CONTROL, effects={"left_right_bias": 0.2})
+    drifting = Knowledge(current=(2e-5, -1e-5))
+    voyage = to_goal((0, 0, 0.3), (3, 2, -1), robot, lookup=tabulate(robot), knowledge=drifting)
+    assert np.abs(voyage.plan.vehicle.current).max() > 0
+    assert end_of(voyage)[:2] == pytest.approx([3, 2], abs=1e-3)
+
+
+def test_a_shortest_dwell_in_seconds_holds_to_the_end() -> None:
+    voyage = to_goal((0, 0, 0), (2, 2, 1), CONTROL, minimum_seconds=4.0)
+    assert voyage.plan.seconds.min() >= 4.0 * (1 - 1e-9)
+    assert max(voyage.end_error) < 1e-3
+
+
+def test_it_passes_places_on_the_way() -> None:
+    voyage = to_goal((0, 0, 0), (0, 3, math.pi), CONTROL, via=[(2, 1), (2, 3)], objective="error")
+    for place in voyage.via:
+        assert np.hypot(*(voyage.plan.guide.q - place).T).min() < 0.02
+
+
+def test_the_margin_is_the_stated_error() -> None:
+    voyage = to_goal((0, 0, 0), (6, 0, 0), CONTROL, keep_out=[Circle(3, 0, 0.8)], walls=BOX)
+    assert voyage.plan.stated_error <= voyage.margin
+    assert voyage.clearance > 0
+    direct = to_goal((0, 0, 0), (6, 0, 0), CONTROL)
+    assert voyage.length > direct.length * 1.02
+
+
+def test_a_narrow_gap_is_passed_with_shorter_dwells() -> None:
+    gate = [Polygon.of([[2, low], [2.5, low], [2.5, high], [2, high]]) for low, high in ((-4, -0.3), (0.3, 4))]
+    voyage = to_goal((0, 0, 0), (6, 0, 0), CONTROL, keep_out=gate, walls=BOX)
+    wide = to_goal((0, 0, 0), (6, 0, 0), CONTROL, walls=BOX)
+    assert voyage.plan.stated_error < 0.6 * wide.plan.stated_error
+    assert len(voyage.plan.dwells) > len(wide.plan.dwells)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_replay_in_the_simulator_stays_out(seed: int) -> None:
+    start, goal, circles, walls = random_case(np.random.default_rng(seed))
+    voyage = to_goal(start, goal, CONTROL, keep_out=circles, walls=walls)
+    clearance, off, turned = replayed_clearance(voyage)
+    assert clearance > 0
+    assert off < voyage.plan.stated_error
+    assert turned < 0.1
+
+
+def test_refusals() -> None:
+    with pytest.raises(NoWayError, match=r"at the start, .* what it must keep out of"):
+        to_goal((0, 0, 0), (5, 0, 0), CONTROL, keep_out=[Circle(0.2, 0, 0.5)])
+    with pytest.raises(InputError, match="goal: give x, y and heading"):
+        to_goal((0, 0, 0), (5, 0), CONTROL)
+    with pytest.raises(InputError, match="as finite numbers"):
+        to_goal((0, math.nan, 0), (5, 0, 0), CONTROL)
+    with pytest.raises(InputError, match="start and goal are the same"):
+        to_goal((1, 1, 0.5), (1, 1, 0.5), CONTROL)
+    with pytest.raises(InputError, match=r"tolerance 0.001 l cannot be kept"):
+        to_goal((0, 0, 0), (3, 0, 0), CONTROL, tolerance=0.001)
+    with pytest.raises(InputError, match="radius above 0"):
+        Circle(0, 0, -1)
+
+
+def test_the_command_says_that_there_is_no_way(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from planner.__main__ import main
+
+    words = ["goal", "--robot", "paper-control", "--goal", "5", "0", "0", "--keep-out", "circle:5,0,1"]
+    assert run_command(main, [*words, "--out", str(tmp_path / "out")]) == 3
+    error = capsys.readouterr().err
+    assert error.startswith("error: there is no way: at the goal")
+    assert len(error.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_files_and_units(tmp_path: Path) -> None:
+    from planner.__main__ import main
+
+    tail = 100 * CONTROL.tail_length
+    (tmp_path / "outline.csv").write_text("".join(f"{x * tail},{y * tail}\n" for x, y in BOX))
+    words = ["goal", "--robot", "paper-control", "--unit", "cm", "--goal", str(3 * tail), str(tail), "-90"]
+    words += ["--walls", str(tmp_path / "outline.csv"), "--keep-out", f"circle:0,{3 * tail},{tail}"]
+    assert run_command(main, [*words, "--out", str(tmp_path / "out")]) == 0
+    content = json.loads((tmp_path / "out" / "goal.json").read_text())
+    assert content["goal"] == pytest.approx([3, 1, -math.pi / 2])
+    assert np.array(content["walls"]) == pytest.approx(np.array(BOX))
+    assert content["keep_out"][0]["circle"] == pytest.approx([0, 3, 1])
+    assert content["margin_over_l"] > 0
+    assert {"plan.json", "schedule.h", "goal.svg"} <= {path.name for path in (tmp_path / "out").iterdir()}
