@@ -8,7 +8,7 @@
 
 A dwell moves the pose by lag and arc of the robot as it is learned so far. The learned numbers walk at random, a
 little in each dwell, so that changes are followed. All derivatives are exact, and nothing but arithmetic, sin, cos
-and sqrt is used: `planner/tracker_core.h` does the same in C. Lengths in l, times in μ0 l⁴/EI.
+and sqrt is used: `planner/c/estimate.h` does the same in C. Lengths in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Estimate:
         self._speed = plan.net_speed
         self._follower = follower
         self._noise = (noise[0] ** 2, noise[0] ** 2, noise[1] ** 2)
-        self._most = (*MOST, MOST_CURRENT * plan.net_speed, MOST_CURRENT * plan.net_speed)
+        self._most = most(plan)
         self.state: list[float] = [*plan.start, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
         self.covariance = prior(plan)
 
@@ -132,8 +132,8 @@ class Estimate:
             self.covariance = P
             for i in range(STATES):
                 self.state[i] += moved[i]
-            for i, most in enumerate(self._most):
-                self.state[3 + i] = min(max(self.state[3 + i], -most), most)
+            for i, limit in enumerate(self._most):
+                self.state[3 + i] = min(max(self.state[3 + i], -limit), limit)
         return size
 
     def _learned(self, side: int) -> list[float]:
@@ -199,6 +199,11 @@ def prior(plan: Plan) -> ROWS:
     P[7, 7] += (0.05 * speed) ** 2 / 4
     P[8, 8] += (0.05 * speed) ** 2 / 4
     return [[float(value) for value in row] for row in P]
+
+
+def most(plan: Plan) -> tuple[float, ...]:
+    """Largest values (6,) of the learned numbers."""
+    return *MOST, MOST_CURRENT * plan.net_speed, MOST_CURRENT * plan.net_speed
 
 
 def _identity() -> ROWS:

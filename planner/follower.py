@@ -15,11 +15,12 @@ from planner.vehicle import BEFORE_KNOTS, STEP, Vehicle
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
-_EXACT = 1e-7  # rad, of the heading at a flip
-_LARGEST_STEP = 0.4  # rad that the robot turns between two evaluations
-_TURNS = 4 * math.pi  # a dwell that turns further than this leads nowhere
-_MOST_BIAS = 0.3  # rad
-_MOST_LOOKS = 500  # evaluations of the equation for one dwell; some four are needed
+EXACT = 1e-7  # rad, of the heading at a flip
+LARGEST_STEP = 0.4  # rad that the robot turns between two evaluations
+TURNS = 4 * math.pi  # a dwell that turns further than this leads nowhere
+MOST_BIAS = 0.3  # rad
+HALVINGS = 30
+MOST_LOOKS = 500  # evaluations of the equation for one dwell; some four are needed
 _KNOTS: list[float] = BEFORE_KNOTS.tolist()
 
 
@@ -112,7 +113,7 @@ class Follower:
         reached = self._arc[self.place]
         way, self._reached = reached - self._reached, reached
         self._bias += (self._error + self._before) * way / (4 * self._ahead**2)
-        self._bias = min(max(self._bias, -_MOST_BIAS), _MOST_BIAS)
+        self._bias = min(max(self._bias, -MOST_BIAS), MOST_BIAS)
         self._before = self._error
 
     def _look(self, pose: tuple[float, float, float], sense: int) -> float:
@@ -162,18 +163,18 @@ class Follower:
     def next_flip(self, pose: tuple[float, float, float], sense: int, before: float | None) -> tuple[float, bool]:
         """Length of the dwell that begins at `pose`, and whether the path ends in it."""
         rate = abs(self._twist[0 if sense > 0 else 1][2])
-        longest, largest = _TURNS / rate, _LARGEST_STEP / rate
+        longest, largest = TURNS / rate, LARGEST_STEP / rate
         time = self._dwell
         value = self._look(self.moved(pose, sense, before, time), sense)
         low, low_value, slope = 0.0, None, rate
-        for _ in range(_MOST_LOOKS):
+        for _ in range(MOST_LOOKS):
             if self._ended:
                 return self._end(pose, sense, before, time), True
-            if value >= 0 and (low_value is None or value < _EXACT):
+            if value >= 0 and (low_value is None or value < EXACT):
                 return time, False
             if value >= 0:  # between two evaluations
                 return self._root(pose, sense, before, (low, low_value or 0.0), (time, value)), False
-            if -value < _EXACT:
+            if -value < EXACT:
                 return time, False
             low, low_value = time, value
             time += min(-1.02 * value / max(slope, 0.1 * rate), largest)
@@ -193,10 +194,10 @@ class Follower:
     ) -> float:
         """Regula falsi (Illinois) between a value below zero and one above."""
         (a, fa), (b, fb) = low, high
-        for _ in range(30):
+        for _ in range(HALVINGS):
             time = a - fa * (b - a) / (fb - fa)
             value = self._look(self.moved(pose, sense, before, time), sense)
-            if abs(value) < _EXACT:
+            if abs(value) < EXACT:
                 break
             if value < 0:
                 a, fa, fb = time, value, fb / 2
@@ -207,7 +208,7 @@ class Follower:
     def _end(self, pose: tuple[float, float, float], sense: int, before: float | None, time: float) -> float:
         """The time at which the path ends, by halving."""
         low, high = 0.0, time
-        for _ in range(30):
+        for _ in range(HALVINGS):
             middle = (low + high) / 2
             self._look(self.moved(pose, sense, before, middle), sense)
             low, high = (low, middle) if self._ended else (middle, high)

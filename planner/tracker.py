@@ -6,8 +6,8 @@
 
 Every call says the direction of the motor and when to flip next. At most one flip can have happened since the
 last call: the one that was announced. The tracker learns nine numbers of the robot (`planner.estimate`). A pose may
-be late: it is compared with the place where the robot was then, counted back from now. Poses that cannot be are
-left out; so are values that are not finite, and times that go back. A pose may be missing for as long as you like.
+be late: it is compared with the place where the robot was then, counted back from now. A pose that cannot be is
+left out. So are values that are not finite, and times that go back. A pose may be missing for as long as you like.
 
 The alarm says that the robot behaves like no robot of this model. It compares WINDOW accepted poses with what was
 expected: for a robot of the model their sum of squares is below a limit with probability 1 − FALSE_ALARM. It also
@@ -37,10 +37,11 @@ WINDOW = 40
 ALARM_AT = float(chi2.ppf(1 - FALSE_ALARM, 3 * WINDOW))
 GATE = float(chi2.ppf(0.9999, 3))
 KEPT = 12  # dwells that are remembered for late poses
+SLACK = 1e-6  # time units; a time this close before the announced flip is the flip's own, rounded
 LONGEST_GAP = 1e5  # time units; a clock that jumps further is not believed
 LOST = 10  # poses left out one after another, from which the pose is taken to be unknown
 DISPLACED = 0.3  # standard deviation of the pose then [l, rad]
-_QUANTILE = 1.96
+QUANTILE = 1.96
 
 
 class Advice(NamedTuple):
@@ -100,7 +101,7 @@ class Tracker:
         """
         if self._now < now < self._now + LONGEST_GAP:
             self._now = now
-        if not self._finished and self._now >= self._flip_at:
+        if not self._finished and self._now >= self._flip_at - SLACK:
             self._flip()
         if pose is not None and not self._finished:
             when = self._now - self._latency if seen_at is None else seen_at
@@ -113,7 +114,7 @@ class Tracker:
     def advice(self) -> Advice:
         """The same answer again."""
         P = self._estimate.covariance
-        error = self._swing_error + _QUANTILE * math.sqrt(max(P[0][0] + P[1][1], 0.0) / 2)
+        error = self._swing_error + QUANTILE * math.sqrt(max(P[0][0] + P[1][1], 0.0) / 2)
         return Advice(0 if self._finished else self._dwell.sense, self._flip_at, self._finished, self.alarm, error)
 
     @property

@@ -69,7 +69,7 @@ def test_counting_back_and_going_forward_end_at_the_same_pose(estimate: Estimate
     twist = car.twist * np.array([[1.04, 1.04, 1.03], [1.04, 1.04, 0.98]])
 
     def change(dwell: Dwell, time: float) -> np.ndarray:
-        lag = car.lag_of(dwell.sense, dwell.before, time) + [0, 0, dwell.sense * state[6]]
+        lag = car.lag_of(dwell.sense, dwell.before, time) + np.array([0, 0, dwell.sense * state[6]])
         return planar.compose(lag, planar.arc(twist[0 if dwell.sense > 0 else 1], time))
 
     def drift(time: float) -> np.ndarray:

@@ -17,7 +17,7 @@ from planner.plan import Plan, plan
 from planner.tracker import Advice, Tracker
 from planner.vehicle import Vehicle
 from sim.model.presets import PRESETS
-from tests.planner.swimming import Camera, swim
+from tests.planner.swimming import Camera, rms, swim
 
 
 @cache
@@ -29,10 +29,6 @@ def changed(*, left: float = 1.0, right: float = 1.0, speed: float = 1.0, curren
     car = planned().vehicle
     twist = car.twist * np.array([[speed, speed, left], [speed, speed, right]])
     return replace(car, twist=twist, current=np.array([current, 0.0]))
-
-
-def rms(distance: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(distance**2)))
 
 
 ROBOTS = {

@@ -78,7 +78,10 @@ def test_the_command_itself_exits_with_2(tmp_path: Path) -> None:
     [
         ("", "not a plan.json"),
         ("{}", "no format"),
-        ('{"format": 2, "robot": {"groups": {"omega_bar": 10}, "time_scale_s": 1}, "first_direction": 1}', "no entry"),
+        (
+            '{"format": 2, "robot": {"groups": {"omega_bar": 10}, "time_scale_s": 1}, "first_direction": 1}',
+            "no entry",
+        ),
         ("not json", "not a plan.json"),
     ],
 )
