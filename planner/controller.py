@@ -1,8 +1,8 @@
 """tracker.h: the tracker and the plan's tables as one C99 header for the robot's microcontroller.
 
-The code is that of `planner/c`, which mirrors `planner.follower`, `planner.estimate` and `planner.tracker`. Numbers
-that both need come from the Python side. Lags are 16-bit numbers with one unit for each column; it is 1e-7 l for
-the paper's robot. The path has nine digits. `rounded` is the plan with these numbers.
+The code is that of `planner/c`, which mirrors `planner.follower`, `planner.estimate` and `planner.tracker`.
+Numbers that both need come from the Python side. Lags are 16-bit numbers with one unit for each column; it is
+1e-7 l for the paper's robot. The path has nine digits. `rounded` is the plan with these numbers.
 """
 
 from __future__ import annotations
@@ -84,7 +84,8 @@ def _numbers(result: Plan) -> str:
     """What the code needs as macros: counts and times as they are, the rest as tracker_real."""
     counts = {
         "FIRST_DIRECTION": result.first_direction, "POINTS": len(result.guide.q),
-        "TIMES": result.vehicle.rest.shape[1], "KNOTS": len(BEFORE_KNOTS), "HALVINGS": follower.HALVINGS, "MOST_LOOKS": follower.MOST_LOOKS,
+        "TIMES": result.vehicle.rest.shape[1], "KNOTS": len(BEFORE_KNOTS),
+        "HALVINGS": follower.HALVINGS, "MOST_LOOKS": follower.MOST_LOOKS,
         "KEPT": tracker.KEPT, "LOST": tracker.LOST, "WINDOW": tracker.WINDOW,
     }  # fmt: skip
     times = {"TIME_SCALE": result.robot.time_scale, "SLACK": tracker.SLACK, "LONGEST_GAP": tracker.LONGEST_GAP}
@@ -130,10 +131,8 @@ def _tables(result: Plan) -> str:
             f"{real}knots[TRACKER_KNOTS] = {_row(BEFORE_KNOTS.tolist())};",
             f"{real}lag_unit[3] = {_row(unit.tolist())};",
             f"{real}path[TRACKER_POINTS][3] = {_nested(_path(result).tolist(), _nine)};",
-            f"static const int16_t tracker_rest[2][TRACKER_TIMES][3] = {_nested(rest.tolist())};",
-            "static const int16_t tracker_lag[2][TRACKER_KNOTS][TRACKER_TIMES][3] = "
-            + _nested(lag.tolist())
-            + ";\n",
+            f"{short}rest[2][TRACKER_TIMES][3] = {_nested(rest.tolist())};",
+            f"{short}lag[2][TRACKER_KNOTS][TRACKER_TIMES][3] = {_nested(lag.tolist())};\n",
         ]
     )
 

@@ -5,9 +5,10 @@
     advice = tracker.feed(now, (x, y, heading), seen_at)    # a pose, and when it was true
 
 Every call says the direction of the motor and when to flip next. At most one flip can have happened since the
-last call: the one that was announced. The tracker learns nine numbers of the robot (`planner.estimate`). A pose may
-be late: it is compared with the place where the robot was then, counted back from now. A pose that cannot be is
-left out. So are values that are not finite, and times that go back. A pose may be missing for as long as you like.
+last call: the one that was announced. The tracker learns nine numbers of the robot (`planner.estimate`). A pose
+may be late: it is compared with the place where the robot was then, counted back from now. A pose that cannot be
+is left out. So are values that are not finite, and times that go back. No pose for a long time does no harm but to
+the error.
 
 The alarm says that the robot behaves like no robot of this model. It compares WINDOW accepted poses with what was
 expected: for a robot of the model their sum of squares is below a limit with probability 1 − FALSE_ALARM. It also
