@@ -135,6 +135,7 @@ class Tracker:
         self._past.append(done)
         self._dwell = Dwell(self._flip_at, -done.sense, done.length, 0.0)
         self._plan_flip()
+        self._finished = self._ends and self._flip_at <= self._now  # the path ends at the flip
 
     def _plan_flip(self) -> None:
         """Time of the next flip, and whether the path ends there."""

@@ -33,10 +33,11 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> CompiledTracker:
 
 
 class Both:
-    """Feeds the tracker in Python and the one in C, and compares their answers."""
+    """Feeds the trackers in Python and in C, compares their answers, and holds them to the shortest dwell."""
 
     def __init__(self, one: Tracker, other: CompiledTracker):
         self.one, self.other, self.calls = one, other, 0
+        self.last, self.flipped_at = one.advice, 0.0
         other.restart()
 
     def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Advice:
@@ -47,7 +48,10 @@ class Both:
         assert other.flip_at == pytest.approx(one.flip_at, rel=near)
         assert other.error == pytest.approx(one.error, rel=near)
         assert list(self.one.learned.values()) == pytest.approx(self.other.state.tolist(), rel=near, abs=near)
-        self.calls += 1
+        if one.direction == -self.last.direction != 0:  # the flip that was announced has happened
+            assert self.last.flip_at - self.flipped_at >= planned().minimum_dwell * (1 - 1e-12)
+            self.flipped_at = self.last.flip_at
+        self.calls, self.last = self.calls + 1, one
         return one
 
 
@@ -76,15 +80,14 @@ def test_the_same_orders_from_nonsense(compiled: CompiledTracker, seed: int) -> 
     rng = np.random.default_rng(seed)
     both = Both(Tracker(planned()), compiled)
     odd = [math.nan, math.inf, -math.inf, 1e300, -1e300, 0.0]
-    now, before = 0.0, both.one.advice
+    now = 0.0
     for _ in range(300):
         now = max(now + float(rng.choice([0.1, 0.5, 3.0, -1.0]) * rng.random()), 0.0)
         near = np.array(both.one._estimate.pose) + rng.normal(size=3) * rng.choice([0.01, 0.1, 3.0])
         pose = tuple(float(v) if rng.random() < 0.97 else float(rng.choice(odd)) for v in near)
         time = now if rng.random() < 0.95 else float(rng.choice(odd))
         seen = float(now - rng.exponential(rng.choice([0.1, 2.0, 20.0])))
-        before = both.feed(time, pose if rng.random() < 0.7 else None, seen)  # type: ignore[arg-type]
-    assert before.flip_at > planned().minimum_dwell
+        both.feed(time, pose if rng.random() < 0.7 else None, seen)  # type: ignore[arg-type]
 
 
 def test_single_precision_keeps_the_robot_on_its_path(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.path import circle
+from planner.path import circle, polygon
 from planner.plan import Plan, plan
 from planner.tracker import Advice, Tracker
 from planner.vehicle import Vehicle
@@ -104,6 +104,17 @@ def test_alarms_are_rare_for_a_robot_of_the_model_and_come_for_another() -> None
 def test_wrong_poses_are_no_alarm() -> None:
     """A camera that is wrong now and then says nothing of the robot. Two poses in 40 were enough for an alarm."""
     assert not alarmed(changed(), Camera(wrong=0.1))
+
+
+@pytest.mark.parametrize("late", [0.0, 0.01])
+def test_no_flip_just_before_the_end(late: float) -> None:
+    """Where the path ended at a flip, the motor was told to turn the other way for no time at all."""
+    square = plan(polygon(4, 2.0), PRESETS["paper-control"], minimum_dwell=0.6, point="head_tip")
+    tracker = Tracker(square)
+    advice = tracker.advice
+    while not advice.finished:
+        last, advice = advice, tracker.feed(advice.flip_at + late)
+        assert advice.finished or advice.flip_at > last.flip_at + late
 
 
 VALUES = st.one_of(st.floats(-1e3, 1e3), st.sampled_from([math.nan, math.inf, -math.inf, 1e300, -1e300, 0.0]))
