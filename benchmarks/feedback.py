@@ -67,21 +67,22 @@ def both(case: Case, planned: Plan) -> tuple[Swum, Swum]:
 def draw(planned: Plan, found: list[tuple[Swum, Swum]]) -> Figure:
     """Tracks of the hardest case; distances from the path over the way in all cases."""
     figure = Figure(figsize=(10, 6.6), layout="constrained")
+    upper, lower = figure.subfigures(2, 1, height_ratios=(1.15, 1))
     ways = zip(found[-1], (REPLAYED, FEEDBACK), ("open loop", "with the tracker"), strict=True)
     for i, (swum, colour, name) in enumerate(ways):
-        axes = figure.add_subplot(2, 2, 1 + i)
+        axes = upper.add_subplot(1, 2, 1 + i)
         axes.plot(*planned.reference.T, color=DECLARED, lw=1.2)
         axes.plot(*swum.track.T, color=colour, lw=0.8)
         half = int(np.searchsorted(swum.time, planned.duration / 2))
         axes.plot(*swum.track[half], "o", color=colour, ms=5)
         axes.set_aspect("equal")
-        axes.set_title(f"{name}: {swum.rms():.3f} l rms", fontsize=10)
+        axes.set_title(f"{CASES[-1].name}, {name}: {swum.rms():.2g} l rms", fontsize=10)
         axes.set_xlabel("x / l")
         axes.set_ylabel("y / l")
     for i, case in enumerate(CASES):
-        axes = figure.add_subplot(2, len(CASES), len(CASES) + 1 + i)
+        axes = lower.add_subplot(1, len(CASES), 1 + i)
         for swum, colour in zip(found[i], (REPLAYED, FEEDBACK), strict=True):
-            axes.semilogy(LENGTH * swum.time / swum.time[-1], *[smooth(swum)], color=colour, lw=1.0)
+            axes.semilogy(LENGTH * swum.time / swum.time[-1], smooth(swum), color=colour, lw=1.0)
         axes.set_ylim(3e-3, 10)
         axes.set_title(case.name, fontsize=9)
         axes.set_xlabel("way / l", fontsize=8)
@@ -116,7 +117,7 @@ def lines(found: list[tuple[Swum, Swum]]) -> Iterator[str]:
             yield f"{case.name:28}{name:11}{swum.rms():8.4f}{swum.distance.max():8.3f}{quarters}{rang:>8}"
 
 
-def main(out: str = "docs/tracking.png", robots: str = "50") -> None:
+def main(out: str = "docs/tracking.png", robots: str = "40") -> None:
     planned = plan(eight(LENGTH), ROBOT)
     found = Parallel(n_jobs=-1)(delayed(both)(case, planned) for case in CASES)
     minutes = planned.duration * ROBOT.time_scale / 60

@@ -83,7 +83,7 @@ typedef double tracker_real;
 def _numbers(result: Plan) -> str:
     """What the code needs as macros: counts and times as they are, the rest as tracker_real."""
     counts = {
-        "FIRST_DIRECTION": result.first_direction, "POINTS": len(result.guide.q),
+        "FIRST_DIRECTION": result.first_direction, "STATES": estimate.STATES, "POINTS": len(result.guide.q),
         "TIMES": result.vehicle.rest.shape[1], "KNOTS": len(BEFORE_KNOTS),
         "HALVINGS": follower.HALVINGS, "MOST_LOOKS": follower.MOST_LOOKS,
         "KEPT": tracker.KEPT, "LOST": tracker.LOST, "WINDOW": tracker.WINDOW,
@@ -125,9 +125,9 @@ def _tables(result: Plan) -> str:
             f"{real}start[3] = {_row(result.start)};",
             f"{real}twist[2][3] = {_nested(vehicle.twist.tolist())};",
             f"{real}current[2] = {_row(vehicle.current.tolist())};",
-            f"{real}changes[3] = {_row(estimate.CHANGES)};",
-            f"{real}most[6] = {_row(most)};",
-            f"{real}prior[9][9] = {_nested(prior(result))};",
+            f"{real}changes[4] = {_row(estimate.CHANGES)};",
+            f"{real}most[TRACKER_STATES - 3] = {_row(most)};",
+            f"{real}prior[TRACKER_STATES][TRACKER_STATES] = {_nested(prior(result))};",
             f"{real}knots[TRACKER_KNOTS] = {_row(BEFORE_KNOTS.tolist())};",
             f"{real}lag_unit[3] = {_row(unit.tolist())};",
             f"{real}path[TRACKER_POINTS][3] = {_nested(_path(result).tolist(), _nine)};",

@@ -1,8 +1,8 @@
-"""What a tracker knows of the robot: nine numbers and their covariance, from poses (a Kalman filter).
+"""What a tracker knows of the robot: ten numbers and their covariance, from poses (a Kalman filter).
 
     x, y, heading    of the head's centre at the last flip
     yaw rates        relative errors of the plan's, left and right
-    speed            relative error
+    surge, sway      relative errors of the speeds forward and to the side
     lag angle        error of the angle that a flip adds to the heading
     current x, y     beside the plan's
 
@@ -25,12 +25,13 @@ from planner.plan import Plan
 
 POSE = tuple[float, float, float]
 ROWS = list[list[float]]
-NAMES = ("x", "y", "heading", "yaw rate, left", "yaw rate, right", "speed", "lag angle", "current x", "current y")
+NAMES = ("x", "y", "heading", "yaw rate, left", "yaw rate, right", "surge", "sway", "lag angle",
+         "current x", "current y")  # fmt: skip
 STATES = len(NAMES)
-DOUBT = (0.03, 0.03, 0.03)  # standard deviations beside the plan's own: yaw rates, speed
-CHANGES = (1.5e-3, 1.5e-3, 5e-4)  # yaw rates and speed: what a dwell adds to their standard deviation
+DOUBT = (0.03, 0.03, 0.03, 0.03)  # standard deviations beside the plan's own: yaw rates, surge, sway
+CHANGES = (1.5e-3, 1.5e-3, 5e-4, 5e-4)  # what a dwell adds to them
 WALK = 3e-4  # l and rad that a dwell adds to what is unknown of the pose
-MOST = (0.5, 0.5, 0.5, 0.3)  # largest yaw rates, speed, lag angle that are learned
+MOST = (0.5, 0.5, 0.5, 0.5, 0.3)  # largest yaw rates, surge, sway, lag angle that are learned
 MOST_CURRENT = 0.5  # of the net speed
 
 
@@ -44,7 +45,7 @@ class Dwell(NamedTuple):
 
 
 class Estimate:
-    """State (9,) and covariance (9, 9) at the last flip.
+    """State (10,) and covariance (10, 10) at the last flip.
 
     Args:
         plan: gives the robot and where it starts.
@@ -59,7 +60,7 @@ class Estimate:
         self._follower = follower
         self._noise = (noise[0] ** 2, noise[0] ** 2, noise[1] ** 2)
         self._most = most(plan)
-        self.state: list[float] = [*plan.start, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        self.state: list[float] = [*plan.start, *[0.0] * (STATES - 3)]
         self.covariance = prior(plan)
 
     @property
@@ -71,9 +72,9 @@ class Estimate:
         state = self.state
         self._follower.set_robot(
             [self._learned(0), self._learned(1)],
-            state[6],
-            [self._current[0] + state[7], self._current[1] + state[8]],
-            (self._sideways() / self._speed, state[7] / self._speed, state[8] / self._speed),
+            state[7],
+            [self._current[0] + state[8], self._current[1] + state[9]],
+            (self._sideways() / self._speed, state[8] / self._speed, state[9] / self._speed),
         )
 
     def advance(self, dwell: Dwell) -> None:
@@ -84,7 +85,7 @@ class Estimate:
             self.state[i] += change.move[i]
 
     def seen_from(self, when: float, now: Dwell, past: Sequence[Dwell]) -> tuple[POSE, ROWS] | None:
-        """Pose at the time `when`, and its derivatives (3, 9) by the state; None if it is too long ago.
+        """Pose at the time `when`, and its derivatives (3, 10) by the state; None if it is too long ago.
 
         Args:
             when: the time.
@@ -110,7 +111,7 @@ class Estimate:
 
         Args:
             left: measured pose less the expected one.
-            H: derivatives (3, 9) of the expected pose.
+            H: derivatives (3, 10) of the expected pose.
             largest: squared size from which the pose is left out.
 
         Returns:
@@ -139,14 +140,13 @@ class Estimate:
     def _learned(self, side: int) -> list[float]:
         """Twist of a direction as it is learned."""
         forward, left, rate = self._twist[side]
-        speed = 1 + self.state[5]
-        return [forward * speed, left * speed, rate * (1 + self.state[3 + side])]
+        return [forward * (1 + self.state[5]), left * (1 + self.state[6]), rate * (1 + self.state[3 + side])]
 
     def _sideways(self) -> float:
         """Mean speed to the left, beside the plan's, that comes from unequal turns."""
         (_, left, fast), (_, right, slow) = self._twist
         a, b = fast * (1 + self.state[3]), -slow * (1 + self.state[4])
-        own = (b * left + a * right) * (1 + self.state[5]) / (a + b)
+        own = (b * left + a * right) * (1 + self.state[6]) / (a + b)
         return own - (-slow * left + fast * right) / (fast - slow)
 
     def _change(self, heading: float, dwell: Dwell, time: float) -> _Change:
@@ -154,30 +154,32 @@ class Estimate:
         state, sense = self.state, dwell.sense
         side = 0 if sense > 0 else 1
         z, x, turned = self._follower.lag_of(side, dwell.before, time)
-        turned += sense * state[6]
+        turned += sense * state[7]
         forward, left, rate = self._learned(side)
         along, across, angle = arc_of(rate, time)
-        ahead, aside = along * forward - across * left, across * forward + along * left
         more = 1 + state[3 + side]
         along_r, across_r = (time * math.cos(angle) - along) / more, (time * math.sin(angle) - across) / more
         ahead_r, aside_r = along_r * forward - across_r * left, across_r * forward + along_r * left
         c, s = math.cos(heading), math.sin(heading)
         lag_x, lag_y = c * z - s * x, s * z + c * x
         c, s = math.cos(heading + turned), math.sin(heading + turned)
-        arc_x, arc_y = c * ahead - s * aside, s * ahead + c * aside
+        surge_x, surge_y = (c * along - s * across) * forward, (s * along + c * across) * forward
+        sway_x, sway_y = -(c * across + s * along) * left, (c * along - s * across) * left
+        arc_x, arc_y = surge_x + sway_x, surge_y + sway_y
         B = [[0.0] * STATES for _ in range(3)]
         B[0][3 + side], B[1][3 + side] = c * ahead_r - s * aside_r, s * ahead_r + c * aside_r
         B[2][3 + side] = angle / more
-        B[0][5], B[1][5] = arc_x / (1 + state[5]), arc_y / (1 + state[5])
-        B[0][6], B[1][6], B[2][6] = -sense * arc_y, sense * arc_x, float(sense)
-        B[0][7] = B[1][8] = time
+        B[0][5], B[1][5] = surge_x / (1 + state[5]), surge_y / (1 + state[5])
+        B[0][6], B[1][6] = sway_x / (1 + state[6]), sway_y / (1 + state[6])
+        B[0][7], B[1][7], B[2][7] = -sense * arc_y, sense * arc_x, float(sense)
+        B[0][8] = B[1][9] = time
         x, y = lag_x + arc_x, lag_y + arc_y
-        current_x, current_y = self._current[0] + state[7], self._current[1] + state[8]
+        current_x, current_y = self._current[0] + state[8], self._current[1] + state[9]
         return _Change((x + current_x * time, y + current_y * time, turned + angle), (-y, x), B)
 
 
 class _Change(NamedTuple):
-    """What is added to a pose; its derivatives by the heading before (x, y), and by the learned numbers (3, 9)."""
+    """What is added to a pose; its derivatives by the heading before (x, y), and by the state (3, 10)."""
 
     move: POSE
     lever: tuple[float, float]
@@ -185,24 +187,26 @@ class _Change(NamedTuple):
 
 
 def prior(plan: Plan) -> ROWS:
-    """Covariance (9, 9) before the first pose: how well the robot was put, and what the plan says of the rest."""
+    """Covariance (10, 10) before the first pose: how well the robot was put, and what the plan says."""
     vehicle = plan.vehicle
     P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in DOUBT), 1e-6, 1e-12, 1e-12])
     speed = np.hypot(vehicle.twist[0, 0], vehicle.twist[0, 1])
     for mode in vehicle.modes:
         one = np.zeros(STATES)
         one[3:5] = mode.twist[:, 2] / vehicle.twist[:, 2]
-        one[5] = mode.twist[0, :2] @ vehicle.twist[0, :2] / speed**2
-        one[6] = mode.lag[0, 2]
-        one[7:] = mode.current
+        one[5:7] = (
+            mode.twist[0, :2] * vehicle.twist[0, :2] / np.maximum(vehicle.twist[0, :2] ** 2, 1e-6 * speed**2)
+        )
+        one[7] = mode.lag[0, 2]
+        one[8:] = mode.current
         P += np.outer(one, one)
-    P[7, 7] += (0.05 * speed) ** 2 / 4
     P[8, 8] += (0.05 * speed) ** 2 / 4
+    P[9, 9] += (0.05 * speed) ** 2 / 4
     return [[float(value) for value in row] for row in P]
 
 
 def most(plan: Plan) -> tuple[float, ...]:
-    """Largest values (6,) of the learned numbers."""
+    """Largest values (7,) of the learned numbers."""
     return *MOST, MOST_CURRENT * plan.net_speed, MOST_CURRENT * plan.net_speed
 
 
@@ -241,7 +245,8 @@ def _propagated(P: ROWS, F: ROWS) -> ROWS:
             full[i][j] = _dot(half[i], F[j])
     for i in range(3):
         full[i][i] += WALK**2
-        full[3 + i][3 + i] += CHANGES[i] ** 2
+    for i, change in enumerate(CHANGES):
+        full[3 + i][3 + i] += change**2
     return full
 
 

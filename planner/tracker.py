@@ -5,7 +5,7 @@
     advice = tracker.feed(now, (x, y, heading), seen_at)    # a pose, and when it was true
 
 Every call says the direction of the motor and when to flip next. At most one flip can have happened since the
-last call: the one that was announced. The tracker learns nine numbers of the robot (`planner.estimate`). A pose
+last call: the one that was announced. The tracker learns ten numbers of the robot (`planner.estimate`). A pose
 may be late: it is compared with the place where the robot was then, counted back from now. A pose that cannot be
 is left out. So are values that are not finite, and times that go back. No pose for a long time does no harm but to
 the error.
@@ -135,7 +135,7 @@ class Tracker:
         self._past.append(done)
         self._dwell = Dwell(self._flip_at, -done.sense, done.length, 0.0)
         self._plan_flip()
-        self._finished = self._ends and self._flip_at <= self._now  # the path ends at the flip
+        self._finished = self._ends and self._flip_at <= self._now + SLACK  # the path ends at the flip
 
     def _plan_flip(self) -> None:
         """Time of the next flip, and whether the path ends there."""

@@ -8,9 +8,8 @@ static void tracker_change_of(const tracker *t, tracker_real heading, const trac
     tracker_real lag[3], twist[3], along, across;
     tracker_lag_of(side, dwell->before, time, lag);
     tracker_learned(t, side, twist);
-    tracker_real turned = lag[2] + sense * state[6], forward = twist[0], left = twist[1];
+    tracker_real turned = lag[2] + sense * state[7], forward = twist[0], left = twist[1];
     tracker_real angle = tracker_arc(twist[2], time, &along, &across);
-    tracker_real ahead = along * forward - across * left, aside = across * forward + along * left;
     tracker_real more = 1 + state[3 + side];
     tracker_real along_r = (time * TRACKER_COS(angle) - along) / more;
     tracker_real across_r = (time * TRACKER_SIN(angle) - across) / more;
@@ -19,22 +18,26 @@ static void tracker_change_of(const tracker *t, tracker_real heading, const trac
     tracker_real lag_x = c * lag[0] - s * lag[1], lag_y = s * lag[0] + c * lag[1];
     c = TRACKER_COS(heading + turned);
     s = TRACKER_SIN(heading + turned);
-    tracker_real arc_x = c * ahead - s * aside, arc_y = s * ahead + c * aside, x = lag_x + arc_x, y = lag_y + arc_y;
+    tracker_real surge_x = (c * along - s * across) * forward, surge_y = (s * along + c * across) * forward;
+    tracker_real sway_x = -(c * across + s * along) * left, sway_y = (c * along - s * across) * left;
+    tracker_real arc_x = surge_x + sway_x, arc_y = surge_y + sway_y, x = lag_x + arc_x, y = lag_y + arc_y;
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < TRACKER_STATES; k++) out->slope[i][k] = 0;
     out->slope[0][3 + side] = c * ahead_r - s * aside_r;
     out->slope[1][3 + side] = s * ahead_r + c * aside_r;
     out->slope[2][3 + side] = angle / more;
-    out->slope[0][5] = arc_x / (1 + state[5]);
-    out->slope[1][5] = arc_y / (1 + state[5]);
-    out->slope[0][6] = -sense * arc_y;
-    out->slope[1][6] = sense * arc_x;
-    out->slope[2][6] = (tracker_real)sense;
-    out->slope[0][7] = out->slope[1][8] = time;
+    out->slope[0][5] = surge_x / (1 + state[5]);
+    out->slope[1][5] = surge_y / (1 + state[5]);
+    out->slope[0][6] = sway_x / (1 + state[6]);
+    out->slope[1][6] = sway_y / (1 + state[6]);
+    out->slope[0][7] = -sense * arc_y;
+    out->slope[1][7] = sense * arc_x;
+    out->slope[2][7] = (tracker_real)sense;
+    out->slope[0][8] = out->slope[1][9] = time;
     out->lever[0] = -y;
     out->lever[1] = x;
-    out->move[0] = x + (tracker_current[0] + state[7]) * time;
-    out->move[1] = y + (tracker_current[1] + state[8]) * time;
+    out->move[0] = x + (tracker_current[0] + state[8]) * time;
+    out->move[1] = y + (tracker_current[1] + state[9]) * time;
     out->move[2] = turned + angle;
 }
 
@@ -103,9 +106,9 @@ static void tracker_advance(tracker *t, const tracker_dwell *done)
     }
     for (int i = 0; i < 3; i++) {
         t->covariance[i][i] += TRACKER_WALK * TRACKER_WALK;
-        t->covariance[3 + i][3 + i] += tracker_changes[i] * tracker_changes[i];
         t->state[i] += change.move[i];
     }
+    for (int i = 0; i < 4; i++) t->covariance[3 + i][3 + i] += tracker_changes[i] * tracker_changes[i];
 }
 
 /* Learns from a pose and returns the squared size of what it differs; learns nothing if that is too large. */
@@ -128,7 +131,7 @@ static tracker_real tracker_update(tracker *t, const tracker_real left[3], track
         t->state[i] += moved[i];
         for (int j = 0; j < TRACKER_STATES; j++) t->covariance[i][j] = P[i][j];
     }
-    for (int i = 0; i < 6; i++)
+    for (int i = 0; i < TRACKER_STATES - 3; i++)
         t->state[3 + i] = tracker_smaller(tracker_larger(t->state[3 + i], -tracker_most[i]), tracker_most[i]);
     return size;
 }

@@ -13,7 +13,6 @@
 #define TRACKER_FLOOR floor
 #define TRACKER_FABS fabs
 #endif
-#define TRACKER_STATES 9
 #define TRACKER_PI ((tracker_real)3.14159265358979323846)
 
 typedef struct {
@@ -31,7 +30,7 @@ typedef struct {
 } tracker_dwell;
 
 typedef struct {
-    tracker_real state[TRACKER_STATES]; /* pose at the last flip; yaw rates, speed, lag angle, current */
+    tracker_real state[TRACKER_STATES]; /* pose at the last flip; yaw rates, surge, sway, lag angle, current */
     tracker_real covariance[TRACKER_STATES][TRACKER_STATES];
     tracker_real noise[3], score;
     tracker_dwell dwell, past[TRACKER_KEPT];
@@ -119,9 +118,8 @@ static void tracker_moved(const tracker *t, const tracker_begin_of_dwell *from, 
 
 static void tracker_learned(const tracker *t, int side, tracker_real twist[3])
 {
-    tracker_real speed = 1 + t->state[5];
-    twist[0] = tracker_twist[side][0] * speed;
-    twist[1] = tracker_twist[side][1] * speed;
+    twist[0] = tracker_twist[side][0] * (1 + t->state[5]);
+    twist[1] = tracker_twist[side][1] * (1 + t->state[6]);
     twist[2] = tracker_twist[side][2] * (1 + t->state[3 + side]);
 }
 
@@ -130,7 +128,7 @@ static tracker_real tracker_sideways(const tracker *t)
     tracker_real left = tracker_twist[0][1], fast = tracker_twist[0][2];
     tracker_real right = tracker_twist[1][1], slow = tracker_twist[1][2];
     tracker_real a = fast * (1 + t->state[3]), b = -slow * (1 + t->state[4]);
-    tracker_real own = (b * left + a * right) * (1 + t->state[5]) / (a + b);
+    tracker_real own = (b * left + a * right) * (1 + t->state[6]) / (a + b);
     return own - (-slow * left + fast * right) / (fast - slow);
 }
 
@@ -138,12 +136,12 @@ static void tracker_apply(tracker *t)
 {
     tracker_learned(t, 0, t->twist[0]);
     tracker_learned(t, 1, t->twist[1]);
-    t->lag_angle = t->state[6];
-    t->current[0] = tracker_current[0] + t->state[7];
-    t->current[1] = tracker_current[1] + t->state[8];
+    t->lag_angle = t->state[7];
+    t->current[0] = tracker_current[0] + t->state[8];
+    t->current[1] = tracker_current[1] + t->state[9];
     t->slip[0] = tracker_sideways(t) / TRACKER_NET_SPEED;
-    t->slip[1] = t->state[7] / TRACKER_NET_SPEED;
-    t->slip[2] = t->state[8] / TRACKER_NET_SPEED;
+    t->slip[1] = t->state[8] / TRACKER_NET_SPEED;
+    t->slip[2] = t->state[9] / TRACKER_NET_SPEED;
 }
 
 /* ---- when to flip -------------------------------------------------------------------------------------------- */

@@ -44,7 +44,7 @@ static void tracker_flip(tracker *t)
     t->dwell.before = done.length;
     t->dwell.sense = -done.sense;
     tracker_plan_flip(t);
-    t->finished = t->ends && t->flip_at <= t->now; /* the path ends at the flip */
+    t->finished = t->ends && t->flip_at <= t->now + TRACKER_SLACK; /* the path ends at the flip */
 }
 
 static void tracker_judge(tracker *t, tracker_real size)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from planner.controller import tracker_header
+from planner.estimate import STATES
 from planner.plan import Plan
 from planner.tracker import Advice
 
@@ -64,14 +65,14 @@ class CompiledTracker:
 
     def restart(self) -> None:
         self._library.begin(0.01, 0.01)
-        self.state = np.zeros(9)
+        self.state = np.zeros(STATES)
 
     def feed(
         self, now: float, pose: tuple[float, float, float] | None = None, seen_at: float | None = None
     ) -> Advice:
         own = None if pose is None else np.array(pose, dtype=float)
         seen = now if seen_at is None else seen_at
-        out = np.zeros(14)
+        out = np.zeros(5 + STATES)
         address = None if own is None else own.ctypes.data
         self._library.feed(now * self._scale, address, seen * self._scale, out.ctypes.data)
         self.state = out[5:]

@@ -42,9 +42,11 @@ ROBOTS = {
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_robots_that_differ_stay_on_the_path(name: str) -> None:
-    distance, dwells = swim(Tracker(planned()), planned(), ROBOTS[name], Camera())
-    assert rms(distance) < 0.026
-    assert min(dwells[:-1]) >= planned().minimum_dwell * (1 - 1e-9)
+    cameras = [Camera(rng=np.random.default_rng(seed)) for seed in range(3)]
+    swims = [swim(Tracker(planned()), planned(), ROBOTS[name], camera) for camera in cameras]
+    assert np.mean([rms(distance) for distance, _ in swims]) < 0.026
+    for _, dwells in swims:
+        assert min(dwells[:-1]) >= planned().minimum_dwell * (1 - 1e-9)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +77,7 @@ def test_it_learns_the_robot() -> None:
     swim(tracker, planned(), changed(left=1.04, right=0.99, speed=0.97), Camera())
     # On a circle of many small swings the difference of the turns shows at once; their mean hardly does.
     assert tracker.learned["yaw rate, left"] - tracker.learned["yaw rate, right"] == pytest.approx(0.05, abs=0.02)
-    assert tracker.learned["speed"] == pytest.approx(-0.03, abs=0.02)
+    assert tracker.learned["surge"] == pytest.approx(-0.03, abs=0.02)
 
 
 def alarmed(car: Vehicle, camera: Camera) -> bool:
