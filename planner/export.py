@@ -1,4 +1,4 @@
-"""The files of a plan: plan.json, plan.csv, schedule.h for a microcontroller, plan.svg.
+"""The files of a plan: plan.json, plan.csv, plan.svg; schedule.h and tracker.h for a microcontroller.
 
 schedule.h has dwell times in whole milliseconds as 16-bit numbers. The motor flips after each. The rounding error
 of a dwell is carried over to the next one, so no flip is more than half a millisecond early or late. A dwell that
@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from planner.controller import tracker_header
 from planner.plan import Plan
 from planner.record import plan_record
 from sim.io.errors import InputError
@@ -25,7 +26,7 @@ _CHECKPOINTS = 32
 
 
 def write_plan(result: Plan, folder: str | Path) -> list[Path]:
-    """Write the four files of a plan; returns their paths.
+    """Write the five files of a plan; returns their paths.
 
     Args:
         result: the plan.
@@ -39,17 +40,18 @@ def write_plan(result: Plan, folder: str | Path) -> list[Path]:
         >>> from softflagella import circle, load_robot, plan, write_plan
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     [path.name for path in write_plan(plan(circle(2.0), load_robot("paper-control")), folder)]
-        ['plan.json', 'plan.csv', 'schedule.h', 'plan.svg']
+        ['plan.json', 'plan.csv', 'schedule.h', 'tracker.h', 'plan.svg']
     """
     out = Path(folder)
     header = controller_header(result)
     record = {**plan_record(result), "code_version": code_version()}
-    paths = [out / name for name in ("plan.json", "plan.csv", "schedule.h", "plan.svg")]
+    paths = [out / name for name in ("plan.json", "plan.csv", "schedule.h", "tracker.h", "plan.svg")]
     write_text(paths[0], json.dumps(record) + "\n")
     with whole_file(paths[1]) as part:
         dwell_table(result).to_csv(part, index=False, float_format="%.8g")
     write_text(paths[2], header)
-    _picture(result, paths[3])
+    write_text(paths[3], tracker_header(result))
+    _picture(result, paths[4])
     return paths
 
 

@@ -15,10 +15,12 @@ from planner.vehicle import BEFORE_KNOTS, STEP, Vehicle
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
-_EXACT = 1e-7  # rad, of the heading at a flip
-_LARGEST_STEP = 0.4  # rad that the robot turns between two evaluations
-_TURNS = 4 * math.pi  # a dwell that turns further than this leads nowhere
-_MOST_BIAS = 0.3  # rad
+EXACT = 1e-7  # rad, of the heading at a flip
+LARGEST_STEP = 0.4  # rad that the robot turns between two evaluations
+TURNS = 4 * math.pi  # a dwell that turns further than this leads nowhere
+MOST_BIAS = 0.3  # rad
+HALVINGS = 30
+MOST_LOOKS = 500  # evaluations of the equation for one dwell; some four are needed
 _KNOTS: list[float] = BEFORE_KNOTS.tolist()
 
 
@@ -68,30 +70,10 @@ class Follower:
     ) -> tuple[float, float, float]:
         """Pose of the head's centre after `time` in direction `sense`."""
         side = 0 if sense > 0 else 1
-        u = time / STEP
-        i = int(u)
-        rest = self._rest[side]
-        if i > len(rest) - 2:
-            i, w = len(rest) - 2, 1.0
-        else:
-            w = u - i
-        if before is None:
-            (z0, x0, a0), (z1, x1, a1) = rest[i], rest[i + 1]
-            z, x, turned = z0 + w * (z1 - z0), x0 + w * (x1 - x0), a0 + w * (a1 - a0)
-        else:
-            k, part = _between(before)
-            near, far = self._lag[side][k], self._lag[side][k + 1]
-            (z0, x0, a0), (z1, x1, a1) = near[i], near[i + 1]
-            z, x, turned = z0 + w * (z1 - z0), x0 + w * (x1 - x0), a0 + w * (a1 - a0)
-            if part:
-                (z0, x0, a0), (z1, x1, a1) = far[i], far[i + 1]
-                z += part * (z0 + w * (z1 - z0) - z)
-                x += part * (x0 + w * (x1 - x0) - x)
-                turned += part * (a0 + w * (a1 - a0) - turned)
+        z, x, turned = self.lag_of(side, before, time)
         turned += sense * self._lag_angle
         forward, left, rate = self._twist[side]
-        angle = rate * time
-        along, across = math.sin(angle) / rate, (1 - math.cos(angle)) / rate
+        along, across, angle = arc_of(rate, time)
         ahead, aside = along * forward - across * left, across * forward + along * left
         c, s = math.cos(turned), math.sin(turned)
         z, x = z + c * ahead - s * aside, x + s * ahead + c * aside
@@ -102,13 +84,36 @@ class Follower:
             pose[2] + turned + angle,
         )
 
+    def lag_of(self, side: int, before: float | None, time: float) -> tuple[float, float, float]:
+        """Lag after `time` in direction `side` (0: positive, 1: negative); before None: from rest."""
+        u = time / STEP
+        i = int(u)
+        rest = self._rest[side]
+        if i > len(rest) - 2:
+            i, w = len(rest) - 2, 1.0
+        else:
+            w = u - i
+        if before is None:
+            (z0, x0, a0), (z1, x1, a1) = rest[i], rest[i + 1]
+            return z0 + w * (z1 - z0), x0 + w * (x1 - x0), a0 + w * (a1 - a0)
+        k, part = _between(before)
+        near, far = self._lag[side][k], self._lag[side][k + 1]
+        (z0, x0, a0), (z1, x1, a1) = near[i], near[i + 1]
+        z, x, turned = z0 + w * (z1 - z0), x0 + w * (x1 - x0), a0 + w * (a1 - a0)
+        if part:
+            (z0, x0, a0), (z1, x1, a1) = far[i], far[i + 1]
+            z += part * (z0 + w * (z1 - z0) - z)
+            x += part * (x0 + w * (x1 - x0) - x)
+            turned += part * (a0 + w * (a1 - a0) - turned)
+        return z, x, turned
+
     def learn(self, pose: tuple[float, float, float], sense: int) -> None:
         """Add the mean error of the last two dwells to the integral; errors at flips alternate."""
         self._look(pose, sense)
         reached = self._arc[self.place]
         way, self._reached = reached - self._reached, reached
         self._bias += (self._error + self._before) * way / (4 * self._ahead**2)
-        self._bias = min(max(self._bias, -_MOST_BIAS), _MOST_BIAS)
+        self._bias = min(max(self._bias, -MOST_BIAS), MOST_BIAS)
         self._before = self._error
 
     def _look(self, pose: tuple[float, float, float], sense: int) -> float:
@@ -158,24 +163,26 @@ class Follower:
     def next_flip(self, pose: tuple[float, float, float], sense: int, before: float | None) -> tuple[float, bool]:
         """Length of the dwell that begins at `pose`, and whether the path ends in it."""
         rate = abs(self._twist[0 if sense > 0 else 1][2])
-        longest, largest = _TURNS / rate, _LARGEST_STEP / rate
+        longest, largest = TURNS / rate, LARGEST_STEP / rate
         time = self._dwell
         value = self._look(self.moved(pose, sense, before, time), sense)
         low, low_value, slope = 0.0, None, rate
-        while not self._ended:
-            if value >= 0 and (low_value is None or value < _EXACT):
+        for _ in range(MOST_LOOKS):
+            if self._ended:
+                return self._end(pose, sense, before, time), True
+            if value >= 0 and (low_value is None or value < EXACT):
                 return time, False
             if value >= 0:  # between two evaluations
                 return self._root(pose, sense, before, (low, low_value or 0.0), (time, value)), False
-            if -value < _EXACT:
+            if -value < EXACT:
                 return time, False
             low, low_value = time, value
             time += min(-1.02 * value / max(slope, 0.1 * rate), largest)
             if time > longest:
-                raise InputError("the robot turns in circles and does not reach the path; check the path's scale")
+                break
             value = self._look(self.moved(pose, sense, before, time), sense)
             slope = (value - low_value) / (time - low)
-        return self._end(pose, sense, before, time), True
+        raise InputError("the robot turns in circles and does not reach the path; check the path's scale")
 
     def _root(
         self,
@@ -187,10 +194,10 @@ class Follower:
     ) -> float:
         """Regula falsi (Illinois) between a value below zero and one above."""
         (a, fa), (b, fb) = low, high
-        for _ in range(30):
+        for _ in range(HALVINGS):
             time = a - fa * (b - a) / (fb - fa)
             value = self._look(self.moved(pose, sense, before, time), sense)
-            if abs(value) < _EXACT:
+            if abs(value) < EXACT:
                 break
             if value < 0:
                 a, fa, fb = time, value, fb / 2
@@ -201,11 +208,18 @@ class Follower:
     def _end(self, pose: tuple[float, float, float], sense: int, before: float | None, time: float) -> float:
         """The time at which the path ends, by halving."""
         low, high = 0.0, time
-        for _ in range(30):
+        for _ in range(HALVINGS):
             middle = (low + high) / 2
             self._look(self.moved(pose, sense, before, middle), sense)
             low, high = (low, middle) if self._ended else (middle, high)
         return high
+
+
+def arc_of(rate: float, time: float) -> tuple[float, float, float]:
+    """sin Ω T/Ω, (1 − cos Ω T)/Ω and Ω T."""
+    angle = rate * time
+    half = math.sin(angle / 2)
+    return math.sin(angle) / rate, 2 * half * half / rate, angle
 
 
 def _between(before: float) -> tuple[int, float]:

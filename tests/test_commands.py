@@ -153,7 +153,7 @@ def own_table(made: Path, out: Path) -> str:
 def plan(made: Path, out: Path) -> str:
     done("planner", "plan", "square:3", "--robot", made / "robot.toml", "--out", out / "plan")
     written = {path.name for path in (out / "plan").iterdir()}
-    assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h"}
+    assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h", "tracker.h"}
     return "of the declared path"
 
 

@@ -20,6 +20,7 @@ from sim.effects import catalogue
 from sim.inputs import load_robot, robot_toml
 from sim.io.errors import InputError, run_command
 from sim.model.groups import DWELL, GROUP_COLUMNS
+from sim.model.plan_file import FORMAT
 from sim.model.presets import PRESETS
 from sim.model.schedule import load_schedule
 from sim.motion.batches import steady_columns
@@ -107,6 +108,7 @@ def test_the_worst_robot_of_a_table_leaves_the_others_alone(tmp_path: Path) -> N
 def plans(draw: st.DrawFn) -> object:
     """A plan.json with some entries replaced."""
     plan: dict[str, Any] = {
+        "format": FORMAT,
         "robot": {"groups": dict(CONTROL), "time_scale_s": 2.0},
         "first_direction": 1,
         "dwell_bar": [0.7, 0.8],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.model.plan_file import read_plan_file
 
 
 @dataclass(frozen=True)
@@ -70,17 +70,15 @@ def load_schedule(path: str | Path) -> Schedule:
         >>> bool((same.dwells == result.dwells).all())
         True
     """
+    content = read_plan_file(path)
     try:
-        content = json.loads(Path(path).read_text())
         return Schedule(
             robot={str(k): float(v) for k, v in content["robot"]["groups"].items()},
-            first_direction=int(content["first_direction"]),
+            first_direction=content["first_direction"],
             dwells=np.asarray(content["dwell_bar"], dtype=float),
             start=tuple(float(content["start"][k]) for k in ("x_over_l", "y_over_l", "heading_rad")),  # type: ignore[arg-type]
             time_scale=float(content["robot"]["time_scale_s"]),
         )
-    except (json.JSONDecodeError, UnicodeDecodeError) as broken:
-        raise InputError(f"{path} is not JSON: {broken}; give a plan.json of the planner") from None
     except KeyError as missing:
         raise InputError(f"{path} has no entry {missing}; give a plan.json of the planner") from None
     except (TypeError, ValueError, AttributeError, OverflowError) as wrong:

@@ -11,12 +11,14 @@ from typing import Any
 
 import pytest
 
+import softflagella as sf
 from sim.inputs import load_robot
 from tests.docs.pages import DOCS, PAGES, ROOT, blocks, name_of
+from tests.planner.compiled import compile_c
 
 RUN = ("sh", "python")
-SLOW = {"tutorial/closing.md", "tutorial/schedule.md", "howto/effect.md", "howto/cluster.md"}
-SHOWN = {*RUN, "toml", "text"}
+SLOW = {"tutorial/closing.md", "tutorial/schedule.md", "howto/effect.md", "howto/cluster.md", "howto/tracker.md"}
+SHOWN = {*RUN, "toml", "text", "c"}
 
 
 def marked() -> list[Any]:
@@ -51,6 +53,16 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytes
                 ["sh", "-e", "-c", block.code], env=shell, cwd=work, capture_output=True, text=True, check=False
             )
             assert done.returncode == 0, f"{block.code}\n{done.stdout}\n{done.stderr}"
+
+
+def test_c_on_pages_compiles(tmp_path: Path) -> None:
+    robot = sf.load_robot("paper-control")
+    sf.write_plan(sf.plan(sf.circle(2.0), robot), tmp_path)
+    found = [block for page in PAGES for block in blocks(page) if block.language == "c"]
+    assert found
+    for block in found:
+        (tmp_path / "page.c").write_text(block.code)
+        compile_c(tmp_path / "page.c", tmp_path / "page.o", "-c")
 
 
 def test_every_block_is_of_a_known_language() -> None:

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from planner.distance import distance_to
 from planner.plan import Plan
-from planner.tracker import Tracker
+from planner.tracker import Advice
 from planner.vehicle import Vehicle
 from sim.mechanics import planar
+
+
+class Tracks(Protocol):
+    """`planner.Tracker`, or what is fed like it."""
+
+    def feed(
+        self, now: float, pose: tuple[float, float, float] | None = None, seen_at: float | None = None
+    ) -> Advice: ...
 
 
 @dataclass
@@ -40,7 +48,7 @@ def _moved(car: Vehicle, pose: np.ndarray, sense: int, before: float | None, sta
     return moved + np.append(car.current * (time - start), 0.0)
 
 
-def swim(tracker: Tracker, plan: Plan, truth: Vehicle, camera: Camera, *, changes_to: Vehicle | None = None,
+def swim(tracker: Tracks, plan: Plan, truth: Vehicle, camera: Camera, *, changes_to: Vehicle | None = None,
          most: int = 5000) -> tuple[np.ndarray, list[float]]:  # fmt: skip
     """Distances from the declared path at many instants, and the dwells that were ordered."""
     pose, before, start, seen, waiting = np.array(plan.start), None, 0.0, 0.0, []
@@ -66,4 +74,9 @@ def swim(tracker: Tracker, plan: Plan, truth: Vehicle, camera: Camera, *, change
         dwells.append(known - start)
         pose, before, start = at(known), known - start, known
         advice = tracker.feed(known)
-    return distance_to(plan.reference, np.array(track)[:, :2]), dwells
+    followed = planar.compose(np.array(track), np.array([plan.offset, 0.0, 0.0]))
+    return distance_to(plan.reference, followed[:, :2]), dwells
+
+
+def rms(distance: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(distance**2)))

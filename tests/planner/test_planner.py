@@ -254,7 +254,7 @@ def test_the_command_refuses_and_writes_nothing(
 def test_files_of_a_plan(tmp_path: Path) -> None:
     result = plan(polygon(4, 3.0), CONTROL)
     written = write_plan(result, tmp_path / "out")
-    assert [p.name for p in written] == ["plan.json", "plan.csv", "schedule.h", "plan.svg"]
+    assert [p.name for p in written] == ["plan.json", "plan.csv", "schedule.h", "tracker.h", "plan.svg"]
     content = json.loads(written[0].read_text())
     assert content["stated_error_over_l"] == pytest.approx(result.stated_error)
     assert content["model"] == result.model
@@ -266,7 +266,7 @@ def test_files_of_a_plan(tmp_path: Path) -> None:
     numbers = [int(v) for v in header.split("{")[1].split("}")[0].replace("\n", " ").split(",")]
     assert sum(numbers) == pytest.approx(1000 * result.seconds.sum(), abs=1)
     assert f"SCHEDULE_COUNT {len(numbers)}" in header
-    assert "<svg" in written[3].read_text()
+    assert "<svg" in written[4].read_text()
 
 
 def test_the_header_compiles(tmp_path: Path) -> None:

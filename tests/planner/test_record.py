@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,11 @@ import pytest
 
 from planner.path import circle
 from planner.plan import plan
-from planner.record import FORMAT, load_plan, plan_record
+from planner.record import load_plan, plan_record
 from sim.io.errors import InputError
+from sim.model.plan_file import FORMAT
 from sim.model.presets import PRESETS
+from sim.model.schedule import load_schedule
 
 
 @pytest.fixture(scope="module")
@@ -35,8 +38,9 @@ def test_it_reads_back(record: dict[str, Any], tmp_path: Path) -> None:
     [
         ({"format": 99}, f"has format 99, this version reads {FORMAT}"),
         ({"reference": []}, "reference must have two or more rows"),
-        ({"reference": [[float("nan"), 0.0], [1.0, 1.0]]}, "reference must have two or more rows"),
+        ({"reference": [["nan", 0.0], [1.0, 1.0]]}, "reference must have two or more rows"),
         ({"stated_error_over_l": float("nan")}, "no finite number"),
+        ({"stated_error_over_l": "nan"}, "no finite number"),
         ({"robot": {"groups": {"omega_bar": 1e6}}}, "omega_bar is not between"),
         ({"robot": 3}, "not a plan.json"),
     ],
@@ -49,8 +53,34 @@ def test_edited_files_are_refused(
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["", "[1, 2]", "{}", "\x00", '{"format": 2}'])
-def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
+READERS = [load_plan, load_schedule]  # of the planner and of the simulator
+
+
+@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize("text", ["", "[1, 2]", "{}", "\x00", '{"format": 2}', "[" * 100_000])
+def test_other_files_are_refused(reader: Callable[[Path], object], tmp_path: Path, text: str) -> None:
     (tmp_path / "plan.json").write_text(text)
     with pytest.raises(InputError, match=r"not a plan\.json"):
-        load_plan(tmp_path / "plan.json")
+        reader(tmp_path / "plan.json")
+
+
+@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        (f'"format": {FORMAT}', '"format": 99', f"has format 99, this version reads {FORMAT}"),
+        ('"omega_bar": ', '"omega_bar": 9e9, "was": ', "omega_bar is not between"),
+        ('"dwell_bar": [', '"dwell_bar": [NaN, ', "NaN is no finite number"),
+        ('"predicted_rms_over_l": ', '"predicted_rms_over_l": 1e999, "was": ', "1e999 is no finite number"),
+    ],
+)
+def test_both_readers_refuse_the_same_files(
+    reader: Callable[[Path], object], record: dict[str, Any], tmp_path: Path, old: str, new: str, expected: str
+) -> None:
+    """`sim replay` replayed a plan.json of any format, and one with NaN in it."""
+    text = json.dumps(record)
+    assert old in text
+    (tmp_path / "plan.json").write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=expected) as caught:
+        reader(tmp_path / "plan.json")
+    assert "\n" not in str(caught.value)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 
 from planner.path import circle
@@ -30,3 +32,18 @@ def test_it_answers_like_the_tracker_in_seconds() -> None:
     for words, advice in zip(found, expected, strict=True):
         assert int(words[0]) == advice.direction
         assert float(words[1]) == pytest.approx(advice.flip_at * scale, abs=1e-5)
+
+
+def test_a_line_with_the_announced_time_is_the_flip() -> None:
+    """Times that were printed rounded down were taken for the moment before the flip."""
+    result = plan(circle(2.0), PRESETS["paper-control"])
+    directions, line = [], "0"
+
+    def lines() -> Iterator[str]:
+        for _ in range(60):
+            yield line
+
+    for answer in answers(Tracker(result), lines(), result.robot.time_scale):
+        direction, line = answer.split()[:2]
+        directions.append(int(direction))
+    assert directions == [result.first_direction * (-1) ** k for k in range(60)]

@@ -76,10 +76,13 @@ def test_the_command_itself_exits_with_2(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("", "not JSON"),
-        ("{}", "no entry"),
-        ('{"robot": {"groups": {}, "time_scale_s": 1}, "first_direction": 1, "dwell_bar": []}', "no entry"),
-        ("not json", "not JSON"),
+        ("", "not a plan.json"),
+        ("{}", "no format"),
+        (
+            '{"format": 2, "robot": {"groups": {"omega_bar": 10}, "time_scale_s": 1}, "first_direction": 1}',
+            "no entry",
+        ),
+        ("not json", "not a plan.json"),
     ],
 )
 def test_replay_refuses(text: str, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

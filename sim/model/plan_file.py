@@ -1,0 +1,49 @@
+"""plan.json as both sides read it: the format, finite numbers, and the robot that it is for.
+
+The planner writes the file and reads it again, and the simulator replays it. So both check the same things here.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from sim.io.errors import InputError
+
+FORMAT = 2
+FASTEST = 1e4  # ω̄ above which the file is taken for edited
+
+
+def read_plan_file(path: str | Path) -> dict[str, Any]:
+    """The content of a plan.json.
+
+    Raises:
+        InputError: the file cannot be read, is no plan.json of this format, has a number that is not finite, or
+            a motor speed that cannot be.
+    """
+    try:
+        content = json.loads(Path(path).read_text(), parse_constant=_finite, parse_float=_finite)
+    except OSError as missing:
+        raise InputError(f"{path} cannot be read ({missing.strerror}); give a plan.json of the planner") from None
+    except (ValueError, RecursionError) as broken:  # JSON, text encoding, numbers
+        raise InputError(f"{path} is not a plan.json of the planner ({broken}); plan again") from None
+    if not isinstance(content, dict) or "format" not in content:
+        raise InputError(f"{path} is not a plan.json of the planner (it has no format); plan again")
+    if content["format"] != FORMAT:
+        raise InputError(f"{path} has format {content['format']}, this version reads {FORMAT}: plan again")
+    try:
+        speed = float(content["robot"]["groups"]["omega_bar"])
+    except (KeyError, TypeError, ValueError, OverflowError) as broken:
+        raise InputError(f"{path} is not a plan.json of the planner ({broken}); plan again") from None
+    if not 0 < abs(speed) <= FASTEST:
+        raise InputError(f"{path}: omega_bar is not between 0 and {FASTEST:g}; plan again")
+    return content
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is no finite number")
+    return value

@@ -1,0 +1,79 @@
+"""tracker.h compiled as a library: a tracker that is fed like `planner.Tracker`, in the plan's time units."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.controller import tracker_header
+from planner.estimate import STATES
+from planner.plan import Plan
+from planner.tracker import Advice
+
+FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2")
+_LIBRARY = """#include "tracker.h"
+static tracker keeper;
+static void told(tracker_advice advice, double *out)
+{
+    out[0] = advice.direction; out[1] = advice.flip_at; out[2] = advice.finished; out[3] = advice.alarm;
+    out[4] = advice.error;
+    for (int i = 0; i < TRACKER_STATES; i++) out[5 + i] = keeper.state[i];
+}
+void begin(double noise, double heading)
+{
+    tracker_begin(&keeper, (tracker_real)noise, (tracker_real)heading, 0.0);
+}
+void feed(double now, const double *pose, double seen, double *out)
+{
+    tracker_real own[3] = {0, 0, 0};
+    for (int i = 0; i < 3 && pose; i++) own[i] = (tracker_real)pose[i];
+    told(tracker_feed(&keeper, now, pose ? own : 0, seen), out);
+}
+int memory(void) { return (int)sizeof(tracker); }
+"""
+
+
+def compile_c(source: Path, out: Path, *flags: str) -> None:
+    """Compile a C file with all warnings as errors; the test is skipped where there is no compiler."""
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("no C compiler on this machine")
+    subprocess.run([compiler, *FLAGS, *flags, "-o", str(out), str(source), "-lm"], check=True)
+
+
+class CompiledTracker:
+    """tracker.h behind the methods of `planner.Tracker`; one plan in one library."""
+
+    def __init__(
+        self, plan: Plan, folder: Path, *, single: bool = False, noise: tuple[float, float] = (0.01, 0.01)
+    ):
+        (folder / "tracker.h").write_text(tracker_header(plan))
+        (folder / "library.c").write_text(_LIBRARY)
+        out = folder / f"library{int(single)}.so"
+        compile_c(folder / "library.c", out, "-shared", "-fPIC", *(["-DTRACKER_FLOAT"] if single else []))
+        self._library = ctypes.CDLL(str(out))
+        self._library.begin.argtypes = [ctypes.c_double] * 2
+        self._library.feed.argtypes = [ctypes.c_double, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+        self._scale = plan.robot.time_scale
+        self.memory: int = self._library.memory()
+        self.restart()
+
+    def restart(self) -> None:
+        self._library.begin(0.01, 0.01)
+        self.state = np.zeros(STATES)
+
+    def feed(
+        self, now: float, pose: tuple[float, float, float] | None = None, seen_at: float | None = None
+    ) -> Advice:
+        own = None if pose is None else np.array(pose, dtype=float)
+        seen = now if seen_at is None else seen_at
+        out = np.zeros(5 + STATES)
+        address = None if own is None else own.ctypes.data
+        self._library.feed(now * self._scale, address, seen * self._scale, out.ctypes.data)
+        self.state = out[5:]
+        return Advice(int(out[0]), float(out[1]) / self._scale, bool(out[2]), bool(out[3]), float(out[4]))

@@ -1,0 +1,133 @@
+"""tracker.h: compiled without a warning, and the same orders as in Python, whatever it is fed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.controller import rounded, table_bytes, tracker_header
+from planner.path import circle
+from planner.plan import Plan, plan
+from planner.tracker import POSE, SLACK, Advice, Tracker
+from sim.model.presets import PRESETS
+from tests.planner.compiled import CompiledTracker, compile_c
+from tests.planner.swimming import Camera, rms, swim
+
+# A difference in the last digit grows, because each flip decides the later ones: 1e-13 to 1e-6 in 100 time units.
+SHORT, ROUNDING, GROWN = 60.0, 1e-11, 1e-4
+
+
+@cache
+def planned() -> Plan:
+    """A short path: see ROUNDING."""
+    share = np.linspace(0, 1, 200)
+    path = np.stack([2.4 * share, 0.3 * np.sin(np.pi * share)], 1)
+    return rounded(plan(path, PRESETS["paper-control"], minimum_dwell=0.6, point="head_tip"))
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> CompiledTracker:
+    return CompiledTracker(planned(), tmp_path_factory.mktemp("double"))
+
+
+class Both:
+    """Feeds the trackers in Python and in C, compares their answers, and holds them to the shortest dwell."""
+
+    def __init__(self, one: Tracker, other: CompiledTracker):
+        self.one, self.other, self.calls = one, other, 0
+        other.restart()
+        self.last, self.told, self.flipped_at = one.advice, other.feed(0.0), 0.0
+
+    def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Advice:
+        seen = now if seen_at is None else seen_at
+        flips = now >= self.last.flip_at - SLACK
+        own = max(now, self.told.flip_at) if flips else now  # late in a swim the two announce slightly other times
+        one, other = self.one.feed(now, pose, seen), self.other.feed(own, pose, seen)
+        assert (one.direction, one.finished, one.alarm) == (other.direction, other.finished, other.alarm)
+        near = ROUNDING if self.one._now < SHORT else GROWN
+        assert other.flip_at == pytest.approx(one.flip_at, rel=near)
+        assert other.error == pytest.approx(one.error, rel=near)
+        assert list(self.one.learned.values()) == pytest.approx(self.other.state.tolist(), rel=near, abs=near)
+        if one.direction == -self.last.direction != 0:  # the flip that was announced has happened
+            assert self.last.flip_at - self.flipped_at >= planned().minimum_dwell * (1 - 1e-12)
+            self.flipped_at = self.last.flip_at
+        self.calls, self.last, self.told = self.calls + 1, one, other
+        return one
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        Camera(),
+        Camera(gaps=1.0),
+        Camera(delay=2.0, gaps=0.2, wrong=0.1),
+        Camera(every=0.21, delay=0.9, gaps=0.5, wrong=0.3, rng=np.random.default_rng(1)),
+    ],
+    ids=["good", "none at all", "late, gaps, wrong", "often and bad"],
+)
+def test_the_same_orders_as_in_python(compiled: CompiledTracker, camera: Camera) -> None:
+    car = planned().vehicle
+    truth = replace(car, twist=car.twist * np.array([[0.97, 0.97, 1.04], [0.97, 0.97, 0.98]]))
+    both = Both(Tracker(planned()), compiled)
+    swim(both, planned(), truth, camera)
+    assert both.calls > 100
+    assert both.one.advice.finished
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_same_orders_from_nonsense(compiled: CompiledTracker, seed: int) -> None:
+    """Times that go back and jump, poses from anywhere, late by any time, no numbers."""
+    rng = np.random.default_rng(seed)
+    both = Both(Tracker(planned()), compiled)
+    odd = [math.nan, math.inf, -math.inf, 1e300, -1e300, 0.0]
+    now = 0.0
+    for _ in range(300):
+        now = max(now + float(rng.choice([0.1, 0.5, 3.0, -1.0]) * rng.random()), 0.0)
+        near = np.array(both.one._estimate.pose) + rng.normal(size=3) * rng.choice([0.01, 0.1, 3.0])
+        pose = tuple(float(v) if rng.random() < 0.97 else float(rng.choice(odd)) for v in near)
+        time = now if rng.random() < 0.95 else float(rng.choice(odd))
+        seen = float(now - rng.exponential(rng.choice([0.1, 2.0, 20.0])))
+        both.feed(time, pose if rng.random() < 0.7 else None, seen)  # type: ignore[arg-type]
+
+
+def test_single_precision_keeps_the_robot_on_its_path(tmp_path: Path) -> None:
+    single = CompiledTracker(planned(), tmp_path, single=True)
+    car = planned().vehicle
+    truth = replace(car, twist=car.twist * np.array([[0.97, 0.97, 1.04], [0.97, 0.97, 0.98]]))
+    distance, dwells = swim(single, planned(), truth, Camera(delay=1.0, gaps=0.2))
+    double, _ = swim(Tracker(planned()), planned(), truth, Camera(delay=1.0, gaps=0.2))
+    assert rms(distance) == pytest.approx(rms(double), rel=0.03)
+    assert min(dwells[:-1]) >= planned().minimum_dwell * (1 - 1e-6)
+
+
+def test_memory_is_what_the_documentation_says(tmp_path: Path, compiled: CompiledTracker) -> None:
+    single = CompiledTracker(planned(), tmp_path, single=True)
+    assert single.memory <= 900
+    assert compiled.memory <= 1600
+    assert table_bytes(planned()) == 2 * (2 * 33 * 101 * 3 + 2 * 101 * 3) + 12 * len(planned().guide.q)
+
+
+def test_the_example_in_the_header_compiles(tmp_path: Path) -> None:
+    text = tracker_header(planned())
+    (tmp_path / "tracker.h").write_text(text)
+    lines = [line[3:] for line in text.splitlines()[:16] if line.startswith(" *     ")]
+    code = "\n".join(line.partition(";")[0] + ";" for line in lines)
+    given = "double now = 0, seen = 0; tracker_real x = 0, y = 0, heading = 0;"
+    program = f'#include "tracker.h"\nint main(void){{ {given}\n{code}\nreturn advice.direction == 0; }}\n'
+    (tmp_path / "main.c").write_text(program)
+    compile_c(tmp_path / "main.c", tmp_path / "main")
+
+
+def test_sixteen_bits_are_enough() -> None:
+    """Path and lags as the header has them: the planned flips change by less than a millisecond."""
+    exact = plan(circle(2.0), PRESETS["paper-control"])
+    one, other = Tracker(exact), Tracker(rounded(exact))
+    for _ in range(200):
+        assert one.advice.flip_at == pytest.approx(other.advice.flip_at, abs=4e-4)
+        one.feed(one.advice.flip_at)
+        other.feed(other.advice.flip_at)
