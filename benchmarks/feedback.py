@@ -67,7 +67,7 @@ def both(case: Case, planned: Plan) -> tuple[Swum, Swum]:
 def draw(planned: Plan, found: list[tuple[Swum, Swum]]) -> Figure:
     """Tracks of the hardest case; distances from the path over the way in all cases."""
     figure = Figure(figsize=(10, 6.6), layout="constrained")
-    upper, lower = np.ravel(figure.subfigures(2, 1, height_ratios=(1.15, 1)))
+    upper, lower = np.asarray(figure.subfigures(2, 1, height_ratios=(1.15, 1)), dtype=object)
     ways = zip(found[-1], (REPLAYED, FEEDBACK), ("open loop", "with the tracker"), strict=True)
     for i, (swum, colour, name) in enumerate(ways):
         axes = upper.add_subplot(1, 2, 1 + i)
