@@ -33,12 +33,13 @@ main = program.main
     aliases=("close",),
 )
 def _calibrate(arguments: Namespace) -> None:
+    from calibration.corrected import corrected_toml
     from calibration.loop import calibrate, verdict_record
     from calibration.measurements import read_measurements
     from calibration.protocols import PROTOCOLS
     from calibration.report import write_report
-    from calibration.swimmer import Swimmer, corrected_robot
-    from sim.inputs import load_robot, robot_toml
+    from calibration.swimmer import Swimmer
+    from sim.inputs import load_robot
     from sim.io.files import write_text
 
     robot = load_robot(arguments.robot)
@@ -50,7 +51,7 @@ def _calibrate(arguments: Namespace) -> None:
     folder = Path(arguments.out)
     record = verdict_record(result, table=Path(arguments.table).name)
     write_report(result, data, folder / "report.html", title=Path(arguments.table).name)
-    write_text(folder / "corrected.toml", robot_toml(corrected_robot(robot, result.delivered)))
+    write_text(folder / "corrected.toml", corrected_toml(robot, result.delivered))
     write_text(folder / "verdict.json", json.dumps(record, indent=1) + "\n")
     print(result.sentence)
     print(

@@ -148,10 +148,11 @@ def _add_fit(page: Page, result: Verdict) -> None:
             break
     page.table(("parameter", "value", "95 % interval, by profile deviance"), rows)
     combination, error = least_determined(result.final)
+    delivered = result.delivered.parameters
     page.text(
         f"The runs determine {combination} worst: {100 * error:.1f} %. corrected.toml has the model fitted once "
         "more to all runs, with the locked ones: "
-        + ", ".join(f"{name} {result.delivered[name]:.4g}" for name in result.final.names if name not in given)
+        + ", ".join(f"{name} {delivered[name]:.4g}" for name in result.final.names if name not in given)
         + "."
     )
 

@@ -339,17 +339,3 @@ def robot_numbers(robot: Robot, parameters: Parameters) -> dict[str, Any]:
         if hasattr(robot, name):
             own[name] = float(parameters.get(name, robot_number(robot, name)))
     return own
-
-
-def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
-    """`robot` with fitted coefficients, numbers and effects; drift between runs and the observation are left
-    out.
-    """
-    own = robot_numbers(robot, parameters)
-    own["tail_length"] = robot.tail_length + parameters.get(LENGTH, 0.0)
-    sizes = {
-        name: float(value)
-        for name, value in parameters.items()
-        if name in catalogue() and value != catalogue()[name].null
-    }
-    return replace(robot, **own, effects={**robot.effects, **sizes})

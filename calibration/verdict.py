@@ -15,6 +15,7 @@ from calibration.discriminate import Batch, NextRun
 from calibration.fit import Fit
 from calibration.generic import Generic
 from calibration.imitation import DOUBT
+from calibration.locked import Delivered
 from calibration.misfit import DRAWS, Misfit
 from calibration.prior import Pull, likeliest, rivals
 from sim.arrays import Flags, Floats
@@ -55,7 +56,7 @@ class Verdict:
     error_after_interval: tuple[float, float]
     noise_ceiling: float
     locked_p: float  # agreement of the locked runs with the final model
-    delivered: dict[str, float]  # parameters of the final model fitted to all runs
+    delivered: Delivered  # the final model fitted to all runs
     errors_by_output: dict[str, dict[str, float]]
     locked: str  # names of the sessions
     used: Flags
@@ -170,7 +171,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         name: {
             "value": final.parameters[name],
             "interval": list(result.final_intervals[name]),
-            "value_all_runs": result.delivered[name],
+            "value_all_runs": result.delivered.parameters[name],
         }
         for name in final.names
     }

@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.corrected import corrected_robot
 from calibration.fit import fit
 from calibration.locked import middle_session
 from calibration.loop import calibrate
 from calibration.measurements import read_measurements
 from calibration.misfit import check_misfit
 from calibration.model import start_values
-from calibration.swimmer import corrected_robot
 from tests.calibration import toy
 from tests.calibration.toy_tables import START, TRUTH, closed, toy_swimmer, toy_table
 
