@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from calibration.fit import Fit
 from calibration.locked import middle_session
 from calibration.measurements import Measurements, read_measurements
 from calibration.misfit import TESTABLE
@@ -74,6 +75,9 @@ class Linear:
     def possible(self) -> tuple[Linear, list[dict[str, Any]]]:
         """The same runs again."""
         return self, [{"run": i} for i in range(len(self.runs))]
+
+    def predictive(self, base: Fit, used: Flags, rows: Flags, test: Flags) -> None:
+        """None: the stand-in cannot be corrected."""
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """The start as it is."""

@@ -4,6 +4,9 @@ The covariance is that of the fit to all runs. It goes into the table [calibrati
 (`planner.knowledge`). What belongs to the way of measuring is left out: the camera, the zero of the heading, the
 tachometer, the tracked point, slip of the motor and drift between runs. The errors of what is kept contain the
 errors of these. A current in the tank is stated on its own.
+
+Where no effect explains the runs, a correction goes into the table [correction] (`sim.model.correction`). Its
+uncertainty is that of its weights and of what it leaves beyond noise, at the robot of the file.
 """
 
 from __future__ import annotations
@@ -16,12 +19,23 @@ import numpy as np
 from calibration.given import LENGTH
 from calibration.influences import CURRENT
 from calibration.locked import Delivered
-from calibration.model import Parameters
+from calibration.model import Parameters, Predictive
+from calibration.predictive import Corrected
 from calibration.swimmer import robot_numbers
 from planner.knowledge import COEFFICIENTS, NUMBERS, Knowledge, knowledge_toml
 from sim.effects import catalogue
 from sim.inputs import robot_toml
+from sim.io.errors import InputError
 from sim.model.robot import Robot
+
+
+def check_given(robot: Robot) -> None:
+    """Refuse a robot that already has a correction: its table of runs belongs to the robot as given."""
+    if robot.correction is not None:
+        raise InputError(
+            f"robot {robot.name!r} has a table [correction] from an earlier calibration: calibrate the robot "
+            "as it was given, with the runs of both"
+        )
 
 
 def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
@@ -63,7 +77,28 @@ def knowledge_of(robot: Robot, delivered: Delivered) -> Knowledge:
     )
 
 
-def corrected_toml(robot: Robot, delivered: Delivered) -> str:
-    """The text of corrected.toml."""
+def corrected_toml(robot: Robot, delivered: Delivered, predictive: Predictive | None = None) -> str:
+    """The text of corrected.toml; with the correction of `predictive` where nothing explains the runs."""
     corrected = corrected_robot(robot, delivered.parameters)
-    return robot_toml(corrected) + "\n" + knowledge_toml(knowledge_of(robot, delivered))
+    known = knowledge_of(robot, delivered)
+    if predictive is not None:
+        learnt: Corrected = predictive.content
+        known = _with_correction(known, learnt, corrected)
+        corrected = replace(corrected, correction=learnt.correction)
+    return robot_toml(corrected) + "\n" + knowledge_toml(known)
+
+
+def _with_correction(known: Knowledge, learnt: Corrected, robot: Robot) -> Knowledge:
+    """With the uncertainty of the correction at this robot; as it is if the robot is outside the runs."""
+    values = robot.group_values()
+    try:
+        learnt.correction.applied(values)
+    except InputError:
+        return known
+    knobs = tuple(learnt.correction.weights)
+    names = (*known.names, *(name for name in knobs if name not in known.names))
+    covariance = np.zeros((len(names), len(names)))
+    covariance[: len(known.names), : len(known.names)] = known.covariance
+    places = [names.index(name) for name in knobs]
+    covariance[np.ix_(places, places)] += learnt.knob_covariance(values)
+    return replace(known, names=names, covariance=covariance)

@@ -76,8 +76,8 @@ class Delivered:
     covariance: Floats  # (p, p); a 95 % interval is 1.96 standard deviations to each side
 
 
-def fitted_to_all(model: Model, fitted: Fit, rows: Flags) -> Delivered:
-    """A fitted model after one linear step that fits it to all runs in `rows`.
+def fitted_to_all(model: Model, fitted: Fit, rows: Flags, *, moved: bool = True) -> Delivered:
+    """A fitted model after one linear step that fits it to all runs in `rows`; without the step if not `moved`.
 
     Its covariance allows for the estimates of S and ρ, as the intervals of the fit do.
     """
@@ -88,4 +88,5 @@ def fitted_to_all(model: Model, fitted: Fit, rows: Flags) -> Delivered:
     found = least_squares(products, passes=3)
     wider = student.ppf(0.975, fitted.freedom) / normal.ppf(0.975)
     covariance = fitted.inflation * found.covariance * np.outer(wider, wider)
-    return Delivered(stepped(fitted.fitted, fitted.parameters, found.step), fitted.fitted, covariance)
+    step = found.step if moved else np.zeros_like(found.step)
+    return Delivered(stepped(fitted.fitted, fitted.parameters, step), fitted.fitted, covariance)

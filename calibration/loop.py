@@ -12,6 +12,7 @@
 it), "ambiguous" (several do and the runs
    cannot tell them apart), "unexplained" (there is a departure, and no effect in the catalogue explains it).
 7. If no single effect explains it, pairs are tried. If several explain it, next runs that would tell them apart.
+   If nothing explains it, the best predictive model, for steering (`calibration.predictive`).
 8. Errors on the locked runs: as given, calibrated, with the effect, with a generic correction of the calibrated
    model (`calibration.generic`), and from noise alone. Whether the locked runs agree with the final model
    (`calibration.locked`).
@@ -43,7 +44,7 @@ from calibration.generic import correct
 from calibration.gross import gross_errors
 from calibration.locked import error_interval, errors, fitted_to_all, locked_p_value, middle_session
 from calibration.misfit import DRAWS, Misfit, check_misfit
-from calibration.model import Model, Parameter, Runs, start_values
+from calibration.model import Model, Parameter, Predictive, Runs, start_values
 from calibration.prior import pulls
 from calibration.profile import profile_intervals
 from calibration.sessions import divided, groups, limits
@@ -143,7 +144,6 @@ def calibrate(
     if final is not found.base:
         final_intervals = profile_intervals(model, final, task.used, title=task.title("intervals"))
     generic = correct(task.runs, found.base.prediction, task.used)
-    error = _errors(task, found, found.base.prediction + generic.correction)
     noise = found.base.noise.run
     wanted, batch = _next_runs(task, found)
     verdict = "none"
@@ -151,6 +151,10 @@ def calibrate(
         verdict = "number"
     elif found.misfit.p_value < level:
         verdict = ("unexplained", "effect", "ambiguous")[min(len(found.best), 2)]
+    predictive = None
+    if verdict == "unexplained":
+        predictive = model.predictive(found.base, task.used, ~task.gross, task.test)
+    error = _errors(task, found, found.base.prediction + generic.correction, predictive)
     return Verdict(
         verdict=verdict,
         effects=tuple(dict.fromkeys(e.name for c in found.best for e in (*c.beside, c.effect))),
@@ -164,17 +168,19 @@ def calibrate(
         numbers=pulls(final, model.given),
         instead=found.instead,
         generic=generic,
+        predictive=predictive,
         next_runs=wanted,
         next_batch=batch,
         error_uncalibrated=error["uncalibrated"][0],
         error_before=error["before"][0],
         error_generic=error["generic"][0],
+        error_predictive=error["predictive"][0] if predictive else None,
         error_after=error["after"][0],
         error_after_interval=error_interval(task.runs, final.prediction, task.test, seed),
         noise_ceiling=float(np.sqrt(np.trace(noise) / len(noise))),
         errors_by_output={name: by_output for name, (_, by_output) in error.items()},
         locked_p=locked_p_value(final, task.runs, task.test, seed=seed + 3),
-        delivered=fitted_to_all(model, final, ~task.gross),
+        delivered=fitted_to_all(model, final, ~task.gross, moved=predictive is None),
         locked=task.locked_names,
         used=task.used,
         uncalibrated=task.uncalibrated,
@@ -247,14 +253,18 @@ def _as_good(found: list[Candidate], number: Fit, level: float) -> list[Candidat
     return [found[place] for _, place in sorted(near)]
 
 
-def _errors(task: _Task, found: _Explained, generic: Floats) -> dict[str, tuple[float, dict[str, float]]]:
-    """Errors of four models on the locked runs: all outputs together, and by output."""
+def _errors(
+    task: _Task, found: _Explained, generic: Floats, predictive: Predictive | None
+) -> dict[str, tuple[float, dict[str, float]]]:
+    """Errors of the models on the locked runs: all outputs together, and by output."""
     predictions = {
         "uncalibrated": task.uncalibrated,
         "before": found.base.prediction,
         "after": found.final.prediction,
         "generic": generic,
     }
+    if predictive is not None:
+        predictions["predictive"] = predictive.prediction
     return {name: errors(task.runs, prediction, task.test) for name, prediction in predictions.items()}
 
 

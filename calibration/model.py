@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from sim.arrays import Flags, Floats, Integers
+
+if TYPE_CHECKING:
+    from calibration.fit import Fit
 
 Parameters = Mapping[str, float]
 
@@ -59,6 +62,15 @@ class Runs:
         """The runs in `rows` (n,)."""
         own: dict[str, Any] = {k: v[rows] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         return replace(self, **own)
+
+
+@dataclass(frozen=True)
+class Predictive:
+    """A model that predicts runs that no effect explains."""
+
+    prediction: Floats  # (n, k)
+    terms: tuple[str, ...]  # that it depends on, in words
+    content: Any  # what is handed on
 
 
 class Model(Protocol):
@@ -110,6 +122,15 @@ class Model(Protocol):
 
     def possible(self) -> tuple[Model, list[dict[str, Any]]]:
         """A model of runs that can be made next, and their settings."""
+        ...
+
+    def predictive(self, base: Fit, used: Flags, rows: Flags, test: Flags) -> Predictive | None:
+        """The best predictive model where no effect explains the runs, if there is one that goes beyond them.
+
+        Args:
+            base: the calibrated model.
+            used, rows, test: (n,) runs to learn from, to learn from in the end, and to state the error on.
+        """
         ...
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:

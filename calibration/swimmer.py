@@ -11,14 +11,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from calibration.given import CAMERA, GROUPS, HEADING, LENGTH, POWERS, TACHOMETER, given_numbers, robot_number
 from calibration.influences import CURRENT, SLIP, TRACKED_POINT, Influence, influences, reason_untestable
 from calibration.measurements import Measurements
-from calibration.model import Parameter, Parameters, by_differences
+from calibration.model import Parameter, Parameters, Predictive, by_differences
 from calibration.noise import Noise, repeat_covariance
 from calibration.observation import Observation
 from calibration.plausible import check_inputs, check_outputs
@@ -31,6 +31,9 @@ from sim.motion.sensitivity import Sensitivities
 from sim.solve.refinement import FEW, MANY
 from surrogate.export import load
 from surrogate.lookup import Lookup
+
+if TYPE_CHECKING:
+    from calibration.fit import Fit
 
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
 SANE = (0.1, 20.0)  # range of the coefficients; at its ends the model lacks something
@@ -243,6 +246,17 @@ class Swimmer:
             rows=np.arange(count), limits=(), tails=grid[:, 0], length=grid[:, 1], omega=grid[:, 2], noted=noted,
         )  # fmt: skip
         return replace(self, runs=own), settings
+
+    def robots(self, parameters: Parameters) -> tuple[list[Robot], Integers]:
+        """The robots that are simulated for the runs at `parameters`, and the place of each run among them."""
+        runs, place = self._conditions(parameters)
+        return [run.robot for run in runs], place
+
+    def predictive(self, base: Fit, used: Flags, rows: Flags, test: Flags) -> Predictive | None:
+        """A correction of the head's load (`calibration.predictive`)."""
+        from calibration.predictive import predictive
+
+        return predictive(self, base, used, rows, test)
 
     def _inside(self, lookup: Lookup, parameters: Parameters) -> Flags:
         """Which runs (n,) the look-up table covers at `parameters`."""

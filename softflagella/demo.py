@@ -171,7 +171,7 @@ def _close(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     verdict = calibrate(Swimmer(start, data))
     record = verdict_record(verdict, table="table.csv")
     write_text(place / "verdict.json", json.dumps(record, indent=1) + "\n")
-    write_text(place / "corrected.toml", corrected_toml(start, verdict.delivered))
+    write_text(place / "corrected.toml", corrected_toml(start, verdict.delivered, verdict.predictive))
     print(f"  {name}: {verdict.sentence}")
     return verdict, data
 
