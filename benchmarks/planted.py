@@ -132,7 +132,8 @@ def stand_in(which: Design = PAPER) -> Linear:
     names = [p.name for p in (*model.coefficients, *model.given, *model.effects)]
     prediction, table = model.derivatives(start_values(model), names)
     J, G, D = np.split(table, np.cumsum([len(model.coefficients), len(model.given)]), -1)
-    return Linear(model.runs, model.coefficients, model.given, model.effects, prediction, J, G, D, {})
+    effects = tuple(replace(e, second=None) for e in model.effects)  # it is linear in the sizes alone
+    return Linear(model.runs, model.coefficients, model.given, effects, prediction, J, G, D, {})
 
 
 def scatter(runs: Runs, outputs: int, seed: int, *, heavy: bool = False) -> Floats:

@@ -37,6 +37,7 @@ from calibration.attribute import (
     pairs,
     with_imitability,
 )
+from calibration.directions import directions
 from calibration.discriminate import Batch, NextRun, next_runs
 from calibration.fit import Fit, fit
 from calibration.freed import Freed, freed
@@ -210,8 +211,7 @@ def _explain(task: _Task) -> _Explained:
     guess = model.guess(dict(task.start), used)
     coefficients = tuple(p.name for p in (*model.coefficients, *model.given))
     base = fit(model, guess, coefficients, used, title=task.title("fit"))
-    names = [e.name for e in model.effects]
-    along = model.derivatives(base.parameters, names, title=task.title("derivatives"))[1]
+    along = directions(model, base.parameters, model.effects, title=task.title("derivatives"))
     misfit = check_misfit(base, task.runs, used, along, level=level, seed=seed)
     without = freed(model, base, used, along, level=level, seed=seed, draws=DRAWS)
     if misfit.p_value >= level and without is None:

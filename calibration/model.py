@@ -38,6 +38,8 @@ class Parameter:
     sigma: float | None = None  # of a number as given: one standard deviation on its own scale; None: free
     plausible: tuple[float, float] | None = None  # sizes of an effect that its source allows; None: all
     shown: float = 1.0  # factor to the unit in which a change is shown
+    second: Parameter | None = None  # of an effect: its second number, which shows only with the effect
+    grid: tuple[float, ...] = ()  # of a second number: values at which the effect is looked for
 
 
 @dataclass(frozen=True)
@@ -140,12 +142,17 @@ class Model(Protocol):
 
 def start_values(model: Model) -> dict[str, float]:
     """Every parameter as given: effects at their null."""
-    return {p.name: p.start for p in (*model.coefficients, *model.given, *model.effects)}
+    return {p.name: p.start for p in _every(model)}
 
 
 def parameter(model: Model, name: str) -> Parameter:
     """The coefficient, number or effect called `name`."""
-    return next(p for p in (*model.coefficients, *model.given, *model.effects) if p.name == name)
+    return next(p for p in _every(model) if p.name == name)
+
+
+def _every(model: Model) -> tuple[Parameter, ...]:
+    seconds = (e.second for e in model.effects if e.second)
+    return (*model.coefficients, *model.given, *model.effects, *seconds)
 
 
 def moved(one: Parameter, value: float, by: float) -> float:

@@ -97,6 +97,13 @@ class Swimmer:
         return {i.parameter.title: why for i in influences().values() if (why := self._reason(i))}
 
     @cached_property
+    def _seconds(self) -> dict[str, Influence]:
+        """Second numbers of effects, by name."""
+        owners = [i for i in self._influences.values() if i.parameter.second]
+        return {i.parameter.second.name: Influence(i.parameter.second, i.parameter.second.name, None, i.odd)
+                for i in owners if i.parameter.second}  # fmt: skip
+
+    @cached_property
     def _influences(self) -> dict[str, Influence]:
         return {name: i for name, i in influences().items() if not self._reason(i)}
 
@@ -132,10 +139,12 @@ class Swimmer:
 
         If a run has no direct solution: by differences of motions that are stepped in time, or NaN if `quick`.
         """
-        influences = {name: self._influences.get(name) for name in names}
+        influences = {name: self._influences.get(name) or self._seconds.get(name) for name in names}
         odd = any(i is not None and i.odd for i in influences.values())
         runs, place = self._conditions(parameters, signed=odd)
         columns = self._columns(runs, [parameters])
+        for second in (i.parameter.second for i in influences.values() if i and i.parameter.second):
+            columns.setdefault(second.name, np.full(len(runs), float(parameters.get(second.name, second.start))))
         moves = {name: _moves(name, influence) for name, influence in influences.items()}
         wanted = tuple(dict.fromkeys(move for group in moves.values() for move in group))
         # Effects at their null may need more phases than the motion; effects that are present have them already.
@@ -304,6 +313,8 @@ class Swimmer:
                 before = self.robot.effects.get(influence.effect or "", before)
             if influence.effect is not None:
                 effects[influence.effect] = before + by
+                if second := influence.parameter.second:
+                    effects[second.name] = parameters.get(second.name, second.start)
             elif influence.name in CURRENT:
                 current += by
         robot = replace(
@@ -316,7 +327,10 @@ class Swimmer:
 
     def _columns(self, runs: list[_Run], sets: Sequence[Parameters]) -> dict[str, Floats]:
         """Runs as columns for the simulator, with every effect that is present in any of the sets."""
-        names = {i.effect for parameters in sets for i in self._at_work(parameters) if i.effect}
+        work = [i for parameters in sets for i in self._at_work(parameters)]
+        names = {i.effect for i in work if i.effect} | {
+            i.parameter.second.name for i in work if i.parameter.second
+        }
         nulls = {name: catalogue()[name].null for name in sorted(names)}
         rows = [{**nulls, **run.robot.group_values()} for run in runs]
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
