@@ -7,8 +7,8 @@ not locked, by generalised least squares with the same noise. What differs is wh
     stepwise                    one more effect as long as BIC falls
     generic correction          none; a regression of the outputs on the inputs
 
-Tables are those of the linear stand-in (`benchmarks.given`). A claim is wrong if the truth is not among the sets that
-are named. "Error" is that on the locked runs over the noise of a run, median.
+Tables are those of the linear stand-in (`benchmarks.given`). A claim is wrong if the truth is not among the
+sets that are named. "Error" is that on the locked runs over the noise of a run, median.
 
 Usage: python -m benchmarks.baselines [TABLES]      a table on the screen
 """
