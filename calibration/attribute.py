@@ -39,7 +39,7 @@ _CURVED = 0.3  # share of the best score's z² below which an effect is not refi
 _FAR = 6.0  # standard deviations of χ²
 _LEAVES_MORE = "leaves far more than noise, by its score"
 _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
-_FIRST = 3  # number of single effects to which a second one is added
+FIRST = 3  # number of single effects to which a second one is added
 INDISTINGUISHABLE = 6.63  # χ² with one degree of freedom, 99 %
 
 
@@ -208,7 +208,7 @@ def beside_wrong_numbers(
             if worst is not None:
                 reach.append((one.refit.deviance - worst.z**2, one.effect.name, one))
     again = []
-    for _, name, one in sorted(reach, key=lambda r: r[:2])[:_FIRST]:
+    for _, name, one in sorted(reach, key=lambda r: r[:2])[:FIRST]:
         assert one.refit is not None
         refit = free_numbers(model, one.refit, used)
         others = along.without(names.index(name))
@@ -229,7 +229,7 @@ def pairs(
     """Second effects, added to the best fits with a single one."""
     refitted = [c for c in found if c.refit is not None]
     second: list[Candidate] = []
-    for first in sorted(refitted, key=_deviance)[:_FIRST]:
+    for first in sorted(refitted, key=_deviance)[:FIRST]:
         assert first.refit is not None
         title = "second effects" if progress else ""
         others = tuple(e for e in model.effects if e.name != first.effect.name)

@@ -22,11 +22,14 @@ it), "ambiguous" (several do and the runs
 from __future__ import annotations
 
 import math
+import sys
+import time
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calibration.attribute import (
+    FIRST,
     INDISTINGUISHABLE,
     Candidate,
     beside_wrong_numbers,
@@ -44,7 +47,7 @@ from calibration.freed import Freed, freed
 from calibration.generic import correct
 from calibration.gross import gross_errors
 from calibration.locked import error_interval, errors, fitted_to_all, locked_p_value, middle_session
-from calibration.misfit import DRAWS, Misfit, check_misfit
+from calibration.misfit import DRAWS, TESTABLE, Misfit, check_misfit
 from calibration.model import Model, Parameter, Predictive, Runs, start_values
 from calibration.prior import pulls
 from calibration.profile import profile_intervals
@@ -208,10 +211,13 @@ def _prepare(model: Model, locked: Flags | None, level: float, seed: int, progre
 def _explain(task: _Task) -> _Explained:
     """Fit the coefficients and test the residual. If it is more than noise, examine single effects, then pairs."""
     model, used, level, seed = task.model, task.used, task.level, task.seed
+    began = time.monotonic()
     guess = model.guess(dict(task.start), used)
     coefficients = tuple(p.name for p in (*model.coefficients, *model.given))
     base = fit(model, guess, coefficients, used, title=task.title("fit"))
+    fitted = time.monotonic()
     along = directions(model, base.parameters, model.effects, title=task.title("derivatives"))
+    derived = time.monotonic()
     misfit = check_misfit(base, task.runs, used, along, level=level, seed=seed)
     without = freed(model, base, used, along, level=level, seed=seed, draws=DRAWS)
     if misfit.p_value >= level and without is None:
@@ -220,6 +226,8 @@ def _explain(task: _Task) -> _Explained:
     if without is not None:  # every effect that may explain as much as the wrong number does
         rivalling = math.sqrt(max(base.deviance - without.fit.deviance - INDISTINGUISHABLE, 1.0))
         tested = replace(misfit, critical_z=min(misfit.critical_z, rivalling))
+    if task.progress:
+        print(_forecast(tested, fitted - began, derived - fitted), file=sys.stderr)
     found = examine(
         model, base, tested, model.effects, along, used, task.start, level=level, seed=seed, progress=task.progress
     )
@@ -234,6 +242,22 @@ def _explain(task: _Task) -> _Explained:
         best = explaining(found_pairs)
     best = with_imitability(model, best, base, used, seed)
     return _Explained(base, misfit, tuple(found) or _unexamined(misfit, model.effects), tuple(best))
+
+
+def _forecast(misfit: Misfit, of_a_fit: float, of_directions: float) -> str:
+    """How long the effects will take, in words, by how long the first fit and the derivatives took [s]."""
+    scores = misfit.scores
+    count = int(((np.abs(scores.z) >= misfit.critical_z) & (scores.survived >= TESTABLE)).sum())
+    single = count * of_a_fit
+    more = FIRST * (of_directions + single)
+    return (
+        f"there is more than noise: {count} effects to fit, about {_duration(single)}; if none of them explains "
+        f"the runs, pairs follow, {_duration(more)} at most, mostly much less"
+    )
+
+
+def _duration(seconds: float) -> str:
+    return f"{max(seconds, 1):.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
 def _better(best: list[Candidate], number: Fit) -> bool:
