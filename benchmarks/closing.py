@@ -15,11 +15,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from calibration.corrected import corrected_robot
 from calibration.locked import fitted_to_all
 from calibration.loop import calibrate
 from calibration.measurements import read_measurements
 from calibration.steer import gap_closed, steer
-from calibration.swimmer import Swimmer, corrected_robot
+from calibration.swimmer import Swimmer
 from calibration.synthetic import make_table
 from planner.path import polygon
 from sim.model.presets import PRESETS
@@ -47,11 +48,10 @@ def main(robots: str = "10") -> None:
         model = Swimmer(start, read_measurements(table))
         verdict = calibrate(model, progress=False)
         swimmer = replace(truth, tails=2).with_motor(10.0)
+        before = fitted_to_all(model, verdict.base, np.ones(len(table), bool))
         models = {
-            "before": corrected_robot(
-                replace(swimmer, effects={}), fitted_to_all(model, verdict.base, np.ones(len(table), bool))
-            ),
-            "after": corrected_robot(replace(swimmer, effects={}), verdict.delivered),
+            "before": corrected_robot(replace(swimmer, effects={}), before.parameters),
+            "after": corrected_robot(replace(swimmer, effects={}), verdict.delivered.parameters),
             "truth": swimmer,
         }
         rms = [one.error.rms for one in steer(models, swimmer, polygon(4, 3.0)).values()]

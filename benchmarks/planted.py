@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from calibration.fit import Fit
 from calibration.locked import middle_session
 from calibration.measurements import Measurements, read_measurements
 from calibration.misfit import TESTABLE
@@ -75,6 +76,9 @@ class Linear:
         """The same runs again."""
         return self, [{"run": i} for i in range(len(self.runs))]
 
+    def predictive(self, base: Fit, used: Flags, rows: Flags, test: Flags) -> None:
+        """None: the stand-in cannot be corrected."""
+
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """The start as it is."""
         return start
@@ -128,7 +132,8 @@ def stand_in(which: Design = PAPER) -> Linear:
     names = [p.name for p in (*model.coefficients, *model.given, *model.effects)]
     prediction, table = model.derivatives(start_values(model), names)
     J, G, D = np.split(table, np.cumsum([len(model.coefficients), len(model.given)]), -1)
-    return Linear(model.runs, model.coefficients, model.given, model.effects, prediction, J, G, D, {})
+    effects = tuple(replace(e, second=None) for e in model.effects)  # it is linear in the sizes alone
+    return Linear(model.runs, model.coefficients, model.given, effects, prediction, J, G, D, {})
 
 
 def scatter(runs: Runs, outputs: int, seed: int, *, heavy: bool = False) -> Floats:

@@ -33,15 +33,17 @@ main = program.main
     aliases=("close",),
 )
 def _calibrate(arguments: Namespace) -> None:
+    from calibration.corrected import check_given, corrected_toml
     from calibration.loop import calibrate, verdict_record
     from calibration.measurements import read_measurements
     from calibration.protocols import PROTOCOLS
     from calibration.report import write_report
-    from calibration.swimmer import Swimmer, corrected_robot
-    from sim.inputs import load_robot, robot_toml
+    from calibration.swimmer import Swimmer
+    from sim.inputs import load_robot
     from sim.io.files import write_text
 
     robot = load_robot(arguments.robot)
+    check_given(robot)
     data = read_measurements(arguments.table)
     for line in data.set_aside:
         print(f"set aside: {line}", file=sys.stderr)
@@ -50,7 +52,7 @@ def _calibrate(arguments: Namespace) -> None:
     folder = Path(arguments.out)
     record = verdict_record(result, table=Path(arguments.table).name)
     write_report(result, data, folder / "report.html", title=Path(arguments.table).name)
-    write_text(folder / "corrected.toml", robot_toml(corrected_robot(robot, result.delivered)))
+    write_text(folder / "corrected.toml", corrected_toml(robot, result.delivered, result.predictive))
     write_text(folder / "verdict.json", json.dumps(record, indent=1) + "\n")
     print(result.sentence)
     print(

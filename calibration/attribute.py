@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from tqdm import tqdm
 
+from calibration.directions import Directions, directions
 from calibration.fit import Fit, fit
 from calibration.freed import free_numbers
 from calibration.imitation import absorbable_shares, imitability
@@ -38,7 +39,7 @@ _CURVED = 0.3  # share of the best score's z² below which an effect is not refi
 _FAR = 6.0  # standard deviations of χ²
 _LEAVES_MORE = "leaves far more than noise, by its score"
 _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
-_FIRST = 3  # number of single effects to which a second one is added
+FIRST = 3  # number of single effects to which a second one is added
 INDISTINGUISHABLE = 6.63  # χ² with one degree of freedom, 99 %
 
 
@@ -74,7 +75,7 @@ def examine(
     base: Fit,
     misfit: Misfit,
     effects: tuple[Parameter, ...],
-    along: Floats,
+    along: Directions,
     used: Flags,
     given: Parameters,
     *,
@@ -87,7 +88,7 @@ def examine(
 
     Args:
         base: the fit without them; it has `beside`.
-        along: ∂f/∂ε of `effects` there, (n, k, e).
+        along: directions of `effects` there.
     """
     found = []
     local = inside(model, base.parameters)
@@ -117,17 +118,19 @@ def examine(
                 Candidate(effect, beside, z, survived, detectable, exact, None, None, 0.0, 0.0, _LEAVES_MORE)
             )
             continue
-        guess = min(max(guess, low), high)
+        own = {effect.name: min(max(guess, low), high)}
+        if effect.second is not None:
+            own[effect.second.name] = float(misfit.second[j]) if local else effect.second.start
         refit = fit(
             model,
-            {**(base.parameters if local else given), effect.name: guess},
-            (*base.names, effect.name),
+            {**(base.parameters if local else given), **own},
+            (*base.names, *own),
             used,
             free=free,
             title="",
         )
         refit = replace(refit, wrong=base.wrong)
-        others = np.delete(along, j, -1)
+        others = along.without(j)
         one = Candidate(effect, beside, z, survived, detectable, exact, refit, None, 0.0, 0.0, "")
         found.append(_judged(model, one, base, refit, used, others, level, seed))
     return found
@@ -151,18 +154,18 @@ def detectable_sizes(misfit: Misfit, place: int) -> tuple[float, float]:
 
 
 def _judged(
-    model: Model, one: Candidate, base: Fit, refit: Fit, used: Flags, others: Floats, level: float, seed: int
+    model: Model, one: Candidate, base: Fit, refit: Fit, used: Flags, others: Directions, level: float, seed: int
 ) -> Candidate:
     """The candidate with a refit, and the reason why that is kept or not.
 
     Args:
-        others: ∂f/∂ε of all other effects, (n, k, e).
+        others: directions of all other effects.
     """
     after = check_misfit(
         refit, model.runs, used, others, level=level, seed=seed + 1, draws=_DRAWS, decide=level / 2
     )
     gain, error = _session_gain(model, base, refit, used)
-    ends = refit.interval(one.effect.name)
+    ends = interval_at_second(refit, one.effect)
     reason = "kept"
     if not refit.arrived:
         reason = "its fit does not arrive at a minimum"
@@ -175,13 +178,27 @@ def _judged(
     return replace(one, refit=refit, refit_misfit=after, gain=gain, gain_error=error, verdict=reason)
 
 
+def interval_at_second(refit: Fit, effect: Parameter) -> tuple[float, float]:
+    """95 % interval of an effect, with its second number as it was fitted.
+
+    A weak effect's size and second number cannot be told apart, and the interval over both would hold the null.
+    """
+    if effect.second is None:
+        return refit.interval(effect.name)
+    i, j = refit.names.index(effect.name), refit.names.index(effect.second.name)
+    V = refit.covariance
+    share = 1 - V[i, j] ** 2 / (V[i, i] * V[j, j])
+    half = refit.half_width(i) * math.sqrt(max(share, 0.0))
+    return refit.parameters[effect.name] - half, refit.parameters[effect.name] + half
+
+
 def beside_wrong_numbers(
-    model: Model, base: Fit, found: list[Candidate], used: Flags, along: Floats, *, level: float, seed: int
+    model: Model, base: Fit, found: list[Candidate], used: Flags, along: Directions, *, level: float, seed: int
 ) -> list[Candidate]:
     """The best few refits once more, without the priors of numbers that they contradict.
 
     Args:
-        along: ∂f/∂ε of `model.effects`, (n, k, e).
+        along: directions of `model.effects`.
     """
     reach = []
     names = [e.name for e in model.effects]
@@ -191,10 +208,10 @@ def beside_wrong_numbers(
             if worst is not None:
                 reach.append((one.refit.deviance - worst.z**2, one.effect.name, one))
     again = []
-    for _, name, one in sorted(reach, key=lambda r: r[:2])[:_FIRST]:
+    for _, name, one in sorted(reach, key=lambda r: r[:2])[:FIRST]:
         assert one.refit is not None
         refit = free_numbers(model, one.refit, used)
-        others = np.delete(along, names.index(name), -1)
+        others = along.without(names.index(name))
         again.append(_judged(model, one, base, refit, used, others, level, seed))
     return again
 
@@ -212,11 +229,11 @@ def pairs(
     """Second effects, added to the best fits with a single one."""
     refitted = [c for c in found if c.refit is not None]
     second: list[Candidate] = []
-    for first in sorted(refitted, key=_deviance)[:_FIRST]:
+    for first in sorted(refitted, key=_deviance)[:FIRST]:
         assert first.refit is not None
         title = "second effects" if progress else ""
         others = tuple(e for e in model.effects if e.name != first.effect.name)
-        along = model.derivatives(first.refit.parameters, [e.name for e in others], title=title)[1]
+        along = directions(model, first.refit.parameters, others, title=title)
         misfit = check_misfit(first.refit, model.runs, used, along, level=level, seed=seed + 2)
         second += examine(
             model,
@@ -257,7 +274,8 @@ def with_imitability(model: Model, best: list[Candidate], base: Fit, used: Flags
     for one in best:
         assert one.refit is not None
         strength = math.sqrt(max(base.deviance - one.refit.deviance, 0.0))
-        names = tuple(e.name for e in one.claimed)
+        seconds = (e.second.name for e in one.claimed if e.second)
+        names = (*(e.name for e in one.claimed), *seconds)
         shares = absorbable_shares(one.refit, model.runs, used, names, seed=seed)
         found.append(replace(one, imitable=imitability(shares, strength)))
     return found
@@ -270,13 +288,15 @@ def inside(model: Model, fitted: Parameters) -> bool:
 
 def explaining(found: list[Candidate]) -> list[Candidate]:
     """Kept effects that the runs cannot tell from the best one, best first."""
-    kept = sorted((c for c in found if c.kept and c.refit), key=lambda c: _deviance(c))
+    kept = sorted((c for c in found if c.kept and c.refit), key=_deviance)
     return [c for c in kept if _deviance(c) - _deviance(kept[0]) < INDISTINGUISHABLE]
 
 
 def _deviance(candidate: Candidate) -> float:
+    """Of the refit, and what second numbers cost: each may gain as much by chance."""
     assert candidate.refit is not None
-    return candidate.refit.deviance
+    seconds = sum(e.second is not None for e in candidate.claimed)
+    return candidate.refit.deviance + INDISTINGUISHABLE * seconds
 
 
 def _session_gain(model: Model, base: Fit, refit: Fit, used: Flags) -> tuple[float, float]:

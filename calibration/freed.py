@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from calibration.directions import Directions
 from calibration.fit import Fit, fit
 from calibration.misfit import Misfit, check_misfit
 from calibration.model import Model
 from calibration.prior import likeliest, pulls, rivals
-from sim.arrays import Flags, Floats
+from sim.arrays import Flags
 
 _MOST = 2  # numbers that may be wrong together
 
@@ -42,12 +43,12 @@ def free_numbers(model: Model, fitted: Fit, used: Flags) -> Fit:
 
 
 def freed(
-    model: Model, base: Fit, used: Flags, along: Floats, *, level: float, seed: int, draws: int
+    model: Model, base: Fit, used: Flags, along: Directions, *, level: float, seed: int, draws: int
 ) -> Freed | None:
     """What is left after the wrong numbers of `base` were freed; None if no number is wrong.
 
     Args:
-        along: ∂f/∂ε of the effects, (n, k, e).
+        along: directions of the effects.
     """
     found = free_numbers(model, base, used)
     if found is base:

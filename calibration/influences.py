@@ -9,7 +9,7 @@ table does not have it, they cannot be tested, and the report says so.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from calibration.model import Parameter
 from sim.effects import Effect, catalogue
@@ -68,11 +68,16 @@ def influences() -> dict[str, Influence]:
 
 
 def _plain(effect: Effect) -> Influence:
-    parameter = Parameter(
-        effect.name, effect.title, effect.null, effect.bounds, effect.typical - effect.null, unit=effect.unit,
-        plausible=effect.plausible,
-    )  # fmt: skip
+    second = next((e for e in catalogue().values() if e.beside == effect.name and e.grid), None)
+    parameter = replace(_parameter(effect), second=None if second is None else _parameter(second))
     return Influence(parameter, effect.name, None, effect.symmetry == "odd")
+
+
+def _parameter(effect: Effect) -> Parameter:
+    return Parameter(
+        effect.name, effect.title, effect.null, effect.bounds, effect.typical - effect.null, unit=effect.unit,
+        plausible=effect.plausible, grid=effect.grid,
+    )  # fmt: skip
 
 
 def reason_untestable(

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from scipy.stats import norm as normal
+from scipy.stats import t as student
 
 from calibration.fit import Fit
-from calibration.model import Model, Runs, stepped
+from calibration.model import Model, Parameter, Runs, stepped
 from calibration.noise import inverse_root, least_squares, sums
 from calibration.prior import with_prior
 from calibration.sessions import groups
@@ -63,11 +67,26 @@ def locked_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> float:
     return (1 + count) / (1 + _DRAWS)
 
 
-def fitted_to_all(model: Model, fitted: Fit, rows: Flags) -> dict[str, float]:
-    """Parameters of a fitted model after one linear step that fits it to all runs in `rows`."""
+@dataclass(frozen=True)
+class Delivered:
+    """The model that is handed on: fitted to all runs."""
+
+    parameters: dict[str, float]
+    fitted: tuple[Parameter, ...]
+    covariance: Floats  # (p, p); a 95 % interval is 1.96 standard deviations to each side
+
+
+def fitted_to_all(model: Model, fitted: Fit, rows: Flags, *, moved: bool = True) -> Delivered:
+    """A fitted model after one linear step that fits it to all runs in `rows`; without the step if not `moved`.
+
+    Its covariance allows for the estimates of S and ρ, as the intervals of the fit do.
+    """
     data = model.runs
     table = np.concatenate([fitted.jacobian, (data.y - fitted.prediction)[..., None]], -1)
     products = sums(inverse_root(fitted.noise.run) @ table[rows], data.session[rows], len(fitted.noise.run))
     products = with_prior(products, fitted.fitted, fitted.parameters)
-    step = least_squares(products, passes=3).step
-    return stepped(fitted.fitted, fitted.parameters, step)
+    found = least_squares(products, passes=3)
+    wider = student.ppf(0.975, fitted.freedom) / normal.ppf(0.975)
+    covariance = fitted.inflation * found.covariance * np.outer(wider, wider)
+    step = found.step if moved else np.zeros_like(found.step)
+    return Delivered(stepped(fitted.fitted, fitted.parameters, step), fitted.fitted, covariance)

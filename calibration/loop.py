@@ -12,6 +12,7 @@
 it), "ambiguous" (several do and the runs
    cannot tell them apart), "unexplained" (there is a departure, and no effect in the catalogue explains it).
 7. If no single effect explains it, pairs are tried. If several explain it, next runs that would tell them apart.
+   If nothing explains it, the best predictive model, for steering (`calibration.predictive`).
 8. Errors on the locked runs: as given, calibrated, with the effect, with a generic correction of the calibrated
    model (`calibration.generic`), and from noise alone. Whether the locked runs agree with the final model
    (`calibration.locked`).
@@ -21,11 +22,14 @@ it), "ambiguous" (several do and the runs
 from __future__ import annotations
 
 import math
+import sys
+import time
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calibration.attribute import (
+    FIRST,
     INDISTINGUISHABLE,
     Candidate,
     beside_wrong_numbers,
@@ -36,14 +40,15 @@ from calibration.attribute import (
     pairs,
     with_imitability,
 )
+from calibration.directions import directions
 from calibration.discriminate import Batch, NextRun, next_runs
 from calibration.fit import Fit, fit
 from calibration.freed import Freed, freed
 from calibration.generic import correct
 from calibration.gross import gross_errors
 from calibration.locked import error_interval, errors, fitted_to_all, locked_p_value, middle_session
-from calibration.misfit import DRAWS, Misfit, check_misfit
-from calibration.model import Model, Parameter, Runs, start_values
+from calibration.misfit import DRAWS, TESTABLE, Misfit, check_misfit
+from calibration.model import Model, Parameter, Predictive, Runs, start_values
 from calibration.prior import pulls
 from calibration.profile import profile_intervals
 from calibration.sessions import divided, groups, limits
@@ -143,7 +148,6 @@ def calibrate(
     if final is not found.base:
         final_intervals = profile_intervals(model, final, task.used, title=task.title("intervals"))
     generic = correct(task.runs, found.base.prediction, task.used)
-    error = _errors(task, found, found.base.prediction + generic.correction)
     noise = found.base.noise.run
     wanted, batch = _next_runs(task, found)
     verdict = "none"
@@ -151,6 +155,10 @@ def calibrate(
         verdict = "number"
     elif found.misfit.p_value < level:
         verdict = ("unexplained", "effect", "ambiguous")[min(len(found.best), 2)]
+    predictive = None
+    if verdict == "unexplained":
+        predictive = model.predictive(found.base, task.used, ~task.gross, task.test)
+    error = _errors(task, found, found.base.prediction + generic.correction, predictive)
     return Verdict(
         verdict=verdict,
         effects=tuple(dict.fromkeys(e.name for c in found.best for e in (*c.beside, c.effect))),
@@ -164,17 +172,19 @@ def calibrate(
         numbers=pulls(final, model.given),
         instead=found.instead,
         generic=generic,
+        predictive=predictive,
         next_runs=wanted,
         next_batch=batch,
         error_uncalibrated=error["uncalibrated"][0],
         error_before=error["before"][0],
         error_generic=error["generic"][0],
+        error_predictive=error["predictive"][0] if predictive else None,
         error_after=error["after"][0],
         error_after_interval=error_interval(task.runs, final.prediction, task.test, seed),
         noise_ceiling=float(np.sqrt(np.trace(noise) / len(noise))),
         errors_by_output={name: by_output for name, (_, by_output) in error.items()},
         locked_p=locked_p_value(final, task.runs, task.test, seed=seed + 3),
-        delivered=fitted_to_all(model, final, ~task.gross),
+        delivered=fitted_to_all(model, final, ~task.gross, moved=predictive is None),
         locked=task.locked_names,
         used=task.used,
         uncalibrated=task.uncalibrated,
@@ -201,11 +211,13 @@ def _prepare(model: Model, locked: Flags | None, level: float, seed: int, progre
 def _explain(task: _Task) -> _Explained:
     """Fit the coefficients and test the residual. If it is more than noise, examine single effects, then pairs."""
     model, used, level, seed = task.model, task.used, task.level, task.seed
+    began = time.monotonic()
     guess = model.guess(dict(task.start), used)
     coefficients = tuple(p.name for p in (*model.coefficients, *model.given))
     base = fit(model, guess, coefficients, used, title=task.title("fit"))
-    names = [e.name for e in model.effects]
-    along = model.derivatives(base.parameters, names, title=task.title("derivatives"))[1]
+    fitted = time.monotonic()
+    along = directions(model, base.parameters, model.effects, title=task.title("derivatives"))
+    derived = time.monotonic()
     misfit = check_misfit(base, task.runs, used, along, level=level, seed=seed)
     without = freed(model, base, used, along, level=level, seed=seed, draws=DRAWS)
     if misfit.p_value >= level and without is None:
@@ -214,6 +226,8 @@ def _explain(task: _Task) -> _Explained:
     if without is not None:  # every effect that may explain as much as the wrong number does
         rivalling = math.sqrt(max(base.deviance - without.fit.deviance - INDISTINGUISHABLE, 1.0))
         tested = replace(misfit, critical_z=min(misfit.critical_z, rivalling))
+    if task.progress:
+        print(_forecast(tested, fitted - began, derived - fitted), file=sys.stderr)
     found = examine(
         model, base, tested, model.effects, along, used, task.start, level=level, seed=seed, progress=task.progress
     )
@@ -228,6 +242,22 @@ def _explain(task: _Task) -> _Explained:
         best = explaining(found_pairs)
     best = with_imitability(model, best, base, used, seed)
     return _Explained(base, misfit, tuple(found) or _unexamined(misfit, model.effects), tuple(best))
+
+
+def _forecast(misfit: Misfit, of_a_fit: float, of_directions: float) -> str:
+    """How long the effects will take, in words, by how long the first fit and the derivatives took [s]."""
+    scores = misfit.scores
+    count = int(((np.abs(scores.z) >= misfit.critical_z) & (scores.survived >= TESTABLE)).sum())
+    single = count * of_a_fit
+    more = FIRST * (of_directions + single)
+    return (
+        f"there is more than noise: {count} effects to fit, about {_duration(single)}; if none of them explains "
+        f"the runs, pairs follow, {_duration(more)} at most, mostly much less"
+    )
+
+
+def _duration(seconds: float) -> str:
+    return f"{max(seconds, 1):.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
 def _better(best: list[Candidate], number: Fit) -> bool:
@@ -247,14 +277,18 @@ def _as_good(found: list[Candidate], number: Fit, level: float) -> list[Candidat
     return [found[place] for _, place in sorted(near)]
 
 
-def _errors(task: _Task, found: _Explained, generic: Floats) -> dict[str, tuple[float, dict[str, float]]]:
-    """Errors of four models on the locked runs: all outputs together, and by output."""
+def _errors(
+    task: _Task, found: _Explained, generic: Floats, predictive: Predictive | None
+) -> dict[str, tuple[float, dict[str, float]]]:
+    """Errors of the models on the locked runs: all outputs together, and by output."""
     predictions = {
         "uncalibrated": task.uncalibrated,
         "before": found.base.prediction,
         "after": found.final.prediction,
         "generic": generic,
     }
+    if predictive is not None:
+        predictions["predictive"] = predictive.prediction
     return {name: errors(task.runs, prediction, task.test) for name, prediction in predictions.items()}
 
 

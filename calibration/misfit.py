@@ -10,7 +10,8 @@ Four statistics:
     kernel   rᵀ K r: smooth structure over the runs' inputs;
     shape    max |z| over directions in which one output follows an input, a square or a product of two;
     score    max |z_j| over the catalogue. The scatter of the sessions is estimated with effect j in the model,
-             because otherwise a shift of all runs would look like scatter.
+             because otherwise a shift of all runs would look like scatter. An effect with a second number has
+             one score at each of several values of it, and the largest counts (`calibration.directions`).
 
 Numbers as given have priors of covariance P (`calibration.prior`), so Σ is Σ + J P Jᵀ in all of them.
 
@@ -25,17 +26,18 @@ Source: score tests after projection, Rao (1948); kernel score, e.g. Liu, Lin, G
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import rankdata
 
+from calibration.directions import Directions
 from calibration.features import features
 from calibration.fit import Fit
 from calibration.model import Runs
 from calibration.noise import Sums, inverse, inverse_root, least_squares, repeat_covariance, root_diagonal, sums
 from calibration.prior import changes, precisions
-from sim.arrays import Flags, Floats
+from sim.arrays import Flags, Floats, Integers
 
 DRAWS = 1000
 TESTABLE = 0.03  # an effect cannot be tested if less than this share of its signal survives the projection
@@ -67,6 +69,7 @@ class Misfit:
     critical_z: float  # quantile of max |z_j| at the level
     features: tuple[str, ...]
     exact_length: Floats  # (e,) `Scores.length` if the numbers as given were exact
+    second: Floats  # (e,) value of each effect's second number at its largest score; NaN where there is none
 
 
 class _Tester:
@@ -146,7 +149,7 @@ def check_misfit(
     fitted: Fit,
     data: Runs,
     used: Flags,
-    directions: Floats,
+    directions: Directions,
     *,
     level: float,
     seed: int,
@@ -157,13 +160,14 @@ def check_misfit(
 
     Args:
         fitted: model fitted to the runs in `used`.
-        directions: ∂f/∂ε of the candidates, (n, k, e), at their null; e may be 0.
+        directions: of e candidates, at their null; e may be 0. Of an effect with a second number, the value with
+            the largest score counts, in the bootstrap, too.
         level: α of the critical |z|.
         seed: of the bootstrap.
         decide: stop drawing as soon as it is clear whether the p-value is below this.
     """
     precision = precisions(fitted.fitted)
-    tester = _Tester(data, used, fitted.jacobian[used], directions[used], precision)
+    tester = _Tester(data, used, fitted.jacobian[used], directions.table[used], precision)
     left = (data.y - fitted.prediction)[used]
     residual = left + tester.J @ changes(fitted.fitted, fitted.parameters)
     observed = tester.scores(residual[None])
@@ -189,6 +193,8 @@ def check_misfit(
     null_table = np.concatenate(found)
     columns = range(len(GENERAL) + 1)
     one = Scores(*(getattr(observed, name)[0] for name in Scores.__dataclass_fields__))
+    best = _best(one.z, testable, directions)
+    one = replace(one, z=one.z[best], survived=one.survived[best], length=one.length[best])
     return Misfit(
         scores=one,
         p={
@@ -199,8 +205,17 @@ def check_misfit(
         p_value=_p_value(null_table, own) if testable.any() else _p_value(null_table[:, :-1], own[:-1]),
         critical_z=float(np.quantile(null_table[:, -1], 1 - level)),
         features=tester.names,
-        exact_length=exact.length[0],
+        exact_length=exact.length[0][best],
+        second=directions.second[best],
     )
+
+
+def _best(z: Floats, testable: Flags, directions: Directions) -> Integers:
+    """The column of each effect with the largest |z|, among those that are testable if any is, (e,)."""
+    size = np.abs(z) + np.where(testable, 1e6, 0.0)
+    owners = np.unique(directions.owner)
+    columns = [np.flatnonzero(directions.owner == owner) for owner in owners]
+    return np.array([own[np.argmax(size[own])] for own in columns], dtype=np.int64)
 
 
 def _decided(null: Floats, own: Floats, level: float) -> bool:

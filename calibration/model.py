@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from sim.arrays import Flags, Floats, Integers
+
+if TYPE_CHECKING:
+    from calibration.fit import Fit
 
 Parameters = Mapping[str, float]
 
@@ -35,6 +38,8 @@ class Parameter:
     sigma: float | None = None  # of a number as given: one standard deviation on its own scale; None: free
     plausible: tuple[float, float] | None = None  # sizes of an effect that its source allows; None: all
     shown: float = 1.0  # factor to the unit in which a change is shown
+    second: Parameter | None = None  # of an effect: its second number, which shows only with the effect
+    grid: tuple[float, ...] = ()  # of a second number: values at which the effect is looked for
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,15 @@ class Runs:
         """The runs in `rows` (n,)."""
         own: dict[str, Any] = {k: v[rows] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         return replace(self, **own)
+
+
+@dataclass(frozen=True)
+class Predictive:
+    """A model that predicts runs that no effect explains."""
+
+    prediction: Floats  # (n, k)
+    terms: tuple[str, ...]  # that it depends on, in words
+    content: Any  # what is handed on
 
 
 class Model(Protocol):
@@ -112,6 +126,15 @@ class Model(Protocol):
         """A model of runs that can be made next, and their settings."""
         ...
 
+    def predictive(self, base: Fit, used: Flags, rows: Flags, test: Flags) -> Predictive | None:
+        """The best predictive model where no effect explains the runs, if there is one that goes beyond them.
+
+        Args:
+            base: the calibrated model.
+            used, rows, test: (n,) runs to learn from, to learn from in the end, and to state the error on.
+        """
+        ...
+
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """A better start for the coefficients, from the runs in `used` (n,), if there is a cheap one."""
         ...
@@ -119,12 +142,17 @@ class Model(Protocol):
 
 def start_values(model: Model) -> dict[str, float]:
     """Every parameter as given: effects at their null."""
-    return {p.name: p.start for p in (*model.coefficients, *model.given, *model.effects)}
+    return {p.name: p.start for p in _every(model)}
 
 
 def parameter(model: Model, name: str) -> Parameter:
     """The coefficient, number or effect called `name`."""
-    return next(p for p in (*model.coefficients, *model.given, *model.effects) if p.name == name)
+    return next(p for p in _every(model) if p.name == name)
+
+
+def _every(model: Model) -> tuple[Parameter, ...]:
+    seconds = (e.second for e in model.effects if e.second)
+    return (*model.coefficients, *model.given, *model.effects, *seconds)
 
 
 def moved(one: Parameter, value: float, by: float) -> float:

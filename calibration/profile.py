@@ -18,6 +18,7 @@ from calibration.prior import with_prior
 from sim.arrays import Flags, Floats, Integers
 
 _LEAST = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
+_MOST = 5.0  # if it is larger, the others were not refitted along a bent valley, and the end stays
 
 
 def profile_intervals(
@@ -52,7 +53,7 @@ def profile_intervals(
         others = [j for j in range(count) if j != i]
         rise = _deviance(fitted, at, root, data.y - prediction, data.session, used, others) - here
         expected = own**2 / (fitted.covariance[i, i] / fitted.inflation)
-        scale = math.sqrt(expected / rise) if rise > _LEAST * expected > 0 else 1.0
+        scale = math.sqrt(expected / rise) if _LEAST * expected < rise < _MOST * expected else 1.0
         one = fitted.fitted[i]
         intervals[one.name].append(moved(one, fitted.parameters[one.name], own * scale))
     given = {one.name: fitted.interval(one.name) for one in fitted.fitted if one.sigma is not None}

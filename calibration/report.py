@@ -14,6 +14,7 @@ from calibration.loop import Verdict
 from calibration.measurements import Measurements
 from calibration.prior import WRONG
 from calibration.profile import least_determined
+from sim.arrays import Floats
 from sim.io.pages import Page
 from sim.io.provenance import code_version
 
@@ -148,10 +149,11 @@ def _add_fit(page: Page, result: Verdict) -> None:
             break
     page.table(("parameter", "value", "95 % interval, by profile deviance"), rows)
     combination, error = least_determined(result.final)
+    delivered = result.delivered.parameters
     page.text(
         f"The runs determine {combination} worst: {100 * error:.1f} %. corrected.toml has the model fitted once "
         "more to all runs, with the locked ones: "
-        + ", ".join(f"{name} {result.delivered[name]:.4g}" for name in result.final.names if name not in given)
+        + ", ".join(f"{name} {delivered[name]:.4g}" for name in result.final.names if name not in given)
         + "."
     )
 
@@ -196,6 +198,10 @@ def _add_evidence(page: Page, result: Verdict) -> None:
 def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
     page.section("Error on the locked runs")
     low, high = result.error_after_interval
+    corrected: list[tuple[str, float, dict[str, float]]] = []
+    if result.error_predictive is not None:
+        each_output = result.errors_by_output["predictive"]
+        corrected = [("correction in corrected.toml, simulated", result.error_predictive, each_output)]
     page.table(
         ("model", "relative rms", *(_LABELS[o] for o in data.outputs)),
         [
@@ -205,9 +211,19 @@ def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
                 ("calibrated", result.error_before, result.errors_by_output["before"]),
                 ("calibrated, with effects", result.error_after, result.errors_by_output["after"]),
                 ("calibrated, generic correction", result.error_generic, result.errors_by_output["generic"]),
+                *corrected,
             )
         ],
     )
+    if result.predictive is not None:
+        page.text(
+            "So that the robot can be steered although nothing explains the residual, corrected.toml has a "
+            f"correction of the head's load in {', '.join(result.predictive.terms)}. It holds between these runs "
+            f"only: N from {data.tails.min():.0f} to {data.tails.max():.0f}, l from "
+            f"{100 * data.length.min():.3g} to {100 * data.length.max():.3g} cm, ω from {_rpm(data).min():.3g} "
+            f"to {_rpm(data).max():.3g} rpm. A robot outside is refused. The response to a flip is simulated with "
+            "the same load."
+        )
     features = ", ".join(result.generic.features) or "no feature"
     agree = result.locked_p >= _DISAGREES
     page.text(
@@ -217,6 +233,10 @@ def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
         f"Generic correction: {features} (it describes the residual and does not explain it).",
         tone="good" if agree else "bad",
     )
+
+
+def _rpm(data: Measurements) -> Floats:
+    return np.asarray(np.abs(data.omega) * 30 / math.pi)
 
 
 def draw_summary(result: Verdict, data: Measurements) -> Figure:

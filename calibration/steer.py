@@ -37,13 +37,14 @@ def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, 
     """Plan `path` with every model and run the schedules on `truth`.
 
     Args:
-        models: by label; the same robot with other coefficients and effects.
+        models: by label; the same robot with other coefficients, numbers and effects.
     """
     found = {}
     for label, model in models.items():
         planned = plan(path, model, lookup=tabulate(model))
         content = plan_record(planned)
         track = replay([planned.schedule(truth)])[0]
+        track[["x_over_l", "y_over_l"]] *= truth.tail_length / model.tail_length
         found[label] = Steered(content, tracking_error(content, track), track[["x_over_l", "y_over_l"]].to_numpy())
     return found
 

@@ -11,14 +11,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from calibration.given import CAMERA, GROUPS, HEADING, LENGTH, POWERS, TACHOMETER, given_numbers, robot_number
 from calibration.influences import CURRENT, SLIP, TRACKED_POINT, Influence, influences, reason_untestable
 from calibration.measurements import Measurements
-from calibration.model import Parameter, Parameters, by_differences
+from calibration.model import Parameter, Parameters, Predictive, by_differences
 from calibration.noise import Noise, repeat_covariance
 from calibration.observation import Observation
 from calibration.plausible import check_inputs, check_outputs
@@ -31,6 +31,9 @@ from sim.motion.sensitivity import Sensitivities
 from sim.solve.refinement import FEW, MANY
 from surrogate.export import load
 from surrogate.lookup import Lookup
+
+if TYPE_CHECKING:
+    from calibration.fit import Fit
 
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
 SANE = (0.1, 20.0)  # range of the coefficients; at its ends the model lacks something
@@ -94,6 +97,13 @@ class Swimmer:
         return {i.parameter.title: why for i in influences().values() if (why := self._reason(i))}
 
     @cached_property
+    def _seconds(self) -> dict[str, Influence]:
+        """Second numbers of effects, by name."""
+        owners = [i for i in self._influences.values() if i.parameter.second]
+        return {i.parameter.second.name: Influence(i.parameter.second, i.parameter.second.name, None, i.odd)
+                for i in owners if i.parameter.second}  # fmt: skip
+
+    @cached_property
     def _influences(self) -> dict[str, Influence]:
         return {name: i for name, i in influences().items() if not self._reason(i)}
 
@@ -129,10 +139,12 @@ class Swimmer:
 
         If a run has no direct solution: by differences of motions that are stepped in time, or NaN if `quick`.
         """
-        influences = {name: self._influences.get(name) for name in names}
+        influences = {name: self._influences.get(name) or self._seconds.get(name) for name in names}
         odd = any(i is not None and i.odd for i in influences.values())
         runs, place = self._conditions(parameters, signed=odd)
         columns = self._columns(runs, [parameters])
+        for second in (i.parameter.second for i in influences.values() if i and i.parameter.second):
+            columns.setdefault(second.name, np.full(len(runs), float(parameters.get(second.name, second.start))))
         moves = {name: _moves(name, influence) for name, influence in influences.items()}
         wanted = tuple(dict.fromkeys(move for group in moves.values() for move in group))
         # Effects at their null may need more phases than the motion; effects that are present have them already.
@@ -244,6 +256,17 @@ class Swimmer:
         )  # fmt: skip
         return replace(self, runs=own), settings
 
+    def robots(self, parameters: Parameters) -> tuple[list[Robot], Integers]:
+        """The robots that are simulated for the runs at `parameters`, and the place of each run among them."""
+        runs, place = self._conditions(parameters)
+        return [run.robot for run in runs], place
+
+    def predictive(self, base: Fit, used: Flags, rows: Flags, test: Flags) -> Predictive | None:
+        """A correction of the head's load (`calibration.predictive`)."""
+        from calibration.predictive import predictive
+
+        return predictive(self, base, used, rows, test)
+
     def _inside(self, lookup: Lookup, parameters: Parameters) -> Flags:
         """Which runs (n,) the look-up table covers at `parameters`."""
         runs, place = self._conditions(parameters)
@@ -290,6 +313,8 @@ class Swimmer:
                 before = self.robot.effects.get(influence.effect or "", before)
             if influence.effect is not None:
                 effects[influence.effect] = before + by
+                if second := influence.parameter.second:
+                    effects[second.name] = parameters.get(second.name, second.start)
             elif influence.name in CURRENT:
                 current += by
         robot = replace(
@@ -302,7 +327,10 @@ class Swimmer:
 
     def _columns(self, runs: list[_Run], sets: Sequence[Parameters]) -> dict[str, Floats]:
         """Runs as columns for the simulator, with every effect that is present in any of the sets."""
-        names = {i.effect for parameters in sets for i in self._at_work(parameters) if i.effect}
+        work = [i for parameters in sets for i in self._at_work(parameters)]
+        names = {i.effect for i in work if i.effect} | {
+            i.parameter.second.name for i in work if i.parameter.second
+        }
         nulls = {name: catalogue()[name].null for name in sorted(names)}
         rows = [{**nulls, **run.robot.group_values()} for run in runs]
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
@@ -339,17 +367,3 @@ def robot_numbers(robot: Robot, parameters: Parameters) -> dict[str, Any]:
         if hasattr(robot, name):
             own[name] = float(parameters.get(name, robot_number(robot, name)))
     return own
-
-
-def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
-    """`robot` with fitted coefficients, numbers and effects; drift between runs and the observation are left
-    out.
-    """
-    own = robot_numbers(robot, parameters)
-    own["tail_length"] = robot.tail_length + parameters.get(LENGTH, 0.0)
-    sizes = {
-        name: float(value)
-        for name, value in parameters.items()
-        if name in catalogue() and value != catalogue()[name].null
-    }
-    return replace(robot, **own, effects={**robot.effects, **sizes})

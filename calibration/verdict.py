@@ -15,7 +15,9 @@ from calibration.discriminate import Batch, NextRun
 from calibration.fit import Fit
 from calibration.generic import Generic
 from calibration.imitation import DOUBT
+from calibration.locked import Delivered
 from calibration.misfit import DRAWS, Misfit
+from calibration.model import Predictive
 from calibration.prior import Pull, likeliest, rivals
 from sim.arrays import Flags, Floats
 from sim.io.provenance import provenance
@@ -45,17 +47,19 @@ class Verdict:
     candidates: tuple[Candidate, ...]
     numbers: tuple[Pull, ...]  # every number as given in the final model, the farthest first
     instead: tuple[Candidate, ...]  # effects that explain as much as the number that is wrong
-    generic: Generic  # correction of the calibrated model
+    generic: Generic  # correction of the calibrated model's outputs
+    predictive: Predictive | None  # what is handed on where nothing explains the residual
     next_runs: tuple[NextRun, ...]  # where two effects cannot be told apart
     next_batch: Batch | None  # the same, for several runs together
     error_uncalibrated: float
     error_generic: float
+    error_predictive: float | None
     error_before: float
     error_after: float
     error_after_interval: tuple[float, float]
     noise_ceiling: float
     locked_p: float  # agreement of the locked runs with the final model
-    delivered: dict[str, float]  # parameters of the final model fitted to all runs
+    delivered: Delivered  # the final model fitted to all runs
     errors_by_output: dict[str, dict[str, float]]
     locked: str  # names of the sessions
     used: Flags
@@ -129,7 +133,17 @@ class Verdict:
             names += self._outside
             return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart."
         none = "no effect and no pair of effects of the catalogue explains"
-        return f"There is a residual ({p}) that {none}{self._nearest}."
+        return f"There is a residual ({p}) that {none}{self._nearest}.{self._steered}"
+
+    @property
+    def _steered(self) -> str:
+        """What a robot can be steered with although nothing explains the residual."""
+        if self.predictive is None or self.error_predictive is None:
+            return ""
+        return (
+            f" corrected.toml has a correction that describes it: {100 * self.error_predictive:.1f} % on runs "
+            f"that it was not learnt from, {100 * self.error_before:.1f} % without it."
+        )
 
     @property
     def in_form_only(self) -> tuple[str, ...]:
@@ -170,7 +184,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         name: {
             "value": final.parameters[name],
             "interval": list(result.final_intervals[name]),
-            "value_all_runs": result.delivered[name],
+            "value_all_runs": result.delivered.parameters[name],
         }
         for name in final.names
     }
@@ -189,6 +203,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "error_before": result.error_before,
         "error_after": result.error_after,
         "error_generic": result.error_generic,
+        "error_predictive": result.error_predictive,
         "error_after_interval": list(result.error_after_interval),
         "noise_ceiling": result.noise_ceiling,
         "errors_by_output": result.errors_by_output,
@@ -212,6 +227,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         ],
         "untestable": result.untestable,
         "generic_features": list(result.generic.features),
+        "correction_terms": list(result.predictive.terms) if result.predictive else [],
         "next_runs": [run.record() for run in result.next_runs],
         "next_batch": result.next_batch.record() if result.next_batch else None,
         "locked_test": result.locked,

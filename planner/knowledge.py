@@ -3,16 +3,18 @@
 In a robot.toml it is the table
 
     [calibration]
-    names = ["C_t", "C_r", "C_yr"]          # coefficients, as ln C, and effects, as sizes
-    covariance = [[...], [...], [...]]
-    current_m_s = [0.0, 0.0]                # along x and y of the lab
-    current_error_m_s = [0.0, 0.0]          # one standard deviation
+    names = ["C_t", "C_r", "C_yr", "viscosity"]  # coefficients and numbers of the robot, as their logarithms;
+    covariance = [[...], [...], [...], [...]]    # effects, as sizes
+    current_m_s = [0.0, 0.0]                     # along x and y of the lab
+    current_error_m_s = [0.0, 0.0]               # one standard deviation
 
-Every entry may be left out.
+Every entry may be left out. A calibration writes this table into corrected.toml. Numbers of the robot are
+fields of `Robot`: E, μ0, r0, l, R, L and a. Their errors are correlated with those of the coefficients.
 """
 
 from __future__ import annotations
 
+import json
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,13 +25,15 @@ import numpy as np
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.io.errors import InputError
+from sim.model.uncertainty import DEFAULTS
 
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
+NUMBERS = tuple(DEFAULTS)  # fields of `Robot` that are not exact
 
 
 @dataclass(frozen=True)
 class Knowledge:
-    """Covariance (p, p) of ln C and effect sizes, by name; current and its standard deviation [m/s]."""
+    """Covariance (p, p) of ln C, ln numbers and effect sizes; current and its standard deviation [m/s]."""
 
     names: tuple[str, ...] = ()
     covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
@@ -37,9 +41,10 @@ class Knowledge:
     current_error: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        unknown = [name for name in self.names if name not in COEFFICIENTS and name not in catalogue()]
+        unknown = [name for name in self.names if name not in {*COEFFICIENTS, *NUMBERS, *catalogue()}]
         if unknown:
-            raise InputError(f"calibration: unknown name {unknown[0]!r}; give C_t, C_r, C_yr or an effect")
+            allowed = ", ".join((*COEFFICIENTS, *NUMBERS))
+            raise InputError(f"calibration: unknown name {unknown[0]!r}; give {allowed} or an effect")
         V = self.covariance
         if V.shape != (len(self.names),) * 2 or not np.isfinite(V).all() or not np.allclose(V, V.T):
             raise InputError(f"calibration: covariance must be symmetric, {len(self.names)} by {len(self.names)}")
@@ -67,6 +72,18 @@ def read_knowledge(path: str | Path) -> Knowledge:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, TypeError, ValueError, AttributeError) as broken:
         raise InputError(f"{path}: [calibration] cannot be read: {broken}") from None
     return Knowledge(names, covariance, current, error)
+
+
+def knowledge_toml(knowledge: Knowledge) -> str:
+    """The table [calibration] that `read_knowledge` reads back."""
+    rows = ",\n".join(f"    {[float(f'{value:.12g}') for value in row]}" for row in knowledge.covariance.tolist())
+    lines = ["[calibration]", f"names = {json.dumps(knowledge.names)}", f"covariance = [\n{rows},\n]"]
+    if any((*knowledge.current, *knowledge.current_error)):
+        lines += [
+            f"current_m_s = {list(knowledge.current)}",
+            f"current_error_m_s = {list(knowledge.current_error)}",
+        ]
+    return "\n".join(lines) + "\n"
 
 
 def _pair(values: Any) -> tuple[float, float]:

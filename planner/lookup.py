@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from planner.knowledge import Knowledge
+from planner.knowledge import NUMBERS, Knowledge
 from planner.vehicle import Mode, Vehicle, lags_of, resampled
 from sim.arrays import Floats
 from sim.effects import catalogue
@@ -97,11 +100,16 @@ def _table_modes(twist: Floats, lookup: LookupTable) -> list[Mode]:
 
 
 def _coefficient_modes(robot: Robot, lookup: LookupTable, twist: Floats, knowledge: Knowledge) -> list[Mode]:
-    """What the covariance of the robot's coefficients does to its twists, and that of the current."""
+    """What the covariances of the robot's parameters and of the current do to its motion."""
     modes: list[Mode] = []
     if knowledge.names:
-        slopes = np.array([_slope(robot, lookup, twist, name) for name in knowledge.names])  # (p, 2, 3)
-        root = np.linalg.cholesky(knowledge.covariance + 1e-15 * np.eye(len(knowledge.names)))
+        slopes = np.array([
+            _slope_of_number(robot, lookup, twist, name) if name in NUMBERS else _slope(robot, lookup, twist, name)
+            for name in knowledge.names
+        ])  # (p, 2, 3)  # fmt: skip
+        scale = np.sqrt(np.maximum(np.diag(knowledge.covariance), 1e-300))
+        values, vectors = np.linalg.eigh(knowledge.covariance / np.outer(scale, scale))
+        root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
         for k, column in enumerate(root.T):
             move = np.tensordot(column, slopes, 1)
             modes.append(Mode(f"coefficients: {k + 1}", move, np.zeros((2, 3))))
@@ -114,8 +122,30 @@ def _coefficient_modes(robot: Robot, lookup: LookupTable, twist: Floats, knowled
     return modes
 
 
+def _slope_of_number(robot: Robot, lookup: LookupTable, twist: Floats, name: str) -> Floats:
+    """Derivative (2, 3) of the twists in ln of a number of the robot.
+
+    It changes groups, and the units of time and length. The schedule keeps its seconds, the path its metres.
+    """
+    given = robot.head_radius if getattr(robot, name) is None else getattr(robot, name)
+    moved: list[dict[str, Any]] = [{name: given * math.exp(sign * _STEP)} for sign in (1.0, -1.0)]
+    ends = [replace(robot, **one) for one in moved]
+    one, other = (end.group_values() for end in ends)
+    changes = {
+        group: math.log(one[group] / other[group]) / (2 * _STEP)
+        for group in one
+        if group not in catalogue() and one[group] != other[group]
+    }
+    faster = -math.log(ends[0].time_scale / ends[1].time_scale) / (2 * _STEP)
+    longer = math.log(ends[0].tail_length / ends[1].tail_length) / (2 * _STEP)
+    slope = twist * [faster + longer, faster + longer, faster]
+    for group, change in changes.items():
+        slope = slope + change * _slope(robot, lookup, twist, group)
+    return np.asarray(slope)
+
+
 def _slope(robot: Robot, lookup: LookupTable, twist: Floats, name: str) -> Floats:
-    """Derivative (2, 3) of the twists in ln C of a coefficient, or in the size of an effect."""
+    """Derivative (2, 3) of the twists in ln of a coefficient or another group, or in the size of an effect."""
     values = robot.group_values()
     stored = getattr(lookup, "slopes", {})
     if name in stored:

@@ -98,10 +98,14 @@ class Plan:
         """The schedule for `sim.motion.replay`.
 
         Args:
-            robot: the robot that carries it out; default: the one that the plan was made for.
+            robot: the robot that carries it out; default: the one that the plan was made for. Seconds and metres
+                stay as planned, so numbers change where its units of time and length are others.
         """
         own = robot or self.robot
-        return Schedule(own.group_values(), self.first_direction, self.dwells, self.start, own.time_scale)
+        time, length = self.robot.time_scale / own.time_scale, self.robot.tail_length / own.tail_length
+        x, y, heading = self.start
+        start = (x * length, y * length, heading)
+        return Schedule(own.group_values(), self.first_direction, self.dwells * time, start, own.time_scale)
 
     @property
     def duration(self) -> float:

@@ -1,8 +1,8 @@
 """Robots as users give them: robot.toml, names of presets, columns of a table. Checked here, with effects.
 
-A robot.toml has the tables [head], [tails], [fluid], [motor], [drag] and, if there are any, [effects]. The names
-of the keys say their units. Beside a number that was measured, KEY_sigma may state one standard deviation of it: a
-number in the same unit, or a text like "10 %".
+A robot.toml has the tables [head], [tails], [fluid], [motor], [drag] and, if there are any, [effects] and
+[correction]. The names of the keys say their units. Beside a number that was measured, KEY_sigma may state one
+standard deviation of it: a number in the same unit, or a text like "10 %".
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from sim.arrays import Floats
 from sim.effects import catalogue, check_effects, check_size
 from sim.io.errors import InputError
 from sim.io.files import write_text
+from sim.model.correction import correction_tables, read_correction
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
@@ -89,13 +90,15 @@ def load_robot(source: str | Path) -> Robot:
         raise InputError(f"{path} is not TOML: {broken}") from None
     name = tables.pop("name", path.stem)
     tables.pop("calibration", None)  # read by planner.knowledge
+    correction = read_correction(tables.pop("correction"), str(path)) if "correction" in tables else None
     effects = tables.pop("effects", {})
     if not isinstance(effects, dict):
         raise InputError(f"{path}: effects = {effects!r}; write a table [effects] with lines name = size")
     stated: dict[str, tuple[str, object]] = {}
     values = _values(path, tables, stated)
     check_effects(effects)
-    return Robot(name=str(name), effects=dict(effects), sigmas=_sigmas(values, stated), **values)  # type: ignore[arg-type]
+    sigmas = _sigmas(values, stated)
+    return Robot(name=str(name), effects=dict(effects), sigmas=sigmas, correction=correction, **values)  # type: ignore[arg-type]
 
 
 def _sigmas(values: Mapping[str, Any], stated: Mapping[str, tuple[str, object]]) -> dict[str, Sigma]:
@@ -160,6 +163,8 @@ def robot_toml(robot: Robot) -> str:
             tables.setdefault(table, []).append(f"{key}{_SIGMA} = {sigma_text(robot.sigmas[attribute])}")
     if robot.effects:
         tables["effects"] = [f"{name} = {float(size)!r}" for name, size in robot.effects.items()]
+    if robot.correction:
+        tables["correction"] = [f"{k} = {json.dumps(v)}" for k, v in correction_tables(robot.correction).items()]
     blocks = ["\n".join([f"[{table}]", *lines]) for table, lines in tables.items()]
     name = json.dumps(robot.name, ensure_ascii=False)  # escapes as TOML does
     return "\n\n".join([f"name = {name}", *blocks]) + "\n"

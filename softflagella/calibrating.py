@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from calibration.corrected import check_given
 from calibration.loop import calibrate as close_loop
 from calibration.measurements import read_measurements
 from calibration.swimmer import Swimmer
@@ -45,4 +46,5 @@ def calibrate(
         >>> print(verdict.sentence)  # doctest: +SKIP
     """
     given = robot if isinstance(robot, Robot) else load_robot(robot)
+    check_given(given)
     return close_loop(Swimmer(given, read_measurements(table), jobs), seed=seed, progress=progress)

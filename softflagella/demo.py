@@ -29,11 +29,12 @@ import pandas as pd
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
+from calibration.corrected import corrected_robot, corrected_toml
 from calibration.loop import Verdict, calibrate, verdict_record
 from calibration.measurements import Measurements, read_measurements
 from calibration.report import draw_residuals
 from calibration.steer import Steered, draw_steered, gap_closed, steer
-from calibration.swimmer import Swimmer, corrected_robot
+from calibration.swimmer import Swimmer
 from calibration.synthetic import make_table
 from dataset.figures import draw_responses, draw_trends, plain_logarithms
 from dataset.report import usable_rows
@@ -148,7 +149,7 @@ def _steer(verdict: Verdict) -> dict[str, Steered]:
     truth = replace(start, **HIDDEN, effects=HIDDEN_EFFECT)  # type: ignore[arg-type]
     models = {
         "calibrated": corrected_robot(start, verdict.base.parameters),
-        "corrected": corrected_robot(start, verdict.delivered),
+        "corrected": corrected_robot(start, verdict.delivered.parameters),
         "truth known": truth,
     }
     found = steer(models, truth, polygon(4, 3.0))
@@ -170,7 +171,7 @@ def _close(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     verdict = calibrate(Swimmer(start, data))
     record = verdict_record(verdict, table="table.csv")
     write_text(place / "verdict.json", json.dumps(record, indent=1) + "\n")
-    write_text(place / "corrected.toml", robot_toml(corrected_robot(start, verdict.delivered)))
+    write_text(place / "corrected.toml", corrected_toml(start, verdict.delivered, verdict.predictive))
     print(f"  {name}: {verdict.sentence}")
     return verdict, data
 

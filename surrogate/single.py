@@ -42,7 +42,7 @@ class SingleRobot:
     memory: list[Any]  # (2, K, D, 3)
     rest: list[Any]  # (2, D, 3)
     spread: list[Any]  # (2, D, 3)
-    slopes: dict[str, Any]  # d twist/d ln C by coefficient, (2, 3): forward, left, yaw rate
+    slopes: dict[str, Any]  # d twist/d ln of a group, or /d size of an effect, (2, 3): forward, left, yaw rate
     errors: dict[str, dict[str, float]]  # output -> {"rms"}, relative, see `surrogate.tabulate`
     provenance: dict[str, Any]
 

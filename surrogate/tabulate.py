@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Floats
+from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.io.provenance import provenance
 from sim.mechanics import planar
@@ -26,8 +27,7 @@ from sim.motion.steady import steady
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.single import SingleRobot
 
-COEFFICIENTS = ("C_t", "C_r", "C_yr")
-_STEP = 0.02  # in ln C, for derivatives
+_STEP = 0.02  # in the logarithm of a group and in units of an effect's typical size, for derivatives
 _CHECKED = 24  # dwells of the random schedule
 _RANGE = (0.35, 1.8)  # of their lengths
 
@@ -81,16 +81,30 @@ def tabulate(robot: Robot) -> SingleRobot:
 
 
 def _slopes(values: dict[str, float]) -> dict[str, Any]:
-    """Derivatives (2, 3) of the twists in ln C of each coefficient, by differences."""
-    ends = [(name, sign) for name in COEFFICIENTS for sign in (1.0, -1.0)]
-    rows = [{**values, name: values[name] * math.exp(sign * _STEP)} for name, sign in ends for _ in (0, 1)]
+    """Derivatives (2, 3) of the twists in ln of each group, and in the size of each effect, by differences."""
+    names = [name for name in values if name != "N"]
+    rows, widths = [], []
+    for name in names:
+        ends = _ends(name, values[name])
+        widths.append(ends[0][1] - ends[1][1])
+        rows += [{**values, name: value} for value, _ in ends for _ in (0, 1)]
     columns = {name: np.array([row[name] for row in rows]) for name in values}
-    columns["omega_bar"] = columns["omega_bar"] * np.tile([1.0, -1.0], len(ends))
+    columns["omega_bar"] = columns["omega_bar"] * np.tile([1.0, -1.0], 2 * len(names))
     motion = steady(Groups.from_columns(columns))
-    twist = np.stack([motion.v_z, motion.v_x, motion.omega_yr], -1).reshape(len(COEFFICIENTS), 2, 2, 3)
-    slopes = (twist[:, 0] - twist[:, 1]) / (2 * _STEP)
-    found = dict(zip(COEFFICIENTS, slopes, strict=True))
+    twist = np.stack([motion.v_z, motion.v_x, motion.omega_yr], -1).reshape(len(names), 2, 2, 3)
+    slopes = (twist[:, 0] - twist[:, 1]) / np.array(widths)[:, None, None]
+    found = dict(zip(names, slopes, strict=True))
     return {name: slope.tolist() for name, slope in found.items() if np.isfinite(slope).all()}
+
+
+def _ends(name: str, value: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Two values beside `value`, each with its place on the scale of the derivative; within an effect's bounds."""
+    if name not in catalogue():
+        return (value * math.exp(_STEP), _STEP), (value * math.exp(-_STEP), -_STEP)
+    effect = catalogue()[name]
+    step = _STEP * abs(effect.typical - effect.null)
+    low, high = (min(max(value + sign * step, effect.bounds[0]), effect.bounds[1]) for sign in (-1, 1))
+    return (high, high), (low, low)
 
 
 def _missed(table: SingleRobot) -> Floats:

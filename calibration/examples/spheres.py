@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calibration.fit import Fit
 from calibration.loop import Verdict, calibrate
 from calibration.model import Parameter, Parameters, Runs, by_differences
 from sim.arrays import Flags, Floats
@@ -80,6 +81,9 @@ class Spheres:
         return replace(self, runs=runs, diameter=diameter), [
             {"d_mm": round(1000 * d, 2)} for d in diameter.tolist()
         ]
+
+    def predictive(self, base: Fit, used: Flags, rows: Flags, test: Flags) -> None:
+        """None: nothing is to be steered."""
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """The start as it is: the fit is linear in ln μ."""

@@ -8,7 +8,8 @@ So adding an effect is adding its file. An effect
 2. declares its equation, source, unit of ε, bounds, a `typical` size for tests and scores, its symmetry under
    ω → −ω ("even": left and right turns stay mirror images; "odd": they do not), whether it only dissipates,
    whether it keeps dynamic similarity, the sizes that are plausible by its source (outside, a claim is "in form
-   like" the effect), what drives it from run to run, and the effect that it needs beside it to be seen, if any;
+   like" the effect), what drives it from run to run, and the effect that it needs beside it to be seen, if any.
+   An effect with a second number (exponent, time) has it as another effect beside it, with a `grid`;
 3. acts in one of three ways, all differentiable in ε:
    - `adds` returns the body with terms added, which must not depend on what is there already;
    - `scales` returns factors on drag, which multiply;
@@ -35,7 +36,6 @@ class Factors(NamedTuple):
 
     viscosity: Tensor | float = 1.0  # everything that drags, and the flow that a force makes
     drag: Tensor | float = 1.0  # drag of head, disc and tails
-    tail_drag: Tensor | float = 1.0  # ζ∥ and ζ⊥ of the tails alone
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,7 @@ class Effect:
     drivers: tuple[Driver, ...] = ()  # if any, the effect is seen through them alone
     plausible: tuple[float, float] | None = None  # sizes that its source allows; None: all within the bounds
     beside: str = ""  # the effect without which this one shows nothing
+    grid: tuple[float, ...] = ()  # sizes at which a calibration looks for `beside`, whose second number this is
 
     def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
         """The body with this effect's terms added."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sim.model.correction import Correction
 from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
 from sim.model.uncertainty import DEFAULTS, Sigma
 
@@ -48,6 +49,7 @@ class Robot:
     disc_offset: float | None = None  # a; None: the head's radius
     effects: Mapping[str, float] = field(default_factory=dict)
     sigmas: Mapping[str, Sigma] = field(default_factory=dict)  # of the fields that state one, see `sigma`
+    correction: Correction | None = None  # what a calibration learnt that no effect explains
 
     def __post_init__(self) -> None:
         check_tails(self.tails)
@@ -79,8 +81,12 @@ class Robot:
         return self.motor_speed * self.time_scale
 
     def group_values(self) -> dict[str, float]:
-        """The dimensionless groups of this robot by column name, for the positive direction of the motor."""
-        return {
+        """The dimensionless groups of this robot by column name, for the positive direction of the motor.
+
+        Raises:
+            InputError: the robot has a correction, and is outside its range.
+        """
+        values = {
             "C_t": self.C_t,
             "C_r": self.C_r,
             "C_yr": self.C_yr,
@@ -92,6 +98,7 @@ class Robot:
             "a_over_R": (self.disc_offset or self.head_radius) / self.head_radius,
             **self.effects,
         }
+        return values if self.correction is None else self.correction.applied(values)
 
     def groups(self) -> Groups:
         """This robot as a batch of one."""

@@ -3,8 +3,9 @@
     r = 0 on every free node, t = (F_x, F_z, M_y, M_z) = 0 about J
 
 `fill_residual` adds up all forces: local drag and the elastic forces of straight tails (`sim.mechanics.balance`),
-and the non-local effects. These are material frames (`frames`), flow between the parts (`flow`) and friction of
-the contact line. A new non-local effect is called in `_surround`. Units: l, μ0 l⁴/EI, EI/l².
+and the non-local effects. These are material frames (`frames`), flow between the parts (`flow`), friction of
+the contact line, and thinning of the fluid, which changes the drag on every node (`thinning`). A new non-local
+effect is called in `_surround`. Units: l, μ0 l⁴/EI, EI/l².
 
 The Newton matrices of `sim.solve.linearise` leave the non-local effects out; GMRES takes them into account
 (`sim.solve.newton`).
@@ -25,6 +26,7 @@ from sim.mechanics.contact_line import add_contact_line
 from sim.mechanics.flow import add_flow, has_flow
 from sim.mechanics.frames import add_frames, has_frames
 from sim.mechanics.geometry import Geometry, measure, new_geometry
+from sim.mechanics.thinning import thinned, thins
 from sim.model.body import Body
 from sim.solve.rates import Rates, base_phase, fill_rates
 
@@ -87,10 +89,19 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
         for k in range(n):
             velocity = plus(plus(motion.linear, cross(motion.spin, vector(x, k, m))), vector(room.x_dot, k, m))
             velocity = minus(velocity, vector(room.around.flow, k + 1, m))
-            put(r, k, m, node_balance(room.geometry, body, motion, k, m, velocity)[0])
+            residual = node_balance(room.geometry, body, motion, k, m, velocity)[0]
+            if thins(body):
+                residual = plus(residual, thinned(room.geometry, body, k + 1, m, velocity))
+            put(r, k, m, residual)
         flow, moment = vector(room.around.flow, 0, m), vector_at(room.around.moment, m)
         clamp = clamp_balance(room.geometry, body, m, motion, flow, moment)
-        wrench = wrench_of(motion, clamp.force, clamp.moment)
+        force, torque = clamp.force, clamp.moment
+        if thins(body):
+            root = (body.offset, 0.0, 0.0)
+            velocity = minus(plus(motion.linear, cross(motion.spin, root)), flow)
+            change = thinned(room.geometry, body, 0, m, velocity)
+            force, torque = plus(force, change), plus(torque, cross(root, change))
+        wrench = wrench_of(motion, force, torque)
         for a in range(4):
             t[m % instants, a] += wrench[a]
 

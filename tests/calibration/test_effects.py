@@ -9,13 +9,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.corrected import corrected_robot
+from calibration.directions import Directions
 from calibration.fit import fit
 from calibration.locked import middle_session
 from calibration.loop import calibrate
 from calibration.measurements import read_measurements
 from calibration.misfit import check_misfit
 from calibration.model import start_values
-from calibration.swimmer import corrected_robot
 from tests.calibration import toy
 from tests.calibration.toy_tables import START, TRUTH, closed, toy_swimmer, toy_table
 
@@ -48,7 +49,7 @@ def test_an_effect_that_the_coefficients_absorb_is_not_testable() -> None:
     data = read_measurements(table)
     used = ~middle_session(data)
     base = closed(table).base
-    misfit = check_misfit(base, data, used, base.jacobian[..., :1], level=0.05, seed=0, draws=20)
+    misfit = check_misfit(base, data, used, Directions.plain(base.jacobian[..., :1]), level=0.05, seed=0, draws=20)
     assert misfit.scores.survived[0] < 1e-5
     assert misfit.p["score"] == 1.0
     assert misfit.general_p < 0.1

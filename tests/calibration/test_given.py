@@ -10,13 +10,14 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
+from calibration.corrected import corrected_robot
 from calibration.fit import fit
 from calibration.given import CAMERA, HEADING, LENGTH, TACHOMETER
 from calibration.loop import calibrate, verdict_record
 from calibration.measurements import read_measurements
 from calibration.model import by_differences, start_values
 from calibration.prior import pulls
-from calibration.swimmer import Swimmer, corrected_robot
+from calibration.swimmer import Swimmer
 from calibration.synthetic import make_table
 from sim.io.errors import InputError
 from sim.model.robot import Robot
@@ -97,10 +98,10 @@ def test_a_stiffness_far_off_is_named_with_what_looks_like_it() -> None:
         result = calibrate(Swimmer(replace(START, sigmas=sigmas), data), progress=False)
         assert result.verdict == "number"
         assert result.wrong_numbers[0][0].parameter.name == "youngs_modulus"
-        given = result.delivered["youngs_modulus"] / START.youngs_modulus
+        given = result.delivered.parameters["youngs_modulus"] / START.youngs_modulus
         assert given == pytest.approx(share, rel=0.1)
-        corrected = corrected_robot(START, result.delivered)
-        assert corrected.youngs_modulus == result.delivered["youngs_modulus"]
+        corrected = corrected_robot(START, result.delivered.parameters)
+        assert corrected.youngs_modulus == result.delivered.parameters["youngs_modulus"]
 
 
 def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:

@@ -47,7 +47,7 @@ def test_the_locked_session_is_judged_and_used_in_the_end() -> None:
     ruined.loc[ruined["session"] == name, "omega_yr_rad_s"] *= 1.5
     result = closed(ruined)
     assert result.locked_p < 0.01
-    assert result.delivered["C_yr"] != pytest.approx(result.final.parameters["C_yr"], rel=0.02)
+    assert result.delivered.parameters["C_yr"] != pytest.approx(result.final.parameters["C_yr"], rel=0.02)
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from calibration.directions import Directions
 from calibration.locked import middle_session
 from calibration.measurements import read_measurements
 from calibration.misfit import check_misfit
@@ -74,7 +75,11 @@ def test_p_values_of_nulls_are_spread_evenly() -> None:
     for seed in range(40):
         noise = rng.multivariate_normal(np.zeros(len(data.outputs)), base.noise.run, size=len(data))
         drawn = replace(data, y=base.prediction + noise)
-        p.append(check_misfit(base, drawn, used, np.zeros((*data.y.shape, 0)), level=0.05, seed=seed, draws=100))
+        p.append(
+            check_misfit(
+                base, drawn, used, Directions.plain(np.zeros((*data.y.shape, 0))), level=0.05, seed=seed, draws=100
+            )
+        )
     kernel = np.array([m.general_p for m in p])
     assert 0.3 < kernel.mean() < 0.7
     assert (kernel < 0.1).mean() < 0.25

@@ -16,6 +16,7 @@ import numpy as np
 from calibration.swimmer import Solver
 from sim.effects import catalogue
 from sim.inputs import check_columns
+from sim.mechanics.thinning import UNIT_OF_TIME
 from sim.model.groups import Groups
 from sim.motion.sensitivity import Sensitivities
 from sim.solve.assembly import assemble
@@ -60,6 +61,11 @@ def _robots(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     head[:, :, 3] += resistance[:, :, 4]
     parallel, perp, viscosity = (v.numpy() for v in (body.zeta_parallel, body.zeta_perp, body.viscosity))
     a, n, omega = (groups.a_over_R * R).numpy(), groups.N, groups.omega_bar.numpy()
+    terms = body.nonlocal_terms
+    time = UNIT_OF_TIME * body.tail_radius.numpy() ** 4 * np.exp(terms.shear_thinning_time.numpy())
+    rate = np.abs(omega) * a / body.tail_radius.numpy()  # at the clamps
+    thinned = (1 + (time * rate) ** 2) ** (-terms.shear_thinning.numpy() / 2)
+    parallel, perp = parallel * thinned, perp * thinned
     bent = 1 / (1 + 0.05 * viscosity * np.abs(omega))
     tails = np.zeros_like(head)
     tails[:, 0, 0] = n * perp

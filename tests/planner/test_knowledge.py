@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from planner.knowledge import COEFFICIENTS, Knowledge, read_knowledge
+from planner.knowledge import COEFFICIENTS, NUMBERS, Knowledge, knowledge_toml, read_knowledge
 from planner.lookup import vehicle_of
 from planner.path import Path2D, circle, smoothed
 from planner.plan import plan
@@ -63,6 +65,42 @@ def test_the_covariance_widens_the_stated_error_by_what_the_table_says() -> None
     assert mode.twist[0, 2] == pytest.approx(expected[0], rel=0.05)
     one, other = plan(circle(2.0), CONTROL), plan(circle(2.0), CONTROL, knowledge=sure)
     assert other.stated_error > 1.3 * one.stated_error
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_a_number_of_the_robot_moves_the_twist_in_seconds_and_metres(name: str) -> None:
+    """The mode of a number is the difference between two robots, in the units of the first."""
+    lookup = load()
+    sure = Knowledge((name,), np.array([[1e-4]]))
+    (mode,) = [m for m in vehicle_of(CONTROL, lookup, sure).modes if m.name.startswith("coefficients")]
+    ends = []
+    for sign in (0.01, -0.01):
+        value = getattr(CONTROL, name) or CONTROL.head_radius
+        moved: dict[str, Any] = {name: value * np.exp(sign)}
+        robot = replace(CONTROL, **moved)
+        time, length = robot.time_scale / CONTROL.time_scale, robot.tail_length / CONTROL.tail_length
+        ends.append(vehicle_of(robot, lookup).twist * [length / time, length / time, 1 / time])
+    assert abs(mode.twist) == pytest.approx(abs(ends[0] - ends[1]) / 2, rel=0.05, abs=1e-5)
+
+
+def test_another_robot_carries_a_plan_out_in_the_same_seconds_and_metres() -> None:
+    result = plan(circle(2.0), CONTROL)
+    other = replace(CONTROL, viscosity=1.1 * CONTROL.viscosity, tail_length=1.02 * CONTROL.tail_length)
+    one, own = result.schedule(other), result.schedule()
+    assert one.dwells * one.time_scale == pytest.approx(own.dwells * own.time_scale)
+    assert np.array(one.start[:2]) * other.tail_length == pytest.approx(
+        np.array(own.start[:2]) * CONTROL.tail_length
+    )
+
+
+def test_the_table_is_written_as_it_is_read(tmp_path: Path) -> None:
+    V = np.array([[2e-3, -1e-4], [-1e-4, 0.04]])
+    known = Knowledge(("viscosity", "end_over_end_drag"), V, (1e-5, 0.0), (2e-6, 3e-6))
+    (tmp_path / "robot.toml").write_text(robot_toml(CONTROL) + knowledge_toml(known))
+    found = read_knowledge(tmp_path / "robot.toml")
+    assert found.names == known.names
+    assert found.covariance == pytest.approx(V)
+    assert (found.current, found.current_error) == (known.current, known.current_error)
 
 
 def test_a_current_is_steered_against() -> None:

@@ -1,0 +1,130 @@
+"""A correction of the load on the head, learnt from runs that no effect explains.
+
+    C_t → C_t exp(g_1),   C_r → C_r exp(g_2),   C_yr → C_yr exp(g_3),   ε_k → ε_k + g_k
+
+with ε_k the sizes of two effects, the yaw couple and the anisotropy of the head's drag. Together they can move all
+four steady velocities of the robot. It describes what is missing, and does not explain it. Each g is smooth in the
+dimensionless inputs x = (N, ln l/R, ln ω̄ (R/l)⁴):
+
+    g = b tanh(Σ_t w_t φ_t/b),   φ_t = Π_i ((x_i − c_i)/s_i)^p_ti,   p_ti = 0, 1, 2 or 3,
+
+where b is the largest size that is allowed. So it changes drag, and the simulator does the rest: the steady
+motion, and the response to a flip, which was not measured, with the same drag. Left and right turns stay mirror
+images.
+
+A correction holds between the runs that it was learnt from, and a little beyond (`_MARGIN`). A robot outside is
+refused.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.io.errors import InputError
+
+INPUTS = ("N", "ln l/R", "ln ω̄ (R/l)⁴")
+_MARGIN = (0.5, 0.1, 0.1)  # of the inputs, beyond the runs
+MOST = {"C_t": 1.5, "C_r": 1.5, "C_yr": 1.5, "surface_couple": 2.0, "anisotropic_head_drag": 0.6}  # b
+KNOBS = tuple(MOST)  # what a correction may change
+_FACTORS = ("C_t", "C_r", "C_yr")  # what it multiplies; it adds to the others
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Weights w of the terms φ for every knob, and the range of the inputs; tuples, in the order of INPUTS."""
+
+    centre: tuple[float, ...]
+    scale: tuple[float, ...]
+    low: tuple[float, ...]  # smallest inputs of the runs
+    high: tuple[float, ...]
+    powers: tuple[tuple[int, ...], ...]  # of each term, three numbers
+    weights: Mapping[str, tuple[float, ...]]  # knob -> a number for each term
+    error: float  # relative rms on runs that it was not learnt from
+    error_without: float
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that are no correction."""
+        sizes = {len(part) for part in (self.centre, self.scale, self.low, self.high, *self.powers)}
+        if sizes != {len(INPUTS)} or any(len(w) != len(self.powers) for w in self.weights.values()):
+            raise InputError("correction: three numbers for each range and term, and a weight for every term")
+        if unknown := [name for name in self.weights if name not in KNOBS]:
+            raise InputError(f"correction: unknown weights {unknown[0]!r}; allowed are {', '.join(KNOBS)}")
+        weights = [w for row in self.weights.values() for w in row]
+        numbers = [*self.centre, *self.scale, *self.low, *self.high, *weights, self.error, self.error_without]
+        if not np.isfinite(numbers).all() or min(self.scale) <= 0:
+            raise InputError("correction: its numbers must be finite, its scales above 0")
+        if any(power not in (0, 1, 2, 3) for term in self.powers for power in term):
+            raise InputError("correction: powers are 0, 1, 2 or 3")
+
+    def applied(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Groups and effects of a robot by column name, with the correction.
+
+        Raises:
+            InputError: the robot is outside the runs that the correction was learnt from.
+        """
+        x = inputs_of(values)
+        for name, value, low, high, margin in zip(INPUTS, x, self.low, self.high, _MARGIN, strict=True):
+            if not low - margin <= value <= high + margin:
+                raise InputError(
+                    f"{name} = {value:.3g} is outside the runs that the robot's correction was learnt from "
+                    f"({low:.3g} to {high:.3g}): make runs there, or leave out the table [correction]"
+                )
+        terms = self.terms(np.array([x]))[0]
+        found = dict(values)
+        for name, weights in self.weights.items():
+            g = MOST[name] * math.tanh(float(terms @ np.array(weights)) / MOST[name])
+            found[name] = found[name] * math.exp(g) if name in _FACTORS else found.get(name, 0.0) + g
+        return found
+
+    def terms(self, inputs: Floats) -> Floats:
+        """φ of inputs (m, 3), (m, t)."""
+        return monomials((inputs - np.array(self.centre)) / np.array(self.scale), self.powers)
+
+
+def monomials(x: Floats, powers: tuple[tuple[int, ...], ...]) -> Floats:
+    """Products of powers of the columns of x (m, 3), (m, t)."""
+    return np.stack([(x ** np.array(term)).prod(1) for term in powers], 1)
+
+
+def inputs_of(values: Mapping[str, float]) -> tuple[float, float, float]:
+    """INPUTS of a robot."""
+    slender = math.log(values["l_over_R"])
+    return float(values["N"]), slender, math.log(abs(values["omega_bar"])) - 4 * slender
+
+
+def correction_tables(correction: Correction) -> dict[str, Any]:
+    """The table [correction] of a robot.toml, as plain content."""
+    names = [f.name for f in fields(Correction) if f.name not in ("weights", "powers")]
+    found: dict[str, Any] = {}
+    for name in names:
+        value = getattr(correction, name)
+        found[name] = list(value) if isinstance(value, tuple) else value
+    found["powers"] = [list(term) for term in correction.powers]
+    return found | {name: list(row) for name, row in correction.weights.items()}
+
+
+def read_correction(table: Any, place: str) -> Correction:
+    """The correction from its table in a robot.toml.
+
+    Raises:
+        InputError: the table is no correction.
+    """
+    try:
+        content = dict(table)
+        centre, scale, low, high = (
+            tuple(map(float, content.pop(name))) for name in ("centre", "scale", "low", "high")
+        )
+        powers = tuple(tuple(map(int, term)) for term in content.pop("powers"))
+        error, without = (float(content.pop(name)) for name in ("error", "error_without"))
+        weights = {str(name): tuple(map(float, row)) for name, row in content.items()}
+    except KeyError as missing:
+        raise InputError(f"{place}: [correction] has no entry {missing}; copy it from the calibration") from None
+    except (TypeError, ValueError) as broken:
+        raise InputError(f"{place}: [correction] cannot be read: {broken}") from None
+    return Correction(centre, scale, low, high, powers, weights, error, without)

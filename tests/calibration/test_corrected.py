@@ -1,0 +1,106 @@
+"""What a calibration hands on: the corrected robot knows how sure it is, and the planner says so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibration.corrected import corrected_robot, corrected_toml, knowledge_of
+from calibration.influences import CURRENT
+from calibration.synthetic import make_table
+from planner.check import tracking_error
+from planner.knowledge import read_knowledge
+from planner.path import circle
+from planner.plan import plan
+from planner.record import load_plan
+from sim.inputs import load_robot, save_robot
+from sim.io.errors import run_command
+from sim.model.presets import PRESETS
+from sim.model.robot import Robot
+from sim.model.schedule import Schedule, load_schedule
+from sim.motion.replay import replay
+from surrogate.export import load_table
+from tests.calibration.toy_tables import START, closed, toy_table
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -> None:
+    result = closed(toy_table(5, end_over_end_drag=5.0))
+    assert result.effects == ("end_over_end_drag",)
+    path = tmp_path / "corrected.toml"
+    path.write_text(corrected_toml(START, result.delivered))
+    robot, knowledge = load_robot(path), read_knowledge(path)
+    assert robot == corrected_robot(START, result.delivered.parameters)
+    sigma = dict(zip(knowledge.names, np.sqrt(np.diag(knowledge.covariance)), strict=True))
+    assert {"C_t", "C_r", "C_yr", "youngs_modulus", "tail_length", "end_over_end_drag"} <= set(sigma)
+    low, high = result.final.interval("end_over_end_drag")
+    assert 2 * 1.96 * sigma["end_over_end_drag"] == pytest.approx(high - low, rel=0.35)  # a session more
+    assert sigma["youngs_modulus"] < START.sigma("youngs_modulus").of(1.0)
+    assert sigma["tail_length"] == pytest.approx(1e-3 / START.tail_length, rel=0.5)  # of ln l, by its prior
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_a_current_is_handed_on_with_its_error() -> None:
+    delivered = closed(toy_table(5)).delivered
+    one = replace(delivered.fitted[0], name=CURRENT[1], logarithmic=False)
+    found = knowledge_of(
+        START,
+        replace(
+            delivered,
+            parameters={**delivered.parameters, CURRENT[1]: 2e-4},
+            fitted=(*delivered.fitted, one),
+            covariance=np.block([
+                [delivered.covariance, np.zeros((len(delivered.fitted), 1))],
+                [np.zeros((1, len(delivered.fitted))), np.array([[1e-10]])],
+            ]),
+        ),
+    )  # fmt: skip
+    assert found.current == (0.0, 2e-4)
+    assert found.current_error == (0.0, pytest.approx(1e-5))
+    assert CURRENT[1] not in found.names
+
+
+@pytest.mark.slow
+def test_from_a_table_to_a_path_whose_stated_error_holds(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Through the commands. E, μ0 and the coefficients are not those that were given; the true robot swims."""
+    from calibration.__main__ import main as calibration
+    from planner.__main__ import main as planner
+    from surrogate.__main__ import main as surrogate
+
+    given = replace(PRESETS["paper-measured"], tails=2)
+    truth = replace(
+        given, C_t=3.1, C_r=2.4, C_yr=4.4,
+        youngs_modulus=0.93 * given.youngs_modulus, viscosity=1.03 * given.viscosity,
+    )  # fmt: skip
+    save_robot(given, tmp_path / "given.toml")
+    make_table(truth, seed=8, tails=(2, 3, 4), lengths_cm=(6.0, 9.0), title="").to_csv(tmp_path / "runs.csv")
+    robot, table, out = (str(tmp_path / name) for name in ("out/corrected.toml", "robot.json", "plan"))
+    words = ["calibrate", str(tmp_path / "runs.csv"), "--robot", str(tmp_path / "given.toml")]
+    assert run_command(calibration, [*words, "--out", str(tmp_path / "out")]) == 0
+    assert run_command(surrogate, ["robot", robot, "--out", table]) == 0
+    assert run_command(planner, ["plan", "circle:2", "--robot", robot, "--model", table, "--out", out]) == 0
+    record = load_plan(Path(out) / "plan.json")
+    error = tracking_error(record, _swum(load_schedule(Path(out) / "plan.json"), load_robot(robot), truth))
+    assert error.largest < record["stated_error_over_l"] < 6 * error.largest
+    assert "within the stated error" in error.line
+    unsure = plan(circle(2.0), load_robot(robot), lookup=load_table(table)).stated_error
+    assert unsure < 0.8 * record["stated_error_over_l"]
+    capsys.readouterr()
+
+
+def _swum(schedule: Schedule, planned: Robot, truth: Robot):  # type: ignore[no-untyped-def]
+    """The track of the true robot, in units of the planned one: seconds and metres are the same."""
+    time, length = planned.time_scale / truth.time_scale, planned.tail_length / truth.tail_length
+    x, y, heading = schedule.start
+    own = Schedule(
+        truth.group_values(), schedule.first_direction, schedule.dwells * time, (x * length, y * length, heading),
+        truth.time_scale,
+    )  # fmt: skip
+    track = replay([own])[0]
+    track[["x_over_l", "y_over_l"]] /= length
+    return track

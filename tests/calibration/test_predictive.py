@@ -1,0 +1,166 @@
+"""Where no effect explains the runs: a correction that simulates, plans, and says its range."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from calibration.corrected import corrected_toml
+from calibration.loop import Verdict, verdict_record
+from calibration.swimmer import Swimmer
+from planner.knowledge import read_knowledge
+from planner.lookup import vehicle_of
+from planner.path import circle
+from planner.plan import plan
+from sim.inputs import load_robot, robot_toml
+from sim.io.errors import InputError, run_command
+from sim.model.correction import Correction
+from sim.model.presets import PRESETS
+from sim.motion.steady import steady
+from surrogate.export import load
+from tests.calibration.toy_tables import START, closed, install_toy, toy_swimmer, toy_table
+
+CONTROL = PRESETS["paper-control"]
+
+
+@pytest.fixture(scope="module")
+def table() -> pd.DataFrame:
+    """A yaw rate that bends with the tails' length, of no effect's form."""
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        found = toy_table(9, lengths_cm=(5.0, 6.5, 8.0, 9.5, 11.0))
+    found["omega_yr_rad_s"] *= np.exp(0.02 * (found["l_cm"] - 8.0) ** 2)
+    return found
+
+
+@pytest.fixture(scope="module")
+def result(table: pd.DataFrame) -> Verdict:
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        return closed(table)
+
+
+def correction(**changes: object) -> Correction:
+    """C_yr grows by 10 % for each 0.2 of ln l."""
+    x = np.array([CONTROL.tails, np.log(CONTROL.tail_length / CONTROL.head_radius), 0.0])
+    x[2] = np.log(CONTROL.omega_bar) - 4 * x[1]
+    low, high = x - np.array([0, 0.3, 0.3]), x + np.array([1, 0.3, 0.3])
+    plain = Correction(
+        tuple(x.tolist()), (1.0, 0.2, 1.0), tuple(low.tolist()), tuple(high.tolist()),
+        ((0, 0, 0), (0, 1, 0)), {"C_yr": (0.2, 0.1), "surface_couple": (0.05, 0.0)}, 0.03, 0.05,
+    )  # fmt: skip
+    return replace(plain, **changes)  # type: ignore[arg-type]
+
+
+def test_it_predicts_runs_that_it_was_not_learnt_from(result: Verdict) -> None:
+    assert result.verdict == "unexplained"
+    assert result.predictive is not None
+    assert result.error_predictive is not None
+    assert any("ln l/R" in term for term in result.predictive.terms)
+    left = result.error_before**2 - result.noise_ceiling**2
+    assert result.error_predictive**2 - result.noise_ceiling**2 < 0.4 * left
+    assert f"{100 * result.error_predictive:.1f} % on runs" in result.sentence
+    assert verdict_record(result, table="t")["error_predictive"] == result.error_predictive
+
+
+def test_the_corrected_robot_simulates_what_was_predicted(
+    result: Verdict, table: pd.DataFrame, tmp_path: Path
+) -> None:
+    """The file's robot, with the table's settings, moves as the correction that was learnt from all runs says."""
+    assert result.predictive is not None
+    (tmp_path / "corrected.toml").write_text(corrected_toml(START, result.delivered, result.predictive))
+    robot = load_robot(tmp_path / "corrected.toml")
+    assert robot.correction == result.predictive.content.correction
+    model = toy_swimmer(table)
+    own = Swimmer(replace(robot, tail_length=START.tail_length), model.runs, solver=model.solver)
+    start = {p.name: p.start for p in (*own.coefficients, *own.given, *own.effects)}
+    start["tail_length_offset"] = robot.tail_length - START.tail_length
+    start |= {k: result.delivered.parameters[k] for k in ("camera_scale", "heading_zero", "tachometer")}
+    left = (model.runs.y - own.predict([start])[0])[result.used]
+    before = (model.runs.y - result.base.prediction)[result.used]
+    assert (left**2).mean() < 0.6 * (before**2).mean()
+
+
+def test_its_uncertainty_is_in_the_covariance(result: Verdict, tmp_path: Path) -> None:
+    assert result.predictive is not None
+    (tmp_path / "with.toml").write_text(corrected_toml(START, result.delivered, result.predictive))
+    (tmp_path / "without.toml").write_text(corrected_toml(START, result.delivered))
+    known, plain = (read_knowledge(tmp_path / f"{name}.toml") for name in ("with", "without"))
+    assert {"surface_couple", "anisotropic_head_drag"} <= set(known.names)
+    place = known.names.index("C_yr")
+    assert known.covariance[place, place] > 1.2 * plain.covariance[place, place]
+
+
+def test_a_robot_with_a_correction_is_that_with_other_drag() -> None:
+    robot = replace(CONTROL, correction=correction())
+    longer = replace(robot, tail_length=1.1 * CONTROL.tail_length)
+    for one in (robot, longer):
+        plain, values = replace(one, correction=None).group_values(), one.group_values()
+        g = 0.2 + 0.1 * np.log(one.tail_length / CONTROL.tail_length) / 0.2
+        assert values["C_yr"] == pytest.approx(plain["C_yr"] * np.exp(1.5 * np.tanh(g / 1.5)))
+        assert values["surface_couple"] == pytest.approx(2 * np.tanh(0.025))
+        assert {k: v for k, v in values.items() if k not in ("C_yr", "surface_couple")} == {
+            k: v for k, v in plain.items() if k != "C_yr"
+        }
+    moved, still = steady(robot.groups()), steady(CONTROL.groups())
+    assert abs(moved.omega_yr[0]) > 1.1 * abs(still.omega_yr[0])
+
+
+def test_it_is_written_and_read(tmp_path: Path) -> None:
+    robot = replace(CONTROL, correction=correction())
+    (tmp_path / "robot.toml").write_text(robot_toml(robot))
+    assert load_robot(tmp_path / "robot.toml") == robot
+
+
+def test_outside_its_range_it_refuses() -> None:
+    for change in (
+        {"tails": 4},
+        {"tail_length": 2 * CONTROL.tail_length},
+        {"motor_speed": 2 * CONTROL.motor_speed},
+    ):
+        robot = replace(CONTROL, correction=correction(), **change)  # type: ignore[arg-type]
+        with pytest.raises(InputError, match="outside the runs that the robot's correction was learnt from"):
+            plan(circle(2.0), robot)
+
+
+def test_the_planner_steers_with_it() -> None:
+    robot = replace(CONTROL, correction=correction())
+    turned, plain = (vehicle_of(one, load()).yaw_rate for one in (robot, CONTROL))
+    exact = abs(steady(robot.groups()).omega_yr[0])
+    assert turned == pytest.approx(exact, rel=0.01)
+    assert turned > 1.1 * plain
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ("C_yr = [0.2, 0.1]", "C_q = [0.2, 0.1]|unknown weights"),
+        ("C_yr = [0.2, 0.1]", "C_yr = [0.2]|a weight for every term"),
+        ("powers = [[0, 0, 0], [0, 1, 0]]", "powers = [[0, 0, 0], [0, 4, 0]]|powers are"),
+        ("error = 0.03", "|no entry 'error'"),
+        ("error = 0.03", 'error = "small"|cannot be read'),
+        ("error = 0.03", "error = nan|finite"),
+    ],
+)
+def test_a_wrong_table_is_refused(change: str, expected: str, tmp_path: Path) -> None:
+    text = robot_toml(replace(CONTROL, correction=correction()))
+    new, _, message = expected.partition("|")
+    assert change in text
+    (tmp_path / "robot.toml").write_text(text.replace(change, new))
+    with pytest.raises(InputError, match=message):
+        load_robot(tmp_path / "robot.toml")
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_a_corrected_robot_is_not_calibrated_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from calibration.__main__ import main
+
+    toy_table(1).to_csv(tmp_path / "t.csv", index=False)
+    (tmp_path / "robot.toml").write_text(robot_toml(replace(CONTROL, correction=correction())))
+    words = ["calibrate", str(tmp_path / "t.csv"), "--robot", str(tmp_path / "robot.toml"), "--out", str(tmp_path)]
+    assert run_command(main, words) == 2
+    assert "calibrate the robot as it was given" in capsys.readouterr().err

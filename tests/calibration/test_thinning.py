@@ -1,0 +1,104 @@
+"""An effect with a second number: found at the largest of several scores, and both numbers recovered."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calibration.corrected import corrected_robot
+from calibration.directions import Directions, directions
+from calibration.fit import Fit, fit
+from calibration.influences import influences
+from calibration.loop import calibrate
+from calibration.measurements import read_measurements
+from calibration.misfit import check_misfit
+from calibration.model import by_differences, start_values
+from calibration.swimmer import Swimmer
+from calibration.synthetic import make_table
+from tests.calibration.toy_tables import START, TRUTH, closed, toy_swimmer, toy_table
+
+SIZE, TIME = "shear_thinning", "shear_thinning_time"
+HIDDEN = {SIZE: 0.45, TIME: 0.6}
+SPEEDS = (30.0, 70.0, 170.0)  # rpm: rates of shear from below 1/λ to above it
+
+
+def recovered(refit: Fit | None) -> None:
+    """Both numbers are within 95 % intervals that say something."""
+    assert refit is not None
+    for name, true in HIDDEN.items():
+        low, high = refit.interval(name)
+        assert low - 0.2 * (high - low) < true < high + 0.2 * (high - low)
+    low, high = refit.interval(SIZE)
+    assert high - low < 0.6
+
+
+def test_the_second_number_is_no_candidate_of_its_own() -> None:
+    assert TIME not in influences()
+    second = influences()[SIZE].parameter.second
+    assert second is not None
+    assert second.name == TIME
+    assert len(second.grid) > 1
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_scores_are_taken_at_several_values_and_the_largest_counts() -> None:
+    model = toy_swimmer(toy_table(5, **HIDDEN))
+    used = np.ones(len(model.runs), bool)
+    base = fit(model, start_values(model), ("C_t", "C_r", "C_yr"), used, title="")
+    along = directions(model, base.parameters, model.effects)
+    place = [e.name for e in model.effects].index(SIZE)
+    own = along.table[..., along.owner == place]
+    grid = influences()[SIZE].parameter.second.grid  # type: ignore[union-attr]
+    assert own.shape[-1] == len(grid)
+    for column, value in zip(np.moveaxis(own, -1, 0), grid, strict=True):
+        expected = by_differences(model, {**base.parameters, TIME: value, SIZE: 1e-6}, [SIZE])[1][..., 0]
+        assert column == pytest.approx(expected, rel=0.05, abs=1e-4)
+    found = check_misfit(base, model.runs, used, along, level=0.05, seed=0, draws=50)
+    alone = [
+        check_misfit(base, model.runs, used, Directions.plain(own[..., [j]]), level=0.05, seed=0, draws=50)
+        for j in range(len(grid))
+    ]
+    z = np.array([abs(one.scores.z[0]) for one in alone])
+    assert abs(found.scores.z[place]) == pytest.approx(z.max())
+    assert found.second[place] == grid[int(np.argmax(z))]
+    assert len(found.scores.z) == len(model.effects)
+    together = check_misfit(base, model.runs, used, Directions(own, np.zeros(3, int), np.array(grid)), level=0.05,
+                            seed=0, draws=200)  # fmt: skip
+    first = check_misfit(base, model.runs, used, Directions.plain(own[..., [0]]), level=0.05, seed=0, draws=200)
+    assert together.critical_z >= first.critical_z  # the bootstrap takes the largest, too
+
+
+def test_leaving_an_effect_out_leaves_all_its_columns_out() -> None:
+    table = np.arange(4.0) * np.ones((2, 1, 4))
+    left = Directions(table, np.array([0, 1, 1, 2]), np.array([np.nan, 0.0, 1.0, np.nan])).without(1)
+    assert left.owner.tolist() == [0, 1]
+    assert left.table[0, 0].tolist() == [0.0, 3.0]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize("seed", [3, 4])
+def test_size_and_time_are_recovered_from_the_toy(seed: int) -> None:
+    truth = replace(TRUTH, effects=HIDDEN)
+    table = make_table(truth, seed=seed, lengths_cm=(5.0, 8.0, 11.0), motor_rpm=SPEEDS, title="")
+    result = closed(table)
+    assert SIZE in result.effects
+    refit = next(c.refit for c in result.explaining if c.effect.name == SIZE)
+    recovered(refit)
+    assert result.error_after < 1.15 * result.noise_ceiling
+
+
+@pytest.mark.slow
+def test_local_thinning_is_found_by_the_simulator() -> None:
+    """Truth by time steps on a finer mesh."""
+    truth = replace(TRUTH, effects=HIDDEN)
+    table = make_table(truth, seed=4, tails=(2, 3, 4), lengths_cm=(5.0, 8.0), motor_rpm=SPEEDS, title="")
+    result = calibrate(Swimmer(START, read_measurements(table)), progress=False)
+    assert SIZE in result.effects
+    assert result.error_after < 1.2 * result.noise_ceiling
+    refit = next(c.refit for c in result.explaining if c.effect.name == SIZE)
+    recovered(refit)
+    assert refit is not None
+    assert corrected_robot(START, refit.parameters).effects == {n: refit.parameters[n] for n in HIDDEN}
