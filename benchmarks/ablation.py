@@ -28,8 +28,9 @@ from surrogate.network import Ensemble
 from surrogate.rows import Simulated
 from surrogate.tails import Rows, learnable, rows_of
 
-SMALL = Settings(width=32, depth=3, members=1, epochs=100, iterations=200)
+SMALL = Settings(width=32, depth=3, members=1, epochs=60, iterations=600)
 _CENTRES, _TESTED = 1000, 1000
+_LONGER = 2  # iterations of L-BFGS for one of BFGS
 Result = tuple[str, float, float, float, tuple[float, ...]]  # name, train s, query µs, numbers, errors
 
 
@@ -48,6 +49,9 @@ def main() -> None:
     power, fit._POWER = fit._POWER, 1.0
     found.append(_network("least squares", some, tested))
     fit._POWER = power
+    polish, fit._polish = fit._polish, _lbfgs
+    found.append(_network("L-BFGS for BFGS", some, tested, replace(SMALL, iterations=_LONGER * SMALL.iterations)))
+    fit._polish = polish
     found.append(_network("Adam alone", some, tested, replace(SMALL, iterations=0)))
     smooth, tail.SMOOTHNESS = tail.SMOOTHNESS, (1.5,) * 7
     found.append(_network("inputs scaled alike", some, tested))
@@ -83,11 +87,29 @@ def _judge(name: str, rows: Rows, numbers: Callable[[Tensor], Tensor], seconds: 
 def _network(name: str, rows: Rows, tested: Rows, settings: Settings = SMALL, *, single: bool = False) -> Result:
     began = time.process_time()
     learn: Callable[..., Ensemble] = tails._learn_wrench
-    network = learn(rows, settings, "", True, None)
+    network = learn(rows, settings, "", True)
     if single:
         network = network.float().double()  # the weights rounded
     size = sum(part.numel() for part in network.parameters())
     return _judge(name, tested, network, time.process_time() - began, size)
+
+
+def _lbfgs(network: Ensemble, x: Tensor, residual: fit.Residual, iterations: int, bar: fit.Bar) -> None:
+    """The last 80 steps only, not the whole matrix."""
+    network.requires_grad_(True)
+    optimiser = torch.optim.LBFGS(
+        network.parameters(), max_iter=iterations, max_eval=2 * iterations, history_size=80,
+        line_search_fn="strong_wolfe", tolerance_change=0.0, tolerance_grad=0.0,
+    )  # fmt: skip
+    everything = torch.arange(len(x))
+
+    def closure() -> Tensor:
+        optimiser.zero_grad(set_to_none=True)
+        value = fit._loss(fit._residuals(network, x, residual, everything), fit._HARDEST)
+        value.backward()  # type: ignore[no-untyped-call]
+        return value
+
+    optimiser.step(closure)  # type: ignore[no-untyped-call]
 
 
 def _kernel(name: str, rows: Rows, tested: Rows) -> Result:

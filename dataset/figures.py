@@ -26,6 +26,8 @@ LABELS = {
 _LOGARITHMIC = ("omega_yr_bar", "v_z", "R_yr_over_l")
 _Along = Literal["both", "x", "y"]
 _BINS = 10
+_MOST_BANDS = 4  # with more numbers of tails, one band is drawn for all
+_ALL = "#5b6a78"
 _FEWEST = 12  # rows in a bin that is drawn
 
 
@@ -39,22 +41,23 @@ def draw_trends(rows: pd.DataFrame, output: str, inputs: Sequence[str]) -> Figur
     figure = Figure(figsize=(11, 2.6 * -(-len(inputs) // columns)))
     for place, name in enumerate(inputs):
         axes = figure.add_subplot(-(-len(inputs) // columns), columns, place + 1)
-        for tails, part in rows.groupby("N"):
-            _draw_band(axes, part[name].to_numpy(float), part[output].to_numpy(float), colour(float(str(tails))))
+        parts = [(colour(float(str(tails))), part) for tails, part in rows.groupby("N")]
+        if len(parts) > _MOST_BANDS:
+            _draw_band(axes, rows[name].to_numpy(float), rows[output].to_numpy(float), _ALL, line=False)
+        for shade, part in parts:
+            x, y = part[name].to_numpy(float), part[output].to_numpy(float)
+            _draw_band(axes, x, y, shade, band=len(parts) <= _MOST_BANDS)
         _style(
             axes,
             x=LABELS.get(name, name),
             y=LABELS.get(output, output) if place % columns == 0 else "",
             logarithmic=("x" if name == "omega_bar" else "") + ("y" if output in _LOGARITHMIC else ""),
         )
-    handles = [figure.axes[0].plot([], [], color=colour(n), label=f"N = {n}")[0] for n in sorted(set(rows["N"]))]
-    figure.legend(handles=handles, ncols=len(handles), fontsize=8, frameon=False, loc="upper center")
-    figure.tight_layout(rect=(0, 0, 1, 0.95))
-    return figure
+    return _with_tails_above(figure, rows, 0.95)
 
 
-def _draw_band(axes: Axes, x: Floats, y: Floats, shade: str) -> None:
-    """Median and quartiles of y in bins of equally many rows."""
+def _draw_band(axes: Axes, x: Floats, y: Floats, shade: str, *, line: bool = True, band: bool = True) -> None:
+    """Median (line) and quartiles (band) of y in bins of equally many rows."""
     good = np.isfinite(x) & np.isfinite(y)
     if good.sum() < 2 * _FEWEST:
         return
@@ -66,8 +69,10 @@ def _draw_band(axes: Axes, x: Floats, y: Floats, shade: str) -> None:
     quartiles = np.array(
         [np.quantile(y[place == i], [0.25, 0.5, 0.75]) for i in range(bins) if (place == i).any()]
     )
-    axes.plot(middle, quartiles[:, 1], color=shade, lw=1.4)
-    axes.fill_between(middle, quartiles[:, 0], quartiles[:, 2], color=shade, alpha=0.15, lw=0)
+    if line:
+        axes.plot(middle, quartiles[:, 1], color=shade, lw=1.4)
+    if band:
+        axes.fill_between(middle, quartiles[:, 0], quartiles[:, 2], color=shade, alpha=0.15, lw=0)
 
 
 def draw_indices(found: Mapping[str, Indices]) -> Figure:
@@ -95,13 +100,13 @@ def draw_collapse(rows: pd.DataFrame, linear: Mapping[str, Floats], outputs: Seq
         tails = rows["N"].to_numpy()
         for n in sorted(set(tails)):
             some = (tails == n) & np.isfinite(ratio)
-            axes.plot(linear["S"][some], ratio[some], ".", ms=2.5, alpha=0.5, color=colour(n), label=f"N = {n}")
+            axes.plot(linear["S"][some], ratio[some], ".", ms=2.5, alpha=0.5, color=colour(n))
         axes.axhline(1, color="#1c2733", lw=0.8)
         low, high = np.nanquantile(ratio, [0.005, 0.995])
         axes.set_ylim(low - 0.1 * (high - low), high + 0.1 * (high - low))
         title = f"{LABELS.get(output, output)} / linear theory"
         _style(axes, x="$S = \\zeta_\\perp\\omega_t l^4/EI$", title=title, logarithmic="x")
-    return _finished(figure, markerscale=3)
+    return _with_tails_above(figure, rows, 0.92)
 
 
 def draw_responses(rows: pd.DataFrame) -> Figure:
@@ -118,8 +123,11 @@ def draw_responses(rows: pd.DataFrame) -> Figure:
     for place, (name, scale, label) in enumerate(panels):
         axes = figure.add_subplot(1, 3, place + 1)
         curves = np.stack([np.asarray(curve, dtype=float) for curve in rows[name]]) / scale[:, None]
+        if name == "net_speed_bar" and rows["history"].any():  # without, that of short dwells is not known
+            curves[~rows["history"].to_numpy(bool)] = np.nan
         for third, (shade, which) in enumerate(zip(COLOURS[1:4], ("slow", "middling", "fast"), strict=True)):
             some = curves[thirds == third]
+            some = some[np.isfinite(some).any(1)]
             known = np.isfinite(some).mean(0) > 0.5
             low, middle, high = np.nanquantile(some[:, known], [0.25, 0.5, 0.75], axis=0)
             axes.plot(DWELLS[known], middle, color=shade, lw=1.4, label=f"{which} motors")
@@ -165,6 +173,15 @@ def _style(
         plain_logarithms(axes.yaxis)
     axes.tick_params(axis=along, labelsize=7)
     axes.grid(axis=along, alpha=0.25, lw=0.5)
+
+
+def _with_tails_above(figure: Figure, rows: pd.DataFrame, top: float) -> Figure:
+    """The figure with the colours of the numbers of tails above its panels, which end at `top` of its height."""
+    axes = figure.axes[0]
+    handles = [axes.plot([], [], color=colour(n), label=f"N = {n}")[0] for n in sorted(set(rows["N"]))]
+    figure.legend(handles=handles, ncols=len(handles), fontsize=8, frameon=False, loc="upper center")
+    figure.tight_layout(rect=(0, 0, 1, top))
+    return figure
 
 
 def _finished(figure: Figure, **legend: Any) -> Figure:

@@ -6,8 +6,9 @@ expansion). The variance then is the sum of squared coefficients:
     first order   share of the variance from terms in one input alone
     total         share from all terms that the input is part of
 
-Intervals are percentiles over resampled rows. Inputs enter through their ranks: a sweep's design is even in the
-scale that its configuration declares. Source: Sudret (2008), Reliability Engineering and System Safety 93, 964.
+Intervals are percentiles over resampled blocks of rows. Inputs enter through their ranks: a sweep's design is even
+in the scale that its configuration declares. Source: Sudret (2008), Reliability Engineering and System Safety 93,
+964.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from sim.arrays import Floats
 _HIGHEST = 4  # degree of the polynomials
 _ROWS_A_TERM = 4
 _RESAMPLED = 60
+_BLOCKS = 30
 _MOST_ROWS = 20_000  # more do not change the indices
 
 
@@ -57,10 +59,7 @@ def sobol_indices(inputs: Mapping[str, Floats], output: Floats, *, seed: int = 0
     basis = _basis(np.stack([inputs[name][kept] for name in names], 1), powers, degree)
     y = output[kept]
     first, total = _shares(_fit(basis, y), powers)
-    drawn = []
-    for _ in range(_RESAMPLED):
-        rows = rng.integers(0, len(y), len(y))
-        drawn.append(_shares(_fit(basis[rows], y[rows]), powers))
+    drawn = [_shares(c, powers) for c in _resampled(basis, y, rng)]
     bounds = np.quantile(np.array(drawn), [0.025, 0.975], axis=0)  # (2, first and total, K)
     half = rng.permutation(len(y)) < len(y) // 5
     left_out = y[half] - basis[half] @ _fit(basis[~half], y[~half])
@@ -97,6 +96,19 @@ def _fit(basis: Floats, y: Floats) -> Floats:
     """Least squares; terms that carry nothing get 0."""
     normal = basis.T @ basis + 1e-9 * len(y) * np.eye(basis.shape[1])
     return np.asarray(np.linalg.solve(normal, basis.T @ y))
+
+
+def _resampled(basis: Floats, y: Floats, rng: np.random.Generator) -> list[Floats]:
+    """Least squares on blocks of rows drawn with replacement. The blocks are random; each is summed once."""
+    blocks = np.array_split(rng.permutation(len(y)), min(_BLOCKS, len(y) // 2))
+    normal = np.array([basis[rows].T @ basis[rows] for rows in blocks])
+    right = np.array([basis[rows].T @ y[rows] for rows in blocks])
+    ridge = 1e-9 * len(y) * np.eye(basis.shape[1])
+    found = []
+    for _ in range(_RESAMPLED):
+        times = rng.multinomial(len(blocks), np.full(len(blocks), 1 / len(blocks))).astype(float)
+        found.append(np.linalg.solve(np.tensordot(times, normal, 1) + ridge, times @ right))
+    return found
 
 
 def _shares(coefficients: Floats, powers: np.ndarray) -> tuple[Floats, Floats]:

@@ -18,6 +18,7 @@ from sim.io.pages import Page
 
 OUTPUTS = ("omega_yr_bar", "v_z", "R_yr_over_l", "theta_deg")
 _FEW = 40  # usable rows below which nothing is fitted
+_SIZE = r" by [-+.0-9e]+ a revolution"  # in a reason: counted without
 _SMALL = 0.1  # exponents below it are not listed
 
 
@@ -115,7 +116,9 @@ def _add_dependence(page: Page, usable: pd.DataFrame, names: list[str]) -> None:
             draw_trends(usable, output, [name for name in names if name != "N"]),
             f"{_plain(output)} against each input, by number of tails",
         )
-    page.text("Lines: medians by number of tails. Bands: the middle half of the rows.")
+    page.text(
+        "Lines: medians by number of tails. Bands: the middle half of the rows, of all tails if N has many values."
+    )
 
 
 def _add_linear_theory(page: Page, usable: pd.DataFrame, names: list[str]) -> None:
@@ -166,7 +169,7 @@ def _add_limits(page: Page, rows: pd.DataFrame) -> None:
         f"In {int(rows['touching'].sum())} of {len(rows)} rows tails touch: their numbers are of a model without "
         f"contact. {int(rows['failed'].sum())} rows failed."
     )
-    reasons = rows.loc[stepped, "reason"].value_counts()
+    reasons = rows.loc[stepped, "reason"].astype(str).str.replace(_SIZE, "", regex=True).value_counts()
     if len(reasons):
         page.table(("reason", "rows"), [(str(reason), int(count)) for reason, count in reasons.items()])
     page.section("Cost")

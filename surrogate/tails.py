@@ -146,23 +146,22 @@ def sensitivity_of(heads: Heads, tails: Tails, motion: Tensor) -> Tensor:
     return torch.linalg.inv_ex(matrix)[0] / size[:, :, None]
 
 
-def learn_tails(rows: Rows, settings: Settings, title: str, start: TailTable | None = None) -> TailTable:
-    """Networks of all CLASSES from rows that are `learnable`; those of `start`, if given, learn on."""
+def learn_tails(rows: Rows, settings: Settings, title: str) -> TailTable:
+    """Networks of all CLASSES from rows that are `learnable`."""
     kind = class_of(rows.tails.number)
     networks: list[Ensemble | None] = []
     for k, count in enumerate(CLASSES):
         name = f"{title}: tails of N = {count}{' and more' if count == CLASSES[-1] else ''}" if title else ""
         some = rows.at(kind == k)
         known = len(some.motion) > 0
-        before = start.wrench[k] if start else None
         several = count == CLASSES[-1]
-        networks.append(_learn_wrench(some, settings, name, several, before) if known else None)
+        networks.append(_learn_wrench(some, settings, name, several) if known else None)
     many = rows.at(rows.tails.number > 1)
-    gap = start.gap if start else _learn_gap(many, _GAP, f"{title}: gap" if title else "")
+    gap = _learn_gap(many, _GAP, f"{title}: gap" if title else "")
     return TailTable(tuple(networks), gap)
 
 
-def _learn_wrench(rows: Rows, settings: Settings, title: str, several: bool, start: Ensemble | None) -> Ensemble:
+def _learn_wrench(rows: Rows, settings: Settings, title: str, several: bool) -> Ensemble:
     inputs = tail.inputs_of(rows.tails, rows.motion)
     weight = sensitivity_of(rows.heads, rows.tails, rows.motion)
     matrix = weight @ tail.units_of(rows.tails, rows.motion)
@@ -172,9 +171,8 @@ def _learn_wrench(rows: Rows, settings: Settings, title: str, several: bool, sta
     size = torch.linalg.matrix_norm(matrix * spread)
     share = torch.clamp(_OUTLIER * size.median() / size, max=1.0)
     matrix, wanted = matrix * share[:, None, None], wanted * share[:, None]
-    network = start or _new(settings, inputs, outputs=len(mean))
-    if start is None:
-        _prepare(network, mean, spread, several)
+    network = _new(settings, inputs, outputs=len(mean))
+    _prepare(network, mean, spread, several)
 
     def residual(y: Tensor, at: Tensor) -> Tensor:
         return (matrix[at] @ y[..., None])[..., 0] - wanted[at]

@@ -113,7 +113,6 @@ def learn(
     curve_settings: Settings | None = None,
     *,
     flips_held_out: Simulated | None = None,
-    start: Lookup | None = None,
     source: dict[str, Any] | None = None,
     title: str = "train",
 ) -> Lookup:
@@ -125,7 +124,6 @@ def learn(
         held_out: robots for the errors and the factor of the intervals.
         flipped: robots with response curves.
         flips_held_out: robots with curves for the errors of the response; by default a tenth of `flipped`.
-        start: a table whose networks of the wrench learn on; its other networks are kept.
         source: more provenance.
     """
     chosen, curves_chosen = settings or Settings(), curve_settings or curves.SETTINGS
@@ -133,19 +131,14 @@ def learn(
         tenth = np.arange(len(flipped)) % 10 == 9
         flipped, flips_held_out = flipped.at(~tenth), flipped.at(tenth)
     rows = _learnable(learned)
-    table = learn_tails(rows, chosen, title, start.tails if start else None)
+    table = learn_tails(rows, chosen, title)
     kind = class_of(rows.tails.number)
     inputs = tail.inputs_of(rows.tails, rows.motion)
     flipped, flips_held_out = _several_tails(flipped), _several_tails(flips_held_out)
     own = _learnable(flipped)
     usable = np.flatnonzero(learnable(rows_of(flipped.robots, flipped.motion)))
-    response = (
-        start.curves
-        if start
-        else learn_curves(
-            own.heads, own.tails, own.motion, flipped.at(usable).curves, curves_chosen, title and f"{title}: flips"
-        )
-    )
+    known = flipped.at(usable).curves
+    response = learn_curves(own.heads, own.tails, own.motion, known, curves_chosen, title and f"{title}: flips")
     counts = {"train": len(rows.motion), "widths": len(widths), "held_out": len(held_out), "flips": len(usable)}
     made = provenance({"tails": asdict(chosen), "curves": asdict(curves_chosen)})
     lookup = Lookup(
