@@ -18,8 +18,9 @@ from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker, compile_c
 from tests.planner.swimming import Camera, rms, swim
 
-# A difference in the last digit grows, because each flip decides the later ones: 1e-13 to 1e-6 in 100 time units.
-SHORT, ROUNDING, GROWN = 60.0, 1e-11, 1e-4
+# A difference in the last digit grows, because each flip decides the later ones. So answers are compared up to SHORT;
+# after it the two are only as good as each other.
+SHORT, ROUNDING = 60.0, 1e-11
 
 
 @cache
@@ -46,13 +47,17 @@ class Both:
     def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Advice:
         seen = now if seen_at is None else seen_at
         flips = now >= self.last.flip_at - SLACK
-        own = max(now, self.told.flip_at) if flips else now  # late in a swim the two announce slightly other times
-        one, other = self.one.feed(now, pose, seen), self.other.feed(own, pose, seen)
+        one = self.one.feed(now, pose, seen)
+        if self.one._now > SHORT:
+            self.last = one
+            return one
+        other = self.other.feed(max(now, self.told.flip_at) if flips else now, pose, seen)
         assert (one.direction, one.finished, one.alarm) == (other.direction, other.finished, other.alarm)
-        near = ROUNDING if self.one._now < SHORT else GROWN
-        assert other.flip_at == pytest.approx(one.flip_at, rel=near)
-        assert other.error == pytest.approx(one.error, rel=near)
-        assert list(self.one.learned.values()) == pytest.approx(self.other.state.tolist(), rel=near, abs=near)
+        assert other.flip_at == pytest.approx(one.flip_at, rel=ROUNDING)
+        assert other.error == pytest.approx(one.error, rel=ROUNDING)
+        assert list(self.one.learned.values()) == pytest.approx(
+            self.other.state.tolist(), rel=ROUNDING, abs=ROUNDING
+        )
         if one.direction == -self.last.direction != 0:  # the flip that was announced has happened
             assert self.last.flip_at - self.flipped_at >= planned().minimum_dwell * (1 - 1e-12)
             self.flipped_at = self.last.flip_at
@@ -75,7 +80,7 @@ def test_the_same_orders_as_in_python(compiled: CompiledTracker, camera: Camera)
     truth = replace(car, twist=car.twist * np.array([[0.97, 0.97, 1.04], [0.97, 0.97, 0.98]]))
     both = Both(Tracker(planned()), compiled)
     swim(both, planned(), truth, camera)
-    assert both.calls > 100
+    assert both.calls > 50
     assert both.one.advice.finished
 
 
@@ -95,8 +100,9 @@ def test_the_same_orders_from_nonsense(compiled: CompiledTracker, seed: int) -> 
         both.feed(time, pose if rng.random() < 0.7 else None, seen)  # type: ignore[arg-type]
 
 
-def test_single_precision_keeps_the_robot_on_its_path(tmp_path: Path) -> None:
-    single = CompiledTracker(planned(), tmp_path, single=True)
+@pytest.mark.parametrize("precise", [True, False], ids=["double", "single"])
+def test_in_c_the_robot_stays_on_its_path_as_well(tmp_path: Path, precise: bool) -> None:
+    single = CompiledTracker(planned(), tmp_path, single=not precise)
     car = planned().vehicle
     truth = replace(car, twist=car.twist * np.array([[0.97, 0.97, 1.04], [0.97, 0.97, 0.98]]))
     distance, dwells = swim(single, planned(), truth, Camera(delay=1.0, gaps=0.2))
