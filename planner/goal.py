@@ -237,7 +237,8 @@ class _Trip:
             start=lambda _: Start(self.start, 0, sense),
             finish=ending_at(self.goal, vehicle, min(dwell, max(self.least, _SHORTER * dwell)), q),
         )
-        plan = replace(plan, minimum_dwell=min(dwell, float(plan.dwells.min())))
+        # The bound is for paths that turn less than the robot can; these arcs turn as much as it can.
+        plan = replace(plan, guaranteed=None, minimum_dwell=min(dwell, float(plan.dwells.min())))
         x, y, angle = plan.poses[-1].tolist()
         clearance = math.inf
         if not self.room.empty:

@@ -77,7 +77,7 @@ class Plan:
     drawn_max: float
     stated_error: float  # holds for 95 % of the robots that the model's uncertainty allows, open loop
     feedback_error: float  # the same where the pose is measured, and the rest planned again, every 20 flips
-    guaranteed: float  # bound for a robot without errors, however long the path
+    guaranteed: float | None  # bound for a robot without errors, however long the path; None: not known
     closure: float | None
     model: str  # hash of the look-up table
     warnings: tuple[str, ...]

@@ -11,8 +11,9 @@ from planner.plan import FEEDBACK_EVERY, Plan
 from sim.io.errors import InputError
 from sim.model.plan_file import FORMAT, read_plan_file
 
-_NUMBERS = ("stated_error_over_l", "feedback_error_over_l", "guaranteed_error_over_l", "predicted_rms_over_l",
-            "predicted_max_over_l", "offset_over_l", "minimum_dwell_bar")  # fmt: skip
+_NUMBERS = ("stated_error_over_l", "feedback_error_over_l", "predicted_rms_over_l", "predicted_max_over_l",
+            "offset_over_l", "minimum_dwell_bar")  # fmt: skip
+_GUARANTEE = "guaranteed_error_over_l"  # null where it is not known
 _TABLES = {"reference": 2, "raw_path": 2, "predicted_poses": 3}
 
 
@@ -44,7 +45,7 @@ def plan_record(result: Plan) -> dict[str, Any]:
         "off_drawn_over_l": result.off_drawn,
         "missed_over_l": result.missed,
         "zigzag_rms_over_l": result.zigzag_rms,
-        "guaranteed_error_over_l": result.guaranteed,
+        _GUARANTEE: result.guaranteed,
         "stated_error_over_l": result.stated_error,
         "feedback_error_over_l": result.feedback_error,
         "feedback_every": FEEDBACK_EVERY,
@@ -66,7 +67,7 @@ def load_plan(path: str | Path) -> dict[str, Any]:
     """
     content = read_plan_file(path)
     try:
-        for name in _NUMBERS:
+        for name in (*_NUMBERS, *([] if content[_GUARANTEE] is None else [_GUARANTEE])):
             if not np.isfinite(float(content[name])):
                 raise InputError(f"{path}: {name} = {content[name]} is no finite number; plan again")
         for name, width in _TABLES.items():

@@ -18,8 +18,8 @@ from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker, compile_c
 from tests.planner.swimming import Camera, rms, swim
 
-# A difference in the last digit grows, because each flip decides the later ones. So answers are compared up to SHORT;
-# after it the two are only as good as each other.
+# A difference in the last digit grows, because each flip decides the later ones. So answers are compared up to
+# SHORT; after it the two are only as good as each other.
 SHORT, ROUNDING = 60.0, 1e-11
 
 

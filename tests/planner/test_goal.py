@@ -15,6 +15,7 @@ from benchmarks.keep_out import random_case, replayed_clearance
 from planner.goal import Voyage, to_goal
 from planner.keep_out import Circle, Polygon
 from planner.knowledge import Knowledge
+from planner.record import load_plan, plan_record
 from planner.route import NoWayError
 from planner.schedule import Switches, poses_at_flips
 from sim.io.errors import InputError, run_command
@@ -51,6 +52,14 @@ def test_time_is_within_5_percent_of_brute_force(seed: int) -> None:
     goal = random_goal(np.random.default_rng(seed))
     voyage = to_goal((0, 0, 0), goal, CONTROL)
     assert voyage.plan.duration < 1.05 * brute_force(voyage.plan.vehicle, goal)
+
+
+def test_a_plan_to_a_goal_gives_no_guarantee_and_is_read_again(tmp_path: Path) -> None:
+    """The guaranteed bound is for paths with wider turns."""
+    plan = to_goal((0, 0, 0), (2, 1.5, 2.0), CONTROL).plan
+    assert plan.guaranteed is None
+    (tmp_path / "plan.json").write_text(json.dumps(plan_record(plan)))
+    assert load_plan(tmp_path / "plan.json")["guaranteed_error_over_l"] is None
 
 
 def test_moved_and_mirrored_tasks_give_moved_and_mirrored_plans() -> None:

@@ -126,6 +126,7 @@ def test_paper_cases_are_planned_within_their_bound(name: str) -> None:
     result = plan(path, robot)
     assert result.predicted_rms < 1.3 * result.zigzag_rms
     assert result.drawn_rms < {"circle": 0.020, "square": 0.025, "triangle": 0.06}[name]
+    assert result.guaranteed is not None
     assert result.predicted_max <= min(result.guaranteed, result.stated_error)
     assert result.closure is not None
     assert result.closure < 0.05
@@ -164,6 +165,7 @@ def test_other_points_of_the_axis() -> None:
     """The tip needs a longer rod, the pivot none; each is planned for itself."""
     for point in ("head_tip", "pivot"):
         result = plan(circle(2.5), CONTROL, point=point)  # type: ignore[arg-type]
+        assert result.guaranteed is not None
         assert result.predicted_max <= result.guaranteed
         assert result.offset != 0
 
