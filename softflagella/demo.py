@@ -277,7 +277,7 @@ def _write_page(
 
 
 def _figure(name: str, rms: float) -> str:
-    return f"{rms:.2f} deg" if name == "theta_deg" else f"{100 * rms:.2f} %"
+    return f"{rms:.1g} deg" if name == "theta_deg" else f"{100 * rms:.1g} %"
 
 
 def _draw_robot(robot: Robot, motions: Sequence[Steady]) -> Figure:
@@ -339,7 +339,7 @@ def _draw_parity(rows: pd.DataFrame) -> Figure:
         ends = [np.nanmin(truth[name]), np.nanmax(truth[name])]
         axes.plot(ends, ends, color="#1c2733", lw=0.7)
         error = np.nanmedian(np.abs(found[name] - truth[name]) / scale_of(name, truth))
-        text = f"{error:.2f} deg" if name == "theta_deg" else f"{100 * error:.2f} %"
+        text = f"{error:.1g} deg" if name == "theta_deg" else f"{100 * error:.1g} %"
         axes.set_title(f"{label}: median error {text}", fontsize=9)
         axes.set_xlabel("simulated", fontsize=8)
         axes.tick_params(labelsize=7)

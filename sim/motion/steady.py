@@ -51,7 +51,7 @@ def steady(groups: Groups) -> Steady:
     motion = orbits(groups)
     quick = np.flatnonzero(~motion.failed & (np.abs(motion.omega_yr) > QUICK * np.abs(motion.omega_t)))
     if len(quick):
-        reached = settle(_rows(groups, quick), resolution=Resolution.for_tracks)
+        reached = settle(_rows(groups, quick), resolution=Resolution.for_settling)
         other = quick[_difference(motion.at(quick), reached) > SAME]
         motion = _with_stepped(motion, groups, other, np.full(len(groups), _OTHER_MOTION))
     lost = np.flatnonzero(motion.failed & (motion.method == DIRECT))

@@ -7,7 +7,8 @@ import pytest
 
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
-from tests.sim.robots import CONTROL_VALUES
+from sim.motion.steady import steady
+from tests.sim.robots import CONTROL_VALUES, control
 
 
 def test_replays_of_several_schedules_equal_replays_alone() -> None:
@@ -21,3 +22,13 @@ def test_replays_of_several_schedules_equal_replays_alone() -> None:
         assert track.equals(alone)
         assert float(track.time_bar.iloc[-1]) == pytest.approx(schedule.dwells.sum())
     assert together[0].iloc[0][["x_over_l", "y_over_l", "heading_rad"]].tolist() == [1.0, 2.0, 0.5]
+
+
+@pytest.mark.parametrize(("tails", "omega_bar"), [(2.0, 10.0), (4.0, 10.0)])
+def test_a_replay_turns_as_fast_as_the_steady_motion(tails: float, omega_bar: float) -> None:
+    """A yaw rate 0.2 % too small adds up to a tenth of l in a plan of some hundred dwells."""
+    values = {**CONTROL_VALUES, "N": tails, "omega_bar": omega_bar}
+    track = replay([Schedule(values, 1, np.array([12.0]), (0.0, 0.0, 0.0), 1.0)])[0]
+    late = track[track["time_bar"] > 4]
+    rate = np.polyfit(late["time_bar"], late["heading_rad"], 1)[0]
+    assert rate == pytest.approx(steady(control(N=tails, omega_bar=omega_bar)).omega_yr[0], rel=1e-3)
