@@ -18,6 +18,9 @@ ROWS ?=
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
+# Tests run in two processes, each file in one of them.
+TWO := -n 2 --dist loadfile
+
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test quick lint docs dataset train plan calibrate report bench clean
 
@@ -37,13 +40,13 @@ reports/demo.html: $(STAMP) $(SOURCES) $(wildcard dataset/*.py surrogate/*.py su
 	$(RUN) -m softflagella demo --out $@
 
 test: $(VENV)/.clusters ## run the tests, those of clusters included
-	$(RUN) -m pytest
+	$(RUN) -m pytest $(TWO)
 $(VENV)/.clusters: $(STAMP)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[clusters]'
 	touch $@
 
 quick: $(STAMP) ## run the quick tests, under a minute
-	$(RUN) -m pytest -m "not slow"
+	$(RUN) -m pytest $(TWO) -m "not slow"
 
 lint: $(STAMP) ## style and types
 	$(VENV)/bin/ruff check .
