@@ -31,7 +31,7 @@ _STRIDE = 4  # steps between two kept points
 
 
 class Pilot(Protocol):
-    """`planner.Tracker`, or what is fed like it."""
+    """`planner.tracker`, or what is fed like it."""
 
     def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Advice: ...
 

@@ -52,6 +52,12 @@ class Voyage:
     """A plan from a pose to a pose. Lengths in l, angles in rad.
 
     Poses are x, y and heading of the head's centre.
+
+    Example:
+        >>> from softflagella import load_robot, to_goal
+        >>> voyage = to_goal((0, 0, 0), (3, 1, 1), load_robot("paper-control"))
+        >>> voyage.end_error[0] < 0.01
+        True
     """
 
     plan: Plan
@@ -101,7 +107,7 @@ def to_goal(
         minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
         minimum_seconds: the same in seconds; the larger one counts.
         tolerance: largest acceptable stated error [l].
-        feedback: the robot's pose will be measured every 20 flips (`planner.Tracker`), so the margin around
+        feedback: the robot's pose will be measured every 20 flips (`planner.tracker`), so the margin around
             obstacles is the stated error with feedback.
         knowledge: what a calibration found besides the robot: covariance, current.
         seed: of the random robots from which the stated error is computed.

@@ -22,7 +22,14 @@ _BLOCK = 2_000_000  # distances computed at once
 
 @dataclass(frozen=True)
 class Circle:
-    """A round region."""
+    """A round region: its centre and its radius, in l.
+
+    Example:
+        >>> import numpy as np
+        >>> from softflagella import Circle
+        >>> Circle(1.0, 0.0, 0.5).distance(np.array([[0.0, 0.0]])).tolist()
+        [0.5]
+    """
 
     x: float
     y: float
