@@ -85,8 +85,8 @@ def compiled(made: Path, out: Path) -> str:
 
 def build(made: Path, out: Path) -> str:
     done("dataset", "build", "--config", made / "sweep.toml", "--out", made / "sweep", "--jobs", 1)  # nothing left
-    assert json.loads((made / "sweep" / "manifest.json").read_text())["rows"] == 4
-    return "4 rows: "
+    assert json.loads((made / "sweep" / "manifest.json").read_text())["rows"] == 6
+    return "6 rows: "
 
 
 def report(made: Path, out: Path) -> str:
@@ -97,11 +97,11 @@ def report(made: Path, out: Path) -> str:
 
 def verify(made: Path, out: Path) -> str:
     done("dataset", "verify", made / "sweep", "--rows", 1)
-    return "4 rows as configured, flags consistent; 1 rows simulated again"
+    return "6 rows as configured, flags consistent; 1 rows simulated again"
 
 
 def train(made: Path, out: Path) -> str:
-    wide = (made / "sweep.toml").read_text().replace("rows = 4", "rows = 256")
+    wide = (made / "sweep.toml").read_text().replace("rows = 6", "rows = 256")
     (out / "sweep.toml").write_text(wide)
     done("dataset", "build", "--config", out / "sweep.toml", "--out", out / "data", "--jobs", 1)
     done("surrogate", "train", out / "data", "--out", out / "model.pt", "--epochs", 2)
@@ -174,7 +174,7 @@ def goal(made: Path, out: Path) -> str:
     words = ["--robot", made / "robot.toml", "--goal", 3, 1, 90, "--keep-out", "circle:1.5,3,0.5"]
     done("planner", "goal", *words, "--out", out / "trip")
     written = {path.name for path in (out / "trip").iterdir()}
-    assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h", "goal.json", "goal.svg"}
+    assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h", "tracker.h", "goal.json", "goal.svg"}
     end = load_plan(out / "trip" / "plan.json")["predicted_poses"][-1]
     assert end[:2] == pytest.approx([3, 1], abs=1e-3)
     assert np.sin(end[2]) > 1 - 1e-6
