@@ -121,7 +121,7 @@ def test_dask_sets_a_poisonous_chunk_aside(dask: Dask, tmp_path: Path) -> None:
 
 def test_dask_goes_on_when_a_nanny_is_killed(dask: Dask, calm: Path, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "slow", "dask", dask.address)
-    until(lambda: len(list(MARKS.iterdir())) >= 2)
+    until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
     dask.workers[0].kill()
     assert process.communicate()[1] == ""
     assert process.returncode == 0
@@ -130,7 +130,7 @@ def test_dask_goes_on_when_a_nanny_is_killed(dask: Dask, calm: Path, tmp_path: P
 
 def test_dask_ends_when_its_scheduler_is_killed(dask: Dask, calm: Path, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "endless", "dask", dask.address, patience=2)
-    until(lambda: len(list(MARKS.iterdir())) >= 2)
+    until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
     dask.scheduler.kill()
     line = process.communicate()[1]
     assert process.returncode == 1
@@ -161,8 +161,8 @@ def build_apart(
 ) -> subprocess.Popen[str]:
     code = (
         "import sys, dataset.engine; from tests.dataset.sweeps import *; from dataset.sweep import *; "
-        f"from dataset.__main__ import _ended; dataset.engine.PATIENCE = {patience}; "
-        f"_ended(lambda: build(design(200), {str(folder)!r}, backend={backend!r}, address={address!r}, title='', "
+        f"from dataset.exits import ended; dataset.engine.PATIENCE = {patience}; "
+        f"ended(lambda: build(design(200), {str(folder)!r}, backend={backend!r}, address={address!r}, title='', "
         f"simulate={rows_by}))"
     )
     return subprocess.Popen(
@@ -197,7 +197,7 @@ def ray(tmp_path: Path) -> Iterator[Head]:
 
 def test_ray_ends_when_its_head_is_killed(ray: Head, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "endless", "ray", ray[0], patience=2)
-    until(lambda: len(list(MARKS.iterdir())) >= 2)
+    until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
     ray[1]()
     line = process.communicate()[1].strip().splitlines()[-1]
     assert re.search(r"^unfinished: no workers for 2 s: 0 of 200 rows are stored .* go on with", line)
