@@ -16,10 +16,10 @@ from sim.linear.vectors import Vector, dot, times
 from sim.mechanics.drag import node_drag
 from sim.mechanics.geometry import Geometry, node_tangent
 from sim.model.body import Body
-from sim.model.presets import CONTROL
 
-_RATE = CONTROL.omega_bar / CONTROL.l_over_R * CONTROL.l_over_r0  # ω̄ a/r0 of the control example, a = R
-UNIT_OF_TIME = CONTROL.l_over_r0**4 / _RATE  # λ_1 (l/r0)⁴
+_SPEED, _LENGTH, _SLENDERNESS = 10.0, 6.875, 34.375  # ω̄, l/R, l/r0 of the control example
+_RATE = _SPEED / _LENGTH * _SLENDERNESS  # ω̄ a/r0, a = R
+UNIT_OF_TIME = _SLENDERNESS**4 / _RATE  # λ_1 (l/r0)⁴
 
 
 @compiled
