@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -15,7 +16,7 @@ import pytest
 from dataset.__main__ import main
 from dataset.design import load_design
 from dataset.schema import schema, table_of
-from dataset.store import read, read_manifest, write_rows
+from dataset.store import SWEEP, read, read_manifest, write_rows
 from dataset.sweep import build
 from dataset.verify import verify
 from sim.io.errors import InputError, run_command
@@ -60,6 +61,7 @@ def test_verify_notices_a_changed_number_under_sound_digests(built: Path, tmp_pa
         columns[column] = columns[column] * change
         out = tmp_path / column
         write_rows(out, manifest["config"], columns, code=manifest["code_version"])
+        shutil.copy(built / "out" / SWEEP, out)
         with pytest.raises(InputError, match=words):
             verify(out, rows=6)
 
