@@ -109,18 +109,21 @@ def draw_collapse(rows: pd.DataFrame, linear: Mapping[str, Floats], outputs: Seq
     return _with_tails_above(figure, rows, 0.92)
 
 
+SHOWN = ("lag_psi_rad", "lag_z", "net_speed_bar")  # columns of responses that are drawn
+
+
 def draw_responses(rows: pd.DataFrame) -> Figure:
     """Lags and net speed over the dwell: medians and the middle half, for slow, middling and fast motors."""
     figure = Figure(figsize=(11, 3))
     speed = np.hypot(rows["v_x"].to_numpy(float), rows["v_z"].to_numpy(float))
     turn = np.abs(rows["omega_yr_bar"]).to_numpy(float)
-    panels = (
-        ("lag_psi_rad", turn, "heading lag / yaw rate [time units]"),
-        ("lag_z", rows["v_z"].to_numpy(float), "forward lag / surge [time units]"),
-        ("net_speed_bar", speed, "net speed / speed"),
+    scales = (
+        (turn, "heading lag / yaw rate [time units]"),
+        (rows["v_z"].to_numpy(float), "forward lag / surge [time units]"),
+        (speed, "net speed / speed"),
     )
     thirds = np.asarray(pd.qcut(rows["omega_bar"].abs(), 3, labels=False))
-    for place, (name, scale, label) in enumerate(panels):
+    for place, (name, (scale, label)) in enumerate(zip(SHOWN, scales, strict=True)):
         axes = figure.add_subplot(1, 3, place + 1)
         curves = np.stack([np.asarray(curve, dtype=float) for curve in rows[name]]) / scale[:, None]
         if name == "net_speed_bar" and rows["history"].any():  # without, that of short dwells is not known
@@ -128,6 +131,8 @@ def draw_responses(rows: pd.DataFrame) -> Figure:
         for third, (shade, which) in enumerate(zip(COLOURS[1:4], ("slow", "middling", "fast"), strict=True)):
             some = curves[thirds == third]
             some = some[np.isfinite(some).any(1)]
+            if not len(some):
+                continue
             known = np.isfinite(some).mean(0) > 0.5
             low, middle, high = np.nanquantile(some[:, known], [0.25, 0.5, 0.75], axis=0)
             axes.plot(DWELLS[known], middle, color=shade, lw=1.4, label=f"{which} motors")

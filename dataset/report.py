@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 from scipy.stats import qmc
 
-from dataset.figures import LABELS, draw_collapse, draw_indices, draw_responses, draw_trends, draw_where
+from dataset.figures import LABELS, SHOWN, draw_collapse, draw_indices, draw_responses, draw_trends, draw_where
 from dataset.indices import sobol_indices
-from dataset.schema import COST, INPUTS
+from dataset.schema import COST, INPUTS, schema
 from dataset.store import read, read_manifest
 from dataset.trends import Exponents, exponents, linear_rows
 from sim.arrays import Floats
@@ -24,7 +25,8 @@ _SMALL = 0.1  # exponents below it are not listed
 
 def write_report(folder: str, out: str | Path) -> None:
     """Write the page of a finished data set."""
-    manifest, rows = read_manifest(folder), read(folder)
+    manifest = read_manifest(folder)
+    rows = read(folder, _columns(manifest["effects"]))
     page = Page("Sweep report", _lead(rows))
     if manifest.get("chosen") is not None:
         page.text(
@@ -33,6 +35,12 @@ def write_report(folder: str, out: str | Path) -> None:
         )
     add_sections(page, rows)
     page.write(out, f"configuration {manifest['config_hash']}, code {manifest['code_version']}")
+
+
+def _columns(effects: list[str]) -> list[str]:
+    """Columns that the page shows: every column of single numbers, and few of the long lists."""
+    plain = [field.name for field in schema(effects) if not pa.types.is_fixed_size_list(field.type)]
+    return [*plain, *SHOWN]
 
 
 def _lead(rows: pd.DataFrame) -> str:

@@ -172,6 +172,8 @@ def _complete(
             held[Piece(piece_name(PENDING, c.start, c.stop), c.start, c.stop)] = c
 
     def joined(tasks: Sequence[Joining], then: Callable[[Work, Receipt], None]) -> None:
+        if not tasks:
+            return
         size = sum(task.stop - task.start for task in tasks)
         line = engine.Progress(title and f"{title}: joining files", size, done=0, failed=0)
         crew.run(tasks, line, then)
@@ -183,9 +185,8 @@ class _Crew:
     """The workers of a build; they start when they are needed."""
 
     def __init__(self, opened: Callable[[], Backend], begun: _Begun):
-        self._opened, self._begun, self._backend = opened, begun, None
-
-    _backend: Backend | None
+        self._opened, self._begun = opened, begun
+        self._backend: Backend | None = None
 
     def workers(self) -> Backend:
         """The workers."""

@@ -14,9 +14,9 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from planner.size import UNITS
+from planner.size import UNITS, in_tails
 from sim.io.commands import MODEL, ROBOT, Program, argument, out
 from sim.io.errors import InputError
 
@@ -64,7 +64,8 @@ _PLANNING = (
 def _plan(arguments: Namespace) -> None:
     from planner.export import write_plan
 
-    result = _planned(arguments)
+    task = _task(arguments)
+    result = _planned(task)
     paths = write_plan(result, arguments.out)
     _say(result)
     print(
@@ -72,19 +73,19 @@ def _plan(arguments: Namespace) -> None:
         f"point is within {result.missed:.3f} l of the declared path"
     )
     if arguments.trade_off:
-        paths.append(_trade_off(arguments, result))
+        paths.append(_trade_off(task, result, arguments.out))
     print(f"-> {', '.join(map(str, paths))}")
 
 
-def _trade_off(arguments: Namespace, result: Plan) -> Path:
+def _trade_off(task: _Task, result: Plan, folder: str) -> Path:
     """trade_off.svg in the folder of the plan."""
     from planner.plan import plan
     from planner.trade_off import draw_trade_off, trade_off
     from sim.io.files import whole_file
 
-    path, robot, options = _task(arguments, say=False)
-    found = trade_off(result, lambda dwell: plan(path, robot, **{**options, "dwell": dwell, "tolerance": None}))
-    target = Path(arguments.out) / "trade_off.svg"
+    options = {**task.options, "tolerance": None}
+    found = trade_off(result, lambda dwell: plan(task.path, task.robot, **{**options, "dwell": dwell}))
+    target = Path(folder) / "trade_off.svg"
     with whole_file(target) as part:
         draw_trade_off(found).savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})
     return target
@@ -133,14 +134,14 @@ def _say(result: Plan) -> None:
 )  # fmt: skip
 def _goal(arguments: Namespace) -> None:
     from planner.goal import to_goal
-    from planner.goal_files import read_region, unit_in_tails, write_voyage
+    from planner.goal_files import read_region, write_voyage
     from planner.keep_out import Polygon
     from planner.knowledge import read_knowledge
     from sim.inputs import load_robot
     from surrogate.export import load_table
 
     robot, unit = load_robot(arguments.robot), arguments.unit
-    scale = unit_in_tails(unit, robot)
+    scale = in_tails(unit, robot)
     start, goal = (
         (scale * x, scale * y, math.radians(angle)) for x, y, angle in (arguments.start, arguments.goal)
     )
@@ -195,34 +196,40 @@ def _track(arguments: Namespace) -> None:
     if not 0 <= arguments.latency < math.inf:
         raise InputError(f"--latency {arguments.latency}; give a number of seconds, 0 or more")
     with redirect_stdout(sys.stderr):
-        result = _planned(arguments)
+        result = _planned(_task(arguments))
     scale = result.robot.time_scale
     tracker = Tracker(result, noise=(arguments.noise, arguments.noise_rad), latency=arguments.latency / scale)
     for answer in answers(tracker, sys.stdin, scale):
         print(answer, flush=True)
 
 
-def _planned(arguments: Namespace) -> Plan:
-    """The plan that the command asks for."""
+class _Task(NamedTuple):
+    """What is to be planned: path and robot, and the options of `planner.plan`."""
+
+    path: Path2D
+    robot: Robot
+    options: dict[str, Any]
+
+
+def _planned(task: _Task) -> Plan:
+    """The plan of a task."""
     from planner.plan import plan
 
-    path, robot, options = _task(arguments)
     with _progress() as progress:
-        return plan(path, robot, **options, progress=progress)
+        return plan(task.path, task.robot, **task.options, progress=progress)
 
 
-def _task(arguments: Namespace, *, say: bool = True) -> tuple[Path2D, Robot, dict[str, Any]]:
-    """Path, robot and options of a plan."""
+def _task(arguments: Namespace) -> _Task:
+    """The task that the command asks for."""
     from planner.knowledge import read_knowledge
     from planner.size import describe
     from sim.inputs import load_robot
     from surrogate.export import load_table
 
     robot = load_robot(arguments.robot)
-    path = _path(arguments, robot, say=say)
-    if say:
-        print(f"path: {describe(path, robot)}")
-    return path, robot, {
+    path = _path(arguments, robot)
+    print(f"path: {describe(path, robot)}")
+    return _Task(path, robot, {
         "lookup": load_table(arguments.model),
         "point": arguments.point,
         "corner": arguments.corner,
@@ -231,7 +238,7 @@ def _task(arguments: Namespace, *, say: bool = True) -> tuple[Path2D, Robot, dic
         "minimum_seconds": arguments.min_dwell_s,
         "tolerance": arguments.tolerance,
         "knowledge": read_knowledge(arguments.robot),
-    }  # fmt: skip
+    })  # fmt: skip
 
 
 @contextmanager
@@ -243,7 +250,7 @@ def _progress() -> Iterator[Callable[[float], object]]:
         yield lambda share: bar.update(100 * share - bar.n)
 
 
-def _path(arguments: Namespace, robot: Robot, *, say: bool = True) -> Path2D:
+def _path(arguments: Namespace, robot: Robot) -> Path2D:
     """The path that the command asks for, in tail lengths."""
     from planner.drawings import Drawing, read_path
     from planner.path import circle, polygon, smoothed
@@ -260,16 +267,18 @@ def _path(arguments: Namespace, robot: Robot, *, say: bool = True) -> Path2D:
     else:
         closed = True if arguments.closed else None
         drawing = read_path(arguments.path, closed=closed, shape=arguments.shape)
-    unit = drawing.unit if arguments.unit is None else UNITS.get(arguments.unit)
-    scale = arguments.scale * (1.0 if unit is None else unit / robot.tail_length)
+    if arguments.unit is None and drawing.unit is not None:
+        unit = drawing.unit / robot.tail_length
+    else:
+        unit = in_tails(arguments.unit or "l", robot)
+    scale = arguments.scale * unit
     if not 0 < scale < float("inf"):
         raise InputError(f"--scale {arguments.scale}; give a number above 0")
     path = drawing.path.scaled(scale)
     if arguments.smooth is None:
         return path
     smooth, moved = smoothed(path, arguments.smooth)
-    if say:
-        print(f"smoothed over {arguments.smooth:g} l, which moves the path by up to {moved:.3g} l")
+    print(f"smoothed over {arguments.smooth:g} l, which moves the path by up to {moved:.3g} l")
     return smooth
 
 

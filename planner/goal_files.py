@@ -10,7 +10,7 @@ from planner.drawings import read_path
 from planner.export import write_plan
 from planner.goal import Voyage
 from planner.keep_out import Circle, Polygon, Region
-from planner.size import UNITS
+from planner.size import in_tails
 from sim.io.errors import InputError
 from sim.io.files import whole_file, write_text
 from sim.model.robot import Robot
@@ -30,7 +30,7 @@ def read_region(words: str, unit: str, robot: Robot) -> Region:
     Raises:
         InputError: the words are no region.
     """
-    scale = unit_in_tails(unit, robot)
+    scale = in_tails(unit, robot)
     shape, _, numbers = words.partition(":")
     if shape in _SHAPES and numbers:
         try:
@@ -46,11 +46,6 @@ def read_region(words: str, unit: str, robot: Robot) -> Region:
     drawing = read_path(words, closed=True)
     own = scale if drawing.unit is None else drawing.unit / robot.tail_length
     return Polygon.of(drawing.path.scaled(own))
-
-
-def unit_in_tails(unit: str, robot: Robot) -> float:
-    """A unit of length in tail lengths."""
-    return UNITS[unit] / robot.tail_length if unit in UNITS else 1.0
 
 
 def write_voyage(voyage: Voyage, folder: str | Path) -> list[Path]:

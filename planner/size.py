@@ -22,6 +22,11 @@ def describe(path: Path2D, robot: Robot) -> str:
     )
 
 
+def in_tails(unit: str, robot: Robot) -> float:
+    """A unit of length in tail lengths; l is the tail length itself."""
+    return 1.0 if unit == "l" else UNITS[unit] / robot.tail_length
+
+
 def extent(path: Path2D) -> tuple[float, float]:
     """Width and height."""
     width, height = (path.points.max(0) - path.points.min(0)).tolist()
@@ -46,7 +51,7 @@ def check_size(path: Path2D, robot: Robot, turn_radius: float) -> None:
 
 def _hint(path: Path2D, robot: Robot) -> str:
     """The units with which the numbers of the path would make sense."""
-    own = {"l": 1.0} | {name: size / robot.tail_length for name, size in UNITS.items()}
+    own = {unit: in_tails(unit, robot) for unit in ("l", *UNITS)}
     # The path may have been given in any of these units: undo it, then try the others.
     found = []
     for given, scale in own.items():
