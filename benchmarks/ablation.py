@@ -20,9 +20,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from benchmarks.balance import solve
 from benchmarks.shipped_table import kept
 from dataset.figures import plain_logarithms
-from surrogate import fit, head, tail, tails
+from surrogate import fit, tail, tails
 from surrogate.fit import Settings
 from surrogate.network import Ensemble
 from surrogate.rows import Simulated
@@ -77,7 +78,7 @@ def _several(rows: Simulated) -> Rows:
 
 def _judge(name: str, rows: Rows, numbers: Callable[[Tensor], Tensor], seconds: float, size: float) -> Result:
     began = time.process_time()
-    motion, _ = head.solve(rows.heads, rows.tails, numbers)
+    motion, _ = solve(rows.heads, rows.tails, numbers)
     query = 1e6 * (time.process_time() - began) / len(motion)
     errors = [(motion[:, i] / rows.motion[:, i] - 1).abs().nan_to_num(9.0) * 100 for i in (2, 1)]
     levels = torch.tensor([0.5, 0.95], dtype=torch.float64)

@@ -54,7 +54,8 @@ def _changes(
     def outputs(moved: dict[str, Tensor]) -> tuple[Tensor, ...]:
         heads, tails = head.robots_of(moved, keep=parameters)
         left = head.unbalanced(heads, tails, u, network)
-        return table.outputs(heads, tails, head.full_motion(heads, u - (inverse @ left[..., None])[..., 0]))
+        motion = head.full_motion(heads, u - (inverse @ left[..., None])[..., 0])
+        return table.outputs(heads, motion, table.tail_gap(tails, motion))
 
     found = {}
     for parameter in parameters:

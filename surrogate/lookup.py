@@ -22,7 +22,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from sim.arrays import Flags, Floats
+from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
 from sim.inputs import check_columns
 from sim.io.errors import InputError
@@ -32,6 +32,7 @@ from sim.model.response import DWELLS, LAGS, Responses, at_equal_dwells
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate import head, tail
+from surrogate.balance import inputs_rows
 from surrogate.curves import CurveTable
 from surrogate.head import Heads
 from surrogate.intervals import Intervals
@@ -43,6 +44,13 @@ RESPONSE_OUTPUTS = ("net_speed_bar", *LAGS[::-1])
 OUTSIDE = "outside"  # flag of robots that the table does not know
 BRANCHES = 0.6  # |ω_yr/ω_t| from which a robot may have several motions
 CERTIFIED = "certified_error"
+_REASONS = (  # why a robot is outside
+    "",
+    "none with as many tails were learned",
+    "its tails or its motor were not learned, or no motion was found",
+    "its tails move as none of the learned ones do",
+    "it yaws nearly as fast as its tails turn, and may have several motions",
+)
 _NOT_OF_HEAD = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 
 
@@ -52,6 +60,7 @@ class Motions(NamedTuple):
     heads: Heads
     tails: Tails
     motion: Tensor  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor
+    inputs: Floats  # (M, 7) of the networks, see `surrogate.tail.inputs_of`
     reason: list[str]  # why a robot is outside; else empty
 
 
@@ -151,17 +160,18 @@ class Lookup:
         """Motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
         heads, tails = head.robots_of(values)
         motion, converged = self.tails.solve(heads, tails)
-        known = np.asarray(converged.numpy()) & self._within_ranges(values)
-        found = Motions(heads, tails, motion, self._reasons(tails, motion, known))
-        for row, reason in enumerate(found.reason):
-            if reason and not flag:
-                raise InputError(self._refusal(values, row, reason))
-        return found
+        inputs = inputs_rows(tail.columns_of(tails), motion)
+        known = converged & self._within_ranges(values)
+        reasons = self._reasons(class_of(tails.number).numpy(), motion, inputs, known)
+        if any(reasons) and not flag:
+            row, reason = next((row, reason) for row, reason in enumerate(reasons) if reason)
+            raise InputError(self._refusal(values, row, reason))
+        return Motions(heads, tails, torch.from_numpy(motion), inputs, reasons)
 
     def hints(self, found: Motions) -> Tensor:
         """What the width of an interval may depend on, (M, 11)."""
         heads, tails, motion = found.heads, found.tails, found.motion
-        inputs = tail.inputs_of(tails, motion)
+        inputs = torch.from_numpy(found.inputs)
         remote, spread = torch.zeros(len(motion)).double(), torch.zeros(len(motion)).double()
         weight = sensitivity_of(heads, tails, motion) @ tail.units_of(tails, motion)
         kind = class_of(tails.number)
@@ -169,7 +179,7 @@ class Lookup:
             rows = torch.nonzero(kind == k)[:, 0]
             support = self.support[k]
             if len(rows) and network is not None and support is not None:
-                remote[rows] = support.remoteness(inputs[rows])
+                remote[rows] = torch.from_numpy(support.remoteness(found.inputs[rows.numpy()]))
                 members = network.members_at(inputs[rows])
                 apart = (weight[rows] @ (members - members.mean(0))[..., None])[..., 0]
                 spread[rows] = apart.norm(dim=-1).mean(0)
@@ -203,22 +213,15 @@ class Lookup:
             within &= (low * (1 - 1e-9) <= size) & (size <= high * (1 + 1e-9))
         return within
 
-    def _reasons(self, tails: Tails, motion: Tensor, known: Flags) -> list[str]:
-        inputs, kind = tail.inputs_of(tails, motion), class_of(tails.number)
-        remote = torch.full((len(motion),), torch.nan, dtype=torch.float64)
+    def _reasons(self, kind: Integers, motion: Floats, inputs: Floats, known: Flags) -> list[str]:
+        remote, learned = np.full(len(motion), np.nan), np.zeros(len(motion), dtype=bool)
         for k, support in enumerate(self.support):
-            rows = torch.nonzero(kind == k)[:, 0]
+            rows = np.flatnonzero(kind == k)
             if len(rows) and support is not None:
-                remote[rows] = support.remoteness(inputs[rows])
-        quick = (motion[:, 2] / motion[:, 4]).abs().numpy()
-        reasons = np.full(len(motion), "", dtype=object)
-        reasons[quick > BRANCHES] = "it yaws nearly as fast as its tails turn, and may have several motions"
-        reasons[~(remote.numpy() <= 1)] = "its tails move as none of the learned ones do"
-        reasons[~known] = "its tails or its motor were not learned, or no motion was found"
-        for k, support in enumerate(self.support):
-            if support is None:
-                reasons[(kind == k).numpy()] = "none with as many tails were learned"
-        return [str(reason) for reason in reasons]
+                remote[rows], learned[rows] = support.remoteness(inputs[rows]), True
+        quick = np.abs(motion[:, 2] / motion[:, 4])
+        which = np.select([~learned, ~known, ~(remote <= 1), quick > BRANCHES], [1, 2, 3, 4])
+        return [_REASONS[number] for number in which.tolist()]
 
     def _refusal(self, values: Mapping[str, Floats], row: int, reason: str) -> str:
         for name, (low, high) in self.ranges.items():
@@ -257,7 +260,7 @@ def _check_flips(values: Mapping[str, Floats]) -> None:
 
 def steady_outputs(found: Motions, tails: TailTable) -> dict[str, Floats]:
     """STEADY_OUTPUTS of motions."""
-    values = tails.outputs(found.heads, found.tails, found.motion)
+    values = tails.outputs(found.heads, found.motion, tails.quick_gap(found.tails, found.inputs))
     return {name: np.asarray(value.numpy()) for name, value in zip(STEADY_OUTPUTS, values, strict=True)}
 
 

@@ -10,10 +10,15 @@ over almost all rows. Source: Lasserre and Pauwels, Adv. Comput. Math. 45, 1439 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations_with_replacement
 
+import numpy as np
 import torch
 from torch import Tensor
+
+from sim.arrays import Floats, Integers
+from sim.compiling import compiled
 
 DEGREE = 3
 _KEPT = 0.998  # share of the rows that are inside
@@ -39,21 +44,54 @@ class Support:
         moments = features.T @ features / len(inputs)
         moments = moments + _REGULAR * torch.eye(len(moments), dtype=moments.dtype)
         plain = Support(shift, scale, torch.linalg.cholesky(moments), 1.0)
-        return Support(shift, scale, plain.factor, _SLACK * float(plain.remoteness(inputs).quantile(_KEPT)))
+        limit = _SLACK * float(np.quantile(plain.remoteness(inputs.numpy()), _KEPT))
+        return Support(shift, scale, plain.factor, limit)
 
-    def remoteness(self, inputs: Tensor) -> Tensor:
-        """q over its limit, (M,): at most 1 inside."""
-        features = _monomials((inputs - self.shift) / self.scale)
-        solved = torch.linalg.solve_triangular(self.factor, features.T, upper=False)
-        return solved.square().sum(0) / len(self.factor) / self.limit
+    def remoteness(self, inputs: Floats) -> Floats:
+        """q over its limit, (M,), at inputs (M, F): at most 1 inside."""
+        shift, scale, factor = (np.asarray(part.numpy()) for part in (self.shift, self.scale, self.factor))
+        return _remoteness(shift, scale, factor, *_products(len(shift)), inputs) / self.limit
+
+
+@cache
+def _products(inputs: int) -> tuple[Integers, Integers]:
+    """Monomials up to DEGREE of some inputs, the constant first: monomial p is that of parents[p] times the input
+    last[p]; both (P,).
+    """
+    parents, last = [0], [0]
+    index: dict[tuple[int, ...], int] = {(): 0}
+    for degree in range(1, DEGREE + 1):
+        for names in combinations_with_replacement(range(inputs), degree):
+            index[names] = len(parents)
+            parents.append(index[names[:-1]])
+            last.append(names[-1])
+    return np.array(parents), np.array(last)
 
 
 def _monomials(x: Tensor) -> Tensor:
     """All monomials up to DEGREE of x (M, F), (M, P)."""
     columns = [torch.ones_like(x[:, 0])]
-    index: dict[tuple[int, ...], int] = {(): 0}
-    for degree in range(1, DEGREE + 1):
-        for names in combinations_with_replacement(range(x.shape[1]), degree):
-            index[names] = len(columns)
-            columns.append(columns[index[names[:-1]]] * x[:, names[-1]])
+    for parent, factor in list(zip(*_products(x.shape[1]), strict=True))[1:]:
+        columns.append(columns[parent] * x[:, factor])
     return torch.stack(columns, -1)
+
+
+@compiled
+def _remoteness(
+    shift: Floats, scale: Floats, factor: Floats, parents: Integers, last: Integers, inputs: Floats
+) -> Floats:
+    """q of the module's head, (M,), at inputs (M, F)."""
+    found, count = np.zeros(len(inputs)), len(parents)
+    features, solved = np.ones(count), np.empty(count)
+    for row in range(len(inputs)):
+        x = (inputs[row] - shift) / scale
+        for p in range(1, count):
+            features[p] = features[parents[p]] * x[last[p]]
+        for i in range(count):
+            left = features[i]
+            for j in range(i):
+                left -= factor[i, j] * solved[j]
+            solved[i] = left / factor[i, i]
+            found[row] += solved[i] ** 2
+        found[row] /= count
+    return found

@@ -32,8 +32,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
+
+from sim.arrays import Floats
 
 INPUTS = ("ln S", "ln a", "ln 1/r0", "asinh δ", "β", "asinh v_z", "ln spin drag of head over tails")
 SMOOTHNESS = (0.7, 1.3, 8.0, 2.0, 4.0, 4.0, 5.0)  # over how many standard deviations the wrench changes
@@ -57,6 +60,11 @@ class Tails(NamedTuple):
 def at(tails: Tails, rows: Tensor) -> Tails:
     """The tails of the robots at `rows`."""
     return Tails(*[part[rows] for part in tails])
+
+
+def columns_of(tails: Tails) -> Floats:
+    """The fields as columns, (M, 6)."""
+    return np.asarray(torch.stack(list(tails), 1).numpy())
 
 
 def thrust_of(S: Tensor) -> Tensor:

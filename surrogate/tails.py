@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -24,9 +25,11 @@ from torch import Tensor
 
 from sim.arrays import Flags, Floats
 from surrogate import head, tail
+from surrogate.balance import solve_rows
 from surrogate.fit import Settings, fit
 from surrogate.head import Heads
 from surrogate.network import Ensemble
+from surrogate.perceptron import Packed, evaluate_rows, packed
 from surrogate.tail import Tails
 
 CLASSES = (1, 2, 3)  # networks for N = 1, N = 2, and three or more tails
@@ -48,39 +51,49 @@ class TailTable:
     wrench: tuple[Ensemble | None, ...]  # None where no robots were learned
     gap: Ensemble
 
-    def solve(self, heads: Heads, tails: Tails, member: int | None = None) -> tuple[Tensor, Tensor]:
-        """Motion of robots in balance, (M, 5), and which converged, (M,); see `head.solve`.
-
-        Args:
-            member: of the ensembles; by default their mean.
-        """
-        motion = torch.full((len(tails.number), 5), torch.nan, dtype=torch.float64)
-        converged = torch.zeros(len(motion), dtype=torch.bool)
-        kind = class_of(tails.number)
-        for k, network in enumerate(self.wrench):
-            rows = torch.nonzero(kind == k)[:, 0]
+    def solve(self, heads: Heads, tails: Tails) -> tuple[Floats, Flags]:
+        """(v_x, v_z, ω_yr, ω_h, ω_t) in balance for a positive motor, (M, 5); and which robots converged, (M,)."""
+        motion = np.full((len(tails.number), 5), np.nan)
+        converged = np.zeros(len(motion), dtype=bool)
+        speeds, drags = torch.stack([heads.speed, heads.gain], 1).numpy(), tail.columns_of(tails)
+        resistances = heads.resistance.contiguous().numpy()
+        kind = class_of(tails.number).numpy()
+        for k, network in enumerate(self._packed):
+            rows = np.flatnonzero(kind == k)
             if len(rows) and network is not None:
-                numbers = network if member is None else _member(network, member)
-                motion[rows], converged[rows] = head.solve(head.at(heads, rows), tail.at(tails, rows), numbers)
+                motion[rows], converged[rows] = solve_rows(network, speeds[rows], resistances[rows], drags[rows])
         return motion, converged
 
-    def outputs(self, heads: Heads, tails: Tails, motion: Tensor) -> tuple[Tensor, ...]:
+    @cached_property
+    def _packed(self) -> list[Packed | None]:
+        return [None if network is None else packed(network) for network in self.wrench]
+
+    @cached_property
+    def _packed_gap(self) -> Packed:
+        return packed(self.gap)
+
+    def outputs(self, heads: Heads, motion: Tensor, gap: Tensor) -> tuple[Tensor, ...]:
         """ω_t, ω_h, ω_yr, v_x and v_z of the head's centre, R_yr, θ in degrees, and the gap, each (M,)."""
         yaw, surge = heads.sense * motion[:, 2], motion[:, 1]
         sway = heads.sense * (motion[:, 0] + motion[:, 2] * heads.length / 2)
         radius = torch.sqrt(sway**2 + surge**2) / yaw.abs()
         angle = torch.rad2deg(torch.atan2(sway.abs(), surge))
         spins = heads.sense * motion[:, 4], heads.sense * motion[:, 3]
-        return (*spins, yaw, sway, surge, radius, angle, self.tail_gap(tails, motion))
+        return (*spins, yaw, sway, surge, radius, angle, gap)
+
+    def quick_gap(self, tails: Tails, inputs: Floats) -> Tensor:
+        """`tail_gap` with known inputs (M, 7) of the networks; without derivatives."""
+        inputs = np.column_stack([inputs, np.log(tails.number.numpy())])
+        return _gap(tails, torch.from_numpy(evaluate_rows(self._packed_gap, inputs)[:, 0]))
 
     def tail_gap(self, tails: Tails, motion: Tensor) -> Tensor:
         """Smallest distance between tails over 2 r0, (M,); infinite for one tail."""
-        share = self.gap(_gap_inputs(tails, motion))[:, 0]
-        return torch.where(tails.number > 1, share * _clamp_distance(tails) / (2 * tails.radius), torch.inf)
+        return _gap(tails, self.gap(_gap_inputs(tails, motion))[:, 0])
 
 
-def _member(network: Ensemble, member: int) -> head.Numbers:
-    return lambda inputs: network.members_at(inputs)[member]
+def _gap(tails: Tails, share: Tensor) -> Tensor:
+    """The gap over 2 r0 from its share of the distance of the clamps."""
+    return torch.where(tails.number > 1, share * _clamp_distance(tails) / (2 * tails.radius), torch.inf)
 
 
 class Rows(NamedTuple):

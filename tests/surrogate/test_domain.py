@@ -22,7 +22,7 @@ def test_the_support_is_joint() -> None:
     noise = 0.05 * torch.randn(4000, 2, generator=generator).double()
     support = Support.of(torch.cat([x, x], 1) + noise)
     points = torch.tensor([[0.0, 0.0], [1.5, 1.5], [-1.0, -1.05], [1.0, -1.0], [6.0, 6.0]]).double()
-    assert (support.remoteness(points) <= 1).tolist() == [True, True, True, False, False]
+    assert (support.remoteness(points.numpy()) <= 1).tolist() == [True, True, True, False, False]
 
 
 def sampled(count: int, generator: torch.Generator, size: Callable[[Tensor], Tensor]) -> tuple[Tensor, Tensor]:
