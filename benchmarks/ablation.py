@@ -88,7 +88,7 @@ def _judge(name: str, rows: Rows, numbers: Callable[[Tensor], Tensor], seconds: 
 def _network(name: str, rows: Rows, tested: Rows, settings: Settings = SMALL, *, single: bool = False) -> Result:
     began = time.process_time()
     learn: Callable[..., Ensemble] = tails._learn_wrench
-    network = learn(rows, settings, "", True)
+    network = learn(rows, settings, "", 3)
     if single:
         network = network.float().double()  # the weights rounded
     size = sum(part.numel() for part in network.parameters())
@@ -127,7 +127,9 @@ def _kernel(name: str, rows: Rows, tested: Rows) -> Result:
     matrix = kernel(inputs, inputs) + 1e-8 * torch.eye(len(inputs), dtype=torch.float64)
     weights = torch.linalg.solve(matrix, (wanted - mean) / spread)
     seconds = time.process_time() - began
-    return _judge(name, tested, lambda x: kernel(x, inputs) @ weights * spread + mean, seconds, weights.numel())
+    return _judge(
+        name, tested, lambda x: kernel(x[:, :7], inputs) @ weights * spread + mean, seconds, weights.numel()
+    )
 
 
 def _nearest(name: str, rows: Rows, tested: Rows) -> Result:
@@ -135,7 +137,11 @@ def _nearest(name: str, rows: Rows, tested: Rows) -> Result:
     scale = inputs.std(0) * torch.tensor(tail.SMOOTHNESS)
     scale[-1] = 1e9
     return _judge(
-        name, tested, lambda x: wanted[torch.cdist(x / scale, inputs / scale).argmin(1)], 0.0, wanted.numel()
+        name,
+        tested,
+        lambda x: wanted[torch.cdist(x[:, :7] / scale, inputs / scale).argmin(1)],
+        0.0,
+        wanted.numel(),
     )
 
 

@@ -59,7 +59,7 @@ def _left_and_inverse(heads: Heads, tails: Tails, u: Tensor, numbers: Numbers) -
     width = _DIFFERENCE * (u.abs() + _LEAST_SHARE * u.abs().amax(1, keepdim=True))
     moved = torch.cat([u, *[u + width * unit for unit in torch.eye(4, dtype=u.dtype)]])
     heads = Heads(*[part.repeat(5, *[1] * (part.dim() - 1)) for part in heads])
-    tails = Tails(*[part.repeat(5) for part in tails])
+    tails = Tails(*[part.repeat(5, *[1] * (part.dim() - 1)) for part in tails])
     left = unbalanced(heads, tails, moved, numbers).reshape(5, -1, 4)
     slope = ((left[1:] - left[0]) / width.T[:, :, None]).permute(1, 2, 0)
     return left[0], torch.linalg.inv_ex(slope)[0]

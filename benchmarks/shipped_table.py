@@ -4,8 +4,8 @@ Usage: python -m dataset build --config sweeps/domain.toml --out SWEEP
        python -m benchmarks.shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
        python -m benchmarks.shipped_table WORK --test MODEL   errors and coverage on the locked robots
 
-The tails are learned from robots with heads far wider than those of the sweep. The response to a flip is learned
-from the sweep, and from some of these wide robots. All robots are drawn from Sobol sequences with the seeds below.
+The tails are learned from robots with heads far wider than those of the sweep, a single tail from robots of the
+sweep as well. The response to a flip is learned from the sweep, and from some of these wide robots. All robots are drawn from Sobol sequences with the seeds below.
 The locked robots led to no choice of any kind.
 """
 
@@ -30,8 +30,8 @@ from surrogate.train import learn, split, with_radius
 
 TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=3000)
 CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)
-ROWS = {"tails": (32768, 101), "widths": (4096, 202), "held_out": (4096, 402), "locked": (4096, 20261130)}
-FLIPS = {"flips": (1400, 301), "locked_flips": (400, 20261131)}
+ROWS = {"tails": (32768, 101), "widths": (4096, 202), "held_out": (4096, 402), "locked": (4096, 20261201)}
+FLIPS = {"flips": (1400, 301), "locked_flips": (400, 20261202)}
 _SWEPT = 16384  # rows of the sweep without history whose lags are learned
 _FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated
 
@@ -67,13 +67,16 @@ def kept(work: Path, name: str) -> Simulated:
     return found
 
 
-def swept(folder: str) -> tuple[Simulated, Simulated]:
-    """Rows of a sweep with response curves: to learn (with memory and rest, and _SWEPT without), and held out."""
+def swept(folder: str) -> tuple[Simulated, Simulated, Simulated]:
+    """Rows of a sweep: one tail; with response curves, to learn (with memory and rest, and _SWEPT without); and
+    held out.
+    """
     rows, numbers = read_rows(folder)
     part, history = split(numbers), np.isfinite(rows.curves["rest"]).all((1, 2))
     lags = np.flatnonzero((part == 0) & ~history & (rows.robots["N"] > 1))[:_SWEPT]
     learned = np.union1d(lags, np.flatnonzero((part == 0) & history))
-    return rows.at(learned), rows.at(np.flatnonzero((part > 0) & history))
+    single = np.flatnonzero((part == 0) & (rows.robots["N"] == 1))
+    return rows.at(single), rows.at(learned), rows.at(np.flatnonzero((part > 0) & history))
 
 
 def test(lookup: Lookup, rows: Simulated, flips: Simulated) -> None:
@@ -145,7 +148,8 @@ def main() -> None:
             parser.error("--out needs --sweep")
         tails, widths, held_out, flips = (kept(given.work, n) for n in ("tails", "widths", "held_out", "flips"))
         source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(given.sweep)["config_hash"]}
-        learned, others = swept(given.sweep)
+        single, learned, others = swept(given.sweep)
+        tails = joined([tails, single])
         lookup = learn(
             tails, widths, held_out, joined([flips, learned]), TAILS, CURVES, source=source, flips_held_out=others
         )

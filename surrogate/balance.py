@@ -29,7 +29,7 @@ def solve_rows(network: Packed, heads: Floats, resistances: Floats, tails: Float
         network: of the tails.
         heads: |ω| and gain, (M, 2).
         resistances: of the heads, (M, 4, 5).
-        tails: columns of `surrogate.tail.columns_of`, (M, 6).
+        tails: columns of `surrogate.tail.columns_of`, (M, 13).
     """
     motions, converged = np.empty((len(heads), 5)), np.empty(len(heads), dtype=np.bool_)
     y = np.empty(len(network.mean))
@@ -40,7 +40,7 @@ def solve_rows(network: Packed, heads: Floats, resistances: Floats, tails: Float
 
 @compiled
 def inputs_rows(tails: Floats, motions: Floats) -> Floats:
-    """`surrogate.tail.inputs_of`, (M, 7), of tails (M, 6) that move so (M, 5)."""
+    """`surrogate.tail.inputs_of`, (M, 7), of tails (M, 13) that move so (M, 5)."""
     x = np.empty((len(tails), 7))
     for row in range(len(tails)):
         inputs_at(tails[row], motions[row], x[row])
@@ -49,7 +49,7 @@ def inputs_rows(tails: Floats, motions: Floats) -> Floats:
 
 @compiled
 def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
-    """`surrogate.tail.inputs_of` of one robot, written to x (7,)."""
+    """`surrogate.tail.inputs_of` of one robot, written to x (7,), or `inputs_with_head`, to x (14,)."""
     v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
     drag_number = tail[0] * spin
     deflection = np.sqrt(v_x**2 + yaw**2 + _TINY) / spin * drag_number / (drag_number + _SOFT)
@@ -60,6 +60,8 @@ def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
     x[4] = np.arctan2(v_x, yaw)
     x[5] = np.arcsinh(v_z / (tail[2] * spin) / _SMALL_SURGE)
     x[6] = np.log(tail[5] / (tail[4] * tail[0] * tail[2] ** 2))
+    for i in range(7, len(x)):
+        x[i] = tail[i - 1]
 
 
 @compiled
@@ -118,7 +120,13 @@ def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats)
 @compiled
 def _solve(network: Packed, head: Floats, resistance: Floats, tail: Floats, y: Floats, motion: Floats) -> bool:
     """Broyden's method for one robot; writes y and the motion, and returns whether it converged."""
-    x, left, before, step, change = np.empty(7), np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    x, left, before, step, change = (
+        np.empty(len(network.shift)),
+        np.empty(4),
+        np.empty(4),
+        np.empty(4),
+        np.empty(4),
+    )
     slope, inverse, moved = np.empty((4, 4)), np.eye(4), np.empty(5)
     _first_guess(head, resistance, tail, motion)
     inputs_at(tail, motion, x)

@@ -28,7 +28,7 @@ from sim.solve.assembly import assemble
 from surrogate import tail
 from surrogate.tail import Tails
 
-Numbers = Callable[[Tensor], Tensor]  # inputs (M, 7) -> y (M, 6) of `surrogate.tail`
+Numbers = Callable[[Tensor], Tensor]  # inputs with those of the head (M, 14) -> y (M, 6) of `surrogate.tail`
 
 _ON_TAILS = ("tail_sag",)  # local, but on the tails
 _SENSES = (-1.0, 1.0, -1.0, -1.0, -1.0)  # mirror image of (v_x, v_z, ω_yr, ω_h, ω_t)
@@ -75,7 +75,10 @@ def robots_of(columns: Mapping[str, Floats | Tensor], keep: Collection[str] = ()
     mirror = torch.where(sense[:, None] < 0, torch.tensor(_SENSES, dtype=torch.float64), 1.0)
     resistance = body.resistance.permute(2, 0, 1) * mirror[:, :4, None] * mirror[:, None, :]
     heads = Heads(body.omega.abs(), 1 + body.droop * resistance[:, 3, 3], resistance, body.head_length, sense)
-    tails = Tails(body.zeta_perp, body.zeta_parallel, body.offset, body.tail_radius, count, resistance[:, 3, 3])
+    around = tail.head_inputs(resistance, body.head_length, count * body.zeta_perp)
+    tails = Tails(
+        body.zeta_perp, body.zeta_parallel, body.offset, body.tail_radius, count, resistance[:, 3, 3], around
+    )
     return heads, tails
 
 
@@ -98,7 +101,7 @@ def full_motion(heads: Heads, u: Tensor) -> Tensor:
 def unbalanced(heads: Heads, tails: Tails, u: Tensor, numbers: Numbers) -> Tensor:
     """W − R (v_x, v_z, ω_yr, ω_h, ω_t), (M, 4)."""
     motion = full_motion(heads, u)
-    wrench = tail.wrench_of(tails, motion, numbers(tail.inputs_of(tails, motion)))
+    wrench = tail.wrench_of(tails, motion, numbers(tail.inputs_with_head(tails, motion)))
     return wrench - (heads.resistance @ motion[..., None])[..., 0]
 
 

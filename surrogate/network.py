@@ -76,8 +76,10 @@ class Ensemble(nn.Module):
         return torch.matmul(hidden, self.weights[-1]) + self.biases[-1] + torch.matmul(first, self.bypass)
 
     def members_at(self, inputs: Tensor) -> Tensor:
-        """Outputs of every member, (K, M, O)."""
-        return self.standardised((inputs - self.shift) / self.scale) * self.spread + self.mean
+        """Outputs of every member, (K, M, O); of more inputs than it has, a network takes the first."""
+        return (
+            self.standardised((inputs[..., : len(self.shift)] - self.shift) / self.scale) * self.spread + self.mean
+        )
 
     def forward(self, inputs: Tensor) -> Tensor:
         """Mean of the members, (M, O)."""

@@ -12,7 +12,8 @@ wrench of one tail over a turn. In the units of the simulator it depends on
 The network sees m as the deflection δ = m a S/(S + 12) that this motion makes. With three or more tails the
 velocities hardly change over a turn, and the wrench of one tail does not depend on N. With one or two tails they
 do. So N = 1 and N = 2 have networks of their own, with one more input: the head's spin drag over that of the
-tails.
+tails. A single tail pushes the robot from side to side in each turn, and how far it goes depends on all drag of
+the head. So the network of N = 1 has HEAD_INPUTS, too.
 
 The network gives six numbers y, near (0, 1, 0, 1, 0, 0):
 
@@ -39,7 +40,12 @@ from torch import Tensor
 from sim.arrays import Floats
 
 INPUTS = ("ln S", "ln a", "ln 1/r0", "asinh δ", "β", "asinh v_z", "ln spin drag of head over tails")
+HEAD_INPUTS = (
+    "ln sway drag", "ln surge drag", "ln drag against turning", "ln L", "coupling of sway and turn",
+    "ln side force", "spin drag of the disc over that of the head",
+)  # fmt: skip
 SMOOTHNESS = (0.7, 1.3, 8.0, 2.0, 4.0, 4.0, 5.0)  # over how many standard deviations the wrench changes
+HEAD_SMOOTHNESS = (3.0,) * len(HEAD_INPUTS)
 TYPICAL = ((0.0, 1.0, 0.0, 0.9, 0.2, 0.0), (0.04, 0.4, 0.03, 0.1, 0.3, 0.05))  # mean and spread of y
 _SOFT = 12.0  # S from which a tail bends with the flow while it turns
 _SMALL_DEFLECTION, _SMALL_SURGE = 0.05, 0.05  # below, an input is linear; above, logarithmic
@@ -47,7 +53,7 @@ _TINY = 1e-30
 
 
 class Tails(NamedTuple):
-    """The tails of M robots; each (M,)."""
+    """The tails of M robots; each (M,) where nothing else is said."""
 
     zeta_perp: Tensor
     zeta_parallel: Tensor
@@ -55,6 +61,7 @@ class Tails(NamedTuple):
     radius: Tensor  # r0
     number: Tensor  # N
     head_spin_drag: Tensor  # moment on the head per ω_h
+    head: Tensor  # (M, 7) HEAD_INPUTS; drag over that of the tails
 
 
 def at(tails: Tails, rows: Tensor) -> Tails:
@@ -63,8 +70,31 @@ def at(tails: Tails, rows: Tensor) -> Tails:
 
 
 def columns_of(tails: Tails) -> Floats:
-    """The fields as columns, (M, 6)."""
-    return np.asarray(torch.stack(list(tails), 1).numpy())
+    """The fields as columns, (M, 13)."""
+    return np.asarray(torch.cat([torch.stack(list(tails[:-1]), 1), tails.head], 1).numpy())
+
+
+def head_inputs(resistance: Tensor, length: Tensor, across: Tensor) -> Tensor:
+    """HEAD_INPUTS, (M, 7).
+
+    Args:
+        resistance: of head and disc, (M, 4, 5).
+        length: L, (M,).
+        across: N ζ⊥, (M,).
+    """
+    sway, surge, turn, spin = (resistance[:, i, i] for i in range(4))
+    return torch.stack(
+        [
+            torch.log(sway / across),
+            torch.log(surge / across),
+            torch.log(turn / across),
+            torch.log(length),
+            resistance[:, 0, 2] / torch.sqrt(sway * turn),
+            torch.log(resistance[:, 0, 3] / across),
+            resistance[:, 3, 4] / spin,
+        ],
+        -1,
+    )
 
 
 def thrust_of(S: Tensor) -> Tensor:
@@ -98,6 +128,11 @@ def inputs_of(tails: Tails, motion: Tensor) -> Tensor:
         ],
         -1,
     )
+
+
+def inputs_with_head(tails: Tails, motion: Tensor) -> Tensor:
+    """INPUTS and HEAD_INPUTS, (M, 14)."""
+    return torch.cat([inputs_of(tails, motion), tails.head], -1)
 
 
 def straight_wrench(tails: Tails, motion: Tensor) -> Tensor:

@@ -167,15 +167,15 @@ def learn_tails(rows: Rows, settings: Settings, title: str) -> TailTable:
         name = f"{title}: tails of N = {count}{' and more' if count == CLASSES[-1] else ''}" if title else ""
         some = rows.at(kind == k)
         known = len(some.motion) > 0
-        several = count == CLASSES[-1]
-        networks.append(_learn_wrench(some, settings, name, several) if known else None)
+        networks.append(_learn_wrench(some, settings, name, count) if known else None)
     many = rows.at(rows.tails.number > 1)
     gap = _learn_gap(many, _GAP, f"{title}: gap" if title else "")
     return TailTable(tuple(networks), gap)
 
 
-def _learn_wrench(rows: Rows, settings: Settings, title: str, several: bool) -> Ensemble:
-    inputs = tail.inputs_of(rows.tails, rows.motion)
+def _learn_wrench(rows: Rows, settings: Settings, title: str, count: int) -> Ensemble:
+    """The network of one of CLASSES."""
+    inputs = (tail.inputs_with_head if count == 1 else tail.inputs_of)(rows.tails, rows.motion)
     weight = sensitivity_of(rows.heads, rows.tails, rows.motion)
     matrix = weight @ tail.units_of(rows.tails, rows.motion)
     wrench = (rows.heads.resistance @ rows.motion[..., None])[..., 0]
@@ -185,7 +185,7 @@ def _learn_wrench(rows: Rows, settings: Settings, title: str, several: bool) -> 
     share = torch.clamp(_OUTLIER * size.median() / size, max=1.0)
     matrix, wanted = matrix * share[:, None, None], wanted * share[:, None]
     network = _new(settings, inputs, outputs=len(mean))
-    _prepare(network, mean, spread, several)
+    _prepare(network, mean, spread, count)
 
     def residual(y: Tensor, at: Tensor) -> Tensor:
         return (matrix[at] @ y[..., None])[..., 0] - wanted[at]
@@ -194,11 +194,12 @@ def _learn_wrench(rows: Rows, settings: Settings, title: str, several: bool) -> 
     return network
 
 
-def _prepare(network: Ensemble, mean: Tensor, spread: Tensor, several: bool) -> None:
+def _prepare(network: Ensemble, mean: Tensor, spread: Tensor, count: int) -> None:
     network.mean.copy_(mean)
     network.spread.copy_(spread)
-    network.scale.mul_(torch.tensor(tail.SMOOTHNESS, dtype=torch.float64) / 1.5)
-    if several:
+    smoothness = (*tail.SMOOTHNESS, *tail.HEAD_SMOOTHNESS)[: len(network.scale)]
+    network.scale.mul_(torch.tensor(smoothness, dtype=torch.float64) / 1.5)
+    if count == CLASSES[-1]:
         network.scale[-1] = 1e9  # the head's spin drag plays no part
 
 
