@@ -5,8 +5,8 @@ Usage: python -m dataset build --config sweeps/domain.toml --out SWEEP
        python -m benchmarks.shipped_table WORK --test MODEL   errors and coverage on the locked robots
 
 The tails are learned from robots with heads far wider than those of the sweep, a single tail from robots of the
-sweep as well. The response to a flip is learned from the sweep, and from some of these wide robots. All robots are drawn from Sobol sequences with the seeds below.
-The locked robots led to no choice of any kind.
+sweep as well. The response to a flip is learned from the sweep, and from some of these wide robots. All robots are
+drawn from Sobol sequences with the seeds below. The locked robots led to no choice of any kind.
 """
 
 from __future__ import annotations
