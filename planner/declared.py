@@ -1,16 +1,16 @@
 """The declared path: what the robot can follow of the path as drawn.
 
 A path that the pivot can follow with some room is declared as it is. Otherwise the nearest path that it can follow
-is declared (`planner.nearest_path`), or corners are rounded by arcs (`planner.corners`), or the path is refused.
-How far the declared path is from the drawn one is told from both sides: a missed corner is a point of the drawn
-path that is far from the declared one.
+is declared (`planner.nearest_path`), by root mean square or by the largest distance. Or corners are rounded by
+arcs (`planner.corners`), or the path is refused. How far the declared path is from the drawn one is told from both
+sides: a missed corner is a point of the drawn path that is far from the declared one.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from planner.tractrix import Drift, Reference, reference
 from planner.vehicle import Vehicle
 from sim.io.errors import InputError
 
-Corner = Literal["nearest", "fillet", "error"]
+Corner = Literal["nearest", "minimax", "fillet", "error"]
 ROOMS = (0.85, 0.7, 0.55)  # shares of the pivot's largest curvature that the nearest path may use
 TIGHTEST = 0.95  # a reference that needs more than this share is refused
 LOST = 0.3  # declared paths further off than this share of the drawn one's extent, or than the radius of the
@@ -60,8 +60,8 @@ def declare(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drif
     Raises:
         InputError: the path is too tight; names the place, the radii and a scale that works.
     """
-    if corner not in ("nearest", "fillet", "error"):
-        raise InputError(f"corner {corner!r}; allowed are nearest, fillet, error")
+    if corner not in get_args(Corner):
+        raise InputError(f"corner {corner!r}; allowed are {', '.join(get_args(Corner))}")
     found = _try(raw, vehicle, distance, corner, drift)
     if found is None:
         raise InputError(_too_tight(raw, vehicle, distance, corner, drift))
@@ -99,7 +99,8 @@ def _try(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drift: 
         found = reference(path, distance, _spacing(path), drift)
         return found if np.abs(found.curvature).max() <= TIGHTEST * tight else None
     for room in ROOMS:
-        path = nearest_path(raw, max(distance, 0.0), vehicle.pivot_radius / room, drift=drift)
+        radius = vehicle.pivot_radius / room
+        path = nearest_path(raw, max(distance, 0.0), radius, drift=drift, minimax=corner == "minimax")
         found = reference(path, distance, _spacing(path), drift)
         if np.abs(found.curvature).max() <= TIGHTEST * tight:
             return found

@@ -9,6 +9,9 @@ with r_i points at equal distances on the path as drawn. Two things hold the pos
 has no sideways part, except for the drift; and it turns by at most κ times its length. Both enter as least squares
 with large weights; the second only where it is broken. The tractrix of the result is checked afterwards.
 
+For the smallest largest distance (minimax), the distances get weights, and those of far points grow from round to
+round in proportion to their distance. Source: Lawson (1961), thesis, UCLA.
+
 Every residual belongs to one pose or to two neighbours. So a Gauss-Newton step is a banded system, and its cost
 is linear in the length of the path. A closed path is solved with a stretch of the next lap at both ends. Lengths
 in l.
@@ -35,9 +38,13 @@ _SHORTEST_STEP = 0.25  # of the steps, as a share of the spacing
 _OVERLAP = 6.0  # pivot distances of the next lap, for closed paths
 _BAND = 5
 _PIECES = 4  # points of the path for each pose
+_ROUNDS = 12  # of growing weights
+_LEAST = 0.01  # share of the mean weight that every point keeps
 
 
-def nearest_path(raw: Path2D, pivot_distance: float, radius: float, *, drift: Drift = STILL) -> Path2D:
+def nearest_path(
+    raw: Path2D, pivot_distance: float, radius: float, *, drift: Drift = STILL, minimax: bool = False
+) -> Path2D:
     """The path of the tracked point that is nearest to `raw` among those that the robot can follow.
 
     Args:
@@ -45,6 +52,7 @@ def nearest_path(raw: Path2D, pivot_distance: float, radius: float, *, drift: Dr
         pivot_distance: from the pivot to the tracked point; at least 0.
         radius: smallest radius of the pivot's track.
         drift: what carries the robot off its heading.
+        minimax: nearest by the largest distance, not by the root mean square.
     """
     spacing = max(_SPACING * radius, raw.length / _MOST_POSES)
     target = resample(raw.polyline(), spacing)
@@ -52,10 +60,12 @@ def nearest_path(raw: Path2D, pivot_distance: float, radius: float, *, drift: Dr
     if raw.closed:
         extra = min(lap, math.ceil(_OVERLAP * max(pivot_distance, radius) / spacing))
         target = np.concatenate([target[lap - extra : lap], target, target[1 : extra + 1]])
-    task = _Task(target, pivot_distance, radius, drift, spacing)
+    task = _Task(target, np.ones(len(target)), pivot_distance, radius, drift, spacing)
     poses = _start(target, pivot_distance)
     for weight in _WEIGHTS:
         poses = _descend(poses, task, weight)
+    if minimax:
+        poses = _minimax(poses, task)
     if raw.closed:
         poses = poses[extra : extra + lap + 1]
     at = np.arange(_PIECES * (len(poses) - 1) + 1) / _PIECES
@@ -89,10 +99,30 @@ class _Task(NamedTuple):
     """What stays the same while the poses are sought."""
 
     target: Floats  # (m, 2), points on the path as drawn
+    shares: Floats  # (m,), how much the distance of each point counts
     distance: float  # from the pivot to the tracked point
     radius: float  # smallest of the pivot's track
     drift: Drift
     spacing: float  # of the target's points
+
+
+def _minimax(poses: Floats, task: _Task) -> Floats:
+    """Poses whose largest distance from the target is small."""
+    best, shares = poses, task.shares
+    for _ in range(_ROUNDS):
+        away = _distances(poses, task)
+        shares = shares * away
+        shares = np.maximum(shares / shares.mean(), _LEAST)
+        poses = _descend(poses, task._replace(shares=shares), _WEIGHTS[-1])
+        if _distances(poses, task).max() < _distances(best, task).max():
+            best = poses
+    return best
+
+
+def _distances(poses: Floats, task: _Task) -> Floats:
+    """Of the tracked point from the target, (m,)."""
+    ahead = task.distance * np.stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])], 1)
+    return np.asarray(np.hypot(*(poses[:, :2] + ahead - task.target).T))
 
 
 def _descend(poses: Floats, task: _Task, weight: float) -> Floats:
@@ -129,13 +159,13 @@ def _descend(poses: Floats, task: _Task, weight: float) -> Floats:
 
 def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Floats], Floats, Floats]:
     """Residuals of poses (m, 2) and of steps (m − 1, 4); derivatives (m, 2, 3) and (m − 1, 4, 6)."""
-    target, distance, radius, drift, spacing = task
-    count = len(poses)
+    target, shares, distance, radius, drift, spacing = task
+    count, root = len(poses), np.sqrt(shares)
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    own = poses[:, :2] + distance * np.stack([c, s], 1) - target
+    own = root[:, None] * (poses[:, :2] + distance * np.stack([c, s], 1) - target)
     single = np.zeros((count, 2, 3))
-    single[:, 0, 0] = single[:, 1, 1] = 1.0
-    single[:, 0, 2], single[:, 1, 2] = -distance * s, distance * c
+    single[:, 0, 0] = single[:, 1, 1] = root
+    single[:, 0, 2], single[:, 1, 2] = -distance * s * root, distance * c * root
     move = np.diff(poses[:, :2], axis=0)
     turn = np.diff(poses[:, 2])
     middle = (poses[1:, 2] + poses[:-1, 2]) / 2

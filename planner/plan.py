@@ -140,8 +140,8 @@ def plan(
         robot: the robot; its motor speed is used in both directions.
         lookup: trained table, or the table of this one robot; default the shipped one.
         point: which point must follow the path.
-        corner: places that are too tight: declare the nearest path that can be followed ("nearest"), round corners
-            ("fillet"), or refuse them ("error").
+        corner: places that are too tight: declare the path that can be followed and is nearest by root mean square
+            ("nearest") or by its largest distance ("minimax"), round corners ("fillet"), or refuse ("error").
         objective: what decides the dwell: small "error", short "time", or few "flips"; see `planner.choice`.
         minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
         minimum_seconds: the same in seconds; the larger one counts.

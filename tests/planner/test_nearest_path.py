@@ -34,6 +34,14 @@ def test_it_can_be_followed_and_is_nearer_than_rounded_corners(raw: Path2D) -> N
     assert off(found, raw) < 0.7 * off(fillet(raw, float(followed[0])), raw)
 
 
+@pytest.mark.parametrize("raw", [polygon(4, 3.0), polygon(3, 4.0), ZIGZAG], ids=["square", "triangle", "zigzag"])
+def test_minimax_has_a_smaller_largest_distance(raw: Path2D) -> None:
+    one, other = (nearest_path(raw, A, RADIUS / 0.85, minimax=minimax) for minimax in (False, True))
+    assert sharpest(other) < 1.0
+    assert max(two_sided(other.polyline(), raw.polyline())) < 0.95 * max(two_sided(one.polyline(), raw.polyline()))
+    assert off(one, raw) < off(other, raw) < 2 * off(one, raw)
+
+
 def test_a_path_that_can_be_followed_is_left_as_it_is() -> None:
     found = nearest_path(circle(2.0), A, RADIUS)
     assert max(two_sided(found.polyline(), circle(2.0).polyline())) < 2e-3
