@@ -47,8 +47,8 @@ _PLANNING = (
     argument("--point", default="head_centre", choices=("head_centre", "head_tip", "pivot"),
              help="which point follows the path (default: head_centre)"),
     argument("--corner", default="nearest", choices=("nearest", "minimax", "fillet", "error"),
-             help="places that are too tight: the nearest path that can be followed, by root mean square or by its "
-             "largest distance (minimax); round corners; or refuse"),
+             help="places that are too tight: the nearest path that can be followed, by root mean square or by "
+             "its largest distance (minimax); round corners; or refuse"),
     argument("--objective", default="error", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: error)"),
     *_DWELLS,
