@@ -104,8 +104,8 @@ def train(made: Path, out: Path) -> str:
     wide = (made / "sweep.toml").read_text().replace("rows = 6", "rows = 256")
     (out / "sweep.toml").write_text(wide)
     done("dataset", "build", "--config", out / "sweep.toml", "--out", out / "data", "--jobs", 1)
-    done("surrogate", "train", out / "data", "--out", out / "model.pt", "--epochs", 2)
-    assert load(out / "model.pt").provenance["rows"]["train"] > 150
+    done("surrogate", "train", out / "data", "--out", out / "model.safetensors", "--epochs", 2)
+    assert load(out / "model.safetensors").provenance["rows"]["train"] > 150
     return "held-out error on"
 
 

@@ -99,6 +99,7 @@ LIBRARIES = {
     "numpy",
     "pandas",
     "pyarrow",
+    "safetensors",
     "scipy",
     "svgelements",
     "torch",
