@@ -97,6 +97,7 @@ LIBRARIES = {
     "matplotlib",
     "numba",
     "numpy",
+    "onnx",
     "pandas",
     "pyarrow",
     "safetensors",
