@@ -1,4 +1,5 @@
-/* The look-up table of softflagella in C99, without a heap: the steady motion of a robot, and its response to a flip.
+/* The look-up table of softflagella in C99, without a heap: the steady motion of a robot, and its response to
+   a flip.
 
    Include this file in one C file, beside lookup_weights.h, and link with -lm. Define LOOKUP_FLOAT for single
    precision. Lengths are in tail lengths l, times in mu0 l^4/EI, angles in rad but for the slip angle.
@@ -62,41 +63,45 @@ typedef struct { /* numbers of a robot, and its motion (v_x of the disc, v_z, ya
 
 /* ---- networks ------------------------------------------------------------------------------------------------ */
 
-static lookup_real lookup_weight(const lookup_network *net, const void *numbers, int i)
+static lookup_real lookup_half(uint16_t half)
 {
-    uint32_t bits;
-    uint16_t half;
+    uint32_t bits = (uint32_t)(half & 0x7fff) << 13;
     float value;
-    if (!net->half) return LOOKUP_C(((const float *)numbers)[i]);
-    half = ((const uint16_t *)numbers)[i];
-    bits = (uint32_t)(half & 0x7fff) << 13;
     memcpy(&value, &bits, sizeof value);
     value *= 5192296858534827628530496329220096.0f; /* 2^112 */
     return LOOKUP_C(half & 0x8000 ? -value : value);
 }
 
+/* out[j] += factor * numbers[first + j], for 16-bit or 32-bit numbers */
+static void lookup_add(int half, const void *numbers, int first, lookup_real factor, lookup_real *out, int count)
+{
+    const uint16_t *short_row = (const uint16_t *)numbers + first;
+    const float *row = (const float *)numbers + first;
+    if (half)
+        for (int j = 0; j < count; j++) out[j] += factor * lookup_half(short_row[j]);
+    else
+        for (int j = 0; j < count; j++) out[j] += factor * LOOKUP_C(row[j]);
+}
+
 static void lookup_network_at(const lookup_network *net, const lookup_real *inputs, lookup_real *out)
 {
-    lookup_real first[LOOKUP_INPUTS], one[LOOKUP_WIDTH], two[LOOKUP_WIDTH], *before = one, *after = two, *swap;
+    lookup_real first[LOOKUP_INPUTS], one[LOOKUP_WIDTH], two[LOOKUP_WIDTH];
     const lookup_real *h = first;
     int in = net->inputs;
     for (int i = 0; i < in; i++) first[i] = (inputs[i] - LOOKUP_C(net->shift[i])) / LOOKUP_C(net->scale[i]);
-    for (int k = 0; k < net->depth; k++) {
-        for (int j = 0; j < net->width; j++) {
-            lookup_real sum = lookup_weight(net, net->biases[k], j);
-            for (int i = 0; i < in; i++) sum += h[i] * lookup_weight(net, net->weights[k], i * net->width + j);
-            after[j] = LOOKUP_F(tanh)(sum);
-        }
-        swap = before, before = after, after = swap;
-        h = before;
-        in = net->width;
+    for (int k = 0; k <= net->depth; k++) {
+        int count = k < net->depth ? net->width : net->outputs;
+        lookup_real *next = k == net->depth ? out : k % 2 ? two : one;
+        for (int j = 0; j < count; j++) next[j] = 0;
+        lookup_add(net->half, net->biases[k], 0, 1, next, count);
+        for (int i = 0; i < in; i++) lookup_add(net->half, net->weights[k], i * count, h[i], next, count);
+        for (int j = 0; j < count && k < net->depth; j++) next[j] = LOOKUP_F(tanh)(next[j]);
+        h = next;
+        in = count;
     }
-    for (int j = 0; j < net->outputs; j++) {
-        lookup_real sum = lookup_weight(net, net->biases[net->depth], j);
-        for (int i = 0; i < in; i++) sum += h[i] * lookup_weight(net, net->weights[net->depth], i * net->outputs + j);
-        for (int i = 0; i < net->inputs; i++) sum += first[i] * lookup_weight(net, net->bypass, i * net->outputs + j);
-        out[j] = sum * LOOKUP_C(net->spread[j]) + LOOKUP_C(net->mean[j]);
-    }
+    in = net->outputs;
+    for (int i = 0; i < net->inputs; i++) lookup_add(net->half, net->bypass, i * in, first[i], out, in);
+    for (int j = 0; j < net->outputs; j++) out[j] = out[j] * LOOKUP_C(net->spread[j]) + LOOKUP_C(net->mean[j]);
 }
 
 /* ---- the balance of forces ----------------------------------------------------------------------------------- */
@@ -279,7 +284,8 @@ static int lookup_solve(lookup_body *body)
             if (share > LOOKUP_C(0.5)) way[i] *= LOOKUP_C(0.5) / share;
             u[i] += way[i];
         }
-        if (lookup_size_of(way, u) < LOOKUP_CORRECTION) return isfinite(u[0] + u[1] + u[2]) && body->speed + u[3] > 0;
+        if (lookup_size_of(way, u) < LOOKUP_CORRECTION)
+            return isfinite(u[0] + u[1] + u[2]) && body->speed + u[3] > 0;
         lookup_unbalanced(body, u, now);
         for (int i = 0; i < 4; i++) change[i] = now[i] - left[i];
         lookup_update(inverse, way, change);
@@ -331,8 +337,8 @@ static inline int lookup_query(const lookup_robot *robot, lookup_motion *motion)
 /* Lags (z, x, psi) at a dwell, cubic in ln dwell through four of the dwells of the table. */
 static void lookup_lags(const lookup_body *body, lookup_real dwell, lookup_real *lag)
 {
-    lookup_real x[LOOKUP_INPUTS], c[2 * LOOKUP_COMPONENTS], place, sway = body->u[0] + body->u[2] * body->length / 2;
-    lookup_real speeds[3];
+    lookup_real x[LOOKUP_INPUTS], c[2 * LOOKUP_COMPONENTS], place, speeds[3];
+    lookup_real sway = body->u[0] + body->u[2] * body->length / 2;
     int first = 0;
     lookup_tail_inputs(body, body->u, x);
     x[7] = x[8] = LOOKUP_F(log)(body->drag / (body->tails * body->across));
@@ -360,7 +366,7 @@ static void lookup_lags(const lookup_body *body, lookup_real dwell, lookup_real 
         for (int p = 0; p < 3; p++) {
             lookup_real curve = LOOKUP_C(lookup_curve_mean[3 * i + p]);
             for (int k = 0; k < 2 * LOOKUP_COMPONENTS; k++)
-                curve += c[k] * lookup_weight(&lookup_networks[4], lookup_curve_basis, 3 * (LOOKUP_DWELLS * k + i) + p);
+                curve += c[k] * lookup_half(lookup_curve_basis[3 * (LOOKUP_DWELLS * k + i) + p]);
             lag[p] += weight * curve * speeds[p];
         }
     }

@@ -1,4 +1,5 @@
-/* The look-up table of softflagella for web pages and Node: the steady motion of a robot, and its response to a flip.
+/* The look-up table of softflagella for web pages and Node: the steady motion of a robot, and its response to
+   a flip.
 
    import { readLookup } from "./lookup.js";
    const table = readLookup(await (await fetch("lookup.safetensors")).arrayBuffer());
@@ -51,15 +52,20 @@ function network(arrays, name) {
   }
   const [shift, scale, mean, spread, bypass] = ["shift", "scale", "mean", "spread", "bypass"].map(part);
   const times = (h, weights, sum) => {
-    for (let i = 0; i < h.length; i++) for (let j = 0; j < sum.length; j++) sum[j] += h[i] * weights[i * sum.length + j];
+    h.forEach((factor, i) => {
+      for (let j = 0; j < sum.length; j++) sum[j] += factor * weights[i * sum.length + j];
+    });
     return sum;
   };
   return (inputs) => {
     const first = inputs.map((x, i) => (x - shift[i]) / scale[i]);
     let h = first;
-    for (const { weights, biases } of layers.slice(0, -1)) h = times(h, weights, Float64Array.from(biases)).map(Math.tanh);
+    for (const { weights, biases } of layers.slice(0, -1)) {
+      h = times(h, weights, Float64Array.from(biases)).map(Math.tanh);
+    }
     const { weights, biases } = layers[layers.length - 1];
-    return times(first, bypass, times(h, weights, Float64Array.from(biases))).map((y, j) => y * spread[j] + mean[j]);
+    const last = times(h, weights, Float64Array.from(biases));
+    return times(first, bypass, last).map((y, j) => y * spread[j] + mean[j]);
   };
 }
 
@@ -128,8 +134,8 @@ class Lookup {
   #lags(body, dwell, speeds) {
     const total = body.N * body.across, { dwells } = this.manifest, logs = dwells.map(Math.log);
     const drag = Math.log(body.drag / total);
-    const inputs = [...tailInputs(body, body.u), drag, drag, drag + 2 * Math.log(body.length / 2), Math.log(body.length),
-      Math.log(body.side / total), 0, Math.log(body.N), body.N < 2.5 ? 1 : 0];
+    const inputs = [...tailInputs(body, body.u), drag, drag, drag + 2 * Math.log(body.length / 2),
+      Math.log(body.length), Math.log(body.side / total), 0, Math.log(body.N), body.N < 2.5 ? 1 : 0];
     const c = [...this.networks.lag(inputs), ...this.networks.memory(inputs)];
     const mean = this.arrays["curves.mean"].values, basis = this.arrays["curves.basis"].values;
     const place = Math.log(Math.min(dwell, dwells[dwells.length - 1])), lag = [0, 0, 0];
@@ -160,7 +166,8 @@ function tailInputs(body, u) {
 /* Forces (x, z) and moments (y, z) about the disc that are left at the velocities u. */
 function unbalanced(body, u) {
   const [v_x, v_z, yaw, headSpin] = u, y = body.wrench(tailInputs(body, u));
-  const spin = body.speed + headSpin, S = body.across * spin, across = body.N * body.across, lever = body.length / 2;
+  const spin = body.speed + headSpin, S = body.across * spin;
+  const across = body.N * body.across, lever = body.length / 2;
   const sideways = Math.hypot(v_x, yaw), squared = (sideways / (body.offset * spin)) ** 2;
   const couple = body.N * spin * body.offset ** 2;
   const thrust = (body.across - body.along) * couple * thrustOf(S), torque = body.across * couple * torqueOf(S);
@@ -219,7 +226,8 @@ function solve(body) {
 
 /* The inverse of the derivative of what is unbalanced, by differences and elimination; null if there is none. */
 function invertedSlope(body, u, left) {
-  const largest = Math.max(...u.map(Math.abs)), rows = left.map((_, i) => [0, 1, 2, 3, 4, 5, 6, 7].map((j) => +(j - 4 === i)));
+  const largest = Math.max(...u.map(Math.abs));
+  const rows = left.map((_, i) => [0, 1, 2, 3, 4, 5, 6, 7].map((j) => +(j - 4 === i)));
   for (let j = 0; j < 4; j++) {
     const width = DIFFERENCE * (Math.abs(u[j]) + 1e-3 * largest);
     unbalanced(body, u.map((part, i) => (i === j ? part + width : part))).forEach((part, i) => {

@@ -17,6 +17,7 @@ from surrogate.export import load
 from surrogate.lookup import Lookup
 from surrogate.onnx_graph import INPUTS, save_onnx
 from surrogate.rows import drawn
+from tests.docs.pages import DOCS, blocks
 from tests.surrogate.small import table
 
 REASON = "needs the packages onnx and onnxruntime: pip install 'softflagella[onnx]'"
@@ -56,6 +57,16 @@ def test_it_answers_as_the_table_does(wide: bool, tmp_path: Path) -> None:
         with np.errstate(invalid="ignore"):
             error = np.where(found[name] == wanted[name], 0.0, np.abs(found[name] - wanted[name]) / size)
         assert error[inside].max() < 1e-8, name
+
+
+def test_the_example_of_the_page_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    session(load(), tmp_path)
+    monkeypatch.chdir(tmp_path)
+    (code,) = (block.code for block in blocks(DOCS / "howto" / "files.md") if block.language == "python")
+    exec(compile(code, "files.md", "exec"), {})
+    assert "'omega_yr_bar': array([0.049" in capsys.readouterr().out
 
 
 def test_robots_far_outside_are_flagged_and_one_robot_is_enough(tmp_path: Path) -> None:
