@@ -150,6 +150,12 @@ def own_table(made: Path, out: Path) -> str:
     return "largest error"
 
 
+def export(made: Path, out: Path) -> str:
+    done("surrogate", "export", SHIPPED, "--small", out / "small")
+    assert len((out / "small" / "vectors.csv").read_text().splitlines()) > 20
+    return f"model {load().identity} -> {out / 'small'}"
+
+
 def plan(made: Path, out: Path) -> str:
     done("planner", "plan", "square:3", "--robot", made / "robot.toml", "--out", out / "plan")
     written = {path.name for path in (out / "plan").iterdir()}
@@ -226,7 +232,8 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "compile"): compiled, ("dataset", "build"): build, ("dataset", "report"): report,
     ("dataset", "verify"): verify, ("surrogate", "train"): train, ("surrogate", "query"): query,
     ("surrogate", "inverse"): inverse, ("surrogate", "refine"): refine, ("planner", "track"): follow,
-    ("surrogate", "errors"): errors, ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
+    ("surrogate", "errors"): errors, ("surrogate", "export"): export,
+    ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
     ("planner", "goal"): goal,
     ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
     ("calibration", "tracks"): tracks,
