@@ -135,6 +135,8 @@ def _check(content: Mapping[str, Any]) -> None:
     widths = content["intervals"] or {}
     if not _all_finite([*numbers, *(widths[name] for name in widths if name != "factor")]):
         raise _IncompleteError("some of its numbers are not finite")
+    if any(bool(torch.isnan(part).any()) for part in widths.get("factor", {}).values()):  # infinite: no rows
+        raise _IncompleteError("some of its intervals are no numbers")
 
 
 def _all_finite(part: Any) -> bool:
