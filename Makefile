@@ -8,7 +8,7 @@ SOURCES := $(wildcard sim/*.py sim/*/*.py)
 CONFIG ?= sweep.toml
 DATA ?= data/sweep
 REFINED ?=
-MODEL ?= models/model.pt
+MODEL ?= models/model.safetensors
 ROBOT ?= paper-control
 PLANPATH ?= square:3
 TABLE ?=
@@ -39,10 +39,10 @@ demo: reports/demo.html ## the whole pipeline on the paper's robot, ends with re
 reports/demo.html: $(STAMP) $(SOURCES) $(wildcard dataset/*.py surrogate/*.py surrogate/shipped/* planner/*.py calibration/*.py softflagella/*.py) demo.toml
 	$(RUN) -m softflagella demo --out $@
 
-test: $(VENV)/.clusters ## run the tests, those of clusters included
+test: $(VENV)/.extras ## run the tests, those of clusters and of ONNX files included
 	$(RUN) -m pytest $(TWO)
-$(VENV)/.clusters: $(STAMP)
-	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[clusters]'
+$(VENV)/.extras: $(STAMP)
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[clusters,onnx]'
 	touch $@
 
 quick: $(STAMP) ## run the quick tests, under a minute

@@ -90,7 +90,7 @@ def run_demo(out: str | Path) -> None:
     print("2/4 plan circle, square and triangle without simulating, and replay them")
     errors = _plan_and_replay(folder)
     print("3/4 a small sweep and a look-up table trained on it")
-    data, model = folder / "sweep", folder / "model.pt"
+    data, model = folder / "sweep", folder / "model.safetensors"
     shutil.rmtree(data, ignore_errors=True)  # an earlier demo's rows, perhaps of another version
     _command("dataset", "build", "--config", "demo.toml", "--out", str(data))
     _command("surrogate", "train", str(data), "--out", str(model), "--epochs", "60")

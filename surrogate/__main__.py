@@ -7,6 +7,8 @@ python -m surrogate query POINTS.csv --out OUT.csv     predict rows, with interv
 python -m surrogate inverse TARGETS.csv --out OUT.csv  which robots have these motions
 python -m surrogate errors [--model MODEL]             the stored held-out errors
 python -m surrogate robot ROBOT.toml --out T.json      the table of one robot with its effects, for the planner
+python -m surrogate export [MODEL] --onnx OUT.onnx     the whole query as one ONNX graph
+python -m surrogate export [MODEL] --small FOLDER      weights and readers for a web page or a microcontroller
 """
 
 from __future__ import annotations
@@ -177,6 +179,31 @@ def _robot(arguments: Namespace) -> None:
     save_single(table, arguments.out)
     worst = max(error["rms"] for error in table.errors.values())
     print(f"both directions of the motor, largest error {100 * worst:.2f} % -> {arguments.out}")
+
+
+@program.command(
+    "export",
+    "write a look-up table for other programs",
+    argument("model", nargs="?", help="look-up table (default: the one that comes with the package)"),
+    argument("--onnx", metavar="OUT.onnx", help="the whole query as one ONNX graph, in double precision"),
+    argument(
+        "--small", metavar="FOLDER", help="at most 150 kB, for a web page or a microcontroller, with readers"
+    ),
+)
+def _export(arguments: Namespace) -> None:
+    from surrogate.export import load
+    from surrogate.onnx_graph import save_onnx
+    from surrogate.small_files import save_small
+
+    if not (arguments.onnx or arguments.small):
+        raise InputError("nothing to write; give --onnx OUT.onnx or --small FOLDER")
+    table = load(arguments.model)
+    if arguments.onnx:
+        save_onnx(table, arguments.onnx)
+        print(f"model {table.identity}, {Path(arguments.onnx).stat().st_size / 1000:.0f} kB -> {arguments.onnx}")
+    if arguments.small:
+        print(save_small(table, arguments.small))
+        print(f"model {table.identity} -> {arguments.small}")
 
 
 if __name__ == "__main__":

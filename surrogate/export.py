@@ -1,14 +1,13 @@
-"""Model files: everything that a query needs in one file. Reading a file runs no code from it.
+"""Model files: everything that a query needs in one safetensors file (`surrogate.tensor_file`).
 
-A model is a torch file of tensors and plain values (loaded with weights_only). It holds a hash over everything
-in it, domain and errors included; a file that was changed is refused. The identity of a table is the start of
-this hash, and every plan stores the identity of the table that made it. One model comes with the package
-(`SHIPPED`), so that planning works without training.
+A file holds a hash over everything in it, domain and errors included; a file that was changed is refused. The
+identity of a table is the start of this hash, and every plan stores the identity of the table that made it. One
+model comes with the package (`SHIPPED`), so that planning works without training.
 """
 
 from __future__ import annotations
 
-import pickle
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,18 +15,19 @@ import torch
 from torch import Tensor
 
 from sim.io.errors import InputError
-from sim.io.files import whole_file
-from surrogate.curves import Basis, CurveTable
+from surrogate import tensor_file
+from surrogate.curves import PARTS, SHAPES, Basis, CurveTable
 from surrogate.intervals import Intervals
-from surrogate.lookup import Lookup, digest
+from surrogate.lookup import Lookup
 from surrogate.network import Ensemble
+from surrogate.rows import ROBOT
 from surrogate.single import load_single
 from surrogate.support import Support
 from surrogate.table import LookupTable
-from surrogate.tails import TailTable
+from surrogate.tails import CLASSES, TailTable
 
-SHIPPED = Path(__file__).parent / "shipped" / "model.pt"
-_FORMAT = 4
+SHIPPED = Path(__file__).parent / "shipped" / "model.safetensors"
+FORMAT = 5
 
 
 def content_of(lookup: Lookup) -> dict[str, Any]:
@@ -48,9 +48,7 @@ def content_of(lookup: Lookup) -> dict[str, Any]:
 
 def save(lookup: Lookup, path: str | Path) -> None:
     """Write a model file completely or not at all."""
-    content = content_of(lookup)
-    with whole_file(path) as part:
-        torch.save({"format": _FORMAT, "hash": digest(content), "content": content}, part)
+    tensor_file.write(path, content_of(lookup), FORMAT)
 
 
 def load(path: str | Path | None = None) -> Lookup:
@@ -62,18 +60,18 @@ def load(path: str | Path | None = None) -> Lookup:
     path = SHIPPED if path is None else path
     if not Path(path).is_file():
         raise InputError(f"no model {path}; train one with python -m surrogate train DATA --out {path}")
+    remedy = "train it again with python -m surrogate train"
+    content = tensor_file.read(path, FORMAT, remedy)
     try:
-        stored = torch.load(path, weights_only=True, map_location="cpu")
-        if stored["format"] != _FORMAT:
-            raise InputError(f"{path} has format {stored['format']}, this version reads {_FORMAT}: retrain")
-        if stored["hash"] != digest(stored["content"]):
-            raise InputError(f"{path} was changed after it was written; train it again")
-        return _lookup(stored["content"])
-    except InputError:
-        raise
-    except (RuntimeError, KeyError, TypeError, ValueError, AttributeError, EOFError, pickle.UnpicklingError,
-            UnicodeDecodeError, IndexError, OSError) as broken:  # fmt: skip
-        raise InputError(f"{path} is not a model file: {type(broken).__name__}; train a new one") from None
+        return _lookup(content)
+    except _IncompleteError as lack:
+        raise InputError(f"{path} is no complete look-up table: {lack}; {remedy}") from None
+    except (RuntimeError, KeyError, TypeError, ValueError, AttributeError, IndexError):
+        raise InputError(f"{path} is no complete look-up table; {remedy}") from None
+
+
+class _IncompleteError(Exception):
+    """What a content lacks."""
 
 
 def load_table(path: str | Path | None = None) -> LookupTable:
@@ -96,8 +94,9 @@ def load_table(path: str | Path | None = None) -> LookupTable:
 
 
 def _lookup(content: dict[str, Any]) -> Lookup:
+    _check(content)
     intervals = content["intervals"]
-    table = Lookup(
+    return Lookup(
         tails=TailTable(
             tuple(None if part is None else _network(part) for part in content["wrench"]), _network(content["gap"])
         ),
@@ -107,16 +106,43 @@ def _lookup(content: dict[str, Any]) -> Lookup:
         ),
         support=tuple(None if part is None else Support(**part) for part in content["support"]),
         intervals=None if intervals is None else Intervals(**intervals),
-        ranges={name: (low, high) for name, (low, high) in content["ranges"].items()},
+        ranges={name: (float(low), float(high)) for name, (low, high) in content["ranges"].items()},
         errors=content["errors"],
         provenance=content["provenance"],
     )
-    for network in (*table.tails.wrench, table.tails.gap, *table.curves.networks):
-        if network is not None and not all(
-            bool(torch.isfinite(part).all()) for part in network.state_dict().values()
-        ):
-            raise ValueError("weights are not finite")
-    return table
+
+
+def _check(content: Mapping[str, Any]) -> None:
+    """Refuse a content with which a query would not work."""
+    wanted = ("wrench", "gap", "curves", "bases", "support", "intervals", "ranges", "errors", "provenance")
+    for name in wanted:
+        if name not in content:
+            raise _IncompleteError(f"it has no {name!r}")
+    wrench, support = content["wrench"], content["support"]
+    if len(wrench) != len(CLASSES) or all(part is None for part in wrench):
+        raise _IncompleteError("it has no networks")
+    if [part is None for part in wrench] != [part is None for part in support]:
+        raise _IncompleteError("its networks and their domains do not belong together")
+    if len(content["curves"]) != len(PARTS) or set(content["bases"]) != set(SHAPES):
+        raise _IncompleteError("it has no response to a flip")
+    for name in ROBOT:
+        low, high = content["ranges"].get(name, (1.0, 0.0))
+        if not low <= high:
+            raise _IncompleteError(f"it has no range of {name}")
+    if "rows" not in content["provenance"] or not content["errors"]:
+        raise _IncompleteError("it states no errors")
+    numbers = [content[name] for name in ("wrench", "gap", "curves", "bases", "support")]
+    widths = content["intervals"] or {}
+    if not _all_finite([*numbers, *(widths[name] for name in widths if name != "factor")]):
+        raise _IncompleteError("some of its numbers are not finite")
+    if any(bool(torch.isnan(part).any()) for part in widths.get("factor", {}).values()):  # infinite: no rows
+        raise _IncompleteError("some of its intervals are no numbers")
+
+
+def _all_finite(part: Any) -> bool:
+    if isinstance(part, Mapping | list):
+        return all(_all_finite(own) for own in (part.values() if isinstance(part, Mapping) else part))
+    return part is None or bool(torch.isfinite(torch.as_tensor(part)).all())
 
 
 def _stored(network: Ensemble) -> dict[str, Any]:
@@ -124,9 +150,15 @@ def _stored(network: Ensemble) -> dict[str, Any]:
     return {"shape": network.shape, "state": state}
 
 
-def _network(stored: dict[str, Any]) -> Ensemble:
-    network = Ensemble(**stored["shape"], seed=0)
-    network.load_state_dict(stored["state"])
+def _network(stored: Mapping[str, Any]) -> Ensemble:
+    shape, state = stored["shape"], stored["state"]
+    sizes = state["bypass"].shape + state["weights.0"].shape[2:]
+    if sizes != tuple(shape[name] for name in ("members", "inputs", "outputs", "width")) or shape["depth"] > len(
+        state
+    ):
+        raise _IncompleteError("a network has another shape than is said")
+    network = Ensemble(**shape, seed=0)
+    network.load_state_dict(state)
     for parameter in network.parameters():
         parameter.requires_grad_(False)
     return network

@@ -12,8 +12,6 @@ always: effects on the tails themselves. The table does not extrapolate.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -89,6 +87,7 @@ class Lookup:
     def identity(self) -> str:
         """Hash of all numbers."""
         from surrogate.export import content_of
+        from surrogate.tensor_file import digest
 
         return digest(content_of(self))[:16]
 
@@ -298,26 +297,3 @@ def between_dwells(curves: Floats, dwells: Floats) -> Floats:
                 weight *= (place - knots[first + j]) / (knots[first + i] - knots[first + j])
         total += weight[:, None] * curves[rows, first + i]
     return total
-
-
-def digest(content: Any) -> str:
-    """Hash of nested dictionaries and lists of tensors and plain values."""
-    found = hashlib.sha256()
-
-    def take(part: Any) -> None:
-        if isinstance(part, Tensor):
-            found.update(str((part.dtype, tuple(part.shape))).encode())
-            found.update(part.detach().contiguous().numpy().tobytes())
-        elif isinstance(part, Mapping):
-            for key in sorted(part):
-                found.update(json.dumps(key).encode())
-                take(part[key])
-        elif isinstance(part, list | tuple):
-            found.update(f"[{len(part)}".encode())
-            for item in part:
-                take(item)
-        else:
-            found.update(json.dumps(part).encode())
-
-    take(content)
-    return found.hexdigest()

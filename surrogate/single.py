@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +20,12 @@ import numpy as np
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.files import write_text
+from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.response import DWELLS, Responses
 from sim.motion.net_speed import net_speeds, twists
+from sim.motion.steady_motion import STEADY_OUTPUTS
 
-FORMAT = 2
+FORMAT = 3
 _CURVES = {"lag": (2, len(DWELLS), 3), "memory": (2, -1, len(DWELLS), 3),
            "rest": (2, len(DWELLS), 3), "spread": (2, len(DWELLS), 3)}  # fmt: skip
 
@@ -53,9 +56,8 @@ class SingleRobot:
 
     @property
     def identity(self) -> str:
-        """Hash of the numbers."""
-        numbers = [self.robot, self.steady, self.lag, self.memory, self.rest]
-        return hashlib.sha256(json.dumps(numbers).encode()).hexdigest()[:16]
+        """Hash of everything in the table."""
+        return _digest(asdict(self))[:16]
 
     def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
         """Outputs (M,) of this robot; the sign of `omega_bar` is the direction of the motor.
@@ -96,30 +98,70 @@ class SingleRobot:
 
 
 def save_single(table: SingleRobot, path: str | Path) -> None:
-    """Write a table of one robot as JSON."""
-    write_text(path, json.dumps({"format": FORMAT, **asdict(table)}) + "\n")
+    """Write a table of one robot as JSON, with a hash over everything in it."""
+    content = asdict(table)
+    write_text(path, json.dumps({"format": FORMAT, "hash": _digest(content), **content}) + "\n")
 
 
 def load_single(path: str | Path) -> SingleRobot:
     """Read a table of one robot.
 
     Raises:
-        InputError: the file is not such a table, or one of another version.
+        InputError: the file is not such a table, or one of another version, or it was changed.
     """
     remedy = "make one with python -m surrogate robot"
     try:
-        content = json.loads(Path(path).read_text())
-        version = content.pop("format", 1)
-        if version != FORMAT:
-            raise InputError(f"{path} has format {version}, this version reads {FORMAT}: {remedy}")
-        table = SingleRobot(**content)
-        for name, shape in _CURVES.items():
-            curves = np.array(getattr(table, name), dtype=float)
-            wanted = tuple(len(table.before) if size < 0 else size for size in shape)
-            if curves.shape != wanted or not np.isfinite(curves).all():
-                raise InputError(f"{path} has no curves {name!r} of shape {wanted} in finite numbers: {remedy}")
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as missing:
         raise InputError(f"{path} cannot be read ({missing.strerror}); {remedy}") from None
-    except (json.JSONDecodeError, UnicodeDecodeError, TypeError, ValueError, AttributeError) as broken:
-        raise InputError(f"{path} is no table of a robot: {broken}; {remedy}") from None
-    return table
+    except (ValueError, RecursionError):  # not UTF-8, or no JSON
+        content = None
+    if not isinstance(content, dict):
+        raise InputError(f"{path} is no table of a robot, or is damaged; {remedy}")
+    version = content.pop("format", 1)
+    if version != FORMAT:
+        raise InputError(f"{path} has format {str(version)[:20]}, this version reads {FORMAT}; {remedy}")
+    if content.pop("hash", "") != _digest(content):
+        raise InputError(f"{path} was changed after it was written; {remedy}")
+    lacking = [field.name for field in fields(SingleRobot) if field.name not in content]
+    if lacking or len(content) != len(fields(SingleRobot)):
+        raise InputError(f"{path} is no complete table of a robot{_listed(lacking)}; {remedy}")
+    try:
+        wrong = _wrong(SingleRobot(**content))
+    except (KeyError, TypeError, ValueError, AttributeError):
+        wrong = "its numbers have no such form"
+    if wrong:
+        raise InputError(f"{path} is no table of a robot: {wrong}; {remedy}")
+    return SingleRobot(**content)
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _listed(lacking: list[str]) -> str:
+    return f": it has no {lacking[0]!r}" if lacking else ""
+
+
+def _wrong(table: SingleRobot) -> str:
+    """What is wrong with the numbers of a table; empty if nothing is."""
+    for name, shape in _CURVES.items():
+        curves = np.array(getattr(table, name), dtype=float)
+        wanted = tuple(len(table.before) if size < 0 else size for size in shape)
+        if curves.shape != wanted or not np.isfinite(curves).all():
+            return f"it has no curves {name!r} of shape {wanted} in finite numbers"
+    missing = [name for name in STEADY_OUTPUTS if name not in table.steady]
+    if missing:
+        return f"it has no {missing[0]!r}"
+    motion = np.array([table.steady[name] for name in STEADY_OUTPUTS], dtype=float)
+    if motion.shape != (len(STEADY_OUTPUTS), 2) or np.isnan(motion).any():  # the gap of one tail is infinite
+        return "its steady motion is not two numbers for each output"
+    groups = np.array(
+        [table.robot[name] for name in {*GROUP_COLUMNS, *OPTIONAL_COLUMNS, *table.robot}], dtype=float
+    )
+    slopes = [np.array(slope, dtype=float) for slope in table.slopes.values()]
+    if not np.isfinite(groups).all() or any(s.shape != (2, 3) or not np.isfinite(s).all() for s in slopes):
+        return "its robot or its slopes are not finite numbers"
+    if any(not math.isfinite(error["rms"]) for error in table.errors.values()):
+        return "its errors are not finite numbers"
+    return ""

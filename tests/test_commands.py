@@ -104,8 +104,8 @@ def train(made: Path, out: Path) -> str:
     wide = (made / "sweep.toml").read_text().replace("rows = 6", "rows = 256")
     (out / "sweep.toml").write_text(wide)
     done("dataset", "build", "--config", out / "sweep.toml", "--out", out / "data", "--jobs", 1)
-    done("surrogate", "train", out / "data", "--out", out / "model.pt", "--epochs", 2)
-    assert load(out / "model.pt").provenance["rows"]["train"] > 150
+    done("surrogate", "train", out / "data", "--out", out / "model.safetensors", "--epochs", 2)
+    assert load(out / "model.safetensors").provenance["rows"]["train"] > 150
     return "held-out error on"
 
 
@@ -148,6 +148,12 @@ def own_table(made: Path, out: Path) -> str:
          "--out", out / "plan")  # fmt: skip
     assert len(load_plan(out / "plan" / "plan.json")["dwell_bar"]) > 20
     return "largest error"
+
+
+def export(made: Path, out: Path) -> str:
+    done("surrogate", "export", SHIPPED, "--small", out / "small")
+    assert len((out / "small" / "vectors.csv").read_text().splitlines()) > 20
+    return f"model {load().identity} -> {out / 'small'}"
 
 
 def plan(made: Path, out: Path) -> str:
@@ -226,7 +232,8 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "compile"): compiled, ("dataset", "build"): build, ("dataset", "report"): report,
     ("dataset", "verify"): verify, ("surrogate", "train"): train, ("surrogate", "query"): query,
     ("surrogate", "inverse"): inverse, ("surrogate", "refine"): refine, ("planner", "track"): follow,
-    ("surrogate", "errors"): errors, ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
+    ("surrogate", "errors"): errors, ("surrogate", "export"): export,
+    ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
     ("planner", "goal"): goal,
     ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
     ("calibration", "tracks"): tracks,

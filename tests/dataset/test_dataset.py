@@ -108,7 +108,7 @@ def test_make_dataset_knows_its_sources(tmp_path: Path) -> None:
         refused = make("dataset", f"CONFIG={other}", f"DATA={data}")
         assert refused.returncode != 0
         assert "seed 3 there, 4 here" in refused.stderr
-    model = tmp_path / "model.pt"
+    model = tmp_path / "model.safetensors"
     model.touch()
     done = make("train", f"CONFIG={config}", f"DATA={data}", f"MODEL={model}")
     assert done.returncode == 0

@@ -1,20 +1,15 @@
-"""A trained table: files, mirror images, derivatives, the table backwards, response curves, training."""
+"""A trained table: mirror images, derivatives, the table backwards, response curves, training."""
 
 from __future__ import annotations
 
-from contextlib import suppress
-from pathlib import Path
-
 import numpy as np
 import pytest
-import torch
 
 import surrogate.train as training
 from sim.io.errors import InputError
 from sim.model.response import DWELLS, SETTLED
 from surrogate.certify import certified_error
 from surrogate.evaluate import summary
-from surrogate.export import load, save
 from surrogate.inverse import design, inverse
 from surrogate.lookup import between_dwells
 from surrogate.rows import drawn, simulated
@@ -26,38 +21,6 @@ def inside(count: int = 6) -> dict[str, np.ndarray]:
     robots = rows(256, 13, wide=False).robots
     good = np.flatnonzero(~table().query(robots, flag=True)["outside"])[:count]
     return {name: values[good] for name, values in robots.items()}
-
-
-def test_files_come_back_as_they_were(tmp_path: Path) -> None:
-    save(table(), tmp_path / "model.pt")
-    again = load(tmp_path / "model.pt")
-    assert again.identity == table().identity
-    assert (again.domain, again.errors) == (table().domain, table().errors)
-    robots = inside()
-    for name, values in table().query(robots, intervals=True).items():
-        assert np.array_equal(again.query(robots, intervals=True)[name], values), name
-
-
-def test_changed_and_broken_files_are_refused(tmp_path: Path) -> None:
-    save(table(), tmp_path / "model.pt")
-    whole = (tmp_path / "model.pt").read_bytes()
-    path = tmp_path / "changed.pt"
-    for seed in range(12):  # flipped bits
-        broken = bytearray(whole)
-        place = np.random.default_rng(seed).integers(len(broken))
-        broken[place] ^= 1 << seed % 8
-        path.write_bytes(bytes(broken))
-        with suppress(InputError):  # else a bit of padding, which holds no number
-            assert load(path).identity == table().identity
-    for content in (whole[:2000], b"C_t,C_r\n1,2\n", b"", b"\xff\xfe\x00"):
-        path.write_bytes(content)
-        with pytest.raises(InputError, match="is not a model file"):
-            load(path)
-    stored = torch.load(tmp_path / "model.pt", weights_only=True)
-    stored["content"]["ranges"]["omega_bar"] = [0.0, 1e6]
-    torch.save(stored, path)
-    with pytest.raises(InputError, match="was changed"):
-        load(path)
 
 
 def test_a_reversed_motor_mirrors_the_answer() -> None:

@@ -105,8 +105,8 @@ def test_query_and_inverse_commands(tmp_path: Path) -> None:
 
 
 def test_training_refuses_what_is_no_data_set(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_command(main, ["train", str(tmp_path), "--out", str(tmp_path / "m.pt")]) == 2
+    assert run_command(main, ["train", str(tmp_path), "--out", str(tmp_path / "m.safetensors")]) == 2
     assert "no finished data set" in capsys.readouterr().err
     with pytest.raises(InputError, match="no finished data set"):
         train(str(tmp_path), title="")
-    assert not (tmp_path / "m.pt").exists()
+    assert not (tmp_path / "m.safetensors").exists()

@@ -86,24 +86,6 @@ def test_another_robot_is_refused(table: SingleRobot) -> None:
         table.query({**columns(), "C_t": np.array([9.0])})
 
 
-def test_a_file_that_is_no_table_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "broken.json").write_text("{")
-    with pytest.raises(InputError, match="no table"):
-        load_table(tmp_path / "broken.json")
-    (tmp_path / "old.json").write_text('{"robot": {}, "dwells": [1.0]}')
-    with pytest.raises(InputError, match="has format 1, this version reads"):
-        load_table(tmp_path / "old.json")
-    with pytest.raises(InputError, match="cannot be read"):
-        load_table(tmp_path / "absent.json")
-
-
-def test_a_file_reads_back_to_the_same_table(table: SingleRobot, tmp_path: Path) -> None:
-    save_single(table, tmp_path / "robot.json")
-    again = load_table(tmp_path / "robot.json")
-    assert again.identity == table.identity
-    assert again.response(columns()).memory == pytest.approx(table.response(columns()).memory)
-
-
 def test_its_slopes_are_those_of_the_simulator(table: SingleRobot) -> None:
     """In every group and in the robot's effect."""
     values = ROBOT.group_values()

@@ -1,0 +1,234 @@
+"""The small copy of the look-up table: its size and loss, and its readers in C and JavaScript."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import safetensors.numpy
+
+from sim.io.errors import InputError, run_command
+from sim.model.groups import DWELL
+from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.__main__ import main
+from surrogate.evaluate import scale_of
+from surrogate.export import load
+from surrogate.lookup import RESPONSE_OUTPUTS
+from surrogate.onnx_graph import INPUTS
+from surrogate.rows import drawn
+from surrogate.small import MOST_BYTES, Small, losses_of, small_of
+from surrogate.small_files import save_small
+from tests.planner.compiled import compile_c
+from tests.surrogate.small import table
+
+OUTPUTS = (*STEADY_OUTPUTS, *RESPONSE_OUTPUTS)
+LIBRARY = """#include "lookup.h"
+int answer(const double *in, double *out)
+{
+    lookup_robot robot;
+    lookup_motion motion;
+    lookup_flip flip;
+    lookup_real *inputs = &robot.C_t, *steady = &motion.omega_t_bar, *response = &flip.net_speed_bar;
+    int state, other;
+    for (int i = 0; i < 9; i++) inputs[i] = (lookup_real)in[i];
+    state = lookup_query(&robot, &motion);
+    for (int i = 0; i < 8; i++) out[i] = state == LOOKUP_NO_ANSWER ? NAN : steady[i];
+    other = lookup_response(&robot, (lookup_real)in[9], &flip);
+    for (int i = 0; i < 4; i++) out[8 + i] = other == LOOKUP_NO_ANSWER ? NAN : response[i];
+    return state;
+}
+"""
+SCRIPT = """import { readFileSync, writeFileSync } from "node:fs";
+import { readLookup } from "./lookup.mjs";
+const bytes = readFileSync("lookup.safetensors");
+const table = readLookup(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength));
+const answers = JSON.parse(readFileSync("robots.json")).map((robot) => [
+  table.query(robot), table.response(robot, robot.dwell_bar)]);
+writeFileSync("answers.json", JSON.stringify(answers, (key, value) => (value === Infinity ? "inf" : value)));
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("small")
+    save_small(load(), made)
+    return made
+
+
+def robots_of(count: int, seed: int) -> dict[str, np.ndarray]:
+    robots = {name: np.array(values) for name, values in drawn(count, seed, wide=False).items() if name in INPUTS}
+    robots["omega_bar"][::2] *= -1
+    robots[DWELL] = np.geomspace(0.2, 5.0, count)
+    return {name: robots[name] for name in (*INPUTS, DWELL)}
+
+
+def library(folder: Path, *flags: str) -> ctypes.CDLL:
+    (folder / "library.c").write_text(LIBRARY)
+    out = folder / f"library{len(flags)}.so"
+    compile_c(folder / "library.c", out, "-shared", "-fPIC", *flags)
+    return ctypes.CDLL(str(out))
+
+
+def answers(made: ctypes.CDLL, robots: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """What C answers, and its states."""
+    rows = np.ascontiguousarray(np.stack([robots[name] for name in (*INPUTS, DWELL)], 1))
+    found, states = np.zeros((len(rows), len(OUTPUTS))), []
+    for row, out in zip(rows, found, strict=True):
+        pointers = (part.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for part in (row, out))
+        states.append(made.answer(*pointers))
+    return dict(zip(OUTPUTS, found.T, strict=True)), np.array(states)
+
+
+def apart(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Differences over the scales of the outputs; 0 where neither has an answer."""
+    result = {}
+    for name in OUTPUTS:
+        same = (found[name] == wanted[name]) | (np.isnan(found[name]) & np.isnan(wanted[name]))
+        with np.errstate(invalid="ignore"):
+            result[name] = np.where(same, 0.0, np.abs(found[name] - wanted[name]) / scale_of(name, wanted))
+    return result
+
+
+def vectors(folder: Path) -> dict[str, np.ndarray]:
+    return {str(name): column.to_numpy() for name, column in pd.read_csv(folder / "vectors.csv").items()}
+
+
+def test_it_is_small_and_states_its_loss(folder: Path) -> None:
+    assert (folder / "lookup.safetensors").stat().st_size <= MOST_BYTES
+    arrays = safetensors.numpy.load_file(folder / "lookup.safetensors")
+    assert sum(array.nbytes for array in arrays.values()) == small_of(load()).bytes
+    data = (folder / "lookup.safetensors").read_bytes()
+    header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+    manifest = json.loads(header["__metadata__"]["manifest"])
+    assert manifest["table"] == load().identity
+    assert set(manifest["units"]) == {*INPUTS, DWELL, *OUTPUTS}
+    loss = manifest["loss"]
+    assert {*OUTPUTS} <= set(loss)
+    for name in ("omega_t_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l"):
+        assert loss[name]["p95"] < 0.05 * load().errors[name]["median"], (
+            name
+        )  # nothing beside the table's own errors
+        assert loss[f"{name} one_tail"]["p95"] < 0.005
+    for name in (*RESPONSE_OUTPUTS, "tail_gap"):
+        assert loss[name]["p95"] < load().errors[name]["p95"], name
+
+
+def test_the_stated_loss_holds_for_other_robots(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("surrogate.small._SEED", 91)
+    small = small_of(load())
+    stated = json.loads(manifest_of(folder))["loss"]
+    for name, figures in losses_of(load(), small).items():
+        assert figures["p95"] < 2 * stated[name]["p95"], name
+
+
+def manifest_of(folder: Path) -> str:
+    data = (folder / "lookup.safetensors").read_bytes()
+    header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+    return str(header["__metadata__"]["manifest"])
+
+
+def test_the_reader_in_c_gives_the_vectors(folder: Path) -> None:
+    wanted = vectors(folder)
+    assert set(wanted["N"]) == set(range(1, 9))
+    assert {-1.0, 1.0} == set(np.sign(wanted["omega_bar"]))
+    found, states = answers(library(folder), wanted)
+    assert (states == 0).all()
+    for name, error in apart(found, wanted).items():
+        assert error.max() < 1e-9, name
+
+
+def test_the_reader_in_c_answers_for_all_robots(folder: Path) -> None:
+    """In double precision as the table of the same numbers, in single precision nearly."""
+    robots = robots_of(1024, 92)
+    wanted = small_of(load()).query(robots)
+    inside = ~load().query({name: robots[name] for name in INPUTS}, flag=True)["outside"]
+    found, states = answers(library(folder), robots)
+    assert (states[inside] == 0).all()
+    assert all(error[inside].max() < 1e-8 for error in apart(found, wanted).values())
+    single, states = answers(library(folder, "-DLOOKUP_FLOAT"), robots)
+    rows = inside & (robots["N"] > 1)
+    assert (states[rows] == 0).all()
+    for name, error in apart(single, wanted).items():
+        assert error[rows].max() < (1e-2 if name in ("tail_gap", "theta_deg") else 1e-3), name
+        assert np.quantile(error[rows], 0.95) < 2e-5, name
+
+
+def test_the_reader_in_c_says_when_it_does_not_know(folder: Path) -> None:
+    made = library(folder)
+    good = {name: values[:1] for name, values in vectors(folder).items() if name in (*INPUTS, DWELL)}
+    for name, value, state in (
+        ("omega_bar", 1e4, 1), ("l_over_R", 100.0, 1), ("N", 20.0, 1), ("omega_bar", 0.0, 2), ("C_t", -1.0, 2),
+        ("C_t", np.nan, 2), ("N", 0.0, 2),
+    ):  # fmt: skip
+        assert answers(made, {**good, name: np.array([value])})[1][0] == state, (name, value)
+    for name, value in ((DWELL, 0.1), ("N", 1.0)):
+        assert np.isnan(answers(made, {**good, name: np.array([value])})[0]["net_speed_bar"][0])
+
+
+def test_the_reader_in_javascript_gives_the_same(folder: Path) -> None:
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("no node on this machine")
+    wanted = vectors(folder)
+    rows = pd.DataFrame({name: wanted[name] for name in (*INPUTS, DWELL)})
+    strange = rows.iloc[:3].assign(omega_bar=[1e4, 0.0, 5.0], dwell_bar=[1.0, 1.0, 0.1])
+    (folder / "robots.json").write_text(pd.concat([rows, strange]).to_json(orient="records", double_precision=15))
+    (folder / "run.mjs").write_text(SCRIPT)
+    shutil.copyfile(folder / "lookup.js", folder / "lookup.mjs")
+    subprocess.run([node, "run.mjs"], check=True, cwd=folder)
+    *told, far, still, short = json.loads((folder / "answers.json").read_text())
+    steady = pd.DataFrame([part[0] for part in told])
+    response = pd.DataFrame([part[1] or {} for part in told]).drop(columns="outside")
+    assert not steady["outside"].any()
+    both = pd.concat([steady, response], axis=1).replace("inf", np.inf)
+    found = {str(name): both[name].to_numpy(dtype=float) for name in OUTPUTS}
+    for name, error in apart(found, wanted).items():
+        assert error.max() < 1e-9, name
+    assert far[0]["outside"]
+    assert still == [None, None]
+    assert short[1] is None
+
+
+def test_a_table_that_learned_some_tails_only(tmp_path: Path) -> None:
+    save_small(table(), tmp_path)  # three and more tails, two members
+    made, wanted = library(tmp_path), vectors(tmp_path)
+    assert (wanted["N"] > 2).all()
+    found, states = answers(made, wanted)
+    assert (states < 2).all()
+    assert all(error.max() < 1e-8 for error in apart(found, wanted).values())
+    assert (answers(made, {**wanted, "N": np.full(len(states), 2.0)})[1] == 2).all()
+
+
+def test_where_the_response_does_not_fit_it_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole: Small = small_of(load())
+    monkeypatch.setattr("surrogate.small.MOST_BYTES", 120_000)
+    save_small(load(), tmp_path)
+    less = small_of(load())
+    assert whole.has_response
+    assert not less.has_response
+    lines = (
+        '#include "lookup.h"',
+        "int main(void) { lookup_robot r = {0}; lookup_motion m;",
+        "return lookup_query(&r, &m) != LOOKUP_NO_ANSWER; }\n",
+    )
+    (tmp_path / "only.c").write_text("\n".join(lines))
+    compile_c(tmp_path / "only.c", tmp_path / "only")
+    subprocess.run([tmp_path / "only"], check=True)
+    monkeypatch.setattr("surrogate.small.MOST_BYTES", 30_000)
+    with pytest.raises(InputError, match="too large for 30 kB"):
+        small_of(load())
+
+
+def test_the_command_prints_the_loss(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(main, ["export", "--small", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "omega_yr_bar" in said
+    assert "kB; loss against the whole table" in said
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"lookup.safetensors", "lookup_weights.h", "lookup.h", "lookup.js", "vectors.csv"}
