@@ -92,7 +92,7 @@ def test(lookup: Lookup, rows: Simulated, flips: Simulated) -> None:
     errors = {name: error[inside] for name, error in relative_errors(answer, truth).items()}
     errors["v_z of itself"] = (answer["v_z"] / truth["v_z"] - 1)[inside]
     several = rows.robots["N"][inside] > 1
-    for words, kind in (("two tails and more", several), ("one tail", ~several)):
+    for words, kind in (("all", several | True), ("two tails and more", several), ("one tail", ~several)):
         print(words)
         for name, figures in summary({n: e[kind] for n, e in errors.items()}, apart[inside][kind]).items():
             print(f"  {name:16}" + "".join(f"  {k} {100 * v:.4f}" for k, v in figures.items()))

@@ -2,7 +2,9 @@
 
 The equations are those of `surrogate.head` and `surrogate.tail`, written for one robot instead of for tensors.
 They are solved by Broyden's method. Its first derivative holds the network's numbers y fixed, so it needs no
-evaluation of the network; five or six evaluations are enough. Units: l, μ0 l⁴/EI, EI/l².
+evaluation of the network; five or six evaluations are enough. The table of a single tail has second solutions near
+the true one. So there the equations are solved again with the exact first derivative, and of two different
+solutions that counts whose surge is nearer to the first guess (linear theory). Units: l, μ0 l⁴/EI, EI/l².
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from sim.compiling import compiled
 from sim.linear.dense import solve_dense
 from surrogate.perceptron import Packed, evaluate
 
-STEPS, CORRECTION = 60, 1e-8  # of Broyden's method; the correction is relative
+STEPS, CORRECTION = 60, 1e-9  # of Broyden's method; the correction is relative
 _DIFFERENCE, _LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
 _FIRST_SPIN = 0.6  # ω_t/ω in the first guess
 _LONGEST = 0.5  # largest relative change of ω_t in one step
@@ -32,9 +34,19 @@ def solve_rows(network: Packed, heads: Floats, resistances: Floats, tails: Float
         tails: columns of `surrogate.tail.columns_of`, (M, 13).
     """
     motions, converged = np.empty((len(heads), 5)), np.empty(len(heads), dtype=np.bool_)
-    y = np.empty(len(network.mean))
+    y, guess, other = np.empty(len(network.mean)), np.empty(5), np.empty(5)
     for row in range(len(heads)):
-        converged[row] = _solve(network, heads[row], resistances[row], tails[row], y, motions[row])
+        head, resistance, tail = heads[row], resistances[row], tails[row]
+        _first_guess(head, resistance, tail, guess)
+        motions[row] = guess
+        converged[row] = _solve(network, head, resistance, tail, y, motions[row], False)
+        if tail[4] == 1:
+            other[:] = guess
+            found = _solve(network, head, resistance, tail, y, other, True)
+            nearer = abs(other[1] - guess[1]) < abs(motions[row, 1] - guess[1])
+            if found and (nearer or not converged[row]):
+                motions[row] = other
+                converged[row] = True
     return motions, converged
 
 
@@ -118,17 +130,19 @@ def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats)
 
 
 @compiled
-def _solve(network: Packed, head: Floats, resistance: Floats, tail: Floats, y: Floats, motion: Floats) -> bool:
-    """Broyden's method for one robot; writes y and the motion, and returns whether it converged."""
-    x, left, before, step, change = (
-        np.empty(len(network.shift)),
-        np.empty(4),
-        np.empty(4),
-        np.empty(4),
-        np.empty(4),
-    )
-    slope, inverse, moved = np.empty((4, 4)), np.eye(4), np.empty(5)
-    _first_guess(head, resistance, tail, motion)
+def _solve(
+    network: Packed, head: Floats, resistance: Floats, tail: Floats, y: Floats, motion: Floats, exact: bool
+) -> bool:
+    """Broyden's method for one robot, from the motion given; returns whether it converged.
+
+    Args:
+        y: room for the network's numbers, (6,).
+        motion: first guess, replaced by the result, (5,).
+        exact: the first derivative is that of the network, too.
+    """
+    x, left, before = np.empty(len(network.shift)), np.empty(4), np.empty(4)
+    step, change, moved = np.empty(4), np.empty(4), np.empty(5)
+    slope, inverse = np.empty((4, 4)), np.eye(4)
     inputs_at(tail, motion, x)
     evaluate(network, x, y)
     _unbalanced(head, resistance, tail, motion, y, left)
@@ -140,6 +154,9 @@ def _solve(network: Packed, head: Floats, resistance: Floats, tail: Floats, y: F
         moved[:] = motion
         moved[j] += width
         moved[4] = head[0] + head[1] * moved[3]
+        if exact:
+            inputs_at(tail, moved, x)
+            evaluate(network, x, y)
         _unbalanced(head, resistance, tail, moved, y, before)
         for i in range(4):
             slope[i, j] = (before[i] - left[i]) / width

@@ -27,7 +27,7 @@ _TITLES = {
     "theta_deg": "slip angle [degrees]",
 }  # fmt: skip
 _NO_TRUST = """
-- One tail: its velocities change much within a turn. Its response to a flip is not learned.
+- One tail: its errors are several times those of other robots. Its response to a flip is not learned.
 - Tails that touch: the model has no contact.
 - Surge near zero: a small error of the speed is a large part of it.
 - Dwells below about 0.6 time units: the net speed is a small difference of large numbers.
@@ -45,7 +45,8 @@ def card_of(lookup: Lookup, held_out: Simulated) -> str:
     inside = {
         name: (answer[f"{name}_low"] <= truth[name]) & (truth[name] <= answer[f"{name}_high"]) for name in COMPARED
     }
-    ranges = [(name, *(f"{end:.4g}" for end in ends)) for name, ends in lookup.ranges.items()]
+    names = [name for name in ROBOT if name in lookup.ranges]
+    ranges = [(name, *(f"{end:.4g}" for end in lookup.ranges[name])) for name in names]
     tails, apart = held_out.robots["N"], held_out.motion["tail_gap"] >= 1
     parts = [
         f"# Look-up table {lookup.identity}",

@@ -179,7 +179,7 @@ class Lookup:
             support = self.support[k]
             if len(rows) and network is not None and support is not None:
                 remote[rows] = torch.from_numpy(support.remoteness(found.inputs[rows.numpy()]))
-                members = network.members_at(inputs[rows])
+                members = network.members_at(torch.cat([inputs[rows], tails.head[rows]], -1))
                 apart = (weight[rows] @ (members - members.mean(0))[..., None])[..., 0]
                 spread[rows] = apart.norm(dim=-1).mean(0)
         extra = [

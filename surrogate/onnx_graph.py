@@ -1,7 +1,7 @@
 """The whole query of the look-up table as one ONNX graph, for other languages and runtimes.
 
 Inputs are the nine groups of M robots without effects, outputs the steady motion and `outside`, which says that a
-robot is outside the domain. The graph solves the balance of forces as `surrogate.head` does, with the same
+robot is outside the domain. The graph solves the balance of forces as `surrogate.balance` does, with the same
 stopping rule, so answers agree to 1e-8 of themselves. Left out: effects, intervals, the response to a flip. Needs
 the package onnx (the extra `onnx`).
 """
@@ -20,7 +20,7 @@ from sim.io.errors import InputError
 from sim.io.files import whole_file
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.motion.steady_motion import STEADY_OUTPUTS
-from surrogate import head, lookup, tail
+from surrogate import balance, lookup, tail
 from surrogate.lookup import OUTSIDE, Lookup
 from surrogate.network import Ensemble
 from surrogate.support import DEGREE
@@ -113,7 +113,8 @@ class _Query:
                 unknown = self.g.gather(part, [0] * width)
                 found.append(unknown * np.nan)
             else:
-                found.append(self._network(network, part))
+                own = list(range(network.shape["inputs"]))
+                found.append(self._network(network, self.g.gather(part, own)))
         return self.g.concat(found, 1)
 
     def _network(self, network: Ensemble, inputs: Any) -> Any:
@@ -148,6 +149,14 @@ class _Query:
             ]
         )
 
+    def _head_inputs(self, like: Any) -> Any:
+        """`tail.head_inputs` of robots without effects; `like` gives all inputs the same axes."""
+        g = self.g
+        total = self.N * self.across
+        drag, length = g.log(self.drag / total) + like, g.log(self.length) + like
+        turning = drag + 2 * (length - math.log(2))
+        return g.stack([drag, drag, turning, length, 1 + like, g.log(self.side / total) + like, like])
+
     def _thrust(self, S: Any) -> Any:
         return 0.125 * S / (1 + (S / 8) ** 1.35)
 
@@ -158,13 +167,17 @@ class _Query:
         v_x, v_z, yaw, head_spin = (self.g.gather(u, i) for i in range(4))
         return v_x, v_z, yaw, head_spin, self.speed + head_spin
 
-    def _unbalanced(self, u: Any) -> Any:
+    def _numbers(self, u: Any) -> Any:
+        """Numbers of the tails (K, M, 6) at the velocities u (K, M, 4)."""
+        motion = self._motion(u)
+        inputs = self.g.concat([self._tail_inputs(motion), self._head_inputs(0.0 * motion[4])], -1)
+        return self._networks(inputs, self.table.tails.wrench, len(tail.TYPICAL[0]))
+
+    def _unbalanced(self, u: Any, numbers: Any) -> Any:
         """Forces and moments (K, M, 4) that are left at the velocities u (K, M, 4)."""
         g = self.g
-        motion = self._motion(u)
-        v_x, v_z, yaw, head_spin, spin = motion
-        y = self._networks(self._tail_inputs(motion), self.table.tails.wrench, len(tail.TYPICAL[0]))
-        y = [g.gather(y, i) for i in range(len(tail.TYPICAL[0]))]
+        v_x, v_z, yaw, head_spin, spin = self._motion(u)
+        y = [g.gather(numbers, i) for i in range(len(tail.TYPICAL[0]))]
         S, across = self.across * spin, self.N * self.across
         sideways = g.sqrt(v_x * v_x + yaw * yaw + tail._TINY)
         squared = sideways / (self.offset * spin)
@@ -185,10 +198,10 @@ class _Query:
         )
 
     def _guess(self) -> Any:
-        """Velocities (1, M, 4) of linear theory, see `head.linear_guess`."""
+        """Velocities (1, M, 4) of linear theory, see `surrogate.balance`."""
         g = self.g
         across = self.N * self.across
-        spin = head._FIRST_SPIN * self.speed
+        spin = balance._FIRST_SPIN * self.speed
         for _ in range(3):
             torque = across * self.offset * self.offset * self._torque(self.across * spin)
             spin = self.speed * self.spin_drag / (self.spin_drag + torque)
@@ -203,9 +216,20 @@ class _Query:
         return g.op("Unsqueeze", g.stack([v_x, v_z, yaw, head_spin]), np.array([0], dtype=np.int64))
 
     def _solved(self) -> tuple[Any, Any]:
-        """Velocities (1, M, 4) in balance, and which robots converged, (M,), as in `head.solve`."""
+        """Velocities (1, M, 4) in balance, and which robots converged, (M,), as in `surrogate.balance`."""
+        g, guess = self.g, self._guess()
+        u, found = self._solved_from(guess, exact=False)
+        other, again = self._solved_from(guess, exact=True)
+
+        def off(motion: Any) -> Any:
+            return g.abs(g.gather(g.gather(motion - guess, 0, 0), 1))
+
+        better = (self.N < 1.5) & again & ((off(other) < off(u)) | ~found)
+        return g.where(g.op("Unsqueeze", better, np.array([0, 2], dtype=np.int64)), other, u), found | better
+
+    def _solved_from(self, u: Any, *, exact: bool) -> tuple[Any, Any]:
+        """The same from a first guess, with the derivative of the networks as well, or without."""
         g = self.g
-        u = self._guess()
         done = ~g.finite(g.gather(g.gather(u, 0, 0), 0))  # none
 
         def goes_on(done: Any) -> Any:
@@ -215,30 +239,29 @@ class _Query:
             way = self._shortened(u, self._times(inverse, left))
             way = g.where(g.op("Unsqueeze", done, np.array([0, 2], dtype=np.int64)), 0.0, way)
             after = u - way
-            done = done | (self._relative(way, after) < head.CORRECTION)
-            now = self._unbalanced(after)
+            done = done | (self._relative(way, after) < balance.CORRECTION)
+            now = self._unbalanced(after, self._numbers(after))
             return goes_on(done), after, self._updated(inverse, -way, now - left), now, done
 
-        def cycle(u: Any, done: Any) -> tuple[Any, ...]:
-            left, inverse = self._left_and_inverse(u)
-            u, _, _, done = g.loop(head._RENEWED, goes_on(done), (u, inverse, left, done), step, "dddb")
-            return goes_on(done), u, done
-
-        most = head.STEPS // head._RENEWED
-        return tuple(g.loop(most, goes_on(done), (u, done), cycle, "db"))
+        left, inverse = self._left_and_inverse(u, exact=exact)
+        u, _, _, done = g.loop(balance.STEPS, goes_on(done), (u, inverse, left, done), step, "dddb")
+        return u, done
 
     def _times(self, matrix: Any, vector: Any) -> Any:
         """(M, 4, 4) times (1, M, 4)."""
         last = np.array([3], dtype=np.int64)
         return self.g.op("Squeeze", matrix @ self.g.op("Unsqueeze", vector, last), last)
 
-    def _left_and_inverse(self, u: Any) -> tuple[Any, Any]:
-        """What is unbalanced (1, M, 4), and the inverse of its derivative (M, 4, 4), by differences."""
+    def _left_and_inverse(self, u: Any, *, exact: bool) -> tuple[Any, Any]:
+        """What is unbalanced (1, M, 4), and the inverse of its derivative (M, 4, 4); if it need not be exact, with
+        the tails' numbers held.
+        """
         g = self.g
         largest = g.op("ReduceMax", g.abs(u), np.array([2], dtype=np.int64), keepdims=1)
-        width = head._DIFFERENCE * (g.abs(u) + head._LEAST_SHARE * largest)
+        width = balance._DIFFERENCE * (g.abs(u) + balance._LEAST_SHARE * largest)
         trials = np.concatenate([np.zeros((1, 1, 4)), np.eye(4)[:, None, :]])
-        left = self._unbalanced(u + width * trials)
+        moved = u + width * trials
+        left = self._unbalanced(moved, self._numbers(moved if exact else u))
         first = g.gather(left, [0], 0)
         change = g.op("Transpose", g.gather(left, [1, 2, 3, 4], 0) - first, perm=[1, 2, 0])  # (M, 4, 4)
         slope = change / g.op("Transpose", width, perm=[1, 0, 2])
@@ -268,7 +291,7 @@ class _Query:
     def _shortened(self, u: Any, way: Any) -> Any:
         g = self.g
         change = g.abs(g.gather(way, [3])) / (g.op("Unsqueeze", self.speed, np.array([1])) + g.gather(u, [3]))
-        return way * g.minimum(head._LONGEST / change, 1.0)
+        return way * g.minimum(balance._LONGEST / change, 1.0)
 
     def _relative(self, way: Any, u: Any) -> Any:
         """Size of a correction, (M,)."""

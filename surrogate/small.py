@@ -1,7 +1,8 @@
 """A small copy of the look-up table, for a web page or a microcontroller: at most 150 kB of numbers.
 
 It has one member of each ensemble. Two tails and more, where the table is most exact, are in single precision. The
-rest is in half precision: one tail, the gap, and the response to flips with equal dwells. What this loses against
+rest is in half precision: one tail (but for its last layer), the gap, and the response to flips with equal dwells.
+What this loses against
 the whole table is measured on random robots and written into the file. Left out: effects, intervals, the memory of
 other dwells, and the joint support (only the ranges of the inputs and the limit of the yaw rate are checked).
 `surrogate.small_files` writes its files.
@@ -37,6 +38,7 @@ NETWORKS = ("one_tail", "two_tails", "more_tails", "gap", "lag", "memory")
 EXACT = ("shift", "scale", "mean", "spread")  # in single precision always
 _TRIED, _SEED = 4096, 20
 _VECTORS = 48
+_MOST_COMPONENTS = 30  # of the curves
 _MANIFEST_BYTES = 12_000  # room for the header of the file
 
 Arrays = dict[str, Any]  # by name, single or half precision
@@ -93,7 +95,7 @@ def small_of(table: Lookup) -> Small:
         arrays: Arrays = {}
         for name, network in zip(NETWORKS, (*table.tails.wrench, table.tails.gap), strict=False):
             if network is not None:
-                arrays |= _arrays(name, network.member(0), half=name not in exact)
+                arrays |= _arrays(name, network.member(0), half=name not in exact, last_exact=name == "one_tail")
         if response:
             arrays |= _curve_arrays(table)
         numbers = TailTable(
@@ -156,19 +158,22 @@ def _figures(apart: Floats) -> dict[str, float]:
     return {"median": float(np.median(size)), "p95": float(np.quantile(size, 0.95))} if len(size) else {}
 
 
-def _arrays(name: str, network: Ensemble, *, half: bool, outputs: int | None = None) -> Arrays:
-    """The numbers of a network of one member, without the axis of members; the first `outputs` only."""
+def _arrays(
+    name: str, network: Ensemble, *, half: bool, last_exact: bool = False, outputs: int | None = None
+) -> Arrays:
+    """The numbers of a network of one member, without the axis of members; the first `outputs` only.
+
+    Args:
+        last_exact: its last layer is in single precision in any case.
+    """
+    last = [f"{kind}.{network.shape['depth']}" for kind in ("weights", "biases")]
+    exact = (*EXACT, *last) if last_exact else EXACT
     found: Arrays = {}
     for part, tensor in network.state_dict().items():
         values = tensor if part in EXACT else tensor[0]
-        if part in (
-            "bypass",
-            "mean",
-            "spread",
-            *(f"{kind}.{network.shape['depth']}" for kind in ("weights", "biases")),
-        ):
+        if part in ("bypass", "mean", "spread", *last):
             values = values[..., :outputs]
-        kind = np.float16 if half and part not in EXACT else np.float32
+        kind = np.float16 if half and part not in exact else np.float32
         found[f"{name}.{part}"] = np.ascontiguousarray(values.detach().numpy(), dtype=kind)
     return found
 
@@ -176,7 +181,7 @@ def _arrays(name: str, network: Ensemble, *, half: bool, outputs: int | None = N
 def _curve_arrays(table: Lookup) -> Arrays:
     """Networks and curves of the response to flips with equal dwells."""
     lag, memory = table.curves.bases["lag"], table.curves.bases["memory"]
-    count = min(len(lag.vectors), len(memory.vectors))
+    count = min(len(lag.vectors), len(memory.vectors), _MOST_COMPONENTS)
     found: Arrays = {}
     for name, network in zip(NETWORKS[4:], table.curves.networks, strict=True):
         found |= _arrays(name, network.member(0), half=True, outputs=count)

@@ -71,15 +71,16 @@ def weights_header(table: Lookup, small: Small, losses: Mapping[str, Mapping[str
     depth = max(depth_of(arrays, name) for name in present)
     for name in NETWORKS[: 6 if small.has_response else 4]:
         if name not in present:
-            networks.append("{0, 0, 0, 0, 0, 0, 0, 0, 0, {0}, {0}, 0}")
+            networks.append("{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, {0}, {0}, 0}")
             continue
         own, prefix = depth_of(arrays, name), f"lookup_{name}_"
         inputs, outputs = arrays[f"{name}.bypass"].shape
-        width, half = arrays[f"{name}.weights.0"].shape[1], int(arrays[f"{name}.bypass"].dtype == np.float16)
+        width = arrays[f"{name}.weights.0"].shape[1]
+        half, half_last = (int(arrays[f"{name}.weights.{k}"].dtype == np.float16) for k in (0, own))
         exact = ", ".join(prefix + part for part in EXACT)
         layers = [", ".join(f"{prefix}{part}_{i}" for i in range(own + 1)) for part in ("weights", "biases")]
         networks.append(
-            f"{{{inputs}, {outputs}, {width}, {own}, {half}, {exact},\n"
+            f"{{{inputs}, {outputs}, {width}, {own}, {half}, {half_last}, {exact},\n"
             f"     {{{layers[0]}}},\n     {{{layers[1]}}}, {prefix}bypass}}"
         )
     widest = max(arrays[f"{name}.weights.0"].shape[1] for name in present)
@@ -110,7 +111,8 @@ def weights_header(table: Lookup, small: Small, losses: Mapping[str, Mapping[str
 #define LOOKUP_DWELLS {len(DWELLS)}
 
 typedef struct {{
-    int inputs, outputs, width, depth, half; /* half: weights are 16-bit floats, else 32-bit ones */
+    int inputs, outputs, width, depth;
+    int half, half_last; /* weights (of the last layer) are 16-bit floats, else 32-bit ones */
     const float *shift, *scale, *mean, *spread;
     const void *weights[LOOKUP_DEPTH + 1], *biases[LOOKUP_DEPTH + 1], *bypass; /* row by row: input, output */
 }} lookup_network;

@@ -34,8 +34,7 @@ typedef double lookup_real;
 #endif
 #define LOOKUP_C(number) ((lookup_real)(number))
 #define LOOKUP_PI LOOKUP_C(3.14159265358979323846)
-#define LOOKUP_STEPS 40
-#define LOOKUP_RENEWED 8 /* steps after which the derivative is found again */
+#define LOOKUP_STEPS 60
 
 enum {
     LOOKUP_INSIDE = 0,   /* a robot as the table has learned them */
@@ -91,10 +90,11 @@ static void lookup_network_at(const lookup_network *net, const lookup_real *inpu
     for (int i = 0; i < in; i++) first[i] = (inputs[i] - LOOKUP_C(net->shift[i])) / LOOKUP_C(net->scale[i]);
     for (int k = 0; k <= net->depth; k++) {
         int count = k < net->depth ? net->width : net->outputs;
+        int half = k == net->depth ? net->half_last : net->half;
         lookup_real *next = k == net->depth ? out : k % 2 ? two : one;
         for (int j = 0; j < count; j++) next[j] = 0;
-        lookup_add(net->half, net->biases[k], 0, 1, next, count);
-        for (int i = 0; i < in; i++) lookup_add(net->half, net->weights[k], i * count, h[i], next, count);
+        lookup_add(half, net->biases[k], 0, 1, next, count);
+        for (int i = 0; i < in; i++) lookup_add(half, net->weights[k], i * count, h[i], next, count);
         for (int j = 0; j < count && k < net->depth; j++) next[j] = LOOKUP_F(tanh)(next[j]);
         h = next;
         in = count;
@@ -144,8 +144,10 @@ static int lookup_body_of(const lookup_robot *robot, lookup_body *body)
     return body->wrench->inputs > 0;
 }
 
+/* Inputs of the tails, and from x[7] on what a single tail feels of its head. */
 static void lookup_tail_inputs(const lookup_body *body, const lookup_real *u, lookup_real *x)
 {
+    lookup_real total = body->tails * body->across;
     lookup_real spin = body->speed + u[3], S = body->across * spin;
     lookup_real sideways = LOOKUP_F(sqrt)(u[0] * u[0] + u[2] * u[2]);
     x[0] = LOOKUP_F(log)(S);
@@ -154,13 +156,27 @@ static void lookup_tail_inputs(const lookup_body *body, const lookup_real *u, lo
     x[3] = lookup_asinh(20 * sideways / spin * S / (S + 12));
     x[4] = LOOKUP_F(atan2)(u[0], u[2]);
     x[5] = lookup_asinh(20 * u[1] / (body->offset * spin));
-    x[6] = LOOKUP_F(log)(body->spin_drag / (body->tails * body->across * body->offset * body->offset));
+    x[6] = LOOKUP_F(log)(body->spin_drag / (total * body->offset * body->offset));
+    x[7] = x[8] = LOOKUP_F(log)(body->drag / total);
+    x[9] = x[7] + 2 * LOOKUP_F(log)(body->length / 2);
+    x[10] = LOOKUP_F(log)(body->length);
+    x[11] = 1;
+    x[12] = LOOKUP_F(log)(body->side / total);
+    x[13] = 0;
 }
 
-/* Forces (x, z) and moments (y, z) about the disc that are left at the velocities u. */
-static void lookup_unbalanced(const lookup_body *body, const lookup_real *u, lookup_real *left)
+/* The numbers of the tails at the velocities u. */
+static void lookup_numbers(const lookup_body *body, const lookup_real *u, lookup_real *y)
 {
-    lookup_real x[LOOKUP_INPUTS], y[LOOKUP_OUTPUTS], spin = body->speed + u[3], S = body->across * spin;
+    lookup_real x[LOOKUP_INPUTS];
+    lookup_tail_inputs(body, u, x);
+    lookup_network_at(body->wrench, x, y);
+}
+
+/* Forces (x, z) and moments (y, z) about the disc that are left at the velocities u, for numbers y of the tails. */
+static void lookup_unbalanced(const lookup_body *body, const lookup_real *u, const lookup_real *y, lookup_real *left)
+{
+    lookup_real spin = body->speed + u[3], S = body->across * spin;
     lookup_real across = body->tails * body->across, lever = body->length / 2;
     lookup_real sideways = LOOKUP_F(sqrt)(u[0] * u[0] + u[2] * u[2]);
     lookup_real squared = sideways * sideways / (body->offset * body->offset * spin * spin);
@@ -168,8 +184,6 @@ static void lookup_unbalanced(const lookup_body *body, const lookup_real *u, loo
     lookup_real thrust = (body->across - body->along) * couple * lookup_thrust(S);
     lookup_real torque = body->across * couple * lookup_torque(S);
     lookup_real on_head = body->drag * (u[0] + lever * u[2]) + body->side * u[3];
-    lookup_tail_inputs(body, u, x);
-    lookup_network_at(body->wrench, x, y);
     left[0] = across * (u[2] / 2 - u[0]) + across * sideways * y[0] - on_head;
     left[1] = thrust * (y[1] + squared * y[4]) - (body->tails * body->along + body->drag) * u[1];
     left[2] = across * (u[0] / 2 - u[2] / 3) + across * sideways * y[2] - lever * on_head;
@@ -223,18 +237,22 @@ static int lookup_inverse(lookup_real matrix[4][4], lookup_real inverse[4][4])
     return 1;
 }
 
-/* What is unbalanced, and the inverse of its derivative, by differences. */
-static int lookup_renew(const lookup_body *body, const lookup_real *u, lookup_real *left, lookup_real inverse[4][4])
+/* What is unbalanced, and the inverse of its derivative, by differences; if it need not be exact, with the tails'
+   numbers held. */
+static int lookup_begin(const lookup_body *body, const lookup_real *u, int exact, lookup_real *left,
+                        lookup_real inverse[4][4])
 {
-    lookup_real slope[4][4], moved[4], there[4], largest = 0;
-    lookup_unbalanced(body, u, left);
+    lookup_real slope[4][4], moved[4], there[4], y[LOOKUP_OUTPUTS], largest = 0;
+    lookup_numbers(body, u, y);
+    lookup_unbalanced(body, u, y, left);
     for (int j = 0; j < 4; j++) largest = LOOKUP_F(fmax)(largest, LOOKUP_F(fabs)(u[j]));
     for (int j = 0; j < 4; j++) {
         lookup_real width = LOOKUP_DIFFERENCE * (LOOKUP_F(fabs)(u[j]) + LOOKUP_C(1e-3) * largest);
         memcpy(moved, u, sizeof moved);
         moved[j] += width;
         width = moved[j] - u[j];
-        lookup_unbalanced(body, moved, there);
+        if (exact) lookup_numbers(body, moved, y);
+        lookup_unbalanced(body, moved, y, there);
         for (int i = 0; i < 4; i++) slope[i][j] = (there[i] - left[i]) / width;
     }
     return lookup_inverse(slope, inverse);
@@ -268,13 +286,13 @@ static void lookup_update(lookup_real inverse[4][4], const lookup_real *way, con
         }
 }
 
-static int lookup_solve(lookup_body *body)
+/* The velocities in balance from the first guess u; 0 if none were found. */
+static int lookup_solve_from(const lookup_body *body, int exact, lookup_real *u)
 {
-    lookup_real *u = body->u, left[4], now[4], way[4], change[4], inverse[4][4];
-    lookup_guess(body, u);
+    lookup_real left[4], now[4], way[4], change[4], inverse[4][4], y[LOOKUP_OUTPUTS];
+    if (!lookup_begin(body, u, exact, left, inverse)) return 0;
     for (int count = 0; count < LOOKUP_STEPS; count++) {
         lookup_real share;
-        if (count % LOOKUP_RENEWED == 0 && !lookup_renew(body, u, left, inverse)) return 0;
         for (int i = 0; i < 4; i++) {
             way[i] = 0;
             for (int j = 0; j < 4; j++) way[i] -= inverse[i][j] * left[j];
@@ -286,12 +304,29 @@ static int lookup_solve(lookup_body *body)
         }
         if (lookup_size_of(way, u) < LOOKUP_CORRECTION)
             return isfinite(u[0] + u[1] + u[2]) && body->speed + u[3] > 0;
-        lookup_unbalanced(body, u, now);
+        lookup_numbers(body, u, y);
+        lookup_unbalanced(body, u, y, now);
         for (int i = 0; i < 4; i++) change[i] = now[i] - left[i];
         lookup_update(inverse, way, change);
         memcpy(left, now, sizeof left);
     }
     return 0;
+}
+
+/* The table of a single tail has second solutions near the true one. So two are sought, and the one whose surge is
+   nearer to the first guess counts. */
+static int lookup_solve(lookup_body *body)
+{
+    lookup_real guess[4], other[4], *u = body->u;
+    int found;
+    lookup_guess(body, guess);
+    memcpy(u, guess, sizeof guess);
+    found = lookup_solve_from(body, 0, u);
+    if (body->tails > LOOKUP_C(1.5)) return found;
+    memcpy(other, guess, sizeof guess);
+    if (!lookup_solve_from(body, 1, other)) return found;
+    if (!found || LOOKUP_F(fabs)(other[1] - guess[1]) < LOOKUP_F(fabs)(u[1] - guess[1])) memcpy(u, other, sizeof guess);
+    return 1;
 }
 
 static int lookup_within(const lookup_robot *robot)
@@ -341,11 +376,7 @@ static void lookup_lags(const lookup_body *body, lookup_real dwell, lookup_real 
     lookup_real sway = body->u[0] + body->u[2] * body->length / 2;
     int first = 0;
     lookup_tail_inputs(body, body->u, x);
-    x[7] = x[8] = LOOKUP_F(log)(body->drag / (body->tails * body->across));
-    x[9] = x[8] + 2 * LOOKUP_F(log)(body->length / 2);
-    x[10] = LOOKUP_F(log)(body->length);
-    x[11] = LOOKUP_F(log)(body->side / (body->tails * body->across));
-    x[12] = 0;
+    x[11] = x[12], x[12] = x[13];
     x[13] = LOOKUP_F(log)(body->tails);
     x[14] = body->tails < LOOKUP_C(2.5);
     lookup_network_at(&lookup_networks[4], x, c);

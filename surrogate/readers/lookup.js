@@ -12,7 +12,7 @@
    Lengths are in tail lengths l, times in mu0 l^4/EI, angles in rad but for theta_deg. The formulas are those of
    surrogate/tail.py and surrogate/head.py; the balance of forces is solved by Broyden's method. */
 
-const STEPS = 40, RENEWED = 8, DIFFERENCE = 1e-6, CORRECTION = 1e-9;
+const STEPS = 60, DIFFERENCE = 1e-6, CORRECTION = 1e-9;
 
 export function readLookup(buffer) {
   const view = new DataView(buffer);
@@ -57,8 +57,8 @@ function network(arrays, name) {
     });
     return sum;
   };
-  return (inputs) => {
-    const first = inputs.map((x, i) => (x - shift[i]) / scale[i]);
+  return (inputs) => { // of more inputs than it has, a network takes the first
+    const first = inputs.slice(0, shift.length).map((x, i) => (x - shift[i]) / scale[i]);
     let h = first;
     for (const { weights, biases } of layers.slice(0, -1)) {
       h = times(h, weights, Float64Array.from(biases)).map(Math.tanh);
@@ -133,9 +133,9 @@ class Lookup {
   /* Lags (z, x, psi) at a dwell, cubic in ln dwell through four of the dwells of the table. */
   #lags(body, dwell, speeds) {
     const total = body.N * body.across, { dwells } = this.manifest, logs = dwells.map(Math.log);
-    const drag = Math.log(body.drag / total);
-    const inputs = [...tailInputs(body, body.u), drag, drag, drag + 2 * Math.log(body.length / 2),
-      Math.log(body.length), Math.log(body.side / total), 0, Math.log(body.N), body.N < 2.5 ? 1 : 0];
+    const [sway, surge, turn, length, , side, disc] = headInputs(body);
+    const inputs = [...tailInputs(body, body.u), sway, surge, turn, length, side, disc, Math.log(body.N),
+      body.N < 2.5 ? 1 : 0];
     const c = [...this.networks.lag(inputs), ...this.networks.memory(inputs)];
     const mean = this.arrays["curves.mean"].values, basis = this.arrays["curves.basis"].values;
     const place = Math.log(Math.min(dwell, dwells[dwells.length - 1])), lag = [0, 0, 0];
@@ -163,9 +163,17 @@ function tailInputs(body, u) {
   ];
 }
 
-/* Forces (x, z) and moments (y, z) about the disc that are left at the velocities u. */
-function unbalanced(body, u) {
-  const [v_x, v_z, yaw, headSpin] = u, y = body.wrench(tailInputs(body, u));
+/* What a single tail feels of its head. */
+function headInputs(body) {
+  const total = body.N * body.across, drag = Math.log(body.drag / total);
+  return [drag, drag, drag + 2 * Math.log(body.length / 2), Math.log(body.length), 1, Math.log(body.side / total), 0];
+}
+
+const numbersAt = (body, u) => body.wrench([...tailInputs(body, u), ...headInputs(body)]);
+
+/* Forces (x, z) and moments (y, z) about the disc that are left at the velocities u, for numbers y of the tails. */
+function unbalanced(body, u, y) {
+  const [v_x, v_z, yaw, headSpin] = u;
   const spin = body.speed + headSpin, S = body.across * spin;
   const across = body.N * body.across, lever = body.length / 2;
   const sideways = Math.hypot(v_x, yaw), squared = (sideways / (body.offset * spin)) ** 2;
@@ -196,41 +204,52 @@ function guess(body) {
     (push * (a * lever - b)) / size, headSpin];
 }
 
+/* The table of a single tail has second solutions near the true one. So two are sought, and the one whose surge is
+   nearer to the first guess counts. */
 function solve(body) {
-  let u = guess(body), left, inverse;
+  const first = guess(body);
+  let u = solveFrom(body, first, false);
+  const other = body.N < 1.5 ? solveFrom(body, first, true) : null;
+  if (other && (!u || Math.abs(other[1] - first[1]) < Math.abs(u[1] - first[1]))) u = other;
+  body.u = u;
+  return u !== null;
+}
+
+/* The velocities in balance from a first guess; null if none were found. */
+function solveFrom(body, first, exact) {
+  let u = first;
+  const y = numbersAt(body, u);
+  let left = unbalanced(body, u, y), inverse = invertedSlope(body, u, exact ? null : y, left);
+  if (!inverse) return null;
   const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
   for (let count = 0; count < STEPS; count++) {
-    if (count % RENEWED === 0) {
-      left = unbalanced(body, u);
-      inverse = invertedSlope(body, u, left);
-      if (!inverse) return false;
-    }
     let way = inverse.map((row) => -dot(row, left));
     const shorter = Math.min(0.5 / (Math.abs(way[3]) / (body.speed + u[3])), 1);
     way = way.map((part) => part * shorter);
     u = u.map((part, i) => part + way[i]);
     const moved = Math.max(Math.abs(way[0]), Math.abs(way[1])) / (Math.hypot(u[0], u[1]) + Math.abs(u[2]));
     if (Math.max(moved, Math.abs(way[2] / u[2]), Math.abs(way[3] / u[3])) < CORRECTION) {
-      body.u = u;
-      return u.every(Number.isFinite) && body.speed + u[3] > 0;
+      return u.every(Number.isFinite) && body.speed + u[3] > 0 ? u : null;
     }
-    const now = unbalanced(body, u), change = now.map((part, i) => part - left[i]);
+    const now = unbalanced(body, u, numbersAt(body, u)), change = now.map((part, i) => part - left[i]);
     const missed = inverse.map((row, i) => way[i] - dot(row, change));
     const along = inverse.map((_, j) => dot(way, inverse.map((row) => row[j])));
     const size = dot(along, change);
     if (size) inverse = inverse.map((row, i) => row.map((part, j) => part + (missed[i] * along[j]) / size));
     left = now;
   }
-  return false;
+  return null;
 }
 
-/* The inverse of the derivative of what is unbalanced, by differences and elimination; null if there is none. */
-function invertedSlope(body, u, left) {
+/* The inverse of the derivative of what is unbalanced, by differences and elimination, with the tails' numbers held
+   at y if they are given; null if there is none. */
+function invertedSlope(body, u, y, left) {
   const largest = Math.max(...u.map(Math.abs));
   const rows = left.map((_, i) => [0, 1, 2, 3, 4, 5, 6, 7].map((j) => +(j - 4 === i)));
   for (let j = 0; j < 4; j++) {
     const width = DIFFERENCE * (Math.abs(u[j]) + 1e-3 * largest);
-    unbalanced(body, u.map((part, i) => (i === j ? part + width : part))).forEach((part, i) => {
+    const moved = u.map((part, i) => (i === j ? part + width : part));
+    unbalanced(body, moved, y ?? numbersAt(body, moved)).forEach((part, i) => {
       rows[i][j] = (part - left[i]) / width;
     });
   }

@@ -114,7 +114,8 @@ def test_it_is_small_and_states_its_loss(folder: Path) -> None:
         assert loss[name]["p95"] < 0.05 * load().errors[name]["median"], (
             name
         )  # nothing beside the table's own errors
-        assert loss[f"{name} one_tail"]["p95"] < 0.005
+        thrust = name in ("v_z", "R_yr_over_l")  # a small difference of large numbers, with one tail
+        assert loss[f"{name} one_tail"]["p95"] < (0.02 if thrust else 0.001)
     for name in (*RESPONSE_OUTPUTS, "tail_gap"):
         assert loss[name]["p95"] < load().errors[name]["p95"], name
 
