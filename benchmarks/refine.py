@@ -53,7 +53,7 @@ def trained(rows: Simulated, numbers: np.ndarray, flips: Simulated, seed: int) -
     once = Settings(width=8, depth=1, members=1, epochs=1, iterations=1)
     part = split(numbers)
     learned, widths, held_out = (rows.at(part == i) for i in range(3))
-    return learn(learned, widths, held_out, flips, settings, once, title="")
+    return learn(learned, widths, held_out, flips, settings, once)
 
 
 def errors(table: Lookup, test: Simulated) -> dict[str, np.ndarray]:
