@@ -18,11 +18,12 @@ import numpy as np
 import torch
 
 from dataset.design import Axis, Design
+from surrogate.domain import DOMAIN, MOST_TAILS
 from surrogate.evaluate import relative_errors
 from surrogate.fit import Settings
 from surrogate.lookup import Lookup, steady_outputs
 from surrogate.refine import choose
-from surrogate.rows import DOMAIN, MOST_TAILS, Simulated, as_reached, drawn, joined, simulated
+from surrogate.rows import Simulated, as_reached, drawn, joined, simulated
 from surrogate.train import learn, split, with_radius
 
 ROWS, TEST, FLIPS, SEEDS = 2048, 4096, 48, (1, 2)

@@ -140,8 +140,9 @@ def _inverse(arguments: Namespace) -> None:
     from sim.io.files import write_csv
     from sim.io.tables import read_table
     from sim.motion.steady_motion import STEADY_OUTPUTS
+    from surrogate.domain import BOUNDS
     from surrogate.export import load
-    from surrogate.inverse import BOUNDS, inverse
+    from surrogate.inverse import inverse
 
     points = read_table(arguments.targets)
     names = [name.strip() for name in arguments.free.split(",")]
