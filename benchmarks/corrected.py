@@ -20,6 +20,8 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
 
 from planner.lookup import vehicle_of
 from sim.arrays import Floats
@@ -34,15 +36,18 @@ from sim.model.robot import Robot
 from sim.motion.resolution import Resolution
 from sim.motion.run import Run
 from sim.motion.settling import steady_state
-from sim.motion.switching import MEMORY, steady_twist
+from sim.motion.switching import MEMORY
 from sim.motion.warm import compile_once
 from sim.solve.assembly import bodies, reversed_bodies
+from sim.solve.march import PHASE, SURGE, SWAY, YAW
 from surrogate.single import SingleRobot
 from surrogate.tabulate import tabulate
 
 AT = (8, 13, 18, 22)  # of DWELLS: 0.54, 1.0, 1.9, 3.1
 _MESHES = (Resolution(16, 48), Resolution(24, 72))
+_MESHES_WITH_FLOW = (Resolution(12, 36), Resolution(16, 48))  # within 0.03 % of the others where there is no flow
 _PHASES, _PHASES_WITH_FLOW = 6, 3
+_ADAPTS, _WINDOW = 1.0, 1.5  # time units for the mesh to settle, and for the steady twist
 _SENSES = (1.0, -1.0)
 _VIEW = np.stack([np.ones(3), planar.MIRROR])  # a motion in each direction, seen as for a positive motor
 
@@ -80,10 +85,11 @@ def stepped(robot: Robot, twist: Floats) -> Floats:
     """The same pose changes (2, D, 3) by time steps, with the arcs of `twist`."""
     groups = both(robot)
     body, reverse = bodies(groups)[0], reversed_bodies(groups)[0]
+    meshes = _MESHES_WITH_FLOW if has_flow(body) else _MESHES
     coarse, fine = (
-        np.stack([_lags(body, reverse, groups.N, float(DWELLS[i]), mesh) for i in AT], 1) for mesh in _MESHES
+        np.stack([_lags(body, reverse, groups.N, float(DWELLS[i]), mesh) for i in AT], 1) for mesh in meshes
     )
-    a, b = (mesh.edges for mesh in _MESHES)
+    a, b = (mesh.edges for mesh in meshes)
     lag = fine + (fine - coarse) * a**2 / (b**2 - a**2)
     return planar.compose(lag, planar.arc(twist[:, None], DWELLS[list(AT)]))
 
@@ -94,9 +100,7 @@ def _lags(body: Body, reverse: Body, tails: int, dwell: float, mesh: Resolution)
         Run(own, tails, mesh, steady_state(own, tails, mesh), reverse=other, most_work=np.inf)
         for own, other in ((body, reverse), (reverse, body))
     ]
-    twists, (turn, _) = zip(
-        *[steady_twist(run, tails, s) for run, s in zip(runs, _SENSES, strict=True)], strict=True
-    )
+    twists, (turn, _) = zip(*[_twist(run, tails, s) for run, s in zip(runs, _SENSES, strict=True)], strict=True)
     count = 2 * int(np.ceil((1 + MEMORY / dwell) / 2)) + 1
     phases = _PHASES_WITH_FLOW if has_flow(body) else _PHASES
     changes = np.zeros((2, 3))
@@ -111,6 +115,24 @@ def _lags(body: Body, reverse: Body, tails: int, dwell: float, mesh: Resolution)
             if flip >= count - 1:
                 changes[flip % 2] += planar.between(before, run.pose) * _VIEW[flip % 2] / phases
     return planar.compose(changes, planar.inverse(planar.arc(np.array(twists), dwell)))
+
+
+def _twist(run: Run, tails: int, sense: float) -> tuple[Floats, float]:
+    """Steady twist, seen as for a positive motor, and the time in which the disc turns by a tail spacing.
+
+    Means over a whole number of tail spacings, read from the angle of the disc: with a free surface the spin and
+    the velocities change within a turn.
+    """
+    run.go(_ADAPTS)
+    before = run.state.pose.copy()
+    times, poses = run.go(_WINDOW)
+    track = CubicSpline(np.append(0.0, times), np.concatenate([before[None], poses]) - before)
+    angles, spacing = np.abs(track.c[-1, :, PHASE]), 2 * np.pi / tails
+    count = int(angles[-1] / spacing)
+    place = np.searchsorted(angles, count * spacing)
+    time = float(brentq(lambda t: abs(track(t)[PHASE]) - count * spacing, track.x[place - 1], track.x[place]))
+    mean = track(time) / time
+    return np.array([mean[SURGE], sense * mean[SWAY], sense * mean[YAW]]), time / count
 
 
 def main() -> None:
