@@ -46,7 +46,7 @@ from surrogate.tabulate import tabulate
 AT = (8, 13, 18, 22)  # of DWELLS: 0.54, 1.0, 1.9, 3.1
 _MESHES = (Resolution(16, 48), Resolution(24, 72))
 _MESHES_WITH_FLOW = (Resolution(12, 36), Resolution(16, 48))  # within 0.03 % of the others where there is no flow
-_PHASES, _PHASES_WITH_FLOW = 6, 3
+_PHASES = 6
 _ADAPTS, _WINDOW = 1.0, 1.5  # time units for the mesh to settle, and for the steady twist
 _SENSES = (1.0, -1.0)
 _VIEW = np.stack([np.ones(3), planar.MIRROR])  # a motion in each direction, seen as for a positive motor
@@ -102,18 +102,17 @@ def _lags(body: Body, reverse: Body, tails: int, dwell: float, mesh: Resolution)
     ]
     twists, (turn, _) = zip(*[_twist(run, tails, s) for run, s in zip(runs, _SENSES, strict=True)], strict=True)
     count = 2 * int(np.ceil((1 + MEMORY / dwell) / 2)) + 1
-    phases = _PHASES_WITH_FLOW if has_flow(body) else _PHASES
     changes = np.zeros((2, 3))
-    for phase in range(phases):
+    for phase in range(_PHASES):
         run = runs[0].copy()
         if phase:
-            run.go(turn * phase / phases)
+            run.go(turn * phase / _PHASES)
         for flip in range(1, count + 1):  # the second one is forwards again
             run.flip()
             before = run.pose
             run.go(dwell)
             if flip >= count - 1:
-                changes[flip % 2] += planar.between(before, run.pose) * _VIEW[flip % 2] / phases
+                changes[flip % 2] += planar.between(before, run.pose) * _VIEW[flip % 2] / _PHASES
     return planar.compose(changes, planar.inverse(planar.arc(np.array(twists), dwell)))
 
 

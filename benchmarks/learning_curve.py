@@ -68,7 +68,7 @@ def draw(found: list[Found], path: str) -> None:
     """Error of the yaw rate and of the surge against rows, both logarithmic."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9.0, 4.0), layout="constrained")
+    figure = Figure(figsize=(9.0, 4.4), layout="constrained")
     shown = (("omega_yr_bar", "yaw rate"), ("v_z", "surge, of itself"))
     for place, (output, words) in enumerate(shown):
         axes = figure.add_subplot(1, 2, place + 1)
@@ -85,8 +85,8 @@ def draw(found: list[Found], path: str) -> None:
         axes.grid(alpha=0.3)
         axes.set_xlabel("rows learned")
         axes.set_ylabel(f"error of the {words} [%]")
-        if not place:
-            axes.legend(frameon=False, fontsize=8)
+    lines = figure.axes[0].get_legend_handles_labels()
+    figure.legend(*lines, loc="outside lower center", ncols=2, frameon=False, fontsize=8)
     figure.savefig(path, dpi=100)
 
 
