@@ -13,6 +13,8 @@ ROBOT ?= paper-control
 PLANPATH ?= square:3
 TABLE ?=
 ROWS ?=
+DEVICE ?= cpu
+OUT ?= reports/dataset.html
 
 # Batches are the parallelism: one thread a process.
 export OMP_NUM_THREADS ?= 1
@@ -67,9 +69,9 @@ dataset: $(STAMP) ## simulate CONFIG into DATA (goes on where it stopped; ROWS=�
 $(DATA)/manifest.json:
 	$(MAKE) dataset
 
-train: $(MODEL) ## train the look-up table MODEL on DATA (and on REFINED=…, chosen rows)
+train: $(MODEL) ## train the look-up table MODEL on DATA (and on REFINED=…, chosen rows; DEVICE=cuda or auto)
 $(MODEL): $(DATA)/manifest.json $(REFINED:%=%/manifest.json)
-	$(RUN) -m surrogate train $(DATA) $(REFINED) --out $(MODEL)
+	$(RUN) -m surrogate train $(DATA) $(REFINED) --out $(MODEL) --device $(DEVICE)
 
 plan: $(STAMP) ## plan PLANPATH for ROBOT into reports/plan
 	$(RUN) -m planner plan $(PLANPATH) --robot $(ROBOT) --out reports/plan
@@ -78,8 +80,8 @@ calibrate: $(STAMP) ## close the loop on TABLE=… for ROBOT into reports/calibr
 	@test -n "$(TABLE)" || { echo "error: no table; write make calibrate TABLE=runs.csv ROBOT=robot.toml" >&2; exit 2; }
 	$(RUN) -m calibration calibrate "$(TABLE)" --robot "$(ROBOT)" --out reports/calibration
 
-report: $(DATA)/manifest.json ## picture page of DATA
-	$(RUN) -m dataset report $(DATA) --out reports/dataset.html
+report: $(DATA)/manifest.json ## picture page of DATA into OUT
+	$(RUN) -m dataset report "$(DATA)" --out "$(OUT)"
 
 bench: $(STAMP) ## the figures that the README claims
 	$(RUN) -m benchmarks.run

@@ -28,6 +28,7 @@ from surrogate.fit import Settings
 from surrogate.network import Ensemble
 from surrogate.rows import Simulated
 from surrogate.tails import Rows, learnable, rows_of
+from surrogate.work import Work
 
 SMALL = Settings(width=32, depth=3, members=1, epochs=60, iterations=600)
 _CENTRES, _TESTED = 1000, 1000
@@ -50,7 +51,8 @@ def main() -> None:
     power, fit._POWER = fit._POWER, 1.0
     found.append(_network("least squares", some, tested))
     fit._POWER = power
-    polish, fit._polish = fit._polish, _lbfgs
+    polish: Callable[..., None] = fit._polish
+    fit._polish = _lbfgs  # type: ignore[assignment]
     found.append(_network("L-BFGS for BFGS", some, tested, replace(SMALL, iterations=_LONGER * SMALL.iterations)))
     fit._polish = polish
     found.append(_network("Adam alone", some, tested, replace(SMALL, iterations=0)))
@@ -88,29 +90,29 @@ def _judge(name: str, rows: Rows, numbers: Callable[[Tensor], Tensor], seconds: 
 def _network(name: str, rows: Rows, tested: Rows, settings: Settings = SMALL, *, single: bool = False) -> Result:
     began = time.process_time()
     learn: Callable[..., Ensemble] = tails._learn_wrench
-    network = learn(rows, settings, "", 3)
+    network = learn(rows, settings, Work(), 3)
     if single:
         network = network.float().double()  # the weights rounded
     size = sum(part.numel() for part in network.parameters())
     return _judge(name, tested, network, time.process_time() - began, size)
 
 
-def _lbfgs(network: Ensemble, x: Tensor, residual: fit.Residual, iterations: int, bar: fit.Bar) -> None:
+def _lbfgs(network: Ensemble, k: int, problem: fit.Problem, iterations: int, *others: object) -> None:
     """The last 80 steps only, not the whole matrix."""
-    network.requires_grad_(True)
+    alone = network.member(k).requires_grad_(True)
     optimiser = torch.optim.LBFGS(
-        network.parameters(), max_iter=iterations, max_eval=2 * iterations, history_size=80,
+        alone.parameters(), max_iter=iterations, max_eval=2 * iterations, history_size=80,
         line_search_fn="strong_wolfe", tolerance_change=0.0, tolerance_grad=0.0,
     )  # fmt: skip
-    everything = torch.arange(len(x))
 
     def closure() -> Tensor:
         optimiser.zero_grad(set_to_none=True)
-        value = fit._loss(fit._residuals(network, x, residual, everything), fit._HARDEST)
+        value = problem.loss(alone, problem.every(), fit._HARDEST)
         value.backward()  # type: ignore[no-untyped-call]
         return value
 
     optimiser.step(closure)  # type: ignore[no-untyped-call]
+    network.replace_member(k, alone)
 
 
 def _kernel(name: str, rows: Rows, tested: Rows) -> Result:

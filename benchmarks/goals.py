@@ -8,24 +8,19 @@ Usage: python -m benchmarks.goals [CASES] [FIRST SEED]
 
 from __future__ import annotations
 
-import sys
-import time
 from itertools import product
 from typing import Any
 
 import numpy as np
-import torch
 from scipy.optimize import minimize
 
+from benchmarks.cases import planned
 from planner.choice import QUICK
 from planner.dubins import TURNS, words
-from planner.goal import to_goal
 from planner.last_dwells import flips_after
 from planner.schedule import Switches
 from planner.vehicle import Vehicle
 from sim.arrays import Floats
-from sim.model.presets import PRESETS
-from surrogate.export import load
 
 _STEP = 1e-4
 _LONGER = 1.6  # words longer than this, beside the shortest, are not tried
@@ -104,23 +99,18 @@ def _optimum(vehicle: Vehicle, first: int, dwells: Floats, target: Floats) -> fl
 
 
 def main() -> None:
-    torch.set_num_threads(1)
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-    first = int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    robot, lookup = PRESETS["paper-control"], load()
     ratios = []
-    print(f"{'seed':>5}{'x':>7}{'y':>7}{'heading':>9}{'plan':>9}{'optimum':>9}{'/':>8}{'end':>10}{'s':>7}")
-    for seed in range(first, first + count):
-        goal = random_goal(np.random.default_rng(seed))
-        began = time.process_time()
-        voyage = to_goal((0.0, 0.0, 0.0), goal, robot, lookup=lookup)
-        spent = time.process_time() - began
+    heads = f"{'x':>7}{'y':>7}{'heading':>9}{'plan':>9}{'optimum':>9}{'/':>8}{'end':>10}{'s':>7}"
+    for seed, voyage, spent in planned(
+        lambda rng: {"start": (0.0, 0.0, 0.0), "goal": random_goal(rng)}, 100, heads
+    ):
+        goal = voyage.goal
         least = brute_force(voyage.plan.vehicle, goal)
         ratios.append(voyage.plan.duration / least)
         print(f"{seed:5d}{goal[0]:7.2f}{goal[1]:7.2f}{goal[2]:9.2f}{voyage.plan.duration:9.1f}{least:9.1f}"
               f"{ratios[-1]:8.3f}{max(voyage.end_error):10.1e}{spent:7.2f}", flush=True)  # fmt: skip
     found = np.array(ratios)
-    print(f"\n{count} goals: time by the optimum's {np.median(found):.3f} at the median, "
+    print(f"\n{len(found)} goals: time by the optimum's {np.median(found):.3f} at the median, "
           f"{np.quantile(found, 0.95):.3f} at 95 %, {found.max():.3f} at most; within 5 %: "
           f"{100 * np.mean(found <= 1.05):.0f} %")  # fmt: skip
 

@@ -5,28 +5,23 @@ Usage: python -m benchmarks.keep_out [CASES] [FIRST SEED]
 
 from __future__ import annotations
 
-import sys
-import time
+from typing import Any
 
 import numpy as np
-import torch
 
-from planner.goal import Voyage, to_goal
+from benchmarks.cases import planned
+from planner.goal import Voyage
 from planner.keep_out import Body, Circle, Polygon
-from planner.route import NoWayError
-from sim.model.presets import PRESETS
 from sim.motion.replay import replay
-from surrogate.export import load
-
-Pose = tuple[float, float, float]
 
 
-def random_case(rng: np.random.Generator) -> tuple[Pose, Pose, list[Circle], Polygon]:
+def random_case(rng: np.random.Generator) -> dict[str, Any]:
     """Three circles between a start and a goal, in a tank of 11 by 8 l."""
     start = (0.0, float(rng.uniform(-1, 1)), float(rng.uniform(-1, 1)))
     goal = (6.5, float(rng.uniform(-1, 1)), float(rng.uniform(-3, 3)))
     circles = [Circle(*rng.uniform([1.8, -1.5, 0.3], [4.2, 1.5, 0.8]).tolist()) for _ in range(3)]
-    return start, goal, circles, Polygon.of([[-2.5, -4.0], [9.0, -4.0], [9.0, 4.0], [-2.5, 4.0]])
+    walls = Polygon.of([[-2.5, -4.0], [9.0, -4.0], [9.0, 4.0], [-2.5, 4.0]])
+    return {"start": start, "goal": goal, "keep_out": circles, "walls": walls}
 
 
 def replayed_clearance(voyage: Voyage) -> tuple[float, float, float]:
@@ -39,22 +34,10 @@ def replayed_clearance(voyage: Voyage) -> tuple[float, float, float]:
 
 
 def main() -> None:
-    torch.set_num_threads(1)
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 12
-    first = int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    robot, lookup = PRESETS["paper-control"], load()
     rows = []
-    print(f"{'seed':>5}{'way':>8}{'flips':>7}{'margin':>8}{'stated':>8}{'predicted':>11}{'replayed':>10}"
-          f"{'off goal':>10}{'rad':>8}{'s':>7}")  # fmt: skip
-    for seed in range(first, first + count):
-        start, goal, circles, walls = random_case(np.random.default_rng(seed))
-        began = time.process_time()
-        try:
-            voyage = to_goal(start, goal, robot, keep_out=circles, walls=walls, lookup=lookup)
-        except NoWayError as none:
-            print(f"{seed:5d} {none} ({time.process_time() - began:.1f} s)")
-            continue
-        spent = time.process_time() - began
+    heads = (f"{'way':>8}{'flips':>7}{'margin':>8}{'stated':>8}{'predicted':>11}{'replayed':>10}"
+             f"{'off goal':>10}{'rad':>8}{'s':>7}")  # fmt: skip
+    for seed, voyage, spent in planned(random_case, 12, heads):
         clearance, off, turned = replayed_clearance(voyage)
         rows.append((clearance, off, turned))
         print(f"{seed:5d}{voyage.length:8.2f}{len(voyage.plan.dwells):7d}{voyage.margin:8.3f}"

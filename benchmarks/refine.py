@@ -18,11 +18,12 @@ import numpy as np
 import torch
 
 from dataset.design import Axis, Design
+from surrogate.domain import DOMAIN, MOST_TAILS
 from surrogate.evaluate import relative_errors
 from surrogate.fit import Settings
 from surrogate.lookup import Lookup, steady_outputs
 from surrogate.refine import choose
-from surrogate.rows import DOMAIN, MOST_TAILS, Simulated, as_reached, drawn, joined, simulated
+from surrogate.rows import Simulated, as_reached, drawn, joined, simulated
 from surrogate.train import learn, split, with_radius
 
 ROWS, TEST, FLIPS, SEEDS = 2048, 4096, 48, (1, 2)
@@ -53,7 +54,7 @@ def trained(rows: Simulated, numbers: np.ndarray, flips: Simulated, seed: int) -
     once = Settings(width=8, depth=1, members=1, epochs=1, iterations=1)
     part = split(numbers)
     learned, widths, held_out = (rows.at(part == i) for i in range(3))
-    return learn(learned, widths, held_out, flips, settings, once, title="")
+    return learn(learned, widths, held_out, flips, settings, once)
 
 
 def errors(table: Lookup, test: Simulated) -> dict[str, np.ndarray]:

@@ -27,6 +27,7 @@ from surrogate.fit import Settings
 from surrogate.lookup import Lookup
 from surrogate.rows import Simulated, as_reached, drawn, joined, read_rows, simulated
 from surrogate.train import learn, split, with_radius
+from surrogate.work import Work, remove_states
 
 TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=3000)
 CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)
@@ -151,9 +152,11 @@ def main() -> None:
         single, learned, others = swept(given.sweep)
         tails = joined([tails, single])
         lookup = learn(
-            tails, widths, held_out, joined([flips, learned]), TAILS, CURVES, source=source, flips_held_out=others
-        )
+            tails, widths, held_out, joined([flips, learned]), TAILS, CURVES, source=source, flips_held_out=others,
+            work=Work("train", folder=given.work / "states"),
+        )  # fmt: skip
         save(lookup, given.out)
+        remove_states(given.work / "states")
         print(error_table(lookup))
     if given.test:
         lookup, locked = load(given.test), kept(given.work, "locked")

@@ -1,6 +1,6 @@
 """Command line of the look-up table.
 
-python -m surrogate train DIR … --out MODEL            learn a data set, or several
+python -m surrogate train DIR … --out MODEL            learn a data set, or several; goes on after a kill
 python -m surrogate refine DIR --model MODEL --out DIR2 --rows N
                                                        simulate more rows, where the table is unsure
 python -m surrogate query POINTS.csv --out OUT.csv     predict rows, with intervals, without simulating
@@ -31,6 +31,12 @@ main = program.main
     argument("data", nargs="+", help="folders made by python -m dataset build or python -m surrogate refine"),
     out("model file"),
     argument("--epochs", type=int, help="this many epochs, and as many iterations after them"),
+    argument(
+        "--device",
+        choices=("cpu", "cuda", "auto"),
+        default="cpu",
+        help="where to train (default: cpu); auto: on a CUDA device if there is one",
+    ),
 )
 def _train(arguments: Namespace) -> None:
     from dataclasses import replace
@@ -42,16 +48,20 @@ def _train(arguments: Namespace) -> None:
     from surrogate.export import save
     from surrogate.fit import Settings
     from surrogate.train import held_out, train
+    from surrogate.work import device_named, remove_states
 
+    device, states = device_named(arguments.device), f"{arguments.out}.states"
+    print(f"trains on the device {device}", flush=True)
     tails, curves = Settings(), SETTINGS
     if arguments.epochs is not None:
         if arguments.epochs < 1:
             raise InputError(f"--epochs {arguments.epochs}; give a whole number from 1")
         tails, curves = (replace(s, epochs=arguments.epochs, iterations=arguments.epochs) for s in (tails, curves))
-    lookup = train(arguments.data, tails, curves)
+    lookup = train(arguments.data, tails, curves, device=device, states=states)
     save(lookup, arguments.out)
     card = Path(arguments.out).with_suffix(".md")
     write_text(card, card_of(lookup, held_out(arguments.data)))
+    remove_states(states)
     rows = lookup.provenance["rows"]
     print(f"model {lookup.identity}: {rows['train']} rows, held-out error on {rows['held_out']}")
     print(error_table(lookup))
@@ -132,8 +142,9 @@ def _inverse(arguments: Namespace) -> None:
     from sim.io.files import write_csv
     from sim.io.tables import read_table
     from sim.motion.steady_motion import STEADY_OUTPUTS
+    from surrogate.domain import BOUNDS
     from surrogate.export import load
-    from surrogate.inverse import BOUNDS, inverse
+    from surrogate.inverse import inverse
 
     points = read_table(arguments.targets)
     names = [name.strip() for name in arguments.free.split(",")]

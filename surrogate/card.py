@@ -36,6 +36,12 @@ _NO_TRUST = """
 """
 
 
+_MORE_ROWS = """
+How errors fall with the number of rows is drawn by `python -m benchmarks.learning_curve DATA`. For the domain of
+the shipped table the picture is in docs/figures.md, under "Error against rows".
+"""
+
+
 def card_of(lookup: Lookup, held_out: Simulated) -> str:
     """The card of a table, from robots that it did not learn."""
     answer = lookup.query(held_out.robots, intervals=True, flag=True)
@@ -76,6 +82,7 @@ def card_of(lookup: Lookup, held_out: Simulated) -> str:
     ]
     parts += ["## Yaw rate by region", _lines(("robots", "median", "95 %", "worst", "coverage"), regions)]
     parts += ["## The worst robots", _worst(held_out, answer, errors["omega_yr_bar"], known)]
+    parts += ["## More rows", _MORE_ROWS.strip()]
     parts += ["## Where not to trust it", _NO_TRUST.strip()]
     return "\n\n".join(parts) + "\n"
 

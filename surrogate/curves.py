@@ -31,6 +31,7 @@ from surrogate.fit import Settings, fit
 from surrogate.head import Heads
 from surrogate.network import Ensemble
 from surrogate.tail import Tails
+from surrogate.work import Work
 
 SHAPES = {
     "lag": (len(DWELLS), 3),
@@ -98,7 +99,7 @@ def speeds_of(heads: Heads, motion: Tensor) -> Tensor:
 
 
 def learn_curves(
-    heads: Heads, tails: Tails, motion: Tensor, curves: Mapping[str, Floats], settings: Settings, title: str
+    heads: Heads, tails: Tails, motion: Tensor, curves: Mapping[str, Floats], settings: Settings, work: Work
 ) -> CurveTable:
     """A table from the curves of robots, by name as in SHAPES, each (M, …, 3); NaN where one was not simulated."""
     inputs, speeds = inputs_of(heads, tails, motion), speeds_of(heads, motion)
@@ -113,8 +114,8 @@ def learn_curves(
             targets.append((scaled.reshape(len(scaled), -1) - bases[name].mean) @ bases[name].vectors.T)
         sizes = [(len(bases[name].vectors), (3 / np.prod(SHAPES[name])) ** 0.5) for name in names]
         weights = torch.cat([torch.full((count,), weight, dtype=torch.float64) for count, weight in sizes])
-        words = f"{title}: {' and '.join(names)}" if title else ""
-        networks.append(_learned(inputs[known], torch.cat(targets, -1), weights, settings, words))
+        part = work.part(" and ".join(names))
+        networks.append(_learned(inputs[known], torch.cat(targets, -1), weights, settings, part))
     return CurveTable(tuple(networks), bases)
 
 
@@ -125,7 +126,7 @@ def _basis(flat: Tensor, count: int) -> Basis:
     return Basis(mean, vectors[:count].clone())
 
 
-def _learned(inputs: Tensor, wanted: Tensor, weights: Tensor, settings: Settings, title: str) -> Ensemble:
+def _learned(inputs: Tensor, wanted: Tensor, weights: Tensor, settings: Settings, work: Work) -> Ensemble:
     """A network that gives components (M, C)."""
     network = Ensemble(
         inputs.shape[1], wanted.shape[1], width=settings.width, depth=settings.depth, members=settings.members,
@@ -135,10 +136,12 @@ def _learned(inputs: Tensor, wanted: Tensor, weights: Tensor, settings: Settings
     network.scale.copy_(torch.clamp(inputs.std(0), min=1e-6) * _SMOOTH)
     network.spread.copy_(_spread(wanted))
 
-    def residual(y: Tensor, at: Tensor) -> Tensor:
-        return (y - wanted[at]) * weights
+    data = (wanted, weights.expand(len(wanted), -1))
 
-    fit(network, inputs, residual, settings, title)
+    def residual(y: Tensor, wanted: Tensor, weights: Tensor) -> Tensor:
+        return (y - wanted) * weights
+
+    fit(network, inputs, data, residual, settings, work, unit="% of the way in one unit of time")
     return network
 
 

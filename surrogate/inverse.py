@@ -22,10 +22,6 @@ from surrogate.lookup import OUTSIDE, Lookup
 
 Bounds = Mapping[str, tuple[float, float]]
 
-BOUNDS = {
-    "C_t": (0.3, 12.0), "C_r": (0.3, 9.0), "C_yr": (0.1, 18.0), "omega_bar": (0.5, 150.0), "l_over_R": (2.0, 12.0),
-    "L_over_R": (1.5, 8.0), "l_over_r0": (12.0, 80.0), "a_over_R": (0.5, 1.2),
-}  # fmt: skip
 _STARTS, _STEPS = 16, 40
 _SOLVED = 1e-6  # misfit, relative, of a solution
 _SAME = 1e-3  # difference of ln(input) up to which two solutions are one

@@ -55,7 +55,7 @@ class Ensemble(nn.Module):
 
     def member(self, k: int) -> Ensemble:
         """A network of one member: a copy of member k."""
-        alone = Ensemble(**{**self.shape, "members": 1}, seed=0)
+        alone = Ensemble(**{**self.shape, "members": 1}, seed=0).to(self.shift.device)
         state = self.state_dict()
         own = {name for name, _ in self.named_parameters()}
         alone.load_state_dict({name: part[k : k + 1] if name in own else part for name, part in state.items()})

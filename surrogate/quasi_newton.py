@@ -12,7 +12,8 @@ is scipy's, for the strong Wolfe conditions.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 import torch
@@ -24,6 +25,7 @@ from sim.arrays import Floats
 ValueAndGradient = Callable[[Tensor], tuple[float, Tensor]]
 _CURVATURE = 0.9  # of the Wolfe conditions
 _SEARCHES = 15  # trial steps of a line search
+_STATE = ("x", "value", "gradient", "_matrix", "_direction")
 
 
 class Minimiser:
@@ -35,6 +37,16 @@ class Minimiser:
         self.value, self.gradient = function(x)
         self._matrix: Tensor | None = None  # (n, n); None: steepest descent
         self._direction = -self.gradient / self.gradient.abs().sum().clamp(min=1e-300)
+
+    def state_dict(self) -> dict[str, Any]:
+        """All that the next step depends on."""
+        return {name: getattr(self, name) for name in _STATE}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Go on from a state of the same function."""
+        for name in _STATE:
+            value = state[name]
+            setattr(self, name, value.to(self.x.device) if isinstance(value, Tensor) else value)
 
     def step(self) -> bool:
         """One iteration; False where no step along the gradient makes the value smaller."""

@@ -24,18 +24,10 @@ from sim.model.response import BEFORE, DWELLS, LAG_PARTS
 from sim.motion.batches import run_batches, split, steady_columns
 from sim.motion.response import responses
 from sim.motion.steady import orbits
+from surrogate.domain import DOMAIN, MOST_TAILS, WIDE
 
 ROBOT = (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)
 MOTION = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap", "error")
-DOMAIN = {
-    "C_t": (0.5, 8.0), "C_r": (0.5, 6.0), "C_yr": (0.2, 12.0), "l_over_R": (2.0, 12.0), "L_over_R": (1.5, 8.0),
-    "l_over_r0": (12.0, 80.0), "omega_bar": (0.5, 150.0), "a_over_R": (0.5, 1.2),
-}  # fmt: skip
-MOST_TAILS = 8
-WIDE = {
-    "C_t": (0.3, 12.0), "C_r": (0.3, 9.0), "C_yr": (0.1, 18.0), "l_over_R": (1.85, 13.0), "L_over_R": (1.2, 10.0),
-    "l_over_r0": (11.0, 88.0), "omega_bar": (0.42, 165.0), "a_over_R": (0.46, 1.3),
-}  # fmt: skip
 _TAILS = (1, 1, 2, 2, 3, 4, 5, 7)  # N of eighths of the wide robots; half of the last two have one tail more
 _PHASES = {1: 8, 2: 12}  # to begin with, by N: with one or two tails the motion depends more on the disc's phase
 _BATCH, _CURVE_BATCH = 64, 8

@@ -31,6 +31,7 @@ from surrogate.head import Heads
 from surrogate.network import Ensemble
 from surrogate.perceptron import Packed, evaluate_rows, packed
 from surrogate.tail import Tails
+from surrogate.work import Work
 
 CLASSES = (1, 2, 3)  # networks for N = 1, N = 2, and three or more tails
 TURNS = 1.3  # largest |ω_yr/ω_t| that is learned
@@ -159,21 +160,21 @@ def sensitivity_of(heads: Heads, tails: Tails, motion: Tensor) -> Tensor:
     return torch.linalg.inv_ex(matrix)[0] / size[:, :, None]
 
 
-def learn_tails(rows: Rows, settings: Settings, title: str) -> TailTable:
+def learn_tails(rows: Rows, settings: Settings, work: Work) -> TailTable:
     """Networks of all CLASSES from rows that are `learnable`."""
     kind = class_of(rows.tails.number)
     networks: list[Ensemble | None] = []
     for k, count in enumerate(CLASSES):
-        name = f"{title}: tails of N = {count}{' and more' if count == CLASSES[-1] else ''}" if title else ""
+        part = work.part(f"tails of N = {count}{' and more' if count == CLASSES[-1] else ''}")
         some = rows.at(kind == k)
         known = len(some.motion) > 0
-        networks.append(_learn_wrench(some, settings, name, count) if known else None)
+        networks.append(_learn_wrench(some, settings, part, count) if known else None)
     many = rows.at(rows.tails.number > 1)
-    gap = _learn_gap(many, _GAP, f"{title}: gap" if title else "")
+    gap = _learn_gap(many, _GAP, work.part("gap"))
     return TailTable(tuple(networks), gap)
 
 
-def _learn_wrench(rows: Rows, settings: Settings, title: str, count: int) -> Ensemble:
+def _learn_wrench(rows: Rows, settings: Settings, work: Work, count: int) -> Ensemble:
     """The network of one of CLASSES."""
     inputs = (tail.inputs_with_head if count == 1 else tail.inputs_of)(rows.tails, rows.motion)
     weight = sensitivity_of(rows.heads, rows.tails, rows.motion)
@@ -183,14 +184,13 @@ def _learn_wrench(rows: Rows, settings: Settings, title: str, count: int) -> Ens
     mean, spread = (torch.tensor(part, dtype=torch.float64) for part in tail.TYPICAL)
     size = torch.linalg.matrix_norm(matrix * spread)
     share = torch.clamp(_OUTLIER * size.median() / size, max=1.0)
-    matrix, wanted = matrix * share[:, None, None], wanted * share[:, None]
     network = _new(settings, inputs, outputs=len(mean))
     _prepare(network, mean, spread, count)
 
-    def residual(y: Tensor, at: Tensor) -> Tensor:
-        return (matrix[at] @ y[..., None])[..., 0] - wanted[at]
+    def residual(y: Tensor, matrix: Tensor, wanted: Tensor) -> Tensor:
+        return (matrix @ y[..., None])[..., 0] - wanted
 
-    fit(network, inputs, residual, settings, title)
+    fit(network, inputs, (matrix, wanted), residual, settings, work, weights=share, unit="% of their motion")
     return network
 
 
@@ -221,15 +221,15 @@ def _gap_inputs(tails: Tails, motion: Tensor) -> Tensor:
     return torch.cat([tail.inputs_of(tails, motion), torch.log(tails.number)[:, None]], -1)
 
 
-def _learn_gap(rows: Rows, settings: Settings, title: str) -> Ensemble:
+def _learn_gap(rows: Rows, settings: Settings, work: Work) -> Ensemble:
     inputs = _gap_inputs(rows.tails, rows.motion)
     share = rows.gap * 2 * rows.tails.radius / _clamp_distance(rows.tails)
     network = _new(settings, inputs, outputs=1)
     network.mean.fill_(0.5)
     network.spread.fill_(0.3)
 
-    def residual(y: Tensor, at: Tensor) -> Tensor:
-        return y - share[at, None]
+    def residual(y: Tensor, share: Tensor) -> Tensor:
+        return y - share[:, None]
 
-    fit(network, inputs, residual, settings, title)
+    fit(network, inputs, (share,), residual, settings, work, unit="% of the distance between the clamps")
     return network

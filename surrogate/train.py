@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,9 +30,11 @@ from surrogate.lookup import BRANCHES, Lookup, steady_outputs
 from surrogate.rows import ROBOT, Simulated, joined, read_rows, simulated
 from surrogate.support import Support
 from surrogate.tails import CLASSES, class_of, learn_tails, learnable, rows_of
+from surrogate.work import Work, device_named
 
 _FEWEST_INSIDE = 10
 _FEWEST_ROWS, _FEWEST_OF_A_CLASS = 64, 16
+_QUIET = Work()
 
 
 def split(rows: Integers) -> Integers:
@@ -48,6 +51,8 @@ def train(
     *,
     flips: int = 256,
     title: str = "train",
+    device: str = "cpu",
+    states: str | Path | None = None,
 ) -> Lookup:
     """A look-up table from a finished data set, or from several.
 
@@ -58,14 +63,18 @@ def train(
         curve_settings: the same for the response to a flip.
         flips: robots whose flips are simulated if the data set has no curves.
         title: of the progress bars; empty for none.
+        device: "cpu", "cuda", or "auto" for the latter where there is one.
+        states: folder in which training keeps its states. Started again with the same arguments, it goes on
+            from there, to the same table. When the table is saved, `surrogate.work.remove_states` removes them.
 
     Raises:
-        InputError: there is no data set, or it has too few usable rows.
+        InputError: there is no data set, or it has too few usable rows, or there is no such device.
 
     Example:
         >>> from softflagella import train
         >>> table = train("data/sweep")  # doctest: +SKIP
     """
+    work = Work(title, device_named(device), None if states is None else Path(states))
     folders = [folder] if isinstance(folder, str) else list(folder)
     manifests = [read_manifest(one) for one in folders]
     rows, numbers = _together(folders, manifests)
@@ -80,7 +89,7 @@ def train(
     kept = {"data_hash": "config_hash", "data_code_version": "code_version", "data_chosen": "chosen"}
     source = {name: "+".join(str(m.get(key, "")) for m in manifests) for name, key in kept.items()}
     learned, widths, held_out = sets
-    return learn(learned, widths, held_out, flipped, settings, curve_settings, source=source, title=title)
+    return learn(learned, widths, held_out, flipped, settings, curve_settings, source=source, work=work)
 
 
 def held_out(folder: str | Sequence[str]) -> Simulated:
@@ -114,7 +123,7 @@ def learn(
     *,
     flips_held_out: Simulated | None = None,
     source: dict[str, Any] | None = None,
-    title: str = "train",
+    work: Work = _QUIET,
 ) -> Lookup:
     """A look-up table from simulated robots.
 
@@ -125,22 +134,23 @@ def learn(
         flipped: robots with response curves.
         flips_held_out: robots with curves for the errors of the response; by default a tenth of `flipped`.
         source: more provenance.
+        work: device, progress bars, and where states are kept.
     """
     chosen, curves_chosen = settings or Settings(), curve_settings or curves.SETTINGS
     if flips_held_out is None:
         tenth = np.arange(len(flipped)) % 10 == 9
         flipped, flips_held_out = flipped.at(~tenth), flipped.at(tenth)
     rows = _learnable(learned)
-    table = learn_tails(rows, chosen, title)
+    table = learn_tails(rows, chosen, work)
     kind = class_of(rows.tails.number)
     inputs = tail.inputs_of(rows.tails, rows.motion)
     flipped, flips_held_out = _several_tails(flipped), _several_tails(flips_held_out)
     own = _learnable(flipped)
     usable = np.flatnonzero(learnable(rows_of(flipped.robots, flipped.motion)))
     known = flipped.at(usable).curves
-    response = learn_curves(own.heads, own.tails, own.motion, known, curves_chosen, title and f"{title}: flips")
+    response = learn_curves(own.heads, own.tails, own.motion, known, curves_chosen, work.part("flips"))
     counts = {"train": len(rows.motion), "widths": len(widths), "held_out": len(held_out), "flips": len(usable)}
-    made = provenance({"tails": asdict(chosen), "curves": asdict(curves_chosen)})
+    made = provenance({"tails": asdict(chosen), "curves": asdict(curves_chosen), "device": work.device})
     lookup = Lookup(
         tails=table,
         curves=response,

@@ -106,6 +106,7 @@ def train(made: Path, out: Path) -> str:
     done("dataset", "build", "--config", out / "sweep.toml", "--out", out / "data", "--jobs", 1)
     done("surrogate", "train", out / "data", "--out", out / "model.safetensors", "--epochs", 2)
     assert load(out / "model.safetensors").provenance["rows"]["train"] > 150
+    assert not (out / "model.safetensors.states").exists()
     return "held-out error on"
 
 

@@ -111,8 +111,7 @@ def test_a_narrow_gap_is_passed_with_shorter_dwells() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 3])
 def test_a_replay_in_the_simulator_stays_out(seed: int) -> None:
-    start, goal, circles, walls = random_case(np.random.default_rng(seed))
-    voyage = to_goal(start, goal, CONTROL, keep_out=circles, walls=walls)
+    voyage = to_goal(robot=CONTROL, **random_case(np.random.default_rng(seed)))
     clearance, off, turned = replayed_clearance(voyage)
     assert clearance > 0
     assert off < voyage.plan.stated_error

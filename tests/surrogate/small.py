@@ -33,4 +33,4 @@ def flips() -> Simulated:
 def table() -> Lookup:
     """A table that learned them; its errors are some per cent."""
     held = rows(256, 13, wide=False)
-    return learn(rows(), held.at(np.arange(len(held)) % 2 == 0), held, flips(), TAILS, CURVES, title="")
+    return learn(rows(), held.at(np.arange(len(held)) % 2 == 0), held, flips(), TAILS, CURVES)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
+from dataset.design import load_design
 from sim.io.errors import InputError
+from surrogate.domain import BOUNDS, DOMAIN, MOST_TAILS, WIDE
 from surrogate.intervals import Intervals
 from surrogate.support import Support
 from tests.surrogate.small import rows, table
@@ -23,6 +26,14 @@ def test_the_support_is_joint() -> None:
     support = Support.of(torch.cat([x, x], 1) + noise)
     points = torch.tensor([[0.0, 0.0], [1.5, 1.5], [-1.0, -1.05], [1.0, -1.0], [6.0, 6.0]]).double()
     assert (support.remoteness(points.numpy()) <= 1).tolist() == [True, True, True, False, False]
+
+
+def test_the_sweep_of_the_domain_and_the_bounds_of_the_inverse_are_those_of_the_domain() -> None:
+    axes = load_design(Path(__file__).parents[2] / "sweeps/domain.toml").axes
+    assert {name: (axis.low, axis.high) for name, axis in axes.items()} == {**DOMAIN, "N": (1, MOST_TAILS)}
+    for name, (low, high) in BOUNDS.items():
+        assert WIDE[name][0] <= low <= DOMAIN[name][0]
+        assert DOMAIN[name][1] <= high <= WIDE[name][1]
 
 
 def sampled(count: int, generator: torch.Generator, size: Callable[[Tensor], Tensor]) -> tuple[Tensor, Tensor]:

@@ -1,0 +1,47 @@
+"""Plans from pose to pose for many random cases of the paper's control robot, one line for each case."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+
+from planner.goal import Voyage, to_goal
+from planner.route import NoWayError
+from sim.model.presets import PRESETS
+from surrogate.export import load
+
+
+class Trip(NamedTuple):
+    """One planned case."""
+
+    seed: int
+    voyage: Voyage
+    seconds: float  # of processor time
+
+
+def planned(case: Callable[[np.random.Generator], dict[str, Any]], cases: int, heads: str) -> Iterator[Trip]:
+    """Plan random cases, and print a line for each that has no way.
+
+    Args:
+        case: makes the arguments of `planner.goal.to_goal` from a random generator.
+        cases: how many; the command line may give another number, and then the first seed.
+        heads: of the columns that the caller prints.
+    """
+    torch.set_num_threads(1)
+    given = [int(word) for word in sys.argv[1:3]]
+    count, first = [*given, *(cases, 0)[len(given) :]]
+    robot, lookup = PRESETS["paper-control"], load()
+    print(f" seed{heads}")
+    for seed in range(first, first + count):
+        began = time.process_time()
+        try:
+            voyage = to_goal(robot=robot, lookup=lookup, **case(np.random.default_rng(seed)))
+        except NoWayError as none:
+            print(f"{seed:5d} {none} ({time.process_time() - began:.1f} s)")
+            continue
+        yield Trip(seed, voyage, time.process_time() - began)
