@@ -28,10 +28,12 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 import numpy as np
+import torch
 import surrogate.work as work
 from surrogate.train import learn
 from tests.surrogate.small import CURVES, TAILS, flips, rows
 
+torch.set_num_threads(1)  # as in the tests
 work.EVERY = work._SHARE = 0.0
 left, write = int(sys.argv[2]), work.Checkpoint.write
 
