@@ -107,7 +107,7 @@ def _unbalanced(head: Floats, resistance: Floats, tail: Floats, motion: Floats, 
 
 @compiled
 def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats) -> None:
-    """`surrogate.head.linear_guess`."""
+    """The motion with the torque and thrust of linear theory and the side forces of straight tails."""
     speed, gain = head[0], head[1]
     perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
     spin = _FIRST_SPIN * speed
