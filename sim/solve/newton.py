@@ -20,6 +20,7 @@ from sim.linear.coupled import Coupled, new_coupled
 from sim.linear.gmres import combine, extend, new_krylov, start
 from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import turned_edges
+from sim.mechanics.tail_contact import has_contact
 from sim.model.body import Body
 from sim.solve.linearise import Equations, linearise, new_equations
 from sim.solve.rates import Rates, is_joined
@@ -27,9 +28,11 @@ from sim.solve.residual import Room, fill_residual, is_local, new_room
 
 FINITE_DIFFERENCE_STEP = 1e-6  # of the largest entry, in l or 1 + |ω|
 RELATIVE_TOLERANCE = 1e-3  # of the residual in one Newton correction by GMRES
+FIRMNESS = (0.01, 0.05, 0.25, 1.0)  # of contact: where the solution is hard to find, it comes from softer contact
+_NEAR = 1e-4  # limit of the last correction on the way
 _MOST_PRODUCTS = 60
 _MOST_CORRECTIONS = 30
-_LARGEST_MOVE = 0.3  # of a node in one correction, in l
+_LARGEST_MOVE = 0.3  # of a node in one correction, in l; r0 where tails feel each other
 
 
 class Workspace(NamedTuple):
@@ -57,15 +60,35 @@ def newton(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tole
         tolerance: on the last correction.
 
     Returns:
-        Number of corrections, and size of the last one (in l and 1 + |ω|; above `tolerance`: not converged).
+        Number of corrections (hard contact: from soft contact on, if need be), and size of the last one (in l and 1 + |ω|; above `tolerance`: not converged).
     """
+    if not has_contact(body):
+        return _iterate(body, rates, x, u, work, tolerance)
+    x_start, u_start = x.copy(), u.copy()
+    count, size = _iterate(body, rates, x, u, work, tolerance)
+    if size < tolerance:
+        return count, size
+    x[:], u[:] = x_start, u_start
+    for firmness in FIRMNESS:
+        work.room.firmness[0] = firmness
+        more, size = _iterate(body, rates, x, u, work, tolerance if firmness == 1 else max(tolerance, _NEAR))
+        count += more
+    work.room.firmness[0] = 1.0
+    return count, size
+
+
+@compiled
+def _iterate(
+    body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float
+) -> tuple[int, float]:
+    """The same from here, with the contact forces as firm as `work` says."""
     size = np.inf
     for count in range(1, _MOST_CORRECTIONS + 1):
         dx, du = correct(body, rates, x, u, work, True)
         size = max(np.max(np.abs(dx)), np.max(np.abs(du)) / (1 + abs(body.omega)))
         if not np.isfinite(size):
             return count, np.inf
-        share = min(1.0, _LARGEST_MOVE / size)
+        share = min(1.0, largest_move(body) / size)
         move(body, x, share * dx)
         u += share * du
         if size < tolerance:
@@ -90,6 +113,12 @@ def correct(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, ane
     if not local:
         solve_nonlocal(body, rates, x, u, work, RELATIVE_TOLERANCE, dx, du)
     return dx, du
+
+
+@compiled
+def largest_move(body: Body) -> float:
+    """The largest move of a node in one correction, in l; tails in contact must not pass through each other."""
+    return body.tail_radius if has_contact(body) else _LARGEST_MOVE
 
 
 @compiled

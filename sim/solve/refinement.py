@@ -20,6 +20,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.compiling import compiled
 from sim.linear.spectral import with_phases
+from sim.mechanics.tail_contact import has_contact
 from sim.model.body import Body
 from sim.solve.newton import new_workspace, newton
 from sim.solve.orbit import (
@@ -51,6 +52,8 @@ _PHASE_ERROR = 1e-4  # relative, in the means
 _DOUBT = 0.03  # share of the extrapolation that counts as error
 _SHRINKS = 0.2  # assumed factor on the phase error with the next number of phases, if only one is known
 _MOST_PHASES = 48
+_SLOW, _FASTER, _LEAST_FASTER = 3.0, 1.5, 1.02  # ω̄ to begin with where tails may touch, and factors from there
+_START = 1e-3  # limit of the last Newton correction on the way
 
 
 class Orbit(NamedTuple):
@@ -71,7 +74,7 @@ def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
     """
     if tails > _MOST_PHASES:
         return _unsolved(MANY_PHASES, np.zeros((MESHES[0], tails, 3)), np.zeros((1, 4)))
-    ended, error, x, u = _enough_phases(body, without_nonlocal(body), tails, least)
+    ended, error, x, u = _enough_phases(body, *_first_guess(body, tails), tails, least)
     if ended != SOLVED:
         return _unsolved(ended, x, u)
     return _on_finer_meshes(body, error, x, u)
@@ -81,7 +84,7 @@ def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Flo
     """The orbit on a given mesh: whether there is one, x (n, M, 3) and u (P, 4)."""
     if tails > _MOST_PHASES:
         return False, np.zeros((edges, tails, 3)), np.zeros((1, 4))
-    ended, _, x, u = _enough_phases(body, without_nonlocal(body), tails, FEW)
+    ended, _, x, u = _enough_phases(body, *_first_guess(body, tails), tails, FEW)
     if ended != SOLVED:
         return False, x, u
     x = with_edges(x, body.offset, edges)
@@ -89,10 +92,31 @@ def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Flo
     return size < CORRECTION and turns_forward(body, u), x, u
 
 
-def without_nonlocal(body: Body) -> Body:
-    """The same robot without its non-local effects."""
+def _first_guess(body: Body, tails: int) -> tuple[Body, Floats, Floats]:
+    """The robot without its non-local effects, and a guess of its orbit on the coarsest mesh.
+
+    Contact stays, because it decides on which side of each other the tails lie. So its guess comes from slow
+    motors, at which the tails are apart: the motor is made faster step by step.
+    """
+    phases = tails * int(np.ceil(2 / tails))
     terms = body.nonlocal_terms
-    return body._replace(nonlocal_terms=terms._make([0.0] * len(terms)))
+    plain = body._replace(nonlocal_terms=terms._make([0.0] * len(terms)))
+    if not has_contact(body):
+        return plain, *straight_start(plain, MESHES[0], phases, tails)
+    plain = plain._replace(nonlocal_terms=plain.nonlocal_terms._replace(tail_contact=terms.tail_contact))
+    speed = min(_SLOW / abs(body.omega), 1.0)
+    factor, before = _FASTER, plain._replace(omega=speed * body.omega)
+    x, u = straight_start(before, MESHES[0], phases, tails)
+    _, size = solve_orbit(before, x, u, _START)
+    while size < _START and speed < 1 and factor > _LEAST_FASTER:
+        factor = min(factor, 1 / speed)
+        x_more, u_more = x.copy(), factor * u
+        _, larger = solve_orbit(plain._replace(omega=speed * factor * body.omega), x_more, u_more, _START)
+        if larger < _START:
+            x, u, speed = x_more, u_more, speed * factor
+        else:
+            factor = np.sqrt(factor)
+    return plain, x, u
 
 
 @compiled
@@ -147,15 +171,15 @@ def _is_balanced(body: Body, x: Floats, u: Floats) -> bool:
 
 
 @compiled
-def _enough_phases(body: Body, plain: Body, tails: int, least: int) -> tuple[int, float, Floats, Floats]:
+def _enough_phases(
+    body: Body, plain: Body, x: Floats, u: Floats, tails: int, least: int
+) -> tuple[int, float, Floats, Floats]:
     """On the coarsest mesh, with `least` phases or more: SOLVED or why not, the error of the phases, x and u.
 
-    The first solution is a rough one for the robot without its non-local effects (`plain`), on the fewest phases.
-    Then phases are added, each time from the solution before, until the means stop changing.
+    The first solution, from x and u, is a rough one for the robot without its non-local effects (`plain`), on the
+    fewest phases. Then phases are added, each time from the solution before, until the means stop changing.
     """
-    n = MESHES[0]
-    phases = tails * int(np.ceil(2 / tails))
-    x, u = straight_start(plain, n, phases, tails)
+    phases = x.shape[1]
     before, change, robot, wanted = np.zeros(5), np.nan, plain, 1e-2
     solved = -1  # numbers of phases that the robot itself was solved on, less one
     while True:
