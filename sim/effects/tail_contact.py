@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class TailContact(Effect):
     def number(self, size: Tensor, groups: Groups) -> Tensor:
-        return 200 * size
+        return 500 * size
 
 
 EFFECT = TailContact(

@@ -35,7 +35,8 @@ SOFTNESS = 0.004  # of D: the force grows from nothing to a line over a few of t
 FIRM = 0.02  # of D: at this depth the force per length is that of `Body.nonlocal_terms`
 WIDTH = 0.1  # of D
 POINTS = 96  # of a tail
-_REACH = 1.3  # of D: no force beyond
+_REACH = 1.1  # of D: no force beyond; it is 1e-11 of the line there
+_BESIDE = 0.4  # of D²: edges whose squared distance is larger by this count for nothing
 _EDGES = 24  # of the smooth tail, or more
 
 
@@ -115,7 +116,7 @@ def _turned(v: Vector, share: float) -> Vector:
 def _edges_near(body: Body, one: Floats, k: int, other: Floats, near: Integers) -> int:
     """Number of edges of the other tail that may touch edge k of this one; `near` gets them."""
     n, count, j = len(one) - 1, 0, 0
-    within = 1.1 / n + 2 * _REACH * body.tail_radius  # half an edge each; edges hardly stretch
+    within = 1.1 / n + 2 * 1.2 * body.tail_radius  # half an edge each; edges hardly stretch
     middle = times(0.5, plus(vector_at(one, k), vector_at(one, k + 1)))
     while j < n:
         apart = minus(middle, times(0.5, plus(vector_at(other, j), vector_at(other, j + 1))))
@@ -140,20 +141,26 @@ def _push(
     line = firmness * body.nonlocal_terms.tail_contact * SOFTNESS / FIRM
     stiffness = 0.5 * line / (points * n)  # each pair counts twice
     start, edge = vector_at(one, k), minus(vector_at(one, k + 1), vector_at(one, k))
-    on_ends = np.empty((len(near), 2, 3))
+    on_ends, square = np.empty((len(near), 2, 3)), np.empty(len(near))
     for i in range(points):
         share = (i + 0.5) / points
         at = plus(start, times(share, edge))
+        nearest = np.inf
+        for c in range(len(near)):
+            square[c] = _squared_distance(at, vector_at(other, near[c]), vector_at(other, near[c] + 1))
+            nearest = min(nearest, square[c])
+        if nearest > (_REACH * diameter) ** 2:
+            continue
         closeness, away = 0.0, ZERO
         for c in range(len(near)):
-            weight, first, second = _closeness(at, vector_at(other, near[c]), vector_at(other, near[c] + 1), width,
-                                               _REACH * diameter)  # fmt: skip
+            if square[c] > nearest + _BESIDE * diameter**2:
+                on_ends[c] = 0.0
+                continue
+            weight, first, second = _closeness(at, vector_at(other, near[c]), vector_at(other, near[c] + 1), width)
             closeness += weight
             away = plus(away, plus(first, second))
             put_at(on_ends[c], 0, first)
             put_at(on_ends[c], 1, second)
-        if closeness == 0:
-            continue
         distance = np.sqrt(max(-2 * width**2 * np.log(closeness / n), (0.01 * diameter) ** 2))
         depth = (diameter - distance) / (SOFTNESS * diameter)
         ramp = max(depth, 0.0) + np.log1p(np.exp(-abs(depth)))
@@ -166,7 +173,16 @@ def _push(
 
 
 @compiled
-def _closeness(at: Vector, start: Vector, end: Vector, width: float, reach: float) -> tuple[float, Vector, Vector]:
+def _squared_distance(at: Vector, start: Vector, end: Vector) -> float:
+    """Squared distance of a point from an edge."""
+    edge, away = minus(end, start), minus(at, start)
+    foot = min(max(dot(away, edge) / dot(edge, edge), 0.0), 1.0)
+    away = minus(away, times(foot, edge))
+    return dot(away, away)
+
+
+@compiled
+def _closeness(at: Vector, start: Vector, end: Vector, width: float) -> tuple[float, Vector, Vector]:
     """∫ g dσ over an edge y = start + σ e, g = exp(−|x − y|²/2w²)/√(2π) w; and the parts of ∫ (x − y) g dσ.
 
     Returns:
@@ -176,9 +192,6 @@ def _closeness(at: Vector, start: Vector, end: Vector, width: float, reach: floa
     square = dot(edge, edge)
     foot = dot(away, edge) / square
     across = minus(away, times(foot, edge))
-    beside = max(max(-foot, foot - 1), 0.0)
-    if dot(across, across) + beside * beside * square > reach * reach:
-        return 0.0, ZERO, ZERO
     steep = np.sqrt(0.5 * square) / width
     low, high = -steep * foot, steep * (1 - foot)  # ends of the edge, from the foot, in √2 w
     height = np.exp(-0.5 * dot(across, across) / width**2) / (np.sqrt(2 * np.pi) * width)

@@ -73,6 +73,8 @@ def newton(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tole
         work.room.firmness[0] = firmness
         more, size = _iterate(body, rates, x, u, work, tolerance if firmness == 1 else max(tolerance, _NEAR))
         count += more
+        if not size < _NEAR:
+            break
     work.room.firmness[0] = 1.0
     return count, size
 

@@ -53,7 +53,7 @@ _DOUBT = 0.03  # share of the extrapolation that counts as error
 _SHRINKS = 0.2  # assumed factor on the phase error with the next number of phases, if only one is known
 _MOST_PHASES = 48
 _SLOW, _FASTER, _LEAST_FASTER = 3.0, 1.5, 1.02  # ω̄ to begin with where tails may touch, and factors from there
-_START = 1e-3  # limit of the last Newton correction on the way
+_START, _SOFT = 1e-3, 0.05  # limit of the last Newton correction on the way, and factor on the contact there
 
 
 class Orbit(NamedTuple):
@@ -95,23 +95,25 @@ def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Flo
 def _first_guess(body: Body, tails: int) -> tuple[Body, Floats, Floats]:
     """The robot without its non-local effects, and a guess of its orbit on the coarsest mesh.
 
-    Contact stays, because it decides on which side of each other the tails lie. So its guess comes from slow
-    motors, at which the tails are apart: the motor is made faster step by step.
+    Contact stays, because it decides on which side of each other the tails lie. So its guess comes from a slow
+    motor, at which the tails are apart. The motor is made faster step by step, with a softer contact.
     """
     phases = tails * int(np.ceil(2 / tails))
     terms = body.nonlocal_terms
     plain = body._replace(nonlocal_terms=terms._make([0.0] * len(terms)))
     if not has_contact(body):
         return plain, *straight_start(plain, MESHES[0], phases, tails)
-    plain = plain._replace(nonlocal_terms=plain.nonlocal_terms._replace(tail_contact=terms.tail_contact))
+    touching = plain.nonlocal_terms._replace(tail_contact=terms.tail_contact)
+    plain = plain._replace(nonlocal_terms=touching)
+    soft = plain._replace(nonlocal_terms=touching._replace(tail_contact=_SOFT * terms.tail_contact))
     speed = min(_SLOW / abs(body.omega), 1.0)
-    factor, before = _FASTER, plain._replace(omega=speed * body.omega)
+    factor, before = _FASTER, soft._replace(omega=speed * body.omega)
     x, u = straight_start(before, MESHES[0], phases, tails)
     _, size = solve_orbit(before, x, u, _START)
     while size < _START and speed < 1 and factor > _LEAST_FASTER:
         factor = min(factor, 1 / speed)
         x_more, u_more = x.copy(), factor * u
-        _, larger = solve_orbit(plain._replace(omega=speed * factor * body.omega), x_more, u_more, _START)
+        _, larger = solve_orbit(soft._replace(omega=speed * factor * body.omega), x_more, u_more, _START)
         if larger < _START:
             x, u, speed = x_more, u_more, speed * factor
         else:
