@@ -125,7 +125,8 @@ def test_symmetry_visibility_and_dissipation(name: str) -> None:
     effect = catalogue()[name]
     sizes = [effect.null, effect.typical, effect.typical]
     beside = {effect.beside: catalogue()[effect.beside].typical} if effect.beside else {}
-    groups = control(3, omega_bar=[10.0, 10.0, -10.0], **{**beside, name: sizes})
+    speed, where = (30.0, {"N": 4}) if name == "tail_contact" else (10.0, {})  # tails must touch to feel it
+    groups = control(3, omega_bar=[speed, speed, -speed], **{**where, **beside, name: sizes})
     motion = steady(groups)
     values = {o: getattr(motion, o) for o in OUTPUTS}
     change = max(abs(values[o][1] / values[o][0] - 1) for o in OUTPUTS)
