@@ -51,7 +51,7 @@ def number_change(name: str) -> Change:
 
     def changed(robot: Robot, size: float) -> Robot:
         value = getattr(robot, name) or robot.head_radius  # clamps at a = R where nothing else is said
-        return replace(robot, **{name: value * float(np.exp(size))})
+        return replace(robot, **{name: value * float(np.exp(size))})  # type: ignore[arg-type]
 
     return changed
 
@@ -140,15 +140,17 @@ def deciding_runs(sizes: dict[str, float]) -> None:
         for tails, length, rpm in RUNS
     ]
     predicted = {name: motions([known[name][0](robot, size) for robot in made]) for name, size in sizes.items()}
-    print(f"\n{'explanation':28}{'size':>7}   deciding run             omega_h/omega    yaw [rad/s]   sd to the next")
+    print(
+        f"\n{'explanation':28}{'size':>7}   deciding run             omega_h/omega    yaw [rad/s]   sd to the next"
+    )
     for name, own in predicted.items():
         others = [other for key, other in predicted.items() if key != name]
         apart = [np.hypot(*(np.log(np.abs(own) / np.abs(other)) / NOISE)) for other in others]
         least = np.min(np.nan_to_num(apart), 0)
         run = int(np.argmax(least))
         tails, length, rpm = RUNS[run]
-        print(f"{name:28}{sizes[name]:7.3g}   N = {tails}, {100 * length:2.0f} cm, {rpm:6.2f} rpm"
-              f"{own[0, run]:12.3f}{own[1, run]:15.3f}{least[run]:12.1f}")  # fmt: skip
+        words = f"N = {tails}, {100 * length:2.0f} cm, {rpm:6.2f} rpm{own[0, run]:12.3f}{own[1, run]:15.3f}"
+        print(f"{name:28}{sizes[name]:7.3g}   {words}{least[run]:12.1f}")
 
 
 def main() -> None:

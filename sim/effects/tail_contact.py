@@ -2,11 +2,11 @@
 
     f = F ln(1 + exp((2 r0 − d)/0.008 r0))   per length, where the axes of two tails are d apart
 
-F grows with the size: F = 100 EI/l³ (1000^ε − 1)/999. At ε = 1 tails that touch stay 2 r0 apart to within 2 %, over
-the range of the shipped sweep. By Hertz (f = π/4 E* δ) rubber tails of l/r0 = 34 are twice as hard, and those of
-l/r0 = 15 are a fifth as hard. At small ε tails overlap. Most of what contact does to the motion is there long
-before tails are hard, so on a linear scale all of it would be near zero. Left out: friction, and the fluid between
-the tails, which slows their approach.
+F grows with the size: F = 100 EI/l³ (1000^ε − 1)/999. At ε = 1 tails that touch stay 2 r0 apart to within 2 %
+over the range of the shipped sweep. By Hertz (f = π/4 E* δ) rubber tails of l/r0 = 34 are twice as hard, and
+those of l/r0 = 15 are a fifth as hard. At small ε tails overlap. Most of what contact does to the motion is
+there long before tails are hard. On a linear scale all of it would be near zero. Left out: friction, and the
+fluid between the tails, which slows their approach.
 """
 
 from __future__ import annotations

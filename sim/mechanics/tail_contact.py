@@ -13,10 +13,12 @@ smallest distance, which for a straight line is the distance itself:
 
 the sum over the edges of the other tail, each integral in closed form. The force on x is spread over the other
 tail with the same weights. So force and moment of each pair of points are zero. A tail is here a smooth curve
-through its nodes, with POINTS points on it, whatever the mesh. Left out: friction, and the fluid that is squeezed out between tails.
+through its nodes, with POINTS points on it, whatever the mesh. Left out: friction, and the fluid that is squeezed
+out between tails.
 
-Source: Tong, Choi, Joo, Jawed, *Extreme Mech. Lett.* 58, 101924 (2023), arXiv 2205.10309: an energy of the smoothed
-smallest distance, added implicitly; the smooth smallest distance here is ours. Units: l, EI/l², EI/l³.
+Source: Tong, Choi, Joo, Jawed, *Extreme Mech. Lett.* 58, 101924 (2023), arXiv 2205.10309: an energy of the
+smallest distance, smoothed, and solved for with the balance. The smooth smallest distance here is ours. Units:
+l, EI/l², EI/l³.
 """
 
 from __future__ import annotations

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Integers
-from sim.mechanics.tail_contact import has_contact
 from sim.model.body import Body
 from sim.motion.alike import growth
 from sim.solve.assembly import unpacked
@@ -54,7 +53,7 @@ def solve_orbits(
         found.append(orbit)
         if orbit.ended == SOLVED:
             gap[i] = smallest_gap(body, orbit.x[2], tails)
-            if stability and has_contact(body) and gap[i] < _NEAR:
+            if stability and body.nonlocal_terms.tail_contact != 0 and gap[i] < _NEAR:
                 grows[i] = growth(body, tails, orbit.x[0], orbit.u[0])
             if directions is not None:
                 slopes[i] = _slopes(body, rows[i], directions[i], orbit)

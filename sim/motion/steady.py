@@ -1,12 +1,12 @@
 """Steady motion at constant motor speed: solved for directly where that works, else by time stepping.
 
 The direct solution (`sim.motion.orbits`) is the relative periodic orbit in which all tails move alike. It takes
-less than a millisecond a robot and states the error of its means. Straight tails at rest reach this orbit if the
-robot yaws slowly compared with the spin of its disc (docs/branches.md). If it yaws faster (|ω_yr| > QUICK |ω_t|),
-or if its tails push against each other and may leave this motion (`sim.motion.alike`), the robot is stepped in time
-from rest as well. If stepping reaches another motion, that one is the answer. If Newton's method does not converge,
-stepping gives the answer, too. Such rows say so. Their error is estimated from two meshes and steps.
-Units: l, μ0 l⁴/EI.
+less than a millisecond a robot and states the error of its means. Straight tails at rest reach this orbit if
+the robot yaws slowly compared with the spin of its disc (docs/branches.md). If it yaws faster (|ω_yr| > QUICK
+|ω_t|), or if its tails push against each other and may leave this motion (`sim.motion.alike`), the robot is
+stepped in time from rest as well. If stepping reaches another motion, that one is the answer. If Newton's
+method does not converge, stepping gives the answer, too. Such rows say so. Their error is estimated from two
+meshes and steps. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def newton(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tole
         tolerance: on the last correction.
 
     Returns:
-        Number of corrections (hard contact: from soft contact on, if need be), and size of the last one (in l and 1 + |ω|; above `tolerance`: not converged).
+        Number of corrections, and size of the last one (in l and 1 + |ω|; above `tolerance`: not converged).
     """
     if not has_contact(body):
         return _iterate(body, rates, x, u, work, tolerance)

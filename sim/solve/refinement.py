@@ -20,7 +20,6 @@ import numpy as np
 from sim.arrays import Floats
 from sim.compiling import compiled
 from sim.linear.spectral import with_phases
-from sim.mechanics.tail_contact import has_contact
 from sim.model.body import Body
 from sim.solve.newton import new_workspace, newton
 from sim.solve.orbit import (
@@ -74,7 +73,7 @@ def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
     """
     if tails > _MOST_PHASES:
         return _unsolved(MANY_PHASES, np.zeros((MESHES[0], tails, 3)), np.zeros((1, 4)))
-    ended, error, x, u = _enough_phases(body, *_first_guess(body, tails), tails, least)
+    ended, error, x, u = _on_coarsest_mesh(body, tails, least)
     if ended != SOLVED:
         return _unsolved(ended, x, u)
     return _on_finer_meshes(body, error, x, u)
@@ -84,7 +83,7 @@ def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Flo
     """The orbit on a given mesh: whether there is one, x (n, M, 3) and u (P, 4)."""
     if tails > _MOST_PHASES:
         return False, np.zeros((edges, tails, 3)), np.zeros((1, 4))
-    ended, _, x, u = _enough_phases(body, *_first_guess(body, tails), tails, FEW)
+    ended, _, x, u = _on_coarsest_mesh(body, tails, FEW)
     if ended != SOLVED:
         return False, x, u
     x = with_edges(x, body.offset, edges)
@@ -92,33 +91,50 @@ def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Flo
     return size < CORRECTION and turns_forward(body, u), x, u
 
 
-def _first_guess(body: Body, tails: int) -> tuple[Body, Floats, Floats]:
-    """The robot without its non-local effects, and a guess of its orbit on the coarsest mesh.
-
-    Contact stays, because it decides on which side of each other the tails lie. So its guess comes from a slow
-    motor, at which the tails are apart. The motor is made faster step by step, with a softer contact.
-    """
-    phases = tails * int(np.ceil(2 / tails))
+def _on_coarsest_mesh(body: Body, tails: int, least: int) -> tuple[int, float, Floats, Floats]:
+    """On the coarsest mesh, with `least` phases or more: SOLVED or why not, the error of the phases, x and u."""
     terms = body.nonlocal_terms
     plain = body._replace(nonlocal_terms=terms._make([0.0] * len(terms)))
-    if not has_contact(body):
-        return plain, *straight_start(plain, MESHES[0], phases, tails)
-    touching = plain.nonlocal_terms._replace(tail_contact=terms.tail_contact)
-    plain = plain._replace(nonlocal_terms=touching)
-    soft = plain._replace(nonlocal_terms=touching._replace(tail_contact=_SOFT * terms.tail_contact))
-    speed = min(_SLOW / abs(body.omega), 1.0)
-    factor, before = _FASTER, soft._replace(omega=speed * body.omega)
-    x, u = straight_start(before, MESHES[0], phases, tails)
+    if terms.tail_contact == 0:
+        return _from_straight_tails(body, plain, tails, least)
+    plain = plain._replace(nonlocal_terms=plain.nonlocal_terms._replace(tail_contact=terms.tail_contact))
+    return _enough_phases(body, plain, *_from_a_slow_motor(plain, tails), tails, least)
+
+
+def _from_a_slow_motor(plain: Body, tails: int) -> tuple[Floats, Floats]:
+    """A guess of the orbit on the coarsest mesh, for a robot without other non-local effects than contact.
+
+    Contact decides on which side of each other the tails lie. So the guess comes from a slow motor, at which the
+    tails are apart. The motor is made faster step by step, with a softer contact.
+    """
+    terms = plain.nonlocal_terms
+    soft = plain._replace(nonlocal_terms=terms._replace(tail_contact=_SOFT * terms.tail_contact))
+    speed = min(_SLOW / abs(plain.omega), 1.0)
+    factor, before = _FASTER, soft._replace(omega=speed * plain.omega)
+    x, u = straight_start(before, MESHES[0], _fewest_phases(tails), tails)
     _, size = solve_orbit(before, x, u, _START)
     while size < _START and speed < 1 and factor > _LEAST_FASTER:
         factor = min(factor, 1 / speed)
         x_more, u_more = x.copy(), factor * u
-        _, larger = solve_orbit(soft._replace(omega=speed * factor * body.omega), x_more, u_more, _START)
+        _, larger = solve_orbit(soft._replace(omega=speed * factor * plain.omega), x_more, u_more, _START)
         if larger < _START:
             x, u, speed = x_more, u_more, speed * factor
         else:
             factor = np.sqrt(factor)
-    return plain, x, u
+    return x, u
+
+
+@compiled
+def _fewest_phases(tails: int) -> int:
+    """Two phases or more, a multiple of N."""
+    return tails * int(np.ceil(2 / tails))
+
+
+@compiled
+def _from_straight_tails(body: Body, plain: Body, tails: int, least: int) -> tuple[int, float, Floats, Floats]:
+    """The same as `_enough_phases`, from straight tails."""
+    x, u = straight_start(plain, MESHES[0], _fewest_phases(tails), tails)
+    return _enough_phases(body, plain, x, u, tails, least)
 
 
 @compiled

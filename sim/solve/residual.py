@@ -79,6 +79,7 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
     """
     n, columns, _ = x.shape
     instants = u.shape[0]
+    thinning, touching = thins(body), has_contact(body)
     measure(room.geometry, x, body.offset, body.axial_stiffness)
     fill_rates(rates, body, x, u, room.x_dot, room.by_spin)
     base = base_phase(rates, body, u)
@@ -94,20 +95,20 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
             velocity = plus(plus(motion.linear, cross(motion.spin, vector(x, k, m))), vector(room.x_dot, k, m))
             velocity = minus(velocity, vector(room.around.flow, k + 1, m))
             residual = node_balance(room.geometry, body, motion, k, m, velocity)[0]
-            if thins(body):
+            if thinning:
                 residual = plus(residual, thinned(room.geometry, body, k + 1, m, velocity))
-            if has_contact(body):
+            if touching:
                 residual = plus(residual, vector(room.around.contact, k + 1, m))
             put(r, k, m, residual)
         flow, moment = vector(room.around.flow, 0, m), vector_at(room.around.moment, m)
         clamp = clamp_balance(room.geometry, body, m, motion, flow, moment)
         force, torque = clamp.force, clamp.moment
         root = (body.offset, 0.0, 0.0)
-        if thins(body):
+        if thinning:
             velocity = minus(plus(motion.linear, cross(motion.spin, root)), flow)
             change = thinned(room.geometry, body, 0, m, velocity)
             force, torque = plus(force, change), plus(torque, cross(root, change))
-        if has_contact(body):
+        if touching:
             change = vector(room.around.contact, 0, m)
             force, torque = plus(force, change), plus(torque, cross(root, change))
         wrench = wrench_of(motion, force, torque)

@@ -12,10 +12,11 @@ from scipy.interpolate import CubicSpline
 from sim.linear.spectral import with_phases
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
+from sim.motion.alike import growth
 from sim.motion.resolution import Resolution
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
-from sim.motion.steady import orbits
+from sim.motion.steady import GROWS, orbits
 from sim.solve.orbit import mean_motion
 from sim.solve.refinement import FEW, MANY, SOLVED, difference, orbit_on_mesh, refined_orbit
 from tests.sim.robots import body_of, control
@@ -119,15 +120,28 @@ def test_time_steps_settle_to_the_orbit(name: str) -> None:
 
 @pytest.mark.parametrize("size", [0.3, 1.0])
 def test_sensitivities_are_differences(size: float) -> None:
-    groups = with_contact(ROBOTS["measured"], size)
-    found = sensitivities(groups, ("tail_contact", "C_t"))
-    for i, name in enumerate(("tail_contact", "C_t")):
-        width = 1e-3
-        ends = []
-        for sign in (-1, 1):
-            moved = with_contact(groups, size + sign * width) if i == 0 else replace(
-                groups, C_t=groups.C_t + sign * width
-            )  # fmt: skip
-            ends.append(orbits(moved, phases=MANY).omega_yr[0])
-        slope = (ends[1] - ends[0]) / (2 * width)
-        assert found.derivatives["omega_yr_bar"][0, i] == pytest.approx(slope, rel=5e-3)
+    def yaw(size: float, C_t: float) -> float:
+        groups = replace(with_contact(ROBOTS["measured"], size), C_t=torch.tensor([C_t]).double())
+        return float(orbits(groups, phases=MANY).omega_yr[0])
+
+    C_t, width = float(ROBOTS["measured"].C_t), 1e-3
+    found = sensitivities(with_contact(ROBOTS["measured"], size), ("tail_contact", "C_t"))
+    by_size = (yaw(size + width, C_t) - yaw(size - width, C_t)) / (2 * width)
+    by_drag = (yaw(size, C_t + width) - yaw(size, C_t - width)) / (2 * width)
+    assert found.derivatives["omega_yr_bar"][0] == pytest.approx([by_size, by_drag], rel=5e-3)
+
+
+@pytest.mark.parametrize("tails", [2, 4])
+def test_tails_that_push_a_little_keep_moving_alike(tails: int) -> None:
+    """Their differences decay, with contact and without."""
+    for groups in (control(N=tails, omega_bar=25.0), with_contact(control(N=tails, omega_bar=25.0))):
+        body = body_of(groups)
+        found = refined_orbit(body, tails, FEW)
+        assert growth(body, tails, found.x[0], found.u[0]) < -0.1
+
+
+def test_a_ring_of_five_stout_tails_buckles() -> None:
+    """Its tails leave the motion in which they move alike, which a little noise in their shape shows."""
+    body = body_of(with_contact(control(N=5, omega_bar=58.8, l_over_r0=19.0)))
+    found = refined_orbit(body, 5, FEW)
+    assert growth(body, 5, found.x[0], found.u[0]) > GROWS
