@@ -6,13 +6,13 @@ velocity relative to the fluid that the other parts move:
 
     q_k = −l_k [ζ⊥ I + (ζ∥ − ζ⊥) tt] (v_k − w_k),   w_k = Σ ∫ G(x_k − y) f/μ ds.
 
-The sum is over the edges of the other tails, over the head, and over images. The force of a node is spread
-evenly over the edges beside it, and the integral over a straight edge is exact at any distance. The head is
-pieces of its axis with equal parts of its drag, and rotlets for its spin. In balance, the force of a free node
-on the fluid is its elastic force, contact and load. So w follows from the shape. Only the velocities of clamps
-and head are given, so their forces depend on each other's flow. They are found in a few rounds; each change is
-smaller than the last one. The head's drag, too, is relative to the fluid that the tails move. All of this is
-solved together with the balance, not one step later.
+The sum is over the edges of the other tails, over the head, and over images. The force of a node is spread evenly
+over the edges beside it, and the integral over a straight edge is exact at any distance. The head is pieces of its
+axis with equal parts of its drag, and rotlets for its spin. In balance, the force of a free node on the fluid is
+its elastic force and load. So w follows from the shape. Only the velocities of clamps and head are given, so their
+forces depend on each other's flow. They are found in a few rounds; each change is smaller than the last one. The
+head's drag, too, is relative to the fluid that the tails move. All of this is solved together with the balance,
+not one step later.
 
 C_t is fitted and larger than that of a cylinder (about 1.4). With all of this drag on the fluid, the head would
 move the fluid at the clamps faster than it moves itself. So only a part of the drag moves the fluid: at most the
@@ -87,7 +87,7 @@ def has_flow(body: Body) -> bool:
 @compiled
 def add_flow(
     body: Body, geometry: Geometry, x: Floats, u: Floats, phase: float, instant: int, tails: int,
-    contact: Floats, flow: Floats, wrench: Floats,
+    flow: Floats, wrench: Floats,
 ) -> None:  # fmt: skip
     """The fluid's velocity around a robot at one instant.
 
@@ -95,7 +95,6 @@ def add_flow(
         x: free nodes, (n, M, 3); tail j at instant p of P is column p + j P, at phase φ + 2πj/N.
         u: (v_x, v_z, ω_yr, ω_h), (4,).
         phase: φ.
-        contact: force of other tails on nodes 0..n, (n + 1, M, 3), each in the frame of its tail.
         flow: (n + 1, M, 3), filled in the columns of this instant, each in the frame of its tail.
         wrench: (4,), about J; the effect of the flow on the head is added.
     """
@@ -103,7 +102,7 @@ def add_flow(
     scene, instants = _new_scene(n, tails), columns // tails
     for j in range(tails):
         motion = motion_at(body, u, phase + 2 * np.pi * j / tails)
-        _place_tail(scene, body, geometry, motion, x, contact, j, instant + j * instants)
+        _place_tail(scene, body, geometry, motion, x, j, instant + j * instants)
     _place_head(scene, body, n, tails)
     nodes, edges = (n + 1) * tails, n * tails
     moved = np.zeros_like(scene.place)
@@ -125,7 +124,7 @@ def add_flow(
 
 @compiled
 def _place_tail(
-    scene: Scene, body: Body, geometry: Geometry, motion: Motion, x: Floats, contact: Floats, j: int, column: int
+    scene: Scene, body: Body, geometry: Geometry, motion: Motion, x: Floats, j: int, column: int
 ) -> None:
     """Nodes of tail j, and its edges under the forces of its free nodes."""
     n = x.shape[0]
@@ -136,7 +135,7 @@ def _place_tail(
     scene.of[j * (n + 1) : (j + 1) * (n + 1)] = j
     for k in range(n):
         force = times(0.5 * cell if k == n - 1 else cell, motion.load)
-        force = minus(plus(force, vector(contact, k + 1, column)), vector(geometry.force, k, column))
+        force = minus(force, vector(geometry.force, k, column))
         if k < n - 1:
             force = times(0.5, plus(force, vector(geometry.force, k + 1, column)))
         force = _in_body(motion, force)

@@ -29,8 +29,10 @@ import numpy as np
 
 from sim.arrays import Floats, Integers
 from sim.compiling import compiled
-from sim.linear.blocks import add_at, put, put_at, vector, vector_at
-from sim.linear.vectors import ZERO, Vector, dot, minus, plus, times
+from sim.linear.blocks import add, add_at, put, put_at, vector, vector_at
+from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus, times
+from sim.mechanics.balance import motion_at, wrench_of
+from sim.mechanics.geometry import Geometry
 from sim.model.body import Body
 
 SOFTNESS = 0.004  # of D: the force grows from nothing to a line over a few of these
@@ -49,13 +51,43 @@ def has_contact(body: Body) -> bool:
 
 
 @compiled
-def add_contact(body: Body, x: Floats, instant: int, tails: int, firmness: float, force: Floats) -> None:
-    """The forces of contact on the tails at one instant.
+def add_contact(
+    body: Body, geometry: Geometry, x: Floats, u: Floats, phase: float, instant: int, tails: int, wrench: Floats
+) -> None:
+    """Add contact to the forces of the edges of the tails at one instant, and to the wrench on the robot.
+
+    An edge carries what acts on the nodes beyond it. So its force −Σ f, in `geometry`, is that on these nodes. The
+    clamp feels them through its elastic edge only; `wrench` sets that right.
+
+    Args:
+        x: free nodes, (n, M, 3); tail j at instant p of P is column p + j P, at phase φ + 2πj/N.
+        u: (v_x, v_z, ω_yr, ω_h), (4,).
+        phase: φ.
+        wrench: (4,), about J.
+    """
+    n, columns, _ = x.shape
+    root = (body.offset, 0.0, 0.0)
+    force = np.empty((n + 1, tails, 3))
+    contact_forces(body, x, instant, tails, force)
+    for j in range(tails):
+        total = ZERO
+        for k in range(n, 0, -1):
+            total = plus(total, vector(force, k, j))
+            add(geometry.force, k - 1, instant + j * (columns // tails), times(-1.0, total))
+        total = plus(total, vector(force, 0, j))
+        motion = motion_at(body, u, phase + 2 * np.pi * j / tails)
+        more = wrench_of(motion, total, cross(root, total))
+        for a in range(4):
+            wrench[a] += more[a]
+
+
+@compiled
+def contact_forces(body: Body, x: Floats, instant: int, tails: int, force: Floats) -> None:
+    """Forces of contact on the tails at one instant.
 
     Args:
         x: free nodes, (n, M, 3); tail j at instant p of P is column p + j P.
-        firmness: a factor on the forces.
-        force: (n + 1, M, 3), filled in the columns of this instant: on nodes 0..n, each in the frame of its tail.
+        force: (n + 1, N, 3), filled: on nodes 0..n, each in the frame of its tail.
     """
     n, columns, _ = x.shape
     smooth = _smooth_chain(n)
@@ -73,12 +105,12 @@ def add_contact(body: Body, x: Floats, instant: int, tails: int, firmness: float
                 for k in range(edges):
                     count = _edges_near(body, place[i], k, place[j], near)
                     if count > 0:
-                        _push(body, place[i], k, place[j], near[:count], firmness, push[i], push[j])
+                        _push(body, place[i], k, place[j], near[:count], push[i], push[j])
     back = np.ascontiguousarray(smooth.T)
     for j in range(tails):
         np.dot(back, push[j], nodes)
         for k in range(n + 1):
-            put(force, k, instant + j * (columns // tails), _turned(vector_at(nodes, k), -j / tails))
+            put(force, k, j, _turned(vector_at(nodes, k), -j / tails))
 
 
 @compiled
@@ -132,15 +164,14 @@ def _edges_near(body: Body, one: Floats, k: int, other: Floats, near: Integers) 
 
 @compiled
 def _push(
-    body: Body, one: Floats, k: int, other: Floats, near: Integers, firmness: float,
-    on_one: Floats, on_other: Floats,
-) -> None:  # fmt: skip
+    body: Body, one: Floats, k: int, other: Floats, near: Integers, on_one: Floats, on_other: Floats
+) -> None:
     """Add the forces between the points of edge k of one tail and the edges `near` of the other."""
     n = len(one) - 1
     diameter = 2 * body.tail_radius
     width = WIDTH * diameter
     points = -(-POINTS // n)
-    line = firmness * body.nonlocal_terms.tail_contact * SOFTNESS / FIRM
+    line = body.nonlocal_terms.tail_contact * SOFTNESS / FIRM
     stiffness = 0.5 * line / (points * n)  # each pair counts twice
     start, edge = vector_at(one, k), minus(vector_at(one, k + 1), vector_at(one, k))
     on_ends, square = np.empty((len(near), 2, 3)), np.empty(len(near))

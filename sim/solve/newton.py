@@ -28,8 +28,6 @@ from sim.solve.residual import Room, fill_residual, is_local, new_room
 
 FINITE_DIFFERENCE_STEP = 1e-6  # of the largest entry, in l or 1 + |ω|
 RELATIVE_TOLERANCE = 1e-3  # of the residual in one Newton correction by GMRES
-FIRMNESS = (0.01, 0.05, 0.25, 1.0)  # of contact: where the solution is hard to find, it comes from softer contact
-_NEAR = 1e-4  # limit of the last correction on the way
 _MOST_PRODUCTS = 60
 _MOST_CORRECTIONS = 30
 _LARGEST_MOVE = 0.3  # of a node in one correction, in l; r0 where tails feel each other
@@ -62,28 +60,6 @@ def newton(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tole
     Returns:
         Number of corrections, and size of the last one (in l and 1 + |ω|; above `tolerance`: not converged).
     """
-    if not has_contact(body):
-        return _iterate(body, rates, x, u, work, tolerance)
-    x_start, u_start = x.copy(), u.copy()
-    count, size = _iterate(body, rates, x, u, work, tolerance)
-    if size < tolerance:
-        return count, size
-    x[:], u[:] = x_start, u_start
-    for firmness in FIRMNESS:
-        work.room.firmness[0] = firmness
-        more, size = _iterate(body, rates, x, u, work, tolerance if firmness == 1 else max(tolerance, _NEAR))
-        count += more
-        if not size < _NEAR:
-            break
-    work.room.firmness[0] = 1.0
-    return count, size
-
-
-@compiled
-def _iterate(
-    body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float
-) -> tuple[int, float]:
-    """The same from here, with the contact forces as firm as `work` says."""
     size = np.inf
     for count in range(1, _MOST_CORRECTIONS + 1):
         dx, du = correct(body, rates, x, u, work, True)

@@ -3,9 +3,9 @@
     r = 0 on every free node, t = (F_x, F_z, M_y, M_z) = 0 about J
 
 `fill_residual` adds up all forces: local drag and the elastic forces of straight tails (`sim.mechanics.balance`),
-and the non-local effects. These are material frames (`frames`), flow between the parts (`flow`), contact between
-tails (`tail_contact`), friction of the contact line, and thinning of the fluid, which changes the drag on every
-node (`thinning`). A new non-local effect is called in `_surround`. Units: l, μ0 l⁴/EI, EI/l².
+and the non-local effects. These are material frames (`frames`), flow between the parts (`flow`), contact
+between tails (`tail_contact`), friction of the contact line, and thinning of the fluid, which changes the drag on
+every node (`thinning`). A new non-local effect is called in `_surround`. Units: l, μ0 l⁴/EI, EI/l².
 
 The Newton matrices of `sim.solve.linearise` leave the non-local effects out; GMRES takes them into account
 (`sim.solve.newton`).
@@ -38,7 +38,6 @@ class Surroundings(NamedTuple):
     flow: Floats  # of the fluid at nodes 0..n, (n + 1, M, 3)
     moment: Floats  # further moment of each clamp on the disc, (M, 3)
     wrench: Floats  # on the robot about J, (P, 4)
-    contact: Floats  # force on nodes 0..n by other tails, (n + 1, M, 3)
 
 
 class Room(NamedTuple):
@@ -48,16 +47,14 @@ class Room(NamedTuple):
     around: Surroundings
     x_dot: Floats  # (n, M, 3)
     by_spin: Floats  # (n, M, 3), see `sim.solve.rates`
-    firmness: Floats  # (1,): factor on the contact forces, below 1 while Newton's method nears its solution
 
 
 @compiled
 def new_room(x: Floats, u: Floats) -> Room:
     """Room for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, _ = x.shape
-    flow, contact = np.zeros((n + 1, columns, 3)), np.zeros((n + 1, columns, 3))
-    around = Surroundings(flow, np.zeros((columns, 3)), np.zeros_like(u), contact)
-    return Room(new_geometry(n, columns), around, np.zeros_like(x), np.zeros_like(x), np.ones(1))
+    around = Surroundings(np.zeros((n + 1, columns, 3)), np.zeros((columns, 3)), np.zeros_like(u))
+    return Room(new_geometry(n, columns), around, np.zeros_like(x), np.zeros_like(x))
 
 
 @compiled
@@ -79,7 +76,6 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
     """
     n, columns, _ = x.shape
     instants = u.shape[0]
-    thinning, touching = thins(body), has_contact(body)
     measure(room.geometry, x, body.offset, body.axial_stiffness)
     fill_rates(rates, body, x, u, room.x_dot, room.by_spin)
     base = base_phase(rates, body, u)
@@ -95,21 +91,16 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
             velocity = plus(plus(motion.linear, cross(motion.spin, vector(x, k, m))), vector(room.x_dot, k, m))
             velocity = minus(velocity, vector(room.around.flow, k + 1, m))
             residual = node_balance(room.geometry, body, motion, k, m, velocity)[0]
-            if thinning:
+            if thins(body):
                 residual = plus(residual, thinned(room.geometry, body, k + 1, m, velocity))
-            if touching:
-                residual = plus(residual, vector(room.around.contact, k + 1, m))
             put(r, k, m, residual)
         flow, moment = vector(room.around.flow, 0, m), vector_at(room.around.moment, m)
         clamp = clamp_balance(room.geometry, body, m, motion, flow, moment)
         force, torque = clamp.force, clamp.moment
-        root = (body.offset, 0.0, 0.0)
-        if thinning:
+        if thins(body):
+            root = (body.offset, 0.0, 0.0)
             velocity = minus(plus(motion.linear, cross(motion.spin, root)), flow)
             change = thinned(room.geometry, body, 0, m, velocity)
-            force, torque = plus(force, change), plus(torque, cross(root, change))
-        if touching:
-            change = vector(room.around.contact, 0, m)
             force, torque = plus(force, change), plus(torque, cross(root, change))
         wrench = wrench_of(motion, force, torque)
         for a in range(4):
@@ -127,7 +118,7 @@ def _surround(body: Body, x: Floats, u: Floats, phase: float, p: int, tails: int
             motion = motion_at(body, u, phase + 2 * np.pi * (m - p) / columns)
             add_frames(body, geometry, motion, m, room.x_dot, around.moment)
     if has_contact(body):
-        add_contact(body, x, p, tails, room.firmness[0], around.contact)
+        add_contact(body, geometry, x, u, phase, p, tails, around.wrench[p])
     if has_flow(body):
-        add_flow(body, geometry, x, u, phase, p, tails, around.contact, around.flow, around.wrench[p])
+        add_flow(body, geometry, x, u, phase, p, tails, around.flow, around.wrench[p])
     add_contact_line(body, u, around.wrench[p])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim.mechanics.geometry import straight
-from sim.mechanics.tail_contact import FIRM, SOFTNESS, add_contact
+from sim.mechanics.tail_contact import FIRM, SOFTNESS, contact_forces
 from sim.model.body import Body
 from tests.sim.robots import body_of, control
 
@@ -28,7 +28,7 @@ def bundle(tails: int, seed: int) -> tuple[Body, np.ndarray]:
 def forces(body: Body, x: np.ndarray) -> np.ndarray:
     """Contact forces on nodes 0..n of tails x (n, N, 3), each in the frame of its tail, (n + 1, N, 3)."""
     out = np.full((len(x) + 1, *x.shape[1:]), np.nan)
-    add_contact(body, x, 0, x.shape[1], 1.0, out)
+    contact_forces(body, x, 0, x.shape[1], out)
     return out
 
 
