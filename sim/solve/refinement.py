@@ -51,6 +51,7 @@ _PHASE_ERROR = 1e-4  # relative, in the means
 _DOUBT = 0.03  # share of the extrapolation that counts as error
 _SHRINKS = 0.2  # assumed factor on the phase error with the next number of phases, if only one is known
 _MOST_PHASES = 48
+_SOFTER, _SOFTEST = 5.0, 0.5  # factor from hard contact to softer, and where it ends (EI/l³)
 _SLOW, _FASTER, _LEAST_FASTER = 3.0, 1.5, 1.02  # ω̄ to begin with where tails may touch, and factors from there
 _START, _SOFT = 1e-3, 0.05  # limit of the last Newton correction on the way, and factor on the contact there
 
@@ -74,9 +75,27 @@ def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
     if tails > _MOST_PHASES:
         return _unsolved(MANY_PHASES, np.zeros((MESHES[0], tails, 3)), np.zeros((1, 4)))
     ended, error, x, u = _on_coarsest_mesh(body, tails, least)
-    if ended != SOLVED:
-        return _unsolved(ended, x, u)
-    return _on_finer_meshes(body, error, x, u)
+    orbit = _unsolved(ended, x, u) if ended != SOLVED else _on_finer_meshes(body, error, x, u)
+    if orbit.ended != SOLVED and body.nonlocal_terms.tail_contact > _SOFTEST:
+        return _by_softer_contact(body, tails, least, orbit)
+    return orbit
+
+
+def _by_softer_contact(body: Body, tails: int, least: int, lost: Orbit) -> Orbit:
+    """The orbit from that of the same robot with softer contact, on the same meshes and phases; else `lost`."""
+    terms = body.nonlocal_terms
+    soft = body._replace(nonlocal_terms=terms._replace(tail_contact=terms.tail_contact / _SOFTER))
+    found = refined_orbit(soft, tails, least)
+    if found.ended != SOLVED:
+        return lost
+    for x, u in zip(found.x, found.u, strict=True):
+        _, size = solve_orbit(body, x, u, CORRECTION)
+        if not (size < CORRECTION and turns_forward(body, u)):
+            return lost
+    means = np.array([mean_motion(body, u) for u in found.u])
+    limit = extrapolate(means)
+    error = difference(_without_last_term(means), limit) + _DOUBT * difference(means[2], limit) + _PHASE_ERROR
+    return Orbit(SOLVED, max(error, found.error), limit, found.x, found.u)
 
 
 def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Floats]:
