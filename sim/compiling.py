@@ -30,6 +30,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _HERE = Path(__file__).parent
 _SOURCES = ("arrays.py", "compiling.py", "linear/*.py", "mechanics/*.py", "model/body.py", "solve/*.py")
+_PACKAGES = ("sim", "surrogate")  # with loops whose compiling is shown
 _KEPT = 3  # folders of other versions
 _LEVEL = 1  # of optimisation: loops run as fast as at level 3 and compile in less than half the time
 
@@ -84,7 +85,7 @@ class _Progress(event.Listener):
             self._depth += 1
             if self._bar is None:
                 self._bar = tqdm(
-                    desc="compiling the simulator's loops for first use",
+                    desc="compiling loops for first use",
                     bar_format="{desc}: {n_fmt} done in {elapsed} min",
                     delay=1.0,
                     leave=False,
@@ -101,7 +102,7 @@ class _Progress(event.Listener):
 
 
 def _is_ours(event: Any) -> bool:
-    return str(event.data["dispatcher"].py_func.__module__).startswith("sim.")
+    return str(event.data["dispatcher"].py_func.__module__).split(".")[0] in _PACKAGES
 
 
 event.register("numba:compile", _Progress())  # type: ignore[no-untyped-call]

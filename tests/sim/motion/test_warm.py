@@ -25,7 +25,7 @@ def test_compiling_a_loop_is_announced(
     formula.__module__ = "sim.formula"
     loop = compiling.compiled(formula)
     assert loop(2.0) == 4.0
-    assert "compiling the simulator's loops for first use: 1 done" in capsys.readouterr().err
+    assert "compiling loops for first use: 1 done" in capsys.readouterr().err
     loop(3.0)
     assert capsys.readouterr().err == ""
 
