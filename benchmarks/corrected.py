@@ -20,8 +20,6 @@ from dataclasses import replace
 
 import numpy as np
 import torch
-from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq
 
 from planner.lookup import vehicle_of
 from sim.arrays import Floats
@@ -36,10 +34,9 @@ from sim.model.robot import Robot
 from sim.motion.resolution import Resolution
 from sim.motion.run import Run
 from sim.motion.settling import steady_state
-from sim.motion.switching import MEMORY
+from sim.motion.switching import MEMORY, steady_twist
 from sim.motion.warm import compile_once
 from sim.solve.assembly import bodies, reversed_bodies
-from sim.solve.march import PHASE, SURGE, SWAY, YAW
 from surrogate.single import SingleRobot
 from surrogate.tabulate import tabulate
 
@@ -100,7 +97,11 @@ def _lags(body: Body, reverse: Body, tails: int, dwell: float, mesh: Resolution)
         Run(own, tails, mesh, steady_state(own, tails, mesh), reverse=other, most_work=np.inf)
         for own, other in ((body, reverse), (reverse, body))
     ]
-    twists, (turn, _) = zip(*[_twist(run, tails, s) for run, s in zip(runs, _SENSES, strict=True)], strict=True)
+    found = [
+        steady_twist(run, tails, sense, adapts=_ADAPTS, window=_WINDOW)
+        for run, sense in zip(runs, _SENSES, strict=True)
+    ]
+    twists, (turn, _) = zip(*found, strict=True)
     count = 2 * int(np.ceil((1 + MEMORY / dwell) / 2)) + 1
     changes = np.zeros((2, 3))
     for phase in range(_PHASES):
@@ -114,24 +115,6 @@ def _lags(body: Body, reverse: Body, tails: int, dwell: float, mesh: Resolution)
             if flip >= count - 1:
                 changes[flip % 2] += planar.between(before, run.pose) * _VIEW[flip % 2] / _PHASES
     return planar.compose(changes, planar.inverse(planar.arc(np.array(twists), dwell)))
-
-
-def _twist(run: Run, tails: int, sense: float) -> tuple[Floats, float]:
-    """Steady twist, seen as for a positive motor, and the time in which the disc turns by a tail spacing.
-
-    Means over a whole number of tail spacings, read from the angle of the disc: with a free surface the spin and
-    the velocities change within a turn.
-    """
-    run.go(_ADAPTS)
-    before = run.state.pose.copy()
-    times, poses = run.go(_WINDOW)
-    track = CubicSpline(np.append(0.0, times), np.concatenate([before[None], poses]) - before)
-    angles, spacing = np.abs(track.c[-1, :, PHASE]), 2 * np.pi / tails
-    count = int(angles[-1] / spacing)
-    place = np.searchsorted(angles, count * spacing)
-    time = float(brentq(lambda t: abs(track(t)[PHASE]) - count * spacing, track.x[place - 1], track.x[place]))
-    mean = track(time) / time
-    return np.array([mean[SURGE], sense * mean[SWAY], sense * mean[YAW]]), time / count
 
 
 def main() -> None:

@@ -49,6 +49,7 @@ MEMORY = 1.2  # time units after which a flip is forgotten: the tails turn over 
 _AVERAGED = 2  # half-periods that the mean is taken over, where there are as many
 _ADAPTS = 0.5  # time units after which time steps have forgotten that they began on an orbit of another mesh
 _WINDOW = 0.5  # shortest averaging time of the steady circle
+_APPROACH = 0.9  # of the angle that is left; the steps to its end must not become tiny
 
 
 @dataclass(frozen=True)
@@ -113,18 +114,28 @@ def _lag(body: Body, reverse: Body, tails: int, dwell: float, even: bool, resolu
     return planar.compose(np.mean(changes, 0), planar.inverse(planar.arc(twist, dwell)))
 
 
-def steady_twist(run: Run, tails: int, sense: float) -> tuple[Floats, float]:
-    """Forward, leftward and yaw rate for a positive motor, and the time in which the disc turns by a tail spacing.
+def steady_twist(
+    run: Run, tails: int, sense: float, *, adapts: float = _ADAPTS, window: float = _WINDOW
+) -> tuple[Floats, float]:
+    """Forward, leftward and yaw rate for a positive motor, and the time in which the disc turns by one spacing.
 
-    Velocities repeat with the spacing of the tails: means over a whole number of them.
+    Velocities repeat with the spacing of the tails: means over a whole number of spacings. The spin may change
+    within a turn (near a free surface, say), so the end is approached by the angle of the disc.
+
+    Args:
+        adapts: time units before the averaging.
+        window: shortest averaging time.
     """
-    run.go(_ADAPTS)
-    before = run.state.pose.copy()
-    spacing = 2 * np.pi / tails / max(abs(run.omega_t), 1e-300)
-    time = spacing * max(1, math.ceil(_WINDOW / spacing))
-    run.go(time)
+    run.go(adapts)
+    before, spacing, time = run.state.pose.copy(), 2 * np.pi / tails, 0.0
+    angle = spacing * max(1, math.ceil(window * abs(run.omega_t) / spacing))
+    for share in (_APPROACH, _APPROACH, 1.0):
+        left = angle - abs(run.state.pose[PHASE] - before[PHASE])
+        step = share * max(left, 0.0) / max(abs(run.omega_t), 1e-300)
+        run.go(step)
+        time += step
     change = (run.state.pose - before) / time
-    turn = 2 * np.pi / tails / max(abs(change[PHASE]), 1e-300)
+    turn = spacing / max(abs(change[PHASE]), 1e-300)
     return np.array([change[SURGE], sense * change[SWAY], sense * change[YAW]]), turn
 
 
