@@ -218,7 +218,8 @@ class Lookup:
             rows = np.flatnonzero(kind == k)
             if len(rows) and support is not None:
                 remote[rows], learned[rows] = support.remoteness(inputs[rows]), True
-        quick = np.abs(motion[:, 2] / motion[:, 4])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            quick = np.abs(motion[:, 2] / motion[:, 4])
         which = np.select([~learned, ~known, ~(remote <= 1), quick > BRANCHES], [1, 2, 3, 4])
         return [_REASONS[number] for number in which.tolist()]
 
