@@ -24,11 +24,11 @@ from sim.model.response import DWELLS
 from sim.model.robot import Robot
 from sim.motion.batches import steady_columns
 from sim.motion.response import responses
-from surrogate.domain import BOUNDS, COEFFICIENTS
+from surrogate.domain import BOUNDS, COEFFICIENTS, ROBOT
 from surrogate.export import load
 from surrogate.inverse import design, inverse
 from surrogate.lookup import OUTSIDE, Lookup
-from surrogate.rows import ROBOT, Simulated, as_reached, drawn
+from surrogate.rows import Simulated, as_reached, drawn
 from surrogate.train import with_radius
 
 KINDS = {  # free inputs, and the outputs that are given

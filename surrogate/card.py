@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Flags, Floats
+from surrogate.domain import ROBOT
 from surrogate.evaluate import COMPARED, relative_errors
 from surrogate.intervals import COVERAGE
 from surrogate.lookup import Lookup
-from surrogate.rows import ROBOT, Simulated
+from surrogate.rows import Simulated
 from surrogate.train import with_radius
 
 _WORST = 10

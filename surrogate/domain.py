@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
+
+ROBOT = (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)  # columns of a robot without effects
 DOMAIN = {
     "C_t": (0.5, 8.0), "C_r": (0.5, 6.0), "C_yr": (0.2, 12.0), "l_over_R": (2.0, 12.0), "L_over_R": (1.5, 8.0),
     "l_over_r0": (12.0, 80.0), "omega_bar": (0.5, 150.0), "a_over_R": (0.5, 1.2),

@@ -17,10 +17,10 @@ from torch import Tensor
 from sim.io.errors import InputError
 from surrogate import tensor_file
 from surrogate.curves import PARTS, SHAPES, Basis, CurveTable
+from surrogate.domain import ROBOT
 from surrogate.intervals import Intervals
 from surrogate.lookup import Lookup
 from surrogate.network import Ensemble
-from surrogate.rows import ROBOT
 from surrogate.single import load_single
 from surrogate.support import Support
 from surrogate.table import LookupTable

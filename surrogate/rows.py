@@ -19,14 +19,13 @@ from scipy.stats import qmc
 from dataset.store import read, read_manifest, usable
 from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
-from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, Groups
+from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, LAG_PARTS
 from sim.motion.batches import run_batches, split, steady_columns
 from sim.motion.response import responses
 from sim.motion.steady import orbits
-from surrogate.domain import DOMAIN, MOST_TAILS, WIDE
+from surrogate.domain import DOMAIN, MOST_TAILS, ROBOT, WIDE
 
-ROBOT = (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)
 MOTION = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap", "error")
 _TAILS = (1, 1, 2, 2, 3, 4, 5, 7)  # N of eighths of the wide robots; half of the last two have one tail more
 _PHASES = {1: 8, 2: 12}  # to begin with, by N: with one or two tails the motion depends more on the disc's phase

@@ -23,11 +23,12 @@ from sim.io.errors import InputError
 from sim.io.provenance import fingerprint, provenance
 from surrogate import curves, tail, tails
 from surrogate.curves import learn_curves
+from surrogate.domain import ROBOT
 from surrogate.evaluate import curve_errors, relative_errors, summary
 from surrogate.fit import Settings
 from surrogate.intervals import Intervals
 from surrogate.lookup import BRANCHES, Lookup, steady_outputs
-from surrogate.rows import ROBOT, Simulated, joined, read_rows, simulated
+from surrogate.rows import Simulated, joined, read_rows, simulated
 from surrogate.support import Support
 from surrogate.tails import CLASSES, class_of, learn_tails, learnable, rows_of
 from surrogate.work import Work, device_named
