@@ -70,7 +70,8 @@ class Minimiser:
         def at(point: Floats) -> tuple[float, Tensor]:
             key = point.tobytes()
             if key not in tried:
-                tried[key] = self.function(torch.as_tensor(point, device=self.x.device))
+                # A copy, since it is aligned: the last digits of matrix products depend on that.
+                tried[key] = self.function(torch.tensor(point, device=self.x.device))
             return tried[key]
 
         def value(point: Floats) -> float:
