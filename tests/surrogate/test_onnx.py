@@ -52,6 +52,11 @@ def test_it_answers_as_the_table_does(wide: bool, tmp_path: Path) -> None:
     assert np.count_nonzero(wanted["outside"] != found["outside"]) <= 2  # a limit may be met to rounding
     inside = ~wanted["outside"] & ~found["outside"]
     assert inside.mean() > 0.9
+    # The table of one tail has second solutions. Rounding decides which one some few robots get.
+    other = np.abs(found["omega_t_bar"] / wanted["omega_t_bar"] - 1) > 1e-8
+    assert np.count_nonzero(inside & other) <= 3
+    assert (robots["N"][inside & other] == 1).all()
+    inside &= ~other
     for name in STEADY_OUTPUTS:
         size = np.hypot(wanted["v_x"], wanted["v_z"]) if name == "v_z" else np.abs(wanted[name])
         with np.errstate(invalid="ignore"):
