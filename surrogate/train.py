@@ -191,7 +191,7 @@ def _errors(lookup: Lookup, rows: Simulated) -> tuple[torch.Tensor, dict[str, to
     errors = relative_errors(steady_outputs(found, lookup.tails), truth)
     return (
         lookup.hints(found)[torch.as_tensor(inside)],
-        {name: torch.as_tensor(error[inside]) for name, error in errors.items()},
+        {name: torch.tensor(error[inside]) for name, error in errors.items()},
         inside,
     )
 
