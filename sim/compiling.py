@@ -3,7 +3,8 @@
 numba's own cache depends only on the file of the loop. If a formula in another file changes, it would use old
 machine code. So the cache is a folder whose name has a digest of all files that compiled loops are made of. After
 a change the loops are always compiled again. The folders of the last few versions are kept. They are beside this
-file, or in the user's cache folder if this one cannot be written.
+file, or in the user's cache folder if this one cannot be written. Loops of other packages have folders of their
+own in it, named by a digest of all files beside them.
 
 Sums may be reordered and multiplications fused, so last digits can differ between machines. NaN and infinity keep
 their meaning.
@@ -16,6 +17,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from shutil import rmtree
@@ -30,7 +32,6 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _HERE = Path(__file__).parent
 _SOURCES = ("arrays.py", "compiling.py", "linear/*.py", "mechanics/*.py", "model/body.py", "solve/*.py")
-_PACKAGES = ("sim", "surrogate")  # with loops whose compiling is shown
 _KEPT = 3  # folders of other versions
 _LEVEL = 1  # of optimisation: loops run as fast as at level 3 and compile in less than half the time
 
@@ -72,6 +73,16 @@ def mark_all_compiled() -> None:
     _ALL.touch()
 
 
+_modules: set[str] = set()  # with compiled loops
+
+
+@cache
+def folder_beside(place: Path) -> Path:
+    """Where loops of files in another package's folder are kept."""
+    digest = sha256(b"".join(path.read_bytes() for path in sorted(place.glob("*.py")))).hexdigest()[:12]
+    return CACHE / f"beside-{digest}"
+
+
 class _Progress(event.Listener):
     """A line on stderr while numba compiles loops of this package; it appears after a second."""
 
@@ -102,7 +113,7 @@ class _Progress(event.Listener):
 
 
 def _is_ours(event: Any) -> bool:
-    return str(event.data["dispatcher"].py_func.__module__).split(".")[0] in _PACKAGES
+    return event.data["dispatcher"].py_func.__module__ in _modules
 
 
 event.register("numba:compile", _Progress())  # type: ignore[no-untyped-call]
@@ -110,7 +121,10 @@ event.register("numba:compile", _Progress())  # type: ignore[no-untyped-call]
 
 def compiled(function: F) -> F:
     """Compile a function of numbers and arrays on its first call, without holding the interpreter's lock."""
-    with _setting("CACHE_DIR", str(CACHE)):
+    _modules.add(function.__module__)
+    place = Path(function.__code__.co_filename)
+    folder = CACHE if place.is_relative_to(_HERE) else folder_beside(place.parent)
+    with _setting("CACHE_DIR", str(folder)):
         loop: Any = njit(
             cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"}
         )(function)

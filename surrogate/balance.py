@@ -15,12 +15,12 @@ from sim.arrays import Flags, Floats
 from sim.compiling import compiled
 from sim.linear.dense import solve_dense
 from surrogate.perceptron import Packed, evaluate
+from surrogate.tail import SMALL_DEFLECTION, SMALL_SURGE, SOFT, TINY, thrust_of, torque_of
 
 STEPS, CORRECTION = 60, 1e-9  # of Broyden's method; the correction is relative
 _DIFFERENCE, _LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
 _FIRST_SPIN = 0.6  # ω_t/ω in the first guess
 _LONGEST = 0.5  # largest relative change of ω_t in one step
-_SOFT, _SMALL_DEFLECTION, _SMALL_SURGE, _TINY = 12.0, 0.05, 0.05, 1e-30  # as in surrogate.tail
 
 
 @compiled
@@ -64,26 +64,16 @@ def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
     """`surrogate.tail.inputs_of` of one robot, written to x (7,), or `inputs_with_head`, to x (14,)."""
     v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
     drag_number = tail[0] * spin
-    deflection = np.sqrt(v_x**2 + yaw**2 + _TINY) / spin * drag_number / (drag_number + _SOFT)
+    deflection = np.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
     x[0] = np.log(drag_number)
     x[1] = np.log(tail[2])
     x[2] = -np.log(tail[3])
-    x[3] = np.arcsinh(deflection / _SMALL_DEFLECTION)
+    x[3] = np.arcsinh(deflection / SMALL_DEFLECTION)
     x[4] = np.arctan2(v_x, yaw)
-    x[5] = np.arcsinh(v_z / (tail[2] * spin) / _SMALL_SURGE)
+    x[5] = np.arcsinh(v_z / (tail[2] * spin) / SMALL_SURGE)
     x[6] = np.log(tail[5] / (tail[4] * tail[0] * tail[2] ** 2))
     for i in range(7, len(x)):
         x[i] = tail[i - 1]
-
-
-@compiled
-def _thrust(S: float) -> float:
-    return 0.125 * S / (1 + (S / 8) ** 1.35)
-
-
-@compiled
-def _torque(S: float) -> float:
-    return (1 + (S / 6) ** 2) ** -0.125
 
 
 @compiled
@@ -92,14 +82,14 @@ def _unbalanced(head: Floats, resistance: Floats, tail: Floats, motion: Floats, 
     v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
     perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
     S = perp * spin
-    sideways = np.sqrt(v_x**2 + yaw**2 + _TINY)
+    sideways = np.sqrt(v_x**2 + yaw**2 + TINY)
     squared = (sideways / (a * spin)) ** 2
     couple = number * spin * a**2
     across = number * perp
     left[0] = across * (yaw / 2 - v_x + sideways * y[0])
-    left[1] = -number * parallel * v_z + (perp - parallel) * couple * _thrust(S) * (y[1] + squared * y[4])
+    left[1] = -number * parallel * v_z + (perp - parallel) * couple * thrust_of(S) * (y[1] + squared * y[4])
     left[2] = across * (v_x / 2 - yaw / 3 + sideways * y[2])
-    left[3] = -perp * couple * _torque(S) * (y[3] + squared * y[5])
+    left[3] = -perp * couple * torque_of(S) * (y[3] + squared * y[5])
     for i in range(4):
         for j in range(5):
             left[i] -= resistance[i, j] * motion[j]
@@ -112,7 +102,7 @@ def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats)
     perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
     spin = _FIRST_SPIN * speed
     for _ in range(3):
-        torque = number * perp * a**2 * _torque(perp * spin)
+        torque = number * perp * a**2 * torque_of(perp * spin)
         spin = speed * resistance[3, 3] / (resistance[3, 3] + gain * (torque + resistance[3, 4]))
     head_spin = (spin - speed) / gain
     matrix, push = resistance[:3, :3].copy(), np.empty((3, 1))
@@ -123,7 +113,7 @@ def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats)
     matrix[2, 0] -= number * perp / 2
     for i in range(3):
         push[i, 0] = -resistance[i, 3] * head_spin - resistance[i, 4] * spin
-    push[1, 0] += number * (perp - parallel) * spin * a**2 * _thrust(perp * spin)
+    push[1, 0] += number * (perp - parallel) * spin * a**2 * thrust_of(perp * spin)
     solve_dense(matrix, push)
     motion[:3] = push[:, 0]
     motion[3], motion[4] = head_spin, spin

@@ -43,6 +43,7 @@ PARTS = (("lag", "spread"), ("memory", "rest"))  # what each network gives
 COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 20}
 SETTINGS = Settings(width=48, depth=2, members=2, epochs=200, iterations=150)
 _SMALL_SURGE = 0.1  # of v_x
+_OF_HEAD = [0, 1, 2, 3, 5, 6]  # of the inputs of the head: all but the coupling of sway and turn
 _SMOOTH = 2.0  # standard deviations over which the components change
 
 
@@ -62,7 +63,7 @@ class CurveTable:
 
     def curves(self, heads: Heads, tails: Tails, motion: Tensor) -> dict[str, Floats]:
         """Lag, memory, rest and spread, each (M, …, 3) as in SHAPES, in l, l, rad, for a positive motor."""
-        inputs, speeds = inputs_of(heads, tails, motion), speeds_of(heads, motion)
+        inputs, speeds = inputs_of(tails, motion), speeds_of(heads, motion)
         found = {}
         for names, network in zip(PARTS, self.networks, strict=True):
             sizes = [len(self.bases[name].vectors) for name in names]
@@ -74,21 +75,10 @@ class CurveTable:
         return found
 
 
-def inputs_of(heads: Heads, tails: Tails, motion: Tensor) -> Tensor:
+def inputs_of(tails: Tails, motion: Tensor) -> Tensor:
     """Inputs of the network, (M, 15)."""
-    across = tails.number * tails.zeta_perp
-    resistance = heads.resistance
-    extra = [
-        torch.log(resistance[:, 0, 0] / across),
-        torch.log(resistance[:, 1, 1] / across),
-        torch.log(resistance[:, 2, 2] / across),
-        torch.log(heads.length),
-        torch.log(resistance[:, 0, 3] / across),
-        resistance[:, 3, 4] / resistance[:, 3, 3],
-        torch.log(tails.number),
-        (tails.number == 2).double(),
-    ]
-    return torch.cat([tail.inputs_of(tails, motion), torch.stack(extra, -1)], -1)
+    extra = [torch.log(tails.number), (tails.number == 2).double()]
+    return torch.cat([tail.inputs_of(tails, motion), tails.head[:, _OF_HEAD], torch.stack(extra, -1)], -1)
 
 
 def speeds_of(heads: Heads, motion: Tensor) -> Tensor:
@@ -102,7 +92,7 @@ def learn_curves(
     heads: Heads, tails: Tails, motion: Tensor, curves: Mapping[str, Floats], settings: Settings, work: Work
 ) -> CurveTable:
     """A table from the curves of robots, by name as in SHAPES, each (M, …, 3); NaN where one was not simulated."""
-    inputs, speeds = inputs_of(heads, tails, motion), speeds_of(heads, motion)
+    inputs, speeds = inputs_of(tails, motion), speeds_of(heads, motion)
     networks: list[Ensemble] = []
     bases: dict[str, Basis] = {}
     for names in PARTS:

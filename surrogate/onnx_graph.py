@@ -18,14 +18,13 @@ import numpy as np
 
 from sim.io.errors import InputError
 from sim.io.files import whole_file
-from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate import balance, lookup, tail
+from surrogate.domain import ROBOT
 from surrogate.lookup import OUTSIDE, Lookup
 from surrogate.network import Ensemble
 from surrogate.support import DEGREE
 
-INPUTS = (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)
 UNITS = {
     "C_t": "1", "C_r": "1", "C_yr": "1", "l_over_R": "1", "L_over_R": "1", "l_over_r0": "1",
     "omega_bar": "EI/(mu0 l^4), signed", "N": "1, a whole number", "a_over_R": "1",
@@ -60,7 +59,7 @@ class _Query:
 
     def __init__(self, graph: Any, table: Lookup):
         self.g, self.table = graph, table
-        columns = {name: graph.input(name, ("robots",), UNITS[name]) for name in INPUTS}
+        columns = {name: graph.input(name, ("robots",), UNITS[name]) for name in ROBOT}
         self._sort(columns["N"])
         own = {name: graph.gather(column, self.order, 0) for name, column in columns.items()}
         self.own, self.N = own, own["N"]
@@ -95,7 +94,7 @@ class _Query:
         g.output(OUTSIDE, g.gather(outside, self.back, 0), ("robots",), UNITS[OUTSIDE], flag=True)
         metadata = {
             "table": self.table.identity,
-            "units": json.dumps({name: UNITS[name] for name in (*INPUTS, *STEADY_OUTPUTS, OUTSIDE)}),
+            "units": json.dumps({name: UNITS[name] for name in (*ROBOT, *STEADY_OUTPUTS, OUTSIDE)}),
             "domain": json.dumps(self.table.ranges),
             "errors": json.dumps(self.table.errors),
         }
@@ -134,17 +133,17 @@ class _Query:
         g = self.g
         v_x, v_z, yaw, _, spin = motion
         drag_number = self.across * spin
-        sideways = g.sqrt(v_x * v_x + yaw * yaw + tail._TINY)
-        deflection = sideways / spin * drag_number / (drag_number + tail._SOFT)
+        sideways = g.sqrt(v_x * v_x + yaw * yaw + tail.TINY)
+        deflection = sideways / spin * drag_number / (drag_number + tail.SOFT)
         like = 0.0 * spin  # gives all inputs the same axes
         return g.stack(
             [
                 g.log(drag_number),
                 g.log(self.offset) + like,
                 g.log(self.own["l_over_r0"]) + like,
-                g.asinh(deflection / tail._SMALL_DEFLECTION),
+                g.asinh(deflection / tail.SMALL_DEFLECTION),
                 g.atan2(v_x, yaw),
-                g.asinh(v_z / (self.offset * spin) / tail._SMALL_SURGE),
+                g.asinh(v_z / (self.offset * spin) / tail.SMALL_SURGE),
                 g.log(self.spin_drag / (self.N * self.across * self.offset * self.offset)) + like,
             ]
         )
@@ -156,12 +155,6 @@ class _Query:
         drag, length = g.log(self.drag / total) + like, g.log(self.length) + like
         turning = drag + 2 * (length - math.log(2))
         return g.stack([drag, drag, turning, length, 1 + like, g.log(self.side / total) + like, like])
-
-    def _thrust(self, S: Any) -> Any:
-        return 0.125 * S / (1 + (S / 8) ** 1.35)
-
-    def _torque(self, S: Any) -> Any:
-        return (1 + (S / 6) ** 2.0) ** -0.125
 
     def _motion(self, u: Any) -> Any:
         v_x, v_z, yaw, head_spin = (self.g.gather(u, i) for i in range(4))
@@ -179,13 +172,13 @@ class _Query:
         v_x, v_z, yaw, head_spin, spin = self._motion(u)
         y = [g.gather(numbers, i) for i in range(len(tail.TYPICAL[0]))]
         S, across = self.across * spin, self.N * self.across
-        sideways = g.sqrt(v_x * v_x + yaw * yaw + tail._TINY)
+        sideways = g.sqrt(v_x * v_x + yaw * yaw + tail.TINY)
         squared = sideways / (self.offset * spin)
         squared = squared * squared
         couple = self.N * spin * self.offset * self.offset
         force = across * sideways
-        thrust = (self.across - self.along) * couple * self._thrust(S)
-        torque = self.across * couple * self._torque(S)
+        thrust = (self.across - self.along) * couple * tail.thrust_of(S)
+        torque = self.across * couple * tail.torque_of(S)
         lever = 0.5 * self.length
         on_head = self.drag * (v_x + lever * yaw) + self.side * head_spin
         return g.stack(
@@ -203,11 +196,11 @@ class _Query:
         across = self.N * self.across
         spin = balance._FIRST_SPIN * self.speed
         for _ in range(3):
-            torque = across * self.offset * self.offset * self._torque(self.across * spin)
+            torque = across * self.offset * self.offset * tail.torque_of(self.across * spin)
             spin = self.speed * self.spin_drag / (self.spin_drag + torque)
         head_spin = spin - self.speed
         thrust = self.N * (self.across - self.along) * spin * self.offset * self.offset
-        v_z = thrust * self._thrust(self.across * spin) / (self.drag + self.N * self.along)
+        v_z = thrust * tail.thrust_of(self.across * spin) / (self.drag + self.N * self.along)
         lever = 0.5 * self.length
         a, b, d = self.drag + across, self.drag * lever - 0.5 * across, self.drag * lever * lever + across / 3
         push = -(self.side * head_spin)

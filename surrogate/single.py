@@ -20,10 +20,10 @@ import numpy as np
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.files import write_text
-from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.response import DWELLS, Responses
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.domain import ROBOT
 
 FORMAT = 3
 _CURVES = {"lag": (2, len(DWELLS), 3), "memory": (2, -1, len(DWELLS), 3),
@@ -156,9 +156,7 @@ def _wrong(table: SingleRobot) -> str:
     motion = np.array([table.steady[name] for name in STEADY_OUTPUTS], dtype=float)
     if motion.shape != (len(STEADY_OUTPUTS), 2) or np.isnan(motion).any():  # the gap of one tail is infinite
         return "its steady motion is not two numbers for each output"
-    groups = np.array(
-        [table.robot[name] for name in {*GROUP_COLUMNS, *OPTIONAL_COLUMNS, *table.robot}], dtype=float
-    )
+    groups = np.array([table.robot[name] for name in {*ROBOT, *table.robot}], dtype=float)
     slopes = [np.array(slope, dtype=float) for slope in table.slopes.values()]
     if not np.isfinite(groups).all() or any(s.shape != (2, 3) or not np.isfinite(s).all() for s in slopes):
         return "its robot or its slopes are not finite numbers"

@@ -25,10 +25,10 @@ from sim.model.groups import DWELL
 from sim.model.response import DWELLS, at_equal_dwells
 from sim.motion.net_speed import twists
 from surrogate import curves
+from surrogate.domain import ROBOT
 from surrogate.evaluate import COMPARED, relative_errors, scale_of
 from surrogate.lookup import RESPONSE_OUTPUTS, Lookup, between_dwells, steady_outputs
 from surrogate.network import Ensemble
-from surrogate.onnx_graph import INPUTS
 from surrogate.rows import drawn
 from surrogate.tails import TailTable
 
@@ -70,7 +70,7 @@ class Small:
         found = self.table.motions(values, flag=True)
         result = steady_outputs(found, self.table.tails)
         if DWELL in columns and self.has_response:
-            inputs = curves.inputs_of(found.heads, found.tails, found.motion)
+            inputs = curves.inputs_of(found.tails, found.motion)
             parts = [_network(self.arrays, name)(inputs) for name in NETWORKS[4:]]
             mean, basis = (torch.tensor(self.arrays[f"curves.{name}"]).double() for name in ("mean", "basis"))
             flat = (mean + torch.cat(parts, -1) @ basis).reshape(-1, len(DWELLS), 3)
@@ -146,8 +146,8 @@ def vectors_of(table: Lookup, small: Small) -> dict[str, Floats]:
 
 def _robots(count: int, seed: int) -> dict[str, Floats]:
     """Random robots of the domain, every second one with a reversed motor, with dwells."""
-    robots = {name: np.array(values) for name, values in drawn(count, seed, wide=False).items() if name in INPUTS}
-    robots = {name: robots[name] for name in INPUTS}
+    robots = {name: np.array(values) for name, values in drawn(count, seed, wide=False).items() if name in ROBOT}
+    robots = {name: robots[name] for name in ROBOT}
     robots["omega_bar"][::2] *= -1
     return robots | {DWELL: 0.25 * 12 ** np.random.default_rng(seed).uniform(size=count)}
 

@@ -22,8 +22,9 @@ from sim.io.files import whole_file, write_text
 from sim.model.groups import DWELL
 from sim.model.response import DWELLS
 from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.domain import ROBOT
 from surrogate.lookup import RESPONSE_OUTPUTS, Lookup
-from surrogate.onnx_graph import INPUTS, UNITS
+from surrogate.onnx_graph import UNITS
 from surrogate.small import EXACT, NETWORKS, Small, depth_of, losses_of, small_of, vectors_of
 
 READERS = Path(__file__).parent / "readers"
@@ -86,7 +87,7 @@ def weights_header(table: Lookup, small: Small, losses: Mapping[str, Mapping[str
     widest = max(arrays[f"{name}.weights.0"].shape[1] for name in present)
     outputs = max(arrays[f"{name}.bypass"].shape[1] for name in NETWORKS[:4] if name in present)
     inputs = max(16, *(arrays[f"{name}.bypass"].shape[0] for name in present))
-    ends = [[table.ranges[name][side] for name in INPUTS] for side in (0, 1)]
+    ends = [[table.ranges[name][side] for name in ROBOT] for side in (0, 1)]
     components = arrays["lag.bypass"].shape[1] if small.has_response else 0
     if small.has_response:
         dwells = ", ".join(repr(dwell) for dwell in DWELLS.tolist())
@@ -117,7 +118,7 @@ typedef struct {{
     const void *weights[LOOKUP_DEPTH + 1], *biases[LOOKUP_DEPTH + 1], *bypass; /* row by row: input, output */
 }} lookup_network;
 
-/* ranges of {", ".join(INPUTS)} */
+/* ranges of {", ".join(ROBOT)} */
 static const float lookup_low[9] = {{{_listed(np.array(ends[0], dtype=np.float32))}}};
 static const float lookup_high[9] = {{{_listed(np.array(ends[1], dtype=np.float32))}}};
 {numbers}
@@ -134,9 +135,9 @@ def _manifest(table: Lookup, small: Small, losses: Mapping[str, Any]) -> dict[st
         "format": FORMAT,
         "table": table.identity,
         "networks": [name for name in NETWORKS if f"{name}.bypass" in small.arrays],
-        "domain": {name: list(table.ranges[name]) for name in INPUTS},
+        "domain": {name: list(table.ranges[name]) for name in ROBOT},
         "dwells": DWELLS.tolist() if small.has_response else [],
-        "units": {name: _UNITS[name] for name in (*INPUTS, DWELL, *STEADY_OUTPUTS, *RESPONSE_OUTPUTS)},
+        "units": {name: _UNITS[name] for name in (*ROBOT, DWELL, *STEADY_OUTPUTS, *RESPONSE_OUTPUTS)},
         "loss": losses,
         "errors": table.errors,
     }

@@ -31,13 +31,14 @@ effects on the tails themselves. Units: l, μ0 l⁴/EI, EI/l². Source: the pape
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from sim.arrays import Floats
+from sim.linear.vectors import formula
 
 INPUTS = ("ln S", "ln a", "ln 1/r0", "asinh δ", "β", "asinh v_z", "ln spin drag of head over tails")
 HEAD_INPUTS = (
@@ -47,9 +48,9 @@ HEAD_INPUTS = (
 SMOOTHNESS = (0.7, 1.3, 8.0, 2.0, 4.0, 4.0, 5.0)  # over how many standard deviations the wrench changes
 HEAD_SMOOTHNESS = (3.0,) * len(HEAD_INPUTS)
 TYPICAL = ((0.0, 1.0, 0.0, 0.9, 0.2, 0.0), (0.04, 0.4, 0.03, 0.1, 0.3, 0.05))  # mean and spread of y
-_SOFT = 12.0  # S from which a tail bends with the flow while it turns
-_SMALL_DEFLECTION, _SMALL_SURGE = 0.05, 0.05  # below, an input is linear; above, logarithmic
-_TINY = 1e-30
+SOFT = 12.0  # S from which a tail bends with the flow while it turns
+SMALL_DEFLECTION, SMALL_SURGE = 0.05, 0.05  # below, an input is linear; above, logarithmic
+TINY = 1e-30
 
 
 class Tails(NamedTuple):
@@ -97,12 +98,14 @@ def head_inputs(resistance: Tensor, length: Tensor, across: Tensor) -> Tensor:
     )
 
 
-def thrust_of(S: Tensor) -> Tensor:
+@formula
+def thrust_of(S: Any) -> Any:
     """T: thrust/[(ζ⊥ − ζ∥) ω_t a²] of a tail in linear theory, roughly."""
     return 0.125 * S / (1 + (S / 8) ** 1.35)
 
 
-def torque_of(S: Tensor) -> Tensor:
+@formula
+def torque_of(S: Any) -> Any:
     """Q: torque/[ζ⊥ ω_t a²] of a tail in linear theory, roughly."""
     return (1 + (S / 6) ** 2) ** -0.125
 
@@ -115,15 +118,15 @@ def inputs_of(tails: Tails, motion: Tensor) -> Tensor:
     """
     v_x, v_z, yaw, _, spin = motion.unbind(-1)
     drag_number, clamp = tails.zeta_perp * spin, tails.offset * spin
-    deflection = torch.sqrt(v_x**2 + yaw**2 + _TINY) / spin * drag_number / (drag_number + _SOFT)
+    deflection = torch.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
     return torch.stack(
         [
             torch.log(drag_number),
             torch.log(tails.offset),
             -torch.log(tails.radius),
-            torch.asinh(deflection / _SMALL_DEFLECTION),
+            torch.asinh(deflection / SMALL_DEFLECTION),
             torch.atan2(v_x, yaw),
-            torch.asinh(v_z / clamp / _SMALL_SURGE),
+            torch.asinh(v_z / clamp / SMALL_SURGE),
             torch.log(tails.head_spin_drag / (tails.number * tails.zeta_perp * tails.offset**2)),
         ],
         -1,
@@ -147,7 +150,7 @@ def units_of(tails: Tails, motion: Tensor) -> Tensor:
     """∂(wrench)/∂y at a motion, (M, 4, 6)."""
     v_x, _, yaw, _, spin = motion.unbind(-1)
     drag_number = tails.zeta_perp * spin
-    sideways = torch.sqrt(v_x**2 + yaw**2 + _TINY)
+    sideways = torch.sqrt(v_x**2 + yaw**2 + TINY)
     squared = (sideways / (tails.offset * spin)) ** 2
     couple = tails.number * spin * tails.offset**2
     force = tails.number * tails.zeta_perp * sideways

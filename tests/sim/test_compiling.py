@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import sim
-from sim.compiling import CACHE, digest_of, prune
+from sim.compiling import CACHE, digest_of, folder_beside, prune
 
 SIM = Path(sim.__file__).parent
 MARKS = {"compiled", "formula"}
@@ -98,3 +98,11 @@ def test_a_change_of_what_loops_are_made_of_is_another_version(name: str, copied
 def test_a_change_elsewhere_is_the_same_version(name: str, copied: Path) -> None:
     """An effect or a way to use the loops is no reason to compile them anew."""
     assert digest_with_a_change(copied, name) == digest_of(copied)
+
+
+def test_loops_elsewhere_are_compiled_again_when_a_file_beside_them_changes(tmp_path: Path) -> None:
+    (tmp_path / "one.py").write_text("NUMBER = 1\n")
+    before = folder_beside(tmp_path)
+    folder_beside.cache_clear()
+    (tmp_path / "one.py").write_text("NUMBER = 2\n")
+    assert folder_beside(tmp_path) != before

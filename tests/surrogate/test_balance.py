@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
 
 from benchmarks.balance import linear_guess, solve
-from surrogate import head, perceptron, tail
-from surrogate.balance import inputs_rows
+from sim.compiling import folder_beside
+from surrogate import balance, head, perceptron, tail
+from surrogate.balance import inputs_rows, solve_rows
 from surrogate.export import load
 from surrogate.network import Ensemble
 from surrogate.perceptron import evaluate_rows, packed
 from surrogate.rows import drawn
 from surrogate.tails import class_of, rows_of
 from tests.surrogate.small import rows, table
+
+
+def test_loops_are_kept_by_all_files_beside_them() -> None:
+    """Before, they kept machine code of an older version of each other."""
+    folder = folder_beside(Path(balance.__file__).parent)
+    assert Path(solve_rows.stats.cache_path).is_relative_to(folder)
 
 
 def test_tanh_is_exact_to_the_last_digits() -> None:

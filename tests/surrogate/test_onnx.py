@@ -13,9 +13,10 @@ import pytest
 from sim.io.errors import InputError, run_command
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.__main__ import main
+from surrogate.domain import ROBOT
 from surrogate.export import load
 from surrogate.lookup import Lookup
-from surrogate.onnx_graph import INPUTS, save_onnx
+from surrogate.onnx_graph import save_onnx
 from surrogate.rows import drawn
 from tests.docs.pages import DOCS, blocks
 from tests.surrogate.small import table
@@ -38,7 +39,7 @@ def run(made: Any, robots: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def of(count: int, seed: int, *, wide: bool) -> dict[str, np.ndarray]:
-    robots = {name: np.array(values) for name, values in drawn(count, seed, wide=wide).items() if name in INPUTS}
+    robots = {name: np.array(values) for name, values in drawn(count, seed, wide=wide).items() if name in ROBOT}
     robots["omega_bar"][::2] *= -1
     return robots
 
@@ -96,11 +97,11 @@ def test_a_table_that_learned_some_tails_only_flags_the_others(tmp_path: Path) -
 
 def test_inputs_and_outputs_have_names_and_units(tmp_path: Path) -> None:
     made = session(load(), tmp_path)
-    assert [part.name for part in made.get_inputs()] == [*INPUTS]
+    assert [part.name for part in made.get_inputs()] == [*ROBOT]
     assert [part.name for part in made.get_outputs()] == [*STEADY_OUTPUTS, "outside"]
     told = made.get_modelmeta().custom_metadata_map
     assert told["table"] == load().identity
-    assert set(json.loads(told["units"])) == {*INPUTS, *STEADY_OUTPUTS, "outside"}
+    assert set(json.loads(told["units"])) == {*ROBOT, *STEADY_OUTPUTS, "outside"}
     assert json.loads(told["domain"])["omega_bar"] == [*load().ranges["omega_bar"]]
 
 

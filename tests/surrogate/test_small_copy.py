@@ -17,10 +17,10 @@ from sim.io.errors import InputError, run_command
 from sim.model.groups import DWELL
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.__main__ import main
+from surrogate.domain import ROBOT
 from surrogate.evaluate import scale_of
 from surrogate.export import load
 from surrogate.lookup import RESPONSE_OUTPUTS
-from surrogate.onnx_graph import INPUTS
 from surrogate.rows import drawn
 from surrogate.small import MOST_BYTES, Small, losses_of, small_of
 from surrogate.small_files import save_small
@@ -62,10 +62,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def robots_of(count: int, seed: int) -> dict[str, np.ndarray]:
-    robots = {name: np.array(values) for name, values in drawn(count, seed, wide=False).items() if name in INPUTS}
+    robots = {name: np.array(values) for name, values in drawn(count, seed, wide=False).items() if name in ROBOT}
     robots["omega_bar"][::2] *= -1
     robots[DWELL] = np.geomspace(0.2, 5.0, count)
-    return {name: robots[name] for name in (*INPUTS, DWELL)}
+    return {name: robots[name] for name in (*ROBOT, DWELL)}
 
 
 def library(folder: Path, *flags: str) -> ctypes.CDLL:
@@ -77,7 +77,7 @@ def library(folder: Path, *flags: str) -> ctypes.CDLL:
 
 def answers(made: ctypes.CDLL, robots: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """What C answers, and its states."""
-    rows = np.ascontiguousarray(np.stack([robots[name] for name in (*INPUTS, DWELL)], 1))
+    rows = np.ascontiguousarray(np.stack([robots[name] for name in (*ROBOT, DWELL)], 1))
     found, states = np.zeros((len(rows), len(OUTPUTS))), []
     for row, out in zip(rows, found, strict=True):
         pointers = (part.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for part in (row, out))
@@ -107,7 +107,7 @@ def test_it_is_small_and_states_its_loss(folder: Path) -> None:
     header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
     manifest = json.loads(header["__metadata__"]["manifest"])
     assert manifest["table"] == load().identity
-    assert set(manifest["units"]) == {*INPUTS, DWELL, *OUTPUTS}
+    assert set(manifest["units"]) == {*ROBOT, DWELL, *OUTPUTS}
     loss = manifest["loss"]
     assert {*OUTPUTS} <= set(loss)
     for name in ("omega_t_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l"):
@@ -148,7 +148,7 @@ def test_the_reader_in_c_answers_for_all_robots(folder: Path) -> None:
     """In double precision as the table of the same numbers, in single precision nearly."""
     robots = robots_of(1024, 92)
     wanted = small_of(load()).query(robots)
-    inside = ~load().query({name: robots[name] for name in INPUTS}, flag=True)["outside"]
+    inside = ~load().query({name: robots[name] for name in ROBOT}, flag=True)["outside"]
     found, states = answers(library(folder), robots)
     assert (states[inside] == 0).all()
     assert all(error[inside].max() < 1e-8 for error in apart(found, wanted).values())
@@ -162,7 +162,7 @@ def test_the_reader_in_c_answers_for_all_robots(folder: Path) -> None:
 
 def test_the_reader_in_c_says_when_it_does_not_know(folder: Path) -> None:
     made = library(folder)
-    good = {name: values[:1] for name, values in vectors(folder).items() if name in (*INPUTS, DWELL)}
+    good = {name: values[:1] for name, values in vectors(folder).items() if name in (*ROBOT, DWELL)}
     for name, value, state in (
         ("omega_bar", 1e4, 1), ("l_over_R", 100.0, 1), ("N", 20.0, 1), ("omega_bar", 0.0, 2), ("C_t", -1.0, 2),
         ("C_t", np.nan, 2), ("N", 0.0, 2),
@@ -177,7 +177,7 @@ def test_the_reader_in_javascript_gives_the_same(folder: Path) -> None:
     if node is None:
         pytest.skip("no node on this machine")
     wanted = vectors(folder)
-    rows = pd.DataFrame({name: wanted[name] for name in (*INPUTS, DWELL)})
+    rows = pd.DataFrame({name: wanted[name] for name in (*ROBOT, DWELL)})
     strange = rows.iloc[:3].assign(omega_bar=[1e4, 0.0, 5.0], dwell_bar=[1.0, 1.0, 0.1])
     (folder / "robots.json").write_text(pd.concat([rows, strange]).to_json(orient="records", double_precision=15))
     (folder / "run.mjs").write_text(SCRIPT)
