@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
+import pandas as pd
 import pytest
 
+from dataset.figures import SHOWN, draw_responses
 from dataset.indices import sobol_indices
 from dataset.trends import exponents, linear_rows
+from sim.model.response import DWELLS
 from sim.motion.batches import steady_columns
 from tests.sim.points import sweep_points
 
@@ -57,3 +62,18 @@ def test_linear_theory_is_near_for_slow_motors() -> None:
     assert rows.tolist() == list(range(16))
     assert linear["omega_yr_bar"] == pytest.approx(simulated["omega_yr_bar"], rel=0.08)
     assert linear["v_z"] == pytest.approx(simulated["v_z"], rel=0.15)
+
+
+def test_motors_of_which_nothing_is_known_have_no_median() -> None:
+    """The fast third has no history, so its net speed is not known at any dwell; slow and middling are drawn."""
+    count = 30
+    steady = {"v_x": 0.1, "v_z": 1.0, "omega_yr_bar": 0.2}
+    rows = pd.DataFrame({name: np.full(count, value) for name, value in steady.items()})
+    rows["omega_bar"] = np.arange(1.0, count + 1)
+    rows["history"] = np.arange(count) < 20
+    for name in SHOWN:
+        rows[name] = [np.ones(len(DWELLS))] * count
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = draw_responses(rows)
+    assert [len(axes.get_lines()) for axes in figure.axes] == [3, 3, 2]
