@@ -49,6 +49,9 @@ _PLANNING = (
     argument("--corner", default="nearest", choices=("nearest", "minimax", "fillet", "error"),
              help="places that are too tight: the nearest path that can be followed, by root mean square or by "
              "its largest distance (minimax); round corners; or refuse"),
+    argument("--time-weight", type=float, default=0.0,
+             help="cut corners to save time: the mean squared distance, in l², that is worth the time of the "
+             "whole path (default: 0; 0.03 cuts a little)"),
     argument("--objective", default="error", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: error)"),
     *_DWELLS,
@@ -234,6 +237,7 @@ def _task(arguments: Namespace) -> _Task:
         "lookup": load_table(arguments.model),
         "point": arguments.point,
         "corner": arguments.corner,
+        "time_weight": arguments.time_weight,
         "objective": arguments.objective,
         "minimum_dwell": arguments.min_dwell,
         "minimum_seconds": arguments.min_dwell_s,

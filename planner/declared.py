@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -36,6 +36,16 @@ _SCALES = (1.5, 2.0, 2.5, 3.5, 5.0, 7.5, 12.0, 20.0)  # tried for a message
 _NOISY = 1.5  # times as long as when it is smoothed
 
 
+class Follower(NamedTuple):
+    """What decides which paths can be followed, and which is chosen."""
+
+    vehicle: Vehicle  # its pivot radius limits the curvature
+    distance: float  # from the pivot to the tracked point
+    drift: Drift  # what carries the robot off its heading
+    corner: Corner  # what to do with places that are too tight
+    time_weight: float = 0.0  # as in `planner.nearest_path` [l²]
+
+
 @dataclass(frozen=True)
 class Declared:
     """The declared path with its tractrix, and its distances from the path as drawn [l]."""
@@ -47,33 +57,31 @@ class Declared:
     warnings: tuple[str, ...]
 
 
-def declare(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drift: Drift) -> Declared:
-    """Choose what the robot will follow.
-
-    Args:
-        raw: the path as drawn.
-        vehicle: its pivot radius limits the curvature.
-        distance: from the pivot to the tracked point.
-        corner: what to do with places that are too tight.
-        drift: what carries the robot off its heading.
+def declare(raw: Path2D, own: Follower) -> Declared:
+    """Choose what the robot will follow of the path as drawn.
 
     Raises:
-        InputError: the path is too tight; names the place, the radii and a scale that works.
+        InputError: the path is too tight; names the place, the radii and a scale that works. Or corner or time
+            weight are no such thing.
     """
-    if corner not in get_args(Corner):
-        raise InputError(f"corner {corner!r}; allowed are {', '.join(get_args(Corner))}")
-    found = _try(raw, vehicle, distance, corner, drift)
+    if own.corner not in get_args(Corner):
+        raise InputError(f"corner {own.corner!r}; allowed are {', '.join(get_args(Corner))}")
+    if not (math.isfinite(own.time_weight) and own.time_weight >= 0):
+        raise InputError(f"time weight {own.time_weight:g}; give a number of l², 0 or more")
+    if own.time_weight and own.corner not in ("nearest", "minimax"):
+        raise InputError(f"a time weight needs corner = nearest or minimax, not {own.corner}")
+    found = _try(raw, own)
     if found is None:
-        raise InputError(_too_tight(raw, vehicle, distance, corner, drift))
-    limit = TIGHTEST / vehicle.pivot_radius
+        raise InputError(_too_tight(raw, own))
+    limit = TIGHTEST / own.vehicle.pivot_radius
     largest = max(extent(raw))
     curvature = float(np.abs(found.curvature).max())
     warnings = []
     if curvature > limit:
-        raise InputError(_too_tight(raw, vehicle, distance, corner, drift))
+        raise InputError(_too_tight(raw, own))
     off, missed = two_sided(found.p, raw.polyline())
-    if max(off, missed) > _lost(raw, vehicle):
-        raise InputError(_too_tight(raw, vehicle, distance, corner, drift))
+    if max(off, missed) > _lost(raw, own.vehicle):
+        raise InputError(_too_tight(raw, own))
     if max(off, missed) > WARN * largest:
         warnings.append(
             f"the shape is lost in part: the declared path is up to {max(off, missed):.2g} l from the drawn one, "
@@ -82,27 +90,30 @@ def declare(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drif
     return Declared(found, curvature, off, missed, tuple(warnings))
 
 
-def _try(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drift: Drift) -> Reference | None:
+def _try(raw: Path2D, own: Follower) -> Reference | None:
     """A reference that can be followed, or none."""
-    tight = 1 / vehicle.pivot_radius
-    own = reference(raw, distance, _spacing(raw), drift)
-    sharpest = np.abs(own.curvature).max() / tight
-    if sharpest <= ROOMS[0]:
-        return own
+    vehicle, distance, drift, corner, time_weight = own
+    limit = TIGHTEST / vehicle.pivot_radius
+    drawn = reference(raw, distance, _spacing(raw), drift)
+    sharpest = np.abs(drawn.curvature).max()
+    if sharpest * vehicle.pivot_radius <= ROOMS[0] and not time_weight:
+        return drawn
     if corner == "error":
         _refuse_corner(raw)
-        return own if sharpest <= TIGHTEST else None
+        return drawn if sharpest <= limit else None
     if _smoothing(raw, vehicle.turn_radius / 4):
         return None
     if corner == "fillet":
-        path = _rounded(raw, vehicle, distance, drift)
+        path = _rounded(raw, own)
         found = reference(path, distance, _spacing(path), drift)
-        return found if np.abs(found.curvature).max() <= TIGHTEST * tight else None
+        return found if np.abs(found.curvature).max() <= limit else None
     for room in ROOMS:
-        radius = vehicle.pivot_radius / room
-        path = nearest_path(raw, max(distance, 0.0), radius, drift=drift, minimax=corner == "minimax")
+        path = nearest_path(
+            raw, max(distance, 0.0), vehicle.pivot_radius / room, drift=drift, minimax=corner == "minimax",
+            time_weight=time_weight,
+        )  # fmt: skip
         found = reference(path, distance, _spacing(path), drift)
-        if np.abs(found.curvature).max() <= TIGHTEST * tight:
+        if np.abs(found.curvature).max() <= limit:
             return found
     return None
 
@@ -126,14 +137,14 @@ def _refuse_corner(raw: Path2D) -> None:
         )
 
 
-def _rounded(raw: Path2D, vehicle: Vehicle, distance: float, drift: Drift) -> Path2D:
+def _rounded(raw: Path2D, own: Follower) -> Path2D:
     """Corners rounded by the smallest radius that leaves the pivot some room."""
-    limit = _FILLET_ROOM / vehicle.pivot_radius
-    low, high = 0.0, min(largest_fillet(raw), math.hypot(distance, 1 / limit))
+    limit = _FILLET_ROOM / own.vehicle.pivot_radius
+    low, high = 0.0, min(largest_fillet(raw), math.hypot(own.distance, 1 / limit))
 
     def tightest(radius: float) -> float:
         path = fillet(raw, radius)
-        return float(np.abs(reference(path, distance, _spacing(path), drift).curvature).max())
+        return float(np.abs(reference(path, own.distance, _spacing(path), own.drift).curvature).max())
 
     if tightest(high) > limit:
         return fillet(raw, high)
@@ -143,13 +154,14 @@ def _rounded(raw: Path2D, vehicle: Vehicle, distance: float, drift: Drift) -> Pa
     return fillet(raw, high)
 
 
-def _too_tight(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drift: Drift) -> str:
-    own = reference(raw, distance, _spacing(raw), drift)
-    curvature = np.abs(own.curvature)
+def _too_tight(raw: Path2D, own: Follower) -> str:
+    vehicle = own.vehicle
+    drawn = reference(raw, own.distance, _spacing(raw), own.drift)
+    curvature = np.abs(drawn.curvature)
     worst = int(curvature.argmax())
-    x, y = own.p[worst]
+    x, y = drawn.p[worst]
     remedy = _smoothing(raw, vehicle.turn_radius / 4)
-    scale = None if remedy else _working_scale(raw, vehicle, distance, corner, drift)
+    scale = None if remedy else _working_scale(raw, own)
     remedy = remedy or (f"scale the path by {scale:.3g}" if scale else "smooth the path, with --smooth LENGTH")
     return (
         f"path too tight at ({x:.3g}, {y:.3g}) l: the pivot would turn with radius {1 / curvature[worst]:.3g} l, "
@@ -158,15 +170,15 @@ def _too_tight(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, d
     )
 
 
-def _working_scale(raw: Path2D, vehicle: Vehicle, distance: float, corner: Corner, drift: Drift) -> float | None:
+def _working_scale(raw: Path2D, own: Follower) -> float | None:
     """The first of some scales at which the path is accepted, tried; or none."""
 
     def works(factor: float) -> bool:
         larger = raw.scaled(factor)
-        found = _try(larger, vehicle, distance, corner, drift)
-        if found is None or np.abs(found.curvature).max() > TIGHTEST / vehicle.pivot_radius:
+        found = _try(larger, own)
+        if found is None or np.abs(found.curvature).max() > TIGHTEST / own.vehicle.pivot_radius:
             return False
-        return max(two_sided(found.p, larger.polyline())) <= _lost(larger, vehicle)
+        return max(two_sided(found.p, larger.polyline())) <= _lost(larger, own.vehicle)
 
     for factor in _SCALES:
         if raw.length * factor < LONGEST and works(factor):

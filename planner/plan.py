@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planner.choice import QUICK, Objective, check_least, dwells_for
-from planner.declared import Corner, Declared, declare
+from planner.declared import Corner, Declared, Follower, declare
 from planner.distance import distance_to
 from planner.knowledge import Knowledge
 from planner.lookup import vehicle_of
@@ -124,6 +124,7 @@ def plan(
     lookup: LookupTable | None = None,
     point: Point = "head_centre",
     corner: Corner = "nearest",
+    time_weight: float = 0.0,
     objective: Objective = "error",
     minimum_dwell: float | None = None,
     minimum_seconds: float | None = None,
@@ -142,6 +143,8 @@ def plan(
         point: which point must follow the path.
         corner: places that are too tight: declare the path that can be followed and is nearest by root mean square
             ("nearest") or by its largest distance ("minimax"), round corners ("fillet"), or refuse ("error").
+        time_weight: for "nearest" and "minimax": the mean squared distance [l²] from the drawn path that is worth
+            as much as the time in which the whole path is followed; 0: distance alone counts.
         objective: what decides the dwell: small "error", short "time", or few "flips"; see `planner.choice`.
         minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
         minimum_seconds: the same in seconds; the larger one counts.
@@ -176,7 +179,7 @@ def plan(
 
     @cache
     def declared(drift: Drift) -> Declared:
-        return declare(raw, vehicle, swimmer.rod, corner, drift)
+        return declare(raw, Follower(vehicle, swimmer.rod, drift, corner, time_weight))
 
     def made(dwell: float) -> Plan:
         straight = zigzag(vehicle, dwell, swimmer.offset)

@@ -73,3 +73,28 @@ def test_a_drifting_robot_gets_a_path_that_it_can_follow() -> None:
     drift = Drift(0.3, (0.1, 0.0))
     found = nearest_path(polygon(4, 4.0), A, RADIUS / 0.8, drift=drift)
     assert sharpest(found, drift) < 0.95
+
+
+@pytest.mark.parametrize(("corners", "side"), [(4, 2.0), (4, 2.5), (3, 2.5), (3, 3.0)])
+@pytest.mark.parametrize("room", [0.85, 0.7, 0.55])
+def test_a_lap_ends_as_it_begins_however_small(corners: int, side: float, room: float) -> None:
+    """Laps whose ends did not meet had a kink there, and were refused as too tight."""
+    found = nearest_path(polygon(corners, side), A, RADIUS / room)
+    assert sharpest(found) < 1.2 * room
+
+
+def test_a_closed_path_that_is_begun_elsewhere_gives_the_same_lap() -> None:
+    square = polygon(4, 2.0).polyline()
+    begun = Path2D.of(np.concatenate([square[1:], square[1:2]]))
+    one, other = (nearest_path(raw, A, RADIUS / 0.85) for raw in (polygon(4, 2.0), begun))
+    assert max(two_sided(one.polyline(), other.polyline())) < 0.02
+
+
+def test_a_time_weight_saves_way_and_costs_distance() -> None:
+    raw = polygon(4, 3.0)
+    found = [nearest_path(raw, A, RADIUS / 0.85, time_weight=weight) for weight in (0.0, 0.03, 0.1, 0.3)]
+    ways = [reference(path, A, 0.02).arc[-1] for path in found]
+    assert ways == sorted(ways, reverse=True)
+    assert ways[-1] < 0.95 * ways[0]
+    assert off(found[0], raw) < off(found[2], raw) < off(found[3], raw)
+    assert all(sharpest(path) < 1.0 for path in found)
