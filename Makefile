@@ -29,12 +29,13 @@ TWO := -n 2 --dist loadfile
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1\t\2/' | expand -t 20
 
-setup: $(STAMP) ## make .venv, install everything, pinned, and compile the simulator's loops
+setup: $(STAMP) ## make .venv, install everything, pinned, and compile all loops
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt torch
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	$(RUN) -m sim compile
+	$(RUN) -m surrogate compile
 	touch $@
 
 demo: reports/demo.html ## the whole pipeline on the paper's robot, ends with reports/demo.html

@@ -7,8 +7,6 @@ design only add chunks. An interruption loses the chunks under way.
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -23,7 +21,7 @@ from dataset.lock import locked
 from dataset.pieces import Piece, piece_name
 from dataset.places import Place, place
 from dataset.store import MANIFEST, PENDING
-from dataset.work import Joining, Receipt, Simulate, Task, Work, rows_version
+from dataset.work import Joining, Receipt, Simulate, Task, Work, compile_on_this_host, rows_version
 from sim.io.errors import InputError
 
 _SECONDS = 20.0  # of processor time that a chunk should take
@@ -155,7 +153,7 @@ def _complete(
     gaps = folder.missing(held, rows)
     if gaps:
         if simulate is None:
-            _compile_first()
+            compile_on_this_host()
         done = rows - sum(stop - start for start, stop in gaps)
         begun.progress = engine.Progress(title, rows, done=done, failed=sum(c.failed for c in held.values()))
         workers = crew.workers()
@@ -249,21 +247,6 @@ def _imported(name: str) -> Simulate:
     except (ImportError, AttributeError):
         raise InputError(f"its rows were made by {name}, which cannot be imported here") from None
     return found
-
-
-def _compile_first() -> None:
-    """Compile the simulator's loops before there are workers, in a process that can be stopped at any time."""
-    from sim.compiling import all_compiled
-
-    if all_compiled():
-        return
-    code = f"import sys; sys.path[:] = {sys.path!r}; from dataset.work import compile_on_this_host as c; c()"
-    compiling = subprocess.Popen([sys.executable, "-c", code])
-    try:
-        if compiling.wait():
-            raise InputError("the simulator's loops do not compile; python -m sim compile says why")
-    finally:
-        compiling.kill()
 
 
 def _aside(chunks: Sequence[tuple[Work, str]]) -> str:

@@ -23,6 +23,7 @@ from dataset.pieces import Contents, Piece, join, piece_name, write_piece
 from dataset.places import Place, StorageError, place
 from dataset.schema import schema, table_of
 from dataset.store import PENDING, SWEEP
+from sim.io.errors import InputError
 from sim.io.provenance import code_version
 
 Simulate = Callable[[dict[str, Any]], dict[str, Any]]
@@ -153,7 +154,11 @@ def _loops() -> Iterator[None]:
 
 
 def compile_on_this_host() -> None:
-    """Compile the simulator's loops unless that has been done; one process of a host does, the others wait."""
+    """Compile the simulator's loops unless that has been done; one process of a host does, the others wait.
+
+    Raises:
+        InputError: they do not compile.
+    """
     from sim.compiling import CACHE, all_compiled
 
     if all_compiled():
@@ -162,4 +167,5 @@ def compile_on_this_host() -> None:
         fcntl.flock(lock, fcntl.LOCK_EX)
         from sim.motion.warm import compile_once
 
-        compile_once()
+        if not compile_once():
+            raise InputError("the simulator's loops do not compile; python -m sim compile says why")

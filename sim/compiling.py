@@ -10,11 +10,18 @@ Sums may be reordered and multiplications fused, so last digits can differ betwe
 their meaning.
 
 The first use of a loop compiles it. A progress bar on stderr says so. `python -m sim compile` compiles all loops.
+
+A loop that this process compiles can give other last digits than the same loop read from disk: of a loop that
+several others call, the first copy in the process is used by all of them, and the copies were not optimised with
+the same neighbours. So where results must be the same in each process, loops are compiled in another one
+(`compile_apart`), and only read here.
 """
 
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -57,20 +64,31 @@ def _cache_folder() -> Path:
 
 
 CACHE = _cache_folder()
-_ALL = CACHE / f"all-for-{get_host_cpu_name()}"  # machine code belongs to one kind of processor
+_ALL = f"all-for-{get_host_cpu_name()}"  # machine code belongs to one kind of processor
+_APART = "SOFTFLAGELLA_COMPILES"  # environment of a process that compiles for others
 if not CACHE.exists():
     prune(CACHE.parent, _KEPT)
 
 
-def all_compiled() -> bool:
-    """Whether every loop has been compiled for this processor."""
-    return _ALL.exists()
+def all_compiled(folder: Path = CACHE) -> bool:
+    """Whether every loop of a folder has been compiled for this processor; true where they are being compiled."""
+    return (folder / _ALL).exists() or _APART in os.environ
 
 
-def mark_all_compiled() -> None:
-    """Remember that every loop has been compiled for this processor."""
-    CACHE.mkdir(parents=True, exist_ok=True)
-    _ALL.touch()
+def mark_all_compiled(folder: Path = CACHE) -> None:
+    """Remember that every loop of a folder has been compiled for this processor."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / _ALL).touch()
+
+
+def compile_apart(module: str) -> bool:
+    """Call `compile_all` of a module in a process of its own; whether it came to its end."""
+    code = f"import sys; sys.path[:] = {sys.path!r}; from {module} import compile_all; compile_all()"
+    process = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, _APART: "1"})
+    try:
+        return process.wait() == 0
+    finally:
+        process.kill()
 
 
 _modules: set[str] = set()  # with compiled loops

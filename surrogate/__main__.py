@@ -217,5 +217,12 @@ def _export(arguments: Namespace) -> None:
         print(f"model {table.identity} -> {arguments.small}")
 
 
+@program.command("compile", "compile the loops of queries now rather than on first use")
+def _compile(_: Namespace) -> None:
+    from surrogate.warm import compile_all
+
+    compile_all()
+
+
 if __name__ == "__main__":
     program.exit()

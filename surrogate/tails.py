@@ -31,6 +31,7 @@ from surrogate.head import Heads
 from surrogate.network import Ensemble
 from surrogate.perceptron import Packed, evaluate_rows, packed
 from surrogate.tail import Tails
+from surrogate.warm import compile_once
 from surrogate.work import Work
 
 CLASSES = (1, 2, 3)  # networks for N = 1, N = 2, and three or more tails
@@ -54,6 +55,7 @@ class TailTable:
 
     def solve(self, heads: Heads, tails: Tails) -> tuple[Floats, Flags]:
         """(v_x, v_z, ω_yr, ω_h, ω_t) in balance for a positive motor, (M, 5); and which robots converged, (M,)."""
+        compile_once()
         motion = np.full((len(tails.number), 5), np.nan)
         converged = np.zeros(len(motion), dtype=bool)
         speeds, drags = torch.stack([heads.speed, heads.gain], 1).numpy(), tail.columns_of(tails)

@@ -68,8 +68,8 @@ class Processes:
         for executor in executors:
             for process in list((executor._processes or {}).values()):
                 process.kill()
-        for executor in executors:
-            executor.shutdown(wait=False, kill_workers=True)
+        for executor in executors:  # wait, since a thread that dies with the program leaves semaphores behind
+            executor.shutdown(wait=True, kill_workers=True)
         self._busy, self._free = {}, []
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.compiling import all_compiled, mark_all_compiled
+from sim.compiling import all_compiled, compile_apart, mark_all_compiled
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
@@ -43,8 +43,12 @@ def compile_all() -> float:
     return time.perf_counter() - began
 
 
-def compile_once() -> None:
-    """Compile all loops, unless that has been done. Call it before starting processes: each would compile."""
-    if not all_compiled():
-        print("first use: compiling the simulator's loops, about a minute", file=sys.stderr, flush=True)
-        compile_all()
+def compile_once() -> bool:
+    """Compile all loops in another process, unless that has been done; false if that failed.
+
+    Call it before starting processes: each would compile.
+    """
+    if all_compiled():
+        return True
+    print("first use: compiling the simulator's loops, about a minute", file=sys.stderr, flush=True)
+    return compile_apart(__name__)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -38,9 +39,38 @@ def test_processes_are_preceded_by_one_compilation(
     monkeypatch.setattr(warm, "_STAGES", stages)
     monkeypatch.setattr(warm, "all_compiled", lambda: bool(done))
     monkeypatch.setattr(warm, "mark_all_compiled", lambda: done.append("marked"))
-    warm.compile_once()
+    monkeypatch.setattr(warm, "compile_apart", lambda module: bool(warm.compile_all()) and module == warm.__name__)
+    assert warm.compile_once()
     assert done == ["one", "marked"]
     assert "first use" in capsys.readouterr().err
-    warm.compile_once()
+    assert warm.compile_once()
     assert done == ["one", "marked"]
     assert capsys.readouterr().err == ""
+
+
+LOOPS = """
+from sim.compiling import compiled
+
+@compiled
+def part(x: float) -> float:
+    return 2 * x
+
+@compiled
+def whole(x: float) -> float:
+    return part(x) + 1
+
+def compile_all() -> None:
+    whole(1.0)
+"""
+
+
+def test_what_another_process_compiled_is_only_read_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Machine code that is compiled here may have other last digits."""
+    (tmp_path / "someones_loops.py").write_text(LOOPS)
+    monkeypatch.syspath_prepend(tmp_path)
+    assert compiling.compile_apart("someones_loops")
+    loops = importlib.import_module("someones_loops")
+    assert loops.whole(2.0) == 5.0
+    assert sum(loops.whole.stats.cache_hits.values()) == 1
+    assert not loops.whole.stats.cache_misses
+    assert not compiling.compile_apart("nobodys_loops")

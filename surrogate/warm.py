@@ -1,0 +1,28 @@
+"""Compile all loops of the look-up table, so that each process reads the same machine code from disk."""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from pathlib import Path
+
+from sim.compiling import all_compiled, compile_apart, folder_beside, mark_all_compiled
+
+_FOLDER = folder_beside(Path(__file__).parent)
+
+
+def compile_all() -> None:
+    """Call every loop once. Loops that are compiled already are only loaded."""
+    from surrogate.export import load
+    from surrogate.rows import drawn
+
+    load().query(drawn(16, 0, wide=False), flag=True)
+    mark_all_compiled(_FOLDER)
+
+
+@cache
+def compile_once() -> None:
+    """Compile all loops in another process, unless that has been done."""
+    if not all_compiled(_FOLDER):
+        print("first use: compiling the look-up table's loops", file=sys.stderr, flush=True)
+        compile_apart(__name__)
