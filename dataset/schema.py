@@ -91,7 +91,7 @@ FLAGS = (
     Column("row", _whole, "1", "row of the design"),
     Column("converged", _flag, "1", "the motion is steady and solved to tolerance"),
     Column("failed", _flag, "1", "the simulation broke down; outputs are NaN"),
-    Column("touching", _flag, "1", "tails touch: outside the model's validity"),
+    Column("touching", _flag, "1", "tails touch, and no contact holds them apart: outside the model's validity"),
     Column("stepped", _flag, "1", "the response was simulated by time steps"),
     Column("history", _flag, "1", "memory and rest were simulated"),
     Column("reason", pa.string(), "1", "why the row failed, did not converge or was stepped in time; else empty"),

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Floats
+from sim.effects.tail_contact import EFFECT as CONTACT
+from sim.effects.tail_contact import least_gap
 from sim.inputs import check_columns
 from sim.model.groups import Groups
 from sim.model.response import LAG_PARTS
@@ -59,7 +61,7 @@ def _row(values: dict[str, Floats], history: bool, sensitivities: bool) -> Colum
         "error": motion.error,
         "failed": failed,
         "converged": columns["converged"] & ~failed,
-        "touching": columns["tail_gap"] < 1,
+        "touching": columns["tail_gap"] < least_gap(values.get(CONTACT.name, 0.0)),
         "stepped": response.stepped,
         HISTORY: np.array([history]),
         "reason": np.where(response.failed & ~motion.failed, NO_RESPONSE, motion.note),

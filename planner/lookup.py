@@ -13,6 +13,8 @@ from planner.knowledge import NUMBERS, Knowledge
 from planner.vehicle import Mode, Vehicle, lags_of, resampled
 from sim.arrays import Floats
 from sim.effects import catalogue
+from sim.effects.tail_contact import EFFECT as CONTACT
+from sim.effects.tail_contact import least_gap
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.robot import Robot
@@ -60,6 +62,7 @@ def vehicle_of(robot: Robot, lookup: LookupTable, knowledge: Knowledge | None = 
         modes=(*_table_modes(twist, lookup), *_coefficient_modes(robot, lookup, twist, knowledge)),
         current=np.asarray(knowledge.current) * unit,
         tail_gap=float(np.min(found["tail_gap"])),
+        least_gap=float(least_gap(robot.effects.get(CONTACT.name, 0.0))),
     )
 
 

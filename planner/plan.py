@@ -324,8 +324,9 @@ def scheduled(
 
 
 def _warnings(vehicle: Vehicle) -> tuple[str, ...]:
-    if vehicle.tail_gap < 1.0:
-        return (f"tails touch (predicted gap {vehicle.tail_gap:.2f} diameters): the model has no contact",)
+    if vehicle.tail_gap < vehicle.least_gap:
+        without = "the model has no contact" if vehicle.least_gap == 1.0 else "contact does not hold them apart"
+        return (f"tails touch (predicted gap {vehicle.tail_gap:.2f} diameters): {without}",)
     return ()
 
 

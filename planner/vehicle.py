@@ -43,6 +43,7 @@ class Vehicle:
     modes: tuple[Mode, ...] = ()  # what is uncertain, each by one standard deviation
     current: Floats = field(default_factory=lambda: np.zeros(2))  # in the lab
     tail_gap: float = 10.0  # in diameters
+    least_gap: float = 1.0  # below it the model does not hold, because tails touch
 
     def lag_of(self, sense: int, before: ArrayLike | None, time: ArrayLike) -> Floats:
         """Lag (..., 3) after `time` (...), where the dwell before had length `before` (...); None: from rest."""

@@ -31,6 +31,8 @@ def _steady(arguments: Namespace) -> None:
     import numpy as np
     import pandas as pd
 
+    from sim.effects.tail_contact import EFFECT as CONTACT
+    from sim.effects.tail_contact import least_gap
     from sim.io.files import write_csv
     from sim.io.tables import read_table
     from sim.motion.batches import steady_columns
@@ -47,7 +49,7 @@ def _steady(arguments: Namespace) -> None:
     table = pd.concat([points, pd.DataFrame(result)], axis=1)
     write_csv(table, arguments.out)
     ended = table["converged"].to_numpy()
-    touching = int(np.count_nonzero(table["tail_gap"] < 1))
+    touching = int(np.count_nonzero(table["tail_gap"] < least_gap(table.get(CONTACT.name, 0.0))))
     direct = int(np.count_nonzero(table["method"] == "direct"))
     print(
         f"{len(table)} rows, {int(ended.sum())} converged ({direct} solved directly), "

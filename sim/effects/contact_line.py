@@ -40,6 +40,6 @@ EFFECT = ContactLine(
     typical=0.05,
     symmetry="even",
     dissipative=True,
-    similar=False,  # its creep speed is a speed of its own
+    similar=False,  # its creep speed is a speed of its own, see `contact_line_speed`
     reach="nonlocal",
 )

@@ -1,8 +1,9 @@
 """How close the tails come to each other.
 
 gap = min |x − y| / (2 r0) over nodes x of one tail and points y on the edges of another. At 1 the tails touch. The
-model has no contact, so rows below 1 are kept and flagged. Distances are from nodes to edges. Where two edges
-cross between their nodes, the error of the distance is at most half an edge. Units: l.
+base model has no contact, so rows below 1 are kept and flagged. With the effect `tail_contact`, rows are flagged
+only where the gap is not kept (`sim.effects.tail_contact.least_gap`). Distances are from nodes to edges. Where two
+edges cross between their nodes, the error of the distance is at most half an edge. Units: l.
 """
 
 from __future__ import annotations

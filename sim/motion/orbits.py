@@ -11,11 +11,13 @@ import numpy as np
 
 from sim.arrays import Floats, Integers
 from sim.model.body import Body
+from sim.motion.alike import growth
 from sim.solve.assembly import unpacked
 from sim.solve.derivative import orbit_slopes
 from sim.solve.orbit import mean_motion, residual_on_orbit, smallest_gap
 from sim.solve.refinement import FEW, SOLVED, Orbit, extrapolate, refined_orbit
 
+_NEAR = 1.1  # gap from which tails cannot touch, given the error of the gap
 WIDTH = 1e-5  # finite-difference step in a robot's numbers; the balance depends almost linearly on them
 
 
@@ -27,9 +29,12 @@ class Orbits(NamedTuple):
     error: Floats  # (B,) estimated relative error
     ended: Integers  # (B,) SOLVED or why not, see `sim.solve.refinement`
     gap: Floats  # (B,) smallest distance between tails over 2 r0
+    growth: Floats  # (B,) see `sim.motion.alike`; NaN where tails do not push against each other
 
 
-def solve_orbits(rows: Floats, tails: int, directions: Floats | None = None, *, phases: int = FEW) -> Orbits:
+def solve_orbits(
+    rows: Floats, tails: int, directions: Floats | None = None, *, phases: int = FEW, stability: bool = False
+) -> Orbits:
     """Orbits of robots with N tails.
 
     Args:
@@ -37,16 +42,19 @@ def solve_orbits(rows: Floats, tails: int, directions: Floats | None = None, *, 
         tails: N.
         directions: (B, K, K'), directions of the derivatives (none by default).
         phases: number of phases to begin with.
+        stability: whether to find out if tails that touch keep moving alike.
     """
     count = 0 if directions is None else directions.shape[1]
     slopes = np.full((len(rows), count, 5), np.nan)
     found: list[Orbit] = []
-    gap = np.full(len(rows), np.nan)
+    gap, grows = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
     for i, body in enumerate(unpacked(rows)):
         orbit = refined_orbit(body, tails, phases)
         found.append(orbit)
         if orbit.ended == SOLVED:
             gap[i] = smallest_gap(body, orbit.x[2], tails)
+            if stability and body.nonlocal_terms.tail_contact != 0 and gap[i] < _NEAR:
+                grows[i] = growth(body, tails, orbit.x[0], orbit.u[0])
             if directions is not None:
                 slopes[i] = _slopes(body, rows[i], directions[i], orbit)
     return Orbits(
@@ -55,6 +63,7 @@ def solve_orbits(rows: Floats, tails: int, directions: Floats | None = None, *, 
         np.array([orbit.error for orbit in found]),
         np.array([orbit.ended for orbit in found]),
         gap,
+        grows,
     )
 
 

@@ -2,7 +2,8 @@
 
 With 12 edges and 24 steps a revolution the error of ω_yr is 1 % for the control robot. High ω̄ needs more, so the
 default grows with ω̄. The unit of work is one node moved by one step, about 0.6 µs. With flow between the parts, a
-step of M nodes costs as much as 3 M steps without flow.
+step of M nodes costs as much as 3 M steps without flow. Contact costs as much as 500 nodes for each tail at each
+other one.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.mechanics.flow import has_flow
+from sim.mechanics.tail_contact import has_contact
 from sim.model.body import Body
 
 MOST_WORK = 1e8  # of one robot in a table: about a minute
 MOST_REPLAY_WORK = 3e9  # of one schedule: about half an hour
 _LONGEST_STEP = 0.04  # time units: the tails need about 0.7 to turn over
 _FLOW = 3.0  # work for the flow of one node at another, in units of a node's step
+_CONTACT = 500.0  # the same for contact of one tail with another
 
 
 @dataclass(frozen=True)
@@ -59,9 +62,10 @@ class Resolution:
         return Resolution(factor * self.edges, factor * self.steps)
 
     def work_of_a_step(self, body: Body, tails: int) -> float:
-        """Work of one step, with the work for flow."""
+        """Work of one step, with the work for flow and contact."""
         nodes = self.edges * tails
-        return nodes * (1 + _FLOW * nodes) if has_flow(body) else float(nodes)
+        work = nodes * (1 + _FLOW * nodes) if has_flow(body) else float(nodes)
+        return work + _CONTACT * tails * (tails - 1) if has_contact(body) else work
 
 
 def time_step(omega_bar: float, resolution: Resolution) -> float:

@@ -1,11 +1,12 @@
 """Steady motion at constant motor speed: solved for directly where that works, else by time stepping.
 
 The direct solution (`sim.motion.orbits`) is the relative periodic orbit in which all tails move alike. It takes
-less than a millisecond a robot and states the error of its means. Straight tails at rest reach this orbit if the
-robot yaws slowly compared with the spin of its disc (docs/branches.md). If it yaws faster (|ω_yr| > QUICK |ω_t|),
-the robot is stepped in time from rest as well. If stepping reaches another motion, that one is the answer. If
-Newton's method does not converge, stepping gives the answer, too. Such rows say so. Their error is estimated from
-two meshes and steps. Units: l, μ0 l⁴/EI.
+less than a millisecond a robot and states the error of its means. Straight tails at rest reach this orbit if
+the robot yaws slowly compared with the spin of its disc (docs/branches.md). If it yaws faster (|ω_yr| > QUICK
+|ω_t|), or if its tails push against each other and may leave this motion (`sim.motion.alike`), the robot is
+stepped in time from rest as well. If stepping reaches another motion, that one is the answer. If Newton's
+method does not converge, stepping gives the answer, too. Such rows say so. Their error is estimated from two
+meshes and steps. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from sim.solve.assembly import numbers
 from sim.solve.refinement import FEW, REASONS, SOLVED
 
 QUICK = 0.4  # ω_yr/ω_t from which straight tails may reach another motion
+GROWS = -0.02  # growth from which tails in contact may leave the motion in which they move alike
 SAME = 0.02  # relative difference up to which a stepped motion counts as the direct one
 _OTHER_MOTION = "straight tails reach another motion than the one in which they move alike"
 
@@ -48,11 +50,12 @@ def steady(groups: Groups) -> Steady:
         (0.049, True)
     """
     check_groups(groups)
-    motion = orbits(groups)
-    quick = np.flatnonzero(~motion.failed & (np.abs(motion.omega_yr) > QUICK * np.abs(motion.omega_t)))
-    if len(quick):
-        reached = settle(_rows(groups, quick), resolution=Resolution.for_settling)
-        other = quick[_difference(motion.at(quick), reached) > SAME]
+    motion, growth = _orbits(groups, FEW, stability=True)
+    quick = np.abs(motion.omega_yr) > QUICK * np.abs(motion.omega_t)
+    doubtful = np.flatnonzero(~motion.failed & (quick | (growth > GROWS)))
+    if len(doubtful):
+        reached = settle(_rows(groups, doubtful), resolution=Resolution.for_settling)
+        other = doubtful[_difference(motion.at(doubtful), reached) > SAME]
         motion = _with_stepped(motion, groups, other, np.full(len(groups), _OTHER_MOTION))
     lost = np.flatnonzero(motion.failed & (motion.method == DIRECT))
     return _with_stepped(motion, groups, lost, motion.note)
@@ -78,11 +81,16 @@ def _rows(groups: Groups, rows: Integers) -> Groups:
 
 def orbits(groups: Groups, *, phases: int = FEW) -> Steady:
     """The direct solution alone, with `phases` phases to begin with; `failed` where there is no orbit."""
+    return _orbits(groups, phases, stability=False)[0]
+
+
+def _orbits(groups: Groups, phases: int, *, stability: bool) -> tuple[Steady, Floats]:
+    """The direct solution, and how fast tails in contact leave it, (B,)."""
     rows = np.ascontiguousarray(numbers(groups).detach().cpu().numpy().T)
-    found = solve_orbits(rows, groups.N, phases=phases)
+    found = solve_orbits(rows, groups.N, phases=phases, stability=stability)
     means = found.means.T
     solved = found.ended == SOLVED
-    return Steady(
+    motion = Steady(
         omega_t=means[0],
         omega_h=means[1],
         omega_yr=means[2],
@@ -95,6 +103,7 @@ def orbits(groups: Groups, *, phases: int = FEW) -> Steady:
         method=np.full(len(groups), DIRECT),
         note=np.array([REASONS[k] for k in found.ended.tolist()]),
     )
+    return motion, found.growth
 
 
 def stepped(groups: Groups, notes: list[str]) -> Steady:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,12 +20,14 @@ from sim.motion.shapes import tails_over_a_revolution
 from sim.motion.steady import steady
 
 _ROBOT = PRESETS["paper-control"]
+_TOUCHING = replace(PRESETS["paper-measured"], effects={"tail_contact": 1.0})
 _STAGES: tuple[tuple[str, Callable[[], object]], ...] = (
     ("steady motion", lambda: steady(_ROBOT.groups())),
     ("time steps", lambda: settle(_ROBOT.groups())),
     ("response to flips", lambda: responses(_ROBOT.groups())),
     ("replay", lambda: replay([Schedule(_ROBOT.group_values(), 1, np.array([0.1]), (0.0, 0.0, 0.0), 1.0)])),
     ("derivatives", lambda: sensitivities(_ROBOT.groups(), ("C_t", "tail_interaction"))),
+    ("contact between tails", lambda: steady(_TOUCHING.groups())),
     ("pictures", lambda: tails_over_a_revolution(_ROBOT, 4)),
 )
 

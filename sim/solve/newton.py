@@ -20,6 +20,7 @@ from sim.linear.coupled import Coupled, new_coupled
 from sim.linear.gmres import combine, extend, new_krylov, start
 from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import turned_edges
+from sim.mechanics.tail_contact import has_contact
 from sim.model.body import Body
 from sim.solve.linearise import Equations, linearise, new_equations
 from sim.solve.rates import Rates, is_joined
@@ -29,7 +30,7 @@ FINITE_DIFFERENCE_STEP = 1e-6  # of the largest entry, in l or 1 + |ω|
 RELATIVE_TOLERANCE = 1e-3  # of the residual in one Newton correction by GMRES
 _MOST_PRODUCTS = 60
 _MOST_CORRECTIONS = 30
-_LARGEST_MOVE = 0.3  # of a node in one correction, in l
+_LARGEST_MOVE = 0.3  # of a node in one correction, in l; r0 where tails feel each other
 
 
 class Workspace(NamedTuple):
@@ -65,7 +66,7 @@ def newton(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tole
         size = max(np.max(np.abs(dx)), np.max(np.abs(du)) / (1 + abs(body.omega)))
         if not np.isfinite(size):
             return count, np.inf
-        share = min(1.0, _LARGEST_MOVE / size)
+        share = min(1.0, largest_move(body) / size)
         move(body, x, share * dx)
         u += share * du
         if size < tolerance:
@@ -90,6 +91,12 @@ def correct(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, ane
     if not local:
         solve_nonlocal(body, rates, x, u, work, RELATIVE_TOLERANCE, dx, du)
     return dx, du
+
+
+@compiled
+def largest_move(body: Body) -> float:
+    """The largest move of a node in one correction, in l; tails in contact must not pass through each other."""
+    return body.tail_radius if has_contact(body) else _LARGEST_MOVE
 
 
 @compiled

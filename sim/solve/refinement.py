@@ -51,6 +51,9 @@ _PHASE_ERROR = 1e-4  # relative, in the means
 _DOUBT = 0.03  # share of the extrapolation that counts as error
 _SHRINKS = 0.2  # assumed factor on the phase error with the next number of phases, if only one is known
 _MOST_PHASES = 48
+_SOFTER, _SOFTEST = 5.0, 0.5  # factor from hard contact to softer, and where it ends (EI/l³)
+_SLOW, _FASTER, _LEAST_FASTER = 3.0, 1.5, 1.02  # ω̄ to begin with where tails may touch, and factors from there
+_START, _SOFT = 1e-3, 0.05  # limit of the last Newton correction on the way, and factor on the contact there
 
 
 class Orbit(NamedTuple):
@@ -71,17 +74,35 @@ def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
     """
     if tails > _MOST_PHASES:
         return _unsolved(MANY_PHASES, np.zeros((MESHES[0], tails, 3)), np.zeros((1, 4)))
-    ended, error, x, u = _enough_phases(body, without_nonlocal(body), tails, least)
-    if ended != SOLVED:
-        return _unsolved(ended, x, u)
-    return _on_finer_meshes(body, error, x, u)
+    ended, error, x, u = _on_coarsest_mesh(body, tails, least)
+    orbit = _unsolved(ended, x, u) if ended != SOLVED else _on_finer_meshes(body, error, x, u)
+    if orbit.ended != SOLVED and body.nonlocal_terms.tail_contact > _SOFTEST:
+        return _by_softer_contact(body, tails, least, orbit)
+    return orbit
+
+
+def _by_softer_contact(body: Body, tails: int, least: int, lost: Orbit) -> Orbit:
+    """The orbit from that of the same robot with softer contact, on the same meshes and phases; else `lost`."""
+    terms = body.nonlocal_terms
+    soft = body._replace(nonlocal_terms=terms._replace(tail_contact=terms.tail_contact / _SOFTER))
+    found = refined_orbit(soft, tails, least)
+    if found.ended != SOLVED:
+        return lost
+    for x, u in zip(found.x, found.u, strict=True):
+        _, size = solve_orbit(body, x, u, CORRECTION)
+        if not (size < CORRECTION and turns_forward(body, u)):
+            return lost
+    means = np.array([mean_motion(body, u) for u in found.u])
+    limit = extrapolate(means)
+    error = difference(_without_last_term(means), limit) + _DOUBT * difference(means[2], limit) + _PHASE_ERROR
+    return Orbit(SOLVED, max(error, found.error), limit, found.x, found.u)
 
 
 def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Floats]:
     """The orbit on a given mesh: whether there is one, x (n, M, 3) and u (P, 4)."""
     if tails > _MOST_PHASES:
         return False, np.zeros((edges, tails, 3)), np.zeros((1, 4))
-    ended, _, x, u = _enough_phases(body, without_nonlocal(body), tails, FEW)
+    ended, _, x, u = _on_coarsest_mesh(body, tails, FEW)
     if ended != SOLVED:
         return False, x, u
     x = with_edges(x, body.offset, edges)
@@ -89,10 +110,50 @@ def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Flo
     return size < CORRECTION and turns_forward(body, u), x, u
 
 
-def without_nonlocal(body: Body) -> Body:
-    """The same robot without its non-local effects."""
+def _on_coarsest_mesh(body: Body, tails: int, least: int) -> tuple[int, float, Floats, Floats]:
+    """On the coarsest mesh, with `least` phases or more: SOLVED or why not, the error of the phases, x and u."""
     terms = body.nonlocal_terms
-    return body._replace(nonlocal_terms=terms._make([0.0] * len(terms)))
+    plain = body._replace(nonlocal_terms=terms._make([0.0] * len(terms)))
+    if terms.tail_contact == 0:
+        return _from_straight_tails(body, plain, tails, least)
+    plain = plain._replace(nonlocal_terms=plain.nonlocal_terms._replace(tail_contact=terms.tail_contact))
+    return _enough_phases(body, plain, *_from_a_slow_motor(plain, tails), tails, least)
+
+
+def _from_a_slow_motor(plain: Body, tails: int) -> tuple[Floats, Floats]:
+    """A guess of the orbit on the coarsest mesh, for a robot without other non-local effects than contact.
+
+    Contact decides on which side of each other the tails lie. So the guess comes from a slow motor, at which the
+    tails are apart. The motor is made faster step by step, with a softer contact.
+    """
+    terms = plain.nonlocal_terms
+    soft = plain._replace(nonlocal_terms=terms._replace(tail_contact=_SOFT * terms.tail_contact))
+    speed = min(_SLOW / abs(plain.omega), 1.0)
+    factor, before = _FASTER, soft._replace(omega=speed * plain.omega)
+    x, u = straight_start(before, MESHES[0], _fewest_phases(tails), tails)
+    _, size = solve_orbit(before, x, u, _START)
+    while size < _START and speed < 1 and factor > _LEAST_FASTER:
+        factor = min(factor, 1 / speed)
+        x_more, u_more = x.copy(), factor * u
+        _, larger = solve_orbit(soft._replace(omega=speed * factor * plain.omega), x_more, u_more, _START)
+        if larger < _START:
+            x, u, speed = x_more, u_more, speed * factor
+        else:
+            factor = np.sqrt(factor)
+    return x, u
+
+
+@compiled
+def _fewest_phases(tails: int) -> int:
+    """Two phases or more, a multiple of N."""
+    return tails * int(np.ceil(2 / tails))
+
+
+@compiled
+def _from_straight_tails(body: Body, plain: Body, tails: int, least: int) -> tuple[int, float, Floats, Floats]:
+    """The same as `_enough_phases`, from straight tails."""
+    x, u = straight_start(plain, MESHES[0], _fewest_phases(tails), tails)
+    return _enough_phases(body, plain, x, u, tails, least)
 
 
 @compiled
@@ -147,15 +208,15 @@ def _is_balanced(body: Body, x: Floats, u: Floats) -> bool:
 
 
 @compiled
-def _enough_phases(body: Body, plain: Body, tails: int, least: int) -> tuple[int, float, Floats, Floats]:
+def _enough_phases(
+    body: Body, plain: Body, x: Floats, u: Floats, tails: int, least: int
+) -> tuple[int, float, Floats, Floats]:
     """On the coarsest mesh, with `least` phases or more: SOLVED or why not, the error of the phases, x and u.
 
-    The first solution is a rough one for the robot without its non-local effects (`plain`), on the fewest phases.
-    Then phases are added, each time from the solution before, until the means stop changing.
+    The first solution, from x and u, is a rough one for the robot without its non-local effects (`plain`), on the
+    fewest phases. Then phases are added, each time from the solution before, until the means stop changing.
     """
-    n = MESHES[0]
-    phases = tails * int(np.ceil(2 / tails))
-    x, u = straight_start(plain, n, phases, tails)
+    phases = x.shape[1]
     before, change, robot, wanted = np.zeros(5), np.nan, plain, 1e-2
     solved = -1  # numbers of phases that the robot itself was solved on, less one
     while True:

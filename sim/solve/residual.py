@@ -3,9 +3,9 @@
     r = 0 on every free node, t = (F_x, F_z, M_y, M_z) = 0 about J
 
 `fill_residual` adds up all forces: local drag and the elastic forces of straight tails (`sim.mechanics.balance`),
-and the non-local effects. These are material frames (`frames`), flow between the parts (`flow`), friction of
-the contact line, and thinning of the fluid, which changes the drag on every node (`thinning`). A new non-local
-effect is called in `_surround`. Units: l, μ0 l⁴/EI, EI/l².
+and the non-local effects. These are material frames (`frames`), flow between the parts (`flow`), contact
+between tails (`tail_contact`), friction of the contact line, and thinning of the fluid, which changes the drag on
+every node (`thinning`). A new non-local effect is called in `_surround`. Units: l, μ0 l⁴/EI, EI/l².
 
 The Newton matrices of `sim.solve.linearise` leave the non-local effects out; GMRES takes them into account
 (`sim.solve.newton`).
@@ -26,6 +26,7 @@ from sim.mechanics.contact_line import add_contact_line
 from sim.mechanics.flow import add_flow, has_flow
 from sim.mechanics.frames import add_frames, has_frames
 from sim.mechanics.geometry import Geometry, measure, new_geometry
+from sim.mechanics.tail_contact import add_contact, has_contact
 from sim.mechanics.thinning import thinned, thins
 from sim.model.body import Body
 from sim.solve.rates import Rates, base_phase, fill_rates
@@ -116,6 +117,8 @@ def _surround(body: Body, x: Floats, u: Floats, phase: float, p: int, tails: int
         for m in range(p, columns, columns // tails):
             motion = motion_at(body, u, phase + 2 * np.pi * (m - p) / columns)
             add_frames(body, geometry, motion, m, room.x_dot, around.moment)
+    if has_contact(body):
+        add_contact(body, geometry, x, u, phase, p, tails, around.wrench[p])
     if has_flow(body):
         add_flow(body, geometry, x, u, phase, p, tails, around.flow, around.wrench[p])
     add_contact_line(body, u, around.wrench[p])

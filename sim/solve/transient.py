@@ -34,14 +34,13 @@ from sim.linear.spectral import differentiation
 from sim.mechanics.balance import tail_spin
 from sim.model.body import Body
 from sim.solve.march import GAMMA
-from sim.solve.newton import Workspace, correct, move, new_workspace
+from sim.solve.newton import Workspace, correct, largest_move, move, new_workspace
 from sim.solve.orbit import FIRST_PHASE
 from sim.solve.rates import in_transient
 
 MOST_STEPS = 400
 _CORRECTION = 1e-3  # of a node, in l: Newton's method stops below it
 _MOST_CORRECTIONS = 8
-_LARGEST_MOVE = 0.3  # of a node in one correction, in l: more, and the step is shortened
 _OSCILLATION = 0.1  # weight of what averages out over a turn in the error of a step
 _FIRST_STEP = 5e-3  # over √ω̄
 _LONGEST_STEP = 0.5
@@ -157,7 +156,7 @@ def _solve_stage(
     for count in range(_MOST_CORRECTIONS):
         dx, du = correct(body, rates, x, u, work, anew and count == 0)
         size = np.max(np.abs(dx))
-        if not size < min(_LARGEST_MOVE, 2 * before):
+        if not size < min(largest_move(body), 2 * before):  # more, and the step is shortened
             return False
         move(body, x, dx)
         u += du

@@ -52,8 +52,8 @@ def test_derivatives_are_those_of_the_prediction(table: pd.DataFrame) -> None:
     theirs, differences = by_differences(model, at, names)
     assert ours == pytest.approx(theirs, abs=5e-4)  # more phases than the prediction needs
     scale = np.abs(differences).max((0, 1))
-    assert (scale > 0).all()
-    off = np.abs(J - differences).max((0, 1)) / scale
+    assert [name for name, s in zip(names, scale, strict=True) if s < 1e-6] == ["tail_contact"]  # no tails touch
+    off = np.abs(J - differences).max((0, 1)) / np.maximum(scale, 1e-6)
     # Differences are those of predictions on few phases, where an effect near its null may not show in full.
     tolerance = {name: 0.2 if name == "rate_dependent_modulus" else 0.06 for name in names}
     assert {name: o for name, o in zip(names, off.tolist(), strict=True) if o > tolerance[name]} == {}

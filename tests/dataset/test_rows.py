@@ -102,7 +102,8 @@ def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> No
 
     def lost(rows: np.ndarray, *_: object, **__: object) -> Orbits:
         count, none = len(rows), np.full(len(rows), np.nan)
-        return Orbits(np.full((count, 5), np.nan), np.empty((count, 0, 5)), none, np.full(count, NO_START), none)
+        means, slopes = np.full((count, 5), np.nan), np.empty((count, 0, 5))
+        return Orbits(means, slopes, none, np.full(count, NO_START), none, none)
 
     monkeypatch.setattr(steady, "solve_orbits", lost)
     monkeypatch.setattr(response, "orbit_on_mesh", lambda *_: (False, None, None))

@@ -12,11 +12,13 @@ import pytest
 import torch
 
 import sim.effects
+from dataset.simulate import simulate
 from sim.effects import catalogue
+from sim.effects.tail_contact import least_gap
 from sim.motion.steady import orbits, steady
 from sim.motion.switching import switch_response
 from sim.solve.assembly import assemble, numbers
-from tests.sim.robots import control
+from tests.sim.robots import CONTROL_VALUES, control
 
 OUTPUTS = ("omega_t", "omega_yr", "v_x", "v_z")
 
@@ -125,7 +127,8 @@ def test_symmetry_visibility_and_dissipation(name: str) -> None:
     effect = catalogue()[name]
     sizes = [effect.null, effect.typical, effect.typical]
     beside = {effect.beside: catalogue()[effect.beside].typical} if effect.beside else {}
-    groups = control(3, omega_bar=[10.0, 10.0, -10.0], **{**beside, name: sizes})
+    speed, where = (30.0, {"N": 4}) if name == "tail_contact" else (10.0, {})  # tails must touch to feel it
+    groups = control(3, omega_bar=[speed, speed, -speed], **{**where, **beside, name: sizes})
     motion = steady(groups)
     values = {o: getattr(motion, o) for o in OUTPUTS}
     change = max(abs(values[o][1] / values[o][0] - 1) for o in OUTPUTS)
@@ -176,3 +179,15 @@ def test_end_over_end_drag_slows_the_turn_as_much_as_estimated() -> None:
     motion = steady(control(2, end_over_end_drag=[0.0, 5.0], **short))
     ratio = motion.omega_yr[1] / motion.omega_yr[0]
     assert 0.5 < ratio < 0.75
+
+
+def test_a_row_with_contact_is_valid_where_its_gap_is_kept() -> None:
+    """0.99 of a diameter: overlap without contact, within its limit with it."""
+    assert least_gap([0.0, 0.5, 1.0]).tolist() == [1.0, 0.98, 0.98]
+    groups = {**CONTROL_VALUES, "N": 4.0, "omega_bar": 60.0, "l_over_r0": 22.0, "history": False}
+    inputs = {name: np.array([value, value]) for name, value in groups.items()}
+    rows = simulate({**inputs, "tail_contact": np.array([0.0, 1.0])})
+    assert rows["tail_gap"][0] < 0.6
+    assert 0.98 < rows["tail_gap"][1] < 1.0
+    assert rows["touching"].tolist() == [True, False]
+    assert not rows["failed"].any()

@@ -107,8 +107,8 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
     groups = control(2, omega_bar=[10.0, 14.0])
     plain = steady(groups)
 
-    def lose_the_first(rows: np.ndarray, tails: int, *, phases: int) -> Orbits:
-        found = solve_orbits(rows, tails, phases=phases)
+    def lose_the_first(rows: np.ndarray, tails: int, *, phases: int, stability: bool) -> Orbits:
+        found = solve_orbits(rows, tails, phases=phases, stability=stability)
         found.ended[0] = LOST
         found.means[0] = np.nan
         return found
@@ -138,3 +138,17 @@ def test_a_quick_turn_is_followed_from_rest() -> None:
     assert "another motion" in motion.note[0]
     assert abs(motion.v_z[0] / alike.v_z[0] - 1) > 0.1
     assert motion.v_z[1] == alike.v_z[1]
+
+
+def test_tails_in_contact_that_leave_the_orbit_are_stepped_and_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where differences between tails grow, and stepping reaches another motion, that one is the answer."""
+    groups = control(1, N=4, omega_bar=30.0, tail_contact=1.0)
+    plain = steady(groups)
+    assert plain.method.tolist() == [DIRECT]
+    monkeypatch.setattr(sim.motion.orbits, "growth", lambda *_: 0.1)
+    assert steady(groups).method.tolist() == [DIRECT]  # stepping reaches the same motion
+    monkeypatch.setattr(sim.motion.steady, "SAME", 0.0)
+    other = steady(groups)
+    assert other.method.tolist() == [STEPPING]
+    assert "another motion" in other.note[0]
+    assert other.omega_yr == pytest.approx(plain.omega_yr, rel=0.01)

@@ -1,0 +1,147 @@
+"""Tails in contact: gaps are kept, meshes converge, and time steps settle to the same motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from scipy.interpolate import CubicSpline
+
+from sim.linear.spectral import with_phases
+from sim.model.groups import Groups
+from sim.model.presets import PRESETS
+from sim.motion.alike import growth
+from sim.motion.resolution import Resolution
+from sim.motion.sensitivity import sensitivities
+from sim.motion.settling import settle
+from sim.motion.steady import GROWS, orbits
+from sim.solve.orbit import mean_motion
+from sim.solve.refinement import FEW, MANY, SOLVED, difference, orbit_on_mesh, refined_orbit
+from tests.sim.robots import body_of, control
+
+MEANS = ("omega_t", "omega_h", "omega_yr", "v_x", "v_z")
+ROBOTS = {
+    "measured": PRESETS["paper-measured"].groups(),
+    "two": control(N=2, omega_bar=30.0, l_over_r0=18.0, C_yr=4.0),
+    "three": control(N=3, omega_bar=80.0, l_over_r0=26.0),
+    "five": control(N=5, omega_bar=25.0),
+    "backwards": control(N=4, omega_bar=-60.0, l_over_r0=22.0),
+}
+
+
+def with_contact(groups: Groups, size: float = 1.0) -> Groups:
+    return replace(groups, effects={**groups.effects, "tail_contact": torch.full_like(groups.omega_bar, size)})
+
+
+def axes(x: np.ndarray, offset: float, tails: int) -> np.ndarray:
+    """The tails of an orbit x (n, M, 3) as smooth curves in space, (phases, N, points, 3)."""
+    x = with_phases(x, tails * (24 // tails))
+    n, columns, _ = x.shape
+    root = np.zeros((1, columns, 3))
+    root[:, :, 0] = offset
+    curves = CubicSpline(np.arange(n + 1) / n, np.concatenate([root, x]))(np.linspace(0, 1, 10 * n + 1))
+    turn = 2 * np.pi * np.arange(columns) / columns
+    cos, sin = np.cos(turn), np.sin(turn)
+    along, across = cos * curves[..., 0] - sin * curves[..., 1], sin * curves[..., 0] + cos * curves[..., 1]
+    placed = np.stack([along, across, curves[..., 2]], -1)
+    return placed.reshape(10 * n + 1, tails, columns // tails, 3).transpose(2, 1, 0, 3)
+
+
+def true_gap(x: np.ndarray, offset: float, radius: float, tails: int) -> float:
+    """Smallest distance between the axes of two tails over 2 r0, from points on one to pieces of the other."""
+    smallest = np.inf
+    for shapes in axes(x, offset, tails):
+        for i in range(tails):
+            for j in range(i + 1, tails):
+                start, piece = shapes[j, :-1], np.diff(shapes[j], axis=0)
+                away = shapes[i][:, None] - start
+                share = np.clip((away * piece).sum(-1) / (piece * piece).sum(-1), 0, 1)
+                smallest = min(smallest, np.linalg.norm(away - share[..., None] * piece, axis=-1).min())
+    return smallest / (2 * radius)
+
+
+@pytest.mark.parametrize("name", list(ROBOTS))
+def test_gaps_are_kept_to_two_per_cent(name: str) -> None:
+    """Of the axes as smooth curves, over the whole revolution; without contact the tails overlap."""
+    groups = ROBOTS[name]
+    body = body_of(with_contact(groups))
+    plain, found = (refined_orbit(b, groups.N, FEW) for b in (body_of(groups), body))
+    assert plain.ended == found.ended == SOLVED
+    assert true_gap(plain.x[2], body.offset, body.tail_radius, groups.N) < 0.9
+    assert true_gap(found.x[2], body.offset, body.tail_radius, groups.N) == pytest.approx(1, abs=0.02)
+    assert difference(found.means, plain.means) > 10 * found.error
+
+
+@pytest.mark.parametrize("name", ["measured", "three", "five"])
+def test_meshes_converge(name: str) -> None:
+    """The means on 8, 12 and 16 edges come nearer and nearer to those on 32, which the stated error covers."""
+    groups = with_contact(ROBOTS[name])
+    body = body_of(groups)
+    means = {}
+    for edges in (8, 12, 16, 32):
+        solved, _, u = orbit_on_mesh(body, groups.N, edges)
+        assert solved
+        means[edges] = mean_motion(body, u)
+    away = [difference(means[n], means[32]) for n in (8, 12, 16)]
+    assert away[1] < 0.6 * away[0]
+    assert away[2] < 0.7 * away[1]
+    assert away[2] < 0.01
+    found = refined_orbit(body, groups.N, FEW)
+    assert difference(found.means, means[32]) < 2 * found.error + away[2] / 3
+
+
+def test_a_reversed_motor_gives_the_mirror_image() -> None:
+    left, right = (orbits(with_contact(control(N=4, omega_bar=w, l_over_r0=22.0))) for w in (60.0, -60.0))
+    for name, sign in zip(MEANS, (-1, -1, -1, -1, 1), strict=True):
+        assert getattr(right, name)[0] == pytest.approx(sign * getattr(left, name)[0], rel=1e-6)
+
+
+def test_softer_contact_overlaps_more() -> None:
+    gaps = [orbits(with_contact(ROBOTS["measured"], size)).tail_gap[0] for size in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    assert (np.diff(gaps) > 0).all()
+    assert gaps[0] < 0.75
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["measured", "two", "five"])
+def test_time_steps_settle_to_the_orbit(name: str) -> None:
+    """From straight tails at rest, every tail for itself."""
+    groups = with_contact(ROBOTS[name])
+    motion = orbits(groups)
+    stepped = settle(groups, resolution=Resolution(24, 72))
+    assert motion.converged.all()
+    assert stepped.converged.all()
+    assert stepped.tail_gap[0] > 0.98
+    for key in MEANS:
+        assert getattr(stepped, key)[0] == pytest.approx(getattr(motion, key)[0], rel=1e-2)
+
+
+@pytest.mark.parametrize("size", [0.3, 1.0])
+def test_sensitivities_are_differences(size: float) -> None:
+    def yaw(size: float, C_t: float) -> float:
+        groups = replace(with_contact(ROBOTS["measured"], size), C_t=torch.tensor([C_t]).double())
+        return float(orbits(groups, phases=MANY).omega_yr[0])
+
+    C_t, width = float(ROBOTS["measured"].C_t), 1e-3
+    found = sensitivities(with_contact(ROBOTS["measured"], size), ("tail_contact", "C_t"))
+    by_size = (yaw(size + width, C_t) - yaw(size - width, C_t)) / (2 * width)
+    by_drag = (yaw(size, C_t + width) - yaw(size, C_t - width)) / (2 * width)
+    assert found.derivatives["omega_yr_bar"][0] == pytest.approx([by_size, by_drag], rel=5e-3)
+
+
+@pytest.mark.parametrize("tails", [2, 4])
+def test_tails_that_push_a_little_keep_moving_alike(tails: int) -> None:
+    """Their differences decay, with contact and without."""
+    for groups in (control(N=tails, omega_bar=25.0), with_contact(control(N=tails, omega_bar=25.0))):
+        body = body_of(groups)
+        found = refined_orbit(body, tails, FEW)
+        assert growth(body, tails, found.x[0], found.u[0]) < -0.1
+
+
+def test_a_ring_of_five_stout_tails_buckles() -> None:
+    """Its tails leave the motion in which they move alike, which a little noise in their shape shows."""
+    body = body_of(with_contact(control(N=5, omega_bar=58.8, l_over_r0=19.0)))
+    found = refined_orbit(body, 5, FEW)
+    assert growth(body, 5, found.x[0], found.u[0]) > GROWS
