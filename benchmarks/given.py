@@ -19,7 +19,6 @@ from joblib import Parallel, delayed
 
 from benchmarks.operating import per_cent
 from benchmarks.planted import Linear, Signals, outside, scatter, stand_in
-from calibration.imitation import DOUBT
 from calibration.loop import Verdict, calibrate
 from calibration.misfit import TESTABLE
 from calibration.model import Parameter
@@ -44,7 +43,7 @@ class Case:
 def claims(verdict: Verdict, case: Case) -> dict[str, bool]:
     """Every question that can be asked of a verdict."""
     sets = [{e.name for e in c.claimed} for c in verdict.explaining]
-    doubted = any(c.imitable > DOUBT for c in verdict.explaining)
+    doubted = any(c.doubted for c in verdict.explaining)
     found = {
         "an effect is claimed": bool(sets),
         "claimed without the words": bool(sets) and not doubted,

@@ -28,11 +28,12 @@ from tqdm import tqdm
 from calibration.directions import Directions, directions
 from calibration.fit import Fit, fit
 from calibration.freed import free_numbers
-from calibration.imitation import absorbable_shares, imitability
+from calibration.imitation import DOUBT, absorbable_shares, imitability
 from calibration.misfit import TESTABLE, Misfit, check_misfit
 from calibration.model import Model, Parameter, Parameters
 from calibration.prior import likeliest, prior_rows, pulls
 from calibration.sessions import groups
+from calibration.transfer import SURE, transfer_p
 from sim.arrays import Flags, Floats, Integers
 
 _CURVED = 0.3  # share of the best score's z² below which an effect is not refitted if it leaves too much
@@ -59,10 +60,16 @@ class Candidate:
     gain_error: float
     verdict: str  # why it was kept or not
     imitable: float = 0.0  # imitability index of the claim (`calibration.imitation`), where it is kept
+    transfer: float = 1.0  # p-value that it carries over to other runs (`calibration.transfer`), where it is kept
 
     @property
     def kept(self) -> bool:
         return self.verdict == "kept"
+
+    @property
+    def doubted(self) -> bool:
+        """Whether the claim may be something outside the catalogue that looks like it."""
+        return self.imitable > DOUBT or self.transfer < SURE
 
     @property
     def claimed(self) -> tuple[Parameter, ...]:
@@ -268,8 +275,10 @@ def ebic(refit: Fit, count: int, model: Model, used: Flags) -> float:
     return refit.deviance + len(refit.names) * math.log(values) + 2 * math.log(sets)
 
 
-def with_imitability(model: Model, best: list[Candidate], base: Fit, used: Flags, seed: int) -> list[Candidate]:
-    """Claims with their imitability index; their strength is what they take from the deviance of `base`."""
+def with_doubts(model: Model, best: list[Candidate], base: Fit, used: Flags, seed: int) -> list[Candidate]:
+    """Claims with their imitability index and whether they carry over; their strength is what they take from the
+    deviance of `base`.
+    """
     found = []
     for one in best:
         assert one.refit is not None
@@ -277,7 +286,8 @@ def with_imitability(model: Model, best: list[Candidate], base: Fit, used: Flags
         seconds = (e.second.name for e in one.claimed if e.second)
         names = (*(e.name for e in one.claimed), *seconds)
         shares = absorbable_shares(one.refit, model.runs, used, names, seed=seed)
-        found.append(replace(one, imitable=imitability(shares, strength)))
+        transfer = transfer_p(one.refit, model.runs, used, seed=seed + 4)
+        found.append(replace(one, imitable=imitability(shares, strength), transfer=transfer))
     return found
 
 

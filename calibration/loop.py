@@ -38,7 +38,7 @@ from calibration.attribute import (
     explaining,
     inside,
     pairs,
-    with_imitability,
+    with_doubts,
 )
 from calibration.directions import directions
 from calibration.discriminate import Batch, NextRun, next_runs
@@ -240,7 +240,7 @@ def _explain(task: _Task) -> _Explained:
     if not best:
         found_pairs = pairs(model, found, used, task.start, level=level, seed=seed, progress=task.progress)
         best = explaining(found_pairs)
-    best = with_imitability(model, best, base, used, seed)
+    best = with_doubts(model, best, base, used, seed)
     return _Explained(base, misfit, tuple(found) or _unexamined(misfit, model.effects), tuple(best))
 
 

@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from calibration.attribute import Candidate
 from calibration.discriminate import STOP, Batch
 from calibration.imitation import DOUBT
 from calibration.loop import Verdict
 from calibration.measurements import Measurements
 from calibration.prior import WRONG
 from calibration.profile import least_determined
+from calibration.transfer import SURE
 from sim.arrays import Floats
 from sim.io.pages import Page
 from sim.io.provenance import code_version
@@ -186,13 +188,20 @@ def _add_evidence(page: Page, result: Verdict) -> None:
         said = " and ".join(e.title for e in c.claimed)
         page.text(
             f"{said}: {100 * c.imitable:.0f} % of the departures from outside the catalogue that were drawn for "
-            f"comparison would have passed for it; above {100 * DOUBT:.0f} % the verdict says so."
+            f"comparison would have passed for it; above {100 * DOUBT:.0f} % the verdict says so. {_carried(c)}"
         )
     if result.untestable:
         page.text(
             "Not tested, because data are missing: "
             + "; ".join(f"{t} ({why})" for t, why in result.untestable.items())
         )
+
+
+def _carried(claim: Candidate) -> str:
+    if claim.transfer == 1.0:
+        return ""
+    words = "predicts" if claim.transfer >= SURE else "does not predict"
+    return f"Fitted to short tails and few of them, it {words} the other runs (p = {claim.transfer:.3f})."
 
 
 def _add_test(page: Page, result: Verdict, data: Measurements) -> None:

@@ -14,7 +14,6 @@ from calibration.attribute import Candidate
 from calibration.discriminate import Batch, NextRun
 from calibration.fit import Fit
 from calibration.generic import Generic
-from calibration.imitation import DOUBT
 from calibration.locked import Delivered
 from calibration.misfit import DRAWS, Misfit
 from calibration.model import Predictive
@@ -158,7 +157,7 @@ class Verdict:
     @property
     def _outside(self) -> str:
         """A claim that something outside the catalogue could imitate says so."""
-        if all(c.imitable <= DOUBT for c in self.explaining):
+        if not any(c.doubted for c in self.explaining):
             return ""
         many = len(self.explaining) > 1 or len(self.explaining[0].claimed) > 1
         return f", or something outside the catalogue that looks like {'them' if many else 'it'}"
@@ -195,7 +194,8 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "parameters": parameters,
         "in_form_only": list(result.in_form_only),
         "imitability": [c.imitable for c in result.explaining],
-        "imitable": any(c.imitable > DOUBT for c in result.explaining),
+        "transfer_p": [c.transfer for c in result.explaining],
+        "imitable": any(c.doubted for c in result.explaining),
         "effects_instead": [[e.name for e in c.claimed] for c in result.instead],
         "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
         "numbers_as_given": [_number_record(p) for p in result.numbers],

@@ -1,0 +1,81 @@
+"""A claim must carry over from short tails and few of them to the other runs; what only looks like it does not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import calibration.attribute
+from calibration.fit import Fit, fit
+from calibration.loop import calibrate
+from calibration.model import start_values
+from calibration.swimmer import COEFFICIENTS, Swimmer
+from calibration.transfer import SURE, fitted_again, transfer_p
+from calibration.verdict import verdict_record
+from sim.arrays import Flags, Floats
+from tests.calibration.toy_tables import TRUTH, toy_swimmer, toy_table
+
+EFFECT = "end_over_end_drag"
+SIZE = 3.0
+
+
+def model() -> Swimmer:
+    return toy_swimmer(toy_table(8))
+
+
+def everywhere(swimmer: Swimmer) -> Flags:
+    return np.ones(len(swimmer.runs), dtype=bool)
+
+
+def planted(swimmer: Swimmer, share: Floats) -> Swimmer:
+    """The effect on each run by this share (n,)."""
+    truth = {**start_values(swimmer), **{name: getattr(TRUTH, name) for name in COEFFICIENTS}}
+    clean, present = swimmer.predict([truth, {**truth, EFFECT: SIZE}])
+    y = swimmer.runs.y + share[:, None] * (present - clean)
+    return replace(swimmer, runs=replace(swimmer.runs, y=y))
+
+
+def claimed(swimmer: Swimmer) -> Fit:
+    start = {**start_values(swimmer), EFFECT: SIZE}
+    return fit(swimmer, start, (*COEFFICIENTS, EFFECT), everywhere(swimmer), title="")
+
+
+def test_short_tails_and_few_are_fitted() -> None:
+    runs = model().runs
+    near = fitted_again(runs, everywhere(model()))
+    assert set(np.unique(runs.tails[near])) == {2, 3, 4}
+    assert set(np.unique(runs.length[near].round(3))) == {0.05, 0.08}
+    assert near.sum() == len(near) // 2
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_an_effect_carries_over_and_a_mimic_does_not() -> None:
+    own = model()
+    rest = ~fitted_again(own.runs, everywhere(own))
+    for further, carries in ((1.0, True), (3.0, False)):
+        there = planted(own, np.where(rest, further, 1.0))
+        p = transfer_p(claimed(there), there.runs, everywhere(there), seed=1)
+        assert (p >= SURE) == carries
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_runs_that_are_all_alike_say_nothing() -> None:
+    own = planted(model(), np.ones(len(model().runs)))
+    short = own.runs.length < 0.06
+    few = short & (own.runs.tails <= 4)
+    assert transfer_p(claimed(own), own.runs, few, seed=1) == 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("toy_model")
+def test_a_claim_that_does_not_carry_over_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    there = planted(model(), np.full(len(model().runs), 2.0))
+    found = calibrate(there, progress=False)
+    assert found.effects == (EFFECT,)
+    assert [c.transfer >= SURE for c in found.explaining] == [True]
+    monkeypatch.setattr(calibration.attribute, "transfer_p", lambda *_, **__: 0.001)
+    doubted = calibrate(there, progress=False)
+    assert "or something outside the catalogue" in doubted.sentence
+    assert verdict_record(doubted, table="")["transfer_p"] == [0.001]
