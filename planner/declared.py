@@ -24,7 +24,8 @@ from planner.vehicle import Vehicle
 from sim.io.errors import InputError
 
 Corner = Literal["nearest", "minimax", "fillet", "error"]
-ROOMS = (0.85, 0.7, 0.55)  # shares of the pivot's largest curvature that the nearest path may use
+AS_DRAWN = 0.85  # share of the pivot's largest curvature up to which a path is followed as it was drawn
+ROOMS = (0.92, 0.85, 0.7, 0.55)  # shares of it that the nearest path may use
 TIGHTEST = 0.95  # a reference that needs more than this share is refused
 LOST = 0.3  # declared paths further off than this share of the drawn one's extent, or than the radius of the
 # robot's circle, are refused
@@ -96,7 +97,7 @@ def _try(raw: Path2D, own: Follower) -> Reference | None:
     limit = TIGHTEST / vehicle.pivot_radius
     drawn = reference(raw, distance, _spacing(raw), drift)
     sharpest = np.abs(drawn.curvature).max()
-    if sharpest * vehicle.pivot_radius <= ROOMS[0] and not time_weight:
+    if sharpest * vehicle.pivot_radius <= AS_DRAWN and not time_weight:
         return drawn
     if corner == "error":
         _refuse_corner(raw)

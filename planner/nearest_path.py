@@ -3,7 +3,7 @@
 A corner cannot be followed. Rounding it cuts it. It is better to swing out before the corner and to cut a little
 inside. So the pivot's poses (x_i, y_i, φ_i) are found that minimise
 
-    Σ across_i² + (along_i/2)²,   p_i = q_i + a e(φ_i),
+    Σ across_i² + (0.6 along_i)²,   p_i = q_i + a e(φ_i),
 
 with r_i points at equal distances on the path as drawn, and p_i − r_i in parts along that path and across it. Two
 things hold the poses to what the robot can do: a step has no sideways part, except for the drift; and it turns by
@@ -39,7 +39,7 @@ _MOST_POSES = 20_000
 _WEIGHTS = (0.3, 3.0, 30.0, 300.0, 1000.0)  # of what the robot cannot do, one stage after another
 _ITERATIONS = 20  # in each stage
 _EVEN = 0.01  # weight of equal steps
-_ALONG = 0.5  # of distances along the path beside those across: a robot that is late is still on it
+_ALONG = 0.6  # of distances along the path beside those across: a robot that is late is still on it
 _SHORTEST_STEP = 0.25  # of the steps, as a share of the spacing
 _PIECES = 4  # points of the path for each pose
 _ROUNDS = 12  # of growing weights

@@ -31,7 +31,7 @@ from planner.lookup import vehicle_of
 from planner.path import Path2D
 from planner.schedule import Start, Switches, follow, trace
 from planner.size import check_size
-from planner.stated_error import guaranteed, look_ahead, predicted_error, stated_error
+from planner.stated_error import guaranteed, look_ahead, predicted_error, rms_in_time, stated_error
 from planner.tractrix import Drift, Reference
 from planner.vehicle import Vehicle
 from planner.zigzag import Zigzag, zigzag
@@ -304,9 +304,9 @@ def scheduled(
         off_drawn=declared.off_drawn,
         missed=declared.missed,
         zigzag_rms=straight.rms,
-        predicted_rms=error.rms,
+        predicted_rms=rms_in_time(error.distance, switches.dwells),
         predicted_max=error.largest,
-        drawn_rms=float(np.sqrt(np.mean(drawn**2))),
+        drawn_rms=rms_in_time(drawn, switches.dwells),
         drawn_max=float(drawn.max()),
         stated_error=stated_error(vehicle, switches, track, error, seed=seed),
         feedback_error=stated_error(vehicle, switches, track, error, every=FEEDBACK_EVERY, seed=seed),

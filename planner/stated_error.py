@@ -60,12 +60,14 @@ class Predicted:
     closed: bool
 
     @property
-    def rms(self) -> float:
-        return float(np.sqrt(np.mean(self.distance**2)))
-
-    @property
     def largest(self) -> float:
         return float(self.distance.max())
+
+
+def rms_in_time(distance: Floats, dwells: Floats) -> float:
+    """Root mean square over time of distances (M s + 1,), sampled s times in each dwell (M,), as `trace` does."""
+    each = (distance[1:].reshape(len(dwells), -1) ** 2).mean(1)
+    return float(np.sqrt((each * dwells).sum() / dwells.sum()))
 
 
 def predicted_error(declared: Floats, track: Floats, *, closed: bool) -> Predicted:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from planner.distance import distance_to
 from planner.path import Path2D, circle
 from planner.schedule import Switches, follow, trace
-from planner.stated_error import look_ahead, predicted_error, stated_error
+from planner.stated_error import look_ahead, predicted_error, rms_in_time, stated_error
 from planner.tractrix import Reference, reference
 from planner.vehicle import TIMES, Vehicle
 from tests.planner.vehicles import vehicle
@@ -64,3 +65,9 @@ def test_feedback_stops_the_growth() -> None:
         held = stated_error(car, switches, track, error, every=20)
         assert held <= stated_error(car, switches, track, error) + 1e-3
         assert held < error.largest + 0.02, length
+
+
+def test_the_rms_error_is_a_mean_over_time() -> None:
+    """Three time units at a distance of 1, one at 3. Before, both dwells counted alike."""
+    distance = np.array([0.0, 1.0, 1.0, 3.0, 3.0])
+    assert rms_in_time(distance, np.array([3.0, 1.0])) == pytest.approx(math.sqrt((3 * 1 + 1 * 9) / 4))
