@@ -1,10 +1,9 @@
 """Influences: what the model of a run may lack.
 
 Most influences change the robot of a run: an effect of `sim.effects` gets the size null + ε s. Here s is 1 or a
-column of the table (hours since the first run, kelvin above the mean). What grows with a column q may settle: then
-s is (1 − exp(−κ q))/κ, with κ as second number. Others change the observation only: the true speed of the motor,
-the tracked point of the axis, a current in the lab. Some influences need a column. If the table does not have it,
-they cannot be tested, and the report says so.
+column of the table (hours since the first run, kelvin above the mean). Others change the observation only: the
+true speed of the motor, the tracked point of the axis, a current in the lab. Some influences need a column. If the
+table does not have it, they cannot be tested, and the report says so.
 """
 
 from __future__ import annotations
@@ -12,12 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from calibration.model import Parameter, Parameters
-from sim.arrays import Floats
+from calibration.model import Parameter
 from sim.effects import Effect, catalogue
-from sim.model.effect import Driver
 
 SLIP, TRACKED_POINT = "motor_slip", "tracked_point"
 CURRENT = ("current_along_x", "current_along_y")
@@ -36,27 +31,6 @@ class Influence:
     def name(self) -> str:
         return self.parameter.name
 
-    @property
-    def beside(self) -> Parameter | None:
-        """Its second number, if that is one of the simulator's."""
-        return None if self.needs else self.parameter.second
-
-    def strength(self, noted: Floats, parameters: Parameters) -> Floats:
-        """s of the module's head, for a noted quantity (n,)."""
-        rate = self._rate(parameters)
-        return noted if rate == 0 else -np.expm1(-rate * noted) / rate
-
-    def strength_by_rate(self, noted: Floats, parameters: Parameters) -> Floats:
-        """∂s/∂κ (n,)."""
-        rate = self._rate(parameters)
-        if rate == 0:
-            return -noted * noted / 2
-        return (noted * np.exp(-rate * noted) - self.strength(noted, parameters)) / rate
-
-    def _rate(self, parameters: Parameters) -> float:
-        second = self.parameter.second
-        return 0.0 if second is None else float(parameters.get(second.name, second.start))
-
 
 def influences() -> dict[str, Influence]:
     """All influences by name."""
@@ -67,7 +41,7 @@ def influences() -> dict[str, Influence]:
         for driver in effect.drivers:
             parameter = Parameter(
                 driver.name, driver.title, 0.0, driver.bounds, driver.typical, unit=driver.unit,
-                plausible=driver.plausible, second=_settling(driver),
+                plausible=driver.plausible,
             )  # fmt: skip
             found[driver.name] = Influence(parameter, effect.name, driver.column, effect.symmetry == "odd")
     slip = Parameter(
@@ -91,13 +65,6 @@ def influences() -> dict[str, Influence]:
     found[SLIP] = Influence(slip, None, None, False)
     found[TRACKED_POINT] = Influence(point, None, None, False)
     return dict(sorted(found.items()))
-
-
-def _settling(driver: Driver) -> Parameter | None:
-    own = driver.settling
-    if own is None:
-        return None
-    return Parameter(own.name, own.title, 0.0, own.bounds, own.typical, unit=own.unit, grid=own.grid)
 
 
 def _plain(effect: Effect) -> Influence:

@@ -99,11 +99,9 @@ class Swimmer:
     @cached_property
     def _seconds(self) -> dict[str, Influence]:
         """Second numbers of effects, by name."""
-        found = {}
-        for i in self._influences.values():
-            if second := i.parameter.second:
-                found[second.name] = Influence(second, i.effect if i.needs else second.name, i.needs, i.odd)
-        return found
+        owners = [i for i in self._influences.values() if i.parameter.second]
+        return {i.parameter.second.name: Influence(i.parameter.second, i.parameter.second.name, None, i.odd)
+                for i in owners if i.parameter.second}  # fmt: skip
 
     @cached_property
     def _influences(self) -> dict[str, Influence]:
@@ -145,9 +143,7 @@ class Swimmer:
         odd = any(i is not None and i.odd for i in influences.values())
         runs, place = self._conditions(parameters, signed=odd)
         columns = self._columns(runs, [parameters])
-        for second in (
-            i.parameter.second for i in influences.values() if i and i.parameter.second and not i.needs
-        ):
+        for second in (i.parameter.second for i in influences.values() if i and i.parameter.second):
             columns.setdefault(second.name, np.full(len(runs), float(parameters.get(second.name, second.start))))
         moves = {name: _moves(name, influence) for name, influence in influences.items()}
         wanted = tuple(dict.fromkeys(move for group in moves.values() for move in group))
@@ -169,22 +165,12 @@ class Swimmer:
             )
             if name == SLIP:
                 slope = slope * (-columns["omega_bar"] / (1 - parameters[SLIP]))[:, None]
-            scale = self._strength(influence, parameters) if influence else np.ones(len(self.runs))
+            scale = self._drivers[influence.needs] if influence and influence.needs else np.ones(len(self.runs))
             J[..., j] = slope[place] * (scale if influence else parameters[name] * scale)[:, None]
         seen = view.see(found.values)[place] + self._turned(parameters.get(HEADING, 0.0))
         if not quick and not (np.isfinite(J).all() and np.isfinite(seen).all()):
             return by_differences(self, parameters, names, title=title)
         return seen, J
-
-    def _strength(self, influence: Influence, parameters: Parameters) -> Floats:
-        """Change (n,) of the effect's size with the influence's parameter."""
-        if influence.needs is None:
-            return np.ones(len(self.runs))
-        noted = self._drivers[influence.needs]
-        if influence.name not in self._seconds:
-            return influence.strength(noted, parameters)
-        owner = next(i for i in self._influences.values() if i.parameter.second == influence.parameter)
-        return parameters.get(owner.name, 0.0) * owner.strength_by_rate(noted, parameters)
 
     def _slope_of_number(
         self, name: str, runs: list[_Run], columns: dict[str, Floats], found: Sensitivities, view: Observation
@@ -323,11 +309,11 @@ class Swimmer:
             by = parameters[influence.name] - influence.parameter.start
             before = influence.parameter.start
             if influence.needs is not None:
-                by *= float(influence.strength(self._drivers[influence.needs], parameters)[row])
+                by *= float(self._drivers[influence.needs][row])
                 before = self.robot.effects.get(influence.effect or "", before)
             if influence.effect is not None:
                 effects[influence.effect] = before + by
-                if second := influence.beside:
+                if second := influence.parameter.second:
                     effects[second.name] = parameters.get(second.name, second.start)
             elif influence.name in CURRENT:
                 current += by
@@ -342,7 +328,9 @@ class Swimmer:
     def _columns(self, runs: list[_Run], sets: Sequence[Parameters]) -> dict[str, Floats]:
         """Runs as columns for the simulator, with every effect that is present in any of the sets."""
         work = [i for parameters in sets for i in self._at_work(parameters)]
-        names = {i.effect for i in work if i.effect} | {i.beside.name for i in work if i.beside}
+        names = {i.effect for i in work if i.effect} | {
+            i.parameter.second.name for i in work if i.parameter.second
+        }
         nulls = {name: catalogue()[name].null for name in sorted(names)}
         rows = [{**nulls, **run.robot.group_values()} for run in runs]
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}

@@ -68,9 +68,6 @@ def _about(effect: Effect) -> str:
     for driver in effect.drivers:
         words = f"`{driver.name}`, {driver.title}: size = null + ε × `{driver.column}`; unit of ε: {driver.unit}"
         properties.append(("candidate in a calibration", words))
-        if rate := driver.settling:
-            words = f"`{rate.name}`, {rate.title}, κ in {rate.unit}: (1 − exp(−κ q))/κ for q = `{driver.column}`"
-            properties.append(("its second number", words))
     if effect.beside:
         properties.append(("shows only beside", f"`{effect.beside}`"))
     words = inspect.getdoc(import_module(f"sim.effects.{effect.name}")) or ""

@@ -219,9 +219,9 @@ def _export(arguments: Namespace) -> None:
 
 @program.command("compile", "compile the loops of queries now rather than on first use")
 def _compile(_: Namespace) -> None:
-    from surrogate.warm import compile_all
+    from surrogate.warm import FOLDER, compile_all
 
-    compile_all()
+    print(f"loops compiled in {compile_all():.0f} s -> {FOLDER}")
 
 
 if __name__ == "__main__":

@@ -83,6 +83,11 @@ def compiled(made: Path, out: Path) -> str:
     return "loops compiled in"
 
 
+def compiled_queries(made: Path, out: Path) -> str:
+    done("surrogate", "compile")
+    return "loops compiled in"
+
+
 def build(made: Path, out: Path) -> str:
     done("dataset", "build", "--config", made / "sweep.toml", "--out", made / "sweep", "--jobs", 1)  # nothing left
     assert json.loads((made / "sweep" / "manifest.json").read_text())["rows"] == 6
@@ -230,7 +235,8 @@ def tracks(made: Path, out: Path) -> str:
 
 RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "steady"): steady, ("sim", "replay"): replay, ("sim", "robot"): robot, ("sim", "check"): check_paper,
-    ("sim", "compile"): compiled, ("dataset", "build"): build, ("dataset", "report"): report,
+    ("sim", "compile"): compiled, ("surrogate", "compile"): compiled_queries,
+    ("dataset", "build"): build, ("dataset", "report"): report,
     ("dataset", "verify"): verify, ("surrogate", "train"): train, ("surrogate", "query"): query,
     ("surrogate", "inverse"): inverse, ("surrogate", "refine"): refine, ("planner", "track"): follow,
     ("surrogate", "errors"): errors, ("surrogate", "export"): export,

@@ -3,9 +3,8 @@
     μ = μ0 exp(−β (T − T0)),   ε = β (T − T0)
 
 Glycerol loses 8.6 % of its viscosity for each kelvin. All drag is proportional to μ. The flow that a force makes
-is proportional to 1/μ. A vessel that is put into a warmer room takes on its temperature exponentially, so a drift
-with time may settle: after t hours it is ε (1 − exp(−κ t))/κ. The effect can be found only where runs differ in
-temperature or in time. If all runs have the same viscosity, only the unit of time changes.
+is proportional to 1/μ. The effect can be found only where runs differ in temperature or in time. If all runs have
+the same viscosity, only the unit of time changes.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sim.model.effect import Driver, Effect, Factors, Settling
+from sim.model.effect import Driver, Effect, Factors
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -47,14 +46,6 @@ EFFECT = ViscosityDrift(
             (-0.3, 0.3),
             0.02,
             (-0.15, 0.15),
-            Settling(
-                "viscosity_settling",
-                "rate at which the viscosity settles",
-                "1/h",
-                (0.0, 10.0),
-                0.5,
-                (0.0, 0.5, 2.0),
-            ),
         ),
         Driver(
             "viscosity_with_temperature",

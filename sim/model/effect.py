@@ -39,18 +39,6 @@ class Factors(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Settling:
-    """The rate κ at which what grows with a quantity q comes to rest: q stands for (1 − exp(−κ q))/κ."""
-
-    name: str  # a second number of the driver's candidate
-    title: str
-    unit: str  # of κ; its null is 0
-    bounds: tuple[float, float]
-    typical: float
-    grid: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class Driver:
     """A noted quantity that makes an effect differ from run to run: size = null + ε × quantity."""
 
@@ -61,7 +49,6 @@ class Driver:
     bounds: tuple[float, float]
     typical: float
     plausible: tuple[float, float]  # sizes that its source allows
-    settling: Settling | None = None
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,6 @@ def test_the_page_of_effects_has_each() -> None:
             assert words.replace("|", "\\|") in page, effect.name
         for driver in effect.drivers:
             assert f"`{driver.name}`" in page
-            assert driver.settling is None or f"`{driver.settling.name}`" in page
 
 
 def test_the_page_of_columns_has_each() -> None:
