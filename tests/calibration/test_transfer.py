@@ -72,10 +72,8 @@ def test_runs_that_are_all_alike_say_nothing() -> None:
 @pytest.mark.usefixtures("toy_model")
 def test_a_claim_that_does_not_carry_over_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     there = planted(model(), np.full(len(model().runs), 2.0))
-    found = calibrate(there, progress=False)
-    assert found.effects == (EFFECT,)
-    assert [c.transfer >= SURE for c in found.explaining] == [True]
     monkeypatch.setattr(calibration.attribute, "transfer_p", lambda *_, **__: 0.001)
     doubted = calibrate(there, progress=False)
+    assert doubted.effects == (EFFECT,)
     assert "or something outside the catalogue" in doubted.sentence
     assert verdict_record(doubted, table="")["transfer_p"] == [0.001]
