@@ -10,7 +10,7 @@ from scipy.stats import t as student
 
 from calibration.fit import Fit
 from calibration.model import Model, Parameter, Runs, stepped
-from calibration.noise import inverse_root, least_squares, sums
+from calibration.noise import Linear, inverse_root, least_squares, sums
 from calibration.prior import with_prior
 from calibration.sessions import groups
 from sim.arrays import Flags, Floats
@@ -67,6 +67,13 @@ def locked_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> float:
     return (1 + count) / (1 + _DRAWS)
 
 
+def one_step(data: Runs, fitted: Fit, rows: Flags) -> Linear:
+    """The linear step that fits a fitted model to other runs, those in `rows` (n,), with its priors."""
+    table = np.concatenate([fitted.jacobian, (data.y - fitted.prediction)[..., None]], -1)
+    products = sums(inverse_root(fitted.noise.run) @ table[rows], data.session[rows], len(fitted.noise.run))
+    return least_squares(with_prior(products, fitted.fitted, fitted.parameters), passes=3)
+
+
 @dataclass(frozen=True)
 class Delivered:
     """The model that is handed on: fitted to all runs."""
@@ -81,11 +88,7 @@ def fitted_to_all(model: Model, fitted: Fit, rows: Flags, *, moved: bool = True)
 
     Its covariance allows for the estimates of S and ρ, as the intervals of the fit do.
     """
-    data = model.runs
-    table = np.concatenate([fitted.jacobian, (data.y - fitted.prediction)[..., None]], -1)
-    products = sums(inverse_root(fitted.noise.run) @ table[rows], data.session[rows], len(fitted.noise.run))
-    products = with_prior(products, fitted.fitted, fitted.parameters)
-    found = least_squares(products, passes=3)
+    found = one_step(model.runs, fitted, rows)
     wider = student.ppf(0.975, fitted.freedom) / normal.ppf(0.975)
     covariance = fitted.inflation * found.covariance * np.outer(wider, wider)
     step = found.step if moved else np.zeros_like(found.step)

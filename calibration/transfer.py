@@ -14,10 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.fit import Fit
-from calibration.locked import locked_p_value
+from calibration.locked import locked_p_value, one_step
 from calibration.model import Runs, stepped
-from calibration.noise import inverse_root, least_squares, sums
-from calibration.prior import with_prior
 from sim.arrays import Flags
 
 SURE = 0.01
@@ -39,9 +37,7 @@ def transfer_p(fitted: Fit, runs: Runs, used: Flags, *, seed: int) -> float:
     values = near.sum() * runs.y.shape[1]
     if not rest.any() or values < _ENOUGH * len(fitted.names):
         return 1.0
-    table = np.concatenate([fitted.jacobian, (runs.y - fitted.prediction)[..., None]], -1)
-    products = sums(inverse_root(fitted.noise.run) @ table[near], runs.session[near], runs.y.shape[1])
-    found = least_squares(with_prior(products, fitted.fitted, fitted.parameters), passes=3)
+    found = one_step(runs, fitted, near)
     moved = replace(
         fitted,
         parameters=stepped(fitted.fitted, fitted.parameters, found.step),

@@ -237,9 +237,9 @@ def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Fl
     put(2, -broken * one, none, none)
     steps[:, 3] = _EVEN * (forward - spacing)
     put(3, _EVEN * one, none, none)
-    steps[:, 4] = np.sqrt(time_weight / spacing * np.maximum(forward, _SHORTEST_STEP * spacing))
-    slope = steps[:, 4] / (2 * np.maximum(forward, _SHORTEST_STEP * spacing))
-    put(4, np.asarray(slope * (forward > _SHORTEST_STEP * spacing), dtype=np.float64), none, none)
+    length = np.maximum(forward, _SHORTEST_STEP * spacing)
+    steps[:, 4] = np.sqrt(time_weight / spacing * length)
+    put(4, np.asarray(steps[:, 4] / (2 * length) * (length == forward), dtype=np.float64), none, none)
     return (own, steps), single, pair
 
 

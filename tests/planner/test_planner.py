@@ -212,6 +212,9 @@ def test_refusals() -> None:
     refused(polygon(4, 0.1), "too small, the robot's circle has a radius")
     refused([[0, 0], [8e4, 0]], "if you gave m and mean mm")
     refused(polygon(4, 3.0), "corner of 90 degrees", corner="error")
+    for weight in (-1.0, float("nan")):
+        refused(polygon(4, 3.0), "give a number of l²", time_weight=weight)
+    refused(polygon(4, 3.0), "needs corner = nearest or minimax", corner="fillet", time_weight=0.1)
     refused(circle(2.0), "below 0.2 time units", minimum_dwell=0.1)
     refused(circle(2.0), "objective", objective="speed")
     refused(circle(2.0), "outside the look-up table.* omega_bar = 500", robot=CONTROL.with_motor(500.0))
