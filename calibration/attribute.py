@@ -68,8 +68,11 @@ class Candidate:
 
     @property
     def doubted(self) -> bool:
-        """Whether the claim may be something outside the catalogue that looks like it."""
-        return self.imitable > DOUBT or self.transfer < SURE
+        """Whether the claim may be something outside the catalogue that looks like it.
+
+        An effect that explains the runs only beside a wrong number counts as a pair, and is always in doubt.
+        """
+        return self.imitable > DOUBT or self.transfer < SURE or bool(self.refit and self.refit.wrong)
 
     @property
     def claimed(self) -> tuple[Parameter, ...]:

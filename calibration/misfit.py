@@ -35,7 +35,16 @@ from calibration.directions import Directions
 from calibration.features import features
 from calibration.fit import Fit
 from calibration.model import Runs
-from calibration.noise import Sums, inverse, inverse_root, least_squares, repeat_covariance, root_diagonal, sums
+from calibration.noise import (
+    Design,
+    Sums,
+    inverse,
+    inverse_root,
+    least_squares,
+    repeat_covariance,
+    root_diagonal,
+    session_share,
+)
 from calibration.prior import changes, precisions
 from sim.arrays import Flags, Floats, Integers
 
@@ -43,6 +52,7 @@ DRAWS = 1000
 TESTABLE = 0.03  # an effect cannot be tested if less than this share of its signal survives the projection
 GENERAL = ("lack", "kernel", "shape")
 _PASSES = 3
+_PASSES_OF_AN_EFFECT = 2
 _AT_ONCE = 50  # draws
 
 
@@ -78,6 +88,7 @@ class _Tester:
     def __init__(self, data: Runs, used: Flags, J: Floats, D: Floats, precision: Floats):
         self.session, self.condition = data.session[used], data.condition[used]
         self.J, self.D, self.precision = J, D, precision
+        self.design = Design(np.concatenate([J, D], -1), self.session)
         inputs = data.inputs[used]
         spread = inputs.std(0)
         inputs = (inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
@@ -90,6 +101,11 @@ class _Tester:
         self.means = same / np.sqrt(same.sum(1))[:, None]  # (c, n)
         sessions = np.unique(self.session, return_inverse=True)[1].reshape(-1)
         self.sessions = (np.arange(sessions.max() + 1)[:, None] == sessions).astype(float)  # (s, n)
+        roots = np.sqrt(self.sessions.sum(1))
+        self.F_means = self.sessions @ self.F / roots[:, None]  # (s, f)
+        J_means = np.einsum("sn,nkp->skp", self.sessions, J) / roots[:, None, None]
+        self.FJ = np.einsum("nf,nkp->fkp", self.F, J, optimize=True)
+        self.FJ_means = np.einsum("sf,skp->sfkp", self.F_means, J_means)
 
     def scores(self, residual: Floats) -> Scores:
         """Statistics of residuals (B, n, k) from the numbers as given, after a linear refit, each in its own
@@ -97,17 +113,15 @@ class _Tester:
         """
         p, e = self.J.shape[-1], self.D.shape[-1]
         root = inverse_root(repeat_covariance(residual, self.condition))  # (B, k, k)
-        table = np.broadcast_to(np.concatenate([self.J, self.D], -1), (*residual.shape, p + e))
-        table = np.concatenate([table, residual[..., None]], -1)
-        columns = np.asarray(np.einsum("bij,bnjm->bnim", root, table, optimize=True))
-        products = sums(columns, self.session, residual.shape[-1])
+        products = self.design.sums(np.swapaxes(root, -1, -2) @ root, residual)
         products.within[..., range(p), range(p)] += self.precision
         base = least_squares(products.take(np.r_[np.arange(p), p + e][None]), passes=_PASSES)
         share, step = base.share[:, 0], base.step[:, 0]
-        left = self._shrunk(columns[..., -1] - np.einsum("bnkp,bp->bnk", columns[..., :p], step), share)
+        left = residual - np.einsum("nkp,bp->bnk", self.J, step, optimize=True)
+        left = self._shrunk(left @ np.swapaxes(root, -1, -2), share)
         lack = ((self.means @ left) ** 2).sum((-1, -2))
         kernel = np.einsum("bnk,nm,bmk->b", left, self.K, left, optimize=True)
-        shapes = self._shapes(columns[..., :p], base.covariance[:, 0], left, root, share)
+        shapes = self._shapes(base.covariance[:, 0], left, root, share)
         largest = np.abs(shapes).max((-1, -2)) if shapes.size else np.zeros(len(share))
         return Scores(np.stack([lack, kernel, largest], -1), *self._effects(products, p, e), shapes, share)
 
@@ -115,7 +129,8 @@ class _Tester:
         """z, survived share and length of every effect, each with the scatter of sessions that remains with it."""
         own = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
         part = products.take(own)
-        whole = part.at(least_squares(part, passes=_PASSES).share)  # (B, e, p + 2, p + 2)
+        share = session_share(part, np.zeros((len(products.within), e)), passes=_PASSES_OF_AN_EFFECT)
+        whole = part.at(share)  # (B, e, p + 2, p + 2)
         scale = root_diagonal(whole[..., :p, :p])
         known = inverse(whole[..., :p, :p] / scale[..., :, None] / scale[..., None, :])
         weights = (known @ (whole[..., :p, p] / scale)[..., None])[..., 0] / scale
@@ -125,15 +140,18 @@ class _Tester:
         survived = length / np.sqrt(np.maximum(whole[..., p, p], 1e-300))
         return np.where(survived > 1e-6, score / length, 0.0), survived, length
 
-    def _shapes(self, J: Floats, covariance: Floats, left: Floats, root: Floats, share: Floats) -> Floats:
-        """z of every output along every feature, (B, k, f)."""
+    def _shapes(self, covariance: Floats, left: Floats, root: Floats, share: Floats) -> Floats:
+        """z of every output along every feature, (B, k, f).
+
+        Args:
+            left: residuals, white in Σ.
+        """
         count, k = len(left), left.shape[-1]
-        shape = np.broadcast_to(self.F, (count, *self.F.shape))
-        shape = self._shrunk(shape, share)
-        J = self._shrunk(J.reshape(count, len(self.session), -1), share).reshape(J.shape)
-        score = np.einsum("bnf,bnk,bka->baf", shape, left, root, optimize=True)
-        absorbed = np.einsum("bnf,bnkp,bka->bafp", shape, J, root, optimize=True)
-        whole = (root**2).sum(1)[:, :, None] * (shape**2).sum(1)[:, None]
+        score = np.einsum("nf,bnk,bka->baf", self.F, self._shrunk(left, share), root, optimize=True)
+        less = 1 / (1 + share[:, None] * self.sessions.sum(1)) - 1  # Σ⁻¹ of the sessions' means
+        followed = np.einsum("bs,sfkp->bfkp", less, self.FJ_means, optimize=True) + self.FJ
+        absorbed = np.einsum("bik,bia,bfkp->bafp", root, root, followed, optimize=True)
+        whole = (root**2).sum(1)[:, :, None] * ((self.F**2).sum(0) + less @ self.F_means**2)[:, None]
         rest = whole - np.einsum("bafp,bpq,bafq->baf", absorbed, covariance, absorbed, optimize=True)
         seen = rest > TESTABLE**2 * whole
         return np.asarray(np.where(seen, score / np.sqrt(np.where(seen, rest, 1.0)), 0.0)).reshape(count, k, -1)

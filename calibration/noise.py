@@ -111,33 +111,74 @@ def sums(columns: Floats, session: Labels, outputs: int) -> Sums:
     *batch, n, k, m = columns.shape
     flat = columns.reshape(*batch, n * k, m)
     whole = np.swapaxes(flat, -1, -2) @ flat
-    kinds, place, count = np.unique(session, return_inverse=True, return_counts=True)
-    picks = (np.arange(len(kinds))[:, None] == place.reshape(-1)) / np.sqrt(count)[:, None]  # (s, n)
+    picks, count = _picks(session)
     means = np.einsum("sn,...nkm->...skm", picks, columns)
     between = np.swapaxes(means, -1, -2) @ means
-    return Sums(whole - between.sum(-3), between, count.astype(float), outputs)
+    return Sums(whole - between.sum(-3), between, count, outputs)
+
+
+def _picks(session: Labels) -> tuple[Floats, Floats]:
+    """Rows (s, n) that take the mean of each session times the root of its size; the sizes (s,)."""
+    kinds, place, count = np.unique(session, return_inverse=True, return_counts=True)
+    return (np.arange(len(kinds))[:, None] == place.reshape(-1)) / np.sqrt(count)[:, None], count.astype(float)
+
+
+class Design:
+    """Columns (n, k, m) that stay the same for many residuals, each of which has its own S.
+
+    Products of two columns are linear in S⁻¹, so they are made once for every pair of outputs.
+    """
+
+    def __init__(self, columns: Floats, session: Labels):
+        n, k, m = columns.shape
+        self._picks, self._sizes = _picks(session)
+        self._flat = columns.reshape(n * k, m)
+        self._means = np.einsum("sn,nkm->skm", self._picks, columns)  # (s, k, m)
+        self._whole = np.einsum("nim,njl->ijml", columns, columns, optimize=True).reshape(k * k, m * m)
+        between = np.einsum("sim,sjl->ijsml", self._means, self._means, optimize=True)
+        self._between = between.reshape(k * k, -1)
+
+    def sums(self, precision: Floats, residual: Floats) -> Sums:
+        """The same as `sums` of these columns and a residual behind them.
+
+        Args:
+            precision: S⁻¹, (b, k, k).
+            residual: (b, n, k).
+        """
+        b, n, k = residual.shape
+        s, _, m = self._means.shape
+        weighted = residual @ precision
+        means, weighted_means = self._picks @ residual, self._picks @ weighted  # (b, s, k)
+        flat = precision.reshape(b, k * k)
+        whole, between = np.empty((b, m + 1, m + 1)), np.empty((b, s, m + 1, m + 1))
+        whole[:, :m, :m] = (flat @ self._whole).reshape(b, m, m)
+        between[:, :, :m, :m] = (flat @ self._between).reshape(b, s, m, m)
+        whole[:, m, :m] = whole[:, :m, m] = weighted.reshape(b, n * k) @ self._flat
+        across = np.einsum("bsk,skm->bsm", weighted_means, self._means, optimize=True)
+        between[..., m, :m] = between[..., :m, m] = across
+        whole[:, m, m] = (weighted * residual).sum((-1, -2))
+        between[..., m, m] = (weighted_means * means).sum(-1)
+        return Sums(whole - between.sum(-3), between, self._sizes, k)
 
 
 def least_squares(products: Sums, *, passes: int) -> Linear:
-    """Fit the last of the columns, with ρ from its own residuals after `passes` iterations (0: ρ = 0).
+    """Fit the last of the columns, with ρ from its own residuals after `passes` iterations (0: ρ = 0)."""
+    share = session_share(products, np.zeros(products.within.shape[:-2]), passes=passes)
+    return Linear(*_solved(products.at(share)), share)
+
+
+def session_share(products: Sums, share: Floats, *, passes: int) -> Floats:
+    """ρ (...) from the residuals of a fit of the last of the columns, after `passes` iterations from `share`.
 
     The expected scatter of the sessions' means is Σ_s n_s |m_s|² = (k − h/s) Σ_s (1 + ρ n_s), where h of their k s
     degrees of freedom are used by the fit.
     """
-    count = len(products.sizes)
-    p = products.within.shape[-1] - 1
-    share = np.zeros(products.within.shape[:-2])
-    for again in range(passes + 1):
+    count, p = len(products.sizes), products.within.shape[-1] - 1
+    if count == 1 and passes:
+        return np.full_like(share, SESSION_SHARE)
+    for _ in range(passes):
         whole = products.at(share)
-        scale = root_diagonal(whole[..., :p, :p])
-        own = whole[..., :p, :p] / scale[..., :, None] / scale[..., None, :]
-        covariance = inverse(own) / scale[..., :, None] / scale[..., None, :]
-        step = (covariance @ whole[..., :p, p, None])[..., 0]
-        if again == passes:
-            break
-        if count == 1:
-            share = np.full_like(share, SESSION_SHARE)
-            continue
+        step, covariance = _solved(whole)
         left = np.concatenate([-step, np.ones((*share.shape, 1))], -1)
         each = products.between @ left[..., None, :, None]
         between = (each[..., 0] * left[..., None, :]).sum((-1, -2))
@@ -145,7 +186,16 @@ def least_squares(products: Sums, *, passes: int) -> Linear:
         freedom = products.outputs - (covariance * np.swapaxes(means, -1, -2)).sum((-1, -2)) / count
         excess = between / np.maximum(freedom, 0.1 * products.outputs) - count
         share = np.clip(excess / products.sizes.sum(), 0.0, SESSION_SHARE)
-    return Linear(step, covariance, share)
+    return share
+
+
+def _solved(whole: Floats) -> tuple[Floats, Floats]:
+    """Coefficients (..., p) of the last of the columns, and their covariance (..., p, p)."""
+    p = whole.shape[-1] - 1
+    scale = root_diagonal(whole[..., :p, :p])
+    own = whole[..., :p, :p] / scale[..., :, None] / scale[..., None, :]
+    covariance = inverse(own) / scale[..., :, None] / scale[..., None, :]
+    return (covariance @ whole[..., :p, p, None])[..., 0], covariance
 
 
 def repeat_covariance(y: Floats, condition: Labels) -> Floats:

@@ -8,11 +8,15 @@ import numpy as np
 import pytest
 
 from calibration.directions import Directions
+from calibration.features import features
+from calibration.fit import fit
 from calibration.locked import middle_session
 from calibration.measurements import read_measurements
 from calibration.misfit import check_misfit
-from calibration.noise import Noise, inverse_root, least_squares, repeat_covariance, sums
-from tests.calibration.toy_tables import closed, toy_table
+from calibration.model import start_values
+from calibration.noise import Design, Noise, inverse_root, least_squares, repeat_covariance, sums
+from calibration.prior import changes, precisions
+from tests.calibration.toy_tables import closed, toy_swimmer, toy_table
 
 
 def test_whitener_is_the_inverse_root_of_the_block_covariance() -> None:
@@ -41,6 +45,45 @@ def test_products_of_columns_are_those_of_white_columns() -> None:
     fitted = least_squares(found, passes=0)
     plain = table.reshape(18, 4)
     assert fitted.step == pytest.approx(np.linalg.lstsq(plain[:, :3], plain[:, 3], rcond=None)[0])
+
+
+def test_a_design_makes_the_same_products_for_many_residuals() -> None:
+    """Each residual has its own S; against columns that are whitened one residual after the other."""
+    rng = np.random.default_rng(3)
+    session = np.array([0, 0, 1, 1, 1, 2, 2])
+    columns, residuals = rng.normal(size=(7, 3, 4)), rng.normal(size=(5, 7, 3))
+    roots = np.linalg.inv(np.linalg.cholesky([np.eye(3) + np.outer(v, v) for v in rng.normal(size=(5, 3))]))
+    found = Design(columns, session).sums(np.swapaxes(roots, -1, -2) @ roots, residuals)
+    for i, (root, residual) in enumerate(zip(roots, residuals, strict=True)):
+        own = sums(root @ np.concatenate([columns, residual[..., None]], -1), session, 3)
+        assert found.within[i] == pytest.approx(own.within)
+        assert found.between[i] == pytest.approx(own.between)
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_scores_along_features_are_those_of_least_squares() -> None:
+    """One output along one feature: its coefficient over its error, with coefficients and numbers beside it."""
+    model = toy_swimmer(toy_table(8))
+    used = ~middle_session(model.runs)
+    names = tuple(p.name for p in (*model.coefficients, *model.given))
+    fitted = fit(model, start_values(model), names, used, title="")
+    none = Directions(np.zeros((*model.runs.y.shape, 0)), np.zeros(0, int), np.zeros(0))
+    found = check_misfit(fitted, model.runs, used, none, level=0.04, seed=0, draws=50).scores
+    _, table = features(model.runs, used)
+    J = fitted.jacobian[used]
+    residual = (model.runs.y - fitted.prediction)[used] + J @ changes(fitted.fitted, fitted.parameters)
+    noise = Noise(repeat_covariance(residual, model.runs.condition[used]), float(found.share))
+    white = noise.whitener(model.runs.session[used])
+    prior = np.diag(np.sqrt(precisions(fitted.fitted)))
+    for output, feature in ((0, 0), (2, 3), (4, 1)):
+        along = np.zeros_like(residual)
+        along[:, output] = table[used][:, feature]
+        columns = np.concatenate([J, along[..., None]], -1)
+        rows = np.concatenate([white(columns), np.pad(prior, ((0, 0), (0, 1)))])
+        values = np.concatenate([white(residual), np.zeros(len(prior))])
+        step = np.linalg.lstsq(rows, values, rcond=None)[0]
+        error = np.sqrt(np.linalg.inv(rows.T @ rows)[-1, -1])
+        assert found.shapes[output, feature] == pytest.approx(step[-1] / error, rel=1e-6)
 
 
 def test_noise_is_recovered_from_repeats_and_sessions() -> None:

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import calibration.attribute
+from calibration.attribute import Candidate
 from calibration.fit import Fit, fit
 from calibration.loop import calibrate
-from calibration.model import start_values
+from calibration.model import parameter, start_values
+from calibration.prior import pulls
 from calibration.swimmer import COEFFICIENTS, Swimmer
 from calibration.transfer import SURE, fitted_again, transfer_p
 from calibration.verdict import verdict_record
@@ -35,6 +37,10 @@ def planted(swimmer: Swimmer, share: Floats) -> Swimmer:
     clean, present = swimmer.predict([truth, {**truth, EFFECT: SIZE}])
     y = swimmer.runs.y + share[:, None] * (present - clean)
     return replace(swimmer, runs=replace(swimmer.runs, y=y))
+
+
+def names(swimmer: Swimmer) -> tuple[str, ...]:
+    return tuple(p.name for p in (*swimmer.coefficients, *swimmer.given))
 
 
 def claimed(swimmer: Swimmer) -> Fit:
@@ -77,3 +83,15 @@ def test_a_claim_that_does_not_carry_over_says_so(monkeypatch: pytest.MonkeyPatc
     assert doubted.effects == (EFFECT,)
     assert "or something outside the catalogue" in doubted.sentence
     assert verdict_record(doubted, table="")["transfer_p"] == [0.001]
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_an_effect_beside_a_wrong_number_is_in_doubt() -> None:
+    """It is a pair: something outside the catalogue finds two things that explain it more easily than one."""
+    refit = claimed(planted(model(), np.ones(len(model().runs))))
+    own = model()
+    effect = parameter(own, EFFECT)
+    sure = Candidate(effect, (), 8.0, 1.0, 1.0, 1.0, refit, None, 1.0, 0.1, "kept")
+    assert not sure.doubted
+    pull = pulls(fit(own, start_values(own), names(own), everywhere(own), title=""), own.given)[0]
+    assert replace(sure, refit=replace(refit, wrong=((pull,),))).doubted
