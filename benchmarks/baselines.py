@@ -5,12 +5,14 @@ not locked, by generalised least squares with the same noise. What differs is wh
 
     best AIC, best BIC, EBIC    the least deviance + cost over no effect, every single one and every pair
     stepwise                    one more effect as long as BIC falls
+    identification              localised residual, sparse regression on a library, F tests on the other half of
+                                the repeats (`benchmarks.identification`)
     generic correction          none; a regression of the outputs on the inputs
 
 Tables are those of the linear stand-in (`benchmarks.given`). A claim is wrong if the truth is not among the
 sets that are named. "Error" is that on the locked runs over the noise of a run, median.
 
-Usage: python -m benchmarks.baselines [TABLES]      a table on the screen
+Usage: python -m benchmarks.baselines [TABLES] [FIRST_SEED]      a table on the screen
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from benchmarks.given import Case, cases
+from benchmarks.identification import identify
 from benchmarks.operating import per_cent
 from benchmarks.planted import Linear, scatter, stand_in
 from calibration.fit import Fit, fit
@@ -103,11 +106,13 @@ def ways(model: Linear) -> dict[str, Found]:
             break
         taken = best
     found["stepwise"] = Found(_claims(taken), sets.error(sets.fit(taken).prediction))
+    identified = identify(model, sets.used, testable)
+    found["identification"] = Found(_claims(identified), sets.error(sets.fit(identified).prediction))
     base = sets.fit(frozenset()).prediction
     generic = base + correct(model.runs, base, sets.used).correction
     found["generic correction"] = Found((), sets.error(generic))
     own = calibrate(model, progress=False)
-    named = tuple(frozenset(e.name for e in c.claimed) for c in own.explaining)
+    named = tuple(frozenset(e.name for e in c.claimed) for c in (*own.explaining, *own.instead))
     found["this procedure"] = Found(named, own.error_after / own.noise_ceiling)
     return found
 
@@ -132,12 +137,12 @@ def one(case: Case, seed: int) -> dict[str, Found]:
     return ways(replace(model, runs=replace(model.runs, y=y)))
 
 
-def main(count: str = "30") -> None:
+def main(count: str = "30", first: str = "0") -> None:
     todo = [c for c in cases(stand_in()) if c.label in KINDS]
     share = {kind: sum(KINDS[c.label] == kind for c in todo) for kind in KINDS.values()}
     work = [(c, s) for c in todo for s in range(max(int(count) // share[KINDS[c.label]], 1))]
     parallel = Parallel(n_jobs=available_jobs(), verbose=1)
-    results = list(parallel(delayed(one)(c, 37 * i) for i, (c, _) in enumerate(work)))
+    results = list(parallel(delayed(one)(c, int(first) + 37 * i) for i, (c, _) in enumerate(work)))
     print("| tables | way | named right | wrong claim | error / noise |\n|---|---|---|---|---|")
     for kind in share:
         of = [(c, r) for (c, _), r in zip(work, results, strict=True) if KINDS[c.label] == kind]

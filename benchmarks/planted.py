@@ -8,8 +8,7 @@ numbers as given can absorb within their priors.
     nulls           nothing missing; Gaussian noise, and heavy tails (Student, 3 degrees of freedom)
     effects         each testable effect at λ = 2, 4, 8, 16; at λ = 8 with heavy tails, too
     pairs           two effects at λ = 16 each
-    outside         six departures that no effect of the catalogue explains, sized by what the best pair of the
-                    catalogue leaves of them; three of them mimic an effect
+    outside         six departures that no effect of the catalogue explains; three of them mimic an effect
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from calibration.model import Parameter, Parameters, Runs, start_values
 from calibration.noise import Noise
 from calibration.prior import prior_rows
 from calibration.swimmer import Swimmer
-from sim.arrays import Flags, Floats
+from sim.arrays import Flags, Floats, Integers
 from sim.model.presets import PRESETS
 
 ROBOT = replace(PRESETS["paper-measured"], C_t=2.6, C_r=2.0, C_yr=3.2)
@@ -50,6 +49,12 @@ class Linear:
     G: Floats  # (n, k, g)
     D: Floats  # (n, k, e)
     untestable: Mapping[str, str]
+    next: Linear | None = None  # runs that can be made next; None: the same runs
+
+    def subset(self, rows: Integers) -> Linear:
+        """The runs at places `rows`, which may come more than once."""
+        own = {k: getattr(self, k)[rows] for k in ("prediction", "J", "G", "D")}
+        return replace(self, runs=self.runs.subset(rows), **own)
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         """Predictions (P, n, k)."""
@@ -73,8 +78,9 @@ class Linear:
         """Nothing to check."""
 
     def possible(self) -> tuple[Linear, list[dict[str, Any]]]:
-        """The same runs again."""
-        return self, [{"run": i} for i in range(len(self.runs))]
+        """Runs that can be made next, and their places."""
+        model = self.next or self
+        return model, [{"run": i} for i in range(len(model.runs))]
 
     def predictive(self, base: Fit, used: Flags, rows: Flags, test: Flags) -> None:
         """None: the stand-in cannot be corrected."""
@@ -128,7 +134,12 @@ def design(which: Design) -> Measurements:
 
 def stand_in(which: Design = PAPER) -> Linear:
     """Derivatives of the simulator at ROBOT."""
-    model = Swimmer(ROBOT, design(which))
+    return linearised(design(which))
+
+
+def linearised(data: Measurements) -> Linear:
+    """The same at the runs of a table."""
+    model = Swimmer(ROBOT, data)
     names = [p.name for p in (*model.coefficients, *model.given, *model.effects)]
     prediction, table = model.derivatives(start_values(model), names)
     J, G, D = np.split(table, np.cumsum([len(model.coefficients), len(model.given)]), -1)
@@ -229,10 +240,6 @@ def cases(model: Linear, repeats: int) -> list[Case]:
     for a, b in zip(strong, strong[1:] + strong[:1], strict=True):
         both = Case("pairs, λ = 16 each", {**a.sizes, **b.sizes}, a.signal + b.signal)
         found += [both] * max(repeats // 3, 1)
-    for label, signal in outside(model).items():
-        for level in (8.0, 16.0):
-            scale = level / signals.beyond_catalogue(signal)
-            found += [Case(f"outside: {label}, size {level:g}", {}, signal * scale)] * (2 * repeats)
     return found
 
 

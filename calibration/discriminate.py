@@ -1,16 +1,17 @@
-"""Which runs to make next, so that two effects can be told apart.
+"""Which runs to make next, so that effects can be told apart.
 
-Two effects A and B may explain the runs equally well and predict different outputs at other inputs. If A is true,
-a run at x that is made m times adds
+Effects A, B, … may explain the runs equally well and predict different outputs at other inputs. If A is true, new
+runs add
 
-    λ(x) = dᵀ (S/m + J Cov Jᵀ)⁻¹ d,   d = f_A(x) − f_B(x)
+    λ_AB = dᵀ (Σ + J Cov Jᵀ)⁻¹ d,   d = f_A − f_B
 
-to the difference of χ² between B and A. S is the covariance of a run. J and Cov are the derivatives of B and the
-covariance of its fit, because B can be fitted again (T-optimal design, linearised). The same is computed with A
-and B exchanged; the smaller value counts. How often the runs decide is found by drawing them at random. Source:
-Atkinson and Fedorov (1975).
+to the difference of χ² between B and A. Σ is the covariance of the new runs, which are one session
+(`calibration.noise`). J and Cov are the derivatives of B and the covariance of its fit, because B can be fitted
+again (T-optimal design, linearised). There is a λ for every two rivals, both ways; for single runs the smallest
+counts. How often the runs decide is found by drawing them at random. Source: Atkinson and Fedorov (1975).
 
-A batch is chosen one run after the other, each the one that raises λ of the whole batch most. The likelihood ratio
+A batch is chosen one run after the other. With equal odds the wrong one of two is chosen with the probability
+Φ(−√λ/2); the run is taken that makes the sum of these over all pairs least. The likelihood ratio
 of two predictions that were made before the runs is an e-value: under the wrong one it exceeds `STOP` with a
 probability of at most 1/STOP, however often one looks (Ville 1939). So stop when the deviances of the two
 predictions, summed over all new runs, differ by 2 ln STOP. The predictions have fitted parameters, so this holds
@@ -19,11 +20,14 @@ nearly, not exactly.
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.special import ndtr
 
 from calibration.fit import Fit
 from calibration.model import Model
@@ -35,11 +39,12 @@ _DRAWS = 4000
 _DECIDES = 3.84  # difference of χ² at which one of the two is chosen
 _WANTED = 0.9  # share of draws that should decide
 _MOST_REPEATS = 16
+_MOST_RIVALS = 4
 
 
 @dataclass(frozen=True)
 class NextRun:
-    """An experiment, and how well it tells the two rivals apart."""
+    """An experiment, and how well it tells the rivals apart, for the two that it tells apart least."""
 
     settings: dict[str, Any]
     repeats: int
@@ -57,11 +62,11 @@ class NextRun:
 
 @dataclass(frozen=True)
 class Batch:
-    """Runs to make next, all together, to tell two rivals apart."""
+    """Runs to make next, all together, to tell rivals apart."""
 
     settings: tuple[dict[str, Any], ...]  # of each run; the same settings may come more than once
-    separation: float  # λ of the batch
-    decides: float  # share of draws in which the true one is chosen
+    separation: float  # λ of the batch, for the two rivals that it tells apart least
+    decides: float  # share of draws in which the true one of these two is chosen
     stop: float  # difference of deviances on the new runs at which to stop
 
     def record(self) -> dict[str, Any]:
@@ -73,29 +78,42 @@ class Batch:
         }
 
 
+class Pair(NamedTuple):
+    """A true rival and a wrong one that is fitted again."""
+
+    difference: Floats  # of their predictions, (m, k)
+    J: Floats  # (m, k, p) derivatives of the wrong one
+    covariance: Floats  # (p, p) of its fit
+
+
 def next_runs(
-    model: Model, first: Fit, second: Fit, *, count: int = 3, seed: int = 0
+    model: Model, rivals: Sequence[Fit], *, count: int = 3, seed: int = 0
 ) -> tuple[list[NextRun], Batch]:
-    """The best experiments to tell two fits apart, best first, and the best batch of `BATCH` runs."""
+    """The best experiments to tell fits apart, best first, and the best batch of `BATCH` runs.
+
+    Args:
+        rivals: two fits or more, the best first; of many, the first four are told apart.
+    """
     possible, settings = model.possible()
-    sides = [possible.derivatives(fit.parameters, fit.names) for fit in (first, second)]
-    noise = (first.noise.run + second.noise.run) / 2
-    difference = sides[0][0] - sides[1][0]
-    rivals = list(zip((first, second), sides, strict=True))
-    separation = np.min([_separation(difference, J, fit, noise, 1) for fit, (_, J) in rivals], 0)
+    fits = rivals[:_MOST_RIVALS]
+    sides = [possible.derivatives(one.parameters, one.names) for one in fits]
+    pairs = [
+        Pair(true[0] - wrong[0], wrong[1], again.covariance)
+        for (_, true), (again, wrong) in itertools.permutations(zip(fits, sides, strict=True), 2)
+    ]
+    run = np.mean([one.noise.run for one in fits], 0)
+    share = float(np.mean([one.noise.share for one in fits]))
+    alone = np.array([_together(pairs, run, share, [place]).min() for place in range(len(settings))])
     found = []
     rng = np.random.default_rng(seed)
-    for place in np.argsort(-separation)[:count]:
+    for place in np.argsort(-alone)[:count].tolist():
         for repeats in (1, 2, 4, 8, _MOST_REPEATS):
-            strength = min(
-                float(_separation(difference[place : place + 1], J[place : place + 1], fit, noise, repeats)[0])
-                for fit, (_, J) in rivals
-            )
+            strength = float(_together(pairs, run, share, [place] * repeats).min())
             decides = _decides(strength, rng)
             if decides >= _WANTED:
                 break
         found.append(NextRun(settings[place], repeats, strength, decides))
-    chosen, strength = _greedy(difference, [(J, fit.covariance) for fit, (_, J) in rivals], noise)
+    chosen, strength = _greedy(pairs, run, share)
     batch = tuple(settings[place] for place in chosen)
     return found, Batch(batch, strength, _decides(strength, rng), 2 * math.log(STOP))
 
@@ -106,33 +124,31 @@ def _decides(strength: float, rng: np.random.Generator) -> float:
     return float((draws > _DECIDES).mean())
 
 
-def _greedy(difference: Floats, rivals: list[tuple[Floats, Floats]], noise: Floats) -> tuple[list[int], float]:
-    """Places of `BATCH` runs, and λ of them together.
+def _greedy(pairs: Sequence[Pair], run: Floats, share: float) -> tuple[list[int], float]:
+    """Places of `BATCH` runs, and the smallest λ of them together.
 
     Args:
-        difference: of the predictions, (m, k).
-        rivals: derivatives (m, k, p) and covariance (p, p) of each fit.
+        run: covariance of a run, (k, k).
+        share: ρ of the session.
     """
     chosen: list[int] = []
-    best = 0.0
+    strengths = np.zeros(len(pairs))
     for _ in range(BATCH):
-        strengths = [
-            min(_together(difference, J, V, noise, [*chosen, place]) for J, V in rivals)
-            for place in range(len(difference))
-        ]
-        chosen.append(int(np.argmax(strengths)))
-        best = max(strengths)
-    return sorted(chosen), best
+        tried = [_together(pairs, run, share, [*chosen, place]) for place in range(len(pairs[0].difference))]
+        wrong = [float(ndtr(-np.sqrt(one) / 2).sum()) for one in tried]
+        place = int(np.argmin(wrong))
+        strengths = tried[place]
+        chosen.append(place)
+    return sorted(chosen), float(strengths.min())
 
 
-def _together(difference: Floats, J: Floats, covariance: Floats, noise: Floats, places: list[int]) -> float:
-    """λ of several runs made together."""
-    slopes = J[places].reshape(-1, J.shape[-1])
-    spread = np.kron(np.eye(len(places)), noise) + slopes @ covariance @ slopes.T
-    d = difference[places].ravel()
-    return float(d @ np.linalg.solve(spread, d))
-
-
-def _separation(difference: Floats, J: Floats, fit: Fit, noise: Floats, repeats: int) -> Floats:
-    spread = noise / repeats + np.einsum("nap,pq,nbq->nab", J, fit.covariance, J)
-    return np.asarray(np.einsum("na,na->n", difference, np.linalg.solve(spread, difference[..., None])[..., 0]))
+def _together(pairs: Sequence[Pair], run: Floats, share: float, places: list[int]) -> Floats:
+    """λ of several runs made together, for every pair."""
+    count = len(places)
+    noise = np.kron(np.eye(count) + share, run)
+    found = []
+    for pair in pairs:
+        slopes = pair.J[places].reshape(-1, pair.J.shape[-1])
+        d = pair.difference[places].ravel()
+        found.append(float(d @ np.linalg.solve(noise + slopes @ pair.covariance @ slopes.T, d)))
+    return np.array(found)

@@ -293,13 +293,13 @@ def _errors(
 
 
 def _next_runs(task: _Task, found: _Explained) -> tuple[tuple[NextRun, ...], Batch | None]:
-    """Runs that would tell the two best explanations apart, where there are two."""
-    first, second = (*(c.refit for c in (*found.best, *found.instead)), None, None)[:2]
+    """Runs that would tell the best explanations apart, where there are several."""
+    rivals = [c.refit for c in (*found.best, *found.instead) if c.refit]
     if found.freed and found.instead:
-        first, second = found.freed.fit, found.instead[0].refit
-    if first is None or second is None:
+        rivals = [found.freed.fit, *rivals]
+    if len(rivals) < 2:
         return (), None
-    single, batch = next_runs(task.model, first, second, seed=task.seed)
+    single, batch = next_runs(task.model, rivals, seed=task.seed)
     return tuple(single), batch
 
 

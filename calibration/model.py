@@ -60,8 +60,8 @@ class Runs:
     def __len__(self) -> int:
         return len(self.y)
 
-    def subset(self, rows: Flags) -> Any:
-        """The runs in `rows` (n,)."""
+    def subset(self, rows: Flags | Integers) -> Any:
+        """The runs in `rows`: flags (n,), or places."""
         own: dict[str, Any] = {k: v[rows] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         return replace(self, **own)
 

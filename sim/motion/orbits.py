@@ -55,7 +55,7 @@ def solve_orbits(
             gap[i] = smallest_gap(body, orbit.x[2], tails)
             if stability and body.nonlocal_terms.tail_contact != 0 and gap[i] < _NEAR:
                 grows[i] = growth(body, tails, orbit.x[0], orbit.u[0])
-            if directions is not None:
+            if directions is not None and count:
                 slopes[i] = _slopes(body, rows[i], directions[i], orbit)
     return Orbits(
         np.array([orbit.means for orbit in found]),
