@@ -1,9 +1,9 @@
 """Tables whose runs cannot tell two effects apart, and what a batch of eight proposed runs decides.
 
-A small table (N = 2 to 4, two tail lengths, one motor speed, both directions, three days) of the linear stand-in
-with one effect at λ = 8, as often as it takes to find tables with the verdict "ambiguous" and the truth in the set.
-Then the whole procedure runs on the table with the proposed batch added, as a new day; and, for comparison, with a
-factorial of 16 runs (fewest and most tails, shortest and longest, slow and fast, both directions) instead.
+A small table (N = 2 to 4, one tail length, two motor speeds, both directions, three days: 36 runs) of the linear
+stand-in with one effect at λ = 8, as often as it takes to find tables with the verdict "ambiguous" and the truth
+in the set. The whole procedure then runs on the table with the proposed batch added, as a new day. For comparison
+it runs with a factorial of 16 runs: fewest and most tails, shortest and longest, slow and fast, both directions.
 
 Usage: python -m benchmarks.next_batch [TABLES] [FIRST_SEED]      a table on the screen
 """
@@ -27,7 +27,7 @@ from calibration.misfit import TESTABLE
 from sim.arrays import Floats, Integers
 from sim.motion.batches import available_jobs
 
-TAILS, LENGTHS, RPM, DAYS = (2, 3, 4), (7.0, 12.0), 150.0, 3
+TAILS, LENGTH, RPM, DAYS = (2, 3, 4), 9.0, (110.0, 150.0), 3
 GRID_TAILS = (2, 3, 4, 5)
 GRID_LENGTHS = (7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
 GRID_RPM = (60.0, 105.0, 150.0)
@@ -37,7 +37,7 @@ _AT_ONCE = 20  # tables that are tried together
 
 def table() -> Linear:
     """The runs that were made, then those that can be made next."""
-    made = [(n, a, s * RPM, f"day {d}") for d in range(DAYS) for n in TAILS for a in LENGTHS for s in (1, -1)]
+    made = [(n, LENGTH, s * w, f"day {d}") for d in range(DAYS) for n in TAILS for w in RPM for s in (1, -1)]
     possible = [(n, a, s * w, "next") for n in GRID_TAILS for a in GRID_LENGTHS for w in GRID_RPM for s in (1, -1)]
     rows = pd.DataFrame([*made, *possible], columns=["N", "l_cm", "omega_rpm", "session"])
     sense = np.sign(rows["omega_rpm"])

@@ -29,11 +29,19 @@ main = program.main
     out("folder"),
     argument("--protocol", choices=("session", "paper"), default="session", help="what is fitted and tested"),
     argument("--seed", type=int, default=0, help="of the bootstrap (default: 0)"),
+    argument(
+        "--own",
+        action="append",
+        default=[],
+        metavar="COLUMN=VALUES",
+        help="what the lab can set in its next runs, such as l_cm=5,7,9; for N, l_cm and omega_rpm",
+    ),
     JOBS,
     aliases=("close",),
 )
 def _calibrate(arguments: Namespace) -> None:
     from calibration.corrected import check_given, corrected_toml
+    from calibration.grid import owned
     from calibration.loop import calibrate, verdict_record
     from calibration.measurements import read_measurements
     from calibration.protocols import PROTOCOLS
@@ -42,13 +50,15 @@ def _calibrate(arguments: Namespace) -> None:
     from sim.inputs import load_robot
     from sim.io.files import write_text
 
+    own = owned(arguments.own)
     robot = load_robot(arguments.robot)
     check_given(robot)
     data = read_measurements(arguments.table)
     for line in data.set_aside:
         print(f"set aside: {line}", file=sys.stderr)
     data, locked = PROTOCOLS[arguments.protocol](data)
-    result = calibrate(Swimmer(robot, data, arguments.jobs), locked=locked, seed=arguments.seed)
+    model = Swimmer(robot, data, arguments.jobs, own=own)
+    result = calibrate(model, locked=locked, seed=arguments.seed)
     folder = Path(arguments.out)
     record = verdict_record(result, table=Path(arguments.table).name)
     write_report(result, data, folder / "report.html", title=Path(arguments.table).name)

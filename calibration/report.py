@@ -58,7 +58,8 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
     if result.next_runs:
         page.section("Runs to make next")
         page.text(
-            "These runs would tell the first two explanations apart. The last column says how often they would."
+            "These runs would tell the explanations apart. Separation is for the two that they tell apart least; "
+            "the last column says how often they would. Settings are those that `--own` named, or the table's."
         )
         settings = list(result.next_runs[0].settings)
         page.table(
@@ -77,8 +78,8 @@ def _add_batch(page: Page, batch: Batch) -> None:
     wrong = f"{100 / STOP:.0f} %"
     page.text(
         f"Or these {len(batch.settings)} runs together. They would decide in {decides} of cases. "
-        "Note what the two predict, make the runs, add them to the table and close it again. Stop when the "
-        "deviances of the two predictions, summed over all new runs, differ by "
+        "Note what each explanation predicts, make the runs, add them to the table and close it again. Stop when "
+        "the deviances of the best prediction and the next, summed over all new runs, differ by "
         f"{batch.stop:.1f}. Then the wrong one is kept in about {wrong} of cases at most, however often you look."
     )
     page.table(

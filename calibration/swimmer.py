@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from calibration.given import CAMERA, GROUPS, HEADING, LENGTH, POWERS, TACHOMETER, given_numbers, robot_number
+from calibration.grid import Owned, check_owned, settings_of
 from calibration.influences import CURRENT, SLIP, TRACKED_POINT, Influence, influences, reason_untestable
 from calibration.measurements import Measurements
 from calibration.model import Parameter, Parameters, Predictive, by_differences
@@ -71,10 +72,12 @@ class Swimmer:
     runs: Measurements
     jobs: int | None = None
     solver: Solver = DIRECT
+    own: Owned = field(default_factory=dict)  # settings that the lab has for its next runs
 
     def __post_init__(self) -> None:
         """Refuse lengths and speeds that are not possible, before anything is simulated."""
         check_inputs(self.robot, self.runs)
+        check_owned(self.own)
 
     @property
     def coefficients(self) -> tuple[Parameter, ...]:
@@ -236,12 +239,8 @@ class Swimmer:
         check_outputs(self.runs, prediction)
 
     def possible(self) -> tuple[Swimmer, list[dict[str, Any]]]:
-        """Tail counts (one more), tail lengths and motor speeds of the table's range, and slower ones."""
-        runs = self.runs
-        lengths = np.linspace(runs.length.min(), runs.length.max(), 6)
-        speeds = np.abs(runs.omega).max() * np.array([0.4, 0.7, 1.0])
-        tails = np.arange(runs.tails.min(), runs.tails.max() + 2)
-        grid = np.array([(n, a, w) for n in tails for a in lengths for w in (*speeds, *-speeds)])
+        """Runs that can be made next (`calibration.grid`)."""
+        runs, grid = self.runs, settings_of(self.runs, self.own)
         count = len(grid)
         noted = np.tile(runs.noted.mean(0), (count, 1))
         settings = [

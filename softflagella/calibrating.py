@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from calibration.corrected import check_given
+from calibration.grid import Owned
 from calibration.loop import calibrate as close_loop
 from calibration.measurements import read_measurements
 from calibration.swimmer import Swimmer
@@ -20,6 +21,7 @@ def calibrate(
     robot: Robot | str | Path,
     *,
     seed: int = 0,
+    own: Owned | None = None,
     jobs: int | None = None,
     progress: bool = True,
 ) -> Verdict:
@@ -30,6 +32,8 @@ def calibrate(
             of `omega_h_rpm`, `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s`; repeats.
         robot: the robot as given, or its robot.toml.
         seed: of the bootstrap; the same seed gives the same result.
+        own: what the lab can set in its next runs, such as `{"l_cm": (5, 7, 9)}`; for `N`, `l_cm` and `omega_rpm`
+            (both directions). Default: the table's range.
         jobs: threads; default all processors.
         progress: show progress bars.
 
@@ -47,4 +51,5 @@ def calibrate(
     """
     given = robot if isinstance(robot, Robot) else load_robot(robot)
     check_given(given)
-    return close_loop(Swimmer(given, read_measurements(table), jobs), seed=seed, progress=progress)
+    model = Swimmer(given, read_measurements(table), jobs, own=own or {})
+    return close_loop(model, seed=seed, progress=progress)

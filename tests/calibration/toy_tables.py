@@ -9,6 +9,7 @@ import pytest
 
 import calibration.synthetic
 import sim.motion.batches
+from calibration.grid import Owned
 from calibration.loop import Verdict, calibrate
 from calibration.measurements import read_measurements
 from calibration.swimmer import DIRECT, Swimmer
@@ -39,8 +40,8 @@ def toy_table(seed: int, *, lengths_cm: tuple[float, ...] = (5.0, 8.0, 11.0), **
     return make_table(replace(TRUTH, effects=effects), seed=seed, lengths_cm=lengths_cm, title="")
 
 
-def toy_swimmer(table: pd.DataFrame, robot: Robot = START) -> Swimmer:
-    return Swimmer(robot, read_measurements(table), solver=toy.SOLVER)
+def toy_swimmer(table: pd.DataFrame, robot: Robot = START, own: Owned | None = None) -> Swimmer:
+    return Swimmer(robot, read_measurements(table), solver=toy.SOLVER, own=own or {})
 
 
 def closed(table: pd.DataFrame, seed: int = 0) -> Verdict:

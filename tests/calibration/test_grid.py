@@ -1,0 +1,53 @@
+"""Runs that a lab can make next: the table's range, or what the lab has."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+
+from calibration.grid import owned, settings_of
+from sim.io.errors import InputError
+from tests.calibration.toy_tables import START, toy_swimmer, toy_table
+
+
+def test_without_a_word_it_is_the_range_of_the_table() -> None:
+    runs = toy_swimmer(toy_table(3)).runs
+    grid = settings_of(runs, {})
+    assert set(grid[:, 0]) == {2, 3, 4, 5, 6}
+    assert grid[:, 1].min() == pytest.approx(0.05)
+    assert grid[:, 1].max() == pytest.approx(0.11)
+    assert np.abs(grid[:, 2]).max() == pytest.approx(np.abs(runs.omega).max())
+    assert len(np.unique(grid, axis=0)) == len(grid) == 5 * 6 * 6
+    one = toy_swimmer(toy_table(3, lengths_cm=(8.0,))).runs
+    assert len(settings_of(one, {})) == 5 * 6
+
+
+def test_a_lab_gets_only_what_it_has() -> None:
+    own = owned(["N=2,4", "l_cm=5,7", "omega_rpm=60"])
+    runs = toy_swimmer(toy_table(3)).runs
+    speed = 60 * math.pi / 30
+    expected = set(product((2, 4), (0.05, 0.07), (speed, -speed)))
+    assert {tuple(row) for row in settings_of(runs, own).tolist()} == expected
+    _, settings = toy_swimmer(toy_table(3), START, own).possible()
+    assert {s["l_cm"] for s in settings} == {5.0, 7.0}
+    assert {s["omega_rpm"] for s in settings} == {60.0, -60.0}
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ("l_cm", "write COLUMN=VALUE"),
+        ("l_cm=5,", "write COLUMN=VALUE"),
+        ("length=5", "none of N, l_cm, omega_rpm"),
+        ("l_cm=-5", "must be positive"),
+        ("omega_rpm=nan", "must be positive"),
+        ("N=2.5", "integer from 1"),
+        ("N=1000", "integer from 1"),
+    ],
+)
+def test_what_cannot_be_set_is_refused(entry: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        owned([entry])
