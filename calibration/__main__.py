@@ -1,6 +1,7 @@
 """Command line of the calibration.
 
 python -m calibration calibrate TABLE.csv --robot robot.toml --out DIR   verdict.json, report.html, corrected.toml
+python -m calibration decide TABLE.csv verdict.json --robot robot.toml   what new runs say, of several explanations
 python -m calibration simulate --robot robot.toml --out TABLE.csv        a table to try it on
 python -m calibration tracks TRACKS.csv RUNS.csv --out TABLE.csv         camera tracks to a table of runs
 
@@ -75,6 +76,30 @@ def _calibrate(arguments: Namespace) -> None:
     if result.set_aside:
         print(f"set aside: {len(result.set_aside)}, first {result.set_aside[0]}")
     print(f"-> {folder / 'verdict.json'}, {folder / 'report.html'}, {folder / 'corrected.toml'}")
+
+
+@program.command(
+    "decide",
+    "say which of several explanations new runs speak for",
+    argument("table", help="the table with the new runs in sessions of their own"),
+    argument("verdict", help="verdict.json of the table before"),
+    ROBOT,
+    JOBS,
+)
+def _decide(arguments: Namespace) -> None:
+    from calibration.decide import GIVEN_UP, new_runs, read_explanations, sentence, standings
+    from calibration.measurements import read_measurements
+    from calibration.swimmer import Swimmer
+    from sim.inputs import load_robot
+
+    explanations, before = read_explanations(arguments.verdict)
+    model = Swimmer(load_robot(arguments.robot), read_measurements(arguments.table), arguments.jobs)
+    new = new_runs(model.runs, before)
+    found = standings(model, explanations, new)
+    print(f"{new.sum()} new runs. An explanation that is behind by more than {GIVEN_UP:.1f} is given up.")
+    for one in found:
+        print(f"  {one.title}: {f'behind by {one.behind:.1f}' if one.behind else 'best'}")
+    print(sentence(found))
 
 
 @program.command(

@@ -40,8 +40,9 @@ from calibration.attribute import (
     pairs,
     with_doubts,
 )
+from calibration.decide import Explanation
 from calibration.directions import directions
-from calibration.discriminate import Batch, NextRun, next_runs
+from calibration.discriminate import NextRun, next_runs
 from calibration.fit import Fit, fit
 from calibration.freed import Freed, freed
 from calibration.generic import correct
@@ -149,7 +150,11 @@ def calibrate(
         final_intervals = profile_intervals(model, final, task.used, title=task.title("intervals"))
     generic = correct(task.runs, found.base.prediction, task.used)
     noise = found.base.noise.run
-    wanted, batch = _next_runs(task, found)
+    rivals = _rivals(found)
+    wanted: list[NextRun] = []
+    batch = None
+    if rivals:
+        wanted, batch = next_runs(model, [fitted for _, fitted in rivals], seed=seed)
     verdict = "none"
     if found.freed and not found.best:
         verdict = "number"
@@ -173,7 +178,8 @@ def calibrate(
         instead=found.instead,
         generic=generic,
         predictive=predictive,
-        next_runs=wanted,
+        explanations=tuple(Explanation.of(title, fitted) for title, fitted in rivals),
+        next_runs=tuple(wanted),
         next_batch=batch,
         error_uncalibrated=error["uncalibrated"][0],
         error_before=error["before"][0],
@@ -186,6 +192,7 @@ def calibrate(
         locked_p=locked_p_value(final, task.runs, task.test, seed=seed + 3),
         delivered=fitted_to_all(model, final, ~task.gross, moved=predictive is None),
         locked=task.locked_names,
+        sessions=task.runs.session_names,
         used=task.used,
         uncalibrated=task.uncalibrated,
         untestable=dict(model.untestable),
@@ -292,15 +299,14 @@ def _errors(
     return {name: errors(task.runs, prediction, task.test) for name, prediction in predictions.items()}
 
 
-def _next_runs(task: _Task, found: _Explained) -> tuple[tuple[NextRun, ...], Batch | None]:
-    """Runs that would tell the best explanations apart, where there are several."""
-    rivals = [c.refit for c in (*found.best, *found.instead) if c.refit]
+def _rivals(found: _Explained) -> tuple[tuple[str, Fit], ...]:
+    """Explanations that the runs cannot tell apart, in words, best first; none if there are not two."""
+    rivals = [(" and ".join(e.title for e in c.claimed), c.refit) for c in (*found.best, *found.instead)]
+    known = [(title, fitted) for title, fitted in rivals if fitted]
     if found.freed and found.instead:
-        rivals = [found.freed.fit, *rivals]
-    if len(rivals) < 2:
-        return (), None
-    single, batch = next_runs(task.model, rivals, seed=task.seed)
-    return tuple(single), batch
+        wrong = ", ".join(alike[0].parameter.title for alike in found.freed.fit.wrong)
+        known = [(f"{wrong} as given is wrong", found.freed.fit), *known]
+    return tuple(known) if len(known) > 1 else ()
 
 
 def _unfinished(model: Model, base: Fit, final: Fit) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from calibration.attribute import Candidate
+from calibration.decide import Explanation
 from calibration.discriminate import Batch, NextRun
 from calibration.fit import Fit
 from calibration.generic import Generic
@@ -48,7 +49,8 @@ class Verdict:
     instead: tuple[Candidate, ...]  # effects that explain as much as the number that is wrong
     generic: Generic  # correction of the calibrated model's outputs
     predictive: Predictive | None  # what is handed on where nothing explains the residual
-    next_runs: tuple[NextRun, ...]  # where two effects cannot be told apart
+    explanations: tuple[Explanation, ...]  # that the runs cannot tell apart, best first; none if there are not two
+    next_runs: tuple[NextRun, ...]  # that would tell them apart
     next_batch: Batch | None  # the same, for several runs together
     error_uncalibrated: float
     error_generic: float
@@ -61,6 +63,7 @@ class Verdict:
     delivered: Delivered  # the final model fitted to all runs
     errors_by_output: dict[str, dict[str, float]]
     locked: str  # names of the sessions
+    sessions: tuple[str, ...]  # names of all sessions
     used: Flags
     uncalibrated: Floats  # (n, k) prediction of the model as given
     untestable: dict[str, str]  # effects that these runs cannot test: what is missing
@@ -228,6 +231,8 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "untestable": result.untestable,
         "generic_features": list(result.generic.features),
         "correction_terms": list(result.predictive.terms) if result.predictive else [],
+        "explanations": [one.record() for one in result.explanations],
+        "sessions": list(result.sessions),
         "next_runs": [run.record() for run in result.next_runs],
         "next_batch": result.next_batch.record() if result.next_batch else None,
         "locked_test": result.locked,

@@ -233,6 +233,21 @@ def tracks(made: Path, out: Path) -> str:
     return "1 runs -> "
 
 
+def decide(made: Path, out: Path) -> str:
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        before = toy_table(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
+        before.to_csv(out / "t.csv", index=False)
+        done("calibration", "calibrate", out / "t.csv", "--robot", "paper-measured", "--own", "l_cm=5,11", "--out",
+             out / "out")  # fmt: skip
+        verdict = json.loads((out / "out" / "verdict.json").read_text())
+        assert {run["l_cm"] for run in verdict["next_batch"]["runs"]} <= {5.0, 11.0}
+        new = toy_table(2, lengths_cm=(5.0, 11.0), end_over_end_drag=4.0).assign(session="new")
+        pd.concat([before, new.head(10)]).to_csv(out / "more.csv", index=False)
+        done("calibration", "decide", out / "more.csv", out / "out" / "verdict.json", "--robot", "paper-measured")
+    return "Decided: head's end-over-end drag."
+
+
 RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "steady"): steady, ("sim", "replay"): replay, ("sim", "robot"): robot, ("sim", "check"): check_paper,
     ("sim", "compile"): compiled, ("surrogate", "compile"): compiled_queries,
@@ -243,7 +258,7 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
     ("planner", "goal"): goal,
     ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
-    ("calibration", "tracks"): tracks,
+    ("calibration", "tracks"): tracks, ("calibration", "decide"): decide,
 }  # fmt: skip
 
 

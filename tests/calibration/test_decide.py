@@ -1,0 +1,118 @@
+"""New runs decide between explanations that a table could not tell apart, and seldom against the true one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import binom
+
+from calibration.decide import (
+    GIVEN_UP,
+    Explanation,
+    Standing,
+    new_runs,
+    read_explanations,
+    sentence,
+    standings,
+)
+from calibration.discriminate import STOP
+from calibration.loop import verdict_record
+from sim.io.errors import InputError
+from tests.calibration.toy_tables import closed, install_toy, toy_swimmer, toy_table
+
+
+@pytest.fixture(scope="module")
+def undecided(tmp_path_factory: pytest.TempPathFactory) -> tuple[pd.DataFrame, Path]:
+    """A table of one tail length, and its verdict.json."""
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        table = toy_table(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
+        verdict = closed(table)
+    path = tmp_path_factory.mktemp("decide") / "verdict.json"
+    path.write_text(json.dumps(verdict_record(verdict, table="t")))
+    return table, path
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("toy_model")
+def test_new_runs_of_other_lengths_decide_for_the_truth(undecided: tuple[pd.DataFrame, Path]) -> None:
+    table, path = undecided
+    explanations, before = read_explanations(path)
+    assert len(explanations) == 2
+    more = toy_table(2, lengths_cm=(5.0, 11.0), end_over_end_drag=4.0).assign(session="new")
+    model = toy_swimmer(pd.concat([table, more.sample(8, random_state=1)], ignore_index=True))
+    new = new_runs(model.runs, before)
+    assert new.sum() == 8
+    found = standings(model, explanations, new)
+    assert [s.given_up for s in found] == [False, True]
+    assert found[0] == Standing("head's end-over-end drag", 0.0)
+    assert sentence(found).startswith("Decided: head's end-over-end drag.")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("toy_model")
+def test_eight_runs_like_the_old_ones_decide_nothing(undecided: tuple[pd.DataFrame, Path]) -> None:
+    table, path = undecided
+    explanations, before = read_explanations(path)
+    more = toy_table(3, lengths_cm=(8.0,), end_over_end_drag=4.0).assign(session="new")
+    model = toy_swimmer(pd.concat([table, more.sample(8, random_state=3)], ignore_index=True))
+    found = standings(model, explanations, new_runs(model.runs, before))
+    assert not any(s.given_up for s in found)
+    assert "make more runs" in sentence(found)
+    with pytest.raises(InputError, match="a session of their own"):
+        new_runs(toy_swimmer(table).runs, before)
+
+
+def test_the_true_explanation_is_seldom_given_up() -> None:
+    """At most one time in `STOP`; runs of one session are shifted together."""
+    rng = np.random.default_rng(0)
+    n, k = 6, 2
+    slopes = rng.normal(size=(n, k, 1))
+    predictions = {"A": np.zeros((n, k)), "B": rng.normal(size=(n, k))}
+    run, covariance = np.array([[1.0, 0.3], [0.3, 2.0]]), np.array([[0.5]])
+    both = [Explanation(title, {title: 1.0}, covariance, run, 0.4) for title in predictions]
+
+    def model(y: np.ndarray) -> Any:
+        """Its parameter's name says which prediction is meant."""
+        return SimpleNamespace(
+            runs=SimpleNamespace(y=y, session=np.zeros(n, int)), coefficients=(), given=(), effects=(),
+            derivatives=lambda parameters, names: (predictions[names[0]], slopes),
+        )  # fmt: skip
+
+    spread = np.kron(np.eye(n) + 0.4, run) + slopes.reshape(-1, 1) @ covariance @ slopes.reshape(1, -1)
+    root, draws = np.linalg.cholesky(spread), 3000
+    lost, won = 0, 0
+    for _ in range(draws):
+        y = predictions["A"] + (root @ rng.normal(size=n * k)).reshape(n, k)
+        found = {s.title: s for s in standings(model(y), both, np.ones(n, bool))}
+        lost += found["A"].given_up
+        won += found["B"].given_up
+    assert lost <= binom.isf(0.01, draws, 1 / STOP)
+    assert won > 0.1 * draws
+    with pytest.raises(InputError, match="outputs of the table"):
+        standings(model(np.zeros((n, k + 1))), both, np.ones(n, bool))
+
+
+def test_a_verdict_without_rivals_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "verdict.json"
+    for text, said in (
+        ('{"explanations": []}', "no two explanations"),
+        ("[1]", "no two explanations"),
+        ("{", "is not a verdict"),
+        (None, "No such file"),
+    ):
+        if text is not None:
+            path.write_text(text)
+        with pytest.raises(InputError, match=said):
+            read_explanations(path if text is not None else tmp_path / "none.json")
+
+
+def test_what_is_left_is_said() -> None:
+    three = [Standing("A", 0.0), Standing("B", GIVEN_UP - 0.1), Standing("C", GIVEN_UP + 0.1)]
+    assert sentence(three) == "Not decided between A and B: make more runs."
