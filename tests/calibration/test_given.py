@@ -54,7 +54,7 @@ def test_a_stiffness_that_was_given_too_high_is_no_inertia(seed: int) -> None:
 def test_numbers_drawn_from_their_priors_are_no_effects() -> None:
     """One claim in twenty is stated; more than `most` would come from that once in a hundred times (binomial)."""
     rng = np.random.default_rng(2)
-    claimed, covered, count = 0, 0, 40
+    claimed, covered, count = 0, 0, 24
     names = ("youngs_modulus", "viscosity", "tail_radius", "head_radius", "head_length", "disc_offset")
     for seed in range(count):
         values = {n: float(getattr(TRUTH, n) or TRUTH.head_radius) for n in names}
