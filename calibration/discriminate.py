@@ -11,11 +11,8 @@ again (T-optimal design, linearised). There is a λ for every two rivals, both w
 counts. How often the runs decide is found by drawing them at random. Source: Atkinson and Fedorov (1975).
 
 A batch is chosen one run after the other. With equal odds the wrong one of two is chosen with the probability
-Φ(−√λ/2); the run is taken that makes the sum of these over all pairs least. The likelihood ratio
-of two predictions that were made before the runs is an e-value: under the wrong one it exceeds `STOP` with a
-probability of at most 1/STOP, however often one looks (Ville 1939). So stop when the deviances of the two
-predictions, summed over all new runs, differ by 2 ln STOP. The predictions have fitted parameters, so this holds
-nearly, not exactly.
+Φ(−√λ/2); the run is taken that makes the sum of these over all pairs least. `calibration.decide` judges the runs
+once they are made: an explanation is given up where the best one is `STOP` times as likely.
 """
 
 from __future__ import annotations
@@ -33,7 +30,7 @@ from calibration.fit import Fit
 from calibration.model import Model
 from sim.arrays import Floats
 
-STOP = 25.0  # 1/α of the sequence of batches
+STOP = 25.0  # ratio of likelihoods at which an explanation is given up, 1/α of the sequence of batches
 BATCH = 8  # runs
 _DRAWS = 4000
 _DECIDES = 3.84  # difference of χ² at which one of the two is chosen

@@ -78,9 +78,9 @@ def _add_batch(page: Page, batch: Batch) -> None:
     wrong = f"{100 / STOP:.0f} %"
     page.text(
         f"Or these {len(batch.settings)} runs together. They would decide in {decides} of cases. "
-        "Note what each explanation predicts, make the runs, add them to the table and close it again. Stop when "
-        "the deviances of the best prediction and the next, summed over all new runs, differ by "
-        f"{batch.stop:.1f}. Then the wrong one is kept in about {wrong} of cases at most, however often you look."
+        'Add them to the table with a session of their own. Then "calibration decide" says which explanation they '
+        f"speak for. An explanation is given up when the best one is {STOP:.0f} times as likely. So the right one "
+        f"is given up in about {wrong} of cases at most, however often you look."
     )
     page.table(
         [_SETTINGS.get(s, s) for s in batch.settings[0]], [tuple(map(str, s.values())) for s in batch.settings]
