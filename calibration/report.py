@@ -29,6 +29,7 @@ _LABELS = {
     "v": "v, speed",
 }
 _SETTINGS = {"l_cm": "l [cm]", "omega_rpm": "ω [rpm]"}
+_LARGEST = 1e9  # smallest detectable size that is shown
 _DISAGREES = 0.01  # p of the locked runs below which the report says so
 _TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes", "score": "effects"}
 
@@ -168,7 +169,8 @@ def _add_evidence(page: Page, result: Verdict) -> None:
         f"Is there more than noise? p = {result.misfit.p_value:.2g} by all tests together ({each}). Below: score "
         "of each effect, without the part that the coefficients and the numbers as given can absorb; claims need "
         f"more than {result.misfit.critical_z:.2f}. The smallest detectable size is found half of the time. The "
-        "column beside it is that size if every number as given were exact."
+        "column beside it is that size if every number as given were exact. A dash means that the effect changes "
+        "nothing in these runs."
     )
     page.figure(draw_evidence(result), "score of each effect against what a claim needs")
     page.table(
@@ -178,8 +180,8 @@ def _add_evidence(page: Page, result: Verdict) -> None:
                 c.effect.title,
                 f"{c.z:+.1f}",
                 f"{c.survived:.2f}",
-                f"{c.detectable:.2g}",
-                f"{c.detectable_exact:.2g}",
+                _size(c.detectable),
+                _size(c.detectable_exact),
                 c.verdict,
             )
             for c in result.candidates
@@ -363,3 +365,8 @@ def draw_residuals(result: Verdict, data: Measurements) -> Figure:
         axes.set_xlabel("tail length [cm]", fontsize=8)
     figure.tight_layout()
     return figure
+
+
+def _size(value: float) -> str:
+    """A smallest detectable size; a dash where no size shows in these runs."""
+    return f"{value:.2g}" if value < _LARGEST else "–"

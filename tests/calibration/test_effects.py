@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,7 @@ from calibration.loop import calibrate
 from calibration.measurements import read_measurements
 from calibration.misfit import check_misfit
 from calibration.model import start_values
+from calibration.report import write_report
 from tests.calibration import toy
 from tests.calibration.toy_tables import START, TRUTH, closed, toy_swimmer, toy_table
 
@@ -193,3 +195,17 @@ def test_the_generic_correction_helps_where_no_effect_explains() -> None:
     corrected = left - result.generic.correction[result.used]
     assert any("ln l" in name for name in result.generic.features)
     assert (corrected**2).mean() < 0.7 * (left**2).mean()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("toy_model")
+def test_an_effect_that_changes_nothing_says_so(tmp_path: Path) -> None:
+    """The toy's tails cannot touch: no size of contact shows, and the report has no size for it."""
+    model = toy_swimmer(toy_table(1, lengths_cm=(8.0,), end_over_end_drag=4.0))
+    result = calibrate(model, progress=False)
+    contact = next(c for c in result.candidates if c.effect.name == "tail_contact")
+    assert contact.verdict == "it changes nothing in these runs"
+    write_report(result, model.runs, tmp_path / "report.html", title="t")
+    text = (tmp_path / "report.html").read_text()
+    assert "–</td>" in text
+    assert "e+150" not in text
