@@ -20,7 +20,7 @@ import pandas as pd
 from joblib import Parallel, delayed
 
 from benchmarks.operating import per_cent
-from benchmarks.planted import NOISE, Linear, Signals, linearised, scatter
+from benchmarks.planted import Linear, Signals, linearised, scatter, with_values
 from calibration.loop import Verdict, calibrate
 from calibration.measurements import read_measurements
 from calibration.misfit import TESTABLE
@@ -40,18 +40,7 @@ def table() -> Linear:
     made = [(n, LENGTH, s * w, f"day {d}") for d in range(DAYS) for n in TAILS for w in RPM for s in (1, -1)]
     possible = [(n, a, s * w, "next") for n in GRID_TAILS for a in GRID_LENGTHS for w in GRID_RPM for s in (1, -1)]
     rows = pd.DataFrame([*made, *possible], columns=["N", "l_cm", "omega_rpm", "session"])
-    sense = np.sign(rows["omega_rpm"])
-    outputs = {
-        "omega_h_rpm": -sense,
-        "omega_t_rpm": sense,
-        "omega_yr_rad_s": sense,
-        "R_yr_cm": 1.0,
-        "theta_deg": 1.0,
-    }
-    spread = np.exp(np.random.default_rng(0).normal(scale=NOISE, size=(len(rows), len(outputs))))
-    for (name, value), factor in zip(outputs.items(), spread.T, strict=True):
-        rows[name] = value * factor
-    whole = linearised(read_measurements(rows))
+    whole = linearised(read_measurements(with_values(rows, np.random.default_rng(0))))
     new = np.arange(len(made), len(rows))
     return replace(whole, next=whole.subset(new))
 

@@ -116,8 +116,6 @@ def design(which: Design) -> Measurements:
         {
             "N": n, "l_cm": length, "omega_rpm": sign * rpm, "trial": trial,
             "session": {1: "one", 2: f"day {trial}"}.get(which.sessions, f"N = {n}"),
-            "omega_h_rpm": -float(sign), "omega_t_rpm": float(sign), "omega_yr_rad_s": float(sign),
-            "R_yr_cm": 1.0, "theta_deg": 1.0,
         }
         for n in (2, 3, 4, 5)
         for length in which.lengths_cm
@@ -125,11 +123,18 @@ def design(which: Design) -> Measurements:
         for sign in (1, -1)
         for trial in (1, 2)
     ]  # fmt: skip
-    table = pd.DataFrame(rows)
     rng = np.random.default_rng(0)
-    table.iloc[:, 5:] *= np.exp(rng.normal(scale=NOISE, size=(len(table), 5)))
+    table = with_values(pd.DataFrame(rows), rng)
     table["elapsed_min"] = 2.0 * rng.permutation(len(table))
     return read_measurements(table)
+
+
+def with_values(settings: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """A table of runs with noise for values, so that it can be read."""
+    sign = np.sign(settings["omega_rpm"])
+    values = {"omega_h_rpm": -sign, "omega_t_rpm": sign, "omega_yr_rad_s": sign, "R_yr_cm": 1.0, "theta_deg": 1.0}
+    spread = np.exp(rng.normal(scale=NOISE, size=(len(settings), len(values))))
+    return settings.assign(**{name: v * f for (name, v), f in zip(values.items(), spread.T, strict=True)})
 
 
 def stand_in(which: Design = PAPER) -> Linear:

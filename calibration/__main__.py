@@ -87,7 +87,8 @@ def _calibrate(arguments: Namespace) -> None:
     JOBS,
 )
 def _decide(arguments: Namespace) -> None:
-    from calibration.decide import GIVEN_UP, new_runs, read_explanations, sentence, standings
+    from calibration.decide import new_runs, read_explanations, sentence, standings
+    from calibration.discriminate import GIVEN_UP
     from calibration.measurements import read_measurements
     from calibration.swimmer import Swimmer
     from sim.inputs import load_robot

@@ -37,7 +37,7 @@ from calibration.transfer import SURE, transfer_p
 from sim.arrays import Flags, Floats, Integers
 
 _CURVED = 0.3  # share of the best score's z² below which an effect is not refitted if it leaves too much
-_NOTHING = 1e-9  # standard deviations for one unit of an effect
+UNSEEN = 1e9  # smallest detectable size of an effect that changes nothing
 _FAR = 6.0  # standard deviations of χ²
 _LEAVES_MORE = "leaves far more than noise, by its score"
 _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
@@ -115,7 +115,7 @@ def examine(
         reason = ""
         if not local:
             guess = effect.start
-        elif float(misfit.scores.length[j]) < _NOTHING:
+        elif detectable > UNSEEN:
             reason = "it changes nothing in these runs"
         elif survived < TESTABLE:
             reason = "the coefficients absorb it: not testable with these runs"

@@ -10,7 +10,6 @@ is given up if it is behind the best one by more than 2 ln STOP. Source: Grünwa
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,13 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from calibration.discriminate import STOP
+from calibration.discriminate import GIVEN_UP
 from calibration.fit import Fit
-from calibration.model import Model, Runs
+from calibration.model import Model, Runs, start_values
+from calibration.noise import Noise
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
-
-GIVEN_UP = 2 * math.log(STOP)
 
 
 @dataclass(frozen=True)
@@ -34,17 +32,35 @@ class Explanation:
     title: str
     parameters: dict[str, float]  # all that are fitted
     covariance: Floats  # (p, p) of them
-    run: Floats  # (k, k) covariance of a run
-    share: float  # ρ of the sessions
+    noise: Noise
+    outputs: tuple[str, ...]  # (k,) that were fitted
 
     @staticmethod
-    def of(title: str, fitted: Fit) -> Explanation:
+    def of(title: str, fitted: Fit, outputs: tuple[str, ...]) -> Explanation:
         parameters = {name: fitted.parameters[name] for name in fitted.names}
-        return Explanation(title, parameters, fitted.covariance, fitted.noise.run, fitted.noise.share)
+        return Explanation(title, parameters, fitted.covariance, fitted.noise, outputs)
 
     def record(self) -> dict[str, Any]:
-        arrays = {"covariance": self.covariance.tolist(), "run": self.run.tolist()}
-        return {**vars(self), **arrays}
+        """For verdict.json."""
+        return {
+            "title": self.title,
+            "parameters": self.parameters,
+            "covariance": self.covariance.tolist(),
+            "noise_of_a_run": self.noise.run.tolist(),
+            "share_of_sessions": self.noise.share,
+            "outputs": list(self.outputs),
+        }
+
+    @staticmethod
+    def read(record: dict[str, Any]) -> Explanation:
+        """From verdict.json."""
+        return Explanation(
+            record["title"],
+            record["parameters"],
+            np.array(record["covariance"]),
+            Noise(np.array(record["noise_of_a_run"]), record["share_of_sessions"]),
+            tuple(record["outputs"]),
+        )
 
 
 @dataclass(frozen=True)
@@ -73,11 +89,10 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
         raise InputError(f"{path} is not a verdict.json") from None
     if not isinstance(record, dict) or not record.get("explanations"):
         raise InputError(f"{path}: this verdict has no two explanations between which new runs could decide")
-    found = [
-        Explanation(**{**one, "covariance": np.array(one["covariance"]), "run": np.array(one["run"])})
-        for one in record["explanations"]
-    ]
-    return found, set(record["sessions"])
+    try:
+        return [Explanation.read(one) for one in record["explanations"]], set(record["sessions"])
+    except (KeyError, TypeError, ValueError):
+        raise InputError(f"{path} is no verdict.json of this version: close the table again") from None
 
 
 def new_runs(runs: Runs, before: set[str]) -> Flags:
@@ -99,19 +114,24 @@ def standings(model: Model, explanations: Sequence[Explanation], new: Flags) -> 
     """How explanations stand after the new runs in `new` (n,), best first.
 
     Raises:
-        InputError: the table has not the outputs that were fitted.
+        InputError: the table has other outputs than were fitted, or lacks what an effect needs.
     """
-    data = model.runs
+    data, known = model.runs, start_values(model)
     scores = []
     for one in explanations:
-        if len(one.run) != data.y.shape[1]:
-            raise InputError("the table must have the outputs of the table that the verdict was made from")
-        known = {p.name: p.start for p in (*model.coefficients, *model.given, *model.effects)}
+        if one.outputs != data.outputs:
+            raise InputError(
+                f"this table has the outputs {', '.join(data.outputs)}; the verdict was made from "
+                f"{', '.join(one.outputs)}"
+            )
+        missing = [name for name in one.parameters if name not in known]
+        if missing:
+            raise InputError(
+                f"{one.title}: these runs cannot test {', '.join(missing)}; keep every column of the table before"
+            )
         prediction, J = model.derivatives({**known, **one.parameters}, list(one.parameters))
-        same = (data.session[new][:, None] == data.session[new]).astype(float)
-        spread = np.kron(np.eye(int(new.sum())) + one.share * same, one.run)
         slopes = J[new].reshape(-1, J.shape[-1])
-        spread += slopes @ one.covariance @ slopes.T
+        spread = one.noise.covariance(data.session[new]) + slopes @ one.covariance @ slopes.T
         left = (data.y - prediction)[new].ravel()
         scores.append(float(left @ np.linalg.solve(spread, left) + np.linalg.slogdet(spread)[1]))
     found = [Standing(one.title, score - min(scores)) for one, score in zip(explanations, scores, strict=True)]

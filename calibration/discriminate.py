@@ -28,9 +28,11 @@ from scipy.special import ndtr
 
 from calibration.fit import Fit
 from calibration.model import Model
+from calibration.noise import Noise
 from sim.arrays import Floats
 
 STOP = 25.0  # ratio of likelihoods at which an explanation is given up, 1/α of the sequence of batches
+GIVEN_UP = 2 * math.log(STOP)  # the same as a difference of deviances
 BATCH = 8  # runs
 _DRAWS = 4000
 _DECIDES = 3.84  # difference of χ² at which one of the two is chosen
@@ -98,21 +100,20 @@ def next_runs(
         Pair(true[0] - wrong[0], wrong[1], again.covariance)
         for (_, true), (again, wrong) in itertools.permutations(zip(fits, sides, strict=True), 2)
     ]
-    run = np.mean([one.noise.run for one in fits], 0)
-    share = float(np.mean([one.noise.share for one in fits]))
-    alone = np.array([_together(pairs, run, share, [place]).min() for place in range(len(settings))])
+    noise = Noise(np.mean([one.noise.run for one in fits], 0), float(np.mean([one.noise.share for one in fits])))
+    alone = np.array([_together(pairs, noise, [place]).min() for place in range(len(settings))])
     found = []
     rng = np.random.default_rng(seed)
     for place in np.argsort(-alone)[:count].tolist():
         for repeats in (1, 2, 4, 8, _MOST_REPEATS):
-            strength = float(_together(pairs, run, share, [place] * repeats).min())
+            strength = float(_together(pairs, noise, [place] * repeats).min())
             decides = _decides(strength, rng)
             if decides >= _WANTED:
                 break
         found.append(NextRun(settings[place], repeats, strength, decides))
-    chosen, strength = _greedy(pairs, run, share)
+    chosen, strength = _greedy(pairs, noise)
     batch = tuple(settings[place] for place in chosen)
-    return found, Batch(batch, strength, _decides(strength, rng), 2 * math.log(STOP))
+    return found, Batch(batch, strength, _decides(strength, rng), GIVEN_UP)
 
 
 def _decides(strength: float, rng: np.random.Generator) -> float:
@@ -121,17 +122,12 @@ def _decides(strength: float, rng: np.random.Generator) -> float:
     return float((draws > _DECIDES).mean())
 
 
-def _greedy(pairs: Sequence[Pair], run: Floats, share: float) -> tuple[list[int], float]:
-    """Places of `BATCH` runs, and the smallest λ of them together.
-
-    Args:
-        run: covariance of a run, (k, k).
-        share: ρ of the session.
-    """
+def _greedy(pairs: Sequence[Pair], noise: Noise) -> tuple[list[int], float]:
+    """Places of `BATCH` runs, and the smallest λ of them together."""
     chosen: list[int] = []
     strengths = np.zeros(len(pairs))
     for _ in range(BATCH):
-        tried = [_together(pairs, run, share, [*chosen, place]) for place in range(len(pairs[0].difference))]
+        tried = [_together(pairs, noise, [*chosen, place]) for place in range(len(pairs[0].difference))]
         wrong = [float(ndtr(-np.sqrt(one) / 2).sum()) for one in tried]
         place = int(np.argmin(wrong))
         strengths = tried[place]
@@ -139,13 +135,12 @@ def _greedy(pairs: Sequence[Pair], run: Floats, share: float) -> tuple[list[int]
     return sorted(chosen), float(strengths.min())
 
 
-def _together(pairs: Sequence[Pair], run: Floats, share: float, places: list[int]) -> Floats:
+def _together(pairs: Sequence[Pair], noise: Noise, places: list[int]) -> Floats:
     """λ of several runs made together, for every pair."""
-    count = len(places)
-    noise = np.kron(np.eye(count) + share, run)
+    spread = noise.covariance(np.zeros(len(places), dtype=np.int64))  # one session
     found = []
     for pair in pairs:
         slopes = pair.J[places].reshape(-1, pair.J.shape[-1])
         d = pair.difference[places].ravel()
-        found.append(float(d @ np.linalg.solve(noise + slopes @ pair.covariance @ slopes.T, d)))
+        found.append(float(d @ np.linalg.solve(spread + slopes @ pair.covariance @ slopes.T, d)))
     return np.array(found)

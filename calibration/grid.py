@@ -63,11 +63,12 @@ def check_owned(own: Owned) -> None:
 
 
 def settings_of(runs: Measurements, own: Owned) -> Floats:
-    """N, tail length [m] and motor speed [rad/s] of every run that can be made next, (m, 3); both directions."""
-    lengths = np.linspace(runs.length.min(), runs.length.max(), _LENGTHS)
-    speeds = np.abs(runs.omega).max() * np.array(_SPEEDS)
-    tails = np.arange(runs.tails.min(), runs.tails.max() + 2)
-    tails = np.array(own.get("N", tails), dtype=float)
-    lengths = np.array(own["l_cm"]) / 100 if "l_cm" in own else np.unique(lengths.round(9))
-    speeds = np.array(own["omega_rpm"]) * math.pi / 30 if "omega_rpm" in own else speeds
+    """N, l_cm and omega_rpm of every run that can be made next, (m, 3); both directions."""
+    cm, rpm = 100 * runs.length, np.abs(runs.omega).max() * 30 / math.pi
+    default = {
+        "N": np.arange(runs.tails.min(), runs.tails.max() + 2),
+        "l_cm": np.unique(np.linspace(cm.min(), cm.max(), _LENGTHS).round(1)),
+        "omega_rpm": (rpm * np.array(_SPEEDS)).round(1),
+    }
+    tails, lengths, speeds = (np.unique(own.get(name, default[name])).astype(float) for name in SETTINGS)
     return np.array([(n, a, w) for n in tails for a in lengths for w in (*speeds, *-speeds)])

@@ -178,7 +178,7 @@ def calibrate(
         instead=found.instead,
         generic=generic,
         predictive=predictive,
-        explanations=tuple(Explanation.of(title, fitted) for title, fitted in rivals),
+        explanations=tuple(Explanation.of(title, fitted, task.runs.outputs) for title, fitted in rivals),
         next_runs=tuple(wanted),
         next_batch=batch,
         error_uncalibrated=error["uncalibrated"][0],

@@ -35,16 +35,7 @@ from calibration.directions import Directions
 from calibration.features import features
 from calibration.fit import Fit
 from calibration.model import Runs
-from calibration.noise import (
-    Design,
-    Sums,
-    inverse,
-    inverse_root,
-    least_squares,
-    repeat_covariance,
-    root_diagonal,
-    session_share,
-)
+from calibration.noise import Design, Sums, inverse_root, least_squares, repeat_covariance, session_share, solved
 from calibration.prior import changes, precisions
 from sim.arrays import Flags, Floats, Integers
 
@@ -99,13 +90,9 @@ class _Tester:
         kinds, place = np.unique(self.condition, return_inverse=True)
         same = np.arange(len(kinds))[:, None] == place.reshape(-1)
         self.means = same / np.sqrt(same.sum(1))[:, None]  # (c, n)
-        sessions = np.unique(self.session, return_inverse=True)[1].reshape(-1)
-        self.sessions = (np.arange(sessions.max() + 1)[:, None] == sessions).astype(float)  # (s, n)
-        roots = np.sqrt(self.sessions.sum(1))
-        self.F_means = self.sessions @ self.F / roots[:, None]  # (s, f)
-        J_means = np.einsum("sn,nkp->skp", self.sessions, J) / roots[:, None, None]
+        self.F_means = self.design.average(self.F)  # (s, f)
         self.FJ = np.einsum("nf,nkp->fkp", self.F, J, optimize=True)
-        self.FJ_means = np.einsum("sf,skp->sfkp", self.F_means, J_means)
+        self.FJ_means = np.einsum("sf,skp->sfkp", self.F_means, self.design.average(J))
 
     def scores(self, residual: Floats) -> Scores:
         """Statistics of residuals (B, n, k) from the numbers as given, after a linear refit, each in its own
@@ -129,11 +116,8 @@ class _Tester:
         """z, survived share and length of every effect, each with the scatter of sessions that remains with it."""
         own = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
         part = products.take(own)
-        share = session_share(part, np.zeros((len(products.within), e)), passes=_PASSES_OF_AN_EFFECT)
-        whole = part.at(share)  # (B, e, p + 2, p + 2)
-        scale = root_diagonal(whole[..., :p, :p])
-        known = inverse(whole[..., :p, :p] / scale[..., :, None] / scale[..., None, :])
-        weights = (known @ (whole[..., :p, p] / scale)[..., None])[..., 0] / scale
+        whole = part.at(session_share(part, passes=_PASSES_OF_AN_EFFECT))  # (B, e, p + 2, p + 2)
+        weights = solved(whole[..., : p + 1, : p + 1])[0]  # of the coefficients in the effect's signal
         score = whole[..., p, p + 1] - (weights * whole[..., :p, p + 1]).sum(-1)
         square = whole[..., p, p] - (weights * whole[..., :p, p]).sum(-1)
         length = np.sqrt(np.maximum(square, 1e-300))
@@ -148,7 +132,7 @@ class _Tester:
         """
         count, k = len(left), left.shape[-1]
         score = np.einsum("nf,bnk,bka->baf", self.F, self._shrunk(left, share), root, optimize=True)
-        less = 1 / (1 + share[:, None] * self.sessions.sum(1)) - 1  # Σ⁻¹ of the sessions' means
+        less = 1 / (1 + share[:, None] * self.design.sizes) - 1  # Σ⁻¹ of the sessions' means
         followed = np.einsum("bs,sfkp->bfkp", less, self.FJ_means, optimize=True) + self.FJ
         absorbed = np.einsum("bik,bia,bfkp->bafp", root, root, followed, optimize=True)
         whole = (root**2).sum(1)[:, :, None] * ((self.F**2).sum(0) + less @ self.F_means**2)[:, None]
@@ -158,9 +142,9 @@ class _Tester:
 
     def _shrunk(self, table: Floats, share: Floats) -> Floats:
         """Whiten runs (B, n, c) in Σ that are white in S."""
-        size = self.sessions.sum(1)
-        weight = (1 / np.sqrt(1 + share[:, None] * size) - 1) / size  # (B, s)
-        return np.asarray(table + self.sessions.T @ (weight[..., None] * (self.sessions @ table)))
+        less = 1 / np.sqrt(1 + share[:, None] * self.design.sizes) - 1  # (B, s)
+        picks = self.design.picks
+        return np.asarray(table + picks.T @ (less[..., None] * (picks @ table)))
 
 
 def check_misfit(
@@ -196,13 +180,14 @@ def check_misfit(
     rng = np.random.default_rng(seed)
     root = np.linalg.cholesky(repeat_covariance(left, data.condition[used]))
     scatter = float(np.sqrt(observed.share[0]))
+    session = np.unique(tester.session, return_inverse=True)[1].reshape(-1)
     prior = np.where(precision > 0, 1 / np.sqrt(np.where(precision > 0, precision, 1.0)), 0.0)
     own = np.append(observed.general[0], _largest(observed.z, testable))
     found = []
     for start in range(0, draws, _AT_ONCE):
         count = min(_AT_ONCE, draws - start)
         drawn = rng.normal(size=(count, *residual.shape))
-        drawn += scatter * tester.sessions.T @ rng.normal(size=(count, len(tester.sessions), residual.shape[-1]))
+        drawn += scatter * rng.normal(size=(count, session.max() + 1, residual.shape[-1]))[:, session]
         numbers = rng.normal(size=(count, len(prior))) * prior
         null = tester.scores(drawn @ root.T + np.einsum("nkp,bp->bnk", tester.J, numbers))
         found.append(np.column_stack([null.general, _largest(null.z, testable)]))

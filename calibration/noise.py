@@ -38,6 +38,11 @@ class Noise:
     def whitener(self, session: Labels) -> Whitener:
         return Whitener(self, session)
 
+    def covariance(self, session: Labels) -> Floats:
+        """Σ of the runs of `session` (n,), (n k, n k)."""
+        together = session[:, None] == session
+        return np.asarray(np.kron(np.eye(len(session)) + self.share * together, self.run))
+
 
 class Whitener:
     """Σ^−½ for the runs of `session`; applies to residuals (n, k, ...) and flattens them."""
@@ -131,12 +136,16 @@ class Design:
 
     def __init__(self, columns: Floats, session: Labels):
         n, k, m = columns.shape
-        self._picks, self._sizes = _picks(session)
+        self.picks, self.sizes = _picks(session)
         self._flat = columns.reshape(n * k, m)
-        self._means = np.einsum("sn,nkm->skm", self._picks, columns)  # (s, k, m)
+        self.means = self.average(columns)  # (s, k, m)
         self._whole = np.einsum("nim,njl->ijml", columns, columns, optimize=True).reshape(k * k, m * m)
-        between = np.einsum("sim,sjl->ijsml", self._means, self._means, optimize=True)
+        between = np.einsum("sim,sjl->ijsml", self.means, self.means, optimize=True)
         self._between = between.reshape(k * k, -1)
+
+    def average(self, table: Floats) -> Floats:
+        """Mean of each session times the root of its size, (s, ...), of (n, ...)."""
+        return np.asarray(np.tensordot(self.picks, table, 1))
 
     def sums(self, precision: Floats, residual: Floats) -> Sums:
         """The same as `sums` of these columns and a residual behind them.
@@ -146,39 +155,40 @@ class Design:
             residual: (b, n, k).
         """
         b, n, k = residual.shape
-        s, _, m = self._means.shape
+        s, _, m = self.means.shape
         weighted = residual @ precision
-        means, weighted_means = self._picks @ residual, self._picks @ weighted  # (b, s, k)
+        means, weighted_means = self.picks @ residual, self.picks @ weighted  # (b, s, k)
         flat = precision.reshape(b, k * k)
         whole, between = np.empty((b, m + 1, m + 1)), np.empty((b, s, m + 1, m + 1))
         whole[:, :m, :m] = (flat @ self._whole).reshape(b, m, m)
         between[:, :, :m, :m] = (flat @ self._between).reshape(b, s, m, m)
         whole[:, m, :m] = whole[:, :m, m] = weighted.reshape(b, n * k) @ self._flat
-        across = np.einsum("bsk,skm->bsm", weighted_means, self._means, optimize=True)
+        across = np.einsum("bsk,skm->bsm", weighted_means, self.means, optimize=True)
         between[..., m, :m] = between[..., :m, m] = across
         whole[:, m, m] = (weighted * residual).sum((-1, -2))
         between[..., m, m] = (weighted_means * means).sum(-1)
-        return Sums(whole - between.sum(-3), between, self._sizes, k)
+        return Sums(whole - between.sum(-3), between, self.sizes, k)
 
 
 def least_squares(products: Sums, *, passes: int) -> Linear:
     """Fit the last of the columns, with ρ from its own residuals after `passes` iterations (0: ρ = 0)."""
-    share = session_share(products, np.zeros(products.within.shape[:-2]), passes=passes)
-    return Linear(*_solved(products.at(share)), share)
+    share = session_share(products, passes=passes)
+    return Linear(*solved(products.at(share)), share)
 
 
-def session_share(products: Sums, share: Floats, *, passes: int) -> Floats:
-    """ρ (...) from the residuals of a fit of the last of the columns, after `passes` iterations from `share`.
+def session_share(products: Sums, *, passes: int) -> Floats:
+    """ρ (...) from the residuals of a fit of the last of the columns, after `passes` iterations from 0.
 
     The expected scatter of the sessions' means is Σ_s n_s |m_s|² = (k − h/s) Σ_s (1 + ρ n_s), where h of their k s
     degrees of freedom are used by the fit.
     """
     count, p = len(products.sizes), products.within.shape[-1] - 1
+    share = np.zeros(products.within.shape[:-2])
     if count == 1 and passes:
         return np.full_like(share, SESSION_SHARE)
     for _ in range(passes):
         whole = products.at(share)
-        step, covariance = _solved(whole)
+        step, covariance = solved(whole)
         left = np.concatenate([-step, np.ones((*share.shape, 1))], -1)
         each = products.between @ left[..., None, :, None]
         between = (each[..., 0] * left[..., None, :]).sum((-1, -2))
@@ -189,7 +199,7 @@ def session_share(products: Sums, share: Floats, *, passes: int) -> Floats:
     return share
 
 
-def _solved(whole: Floats) -> tuple[Floats, Floats]:
+def solved(whole: Floats) -> tuple[Floats, Floats]:
     """Coefficients (..., p) of the last of the columns, and their covariance (..., p, p)."""
     p = whole.shape[-1] - 1
     scale = root_diagonal(whole[..., :p, :p])

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from calibration.attribute import Candidate
+from calibration.attribute import UNSEEN, Candidate
 from calibration.discriminate import STOP, Batch
 from calibration.imitation import DOUBT
 from calibration.loop import Verdict
@@ -29,7 +29,6 @@ _LABELS = {
     "v": "v, speed",
 }
 _SETTINGS = {"l_cm": "l [cm]", "omega_rpm": "ω [rpm]"}
-_LARGEST = 1e9  # smallest detectable size that is shown
 _DISAGREES = 0.01  # p of the locked runs below which the report says so
 _TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes", "score": "effects"}
 
@@ -369,4 +368,4 @@ def draw_residuals(result: Verdict, data: Measurements) -> Figure:
 
 def _size(value: float) -> str:
     """A smallest detectable size; a dash where no size shows in these runs."""
-    return f"{value:.2g}" if value < _LARGEST else "–"
+    return f"{value:.2g}" if value < UNSEEN else "–"

@@ -243,15 +243,13 @@ class Swimmer:
         runs, grid = self.runs, settings_of(self.runs, self.own)
         count = len(grid)
         noted = np.tile(runs.noted.mean(0), (count, 1))
-        settings = [
-            {"N": int(n), "l_cm": round(100 * length, 1), "omega_rpm": round(omega * 30 / math.pi, 1)}
-            for n, length, omega in grid.tolist()
-        ]
+        settings = [{"N": int(n), "l_cm": length, "omega_rpm": speed} for n, length, speed in grid.tolist()]
         own = replace(
             runs, y=np.zeros((count, len(runs.outputs))),
             condition=np.arange(count), session=np.zeros(count, int),
             session_names=("next",), inputs=np.zeros((count, runs.inputs.shape[1])), set_aside=(),
-            rows=np.arange(count), limits=(), tails=grid[:, 0], length=grid[:, 1], omega=grid[:, 2], noted=noted,
+            rows=np.arange(count), limits=(), tails=grid[:, 0], length=grid[:, 1] / 100,
+            omega=grid[:, 2] * math.pi / 30, noted=noted,
         )  # fmt: skip
         return replace(self, runs=own), settings
 

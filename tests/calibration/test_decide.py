@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,7 +14,6 @@ import pytest
 from scipy.stats import binom
 
 from calibration.decide import (
-    GIVEN_UP,
     Explanation,
     Standing,
     new_runs,
@@ -21,8 +21,9 @@ from calibration.decide import (
     sentence,
     standings,
 )
-from calibration.discriminate import STOP
+from calibration.discriminate import GIVEN_UP, STOP
 from calibration.loop import verdict_record
+from calibration.noise import Noise
 from sim.io.errors import InputError
 from tests.calibration.toy_tables import closed, install_toy, toy_swimmer, toy_table
 
@@ -76,12 +77,14 @@ def test_the_true_explanation_is_seldom_given_up() -> None:
     slopes = rng.normal(size=(n, k, 1))
     predictions = {"A": np.zeros((n, k)), "B": rng.normal(size=(n, k))}
     run, covariance = np.array([[1.0, 0.3], [0.3, 2.0]]), np.array([[0.5]])
-    both = [Explanation(title, {title: 1.0}, covariance, run, 0.4) for title in predictions]
+    both = [Explanation(title, {title: 1.0}, covariance, Noise(run, 0.4), ("a", "b")) for title in predictions]
 
-    def model(y: np.ndarray) -> Any:
+    def model(y: np.ndarray, *outputs: str) -> Any:
         """Its parameter's name says which prediction is meant."""
+        known = tuple(SimpleNamespace(name=name, start=0.0) for name in predictions)
+        runs = SimpleNamespace(y=y, session=np.zeros(n, int), outputs=outputs or ("a", "b"))
         return SimpleNamespace(
-            runs=SimpleNamespace(y=y, session=np.zeros(n, int)), coefficients=(), given=(), effects=(),
+            runs=runs, coefficients=known, given=(), effects=(),
             derivatives=lambda parameters, names: (predictions[names[0]], slopes),
         )  # fmt: skip
 
@@ -95,8 +98,11 @@ def test_the_true_explanation_is_seldom_given_up() -> None:
         won += found["B"].given_up
     assert lost <= binom.isf(0.01, draws, 1 / STOP)
     assert won > 0.1 * draws
-    with pytest.raises(InputError, match="outputs of the table"):
-        standings(model(np.zeros((n, k + 1))), both, np.ones(n, bool))
+    with pytest.raises(InputError, match="has the outputs a, c; the verdict was made from a, b"):
+        standings(model(np.zeros((n, k)), "a", "c"), both, np.ones(n, bool))
+    lost_column = [replace(both[0], parameters={"viscosity_with_time": 0.1})]
+    with pytest.raises(InputError, match="A: these runs cannot test viscosity_with_time"):
+        standings(model(np.zeros((n, k))), lost_column, np.ones(n, bool))
 
 
 def test_a_verdict_without_rivals_is_refused(tmp_path: Path) -> None:
@@ -105,6 +111,7 @@ def test_a_verdict_without_rivals_is_refused(tmp_path: Path) -> None:
         ('{"explanations": []}', "no two explanations"),
         ("[1]", "no two explanations"),
         ("{", "is not a verdict"),
+        ('{"explanations": [{"title": "A"}]}', "no verdict.json of this version"),
         (None, "No such file"),
     ):
         if text is not None:

@@ -17,9 +17,9 @@ def test_without_a_word_it_is_the_range_of_the_table() -> None:
     runs = toy_swimmer(toy_table(3)).runs
     grid = settings_of(runs, {})
     assert set(grid[:, 0]) == {2, 3, 4, 5, 6}
-    assert grid[:, 1].min() == pytest.approx(0.05)
-    assert grid[:, 1].max() == pytest.approx(0.11)
-    assert np.abs(grid[:, 2]).max() == pytest.approx(np.abs(runs.omega).max())
+    assert grid[:, 1].min() == pytest.approx(5)
+    assert grid[:, 1].max() == pytest.approx(11)
+    assert np.abs(grid[:, 2]).max() == pytest.approx(np.abs(runs.omega).max() * 30 / math.pi)
     assert len(np.unique(grid, axis=0)) == len(grid) == 5 * 6 * 6
     one = toy_swimmer(toy_table(3, lengths_cm=(8.0,))).runs
     assert len(settings_of(one, {})) == 5 * 6
@@ -28,12 +28,17 @@ def test_without_a_word_it_is_the_range_of_the_table() -> None:
 def test_a_lab_gets_only_what_it_has() -> None:
     own = owned(["N=2,4", "l_cm=5,7", "omega_rpm=60"])
     runs = toy_swimmer(toy_table(3)).runs
-    speed = 60 * math.pi / 30
-    expected = set(product((2, 4), (0.05, 0.07), (speed, -speed)))
+    expected = set(product((2, 4), (5, 7), (60, -60)))
     assert {tuple(row) for row in settings_of(runs, own).tolist()} == expected
-    _, settings = toy_swimmer(toy_table(3), START, own).possible()
-    assert {s["l_cm"] for s in settings} == {5.0, 7.0}
-    assert {s["omega_rpm"] for s in settings} == {60.0, -60.0}
+
+
+def test_settings_are_those_of_the_lab_to_the_last_digit() -> None:
+    own = {"l_cm": (5.25, 7.0), "omega_rpm": (57.46,)}
+    model, settings = toy_swimmer(toy_table(3), START, own).possible()
+    assert {s["l_cm"] for s in settings} == {5.25, 7.0}
+    assert {s["omega_rpm"] for s in settings} == {57.46, -57.46}
+    assert model.runs.length == pytest.approx([s["l_cm"] / 100 for s in settings])
+    assert model.runs.omega == pytest.approx([s["omega_rpm"] * math.pi / 30 for s in settings])
 
 
 @pytest.mark.parametrize(
