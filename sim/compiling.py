@@ -1,10 +1,11 @@
 """Compiled loops: machine code by numba, kept on disk between runs.
 
-numba's own cache depends only on the file of the loop. If a formula in another file changes, it would use old
-machine code. So the cache is a folder whose name has a digest of all files that compiled loops are made of. After
-a change the loops are always compiled again. The folders of the last few versions are kept. They are beside this
-file, or in the user's cache folder if this one cannot be written. Loops of other packages have folders of their
-own in it, named by a digest of all files beside them.
+numba's own cache depends on the time stamp of the loop's file. If a formula in another file changes, it would use old
+machine code; if a comment changes, it would compile again. So the cache is a folder whose name has a digest of the
+code of all files that compiled loops are made of, without comments and docstrings. The folders of the last few
+versions are kept. They are beside this file, or in the user's cache folder if this one cannot be written. Loops of
+other packages have folders of their own in it, named by a digest of all files of their package. Machine code does not
+depend on the folder that the sources are in.
 
 Sums may be reordered and multiplications fused, so last digits can differ between machines. NaN and infinity keep
 their meaning.
@@ -19,20 +20,23 @@ the same neighbours. So where results must be the same in each process, loops ar
 
 from __future__ import annotations
 
+import ast
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from shutil import rmtree
-from typing import Any, TypeVar, cast
+from types import CodeType
+from typing import Any, Self, TypeVar, cast
 
 from llvmlite.binding import get_host_cpu_name
 from numba import config, njit
 from numba.core import event
+from numba.core.caching import _CacheLocator
 from tqdm import tqdm
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -43,10 +47,28 @@ _KEPT = 3  # folders of other versions
 _LEVEL = 1  # of optimisation: loops run as fast as at level 3 and compile in less than half the time
 
 
-def digest_of(root: Path) -> str:
-    """Twelve characters that name the sources of the compiled loops under `root`."""
-    files = sorted(path for pattern in _SOURCES for path in root.glob(pattern))
-    return sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:12]
+def code_digest(root: Path, patterns: Iterable[str] = _SOURCES) -> str:
+    """Return twelve characters that name the code of the files under `root`, whatever their comments and docstrings."""
+    digest = sha256()
+    for path in sorted(path for pattern in patterns for path in root.glob(pattern)):
+        digest.update(str(path.relative_to(root)).encode())
+        tree = ast.parse(path.read_bytes())
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and ast.get_docstring(node, clean=False):
+                node.body = node.body[1:] or [ast.Pass(lineno=1, col_offset=0)]
+        _add_code(digest, compile(tree, "", "exec", dont_inherit=True))
+    return digest.hexdigest()[:12]
+
+
+def _add_code(digest: Any, code: CodeType) -> None:
+    """Add what a block of code does to a digest; line numbers are left out."""
+    digest.update(repr((code.co_name, code.co_names, code.co_varnames, code.co_freevars)).encode() + code.co_code)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            _add_code(digest, constant)
+        else:
+            members = sorted(constant, key=repr) if isinstance(constant, frozenset) else constant
+            digest.update(repr(members).encode())
 
 
 def prune(folder: Path, kept: int) -> None:
@@ -60,7 +82,7 @@ def _cache_folder() -> Path:
     """Where this version's loops are kept."""
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     place = _HERE / "__pycache__" if os.access(_HERE, os.W_OK) else home / "softflagella"
-    return place / f"compiled-{digest_of(_HERE)}"
+    return place / f"compiled-{code_digest(_HERE)}"
 
 
 CACHE = _cache_folder()
@@ -95,10 +117,42 @@ _modules: set[str] = set()  # with compiled loops
 
 
 @cache
-def folder_beside(place: Path) -> Path:
-    """Where loops of files in another package's folder are kept."""
-    digest = sha256(b"".join(path.read_bytes() for path in sorted(place.glob("*.py")))).hexdigest()[:12]
-    return CACHE / f"beside-{digest}"
+def folder_of_package(root: Path) -> Path:
+    """Return where the loops of another package are kept: all its files, in all its folders, name the folder."""
+    return CACHE / f"{root.name}-{code_digest(root, ('**/*.py',))}"
+
+
+def _package_root(file: Path) -> Path:
+    """Return the outermost folder with an __init__.py around a file, or the file's own folder."""
+    root = file.parent
+    while (root.parent / "__init__.py").exists():
+        root = root.parent
+    return root
+
+
+class Locator(_CacheLocator):  # type: ignore[misc]
+    """Tells numba in which of our folders a loop is kept. The folder's name says which code it belongs to."""
+
+    def __init__(self, module: str, file: Path):
+        self._module = module
+        self._folder = CACHE if file.is_relative_to(_HERE) else folder_of_package(_package_root(file))
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Self:
+        """Return the locator of a function."""
+        return cls(py_func.__module__, Path(py_file))
+
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        """Return the same stamp always: other code has another folder."""
+        return ""
+
+    def get_disambiguator(self) -> str:
+        """Return the module's name, since two modules may have functions of one name."""
+        return self._module
 
 
 class _Progress(event.Listener):
@@ -140,9 +194,7 @@ event.register("numba:compile", _Progress())  # type: ignore[no-untyped-call]
 def compiled(function: F) -> F:
     """Compile a function of numbers and arrays on its first call, without holding the interpreter's lock."""
     _modules.add(function.__module__)
-    place = Path(function.__code__.co_filename)
-    folder = CACHE if place.is_relative_to(_HERE) else folder_beside(place.parent)
-    with _setting("CACHE_DIR", str(folder)):
+    with _setting("CACHE_LOCATOR_CLASSES", f"{__name__}.{Locator.__name__}"):
         loop: Any = njit(
             cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"}
         )(function)

@@ -7,9 +7,9 @@ import time
 from functools import cache
 from pathlib import Path
 
-from sim.compiling import all_compiled, compile_apart, folder_beside, mark_all_compiled
+from sim.compiling import all_compiled, compile_apart, folder_of_package, mark_all_compiled
 
-FOLDER = folder_beside(Path(__file__).parent)
+FOLDER = folder_of_package(Path(__file__).parent)
 
 
 def compile_all() -> float:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import ast
 import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 import sim
-from sim.compiling import CACHE, digest_of, folder_beside, prune
+from sim.compiling import CACHE, Locator, code_digest, folder_of_package, prune
 
 SIM = Path(sim.__file__).parent
 MARKS = {"compiled", "formula"}
@@ -72,14 +74,14 @@ def digest_with_a_change(root: Path, name: str) -> str:
     """The digest while a file has one line more."""
     text = (root / name).read_bytes()
     (root / name).write_bytes(text + b"CHANGED = 1\n")
-    digest = digest_of(root)
+    digest = code_digest(root)
     (root / name).write_bytes(text)
     return digest
 
 
 def test_the_folder_is_named_by_the_code(copied: Path) -> None:
-    assert CACHE.name == f"compiled-{digest_of(SIM)}"
-    assert digest_of(copied) == digest_of(SIM)
+    assert CACHE.name == f"compiled-{code_digest(SIM)}"
+    assert code_digest(copied) == code_digest(SIM)
 
 
 def test_loops_are_found_where_they_are() -> None:
@@ -91,18 +93,63 @@ def test_loops_are_found_where_they_are() -> None:
 
 @pytest.mark.parametrize("name", MADE_OF)
 def test_a_change_of_what_loops_are_made_of_is_another_version(name: str, copied: Path) -> None:
-    assert digest_with_a_change(copied, name) != digest_of(copied)
+    assert digest_with_a_change(copied, name) != code_digest(copied)
 
 
 @pytest.mark.parametrize("name", ELSEWHERE)
 def test_a_change_elsewhere_is_the_same_version(name: str, copied: Path) -> None:
     """An effect or a way to use the loops is no reason to compile them anew."""
-    assert digest_with_a_change(copied, name) == digest_of(copied)
+    assert digest_with_a_change(copied, name) == code_digest(copied)
 
 
-def test_loops_elsewhere_are_compiled_again_when_a_file_beside_them_changes(tmp_path: Path) -> None:
-    (tmp_path / "one.py").write_text("NUMBER = 1\n")
-    before = folder_beside(tmp_path)
-    folder_beside.cache_clear()
-    (tmp_path / "one.py").write_text("NUMBER = 2\n")
-    assert folder_beside(tmp_path) != before
+@pytest.mark.parametrize(
+    ("text", "same"),
+    [
+        ("def f(x):\n    return 2 * x\n", True),
+        ('"""Another."""\n# comment\n\ndef f(x):\n    """Return."""\n    return 2 * x  # twice\n', True),
+        ("def f(x):\n    return 3 * x\n", False),
+        ("def f(x):\n    return x * 2\n", False),
+        ("def f(y):\n    return 2 * y\n", False),
+        ("def f(x):\n    return 2.0 * x\n", False),
+        ("LIMIT = -0.0\ndef f(x):\n    return 2 * x\n", False),
+    ],
+)
+def test_words_are_not_code(text: str, same: bool, tmp_path: Path) -> None:
+    """A change of a comment or a docstring must not cost two minutes of compiling; any other change must."""
+    (tmp_path / "loop.py").write_text('"""A loop."""\n\n\ndef f(x):\n    return 2 * x\n')
+    before = code_digest(tmp_path, ["*.py"])
+    (tmp_path / "loop.py").write_text(text)
+    assert (code_digest(tmp_path, ["*.py"]) == before) == same
+
+
+def test_loops_of_another_package_are_compiled_again_when_any_of_its_files_changes(tmp_path: Path) -> None:
+    """A loop in one folder is made of functions in another one."""
+    for folder in ("package", "package/formulas", "package/table"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "__init__.py").touch()
+    formula = tmp_path / "package" / "formulas" / "drag.py"
+    formula.write_text("NUMBER = 1\n")
+    before = folder_of_package(tmp_path / "package")
+    folder_of_package.cache_clear()
+    formula.write_text("NUMBER = 2\n")
+    assert folder_of_package(tmp_path / "package") != before
+    inside = Locator("package.table.balance", tmp_path / "package" / "table" / "balance.py")
+    assert inside.get_cache_path() == str(folder_of_package(tmp_path / "package"))
+
+
+def test_machine_code_is_read_where_the_sources_have_moved(tmp_path: Path) -> None:
+    """Two checkouts of the same code, or a touched file, share what was compiled."""
+    code = "import sys; sys.path[:0] = sys.argv[1:]; import loops.one as l; print(l.twice(3.0), sum(l.twice.stats.cache_hits.values()))"
+    for place in ("here", "there"):
+        (tmp_path / place / "loops").mkdir(parents=True)
+        (tmp_path / place / "loops" / "__init__.py").touch()
+        text = '"""{}."""\nfrom sim.compiling import compiled\n\n@compiled\ndef twice(x):\n    return 2 * x\n'
+        (tmp_path / place / "loops" / "one.py").write_text(text.format(place))
+    said = [
+        subprocess.run([sys.executable, "-c", code, str(tmp_path / place), str(SIM.parent)], capture_output=True,
+                       text=True, check=True).stdout.split()
+        for place in ("here", "there")
+    ]  # fmt: skip
+    folder_of_package.cache_clear()
+    shutil.rmtree(folder_of_package(tmp_path / "here" / "loops"))
+    assert said == [["6.0", "0"], ["6.0", "1"]]

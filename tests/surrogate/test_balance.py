@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from benchmarks.balance import linear_guess, solve
-from sim.compiling import folder_beside
+from sim.compiling import folder_of_package
 from surrogate import balance, head, perceptron, tail
 from surrogate.balance import inputs_rows, solve_rows
 from surrogate.export import load
@@ -22,7 +22,7 @@ from tests.surrogate.small import rows, table
 
 def test_loops_are_kept_by_all_files_beside_them() -> None:
     """Before, they kept machine code of an older version of each other."""
-    folder = folder_beside(Path(balance.__file__).parent)
+    folder = folder_of_package(Path(balance.__file__).parent)
     assert Path(solve_rows.stats.cache_path).is_relative_to(folder)
 
 
