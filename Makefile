@@ -39,7 +39,7 @@ $(STAMP): pyproject.toml constraints.txt
 	touch $@
 
 demo: reports/demo.html ## the whole pipeline on the paper's robot, ends with reports/demo.html
-reports/demo.html: $(STAMP) $(SOURCES) $(wildcard dataset/*.py surrogate/*.py surrogate/shipped/* planner/*.py calibration/*.py softflagella/*.py) demo.toml
+reports/demo.html: $(STAMP) $(SOURCES) $(wildcard $(foreach p,dataset surrogate planner calibration softflagella,$(p)/*.py $(p)/*/*.py) surrogate/shipped/*) demo.toml
 	$(RUN) -m softflagella demo --out $@
 
 test: $(VENV)/.extras ## run the tests, those of clusters and of ONNX files included

@@ -22,13 +22,15 @@ from torch import Tensor
 
 from benchmarks.balance import solve
 from benchmarks.shipped_table import kept
-from dataset.figures import plain_logarithms
-from surrogate import fit, tail, tails
-from surrogate.fit import Settings
-from surrogate.network import Ensemble
-from surrogate.rows import Simulated
-from surrogate.tails import Rows, learnable, rows_of
-from surrogate.work import Work
+from dataset.report.figures import plain_logarithms
+from surrogate.networks import training_loop as fit
+from surrogate.networks.checkpoints import Work
+from surrogate.networks.ensemble import Ensemble
+from surrogate.networks.training_loop import Settings
+from surrogate.table import wrench_table as tails
+from surrogate.table.wrench_table import Rows, learnable, rows_of
+from surrogate.training.simulated import Simulated
+from surrogate.wrench import tails as tail
 
 SMALL = Settings(width=32, depth=3, members=1, epochs=60, iterations=600)
 _CENTRES, _TESTED = 1000, 1000

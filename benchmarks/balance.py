@@ -1,4 +1,4 @@
-"""The balance of head and tails by torch, for any table of the tails: a reference for `surrogate.balance`.
+"""The balance of head and tails by torch, for any table of the tails: a reference for `surrogate.wrench.balance`.
 
 Broyden's method for all robots at once. Its derivative is found by differences that evaluate the table, and again
 after some steps.
@@ -9,9 +9,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from surrogate import head, tail
-from surrogate.head import Heads, Numbers, full_motion, straight_resistance, unbalanced
-from surrogate.tail import Tails
+from surrogate.wrench import heads as head
+from surrogate.wrench import tails as tail
+from surrogate.wrench.heads import Heads, Numbers, full_motion, straight_resistance, unbalanced
+from surrogate.wrench.tails import Tails
 
 STEPS, CORRECTION = 40, 1e-9  # the correction is relative
 _RENEWED = 8  # steps after which the derivative is found again

@@ -18,14 +18,14 @@ import numpy as np
 import torch
 
 from benchmarks.tracking import CASES
-from planner.check import tracking_error
-from planner.plan import Plan, plan
-from planner.record import plan_record
+from planner.files.plan_json import plan_record
+from planner.files.tracking_error import tracking_error
+from planner.planning.plan import Plan, plan
 from sim.arrays import Floats
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
-from surrogate.export import load
+from surrogate.table.model_file import load
 
 Rule = tuple[int, list[float], tuple[float, float, float]]  # first direction, dwells, start
 

@@ -29,13 +29,13 @@ from benchmarks.given import Case, cases
 from benchmarks.identification import identify
 from benchmarks.operating import per_cent
 from benchmarks.planted import Linear, scatter, stand_in
-from calibration.fit import Fit, fit
-from calibration.generic import correct
-from calibration.locked import errors, middle_session
-from calibration.loop import calibrate
-from calibration.misfit import TESTABLE
-from calibration.model import start_values
-from calibration.noise import repeat_covariance
+from calibration.statistics.fit import Fit, fit
+from calibration.statistics.forward_model import start_values
+from calibration.statistics.held_out import errors, middle_session
+from calibration.statistics.noise import repeat_covariance
+from calibration.statistics.residual_tests import TESTABLE
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.residual_regression import correct
 from sim.arrays import Floats
 from sim.motion.batches import available_jobs
 

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 
-from planner.goal import Voyage, to_goal
-from planner.route import NoWayError
+from planner.goal.route import NoWayError
+from planner.goal.to_goal import Voyage, to_goal
 from sim.model.presets import PRESETS
-from surrogate.export import load
+from surrogate.table.model_file import load
 
 
 class Trip(NamedTuple):
@@ -28,7 +28,7 @@ def planned(case: Callable[[np.random.Generator], dict[str, Any]], cases: int, h
     """Plan random cases, and print a line for each that has no way.
 
     Args:
-        case: makes the arguments of `planner.goal.to_goal` from a random generator.
+        case: makes the arguments of `planner.goal.to_goal.to_goal` from a random generator.
         cases: how many; the command line may give another number, and then the first seed.
         heads: of the columns that the caller prints.
     """

@@ -15,15 +15,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.corrected import corrected_robot
-from calibration.locked import fitted_to_all
-from calibration.loop import calibrate
-from calibration.measurements import read_measurements
-from calibration.steer import gap_closed, steer
-from calibration.swimmer import Swimmer
-from calibration.synthetic import make_table
-from planner.path import polygon
+from calibration.report.corrected_robot import corrected_robot
+from calibration.statistics.held_out import fitted_to_all
+from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.synthetic_table import make_table
+from calibration.verdict.calibrate import calibrate
+from planner.paths.path import polygon
 from sim.model.presets import PRESETS
+from softflagella.replanning import gap_closed, steer
 
 HIDDEN = (
     ("end_over_end_drag", 5.0), ("tail_spin_drag", 1.0), ("surface_couple", 0.4), ("anisotropic_head_drag", 0.5),

@@ -1,10 +1,10 @@
 """Tables of corrected robots: each effect of the catalogue at its typical size on the paper's control robot.
 
-For each robot: the processor time of `surrogate.tabulate.tabulate`, and the error of the net motion that its table
-predicts. The net motion is the change of the robot's pose over two equal dwells, one in each direction of the
-motor, once earlier dwells are forgotten; first with the motor forwards, then with the motor backwards. The error
-is the distance between the two ends over the net distance, or, where it is larger, the difference of the headings
-over the angle by which the robot turns in one dwell.
+For each robot: the processor time of `surrogate.one_robot.tabulate.tabulate`, and the error of the net motion that
+its table predicts. The net motion is the change of the robot's pose over two equal dwells, one in each direction
+of the motor, once earlier dwells are forgotten; first with the motor forwards, then with the motor backwards. The
+error is the distance between the two ends over the net distance, or, where it is larger, the difference of the
+headings over the angle by which the robot turns in one dwell.
 
 The reference is time steps on two meshes, extrapolated, as the mean over the phases of the disc at the flip. The
 steady motion of both sides is that of the direct solution, whose stated error is in the table, too.
@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from planner.lookup import vehicle_of
+from planner.vehicle.from_table import vehicle_of
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.mechanics import planar
@@ -37,8 +37,8 @@ from sim.motion.settling import steady_state
 from sim.motion.switching import MEMORY, steady_twist
 from sim.motion.warm import compile_once
 from sim.solve.assembly import bodies, reversed_bodies
-from surrogate.single import SingleRobot
-from surrogate.tabulate import tabulate
+from surrogate.one_robot.robot_table import SingleRobot
+from surrogate.one_robot.tabulate import tabulate
 
 AT = (8, 13, 18, 22)  # of DWELLS: 0.54, 1.0, 1.9, 3.1
 _MESHES = (Resolution(16, 48), Resolution(24, 72))

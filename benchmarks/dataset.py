@@ -24,19 +24,19 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dataset import pieces
-from dataset.design import load_design
-from dataset.pieces import SEGMENT
-from dataset.places import place
-from dataset.store import batches, read, read_manifest
-from dataset.sweep import build
+from dataset.build.build import build
+from dataset.rows.design import load_design
+from dataset.storage import shards as pieces
+from dataset.storage.data_set import batches, read, read_manifest
+from dataset.storage.shards import SEGMENT
+from dataset.storage.storage import place
 from tests.dataset import sweeps
 
 ROWS = 2048
 _BARE = """
 import sys
-from dataset.design import load_design
-from dataset.simulate import simulate
+from dataset.rows.design import load_design
+from dataset.rows.simulate import simulate
 from sim.motion.batches import one_thread
 with one_thread():
     design = load_design("sweep.toml").with_rows(int(sys.argv[1]))
@@ -45,13 +45,13 @@ print(rows["cost_s"].sum())
 """
 _ENGINE = """
 import sys
-from dataset.design import load_design
-from dataset.sweep import build
+from dataset.rows.design import load_design
+from dataset.build.build import build
 build(load_design("sweep.toml").with_rows(int(sys.argv[1])), sys.argv[2], jobs=int(sys.argv[3]), title="")
 """
 _SYNTHETIC = """
 import sys
-from dataset.sweep import build
+from dataset.build.build import build
 from tests.dataset import sweeps
 build(sweeps.design(int(sys.argv[1])), sys.argv[2], title="", simulate=sweeps.invented)
 """

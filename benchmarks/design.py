@@ -24,12 +24,12 @@ from sim.model.response import DWELLS
 from sim.model.robot import Robot
 from sim.motion.batches import steady_columns
 from sim.motion.response import responses
-from surrogate.domain import BOUNDS, COEFFICIENTS, ROBOT
-from surrogate.export import load
-from surrogate.inverse import design, inverse
-from surrogate.lookup import OUTSIDE, Lookup
-from surrogate.rows import Simulated, as_reached, drawn
-from surrogate.train import with_radius
+from surrogate.input_ranges import BOUNDS, COEFFICIENTS, ROBOT
+from surrogate.table.inverse import design, inverse
+from surrogate.table.lookup import OUTSIDE, Lookup
+from surrogate.table.model_file import load
+from surrogate.training.simulated import Simulated, as_reached, drawn
+from surrogate.training.train import with_radius
 
 KINDS = {  # free inputs, and the outputs that are given
     "which C's give these spins, yaw rates and speeds": (COEFFICIENTS, ("omega_t_bar", "omega_yr_bar", "v_z")),

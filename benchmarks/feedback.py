@@ -21,10 +21,10 @@ from matplotlib.figure import Figure
 from benchmarks.operating import wilson
 from benchmarks.swims import Blind, Camera, Swum, swim
 from planner import circle, plan
-from planner.path import Path2D
-from planner.picture import DECLARED, REPLAYED
-from planner.plan import Plan
-from planner.tracker import FALSE_ALARM, WINDOW, Tracker
+from planner.files.pictures import DECLARED, REPLAYED
+from planner.paths.path import Path2D
+from planner.planning.plan import Plan
+from planner.tracking.tracker import FALSE_ALARM, WINDOW, Tracker
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 

@@ -23,10 +23,10 @@ from scipy.stats import chi2, ncx2
 
 from benchmarks.operating import per_cent
 from benchmarks.planted import Linear, Signals, outside, scatter, stand_in
-from calibration.locked import middle_session
-from calibration.loop import Verdict, calibrate
-from calibration.misfit import TESTABLE
-from calibration.model import Parameter
+from calibration.statistics.forward_model import Parameter
+from calibration.statistics.held_out import middle_session
+from calibration.statistics.residual_tests import TESTABLE
+from calibration.verdict.calibrate import Verdict, calibrate
 from sim.arrays import Floats
 from sim.motion.batches import available_jobs
 

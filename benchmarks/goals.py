@@ -15,11 +15,11 @@ import numpy as np
 from scipy.optimize import minimize
 
 from benchmarks.cases import planned
-from planner.choice import QUICK
-from planner.dubins import TURNS, words
-from planner.last_dwells import flips_after
-from planner.schedule import Switches
-from planner.vehicle import Vehicle
+from planner.goal.dubins import TURNS, words
+from planner.goal.final_dwells import flips_after
+from planner.planning.schedule import Switches
+from planner.vehicle.dwell_choice import QUICK
+from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
 
 _STEP = 1e-4

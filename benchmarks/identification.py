@@ -18,10 +18,10 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from benchmarks.planted import Linear
-from calibration.features import features
-from calibration.model import start_values
-from calibration.noise import repeat_covariance
-from calibration.prior import prior_rows
+from calibration.statistics.forward_model import start_values
+from calibration.statistics.input_features import features
+from calibration.statistics.noise import repeat_covariance
+from calibration.statistics.priors import prior_rows
 from sim.arrays import Flags, Floats
 
 _LEVEL = 0.05

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cases import planned
-from planner.goal import Voyage
-from planner.keep_out import Body, Circle, Polygon
+from planner.goal.obstacles import Body, Circle, Polygon
+from planner.goal.to_goal import Voyage
 from sim.motion.replay import replay
 
 

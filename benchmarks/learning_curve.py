@@ -18,14 +18,14 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from dataset.figures import plain_logarithms
-from surrogate.evaluate import relative_errors
-from surrogate.fit import Settings
-from surrogate.lookup import BRANCHES
-from surrogate.rows import Simulated, read_rows
-from surrogate.tails import Rows, TailTable, learn_tails, learnable, rows_of
-from surrogate.train import split, with_radius
-from surrogate.work import Work
+from dataset.report.figures import plain_logarithms
+from surrogate.networks.checkpoints import Work
+from surrogate.networks.training_loop import Settings
+from surrogate.table.errors import relative_errors
+from surrogate.table.lookup import BRANCHES
+from surrogate.table.wrench_table import Rows, TailTable, learn_tails, learnable, rows_of
+from surrogate.training.simulated import Simulated, read_rows
+from surrogate.training.train import split, with_radius
 
 SETTINGS = {
     "24 × 2, 300 iterations": Settings(width=24, depth=2, members=1, epochs=60, iterations=300),

@@ -11,9 +11,9 @@ import numpy as np
 import torch
 
 from sim.motion.batches import steady_columns
-from surrogate.evaluate import error_table
-from surrogate.export import load
-from surrogate.rows import drawn
+from surrogate.table.errors import error_table
+from surrogate.table.model_file import load
+from surrogate.training.simulated import drawn
 
 ROWS, SIMULATED, REPEATS = 16384, 64, 20
 

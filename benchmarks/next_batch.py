@@ -21,9 +21,9 @@ from joblib import Parallel, delayed
 
 from benchmarks.operating import per_cent
 from benchmarks.planted import Linear, Signals, linearised, scatter, with_values
-from calibration.loop import Verdict, calibrate
-from calibration.measurements import read_measurements
-from calibration.misfit import TESTABLE
+from calibration.statistics.residual_tests import TESTABLE
+from calibration.swimmer.measured_table import read_measurements
+from calibration.verdict.calibrate import Verdict, calibrate
 from sim.arrays import Floats, Integers
 from sim.motion.batches import available_jobs
 

@@ -1,8 +1,8 @@
 """Operating characteristics of closing the loop: how often it is right, wrong or silent, on planted truths.
 
-The whole procedure (`calibration.loop.calibrate`) runs on tables of the paper's design (`benchmarks.planted`),
-made by a linear stand-in for the simulator. `benchmarks.given` has numbers as given that are off, and what is
-outside the catalogue; `benchmarks.through_simulator` has tables of the simulator itself.
+The whole procedure (`calibration.verdict.calibrate.calibrate`) runs on tables of the paper's design
+(`benchmarks.planted`), made by a linear stand-in for the simulator. `benchmarks.given` has numbers as given that
+are off, and what is outside the catalogue; `benchmarks.through_simulator` has tables of the simulator itself.
 
 Usage: python -m benchmarks.operating [NULLS] [REPEATS] [FIRST_SEED]      tables in docs/operating.md
 """
@@ -20,8 +20,8 @@ from joblib import Parallel, delayed
 from scipy.stats import norm
 
 from benchmarks.planted import Case, Design, Linear, cases, nulls, scatter, stand_in
-from calibration.loop import Verdict, calibrate
-from calibration.model import Model, start_values
+from calibration.statistics.forward_model import Model, start_values
+from calibration.verdict.calibrate import Verdict, calibrate
 from sim.motion.batches import available_jobs
 
 PAGE = Path("docs/operating.md")

@@ -20,14 +20,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from calibration.fit import Fit
-from calibration.locked import middle_session
-from calibration.measurements import Measurements, read_measurements
-from calibration.misfit import TESTABLE
-from calibration.model import Parameter, Parameters, Runs, start_values
-from calibration.noise import Noise
-from calibration.prior import prior_rows
-from calibration.swimmer import Swimmer
+from calibration.statistics.fit import Fit
+from calibration.statistics.forward_model import Parameter, Parameters, Runs, start_values
+from calibration.statistics.held_out import middle_session
+from calibration.statistics.noise import Noise
+from calibration.statistics.priors import prior_rows
+from calibration.statistics.residual_tests import TESTABLE
+from calibration.swimmer.measured_table import Measurements, read_measurements
+from calibration.swimmer.swimmer import Swimmer
 from sim.arrays import Flags, Floats, Integers
 from sim.model.presets import PRESETS
 

@@ -1,8 +1,9 @@
 """What chosen rows save: errors of look-up tables against rows, drawn evenly and chosen where a table is unsure.
 
 Steady motion over the whole domain of the shipped table. A table learns the first rows of a sweep. Then as many
-rows are added again, once the next ones of the sequence, once chosen ones (`surrogate.refine`). Errors are those
-of other robots, drawn evenly. Networks are smaller than the shipped ones, and trained for a shorter time.
+rows are added again, once the next ones of the sequence, once chosen ones (`surrogate.training.refine`). Errors
+are those of other robots, drawn evenly. Networks are smaller than the shipped ones, and trained for a shorter
+time.
 
 Usage: python -m benchmarks.refine [--rows N]
 """
@@ -17,14 +18,14 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from dataset.design import Axis, Design
-from surrogate.domain import DOMAIN, MOST_TAILS
-from surrogate.evaluate import relative_errors
-from surrogate.fit import Settings
-from surrogate.lookup import Lookup, steady_outputs
-from surrogate.refine import choose
-from surrogate.rows import Simulated, as_reached, drawn, joined, simulated
-from surrogate.train import learn, split, with_radius
+from dataset.rows.design import Axis, Design
+from surrogate.input_ranges import DOMAIN, MOST_TAILS
+from surrogate.networks.training_loop import Settings
+from surrogate.table.errors import relative_errors
+from surrogate.table.lookup import Lookup, steady_outputs
+from surrogate.training.refine import choose
+from surrogate.training.simulated import Simulated, as_reached, drawn, joined, simulated
+from surrogate.training.train import learn, split, with_radius
 
 ROWS, TEST, FLIPS, SEEDS = 2048, 4096, 48, (1, 2)
 POWERS = (1.0, 2.0, np.inf)  # of the doubt that chances are in proportion to; infinite: the most doubtful ones

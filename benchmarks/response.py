@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dataset.design import load_design
+from dataset.rows.design import load_design
 from sim.inputs import check_columns
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS

@@ -18,16 +18,16 @@ from pathlib import Path
 
 import numpy as np
 
-from dataset.figures import plain_logarithms
-from dataset.store import read_manifest
+from dataset.report.figures import plain_logarithms
+from dataset.storage.data_set import read_manifest
 from sim.arrays import Floats
-from surrogate.evaluate import coverage, curve_errors, error_table, relative_errors, summary
-from surrogate.export import load, save
-from surrogate.fit import Settings
-from surrogate.lookup import Lookup
-from surrogate.rows import Simulated, as_reached, drawn, joined, read_rows, simulated
-from surrogate.train import learn, split, with_radius
-from surrogate.work import Work, remove_states
+from surrogate.networks.checkpoints import Work, remove_states
+from surrogate.networks.training_loop import Settings
+from surrogate.table.errors import coverage, curve_errors, error_table, relative_errors, summary
+from surrogate.table.lookup import Lookup
+from surrogate.table.model_file import load, save
+from surrogate.training.simulated import Simulated, as_reached, drawn, joined, read_rows, simulated
+from surrogate.training.train import learn, split, with_radius
 
 TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=3000)
 CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)

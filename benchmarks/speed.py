@@ -17,7 +17,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.plain import settle_plainly
-from dataset.design import load_design
+from dataset.rows.design import load_design
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.motion.batches import available_jobs, steady_columns

@@ -21,18 +21,18 @@ from joblib import Parallel, delayed
 
 from benchmarks.operating import wilson
 from planner import Path2D, circle, plan, polygon
-from planner.check import tracking_error
-from planner.distance import distance_to
-from planner.knowledge import COEFFICIENTS, Knowledge
-from planner.plan import Plan
-from planner.record import plan_record
+from planner.files.plan_json import plan_record
+from planner.files.tracking_error import tracking_error
+from planner.paths.distance import distance_to
+from planner.planning.plan import Plan
+from planner.vehicle.calibration_table import COEFFICIENTS, Knowledge
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.motion.replay import replay
 from sim.motion.warm import compile_once
-from surrogate.export import load
-from surrogate.tabulate import tabulate
+from surrogate.one_robot.tabulate import tabulate
+from surrogate.table.model_file import load
 
 SIGMA = 0.01  # of ln C
 QUICK = 0.25  # rad that the robot turns in a time unit: from here on a fast turner

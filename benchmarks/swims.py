@@ -11,10 +11,10 @@ from typing import Protocol
 
 import numpy as np
 
-from planner.distance import distance_to
-from planner.estimate import POSE
-from planner.plan import Plan
-from planner.tracker import Advice
+from planner.paths.distance import distance_to
+from planner.planning.plan import Plan
+from planner.tracking.kalman_filter import POSE
+from planner.tracking.tracker import Advice
 from sim.arrays import Floats
 from sim.inputs import check_columns
 from sim.mechanics import planar
@@ -31,7 +31,7 @@ _STRIDE = 4  # steps between two kept points
 
 
 class Pilot(Protocol):
-    """`planner.tracker`, or what is fed like it."""
+    """`planner.tracking.tracker`, or what is fed like it."""
 
     def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Advice: ...
 

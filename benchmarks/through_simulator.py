@@ -25,11 +25,11 @@ from joblib import Parallel, delayed
 
 from benchmarks.operating import judge, per_cent
 from benchmarks.planted import ROBOT, Case, Design, Signals, design, scatter, stand_in
-from calibration.loop import calibrate
-from calibration.misfit import TESTABLE
-from calibration.model import Parameter, start_values, stepped
-from calibration.prior import prior_rows
-from calibration.swimmer import DIRECT, Swimmer
+from calibration.statistics.forward_model import Parameter, start_values, stepped
+from calibration.statistics.priors import prior_rows
+from calibration.statistics.residual_tests import TESTABLE
+from calibration.swimmer.swimmer import DIRECT, Swimmer
+from calibration.verdict.calibrate import calibrate
 from sim.arrays import Floats
 from sim.motion.batches import available_jobs, stepped_columns
 

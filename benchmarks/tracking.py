@@ -12,12 +12,12 @@ import torch
 from tqdm import tqdm
 
 from planner import circle, plan, polygon
-from planner.check import tracking_error
-from planner.record import plan_record
+from planner.files.plan_json import plan_record
+from planner.files.tracking_error import tracking_error
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
-from surrogate.export import load
+from surrogate.table.model_file import load
 
 CASES = (
     ("circle, radius 1.5 l, N = 2", circle(1.5), "paper-control"),

@@ -41,13 +41,13 @@ main = program.main
     aliases=("close",),
 )
 def _calibrate(arguments: Namespace) -> None:
-    from calibration.corrected import check_given, corrected_toml
-    from calibration.grid import owned
-    from calibration.loop import calibrate, verdict_record
-    from calibration.measurements import read_measurements
-    from calibration.protocols import PROTOCOLS
-    from calibration.report import write_report
-    from calibration.swimmer import Swimmer
+    from calibration.report.corrected_robot import check_given, corrected_toml
+    from calibration.report.report import write_report
+    from calibration.swimmer.lab_settings import owned
+    from calibration.swimmer.measured_table import read_measurements
+    from calibration.swimmer.protocols import PROTOCOLS
+    from calibration.swimmer.swimmer import Swimmer
+    from calibration.verdict.calibrate import calibrate, verdict_record
     from sim.inputs import load_robot
     from sim.io.files import write_text
 
@@ -87,10 +87,10 @@ def _calibrate(arguments: Namespace) -> None:
     JOBS,
 )
 def _decide(arguments: Namespace) -> None:
-    from calibration.decide import new_runs, read_explanations, sentence, standings
-    from calibration.discriminate import GIVEN_UP
-    from calibration.measurements import read_measurements
-    from calibration.swimmer import Swimmer
+    from calibration.swimmer.measured_table import read_measurements
+    from calibration.swimmer.swimmer import Swimmer
+    from calibration.verdict.next_runs import GIVEN_UP
+    from calibration.verdict.sequential_test import new_runs, read_explanations, sentence, standings
     from sim.inputs import load_robot
 
     explanations, before = read_explanations(arguments.verdict)
@@ -115,7 +115,7 @@ def _decide(arguments: Namespace) -> None:
 def _simulate(arguments: Namespace) -> None:
     from dataclasses import replace
 
-    from calibration.synthetic import make_table
+    from calibration.swimmer.synthetic_table import make_table
     from sim.effects import check_effects
     from sim.inputs import load_robot
     from sim.io.files import write_csv
@@ -142,7 +142,7 @@ def _simulate(arguments: Namespace) -> None:
     out("CSV"),
 )
 def _tracks(arguments: Namespace) -> None:
-    from calibration.tracks import measure_tracks
+    from calibration.swimmer.camera_tracks import measure_tracks
     from sim.io.files import write_csv
 
     table, aside = measure_tracks(arguments.tracks, arguments.runs)

@@ -12,8 +12,8 @@ import os
 import shlex
 from argparse import Namespace
 
-from dataset.backends import BACKENDS
-from dataset.exits import ended
+from dataset.build.exits import ended
+from dataset.workers.open_backend import BACKENDS
 from sim.io.commands import JOBS, Program, argument, out
 
 program = Program("dataset", "Simulate sweeps of robots into data sets.")
@@ -40,8 +40,8 @@ _SCHEDULER = "DASK_SCHEDULER_ADDRESS"
     ),
 )
 def _build(arguments: Namespace) -> None:
-    from dataset.design import load_design
-    from dataset.sweep import build
+    from dataset.build.build import build
+    from dataset.rows.design import load_design
 
     design = load_design(arguments.config).with_rows(arguments.rows)
     known = arguments.scheduler or os.environ.get(_SCHEDULER)
@@ -72,7 +72,7 @@ def _command(arguments: Namespace) -> str:
 
 @program.command("report", "the sweep at a glance, one page", _DATA, out("page", default="reports/dataset.html"))
 def _report(arguments: Namespace) -> None:
-    from dataset.report import write_report
+    from dataset.report.report import write_report
 
     write_report(arguments.data, arguments.out)
     print(f"-> {arguments.out}")
@@ -88,10 +88,10 @@ def _report(arguments: Namespace) -> None:
 )
 def _verify(arguments: Namespace) -> None:
     if arguments.mend:
-        from dataset.sweep import mend
+        from dataset.build.build import mend
 
         print(ended(lambda: mend(arguments.data, jobs=arguments.jobs)))
-    from dataset.verify import verify
+    from dataset.build.verify import verify
 
     print(verify(arguments.data, rows=arguments.rows))
 

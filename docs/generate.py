@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 
-from dataset.schema import FLAGS, INPUTS, OUTPUTS
+from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
 from sim.model.effect import Effect
 from softflagella.__main__ import PACKAGES

@@ -16,13 +16,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from planner.size import UNITS, in_tails
+from planner.paths.units import UNITS, in_tails
 from sim.io.commands import MODEL, ROBOT, Program, argument, out
 from sim.io.errors import InputError
 
 if TYPE_CHECKING:
-    from planner.path import Path2D
-    from planner.plan import Plan
+    from planner.paths.path import Path2D
+    from planner.planning.plan import Plan
     from sim.model.robot import Robot
 
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
@@ -66,7 +66,7 @@ _PLANNING = (
     out("folder"),
 )
 def _plan(arguments: Namespace) -> None:
-    from planner.export import write_plan
+    from planner.files.plan_files import write_plan
 
     task = _task(arguments)
     result = _planned(task)
@@ -83,8 +83,8 @@ def _plan(arguments: Namespace) -> None:
 
 def _trade_off(task: _Task, result: Plan, folder: str) -> Path:
     """trade_off.svg in the folder of the plan."""
-    from planner.plan import plan
-    from planner.trade_off import draw_trade_off, trade_off
+    from planner.files.trade_off import draw_trade_off, trade_off
+    from planner.planning.plan import plan
     from sim.io.files import whole_file
 
     options = {**task.options, "tolerance": None}
@@ -137,12 +137,12 @@ def _say(result: Plan) -> None:
     out("folder"),
 )  # fmt: skip
 def _goal(arguments: Namespace) -> None:
-    from planner.goal import to_goal
-    from planner.goal_files import read_region, write_voyage
-    from planner.keep_out import Polygon
-    from planner.knowledge import read_knowledge
+    from planner.files.goal_files import read_region, write_voyage
+    from planner.goal.obstacles import Polygon
+    from planner.goal.to_goal import to_goal
+    from planner.vehicle.calibration_table import read_knowledge
     from sim.inputs import load_robot
-    from surrogate.export import load_table
+    from surrogate.table.model_file import load_table
 
     robot, unit = load_robot(arguments.robot), arguments.unit
     scale = in_tails(unit, robot)
@@ -182,7 +182,7 @@ def _goal(arguments: Namespace) -> None:
 
 @program.command(
     "track",
-    "keep a robot on its path: poses come in on a pipe, orders go out (planner.tracker_pipe says how)",
+    "keep a robot on its path: poses come in on a pipe, orders go out (planner.tracking.pipe says how)",
     *_PLANNING,
     argument("--noise", type=float, default=0.01, help="standard deviation of x and y, in tail lengths"),
     argument("--noise-rad", type=float, default=0.01, help="standard deviation of the heading"),
@@ -191,8 +191,8 @@ def _goal(arguments: Namespace) -> None:
 def _track(arguments: Namespace) -> None:
     from contextlib import redirect_stdout
 
-    from planner.tracker import Tracker
-    from planner.tracker_pipe import answers
+    from planner.tracking.pipe import answers
+    from planner.tracking.tracker import Tracker
 
     for name in ("noise", "noise_rad"):
         if not 0 < getattr(arguments, name) < math.inf:
@@ -208,7 +208,7 @@ def _track(arguments: Namespace) -> None:
 
 
 class _Task(NamedTuple):
-    """What is to be planned: path and robot, and the options of `planner.plan`."""
+    """What is to be planned: path and robot, and the options of `planner.planning.plan`."""
 
     path: Path2D
     robot: Robot
@@ -217,7 +217,7 @@ class _Task(NamedTuple):
 
 def _planned(task: _Task) -> Plan:
     """The plan of a task."""
-    from planner.plan import plan
+    from planner.planning.plan import plan
 
     with _progress() as progress:
         return plan(task.path, task.robot, **task.options, progress=progress)
@@ -225,10 +225,10 @@ def _planned(task: _Task) -> Plan:
 
 def _task(arguments: Namespace) -> _Task:
     """The task that the command asks for."""
-    from planner.knowledge import read_knowledge
-    from planner.size import describe
+    from planner.paths.units import describe
+    from planner.vehicle.calibration_table import read_knowledge
     from sim.inputs import load_robot
-    from surrogate.export import load_table
+    from surrogate.table.model_file import load_table
 
     robot = load_robot(arguments.robot)
     path = _path(arguments, robot)
@@ -257,8 +257,8 @@ def _progress() -> Iterator[Callable[[float], object]]:
 
 def _path(arguments: Namespace, robot: Robot) -> Path2D:
     """The path that the command asks for, in tail lengths."""
-    from planner.drawings import Drawing, read_path
-    from planner.path import circle, polygon, smoothed
+    from planner.paths.path import circle, polygon, smoothed
+    from planner.paths.path_files import Drawing, read_path
 
     shape, _, size = arguments.path.partition(":")
     if shape in _SHAPES and size:
@@ -295,8 +295,8 @@ def _path(arguments: Namespace, robot: Robot) -> Path2D:
     out("overlay picture, PNG", default=None),
 )
 def _check(arguments: Namespace) -> None:
-    from planner.check import draw_overlay, tracking_error
-    from planner.record import load_plan
+    from planner.files.plan_json import load_plan
+    from planner.files.tracking_error import draw_overlay, tracking_error
     from sim.io.files import whole_file
     from sim.io.tables import read_table
 

@@ -1,11 +1,11 @@
 """Compiled loops: machine code by numba, kept on disk between runs.
 
-numba's own cache depends on the time stamp of the loop's file. If a formula in another file changes, it would use old
-machine code; if a comment changes, it would compile again. So the cache is a folder whose name has a digest of the
-code of all files that compiled loops are made of, without comments and docstrings. The folders of the last few
+numba's own cache depends on the time stamp of the loop's file. If a formula in another file changes, it would use
+old machine code; if a comment changes, it would compile again. So the cache is a folder whose name has a digest of
+the code of all files that compiled loops are made of, without comments and docstrings. The folders of the last few
 versions are kept. They are beside this file, or in the user's cache folder if this one cannot be written. Loops of
-other packages have folders of their own in it, named by a digest of all files of their package. Machine code does not
-depend on the folder that the sources are in.
+other packages have folders of their own in it, named by a digest of all files of their package. Machine code does
+not depend on the folder that the sources are in.
 
 Sums may be reordered and multiplications fused, so last digits can differ between machines. NaN and infinity keep
 their meaning.
@@ -48,13 +48,15 @@ _LEVEL = 1  # of optimisation: loops run as fast as at level 3 and compile in le
 
 
 def code_digest(root: Path, patterns: Iterable[str] = _SOURCES) -> str:
-    """Return twelve characters that name the code of the files under `root`, whatever their comments and docstrings."""
+    """Return twelve characters that name the code of the files under `root`, not their comments."""
     digest = sha256()
     for path in sorted(path for pattern in patterns for path in root.glob(pattern)):
         digest.update(str(path.relative_to(root)).encode())
         tree = ast.parse(path.read_bytes())
         for node in ast.walk(tree):
-            if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and ast.get_docstring(node, clean=False):
+            if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and ast.get_docstring(
+                node, clean=False
+            ):
                 node.body = node.body[1:] or [ast.Pass(lineno=1, col_offset=0)]
         _add_code(digest, compile(tree, "", "exec", dont_inherit=True))
     return digest.hexdigest()[:12]
@@ -130,7 +132,7 @@ def _package_root(file: Path) -> Path:
     return root
 
 
-class Locator(_CacheLocator):  # type: ignore[misc]
+class Locator(_CacheLocator):
     """Tells numba in which of our folders a loop is kept. The folder's name says which code it belongs to."""
 
     def __init__(self, module: str, file: Path):

@@ -89,7 +89,7 @@ def load_robot(source: str | Path) -> Robot:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as broken:
         raise InputError(f"{path} is not TOML: {broken}") from None
     name = tables.pop("name", path.stem)
-    tables.pop("calibration", None)  # read by planner.knowledge
+    tables.pop("calibration", None)  # read by planner.vehicle.calibration_table
     correction = read_correction(tables.pop("correction"), str(path)) if "correction" in tables else None
     effects = tables.pop("effects", {})
     if not isinstance(effects, dict):

@@ -17,15 +17,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from calibration.synthetic import make_table
-    from calibration.verdict import Verdict
-    from planner.drawings import read_path
-    from planner.export import write_plan
-    from planner.goal import Voyage, to_goal
-    from planner.keep_out import Circle
-    from planner.path import Path2D, circle, polygon
-    from planner.plan import Plan, plan
-    from planner.tracker import Tracker
+    from calibration.swimmer.synthetic_table import make_table
+    from calibration.verdict.verdict import Verdict
+    from planner.files.plan_files import write_plan
+    from planner.goal.obstacles import Circle
+    from planner.goal.to_goal import Voyage, to_goal
+    from planner.paths.path import Path2D, circle, polygon
+    from planner.paths.path_files import read_path
+    from planner.planning.plan import Plan, plan
+    from planner.tracking.tracker import Tracker
     from sim.effects import catalogue as effects
     from sim.inputs import load_robot, save_robot
     from sim.io.errors import InputError
@@ -33,49 +33,49 @@ if TYPE_CHECKING:
     from sim.model.effect import Effect
     from sim.model.robot import Robot
     from sim.model.schedule import Schedule, load_schedule
-    from softflagella.calibrating import calibrate
-    from softflagella.simulating import replay, response, sensitivities, steady, switch_response
-    from softflagella.sweeping import read_sweep, sweep
-    from surrogate.export import load_table
-    from surrogate.table import LookupTable
-    from surrogate.tabulate import tabulate
-    from surrogate.train import train
+    from softflagella.api.calibrate import calibrate
+    from softflagella.api.simulate import replay, response, sensitivities, steady, switch_response
+    from softflagella.api.sweep import read_sweep, sweep
+    from surrogate.interface import LookupTable
+    from surrogate.one_robot.tabulate import tabulate
+    from surrogate.table.model_file import load_table
+    from surrogate.training.train import train
 
 _HOMES = {
-    "Circle": "planner.keep_out",
+    "Circle": "planner.goal.obstacles",
     "Effect": "sim.model.effect",
     "InputError": "sim.io.errors",
-    "LookupTable": "surrogate.table",
-    "Path2D": "planner.path",
-    "Plan": "planner.plan",
+    "LookupTable": "surrogate.interface",
+    "Path2D": "planner.paths.path",
+    "Plan": "planner.planning.plan",
     "Robot": "sim.model.robot",
     "Schedule": "sim.model.schedule",
-    "Voyage": "planner.goal",
-    "Verdict": "calibration.verdict",
+    "Voyage": "planner.goal.to_goal",
+    "Verdict": "calibration.verdict.verdict",
     "__version__": "sim.io.provenance",
-    "calibrate": "softflagella.calibrating",
-    "circle": "planner.path",
+    "calibrate": "softflagella.api.calibrate",
+    "circle": "planner.paths.path",
     "effects": "sim.effects:catalogue",
     "load_robot": "sim.inputs",
     "load_schedule": "sim.model.schedule",
-    "load_table": "surrogate.export",
-    "make_table": "calibration.synthetic",
-    "plan": "planner.plan",
-    "polygon": "planner.path",
-    "read_path": "planner.drawings",
-    "read_sweep": "softflagella.sweeping",
-    "replay": "softflagella.simulating",
-    "response": "softflagella.simulating",
+    "load_table": "surrogate.table.model_file",
+    "make_table": "calibration.swimmer.synthetic_table",
+    "plan": "planner.planning.plan",
+    "polygon": "planner.paths.path",
+    "read_path": "planner.paths.path_files",
+    "read_sweep": "softflagella.api.sweep",
+    "replay": "softflagella.api.simulate",
+    "response": "softflagella.api.simulate",
     "save_robot": "sim.inputs",
-    "sensitivities": "softflagella.simulating",
-    "steady": "softflagella.simulating",
-    "sweep": "softflagella.sweeping",
-    "switch_response": "softflagella.simulating",
-    "tabulate": "surrogate.tabulate",
-    "Tracker": "planner.tracker",
-    "to_goal": "planner.goal",
-    "train": "surrogate.train",
-    "write_plan": "planner.export",
+    "sensitivities": "softflagella.api.simulate",
+    "steady": "softflagella.api.simulate",
+    "sweep": "softflagella.api.sweep",
+    "switch_response": "softflagella.api.simulate",
+    "tabulate": "surrogate.one_robot.tabulate",
+    "Tracker": "planner.tracking.tracker",
+    "to_goal": "planner.goal.to_goal",
+    "train": "surrogate.training.train",
+    "write_plan": "planner.files.plan_files",
 }
 
 __all__ = [

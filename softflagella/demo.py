@@ -29,19 +29,18 @@ import pandas as pd
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from calibration.corrected import corrected_robot, corrected_toml
-from calibration.loop import Verdict, calibrate, verdict_record
-from calibration.measurements import Measurements, read_measurements
-from calibration.report import draw_residuals
-from calibration.steer import Steered, draw_steered, gap_closed, steer
-from calibration.swimmer import Swimmer
-from calibration.synthetic import make_table
-from dataset.figures import draw_responses, draw_trends, plain_logarithms
-from dataset.report import usable_rows
-from dataset.store import read
-from planner.check import TrackingError, draw_overlay, tracking_error
-from planner.path import polygon
-from planner.record import load_plan
+from calibration.report.corrected_robot import corrected_robot, corrected_toml
+from calibration.report.report import draw_residuals
+from calibration.swimmer.measured_table import Measurements, read_measurements
+from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.synthetic_table import make_table
+from calibration.verdict.calibrate import Verdict, calibrate, verdict_record
+from dataset.report.figures import draw_responses, draw_trends, plain_logarithms
+from dataset.report.report import usable_rows
+from dataset.storage.data_set import read
+from planner.files.plan_json import load_plan
+from planner.files.tracking_error import TrackingError, draw_overlay, tracking_error
+from planner.paths.path import polygon
 from sim.inputs import robot_toml
 from sim.io.files import write_text
 from sim.io.pages import Page
@@ -54,9 +53,10 @@ from sim.motion.shapes import tails_over_a_revolution
 from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady
 from sim.motion.warm import compile_once
-from surrogate.evaluate import scale_of
-from surrogate.export import load
-from surrogate.lookup import Lookup
+from softflagella.replanning import Steered, draw_steered, gap_closed, steer
+from surrogate.table.errors import scale_of
+from surrogate.table.lookup import Lookup
+from surrogate.table.model_file import load
 
 
 @dataclass(frozen=True)

@@ -42,13 +42,13 @@ def _train(arguments: Namespace) -> None:
     from dataclasses import replace
 
     from sim.io.files import write_text
-    from surrogate.card import card_of
-    from surrogate.curves import SETTINGS
-    from surrogate.evaluate import error_table, shortcomings
-    from surrogate.export import save
-    from surrogate.fit import Settings
-    from surrogate.train import held_out, train
-    from surrogate.work import device_named, remove_states
+    from surrogate.networks.checkpoints import device_named, remove_states
+    from surrogate.networks.training_loop import Settings
+    from surrogate.table.errors import error_table, shortcomings
+    from surrogate.table.model_file import save
+    from surrogate.table.response_table import SETTINGS
+    from surrogate.training.model_card import card_of
+    from surrogate.training.train import held_out, train
 
     device, states = device_named(arguments.device), f"{arguments.out}.states"
     print(f"trains on the device {device}", flush=True)
@@ -80,9 +80,9 @@ def _train(arguments: Namespace) -> None:
     JOBS,
 )
 def _refine(arguments: Namespace) -> None:
-    from dataset.exits import ended
-    from surrogate.export import load
-    from surrogate.refine import refine
+    from dataset.build.exits import ended
+    from surrogate.table.model_file import load
+    from surrogate.training.refine import refine
 
     table = load(arguments.model)
     words = ["refine", arguments.data, "--model", arguments.model, "--out", arguments.out]
@@ -113,8 +113,8 @@ def _query(arguments: Namespace) -> None:
 
     from sim.io.files import write_csv
     from sim.io.tables import read_table
-    from surrogate.export import load_table
-    from surrogate.lookup import Lookup
+    from surrogate.table.lookup import Lookup
+    from surrogate.table.model_file import load_table
 
     points = read_table(arguments.points)
     table = load_table(arguments.model)
@@ -142,9 +142,9 @@ def _inverse(arguments: Namespace) -> None:
     from sim.io.files import write_csv
     from sim.io.tables import read_table
     from sim.motion.steady_motion import STEADY_OUTPUTS
-    from surrogate.domain import BOUNDS
-    from surrogate.export import load
-    from surrogate.inverse import inverse
+    from surrogate.input_ranges import BOUNDS
+    from surrogate.table.inverse import inverse
+    from surrogate.table.model_file import load
 
     points = read_table(arguments.targets)
     names = [name.strip() for name in arguments.free.split(",")]
@@ -166,8 +166,8 @@ def _inverse(arguments: Namespace) -> None:
 
 @program.command("errors", "print the stored held-out errors", MODEL)
 def _errors(arguments: Namespace) -> None:
-    from surrogate.evaluate import error_table
-    from surrogate.export import load
+    from surrogate.table.errors import error_table
+    from surrogate.table.model_file import load
 
     lookup = load(arguments.model)
     rows = lookup.provenance["rows"]
@@ -183,8 +183,8 @@ def _errors(arguments: Namespace) -> None:
 )
 def _robot(arguments: Namespace) -> None:
     from sim.inputs import load_robot
-    from surrogate.single import save_single
-    from surrogate.tabulate import tabulate
+    from surrogate.one_robot.robot_table import save_single
+    from surrogate.one_robot.tabulate import tabulate
 
     table = tabulate(load_robot(arguments.robot))
     save_single(table, arguments.out)
@@ -202,9 +202,9 @@ def _robot(arguments: Namespace) -> None:
     ),
 )
 def _export(arguments: Namespace) -> None:
-    from surrogate.export import load
-    from surrogate.onnx_graph import save_onnx
-    from surrogate.small_files import save_small
+    from surrogate.export.onnx_query import save_onnx
+    from surrogate.export.small_copy_files import save_small
+    from surrogate.table.model_file import load
 
     if not (arguments.onnx or arguments.small):
         raise InputError("nothing to write; give --onnx OUT.onnx or --small FOLDER")
@@ -219,7 +219,7 @@ def _export(arguments: Namespace) -> None:
 
 @program.command("compile", "compile the loops of queries now rather than on first use")
 def _compile(_: Namespace) -> None:
-    from surrogate.warm import FOLDER, compile_all
+    from surrogate.compile_loops import FOLDER, compile_all
 
     print(f"loops compiled in {compile_all():.0f} s -> {FOLDER}")
 

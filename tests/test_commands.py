@@ -13,13 +13,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.model import start_values
-from planner.record import load_plan
+from calibration.statistics.forward_model import start_values
+from planner.files.plan_json import load_plan
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from sim.model.presets import PRESETS
 from softflagella.__main__ import PACKAGES, main
-from surrogate.export import SHIPPED, load
+from surrogate.table.model_file import SHIPPED, load
 from tests.calibration.toy_tables import START, install_toy, toy_swimmer, toy_table
 from tests.calibration.track import RADIUS, track
 from tests.dataset.sweeps import SMALL

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import sim.motion.run
-from dataset.simulate import simulate
+from dataset.rows.simulate import simulate
 from sim.effects import catalogue
 from sim.inputs import load_robot, robot_toml
 from sim.io.errors import InputError, run_command
@@ -25,7 +25,7 @@ from sim.model.presets import PRESETS
 from sim.model.schedule import load_schedule
 from sim.motion.batches import steady_columns
 from sim.motion.replay import replay
-from surrogate.export import load
+from surrogate.table.model_file import load
 
 CONTROL = PRESETS["paper-control"].group_values()
 INPUTS = (*GROUP_COLUMNS, "a_over_R")

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.fit import Fit
-from calibration.loop import Verdict, calibrate
-from calibration.model import Parameter, Parameters, Runs, by_differences
+from calibration.statistics.fit import Fit
+from calibration.statistics.forward_model import Parameter, Parameters, Runs, by_differences
+from calibration.verdict.calibrate import Verdict, calibrate
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError, run_command
 

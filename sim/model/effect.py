@@ -44,7 +44,7 @@ class Driver:
 
     name: str  # of the candidate in a calibration
     title: str
-    column: str  # of the noted quantity, see `calibration.measurements`
+    column: str  # of the noted quantity, see `calibration.swimmer.measured_table`
     unit: str  # of ε
     bounds: tuple[float, float]
     typical: float

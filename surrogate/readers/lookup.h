@@ -11,7 +11,7 @@
        if (lookup_response(&robot, 0.8, &flip) == LOOKUP_INSIDE) ...
 
    The networks give the mean force of the tails. The balance of forces on head and motor is solved here, by
-   Broyden's method. The formulas are those of surrogate/tail.py and surrogate/head.py. */
+   Broyden's method. The formulas are those of surrogate/wrench/tails.py and surrogate/wrench/heads.py. */
 #ifndef LOOKUP_H
 #define LOOKUP_H
 

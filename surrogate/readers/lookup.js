@@ -10,7 +10,7 @@
    table.query(robot).outside;                 // true: not a robot as the table has learned them
 
    Lengths are in tail lengths l, times in mu0 l^4/EI, angles in rad but for theta_deg. The formulas are those of
-   surrogate/tail.py and surrogate/head.py; the balance of forces is solved by Broyden's method. */
+   surrogate/wrench/tails.py and surrogate/wrench/heads.py; the balance of forces is solved by Broyden's method. */
 
 const STEPS = 60, DIFFERENCE = 1e-6, CORRECTION = 1e-9;
 

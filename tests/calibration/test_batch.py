@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from calibration.discriminate import BATCH, STOP, Pair, _greedy, _together, next_runs
-from calibration.fit import fit
-from calibration.model import start_values
-from calibration.noise import Noise
+from calibration.statistics.fit import fit
+from calibration.statistics.forward_model import start_values
+from calibration.statistics.noise import Noise
+from calibration.verdict.next_runs import BATCH, STOP, Pair, _greedy, _together, next_runs
 from tests.calibration.toy_tables import TRUTH, toy_swimmer, toy_table
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from calibration.examples.spheres import Spheres
-from calibration.fit import fit
-from calibration.loop import calibrate, verdict_record
-from calibration.model import Runs, start_values
-from calibration.noise import Noise
-from calibration.profile import profile_intervals
+from calibration.statistics.fit import fit
+from calibration.statistics.forward_model import Runs, start_values
+from calibration.statistics.noise import Noise
+from calibration.statistics.profile_intervals import profile_intervals
+from calibration.verdict.calibrate import calibrate, verdict_record
 
 
 def falls(diameter: np.ndarray, session: np.ndarray, truth: dict[str, float], seed: int, noise: float) -> Spheres:

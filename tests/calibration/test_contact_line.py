@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibration.influences import influences
-from calibration.measurements import read_measurements
-from calibration.model import by_differences, start_values
-from calibration.swimmer import Swimmer
-from calibration.synthetic import make_table
+from calibration.statistics.forward_model import by_differences, start_values
+from calibration.swimmer.candidate_effects import influences
+from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.synthetic_table import make_table
 from tests.calibration.toy_tables import START, TRUTH
 
 FRICTION, SPEED = "contact_line", "contact_line_speed"

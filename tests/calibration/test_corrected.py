@@ -8,21 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.corrected import corrected_robot, corrected_toml, knowledge_of
-from calibration.influences import CURRENT
-from calibration.synthetic import make_table
-from planner.check import tracking_error
-from planner.knowledge import read_knowledge
-from planner.path import circle
-from planner.plan import plan
-from planner.record import load_plan
+from calibration.report.corrected_robot import corrected_robot, corrected_toml, knowledge_of
+from calibration.swimmer.candidate_effects import CURRENT
+from calibration.swimmer.synthetic_table import make_table
+from planner.files.plan_json import load_plan
+from planner.files.tracking_error import tracking_error
+from planner.paths.path import circle
+from planner.planning.plan import plan
+from planner.vehicle.calibration_table import read_knowledge
 from sim.inputs import load_robot, save_robot
 from sim.io.errors import run_command
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule, load_schedule
 from sim.motion.replay import replay
-from surrogate.export import load_table
+from surrogate.table.model_file import load_table
 from tests.calibration.toy_tables import START, closed, toy_table
 
 

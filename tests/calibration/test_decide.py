@@ -13,7 +13,10 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
-from calibration.decide import (
+from calibration.statistics.noise import Noise
+from calibration.verdict.calibrate import verdict_record
+from calibration.verdict.next_runs import GIVEN_UP, STOP
+from calibration.verdict.sequential_test import (
     Explanation,
     Standing,
     new_runs,
@@ -21,9 +24,6 @@ from calibration.decide import (
     sentence,
     standings,
 )
-from calibration.discriminate import GIVEN_UP, STOP
-from calibration.loop import verdict_record
-from calibration.noise import Noise
 from sim.io.errors import InputError
 from tests.calibration.toy_tables import closed, install_toy, toy_swimmer, toy_table
 

@@ -10,15 +10,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.corrected import corrected_robot
-from calibration.directions import Directions
-from calibration.fit import fit
-from calibration.locked import middle_session
-from calibration.loop import calibrate
-from calibration.measurements import read_measurements
-from calibration.misfit import check_misfit
-from calibration.model import start_values
-from calibration.report import write_report
+from calibration.report.corrected_robot import corrected_robot
+from calibration.report.report import write_report
+from calibration.statistics.fit import fit
+from calibration.statistics.forward_model import start_values
+from calibration.statistics.held_out import middle_session
+from calibration.statistics.residual_tests import check_misfit
+from calibration.statistics.score_directions import Directions
+from calibration.swimmer.measured_table import read_measurements
+from calibration.verdict.calibrate import calibrate
 from tests.calibration import toy
 from tests.calibration.toy_tables import START, TRUTH, closed, toy_swimmer, toy_table
 

@@ -10,15 +10,15 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
-from calibration.corrected import corrected_robot
-from calibration.fit import fit
-from calibration.given import CAMERA, HEADING, LENGTH, TACHOMETER
-from calibration.loop import calibrate, verdict_record
-from calibration.measurements import read_measurements
-from calibration.model import by_differences, start_values
-from calibration.prior import pulls
-from calibration.swimmer import Swimmer
-from calibration.synthetic import make_table
+from calibration.report.corrected_robot import corrected_robot
+from calibration.statistics.fit import fit
+from calibration.statistics.forward_model import by_differences, start_values
+from calibration.statistics.priors import pulls
+from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, LENGTH, TACHOMETER
+from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.synthetic_table import make_table
+from calibration.verdict.calibrate import calibrate, verdict_record
 from sim.io.errors import InputError
 from sim.model.robot import Robot
 from sim.model.uncertainty import Sigma

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from calibration.grid import owned, settings_of
+from calibration.swimmer.lab_settings import owned, settings_of
 from sim.io.errors import InputError
 from tests.calibration.toy_tables import START, toy_swimmer, toy_table
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from calibration.attribute import ebic
-from calibration.fit import fit
-from calibration.imitation import DOUBT, SEEN, absorbable_shares, deformations, imitability
-from calibration.model import start_values
+from calibration.attribution.imitability import DOUBT, SEEN, absorbable_shares, deformations, imitability
+from calibration.attribution.refits import ebic
+from calibration.statistics.fit import fit
+from calibration.statistics.forward_model import start_values
 from tests.calibration.toy_tables import TRUTH, toy_swimmer, toy_table
 
 HIDDEN = "end_over_end_drag"

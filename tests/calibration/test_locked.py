@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibration.locked import middle_session
-from calibration.loop import verdict_record
-from calibration.measurements import read_measurements
-from calibration.profile import least_determined
+from calibration.statistics.held_out import middle_session
+from calibration.statistics.profile_intervals import least_determined
+from calibration.swimmer.measured_table import read_measurements
+from calibration.verdict.calibrate import verdict_record
 from tests.calibration.toy_tables import closed, toy_table
 
 

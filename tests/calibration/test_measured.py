@@ -10,10 +10,10 @@ import pytest
 
 from calibration.examples.helices import read_helices, resistive, with_flow
 from calibration.examples.spheres import median_error, read_spheres
-from calibration.loop import calibrate
-from calibration.measurements import read_measurements
-from calibration.noise import repeat_covariance
-from calibration.swimmer import Swimmer
+from calibration.statistics.noise import repeat_covariance
+from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.swimmer import Swimmer
+from calibration.verdict.calibrate import calibrate
 from tests.calibration.toy_tables import START
 
 MEASURED = Path(__file__).parents[3] / "shared" / "measured"

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.directions import Directions
-from calibration.features import features
-from calibration.fit import fit
-from calibration.locked import middle_session
-from calibration.measurements import read_measurements
-from calibration.misfit import check_misfit
-from calibration.model import start_values
-from calibration.noise import Design, Noise, inverse_root, least_squares, repeat_covariance, sums
-from calibration.prior import changes, precisions
+from calibration.statistics.fit import fit
+from calibration.statistics.forward_model import start_values
+from calibration.statistics.held_out import middle_session
+from calibration.statistics.input_features import features
+from calibration.statistics.noise import Design, Noise, inverse_root, least_squares, repeat_covariance, sums
+from calibration.statistics.priors import changes, precisions
+from calibration.statistics.residual_tests import check_misfit
+from calibration.statistics.score_directions import Directions
+from calibration.swimmer.measured_table import read_measurements
 from tests.calibration.toy_tables import closed, toy_swimmer, toy_table
 
 

@@ -9,10 +9,10 @@ import pytest
 from scipy.stats import binom
 
 import sim.motion.batches
-from calibration.loop import Verdict
-from calibration.measurements import read_measurements
-from calibration.model import start_values
-from calibration.swimmer import COEFFICIENTS, DIRECT, Swimmer
+from calibration.statistics.forward_model import start_values
+from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.swimmer import COEFFICIENTS, DIRECT, Swimmer
+from calibration.verdict.calibrate import Verdict
 from tests.calibration import toy
 from tests.calibration.toy_tables import START, TRUTH, closed, install_toy, toy_table
 

@@ -9,19 +9,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.corrected import corrected_toml
-from calibration.loop import Verdict, verdict_record
-from calibration.swimmer import Swimmer
-from planner.knowledge import read_knowledge
-from planner.lookup import vehicle_of
-from planner.path import circle
-from planner.plan import plan
+from calibration.report.corrected_robot import corrected_toml
+from calibration.swimmer.swimmer import Swimmer
+from calibration.verdict.calibrate import Verdict, verdict_record
+from planner.paths.path import circle
+from planner.planning.plan import plan
+from planner.vehicle.calibration_table import read_knowledge
+from planner.vehicle.from_table import vehicle_of
 from sim.inputs import load_robot, robot_toml
 from sim.io.errors import InputError, run_command
 from sim.model.correction import Correction
 from sim.model.presets import PRESETS
 from sim.motion.steady import steady
-from surrogate.export import load
+from surrogate.table.model_file import load
 from tests.calibration.toy_tables import START, closed, install_toy, toy_swimmer, toy_table
 
 CONTROL = PRESETS["paper-control"]

@@ -8,11 +8,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from calibration.loop import calibrate
-from calibration.measurements import read_measurements
-from calibration.report import write_report
-from calibration.swimmer import Swimmer
-from calibration.verdict import Verdict
+from calibration.report.report import write_report
+from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.swimmer import Swimmer
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import Verdict
 from sim.inputs import load_robot
 from sim.model.uncertainty import DEFAULTS, Sigma
 from tests.reference.make import GIVEN, HERE, TABLES

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from calibration.steer import draw_steered, gap_closed, steer
-from calibration.synthetic import make_table
-from planner.path import polygon
+from calibration.swimmer.synthetic_table import make_table
+from planner.paths.path import polygon
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from sim.model.presets import PRESETS
+from softflagella.replanning import draw_steered, gap_closed, steer
 from tests.calibration.toy_tables import TRUTH
 
 

@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.loop import calibrate
-from calibration.measurements import read_measurements
-from calibration.model import by_differences, start_values
-from calibration.swimmer import Swimmer
-from calibration.synthetic import make_table
+from calibration.statistics.forward_model import by_differences, start_values
+from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.synthetic_table import make_table
+from calibration.verdict.calibrate import calibrate
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
-from surrogate.export import load
+from surrogate.table.model_file import load
 from tests.calibration import toy
 
 START = PRESETS["paper-measured"]
@@ -25,7 +25,7 @@ START = PRESETS["paper-measured"]
 def table() -> pd.DataFrame:
     """A table with everything that can be noted and measured; values by the toy."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("calibration.synthetic.stepped_columns", toy.steady_columns)
+        patch.setattr("calibration.swimmer.synthetic_table.stepped_columns", toy.steady_columns)
         found = make_table(START, seed=3, tails=(2, 3, 5), lengths_cm=(6.0, 9.0), title="")
     rng = np.random.default_rng(0)
     found["v_cm_s"] = 2.0 * np.exp(rng.normal(scale=0.03, size=len(found)))

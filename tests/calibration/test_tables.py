@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.locked import middle_session
-from calibration.loop import calibrate, verdict_record
-from calibration.measurements import read_measurements
-from calibration.noise import SESSION_SHARE
-from calibration.protocols import PROTOCOLS
-from calibration.swimmer import Swimmer
+from calibration.statistics.held_out import middle_session
+from calibration.statistics.noise import SESSION_SHARE
+from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.protocols import PROTOCOLS
+from calibration.swimmer.swimmer import Swimmer
+from calibration.verdict.calibrate import calibrate, verdict_record
 from sim.io.errors import InputError, run_command
 from tests.calibration import toy
 from tests.calibration.toy_tables import START, closed, toy_table

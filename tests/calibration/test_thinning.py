@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.corrected import corrected_robot
-from calibration.directions import Directions, directions
-from calibration.fit import Fit, fit
-from calibration.influences import influences
-from calibration.loop import calibrate
-from calibration.measurements import read_measurements
-from calibration.misfit import check_misfit
-from calibration.model import by_differences, start_values
-from calibration.swimmer import Swimmer
-from calibration.synthetic import make_table
+from calibration.report.corrected_robot import corrected_robot
+from calibration.statistics.fit import Fit, fit
+from calibration.statistics.forward_model import by_differences, start_values
+from calibration.statistics.residual_tests import check_misfit
+from calibration.statistics.score_directions import Directions, directions
+from calibration.swimmer.candidate_effects import influences
+from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.synthetic_table import make_table
+from calibration.verdict.calibrate import calibrate
 from tests.calibration.toy_tables import START, TRUTH, closed, toy_swimmer, toy_table
 
 SIZE, TIME = "shear_thinning", "shear_thinning_time"

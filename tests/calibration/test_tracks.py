@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.tracks import measure_track, measure_tracks
+from calibration.swimmer.camera_tracks import measure_track, measure_tracks
 from sim.io.errors import InputError
 from tests.calibration.track import RADIUS, RATE, SLIP, track
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import calibration.attribute
-from calibration.attribute import Candidate
-from calibration.fit import Fit, fit
-from calibration.loop import calibrate
-from calibration.model import parameter, start_values
-from calibration.prior import pulls
-from calibration.swimmer import COEFFICIENTS, Swimmer
-from calibration.transfer import SURE, fitted_again, transfer_p
-from calibration.verdict import verdict_record
+import calibration.attribution.refits
+from calibration.attribution.refits import Candidate
+from calibration.attribution.transfer_test import SURE, fitted_again, transfer_p
+from calibration.statistics.fit import Fit, fit
+from calibration.statistics.forward_model import parameter, start_values
+from calibration.statistics.priors import pulls
+from calibration.swimmer.swimmer import COEFFICIENTS, Swimmer
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import verdict_record
 from sim.arrays import Flags, Floats
 from tests.calibration.toy_tables import TRUTH, toy_swimmer, toy_table
 
@@ -78,7 +78,7 @@ def test_runs_that_are_all_alike_say_nothing() -> None:
 @pytest.mark.usefixtures("toy_model")
 def test_a_claim_that_does_not_carry_over_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     there = planted(model(), np.full(len(model().runs), 2.0))
-    monkeypatch.setattr(calibration.attribute, "transfer_p", lambda *_, **__: 0.001)
+    monkeypatch.setattr(calibration.attribution.refits, "transfer_p", lambda *_, **__: 0.001)
     doubted = calibrate(there, progress=False)
     assert doubted.effects == (EFFECT,)
     assert "or something outside the catalogue" in doubted.sentence

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from calibration.swimmer import Solver
+from calibration.swimmer.swimmer import Solver
 from sim.effects import catalogue
 from sim.inputs import check_columns
 from sim.mechanics.thinning import UNIT_OF_TIME

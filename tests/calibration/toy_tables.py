@@ -7,13 +7,13 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-import calibration.synthetic
+import calibration.swimmer.synthetic_table
 import sim.motion.batches
-from calibration.grid import Owned
-from calibration.loop import Verdict, calibrate
-from calibration.measurements import read_measurements
-from calibration.swimmer import DIRECT, Swimmer
-from calibration.synthetic import make_table
+from calibration.swimmer.lab_settings import Owned
+from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.swimmer import DIRECT, Swimmer
+from calibration.swimmer.synthetic_table import make_table
+from calibration.verdict.calibrate import Verdict, calibrate
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from tests.calibration import toy
@@ -26,7 +26,7 @@ def install_toy(patch: pytest.MonkeyPatch) -> None:
     """The toy in place of the simulator: for tables, and for every Swimmer that is not told otherwise."""
     own = Swimmer.__init__.__defaults__
     patch.setattr(Swimmer.__init__, "__defaults__", tuple(toy.SOLVER if d is DIRECT else d for d in own))
-    patch.setattr(calibration.synthetic, "stepped_columns", toy.steady_columns)
+    patch.setattr(calibration.swimmer.synthetic_table, "stepped_columns", toy.steady_columns)
     patch.setattr(Swimmer, "guess", lambda model, start, used: start)
     for name in ("steady", "sensitivities", "settle"):  # what all of the simulator's batches call
         patch.setattr(sim.motion.batches, name, refuse_to_simulate)

@@ -16,12 +16,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import dataset.folder
-import dataset.pieces
-import dataset.sweep
-from dataset.backends import Lost
-from dataset.store import read
-from dataset.work import Outcome, Work, rows_version, run_task
+import dataset.build.build
+import dataset.build.sweep_folder
+import dataset.storage.shards
+from dataset.storage.data_set import read
+from dataset.workers.open_backend import Lost
+from dataset.workers.tasks import Outcome, Work, rows_version, run_task
 from sim.io.errors import InputError
 from tests.dataset.sweeps import design, invented
 
@@ -50,7 +50,7 @@ class Here:
 
 
 def build(folder: Path, rows: int) -> None:
-    dataset.sweep.build(design(rows), folder, title="", simulate=invented)
+    dataset.build.build.build(design(rows), folder, title="", simulate=invented)
 
 
 def in_a_child(work: Callable[[], None]) -> int:
@@ -92,8 +92,12 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def main(place: Path) -> None:
-    dataset.sweep.open_backend = lambda *_, **__: Here()  # type: ignore[assignment]
-    dataset.folder.SEGMENT, dataset.pieces.SEGMENT, dataset.pieces.ROW_GROUP = 128, 128, 32
+    dataset.build.build.open_backend = lambda *_, **__: Here()  # type: ignore[assignment]
+    dataset.build.sweep_folder.SEGMENT, dataset.storage.shards.SEGMENT, dataset.storage.shards.ROW_GROUP = (
+        128,
+        128,
+        32,
+    )
     invented(design(2).points())  # loads what all children need
     rows_version()
     base, calm, folder = place / "base", place / "calm", place / "folder"

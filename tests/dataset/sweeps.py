@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dataset.design import Axis, Design
-from dataset.schema import COST
+from dataset.rows.design import Axis, Design
+from dataset.rows.schema import COST
 from sim.model.response import BEFORE, DWELLS
 
 SMALL = """

@@ -16,9 +16,9 @@ from typing import Any
 
 import pytest
 
-from dataset import engine
-from dataset.store import read
-from dataset.sweep import UnfinishedError, build
+from dataset.build import scheduler as engine
+from dataset.build.build import UnfinishedError, build
+from dataset.storage.data_set import read
 from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import MARKS, ROOT, design, invented
@@ -149,7 +149,7 @@ def test_without_dask_workers_it_ends_with_a_line(tmp_path: Path, monkeypatch: p
 
 
 def test_no_scheduler_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    cluster = pytest.importorskip("dataset.backends.dask_cluster", reason="the extra dask is not installed")
+    cluster = pytest.importorskip("dataset.workers.dask_cluster", reason="the extra dask is not installed")
     monkeypatch.setattr(cluster, "_ANSWERS", 1.0)
     for address in (f"tcp://127.0.0.1:{free_port()}", "nonsense://x", "127.0.0.1:http"):
         with pytest.raises(InputError, match="no dask scheduler"):
@@ -160,8 +160,9 @@ def build_apart(
     folder: Path, rows_by: str, backend: str, address: str, *, patience: float = 60
 ) -> subprocess.Popen[str]:
     code = (
-        "import sys, dataset.engine; from tests.dataset.sweeps import *; from dataset.sweep import *; "
-        f"from dataset.exits import ended; dataset.engine.PATIENCE = {patience}; "
+        "import sys, dataset.build.scheduler; from tests.dataset.sweeps import *; "
+        "from dataset.build.build import *; "
+        f"from dataset.build.exits import ended; dataset.build.scheduler.PATIENCE = {patience}; "
         f"ended(lambda: build(design(200), {str(folder)!r}, backend={backend!r}, address={address!r}, title='', "
         f"simulate={rows_by}))"
     )

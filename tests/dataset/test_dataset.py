@@ -14,11 +14,11 @@ import pyarrow as pa
 import pytest
 
 from dataset.__main__ import main
-from dataset.design import load_design
-from dataset.schema import schema, table_of
-from dataset.store import SWEEP, read, read_manifest, write_rows
-from dataset.sweep import build
-from dataset.verify import verify
+from dataset.build.build import build
+from dataset.build.verify import verify
+from dataset.rows.design import load_design
+from dataset.rows.schema import schema, table_of
+from dataset.storage.data_set import SWEEP, read, read_manifest, write_rows
 from sim.io.errors import InputError, run_command
 from tests.dataset.sweeps import ROOT, SMALL
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dataset.__main__ import main
-from dataset.design import Axis, Design, load_design
+from dataset.rows.design import Axis, Design, load_design
 from sim.io.errors import run_command
 from tests.dataset.sweeps import SMALL, design
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from dataset import engine
-from dataset.backends import GONE, Lost
-from dataset.design import Axis
-from dataset.lock import locked
-from dataset.places import place
-from dataset.store import read, read_manifest
-from dataset.sweep import UnfinishedError, build, chunks
-from dataset.work import Joining, Outcome, Task, Work, rows_version, run_task
+from dataset.build import scheduler as engine
+from dataset.build.build import UnfinishedError, build, chunks
+from dataset.rows.design import Axis
+from dataset.storage.data_set import read, read_manifest
+from dataset.storage.lock import locked
+from dataset.storage.storage import place
+from dataset.workers.open_backend import GONE, Lost
+from dataset.workers.tasks import Joining, Outcome, Task, Work, rows_version, run_task
 from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import design, invented
@@ -168,15 +168,15 @@ class Forgetful:
 
 
 def test_what_a_cluster_forgets_is_asked_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dataset.sweep.open_backend", lambda *_, **__: Forgetful(absent=3))
+    monkeypatch.setattr("dataset.build.build.open_backend", lambda *_, **__: Forgetful(absent=3))
     build(design(50), tmp_path / "out", title="", simulate=invented)
     assert read_manifest(tmp_path / "out")["rows"] == 50
 
 
 def test_files_are_joined_by_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dataset.folder.SEGMENT", 64)
+    monkeypatch.setattr("dataset.build.sweep_folder.SEGMENT", 64)
     crew = Forgetful()
-    monkeypatch.setattr("dataset.sweep.open_backend", lambda *_, **__: crew)
+    monkeypatch.setattr("dataset.build.build.open_backend", lambda *_, **__: crew)
     build(design(200), tmp_path / "out", title="", simulate=invented)
     joined = [(task.start, task.stop) for task in crew.seen if isinstance(task, Joining)]
     assert sorted(joined) == sorted(2 * [(0, 64), (64, 128), (128, 192)])  # each of them forgotten once
@@ -194,24 +194,24 @@ def test_a_piece_that_is_damaged_before_it_is_joined(tmp_path: Path, monkeypatch
                 path.write_bytes(path.read_bytes()[:-50])
             super().submit(number, task)
 
-    monkeypatch.setattr("dataset.sweep.open_backend", lambda *_, **__: Damaging())
+    monkeypatch.setattr("dataset.build.build.open_backend", lambda *_, **__: Damaging())
     with pytest.raises(UnfinishedError, match=r"set aside: rows 0 to 199 \(BadPieceError: it is damaged"):
         build(design(200), tmp_path / "out", title="", simulate=invented)
-    monkeypatch.setattr("dataset.sweep.open_backend", lambda *_, **__: Forgetful())
+    monkeypatch.setattr("dataset.build.build.open_backend", lambda *_, **__: Forgetful())
     build(design(200), tmp_path / "out", title="", simulate=invented)
     build(design(200), tmp_path / "calm", title="", simulate=invented)
     assert read(tmp_path / "out").equals(read(tmp_path / "calm"))
 
 
 def test_without_workers_it_ends_with_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dataset.sweep.open_backend", lambda *_, **__: Forgetful(absent=10**9))
+    monkeypatch.setattr("dataset.build.build.open_backend", lambda *_, **__: Forgetful(absent=10**9))
     monkeypatch.setattr(engine, "PATIENCE", 0.5)
     with pytest.raises(UnfinishedError, match=r"no workers for .* 0 of 50 rows .* go on with: the same words"):
         build(design(50), tmp_path / "out", title="", simulate=invented, resume="the same words")
 
 
 def test_a_worker_with_other_code_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dataset.sweep.rows_version", lambda: "0.0+other")
+    monkeypatch.setattr("dataset.build.build.rows_version", lambda: "0.0+other")
     with pytest.raises(InputError, match=r"has version .* the build has 0\.0\+other"):
         build(design(50), tmp_path / "out", jobs=1, title="", simulate=invented)
 
@@ -241,7 +241,7 @@ def test_chunks_are_sized_by_cost_and_workers() -> None:
 def test_impossible_backends_leave_no_folder(
     backend: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dataset.backends.find_spec", lambda _: None)
+    monkeypatch.setattr("dataset.workers.open_backend.find_spec", lambda _: None)
     with pytest.raises(InputError, match=words):
         build(design(4), tmp_path / "out", backend=backend, jobs=0, title="", simulate=invented)
     assert not (tmp_path / "out").exists()

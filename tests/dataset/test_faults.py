@@ -17,8 +17,8 @@ from pathlib import Path
 
 import pytest
 
-from dataset.store import read, read_manifest
-from dataset.sweep import build
+from dataset.build.build import build
+from dataset.storage.data_set import read, read_manifest
 from tests.dataset import sweeps
 from tests.dataset.sweeps import MARKS, ROOT, SMALL, design, invented, without_cost
 
@@ -39,7 +39,8 @@ def started(code: str, *, limit: int | None = None) -> subprocess.Popen[str]:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
     words = (
-        "from tests.dataset.sweeps import *; from dataset.sweep import *; from dataset.__main__ import program; "
+        "from tests.dataset.sweeps import *; from dataset.build.build import *; "
+        "from dataset.__main__ import program; "
     )
     return subprocess.Popen(
         [sys.executable, "-c", words + code],
@@ -50,7 +51,7 @@ def started(code: str, *, limit: int | None = None) -> subprocess.Popen[str]:
 def building(folder: Path, rows: int, rows_by: str, jobs: int = 2) -> str:
     """Code that builds as the command line does."""
     return (
-        "import sys; from dataset.exits import ended; "
+        "import sys; from dataset.build.exits import ended; "
         "from sim.io.errors import run_command; "
         f"sys.exit(run_command(lambda _: ended(lambda: build(design({rows}), {str(folder)!r}, jobs={jobs}, "
         f"title='', simulate={rows_by}, resume='the same words'))))"
@@ -135,7 +136,7 @@ def test_a_script_is_not_run_again_by_its_workers(tmp_path: Path) -> None:
     """It has no `if __name__ == "__main__"`, and its rows are made by a function of its own."""
     script = tmp_path / "script.py"
     script.write_text(
-        "from tests.dataset.sweeps import *\nfrom dataset.sweep import build\nprint('once')\n"
+        "from tests.dataset.sweeps import *\nfrom dataset.build.build import build\nprint('once')\n"
         "def own(points):\n    return invented(points)\n"
         f"build(design(40), {str(tmp_path / 'out')!r}, jobs=2, title='', simulate=own)\n"
     )

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dataset.figures import SHOWN, draw_responses
-from dataset.indices import sobol_indices
-from dataset.trends import exponents, linear_rows
+from dataset.report.figures import SHOWN, draw_responses
+from dataset.report.power_laws import exponents, linear_rows
+from dataset.report.sobol_indices import sobol_indices
 from sim.model.response import DWELLS
 from sim.motion.batches import steady_columns
 from tests.sim.points import sweep_points

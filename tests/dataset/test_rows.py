@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dataset.design import load_design
-from dataset.schema import COST
-from dataset.simulate import simulate
+from dataset.rows.design import load_design
+from dataset.rows.schema import COST
+from dataset.rows.simulate import simulate
 from sim.model.presets import PRESETS
 from sim.model.slopes import SLOPE_INPUTS
 

@@ -12,11 +12,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from dataset.pieces import BadPieceError, Piece, contents_of, join, pieces, plain, write_piece
-from dataset.places import place
-from dataset.schema import FLAGS, INPUTS, OUTPUTS, Column, field_of, schema, table_of
-from dataset.store import batches, read, read_manifest, usable
-from dataset.sweep import build, mend
+from dataset.build.build import build, mend
+from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS, Column, field_of, schema, table_of
+from dataset.storage.data_set import batches, read, read_manifest, usable
+from dataset.storage.shards import BadPieceError, Piece, contents_of, join, pieces, plain, write_piece
+from dataset.storage.storage import place
 from sim.io.errors import InputError
 from tests.dataset.sweeps import design, invented, without_cost
 

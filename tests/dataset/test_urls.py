@@ -15,12 +15,12 @@ from pathlib import Path
 
 import pytest
 
-import dataset.sweep
-from dataset import lock
-from dataset.lock import locked
-from dataset.places import Remote, place
-from dataset.store import batches, read, read_manifest
-from dataset.sweep import build, mend
+import dataset.build.build
+from dataset.build.build import build, mend
+from dataset.storage import lock
+from dataset.storage.data_set import batches, read, read_manifest
+from dataset.storage.lock import locked
+from dataset.storage.storage import Remote, place
 from sim.io.errors import InputError
 from tests.dataset.dying import Here
 from tests.dataset.sweeps import ROOT, design, invented
@@ -41,7 +41,7 @@ def calm(tmp_path: Path) -> Path:
 @pytest.fixture
 def memory(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> str:
     """A folder in the memory of this process, and workers in it."""
-    monkeypatch.setattr(dataset.sweep, "open_backend", lambda *_, **__: Here())
+    monkeypatch.setattr(dataset.build.build, "open_backend", lambda *_, **__: Here())
     return f"memory://{re.sub(r'[^a-z_]', '', request.node.name)}"
 
 
@@ -127,7 +127,7 @@ def break_off(there: Remote) -> None:
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 def test_s3_holds_the_same_files(bucket: str, calm: Path) -> None:
     code = (
-        "from tests.dataset.sweeps import *; from dataset.sweep import build; "
+        "from tests.dataset.sweeps import *; from dataset.build.build import build; "
         f"build(design(200), {bucket!r}, jobs=2, title='', simulate=invented)"
     )
     done = subprocess.run(

@@ -13,8 +13,8 @@ import pytest
 
 import softflagella as sf
 from sim.inputs import load_robot
-from surrogate.export import load
-from surrogate.small_files import save_small
+from surrogate.export.small_copy_files import save_small
+from surrogate.table.model_file import load
 from tests.docs.pages import DOCS, PAGES, ROOT, blocks, name_of
 from tests.planner.compiled import compile_c
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dataset.schema import FLAGS, INPUTS, OUTPUTS
+from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
 from softflagella.__main__ import PACKAGES
 from tests.docs.pages import DOCS, PAGES, ROOT, generator, name_of

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import softflagella as sf
-from calibration.influences import influences
-from calibration.measurements import KNOWN_COLUMNS
-from calibration.tracks import COLUMNS
-from dataset.schema import FLAGS, INPUTS, OUTPUTS
-from planner.export import dwell_table
-from planner.record import plan_record
+from calibration.swimmer.camera_tracks import COLUMNS
+from calibration.swimmer.candidate_effects import influences
+from calibration.swimmer.measured_table import KNOWN_COLUMNS
+from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
+from planner.files.plan_files import dwell_table
+from planner.files.plan_json import plan_record
 from sim.effects import catalogue
 from sim.model.body import Body
 from sim.model.groups import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.controller import tracker_header
-from planner.estimate import STATES
-from planner.plan import Plan
-from planner.tracker import Advice
+from planner.files.tracker_header import tracker_header
+from planner.planning.plan import Plan
+from planner.tracking.kalman_filter import STATES
+from planner.tracking.tracker import Advice
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2")
 _LIBRARY = """#include "tracker.h"

@@ -8,10 +8,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from planner.distance import distance_to
-from planner.plan import Plan
-from planner.tracker import Advice
-from planner.vehicle import Vehicle
+from planner.paths.distance import distance_to
+from planner.planning.plan import Plan
+from planner.tracking.tracker import Advice
+from planner.vehicle.vehicle import Vehicle
 from sim.mechanics import planar
 
 

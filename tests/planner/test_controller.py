@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.controller import rounded, table_bytes, tracker_header
-from planner.path import circle
-from planner.plan import Plan, plan
-from planner.tracker import POSE, SLACK, Advice, Tracker
+from planner.files.tracker_header import rounded, table_bytes, tracker_header
+from planner.paths.path import circle
+from planner.planning.plan import Plan, plan
+from planner.tracking.tracker import POSE, SLACK, Advice, Tracker
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker, compile_c
 from tests.planner.swimming import Camera, rms, swim

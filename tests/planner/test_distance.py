@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.distance import distance_to, nearest, two_sided
+from planner.paths.distance import distance_to, nearest, two_sided
 
 
 def all_with_all(polyline: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.drawings import read_path
-from planner.path import Path2D, smoothed
-from planner.plan import plan
+from planner.paths.path import Path2D, smoothed
+from planner.paths.path_files import read_path
+from planner.planning.plan import plan
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 

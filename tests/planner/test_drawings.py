@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.corners import CORNER, kinks
-from planner.drawings import METRES_PER_PIXEL, Drawing, read_path
-from planner.path import Path2D
+from planner.paths.fillets import CORNER, kinks
+from planner.paths.path import Path2D
+from planner.paths.path_files import METRES_PER_PIXEL, Drawing, read_path
 from sim.io.errors import InputError
 
 

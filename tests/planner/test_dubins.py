@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planner.dubins import TURNS, Shots, shots, words
-from planner.keep_out import Body, Circle, Polygon, Room
-from planner.lattice import Ground
-from planner.route import COURSES, NoWayError, route
-from planner.tractrix import STILL
+from planner.goal.dubins import TURNS, Shots, shots, words
+from planner.goal.lattice import Ground
+from planner.goal.obstacles import Body, Circle, Polygon, Room
+from planner.goal.route import COURSES, NoWayError, route
+from planner.paths.tractrix import STILL
 from sim.arrays import Floats
 from sim.io.errors import InputError
 

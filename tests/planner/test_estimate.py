@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from planner.estimate import MOST, STATES, Dwell, Estimate
-from planner.follower import Follower
-from planner.path import circle
-from planner.plan import Plan, plan
+from planner.paths.path import circle
+from planner.planning.line_of_sight import Follower
+from planner.planning.plan import Plan, plan
+from planner.tracking.kalman_filter import MOST, STATES, Dwell, Estimate
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
 

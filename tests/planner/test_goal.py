@@ -12,16 +12,16 @@ import pytest
 
 from benchmarks.goals import brute_force, random_goal
 from benchmarks.keep_out import random_case, replayed_clearance
-from planner.goal import Voyage, to_goal
-from planner.keep_out import Circle, Polygon
-from planner.knowledge import Knowledge
-from planner.record import load_plan, plan_record
-from planner.route import NoWayError
-from planner.schedule import Switches, poses_at_flips
+from planner.files.plan_json import load_plan, plan_record
+from planner.goal.obstacles import Circle, Polygon
+from planner.goal.route import NoWayError
+from planner.goal.to_goal import Voyage, to_goal
+from planner.planning.schedule import Switches, poses_at_flips
+from planner.vehicle.calibration_table import Knowledge
 from sim.io.errors import InputError, run_command
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
-from surrogate.tabulate import tabulate
+from surrogate.one_robot.tabulate import tabulate
 
 CONTROL = PRESETS["paper-control"]
 BOX = [[-2, -4], [9, -4], [9, 4], [-2, 4]]

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.knowledge import COEFFICIENTS, NUMBERS, Knowledge, knowledge_toml, read_knowledge
-from planner.lookup import vehicle_of
-from planner.path import Path2D, circle, smoothed
-from planner.plan import plan
+from planner.paths.path import Path2D, circle, smoothed
+from planner.planning.plan import plan
+from planner.vehicle.calibration_table import COEFFICIENTS, NUMBERS, Knowledge, knowledge_toml, read_knowledge
+from planner.vehicle.from_table import vehicle_of
 from sim.inputs import load_robot, robot_toml
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
-from surrogate.export import load
+from surrogate.table.model_file import load
 
 CONTROL = PRESETS["paper-control"]
 TABLE = """

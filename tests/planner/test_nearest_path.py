@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from planner.corners import fillet
-from planner.distance import distance_to, two_sided
-from planner.nearest_path import nearest_path
-from planner.path import Path2D, circle, polygon
-from planner.tractrix import STILL, Drift, reference
+from planner.paths.distance import distance_to, two_sided
+from planner.paths.fillets import fillet
+from planner.paths.nearest_feasible import nearest_path
+from planner.paths.path import Path2D, circle, polygon
+from planner.paths.tractrix import STILL, Drift, reference
 
 A, RADIUS = 0.87, 0.37
 ZIGZAG = Path2D.of([[0, 0], [3, 0], [3, 3], [6, 3], [4.5, 0.0], [8, 0]])

@@ -13,20 +13,20 @@ import numpy as np
 import pytest
 
 from planner import Path2D, circle, plan, polygon
-from planner.corners import fillet
-from planner.distance import distance_to
-from planner.export import milliseconds, write_plan
-from planner.lookup import vehicle_of
-from planner.record import plan_record
-from planner.schedule import follow, trace
-from planner.stated_error import guaranteed, look_ahead
-from planner.tractrix import reference
-from planner.zigzag import zigzag
+from planner.files.plan_files import milliseconds, write_plan
+from planner.files.plan_json import plan_record
+from planner.paths.distance import distance_to
+from planner.paths.fillets import fillet
+from planner.paths.tractrix import reference
+from planner.planning.schedule import follow, trace
+from planner.planning.stated_error import guaranteed, look_ahead
+from planner.vehicle.from_table import vehicle_of
+from planner.vehicle.zigzag import zigzag
 from sim.io.errors import InputError, run_command
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
 from sim.model.schedule import load_schedule
-from surrogate.export import load
+from surrogate.table.model_file import load
 from tests.planner.vehicles import vehicle
 
 CONTROL = PRESETS["paper-control"]

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from planner.path import circle
-from planner.plan import plan
-from planner.record import load_plan, plan_record
+from planner.files.plan_json import load_plan, plan_record
+from planner.paths.path import circle
+from planner.planning.plan import plan
 from sim.io.errors import InputError
 from sim.model.plan_file import FORMAT
 from sim.model.presets import PRESETS

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.distance import distance_to
-from planner.path import Path2D, circle
-from planner.schedule import Switches, follow, trace
-from planner.stated_error import look_ahead, predicted_error, rms_in_time, stated_error
-from planner.tractrix import Reference, reference
-from planner.vehicle import TIMES, Vehicle
+from planner.paths.distance import distance_to
+from planner.paths.path import Path2D, circle
+from planner.paths.tractrix import Reference, reference
+from planner.planning.schedule import Switches, follow, trace
+from planner.planning.stated_error import look_ahead, predicted_error, rms_in_time, stated_error
+from planner.vehicle.vehicle import TIMES, Vehicle
 from tests.planner.vehicles import vehicle
 
 

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.path import circle, polygon
-from planner.plan import Plan, plan
-from planner.tracker import Advice, Tracker
-from planner.vehicle import Vehicle
+from planner.paths.path import circle, polygon
+from planner.planning.plan import Plan, plan
+from planner.tracking.tracker import Advice, Tracker
+from planner.vehicle.vehicle import Vehicle
 from sim.model.presets import PRESETS
 from tests.planner.swimming import Camera, rms, swim
 

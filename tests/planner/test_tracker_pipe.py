@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from planner.path import circle
-from planner.plan import plan
-from planner.tracker import Tracker
-from planner.tracker_pipe import answers
+from planner.paths.path import circle
+from planner.planning.plan import plan
+from planner.tracking.pipe import answers
+from planner.tracking.tracker import Tracker
 from sim.model.presets import PRESETS
 
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.path import circle
-from planner.schedule import Switches, follow, poses_at_flips, trace
-from planner.stated_error import look_ahead
-from planner.tractrix import Drift, reference
-from planner.vehicle import BEFORE_KNOTS, TIMES, lags_of
-from planner.zigzag import zigzag
+from planner.paths.path import circle
+from planner.paths.tractrix import Drift, reference
+from planner.planning.schedule import Switches, follow, poses_at_flips, trace
+from planner.planning.stated_error import look_ahead
+from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, lags_of
+from planner.vehicle.zigzag import zigzag
 from sim.mechanics import planar
 from sim.model.response import BEFORE, DWELLS, memory_after
 from tests.planner.vehicles import vehicle

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
+from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
 from sim.arrays import Floats
 from sim.mechanics import planar
 

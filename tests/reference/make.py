@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from calibration.synthetic import make_table
+from calibration.swimmer.synthetic_table import make_table
 from sim.inputs import robot_toml
 from sim.model.presets import PRESETS
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dataset.design import load_design
+from dataset.rows.design import load_design
 
 
 def sweep_points(count: int) -> dict[str, np.ndarray]:

@@ -6,10 +6,10 @@ from functools import cache
 
 import numpy as np
 
-from surrogate.fit import Settings
-from surrogate.lookup import Lookup
-from surrogate.rows import Simulated, drawn, simulated
-from surrogate.train import learn
+from surrogate.networks.training_loop import Settings
+from surrogate.table.lookup import Lookup
+from surrogate.training.simulated import Simulated, drawn, simulated
+from surrogate.training.train import learn
 
 TAILS = Settings(width=20, depth=2, members=2, epochs=40, iterations=60)
 CURVES = Settings(width=16, depth=1, members=1, epochs=30, iterations=20)

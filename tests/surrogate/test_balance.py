@@ -8,21 +8,24 @@ import numpy as np
 import pytest
 import torch
 
+import surrogate
 from benchmarks.balance import linear_guess, solve
 from sim.compiling import folder_of_package
-from surrogate import balance, head, perceptron, tail
-from surrogate.balance import inputs_rows, solve_rows
-from surrogate.export import load
-from surrogate.network import Ensemble
-from surrogate.perceptron import evaluate_rows, packed
-from surrogate.rows import drawn
-from surrogate.tails import class_of, rows_of
+from surrogate.networks import compiled as perceptron
+from surrogate.networks.compiled import evaluate_rows, packed
+from surrogate.networks.ensemble import Ensemble
+from surrogate.table.model_file import load
+from surrogate.table.wrench_table import class_of, rows_of
+from surrogate.training.simulated import drawn
+from surrogate.wrench import heads as head
+from surrogate.wrench import tails as tail
+from surrogate.wrench.balance import inputs_rows, solve_rows
 from tests.surrogate.small import rows, table
 
 
-def test_loops_are_kept_by_all_files_beside_them() -> None:
-    """Before, they kept machine code of an older version of each other."""
-    folder = folder_of_package(Path(balance.__file__).parent)
+def test_loops_are_kept_by_all_files_of_the_package() -> None:
+    """Loops of one folder are made of formulas in another one."""
+    folder = folder_of_package(Path(surrogate.__file__).parent)
     assert Path(solve_rows.stats.cache_path).is_relative_to(folder)
 
 

@@ -6,9 +6,9 @@ import re
 
 import numpy as np
 
-from surrogate.card import card_of
-from surrogate.evaluate import relative_errors, shortcomings
-from surrogate.train import with_radius
+from surrogate.table.errors import relative_errors, shortcomings
+from surrogate.training.model_card import card_of
+from surrogate.training.train import with_radius
 from tests.surrogate.small import rows, table
 
 

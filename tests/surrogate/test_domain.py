@@ -10,11 +10,11 @@ import pytest
 import torch
 from torch import Tensor
 
-from dataset.design import load_design
+from dataset.rows.design import load_design
 from sim.io.errors import InputError
-from surrogate.domain import BOUNDS, DOMAIN, MOST_TAILS, WIDE
-from surrogate.intervals import Intervals
-from surrogate.support import Support
+from surrogate.input_ranges import BOUNDS, DOMAIN, MOST_TAILS, WIDE
+from surrogate.table.intervals import Intervals
+from surrogate.table.support import Support
 from tests.surrogate.small import rows, table
 
 

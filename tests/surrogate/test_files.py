@@ -15,10 +15,10 @@ import torch
 
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
-from surrogate import tensor_file
-from surrogate.export import FORMAT, SHIPPED, content_of, load, load_table, save
-from surrogate.single import SingleRobot, load_single, save_single
-from surrogate.tabulate import tabulate
+from surrogate.one_robot.robot_table import SingleRobot, load_single, save_single
+from surrogate.one_robot.tabulate import tabulate
+from surrogate.table import tensor_file
+from surrogate.table.model_file import FORMAT, SHIPPED, content_of, load, load_table, save
 from tests.surrogate.small import rows, table
 
 NO_PYTHON = re.compile(r"Error|Exception|Traceback|object|__|<class")

@@ -10,8 +10,8 @@ from benchmarks.balance import linear_guess
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.motion.batches import steady_columns
-from surrogate import head
-from surrogate.export import load
+from surrogate.table.model_file import load
+from surrogate.wrench import heads as head
 from tests.surrogate.small import rows, table
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import surrogate.train as training
+import surrogate.training.train as training
 from sim.io.errors import InputError
 from sim.model.response import DWELLS, SETTLED
-from surrogate.certify import certified_error
-from surrogate.evaluate import summary
-from surrogate.inverse import design, inverse
-from surrogate.lookup import between_dwells
-from surrogate.rows import drawn, simulated
+from surrogate.table.certify import certified_error
+from surrogate.table.errors import summary
+from surrogate.table.inverse import design, inverse
+from surrogate.table.lookup import between_dwells
+from surrogate.training.simulated import drawn, simulated
 from tests.surrogate.small import CURVES, TAILS, flips, rows, table
 
 

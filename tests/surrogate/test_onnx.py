@@ -13,11 +13,11 @@ import pytest
 from sim.io.errors import InputError, run_command
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.__main__ import main
-from surrogate.domain import ROBOT
-from surrogate.export import load
-from surrogate.lookup import Lookup
-from surrogate.onnx_graph import save_onnx
-from surrogate.rows import drawn
+from surrogate.export.onnx_query import save_onnx
+from surrogate.input_ranges import ROBOT
+from surrogate.table.lookup import Lookup
+from surrogate.table.model_file import load
+from surrogate.training.simulated import drawn
 from tests.docs.pages import DOCS, blocks
 from tests.surrogate.small import table
 
@@ -115,7 +115,7 @@ def test_without_the_package_the_message_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "onnx", None)
-    monkeypatch.delitem(sys.modules, "surrogate.onnx_builder", raising=False)
+    monkeypatch.delitem(sys.modules, "surrogate.export.onnx_builder", raising=False)
     with pytest.raises(
         InputError, match=r"needs the package onnx; install it with pip install 'softflagella\[onnx\]'"
     ):

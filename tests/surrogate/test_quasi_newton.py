@@ -8,7 +8,7 @@ import torch
 from scipy.optimize import minimize, rosen, rosen_der
 from torch import Tensor
 
-from surrogate.quasi_newton import Minimiser
+from surrogate.networks.bfgs import Minimiser
 
 
 def rosenbrock(x: Tensor) -> tuple[float, Tensor]:

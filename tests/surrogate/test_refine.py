@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dataset.design import Axis
-from dataset.store import read, read_manifest
-from dataset.sweep import UnfinishedError, build, mend
-from dataset.verify import verify
+from dataset.build.build import UnfinishedError, build, mend
+from dataset.build.verify import verify
+from dataset.rows.design import Axis
+from dataset.storage.data_set import read, read_manifest
 from sim.io.errors import InputError
-from surrogate.export import load
-from surrogate.refine import choose, doubt, refine
-from surrogate.train import split, train
+from surrogate.table.model_file import load
+from surrogate.training.refine import choose, doubt, refine
+from surrogate.training.train import split, train
 from tests.dataset import sweeps
 from tests.dataset.sweeps import design, invented
 
@@ -134,7 +134,7 @@ def test_training_counts_a_row_once(base: Path, monkeypatch: pytest.MonkeyPatch)
     def learn(learned: object, widths: object, held_out: object, *_: object, **__: object) -> None:
         seen["sizes"] = [len(part) for part in (learned, widths, held_out)]  # type: ignore[arg-type]
 
-    monkeypatch.setattr("surrogate.train.learn", learn)
+    monkeypatch.setattr("surrogate.training.train.learn", learn)
     more = refined(base, 60)
     train(str(base), title="")
     alone = seen["sizes"]

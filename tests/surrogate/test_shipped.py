@@ -11,10 +11,10 @@ import pytest
 from sim.io.errors import InputError, run_command
 from sim.motion.batches import steady_columns
 from surrogate.__main__ import main
-from surrogate.evaluate import coverage, relative_errors
-from surrogate.export import SHIPPED, load
-from surrogate.rows import drawn
-from surrogate.train import train, with_radius
+from surrogate.table.errors import coverage, relative_errors
+from surrogate.table.model_file import SHIPPED, load
+from surrogate.training.simulated import drawn
+from surrogate.training.train import train, with_radius
 from tests.reference.cases import CONTROL, STEADY_INPUTS, STEADY_POINTS
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.check import tracking_error
-from planner.path import polygon
-from planner.plan import plan
-from planner.record import plan_record
+from planner.files.plan_json import plan_record
+from planner.files.tracking_error import tracking_error
+from planner.paths.path import polygon
+from planner.planning.plan import plan
 from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
@@ -20,9 +20,9 @@ from sim.model.robot import Robot
 from sim.motion.replay import replay
 from sim.motion.steady import steady
 from sim.motion.switching import switch_response
-from surrogate.export import load_table
-from surrogate.single import SingleRobot, save_single
-from surrogate.tabulate import tabulate
+from surrogate.one_robot.robot_table import SingleRobot, save_single
+from surrogate.one_robot.tabulate import tabulate
+from surrogate.table.model_file import load_table
 
 ROBOT = replace(PRESETS["paper-control"], effects={"end_over_end_drag": 5.0})
 

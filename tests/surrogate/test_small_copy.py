@@ -17,13 +17,13 @@ from sim.io.errors import InputError, run_command
 from sim.model.groups import DWELL
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.__main__ import main
-from surrogate.domain import ROBOT
-from surrogate.evaluate import scale_of
-from surrogate.export import load
-from surrogate.lookup import RESPONSE_OUTPUTS
-from surrogate.rows import drawn
-from surrogate.small import MOST_BYTES, Small, losses_of, small_of
-from surrogate.small_files import save_small
+from surrogate.export.small_copy import MOST_BYTES, Small, losses_of, small_of
+from surrogate.export.small_copy_files import save_small
+from surrogate.input_ranges import ROBOT
+from surrogate.table.errors import scale_of
+from surrogate.table.lookup import RESPONSE_OUTPUTS
+from surrogate.table.model_file import load
+from surrogate.training.simulated import drawn
 from tests.planner.compiled import compile_c
 from tests.surrogate.small import table
 
@@ -121,7 +121,7 @@ def test_it_is_small_and_states_its_loss(folder: Path) -> None:
 
 
 def test_the_stated_loss_holds_for_other_robots(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("surrogate.small._SEED", 91)
+    monkeypatch.setattr("surrogate.export.small_copy._SEED", 91)
     small = small_of(load())
     stated = json.loads(manifest_of(folder))["loss"]
     for name, figures in losses_of(load(), small).items():
@@ -208,7 +208,7 @@ def test_a_table_that_learned_some_tails_only(tmp_path: Path) -> None:
 
 def test_where_the_response_does_not_fit_it_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole: Small = small_of(load())
-    monkeypatch.setattr("surrogate.small.MOST_BYTES", 120_000)
+    monkeypatch.setattr("surrogate.export.small_copy.MOST_BYTES", 120_000)
     save_small(load(), tmp_path)
     less = small_of(load())
     assert whole.has_response
@@ -221,7 +221,7 @@ def test_where_the_response_does_not_fit_it_is_left_out(tmp_path: Path, monkeypa
     (tmp_path / "only.c").write_text("\n".join(lines))
     compile_c(tmp_path / "only.c", tmp_path / "only")
     subprocess.run([tmp_path / "only"], check=True)
-    monkeypatch.setattr("surrogate.small.MOST_BYTES", 30_000)
+    monkeypatch.setattr("surrogate.export.small_copy.MOST_BYTES", 30_000)
     with pytest.raises(InputError, match="too large for 30 kB"):
         small_of(load())
 

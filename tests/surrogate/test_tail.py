@@ -11,7 +11,8 @@ from sim.reference.linear_theory import linear_filament
 from sim.solve.assembly import bodies
 from sim.solve.orbit import mean_tail_wrench
 from sim.solve.refinement import orbit_on_mesh
-from surrogate import head, tail
+from surrogate.wrench import heads as head
+from surrogate.wrench import tails as tail
 from tests.surrogate.small import rows
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from surrogate import warm
-from surrogate.export import load
-from surrogate.rows import drawn
+from surrogate import compile_loops as warm
+from surrogate.table.model_file import load
+from surrogate.training.simulated import drawn
 
 
 def test_the_first_query_compiles_apart_and_once(
@@ -20,5 +20,5 @@ def test_the_first_query_compiles_apart_and_once(
     for _ in range(2):
         load().query(robots, flag=True)
     warm.compile_once.cache_clear()
-    assert apart == ["surrogate.warm"]
+    assert apart == ["surrogate.compile_loops"]
     assert "first use" in capsys.readouterr().err

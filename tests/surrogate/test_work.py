@@ -14,12 +14,12 @@ import torch
 from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves
 
-import surrogate.work
+import surrogate.networks.checkpoints
 from sim.io.errors import InputError
-from surrogate import fit
-from surrogate.fit import Problem, Settings, Watch
-from surrogate.network import Ensemble
-from surrogate.work import Checkpoint, Work, device_named, remove_states
+from surrogate.networks import training_loop as fit
+from surrogate.networks.checkpoints import Checkpoint, Work, device_named, remove_states
+from surrogate.networks.ensemble import Ensemble
+from surrogate.networks.training_loop import Problem, Settings, Watch
 from tests.surrogate.small import table
 
 SMALL = Settings(width=8, depth=2, members=2, epochs=6, batch=16, iterations=12)
@@ -29,9 +29,11 @@ import os, signal, sys
 from pathlib import Path
 import numpy as np
 import torch
-import surrogate.work as work
-from surrogate import balance, perceptron, support
-from surrogate.train import learn
+import surrogate.networks.checkpoints as work
+from surrogate.wrench import balance
+from surrogate.networks import compiled as perceptron
+from surrogate.interface import support
+from surrogate.training.train import learn
 from tests.surrogate.small import CURVES, TAILS, flips, rows
 
 torch.set_num_threads(1)  # as in the tests
@@ -107,8 +109,8 @@ def test_training_that_is_killed_twice_goes_on_to_the_same_bytes(tmp_path: Path)
 
 @pytest.mark.parametrize("stop", [1, 4, 6, 8, 17, 18, 19, 30])
 def test_every_state_leads_to_the_same_numbers(stop: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(surrogate.work, "EVERY", 0.0)
-    monkeypatch.setattr(surrogate.work, "_SHARE", 0.0)
+    monkeypatch.setattr(surrogate.networks.checkpoints, "EVERY", 0.0)
+    monkeypatch.setattr(surrogate.networks.checkpoints, "_SHARE", 0.0)
     written, write = [], Checkpoint.write
 
     def stopping(self: Checkpoint, state: object, *, now: bool = False) -> None:

@@ -12,7 +12,7 @@ import pytest
 import torch
 
 import sim.effects
-from dataset.simulate import simulate
+from dataset.rows.simulate import simulate
 from sim.effects import catalogue
 from sim.effects.tail_contact import least_gap
 from sim.motion.steady import orbits, steady
@@ -59,7 +59,7 @@ def test_adding_an_effect_is_adding_a_file(reach: str, tmp_path: Path) -> None:
     (tmp_path / "sim" / "effects" / "stickiness.py").write_text(NEW_EFFECT.format(reach=reach))
     code = """
 import numpy as np
-from calibration.influences import influences
+from calibration.swimmer.candidate_effects import influences
 from sim.inputs import check_columns
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS

@@ -1,0 +1,1 @@
+"""Which effect explains the residual."""

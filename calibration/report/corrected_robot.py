@@ -1,0 +1,104 @@
+"""What a calibration hands on: the corrected robot, and how sure it is, as corrected.toml.
+
+The covariance is that of the fit to all runs. It goes into the table [calibration], which the planner reads
+(`planner.vehicle.calibration_table`). What belongs to the way of measuring is left out: the camera, the zero of
+the heading, the tachometer, the tracked point, slip of the motor and drift between runs. The errors of what is
+kept contain the errors of these. A current in the tank is stated on its own.
+
+Where no effect explains the runs, a correction goes into the table [correction] (`sim.model.correction`). Its
+uncertainty is that of its weights and of what it leaves beyond noise, at the robot of the file.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from calibration.statistics.forward_model import Parameters, Predictive
+from calibration.statistics.held_out import Delivered
+from calibration.swimmer.candidate_effects import CURRENT
+from calibration.swimmer.head_correction import Corrected
+from calibration.swimmer.nuisance_numbers import LENGTH
+from calibration.swimmer.swimmer import robot_numbers
+from planner.vehicle.calibration_table import COEFFICIENTS, NUMBERS, Knowledge, knowledge_toml
+from sim.effects import catalogue
+from sim.inputs import robot_toml
+from sim.io.errors import InputError
+from sim.model.robot import Robot
+
+
+def check_given(robot: Robot) -> None:
+    """Refuse a robot that already has a correction: its table of runs belongs to the robot as given."""
+    if robot.correction is not None:
+        raise InputError(
+            f"robot {robot.name!r} has a table [correction] from an earlier calibration: calibrate the robot "
+            "as it was given, with the runs of both"
+        )
+
+
+def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
+    """`robot` with fitted coefficients, numbers and effects; drift between runs and the observation are left
+    out.
+    """
+    own = robot_numbers(robot, parameters)
+    own["tail_length"] = robot.tail_length + parameters.get(LENGTH, 0.0)
+    sizes = {
+        name: float(value)
+        for name, value in parameters.items()
+        if name in catalogue() and value != catalogue()[name].null
+    }
+    return replace(robot, **own, effects={**robot.effects, **sizes})
+
+
+def knowledge_of(robot: Robot, delivered: Delivered) -> Knowledge:
+    """Covariance of the corrected robot's coefficients, numbers and effects, and the current in the tank.
+
+    Args:
+        robot: as it was given; the error of the tail length is one of ln l of this robot.
+    """
+    length = robot.tail_length + delivered.parameters.get(LENGTH, 0.0)
+    kept, names, scales = [], [], []
+    for place, one in enumerate(delivered.fitted):
+        if one.name in (*COEFFICIENTS, *NUMBERS, *catalogue(), LENGTH):
+            kept.append(place)
+            names.append("tail_length" if one.name == LENGTH else one.name)
+            scales.append(1 / length if one.name == LENGTH else 1.0)
+    covariance = delivered.covariance[np.ix_(kept, kept)] * np.outer(scales, scales)
+    places = {one.name: i for i, one in enumerate(delivered.fitted)}
+    current = [(delivered.parameters[n], places[n]) if n in places else (0.0, None) for n in CURRENT]
+    errors = [0.0 if at is None else math.sqrt(delivered.covariance[at, at]) for _, at in current]
+    return Knowledge(
+        names=tuple(names),
+        covariance=(covariance + covariance.T) / 2,  # rounding
+        current=(current[0][0], current[1][0]),
+        current_error=(errors[0], errors[1]),
+    )
+
+
+def corrected_toml(robot: Robot, delivered: Delivered, predictive: Predictive | None = None) -> str:
+    """The text of corrected.toml; with the correction of `predictive` where nothing explains the runs."""
+    corrected = corrected_robot(robot, delivered.parameters)
+    known = knowledge_of(robot, delivered)
+    if predictive is not None:
+        learnt: Corrected = predictive.content
+        known = _with_correction(known, learnt, corrected)
+        corrected = replace(corrected, correction=learnt.correction)
+    return robot_toml(corrected) + "\n" + knowledge_toml(known)
+
+
+def _with_correction(known: Knowledge, learnt: Corrected, robot: Robot) -> Knowledge:
+    """With the uncertainty of the correction at this robot; as it is if the robot is outside the runs."""
+    values = robot.group_values()
+    try:
+        learnt.correction.applied(values)
+    except InputError:
+        return known
+    knobs = tuple(learnt.correction.weights)
+    names = (*known.names, *(name for name in knobs if name not in known.names))
+    covariance = np.zeros((len(names), len(names)))
+    covariance[: len(known.names), : len(known.names)] = known.covariance
+    places = [names.index(name) for name in knobs]
+    covariance[np.ix_(places, places)] += learnt.knob_covariance(values)
+    return replace(known, names=names, covariance=covariance)

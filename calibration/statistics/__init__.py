@@ -1,0 +1,1 @@
+"""Fits, residual tests and their statistics; knows no robots."""

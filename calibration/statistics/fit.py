@@ -1,0 +1,260 @@
+"""Generalised least squares of a forward model, each parameter on its own scale.
+
+Steps of Levenberg (1944) with the model's own derivatives:
+
+    θ ← θ + (A + λ D⁻²)⁻¹ JᵀΣ⁻¹ (y − f(θ)),   A = JᵀΣ⁻¹J,   θ = (ln C_1, …, ε_1, …),
+
+D is 1 for ln C and a typical size for ε. λ is 0, unless the step is too long or does not improve the fit. A
+parameter at a bound stays there if the step would lead out. The covariance of the parameters is V = A⁻¹, times a
+factor because S is estimated (`_inflation`). Numbers as given have priors, which are rows of their own
+(`calibration.statistics.priors`): they are in A, in the residual and in the deviance. Intervals are 95 %, by
+Student's t. The scatter ρ of a few sessions is uncertain, which limits the degrees of freedom (Satterthwaite
+1946):
+
+    ν = 2 V² / (V′² Var ρ),   Var ρ ≈ 2 (ρ + 1/n)² / (k (s − 1)),   n runs in each of s sessions.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+from calibration.statistics.forward_model import Model, Parameter, Parameters, parameter, stepped
+from calibration.statistics.noise import Noise, Sums, inverse_root, least_squares, repeat_covariance, sums
+from calibration.statistics.priors import with_prior
+from sim.arrays import Flags, Floats, Integers
+
+if TYPE_CHECKING:
+    from calibration.statistics.priors import Pull
+
+_MOST_STEPS = 25
+_SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
+_SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ⁻¹ r by less
+_LARGEST = 0.7  # change of ln C in one step
+_PASSES = 3  # iterations for the scatter of the sessions
+_DAMPING = (0.0, *(10.0**e for e in range(-3, 9)))  # λ
+_NEARER = 5  # starts that are tried
+_UNSETTLED = 1.0  # a fit has not arrived if one more step is expected to reduce rᵀ Σ⁻¹ r by more
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model; arrays over all runs of the table, used or not."""
+
+    parameters: dict[str, float]
+    fitted: tuple[Parameter, ...]  # in the order of the covariance
+    covariance: Floats  # (p, p) of (ln C, ε)
+    inflation: float  # factor in the covariance, because S is estimated
+    freedom: Floats  # (p,) degrees of freedom of the intervals
+    prediction: Floats  # (n, k)
+    jacobian: Floats  # (n, k, p)
+    noise: Noise
+    deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
+    arrived: bool  # the fit is at a minimum, or at one within the bounds
+    wrong: tuple[tuple[Pull, ...], ...] = ()  # numbers whose priors were taken away, each with those like it
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self.fitted)
+
+    @property
+    def at_bounds(self) -> tuple[str, ...]:
+        """Parameters at an end of their range."""
+        return tuple(p.name for p in self.fitted if self.parameters[p.name] in p.bounds)
+
+    def half_width(self, place: int) -> float:
+        """Of the 95 % interval of a parameter, on its own scale."""
+        return float(student.ppf(0.975, self.freedom[place])) * math.sqrt(self.covariance[place, place])
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """95 % interval of a parameter."""
+        value = self.parameters[name]
+        place = self.names.index(name)
+        half = self.half_width(place)
+        if self.fitted[place].logarithmic:
+            return value * math.exp(-half), value * math.exp(half)
+        return value - half, value + half
+
+
+def fit(
+    model: Model,
+    start: Parameters,
+    names: tuple[str, ...],
+    used: Flags,
+    *,
+    free: tuple[str, ...] = (),
+    title: str = "fit",
+) -> Fit:
+    """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay.
+
+    Args:
+        free: numbers as given whose priors are taken away.
+    """
+    data = model.runs
+    fitted = tuple(parameter(model, name) for name in names)
+    fitted = tuple(replace(one, sigma=None) if one.name in free else one for one in fitted)
+    run = repeat_covariance(data.y[used], data.condition[used])
+    task = _Task(model, fitted, used, inverse_root(run), title)
+    point = _descend(task, task.first(dict(start)))
+    linear = least_squares(point.products, passes=_PASSES)
+    share = float(linear.share)
+    whole = point.products.at(linear.share)
+    inflation = _inflation(data.condition[used], len(run))
+    return Fit(
+        parameters=point.parameters,
+        fitted=fitted,
+        covariance=inflation * linear.covariance,
+        inflation=inflation,
+        freedom=_freedom(point.products, share, len(names)),
+        prediction=point.prediction,
+        jacobian=point.derivative,
+        noise=Noise(run, share),
+        deviance=float(whole[-1, -1] + len(run) * np.log1p(share * point.products.sizes).sum()),
+        arrived=_step(fitted, point.parameters, whole, 0).promise < _UNSETTLED,
+    )
+
+
+@dataclass(frozen=True)
+class _Point:
+    """The model at the present parameters of the search."""
+
+    parameters: dict[str, float]
+    prediction: Floats  # (n, k)
+    derivative: Floats  # (n, k, p), at these parameters or near them
+    products: Sums  # of the derivatives and the residual
+
+    @property
+    def solved(self) -> bool:
+        return bool(np.isfinite(self.prediction).all() and np.isfinite(self.derivative).all())
+
+
+@dataclass(frozen=True)
+class _Task:
+    """The model, the runs, and the parameters to fit."""
+
+    model: Model
+    fitted: tuple[Parameter, ...]
+    used: Flags
+    root: Floats
+    title: str
+
+    def first(self, parameters: dict[str, float]) -> _Point:
+        """The model at the start; effects move towards their null while it cannot be solved quickly there."""
+        effects = [one for one in self.fitted if one.name in {e.name for e in self.model.effects}]
+        tried = dict(parameters)
+        for _ in range(_NEARER if effects else 1):
+            point = self.at(tried, None, 1)
+            if point.solved:
+                return point
+            tried.update({one.name: (tried[one.name] + one.start) / 2 for one in effects})
+        return self.at(parameters, None, 1, quick=False)
+
+    def at(
+        self, parameters: dict[str, float], derivative: Floats | None, count: int, *, quick: bool = True
+    ) -> _Point:
+        """The model at `parameters`; its derivatives are computed if none are given."""
+        title = f"{self.title}, step {count}" if self.title else ""
+        if derivative is None:
+            prediction, derivative = self.model.derivatives(
+                parameters, [one.name for one in self.fitted], title=title, quick=quick
+            )
+        else:
+            prediction = self.model.predict([parameters], title=title)[0]
+        data = self.model.runs
+        table = np.concatenate([derivative, (data.y - prediction)[..., None]], -1)[self.used]
+        products = sums(self.root @ table, data.session[self.used], len(self.root))
+        return _Point(parameters, prediction, derivative, with_prior(products, self.fitted, parameters))
+
+
+class _Step(NamedTuple):
+    parameters: dict[str, float]  # after it
+    size: float  # largest change, of ln C or ε
+    promise: float  # by how much it reduces rᵀ Σ⁻¹ r if the model is linear
+    damping: int  # place of its λ in _DAMPING
+
+
+def _descend(task: _Task, point: _Point) -> _Point:
+    """The least rᵀ Σ⁻¹ r from `point`; steps to where the model cannot be solved quickly are too long."""
+    fitted = task.fitted
+    least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
+    for count in range(1, _MOST_STEPS + 1):
+        # The scatter of the sessions comes from the residuals of the fit, but only near the solution. Far from it
+        # every session looks shifted, and with a large ρ the search would stop there.
+        share = least_squares(point.products, passes=0 if count == 1 else _PASSES).share
+        step = _step(fitted, point.parameters, point.products.at(share), least)
+        if step.promise < _SMALL and count > 1:
+            break
+        tried = task.at(step.parameters, None if step.size > _SHORT else point.derivative, count + 1)
+        if tried.solved and tried.products.at(share)[-1, -1] < point.products.at(share)[-1, -1] + _SMALL:
+            point, least, kept = tried, max(least - 2, 0), step.size <= _SHORT
+        elif kept:
+            point, kept = task.at(point.parameters, None, count + 1, quick=False), False
+        else:
+            least = max(step.damping + 1, 2)
+            if least >= len(_DAMPING):
+                break
+    return point
+
+
+def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: Floats, least: int) -> _Step:
+    """A step from `parameters`.
+
+    Args:
+        whole: (p + 1, p + 1) products of the derivatives and the residual.
+        least: place of the least λ allowed.
+    """
+    for place in range(least, len(_DAMPING)):
+        change = _damped(fitted, parameters, whole, _DAMPING[place])
+        if all(abs(c) <= _LARGEST for c, one in zip(change, fitted, strict=True) if one.logarithmic):
+            break
+    new = stepped(fitted, parameters, change)
+    promise = 2 * change @ whole[:-1, -1] - change @ whole[:-1, :-1] @ change
+    return _Step(new, float(np.abs(change).max()), float(promise), place)
+
+
+def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: Floats, damping: float) -> Floats:
+    """Change (p,) of the parameters; zero for those that stay at a bound."""
+    at_low = np.array([parameters[one.name] <= one.bounds[0] for one in fitted])
+    at_high = np.array([parameters[one.name] >= one.bounds[1] for one in fitted])
+    typical = np.array([1.0 if one.logarithmic else abs(one.typical) for one in fitted])
+    change = np.zeros(len(fitted))
+    free = np.arange(len(fitted))
+    while len(free):
+        own = whole[np.ix_(free, free)] + np.diag(damping / typical[free] ** 2)
+        scale = np.sqrt(np.maximum(np.diag(own), 1e-300))
+        inverse = np.linalg.pinv(own / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        change[:] = 0.0
+        change[free] = inverse @ (whole[free, -1] / scale) / scale
+        outward = (at_low & (change < 0)) | (at_high & (change > 0))
+        if not outward.any():
+            break
+        free = free[~outward[free]]
+        change[outward] = 0.0
+    return change
+
+
+def _inflation(condition: Integers, outputs: int) -> float:
+    """Factor by which the variance is larger because S is estimated from ν repeats of k outputs.
+
+    ν/(ν − k − 1), because 1/S is overestimated, times 1 + (k − 1)/(ν − k), because its weights are not optimal.
+    """
+    repeats = len(condition) - len(np.unique(condition))
+    if repeats <= outputs + 1:
+        return 2.0 * repeats
+    return repeats / (repeats - outputs - 1) * (1 + (outputs - 1) / (repeats - outputs))
+
+
+def _freedom(products: Sums, share: float, count: int) -> Floats:
+    """Degrees of freedom of the parameters' variances, (p,)."""
+    step = 0.01 * share + 1e-3 / products.sizes.mean()
+    inverse = [
+        np.linalg.pinv(products.at(np.array(s))[:count, :count], hermitian=True) for s in (share, share + step)
+    ]
+    V, near = (np.maximum(np.diag(i), 1e-100) for i in inverse)
+    sessions = len(products.sizes)
+    spread = 2 * (share + 1 / products.sizes.mean()) ** 2 / (products.outputs * max(sessions - 1, 1))
+    return np.asarray(np.clip(2 * V**2 / np.maximum(((near - V) / step) ** 2 * spread, 1e-12 * V**2), 1.0, 1e6))

@@ -1,0 +1,1 @@
+"""The robot as a model of measured runs."""

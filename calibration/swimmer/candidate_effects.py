@@ -1,0 +1,102 @@
+"""Influences: what the model of a run may lack.
+
+Most influences change the robot of a run: an effect of `sim.effects` gets the size null + ε s. Here s is 1 or a
+column of the table (hours since the first run, kelvin above the mean). Others change the observation only: the
+true speed of the motor, the tracked point of the axis, a current in the lab. Some influences need a column. If the
+table does not have it, they cannot be tested, and the report says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from calibration.statistics.forward_model import Parameter
+from sim.effects import Effect, catalogue
+
+SLIP, TRACKED_POINT = "motor_slip", "tracked_point"
+CURRENT = ("current_along_x", "current_along_y")
+
+
+@dataclass(frozen=True)
+class Influence:
+    """One way in which a run may differ from the model."""
+
+    parameter: Parameter
+    effect: str | None  # of `sim.effects`; None: acts on the observation
+    needs: str | None  # column of the table that it needs
+    odd: bool  # left and right turns differ with it
+
+    @property
+    def name(self) -> str:
+        return self.parameter.name
+
+
+def influences() -> dict[str, Influence]:
+    """All influences by name."""
+    found = {}
+    for effect in catalogue().values():
+        if not effect.drivers and not effect.beside:
+            found[effect.name] = _plain(effect)
+        for driver in effect.drivers:
+            parameter = Parameter(
+                driver.name, driver.title, 0.0, driver.bounds, driver.typical, unit=driver.unit,
+                plausible=driver.plausible,
+            )  # fmt: skip
+            found[driver.name] = Influence(parameter, effect.name, driver.column, effect.symmetry == "odd")
+    slip = Parameter(
+        SLIP, "slip of the motor", 0.0, (-0.3, 0.3), 0.02, unit="share of its speed", plausible=(-0.1, 0.1)
+    )
+    point = Parameter(
+        TRACKED_POINT, "tracked point off the head's centre", 0.0, (-2.0, 2.0), 0.1, unit="L, forward",
+        plausible=(-0.6, 0.6),
+    )  # fmt: skip
+    for name, axis in zip(CURRENT, "xy", strict=True):
+        current = Parameter(
+            name,
+            f"current in the tank along {axis}",
+            0.0,
+            (-0.05, 0.05),
+            0.001,
+            unit="m/s",
+            plausible=(-0.02, 0.02),
+        )
+        found[name] = Influence(current, None, f"heading_{axis}", False)
+    found[SLIP] = Influence(slip, None, None, False)
+    found[TRACKED_POINT] = Influence(point, None, None, False)
+    return dict(sorted(found.items()))
+
+
+def _plain(effect: Effect) -> Influence:
+    second = next((e for e in catalogue().values() if e.beside == effect.name and e.grid), None)
+    parameter = replace(_parameter(effect), second=None if second is None else _parameter(second))
+    return Influence(parameter, effect.name, None, effect.symmetry == "odd")
+
+
+def _parameter(effect: Effect) -> Parameter:
+    return Parameter(
+        effect.name, effect.title, effect.null, effect.bounds, effect.typical - effect.null, unit=effect.unit,
+        plausible=effect.plausible, grid=effect.grid,
+    )  # fmt: skip
+
+
+def reason_untestable(
+    influence: Influence, columns: Mapping[str, object], both_directions: bool, outputs: Sequence[str]
+) -> str:
+    """Why a table cannot test an influence; empty if it can."""
+    if influence.name in CURRENT and "v" not in outputs:
+        return "needs v_cm_s"
+    if influence.needs is not None and influence.needs not in columns:
+        return f"needs {_COLUMNS[influence.needs]}"
+    if influence.odd and not both_directions:
+        return "needs runs in both directions of the motor"
+    return ""
+
+
+_COLUMNS = {
+    "elapsed_h": "elapsed_min, differing between the runs",
+    "temperature_K": "temperature_C, differing between the runs",
+    "heading_x": "heading_deg, differing between the runs",
+    "heading_y": "heading_deg, differing between the runs",
+    "head_over_tank": "tank_diameter_cm, differing between the runs",
+}

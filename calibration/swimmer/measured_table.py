@@ -1,0 +1,247 @@
+"""Measured tables: one run a row, units in the column names.
+
+Needed: N, l_cm, omega_rpm (tails relative to head, signed) and some of the outputs
+
+    omega_h_rpm, omega_t_rpm, omega_yr_rad_s (signed), R_yr_cm, theta_deg, v_cm_s (of the head's centre).
+
+Some conditions must be repeated, because the noise is estimated from repeats. `session` names the group of runs
+that were made together. Without it, all runs of one N are one session. Some effects need elapsed_min,
+temperature_C, tank_diameter_cm or heading_deg (direction of the path in the lab, where a run is a part of a
+circle). Rows that cannot be used are set aside with number and reason. So are columns of other names, unless the
+name looks like a misspelt one.
+
+Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians. A
+row with a wrong sign is a bad row, because the direction of the motor determines all signs.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from calibration.statistics.forward_model import Runs
+from calibration.statistics.noise import repeat_covariance
+from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, TACHOMETER
+from sim.arrays import Floats, Integers
+from sim.io.errors import InputError
+from sim.io.tables import read_table
+
+_RPM = 2 * math.pi / 60
+# Output -> (column, factor to SI, sign relative to the motor's; 0: a magnitude)
+OUTPUTS = {
+    "omega_h": ("omega_h_rpm", _RPM, -1),
+    "omega_t": ("omega_t_rpm", _RPM, 1),
+    "omega_yr": ("omega_yr_rad_s", 1.0, 1),
+    "R_yr": ("R_yr_cm", 0.01, 0),
+    "theta": ("theta_deg", math.pi / 180, 0),
+    "v": ("v_cm_s", 0.01, 0),
+}
+_ERRORS = (  # of `calibration.swimmer.camera_tracks`; not used, since repeats give the noise
+    "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
+)  # fmt: skip
+_SIGMAS = {  # column -> number as given, factor
+    "camera_scale_sigma_percent": (CAMERA, 0.01),
+    "heading_zero_sigma_deg": (HEADING, math.pi / 180),
+    "tachometer_sigma_percent": (TACHOMETER, 0.01),
+}
+_INPUTS = ("N", "l_cm", "omega_rpm")
+_NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm", "heading_deg")
+KNOWN_COLUMNS = {
+    *_INPUTS,
+    *(c for c, _, _ in OUTPUTS.values()),
+    "run",
+    "trial",
+    "session",
+    *_NOTED,
+    *_ERRORS,
+    *_SIGMAS,
+}
+_FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
+_OWN = 1e-3  # share of an output's scatter that must be independent of the other outputs
+
+
+@dataclass(frozen=True)
+class Measurements(Runs):
+    """Usable runs of a table of swimming robots."""
+
+    tails: Floats  # (n,) N
+    length: Floats  # (n,) tail length [m]
+    omega: Floats  # (n,) motor speed, signed [rad/s]
+    noted: Floats  # (n, c) what was noted and differs between the runs, by `noted_names`
+    sigmas: Mapping[str, float]  # σ of camera scale, zero of the heading [rad] and tachometer, where stated
+    noted_names: tuple[str, ...]  # elapsed_h, temperature_K (above the mean), tank_diameter, heading_x, heading_y
+
+
+def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
+    """Measurements from a CSV or a table.
+
+    Raises:
+        InputError: columns are missing or misspelt, or too few runs remain.
+    """
+    table = source if isinstance(source, pd.DataFrame) else read_table(source)
+    for name in _INPUTS:
+        if name not in table:
+            raise InputError(f"the table has no column {name!r}; it needs {', '.join(_INPUTS)}")
+    unknown = [str(c) for c in table if c not in KNOWN_COLUMNS]
+    for name in unknown:
+        near = difflib.get_close_matches(name, KNOWN_COLUMNS, n=1)
+        if near:
+            raise InputError(f"unknown column {name!r}: is it {near[0]!r}? rename or drop it")
+    outputs = tuple(name for name, (column, _, _) in OUTPUTS.items() if column in table)
+    if len(outputs) < 2 or not {"omega_yr", "R_yr", "theta", "v"} & set(outputs):
+        raise InputError(
+            "the table needs at least two outputs, one of them omega_yr_rad_s, R_yr_cm, theta_deg or v_cm_s: "
+            "the spins alone do not tell the coefficients apart"
+        )
+    numbers = table.drop(columns="session", errors="ignore").apply(pd.to_numeric, errors="coerce")
+    reasons = _reasons(table, numbers, outputs)
+    keep = np.array([not r for r in reasons])
+    aside = tuple(f"row {i + 1}: {r}" for i, r in enumerate(reasons) if r)
+    good = numbers[keep]
+    if len(good) < _FEWEST_RUNS:
+        first = f" ({aside[0]})" if aside else ""
+        raise InputError(f"{len(good)} usable runs{first}; a calibration needs at least {_FEWEST_RUNS}")
+    names = (
+        table.loc[keep, "session"].astype(str)
+        if "session" in table
+        else "N = " + good["N"].astype(int).astype(str)
+    )
+    condition = good.groupby(list(_INPUTS), sort=True).ngroup().to_numpy()
+    session_names, session = np.unique(names.to_numpy(dtype=str), return_inverse=True)
+    repeats = len(good) - len(np.unique(condition))
+    if repeats < _FEWEST_REPEATS:
+        raise InputError(f"{repeats} repeated runs; to estimate the noise, give at least {_FEWEST_REPEATS}")
+    columns = []
+    for name in outputs:
+        column, factor, _ = OUTPUTS[name]
+        value = good[column].to_numpy(dtype=float) * factor
+        columns.append(value if name == "theta" else np.log(np.abs(value)))
+    y, outputs, follows = _independent(np.stack(columns, 1), outputs, condition)
+    tails, length, omega = (
+        good[c].to_numpy(dtype=float) * f for c, f in zip(_INPUTS, (1, 0.01, _RPM), strict=True)
+    )
+    noted = _noted(good)
+    inputs = [tails, np.log(length), np.log(np.abs(omega)), np.sign(omega), *noted.values()]
+    return Measurements(
+        outputs=outputs,
+        y=y,
+        condition=condition,
+        session=session,
+        session_names=tuple(str(n) for n in session_names),
+        inputs=np.stack(inputs, 1),
+        input_names=("N", "ln l", "ln |omega|", "direction", *noted),
+        rows=np.flatnonzero(keep) + 1,
+        set_aside=(*aside, *follows, *(f"column {name}: not known, left out" for name in unknown)),
+        limits=_limits(tails, length, omega),
+        tails=tails,
+        length=length,
+        omega=omega,
+        noted=np.stack(list(noted.values()), 1) if noted else np.empty((len(good), 0)),
+        sigmas=_sigmas(good),
+        noted_names=tuple(noted),
+    )
+
+
+def _independent(
+    y: Floats, outputs: tuple[str, ...], condition: Integers
+) -> tuple[Floats, tuple[str, ...], tuple[str, ...]]:
+    """Outputs that were measured: repeats differ, and not just as other outputs do.
+
+    Raises:
+        InputError: an output is the same in all repeats.
+    """
+    run = repeat_covariance(y, condition)
+    kept: list[int] = []
+    follows = []
+    for i, name in enumerate(outputs):
+        column = OUTPUTS[name][0]
+        if not run[i, i] > 1e-12:
+            raise InputError(
+                f"{column} does not differ between repeats; give measured values, unrounded, or leave it out"
+            )
+        own = run[np.ix_(kept, kept)]
+        left = run[i, i] - run[i, kept] @ np.linalg.solve(own, run[kept, i]) if kept else run[i, i]
+        if left < _OWN * run[i, i]:
+            others = ", ".join(OUTPUTS[outputs[j]][0] for j in kept)
+            follows.append(f"column {column}: follows from {others}, so it is not counted twice")
+        else:
+            kept.append(i)
+    return y[:, kept], tuple(outputs[i] for i in kept), tuple(follows)
+
+
+def _sigmas(good: pd.DataFrame) -> dict[str, float]:
+    """Standard deviations of the way of measuring, the same in all rows.
+
+    Raises:
+        InputError: a column has no number, two different ones, or one that is below 0 or too large.
+    """
+    found = {}
+    for column, (name, factor) in _SIGMAS.items():
+        if column in good:
+            values = np.unique(good[column].to_numpy(dtype=float))
+            if len(values) != 1 or not 0 <= values[0] * factor <= 0.5:
+                raise InputError(f"{column} must be one number, the same in all rows, at least 0 and not large")
+            found[name] = float(values[0] * factor)
+    return found
+
+
+def _limits(tails: Floats, length: Floats, omega: Floats) -> tuple[str, ...]:
+    """Inputs that are the same in all runs, in words."""
+    found = []
+    if np.ptp(tails) == 0:
+        found.append(f"all runs have N = {tails[0]:.0f}: what depends on the number of tails cannot be found")
+    if np.ptp(length) == 0:
+        found.append("all runs have one tail length: what depends on it cannot be found")
+    if np.ptp(np.abs(omega)) < 0.01 * np.abs(omega).max():
+        found.append("all runs have one motor speed: what depends on it cannot be found")
+    return tuple(found)
+
+
+def _noted(good: pd.DataFrame) -> dict[str, Floats]:
+    """Notes that every run has and that differ between runs."""
+    found = {}
+    for column, (name, scale) in {
+        "elapsed_min": ("elapsed_h", 1 / 60),
+        "temperature_C": ("temperature_K", 1.0),
+        "tank_diameter_cm": ("tank_diameter", 0.01),
+    }.items():
+        if column in good:
+            value = good[column].to_numpy(dtype=float) * scale
+            if np.isfinite(value).all() and np.ptp(value) > 0:
+                found[name] = value - value.mean() if name == "temperature_K" else value
+    if "heading_deg" in good:
+        value = np.radians(good["heading_deg"].to_numpy(dtype=float))
+        if np.isfinite(value).all() and np.ptp(value) > 0:
+            found["heading_x"], found["heading_y"] = np.cos(value), np.sin(value)
+    return found
+
+
+def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...]) -> list[str]:
+    reasons = [""] * len(table)
+    used = [*_INPUTS, *(OUTPUTS[name][0] for name in outputs)]
+    sign = np.sign(numbers["omega_rpm"].to_numpy(dtype=float))
+    for column in used:
+        value = numbers[column].to_numpy(dtype=float)
+        for i in np.flatnonzero(~np.isfinite(value)):
+            reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is not a finite number"
+    for i in np.flatnonzero(numbers["N"].to_numpy() % 1 != 0):
+        reasons[i] = reasons[i] or f"N = {table['N'].iloc[i]} is not a whole number"
+    for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s"):
+        if column in used:
+            for i in np.flatnonzero(numbers[column].to_numpy(dtype=float) <= 0):
+                reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is not above 0"
+    for i in np.flatnonzero(sign == 0):
+        reasons[i] = reasons[i] or "omega_rpm = 0"
+    for name in outputs:
+        column, _, expected = OUTPUTS[name]
+        if expected:
+            value = numbers[column].to_numpy(dtype=float)
+            for i in np.flatnonzero(value * sign * expected <= 0):
+                reasons[i] = reasons[i] or f"{column} = {value[i]:g} has the wrong sign for its omega_rpm"
+    return reasons

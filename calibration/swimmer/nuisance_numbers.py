@@ -1,0 +1,98 @@
+"""The swimmer's numbers as given: which they are, how well they are known, and what depends on them.
+
+Those of the robot come from robot.toml. Three belong to the way of measuring and come from the table: the camera's
+scale, the zero of the heading and the tachometer. Each is a parameter with a prior
+(`calibration.statistics.priors`).
+
+A motion depends on the robot through its groups, and on the unit of time μ0 l⁴/EI. Both are products of powers of
+the numbers, so the derivative along a number is a sum over groups with these powers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from calibration.statistics.forward_model import Parameter
+from sim.model.robot import Robot
+
+CAMERA, HEADING, TACHOMETER = "camera_scale", "heading_zero", "tachometer"
+LENGTH = "tail_length_offset"
+TABLE_DEFAULTS = {CAMERA: 0.01, HEADING: math.radians(1.0), TACHOMETER: 0.005}
+
+# Powers of the groups, and of "time", "length" (l) and "ahead" (L/l), in each number. The offset of the tail
+# length changes ln l by 1/l for each metre.
+POWERS: dict[str, dict[str, float]] = {
+    "youngs_modulus": {"omega_bar": -1, "time": -1},
+    "viscosity": {"omega_bar": 1, "time": 1},
+    "tail_radius": {"l_over_r0": -1, "omega_bar": -4, "time": -4},
+    LENGTH: {"l_over_R": 1, "l_over_r0": 1, "omega_bar": 4, "time": 4, "length": 1, "ahead": -1},
+    "head_radius": {"l_over_R": -1, "L_over_R": -1, "a_over_R": -1},
+    "head_length": {"L_over_R": 1, "ahead": 1},
+    "disc_offset": {"a_over_R": 1},
+    TACHOMETER: {"omega_bar": 1},
+    CAMERA: {},
+    HEADING: {},
+}
+GROUPS = ("omega_bar", "l_over_r0", "l_over_R", "L_over_R", "a_over_R")
+_TITLES = {
+    "youngs_modulus": "E (Young's modulus)",
+    "viscosity": "μ0 (viscosity)",
+    "tail_radius": "r0 (radius of the tails' section)",
+    "head_radius": "R (head radius)",
+    "head_length": "L (head length)",
+    "disc_offset": "a (radius of the circle of the clamps)",
+}
+_UNITS = {
+    "youngs_modulus": "Pa", "viscosity": "Pa s", "tail_radius": "m", "head_radius": "m", "head_length": "m",
+    "disc_offset": "m",
+}  # fmt: skip
+_FACTOR = 5.0  # a number may be off by
+
+
+def robot_number(robot: Robot, name: str) -> float:
+    """A number of the robot; a is the head's radius if it is not given."""
+    value = getattr(robot, name)
+    return float(robot.head_radius if value is None else value)
+
+
+def given_numbers(robot: Robot, table: Mapping[str, float], outputs: Sequence[str]) -> tuple[Parameter, ...]:
+    """Every number that is not exact.
+
+    Args:
+        robot: with its standard deviations.
+        table: σ of CAMERA, HEADING [rad] and TACHOMETER.
+        outputs: of the table; what no output shows is left out.
+    """
+    found = []
+    for name, title in _TITLES.items():
+        value = robot_number(robot, name)
+        sigma = robot.sigma(name).of(value) / value
+        bounds = (value / _FACTOR, value * _FACTOR)
+        found.append(Parameter(name, title, value, bounds, 1.0, True, _UNITS[name], sigma))
+    length = robot.sigma("tail_length")
+    size = length.of(robot.tail_length)
+    found.append(
+        Parameter(
+            LENGTH, "l (tail length, all tails alike)", 0.0, (-0.02, 0.02), 1e-3, False, "mm", size, shown=1e3
+        )
+    )
+    own = {**TABLE_DEFAULTS, **table}
+    if {"R_yr", "v"} & set(outputs):
+        found.append(Parameter(CAMERA, "scale of the camera", 1.0, (0.5, 2.0), 1.0, True, "1", own[CAMERA]))
+    if "theta" in outputs:
+        found.append(
+            Parameter(
+                HEADING,
+                "zero of the heading",
+                0.0,
+                (-0.5, 0.5),
+                0.02,
+                False,
+                "°",
+                own[HEADING],
+                shown=180 / math.pi,
+            )
+        )
+    found.append(Parameter(TACHOMETER, "ω (tachometer)", 1.0, (0.5, 2.0), 1.0, True, "1", own[TACHOMETER]))
+    return tuple(one for one in found if one.sigma)

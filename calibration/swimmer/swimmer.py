@@ -1,0 +1,382 @@
+"""The swimming robot as a model for the calibration: the simulator, for any coefficients and influences.
+
+Runs under equal conditions share one simulation. A reversed motor mirrors the motion, unless an odd influence is
+present. Motions are solved directly and extrapolated in the mesh (`sim.motion.orbits`); their errors of a few
+hundredths of a percent are far below those of measurements. Outputs are compared as ln |output|, θ in radians.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from calibration.statistics.forward_model import Parameter, Parameters, Predictive, by_differences
+from calibration.statistics.noise import Noise, repeat_covariance
+from calibration.swimmer.candidate_effects import (
+    CURRENT,
+    SLIP,
+    TRACKED_POINT,
+    Influence,
+    influences,
+    reason_untestable,
+)
+from calibration.swimmer.lab_settings import Owned, check_owned, settings_of
+from calibration.swimmer.measured_table import Measurements
+from calibration.swimmer.nuisance_numbers import (
+    CAMERA,
+    GROUPS,
+    HEADING,
+    LENGTH,
+    POWERS,
+    TACHOMETER,
+    given_numbers,
+    robot_number,
+)
+from calibration.swimmer.observation import Observation
+from calibration.swimmer.unit_checks import check_inputs, check_outputs
+from sim.arrays import Flags, Floats, Integers
+from sim.effects import catalogue
+from sim.io.errors import InputError
+from sim.model.robot import Robot
+from sim.motion.batches import sensitivity_columns, steady_columns
+from sim.motion.sensitivity import Sensitivities
+from sim.solve.refinement import FEW, MANY
+from surrogate.table.lookup import Lookup
+from surrogate.table.model_file import load
+
+if TYPE_CHECKING:
+    from calibration.statistics.fit import Fit
+
+COEFFICIENTS = ("C_t", "C_r", "C_yr")
+SANE = (0.1, 20.0)  # range of the coefficients; at its ends the model lacks something
+
+_STEP = 0.05  # finite-difference step in ln C, with the look-up table
+_MOST_GUESSES = 12
+_STARTS = (1.0, 0.6, 1.6)  # factors on the coefficients as given, for several starts
+_FEWEST_COVERED = 24  # runs
+
+
+class _Run(NamedTuple):
+    """One run: the simulated robot, and how it is observed."""
+
+    robot: Robot
+    sign: float  # direction of the motor
+    point: float  # tracked, head lengths ahead of the head's centre
+    current: float  # of the fluid along the path [m/s]
+
+
+class Solver(NamedTuple):
+    """Functions for motions and derivatives, like `steady_columns` and `sensitivity_columns`."""
+
+    steady: Callable[..., Mapping[str, Floats]]
+    slopes: Callable[..., Sensitivities]
+
+
+DIRECT = Solver(steady_columns, sensitivity_columns)
+
+
+@dataclass(frozen=True)
+class Swimmer:
+    """Predicts the outputs of a table for a robot with given parameters."""
+
+    robot: Robot
+    runs: Measurements
+    jobs: int | None = None
+    solver: Solver = DIRECT
+    own: Owned = field(default_factory=dict)  # settings that the lab has for its next runs
+
+    def __post_init__(self) -> None:
+        """Refuse lengths and speeds that are not possible, before anything is simulated."""
+        check_inputs(self.robot, self.runs)
+        check_owned(self.own)
+
+    @property
+    def coefficients(self) -> tuple[Parameter, ...]:
+        return tuple(Parameter(n, n, float(getattr(self.robot, n)), SANE, 1.0, True) for n in COEFFICIENTS)
+
+    @cached_property
+    def given(self) -> tuple[Parameter, ...]:
+        return given_numbers(self.robot, self.runs.sigmas, self.runs.outputs)
+
+    @cached_property
+    def effects(self) -> tuple[Parameter, ...]:
+        own = self.robot.effects
+        return tuple(
+            replace(i.parameter, start=own.get(name, i.parameter.start)) if i.effect == name else i.parameter
+            for name, i in self._influences.items()
+        )
+
+    @cached_property
+    def untestable(self) -> dict[str, str]:
+        return {i.parameter.title: why for i in influences().values() if (why := self._reason(i))}
+
+    @cached_property
+    def _seconds(self) -> dict[str, Influence]:
+        """Second numbers of effects, by name."""
+        owners = [i for i in self._influences.values() if i.parameter.second]
+        return {i.parameter.second.name: Influence(i.parameter.second, i.parameter.second.name, None, i.odd)
+                for i in owners if i.parameter.second}  # fmt: skip
+
+    @cached_property
+    def _influences(self) -> dict[str, Influence]:
+        return {name: i for name, i in influences().items() if not self._reason(i)}
+
+    def _reason(self, influence: Influence) -> str:
+        both = len(np.unique(np.sign(self.runs.omega))) == 2
+        return reason_untestable(influence, self._drivers, both, self.runs.outputs)
+
+    def predict(self, sets: Sequence[Parameters], *, title: str = "", lookup: Lookup | None = None) -> Floats:
+        """Predictions (P, n, k) for P parameter sets, all simulated together.
+
+        With `lookup` the look-up table is used, not the simulator. That is good for a first guess only, because
+        the errors of the table would look like physics.
+        """
+        parts = [self._conditions(parameters) for parameters in sets]
+        runs = [run for own, _ in parts for run in own]
+        columns = self._columns(runs, sets)
+        camera = np.repeat([p.get(CAMERA, 1.0) for p in sets], [len(own) for own, _ in parts])
+        if lookup is not None:
+            found: Mapping[str, Floats] = lookup.query(columns)
+        else:
+            found = self.solver.steady(columns, jobs=self.jobs, title=title)
+        table = self._observation(runs, camera).see(found)
+        if not np.isfinite(table).all():
+            raise InputError("the simulation of a run broke down; check the robot and the run's motor speed")
+        ends = np.cumsum([len(own) for own, _ in parts])
+        whole = np.array([table[end - len(own) + place] for end, (own, place) in zip(ends, parts, strict=True)])
+        return whole + np.array([self._turned(parameters.get(HEADING, 0.0)) for parameters in sets])
+
+    def derivatives(
+        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
+    ) -> tuple[Floats, Floats]:
+        """Prediction (n, k) and derivatives (n, k, p), by the simulator's own sensitivities.
+
+        If a run has no direct solution: by differences of motions that are stepped in time, or NaN if `quick`.
+        """
+        influences = {name: self._influences.get(name) or self._seconds.get(name) for name in names}
+        odd = any(i is not None and i.odd for i in influences.values())
+        runs, place = self._conditions(parameters, signed=odd)
+        columns = self._columns(runs, [parameters])
+        for second in (i.parameter.second for i in influences.values() if i and i.parameter.second):
+            columns.setdefault(second.name, np.full(len(runs), float(parameters.get(second.name, second.start))))
+        moves = {name: _moves(name, influence) for name, influence in influences.items()}
+        wanted = tuple(dict.fromkeys(move for group in moves.values() for move in group))
+        # Effects at their null may need more phases than the motion; effects that are present have them already.
+        phases = FEW if any(i.effect for i in self._at_work(parameters)) else MANY
+        found = self.solver.slopes(columns, wanted, phases=phases, jobs=self.jobs, title=title)
+        view = self._observation(runs, np.array(parameters.get(CAMERA, 1.0)))
+        J = np.empty((len(self.runs), len(self.runs.outputs), len(names)))
+        for j, (name, influence) in enumerate(influences.items()):
+            if name in POWERS:
+                J[..., j] = self._slope_of_number(name, runs, columns, found, view)[place]
+                if name == HEADING:
+                    J[..., j] += self._turned(1.0)
+                continue
+            at = wanted.index(moves[name][0]) if moves[name] else None
+            motion = {} if at is None else {key: table[:, at] for key, table in found.derivatives.items()}
+            slope = view.slopes(
+                found.values, motion, point=float(name == TRACKED_POINT), current=float(name in CURRENT)
+            )
+            if name == SLIP:
+                slope = slope * (-columns["omega_bar"] / (1 - parameters[SLIP]))[:, None]
+            scale = self._drivers[influence.needs] if influence and influence.needs else np.ones(len(self.runs))
+            J[..., j] = slope[place] * (scale if influence else parameters[name] * scale)[:, None]
+        seen = view.see(found.values)[place] + self._turned(parameters.get(HEADING, 0.0))
+        if not quick and not (np.isfinite(J).all() and np.isfinite(seen).all()):
+            return by_differences(self, parameters, names, title=title)
+        return seen, J
+
+    def _slope_of_number(
+        self, name: str, runs: list[_Run], columns: dict[str, Floats], found: Sensitivities, view: Observation
+    ) -> Floats:
+        """Derivatives (m, k) along a number as given, on its own scale."""
+        by = np.array([1 / run.robot.tail_length if name == LENGTH else 1.0 for run in runs])
+        powers = POWERS[name]
+        motion = {key: np.zeros(len(runs)) for key in found.derivatives}
+        for group in (group for group in powers if group in GROUPS):
+            at = found.parameters.index(group)
+            for key, table in found.derivatives.items():
+                motion[key] += powers[group] * by * columns[group] * table[:, at]
+        scales: dict[str, Floats] = {k: powers[k] * by for k in ("time", "length", "ahead") if k in powers}
+        return view.slopes(found.values, motion, camera=float(name == CAMERA), scales=scales)
+
+    def _turned(self, zero: float) -> Floats:
+        """Change (n, k) of the outputs if the zero of the heading is off: θ grows in one direction of the
+        motor.
+        """
+        found = np.zeros(self.runs.y.shape)
+        if "theta" in self.runs.outputs:
+            found[:, self.runs.outputs.index("theta")] = zero * np.sign(self.runs.omega)
+        return found
+
+    def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
+        """Coefficients fitted with the look-up table to the runs that it covers; `start` if those are too few.
+
+        Of several starts, the one that ends nearest to the runs is taken.
+        """
+        lookup = load()
+        covered = used & self._inside(lookup, start)
+        if covered.sum() < _FEWEST_COVERED:
+            return dict(start)
+        part = replace(self, runs=self.runs.subset(covered))
+        found = [
+            part._fit_lookup(lookup, {**start, **{n: factor * start[n] for n in COEFFICIENTS}})
+            for factor in _STARTS
+        ]
+        return min(found, key=lambda pair: pair[1])[0]
+
+    def _fit_lookup(self, lookup: Lookup, start: dict[str, float]) -> tuple[dict[str, float], float]:
+        """Coefficients from one start, and the sum of squares that they leave; infinite off the table."""
+        data, parameters, left = self.runs, dict(start), math.inf
+        whiten = Noise(repeat_covariance(data.y, data.condition), 0.0).whitener(data.session)
+        for _ in range(_MOST_GUESSES):
+            moved = [{**parameters, name: parameters[name] * math.exp(_STEP)} for name in COEFFICIENTS]
+            try:
+                found = self.predict([parameters, *moved], lookup=lookup)
+            except InputError:  # a coefficient left the table's domain on the way
+                return start, math.inf
+            J = whiten(np.moveaxis(found[1:] - found[0], 0, -1) / _STEP)
+            residual = whiten(data.y - found[0])
+            left = float(residual @ residual)
+            step: Floats = np.asarray(np.linalg.lstsq(J, residual, rcond=None)[0])
+            if np.abs(step).max() < 1e-3:
+                break
+            for name, change in zip(COEFFICIENTS, np.clip(step, -0.7, 0.7).tolist(), strict=True):
+                parameters[name] = min(max(parameters[name] * math.exp(change), SANE[0]), SANE[1])
+        return parameters, left
+
+    def check(self, prediction: Floats) -> None:
+        """Refuse a table whose units cannot be those that its columns name."""
+        check_outputs(self.runs, prediction)
+
+    def possible(self) -> tuple[Swimmer, list[dict[str, Any]]]:
+        """Runs that can be made next (`calibration.swimmer.lab_settings`)."""
+        runs, grid = self.runs, settings_of(self.runs, self.own)
+        count = len(grid)
+        noted = np.tile(runs.noted.mean(0), (count, 1))
+        settings = [{"N": int(n), "l_cm": length, "omega_rpm": speed} for n, length, speed in grid.tolist()]
+        own = replace(
+            runs, y=np.zeros((count, len(runs.outputs))),
+            condition=np.arange(count), session=np.zeros(count, int),
+            session_names=("next",), inputs=np.zeros((count, runs.inputs.shape[1])), set_aside=(),
+            rows=np.arange(count), limits=(), tails=grid[:, 0], length=grid[:, 1] / 100,
+            omega=grid[:, 2] * math.pi / 30, noted=noted,
+        )  # fmt: skip
+        return replace(self, runs=own), settings
+
+    def robots(self, parameters: Parameters) -> tuple[list[Robot], Integers]:
+        """The robots that are simulated for the runs at `parameters`, and the place of each run among them."""
+        runs, place = self._conditions(parameters)
+        return [run.robot for run in runs], place
+
+    def predictive(self, base: Fit, used: Flags, rows: Flags, test: Flags) -> Predictive | None:
+        """A correction of the head's load (`calibration.swimmer.head_correction`)."""
+        from calibration.swimmer.head_correction import predictive
+
+        return predictive(self, base, used, rows, test)
+
+    def _inside(self, lookup: Lookup, parameters: Parameters) -> Flags:
+        """Which runs (n,) the look-up table covers at `parameters`."""
+        runs, place = self._conditions(parameters)
+        good = np.ones(len(runs), dtype=bool)
+        for i, run in enumerate(runs):
+            for name, value in run.robot.group_values().items():
+                low, high = lookup.domain.get(name, (0.0, 0.0))
+                good[i] &= low * (1 - 1e-9) <= abs(value) <= high * (1 + 1e-9)
+        return np.asarray(good[place])
+
+    def _at_work(self, parameters: Parameters) -> list[Influence]:
+        """Influences that are not at their null."""
+        found = [i for name, i in self._influences.items() if name in parameters]
+        return [i for i in found if parameters[i.name] != i.parameter.start]
+
+    @cached_property
+    def _drivers(self) -> dict[str, Floats]:
+        """What drives influences, of every run (n,)."""
+        found = dict(zip(self.runs.noted_names, self.runs.noted.T, strict=True))
+        if "tank_diameter" in found:
+            found["head_over_tank"] = 2 * self.robot.head_radius / found["tank_diameter"]
+        return found
+
+    def _conditions(self, parameters: Parameters, *, signed: bool = False) -> tuple[list[_Run], Integers]:
+        """Runs that must be simulated at `parameters`, without duplicates, and the place of each run among them.
+
+        The motor's direction matters if something odd is present, or if `signed`.
+        """
+        runs, work = self.runs, self._at_work(parameters)
+        signed |= any(i.odd for i in work) or any(catalogue()[e].symmetry == "odd" for e in self.robot.effects)
+        omega = runs.omega if signed else np.abs(runs.omega)
+        drivers = [self._drivers[need] for need in dict.fromkeys(i.needs for i in work if i.needs)]
+        table = np.column_stack([runs.tails, runs.length, omega, *drivers]).round(9)
+        _, first, place = np.unique(table, axis=0, return_index=True, return_inverse=True)
+        return [self._run(parameters, int(row), float(omega[row])) for row in first], place.reshape(-1)
+
+    def _run(self, parameters: Parameters, row: int, omega: float) -> _Run:
+        effects, current = dict(self.robot.effects), 0.0
+        for influence in self._at_work(parameters):
+            by = parameters[influence.name] - influence.parameter.start
+            before = influence.parameter.start
+            if influence.needs is not None:
+                by *= float(self._drivers[influence.needs][row])
+                before = self.robot.effects.get(influence.effect or "", before)
+            if influence.effect is not None:
+                effects[influence.effect] = before + by
+                if second := influence.parameter.second:
+                    effects[second.name] = parameters.get(second.name, second.start)
+            elif influence.name in CURRENT:
+                current += by
+        robot = replace(
+            self.robot, **robot_numbers(self.robot, parameters), tails=int(self.runs.tails[row]),
+            tail_length=float(self.runs.length[row]) + parameters.get(LENGTH, 0.0),
+            motor_speed=abs(omega) * parameters.get(TACHOMETER, 1.0) * (1 - parameters.get(SLIP, 0.0)),
+            effects=effects,
+        )  # fmt: skip
+        return _Run(robot, math.copysign(1.0, omega), parameters.get(TRACKED_POINT, 0.0), current)
+
+    def _columns(self, runs: list[_Run], sets: Sequence[Parameters]) -> dict[str, Floats]:
+        """Runs as columns for the simulator, with every effect that is present in any of the sets."""
+        work = [i for parameters in sets for i in self._at_work(parameters)]
+        names = {i.effect for i in work if i.effect} | {
+            i.parameter.second.name for i in work if i.parameter.second
+        }
+        nulls = {name: catalogue()[name].null for name in sorted(names)}
+        rows = [{**nulls, **run.robot.group_values()} for run in runs]
+        columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        columns["omega_bar"] = columns["omega_bar"] * np.array([run.sign for run in runs])
+        return columns
+
+    def _observation(self, runs: list[_Run], camera: Floats) -> Observation:
+        return Observation(
+            self.runs.outputs,
+            time=np.array([run.robot.time_scale for run in runs]),
+            length=np.array([run.robot.tail_length for run in runs]),
+            ahead=np.array([run.robot.head_length / run.robot.tail_length for run in runs]),
+            point=np.array([run.point for run in runs]),
+            current=np.array([run.current for run in runs]),
+            camera=camera,
+        )
+
+
+def _moves(name: str, influence: Influence | None) -> tuple[str, ...]:
+    """The simulator's parameters that a parameter of the calibration changes; none if it acts on what is seen."""
+    if name in POWERS:
+        return tuple(group for group in POWERS[name] if group in GROUPS)
+    if influence is None:
+        return (name,)
+    if name == SLIP:
+        return ("omega_bar",)
+    return (influence.effect,) if influence.effect else ()
+
+
+def robot_numbers(robot: Robot, parameters: Parameters) -> dict[str, Any]:
+    """Fitted coefficients and numbers of the robot, by field; a is kept where R changes."""
+    own: dict[str, Any] = {name: float(parameters[name]) for name in COEFFICIENTS}
+    for name in POWERS:
+        if hasattr(robot, name):
+            own[name] = float(parameters.get(name, robot_number(robot, name)))
+    return own

@@ -1,0 +1,1 @@
+"""The verdict of a calibration, and the next runs."""

@@ -1,0 +1,146 @@
+"""Which runs to make next, so that effects can be told apart.
+
+Effects A, B, … may explain the runs equally well and predict different outputs at other inputs. If A is true, new
+runs add
+
+    λ_AB = dᵀ (Σ + J Cov Jᵀ)⁻¹ d,   d = f_A − f_B
+
+to the difference of χ² between B and A. Σ is the covariance of the new runs, which are one session
+(`calibration.statistics.noise`). J and Cov are the derivatives of B and the covariance of its fit, because B can
+be fitted again (T-optimal design, linearised). There is a λ for every two rivals, both ways; for single runs the
+smallest counts. How often the runs decide is found by drawing them at random. Source: Atkinson and Fedorov (1975).
+
+A batch is chosen one run after the other. With equal odds the wrong one of two is chosen with the probability
+Φ(−√λ/2); the run is taken that makes the sum of these over all pairs least. `calibration.verdict.sequential_test`
+judges the runs once they are made: an explanation is given up where the best one is `STOP` times as likely.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.special import ndtr
+
+from calibration.statistics.fit import Fit
+from calibration.statistics.forward_model import Model
+from calibration.statistics.noise import Noise
+from sim.arrays import Floats
+
+STOP = 25.0  # ratio of likelihoods at which an explanation is given up, 1/α of the sequence of batches
+GIVEN_UP = 2 * math.log(STOP)  # the same as a difference of deviances
+BATCH = 8  # runs
+_DRAWS = 4000
+_DECIDES = 3.84  # difference of χ² at which one of the two is chosen
+_WANTED = 0.9  # share of draws that should decide
+_MOST_REPEATS = 16
+_MOST_RIVALS = 4
+
+
+@dataclass(frozen=True)
+class NextRun:
+    """An experiment, and how well it tells the rivals apart, for the two that it tells apart least."""
+
+    settings: dict[str, Any]
+    repeats: int
+    separation: float  # λ of all repeats
+    decides: float  # share of draws in which the true one is chosen
+
+    def record(self) -> dict[str, Any]:
+        return {
+            **self.settings,
+            "repeats": self.repeats,
+            "separation": round(self.separation, 2),
+            "decides": round(self.decides, 3),
+        }
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Runs to make next, all together, to tell rivals apart."""
+
+    settings: tuple[dict[str, Any], ...]  # of each run; the same settings may come more than once
+    separation: float  # λ of the batch, for the two rivals that it tells apart least
+    decides: float  # share of draws in which the true one of these two is chosen
+    stop: float  # difference of deviances on the new runs at which to stop
+
+    def record(self) -> dict[str, Any]:
+        return {
+            "runs": list(self.settings),
+            "separation": round(self.separation, 2),
+            "decides": round(self.decides, 3),
+            "stop_at_deviance": round(self.stop, 2),
+        }
+
+
+class Pair(NamedTuple):
+    """A true rival and a wrong one that is fitted again."""
+
+    difference: Floats  # of their predictions, (m, k)
+    J: Floats  # (m, k, p) derivatives of the wrong one
+    covariance: Floats  # (p, p) of its fit
+
+
+def next_runs(
+    model: Model, rivals: Sequence[Fit], *, count: int = 3, seed: int = 0
+) -> tuple[list[NextRun], Batch]:
+    """The best experiments to tell fits apart, best first, and the best batch of `BATCH` runs.
+
+    Args:
+        rivals: two fits or more, the best first; of many, the first four are told apart.
+    """
+    possible, settings = model.possible()
+    fits = rivals[:_MOST_RIVALS]
+    sides = [possible.derivatives(one.parameters, one.names) for one in fits]
+    pairs = [
+        Pair(true[0] - wrong[0], wrong[1], again.covariance)
+        for (_, true), (again, wrong) in itertools.permutations(zip(fits, sides, strict=True), 2)
+    ]
+    noise = Noise(np.mean([one.noise.run for one in fits], 0), float(np.mean([one.noise.share for one in fits])))
+    alone = np.array([_together(pairs, noise, [place]).min() for place in range(len(settings))])
+    found = []
+    rng = np.random.default_rng(seed)
+    for place in np.argsort(-alone)[:count].tolist():
+        for repeats in (1, 2, 4, 8, _MOST_REPEATS):
+            strength = float(_together(pairs, noise, [place] * repeats).min())
+            decides = _decides(strength, rng)
+            if decides >= _WANTED:
+                break
+        found.append(NextRun(settings[place], repeats, strength, decides))
+    chosen, strength = _greedy(pairs, noise)
+    batch = tuple(settings[place] for place in chosen)
+    return found, Batch(batch, strength, _decides(strength, rng), GIVEN_UP)
+
+
+def _decides(strength: float, rng: np.random.Generator) -> float:
+    """Share of draws in which the true one is chosen; χ² of the wrong one over it is λ + 2 √λ z."""
+    draws = strength + 2 * np.sqrt(strength) * rng.normal(size=_DRAWS)
+    return float((draws > _DECIDES).mean())
+
+
+def _greedy(pairs: Sequence[Pair], noise: Noise) -> tuple[list[int], float]:
+    """Places of `BATCH` runs, and the smallest λ of them together."""
+    chosen: list[int] = []
+    strengths = np.zeros(len(pairs))
+    for _ in range(BATCH):
+        tried = [_together(pairs, noise, [*chosen, place]) for place in range(len(pairs[0].difference))]
+        wrong = [float(ndtr(-np.sqrt(one) / 2).sum()) for one in tried]
+        place = int(np.argmin(wrong))
+        strengths = tried[place]
+        chosen.append(place)
+    return sorted(chosen), float(strengths.min())
+
+
+def _together(pairs: Sequence[Pair], noise: Noise, places: list[int]) -> Floats:
+    """λ of several runs made together, for every pair."""
+    spread = noise.covariance(np.zeros(len(places), dtype=np.int64))  # one session
+    found = []
+    for pair in pairs:
+        slopes = pair.J[places].reshape(-1, pair.J.shape[-1])
+        d = pair.difference[places].ravel()
+        found.append(float(d @ np.linalg.solve(spread + slopes @ pair.covariance @ slopes.T, d)))
+    return np.array(found)

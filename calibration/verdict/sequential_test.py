@@ -1,0 +1,146 @@
+"""Which of several explanations new runs speak for: the sequential use of a batch of next runs.
+
+Each explanation was fitted before the new runs were made, and gives them a density: Gaussian about its prediction,
+with covariance Σ + J Cov Jᵀ. Σ is the noise of runs and sessions, J Cov Jᵀ the error of the fit. The ratio of two
+densities, of all new runs together, is an e-value. If one of the two is true, the ratio of the other to it exceeds
+`discriminate.STOP` with a probability of at most 1/STOP, however often one looks (Ville 1939). So an explanation
+is given up if it is behind the best one by more than 2 ln STOP. Source: Grünwald, de Heide and Koolen (2024).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calibration.statistics.fit import Fit
+from calibration.statistics.forward_model import Model, Runs, start_values
+from calibration.statistics.noise import Noise
+from calibration.verdict.next_runs import GIVEN_UP
+from sim.arrays import Flags, Floats
+from sim.io.errors import InputError
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A fitted model that explains a table, as verdict.json keeps it."""
+
+    title: str
+    parameters: dict[str, float]  # all that are fitted
+    covariance: Floats  # (p, p) of them
+    noise: Noise
+    outputs: tuple[str, ...]  # (k,) that were fitted
+
+    @staticmethod
+    def of(title: str, fitted: Fit, outputs: tuple[str, ...]) -> Explanation:
+        parameters = {name: fitted.parameters[name] for name in fitted.names}
+        return Explanation(title, parameters, fitted.covariance, fitted.noise, outputs)
+
+    def record(self) -> dict[str, Any]:
+        """For verdict.json."""
+        return {
+            "title": self.title,
+            "parameters": self.parameters,
+            "covariance": self.covariance.tolist(),
+            "noise_of_a_run": self.noise.run.tolist(),
+            "share_of_sessions": self.noise.share,
+            "outputs": list(self.outputs),
+        }
+
+    @staticmethod
+    def read(record: dict[str, Any]) -> Explanation:
+        """From verdict.json."""
+        return Explanation(
+            record["title"],
+            record["parameters"],
+            np.array(record["covariance"]),
+            Noise(np.array(record["noise_of_a_run"]), record["share_of_sessions"]),
+            tuple(record["outputs"]),
+        )
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How far an explanation is behind the best one on the new runs."""
+
+    title: str
+    behind: float  # 2 ln of the ratio of the densities
+
+    @property
+    def given_up(self) -> bool:
+        return self.behind > GIVEN_UP
+
+
+def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
+    """Explanations that the runs of a verdict.json could not tell apart, and the sessions of these runs.
+
+    Raises:
+        InputError: no such file, or its verdict has nothing to decide.
+    """
+    try:
+        record = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from None
+    except ValueError:
+        raise InputError(f"{path} is not a verdict.json") from None
+    if not isinstance(record, dict) or not record.get("explanations"):
+        raise InputError(f"{path}: this verdict has no two explanations between which new runs could decide")
+    try:
+        return [Explanation.read(one) for one in record["explanations"]], set(record["sessions"])
+    except (KeyError, TypeError, ValueError):
+        raise InputError(f"{path} is no verdict.json of this version: close the table again") from None
+
+
+def new_runs(runs: Runs, before: set[str]) -> Flags:
+    """Runs (n,) of sessions that were not there before.
+
+    Raises:
+        InputError: there are none.
+    """
+    new = np.array([runs.session_names[s] not in before for s in runs.session])
+    if not new.any():
+        raise InputError(
+            "all sessions of this table were there before; give the new runs a session of their own "
+            "(column session)"
+        )
+    return new
+
+
+def standings(model: Model, explanations: Sequence[Explanation], new: Flags) -> list[Standing]:
+    """How explanations stand after the new runs in `new` (n,), best first.
+
+    Raises:
+        InputError: the table has other outputs than were fitted, or lacks what an effect needs.
+    """
+    data, known = model.runs, start_values(model)
+    scores = []
+    for one in explanations:
+        if one.outputs != data.outputs:
+            raise InputError(
+                f"this table has the outputs {', '.join(data.outputs)}; the verdict was made from "
+                f"{', '.join(one.outputs)}"
+            )
+        missing = [name for name in one.parameters if name not in known]
+        if missing:
+            raise InputError(
+                f"{one.title}: these runs cannot test {', '.join(missing)}; keep every column of the table before"
+            )
+        prediction, J = model.derivatives({**known, **one.parameters}, list(one.parameters))
+        slopes = J[new].reshape(-1, J.shape[-1])
+        spread = one.noise.covariance(data.session[new]) + slopes @ one.covariance @ slopes.T
+        left = (data.y - prediction)[new].ravel()
+        scores.append(float(left @ np.linalg.solve(spread, left) + np.linalg.slogdet(spread)[1]))
+    found = [Standing(one.title, score - min(scores)) for one, score in zip(explanations, scores, strict=True)]
+    return sorted(found, key=lambda s: s.behind)
+
+
+def sentence(found: Sequence[Standing]) -> str:
+    """What to do now."""
+    left = [s.title for s in found if not s.given_up]
+    if len(left) == 1:
+        return f"Decided: {left[0]}. The next step is to close the loop with all runs."
+    return f"Not decided between {' and '.join(left)}: make more runs."

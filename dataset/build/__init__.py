@@ -1,0 +1,1 @@
+"""A sweep, from its design to a finished data set."""

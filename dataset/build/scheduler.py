@@ -1,0 +1,143 @@
+"""The engine of a sweep: hands chunks to a backend until all are stored, whatever happens to its workers.
+
+A chunk whose worker dies is tried again; one that kills THREE workers is set aside and named, and so is one
+that ends with an error; the other chunks go on. Where no worker is there for PATIENCE seconds, the storage
+refuses, or a worker has other code, the sweep ends with one line; what is stored stays stored.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from tqdm import tqdm
+
+from dataset.storage.storage import StorageError
+from dataset.workers.open_backend import GONE, KILLER, LOST, Backend
+from dataset.workers.tasks import Receipt, Refusal, Work
+from sim.io.errors import InputError
+
+KILLS = 3  # dead workers after which a chunk is set aside
+PATIENCE = 60.0  # seconds without any worker
+_POLL = 0.2  # seconds
+
+
+class NoWorkersError(RuntimeError):
+    """No workers for too long."""
+
+
+@dataclass
+class Result:
+    """What came of a sweep's chunks."""
+
+    receipts: list[Receipt] = field(default_factory=list)
+    set_aside: list[tuple[Work, str]] = field(default_factory=list)  # with the reason
+
+
+class Progress:
+    """A line on stderr: rows, rows a second, time left, failures so far.
+
+    Chunks are runs of a low-discrepancy sequence, so each has its share of robots that take long. The time left
+    is what a row has cost its worker so far, times the rows left, over the workers.
+    """
+
+    def __init__(self, title: str, rows: int, *, done: int, failed: int):
+        self.total, self.rows = rows, done
+        self._title, self._before, self._failed, self._cost = title, done, failed, 0.0
+        self._began = self._shown = time.monotonic()
+        self._bar: tqdm[Any] = tqdm(
+            total=rows, initial=done, bar_format="{desc} |{bar:20}|", delay=1.0, disable=not title
+        )
+
+    @property
+    def simulated(self) -> int:
+        """Rows that this run has added."""
+        return self.rows - self._before
+
+    def add(self, receipt: Receipt) -> None:
+        """A chunk is stored."""
+        count = receipt.contents.stop - receipt.contents.start
+        self.rows += count
+        self._cost += receipt.seconds
+        self._failed += receipt.contents.failed
+        self._bar.n = self.rows
+
+    def show(self, workers: int, *, now: bool = False) -> None:
+        """Renew the line, once a second."""
+        if time.monotonic() - self._shown < 1 and not now:
+            return
+        self._shown = time.monotonic()
+        new = self.simulated
+        words = f"{self._title}: {self.rows}/{self.total} rows"
+        if new:
+            left = (self.total - self.rows) * self._cost / new / max(workers, 1)
+            words += f", {new / (self._shown - self._began):.3g} rows/s, {duration(left)} left"
+        self._bar.set_description_str(
+            f"{words}, {self._failed} failed{'' if workers else ', waiting for workers'}"
+        )
+
+    def close(self) -> None:
+        """End the line."""
+        self.show(1, now=True)
+        self._bar.close()
+
+
+def duration(seconds: float) -> str:
+    """A time in words."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
+
+
+def run(
+    tasks: Sequence[Work],
+    backend: Backend,
+    progress: Progress,
+    *,
+    then: Callable[[Work, Receipt], None] = lambda *_: None,
+) -> Result:
+    """Run all tasks.
+
+    Args:
+        then: called with each task as soon as it is done.
+
+    Raises:
+        NoWorkersError: nobody works for PATIENCE seconds.
+        StorageError: the storage refuses.
+        InputError: a worker has another version of the code.
+    """
+    result, kills = Result(), Counter[int]()
+    waiting, under_way = deque(range(len(tasks))), set[int]()
+    last_seen = time.monotonic()
+    while waiting or under_way:
+        slots = backend.slots()
+        if slots:
+            last_seen = time.monotonic()
+        elif time.monotonic() - last_seen > PATIENCE:
+            raise NoWorkersError(f"no workers for {PATIENCE:.0f} s")
+        while waiting and len(under_way) < slots:
+            number = waiting.popleft()
+            backend.submit(number, tasks[number])
+            under_way.add(number)
+        for number, outcome in backend.collect(_POLL):
+            under_way.discard(number)
+            if isinstance(outcome, Receipt):
+                result.receipts.append(outcome)
+                progress.add(outcome)
+                then(tasks[number], outcome)
+            elif isinstance(outcome, Refusal):
+                if outcome.kind == "error":
+                    result.set_aside.append((tasks[number], outcome.message))
+                else:
+                    raise (StorageError if outcome.kind == "storage" else InputError)(outcome.message)
+            else:
+                kills[number] += {LOST: 1, KILLER: KILLS, GONE: 0}[outcome]
+                if kills[number] < KILLS:
+                    waiting.appendleft(number)
+                else:
+                    result.set_aside.append((tasks[number], f"its worker died {KILLS} times"))
+        progress.show(slots)
+    return result

@@ -1,0 +1,100 @@
+"""A dask cluster, by its own client: a running scheduler's address, or workers started on this machine."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+from typing import Any
+
+import dask
+from distributed import Client, Future, KilledWorker, LocalCluster
+
+from dataset.workers.open_backend import GONE, KILLER, Lost
+from dataset.workers.tasks import Outcome, Refusal, Work, run_task
+from sim.io.errors import InputError
+
+ADDRESS = "DASK_SCHEDULER_ADDRESS"
+_ANSWERS = 10.0  # seconds that a scheduler may take to answer at the start
+_LOOKED = 1.0  # seconds between two looks at the workers
+_SETTINGS = {
+    "distributed.scheduler.allowed-failures": 2,  # of a local cluster: the third death of a worker is the last
+    "distributed.comm.timeouts.connect": "10s",
+}
+
+
+class DaskCluster:
+    """Workers of a dask scheduler."""
+
+    def __init__(self, address: str | None, count: int):
+        address = address or os.environ.get(ADDRESS)
+        for name in ("distributed", "distributed.client", "distributed.scheduler", "distributed.nanny", "tornado"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters is said by this program
+        self._cluster: Any = None
+        try:
+            with dask.config.set(_SETTINGS):
+                if address is None:
+                    self._cluster = LocalCluster(
+                        n_workers=count, threads_per_worker=1, dashboard_address=None, memory_limit=0
+                    )
+                self._client = Client(self._cluster or address, timeout=_ANSWERS, set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as refusal:
+            raise InputError(
+                f"no dask scheduler answers at {address} ({str(refusal).splitlines()[0]}); start one with "
+                "dask scheduler, or give its address as tcp://host:port"
+            ) from None
+        self._busy: dict[Future, int] = {}
+        self._looked, self._slots = 0.0, 0
+
+    def slots(self) -> int:
+        """Threads of the workers that the scheduler knows now."""
+        if time.monotonic() - self._looked > _LOOKED:
+            try:
+                threads = self._client.sync(self._client.scheduler.ncores, callback_timeout=2)
+                self._slots = sum(threads.values())
+            except Exception:  # whatever a connection can say: nobody is there
+                self._slots = 0
+            self._looked = time.monotonic()
+        return self._slots
+
+    def submit(self, number: int, task: Work) -> None:
+        """Hand a task to the scheduler."""
+        self._busy[self._client.submit(run_task, task, pure=False)] = number
+
+    def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
+        """What has ended."""
+        until = time.monotonic() + seconds
+        while not any(future.done() for future in self._busy) and time.monotonic() < until:
+            time.sleep(0.02)
+        ended: list[tuple[int, Outcome | Lost]] = []
+        for future in [future for future in self._busy if future.done()]:
+            number = self._busy.pop(future)
+            ended.append((number, _outcome(future)))
+        return ended
+
+    def stop(self) -> None:
+        """Forget the tasks under way and leave."""
+
+        def leave() -> None:
+            self._client.cancel(list(self._busy), force=True)
+            self._client.close(timeout=1)
+            if self._cluster is not None:
+                self._cluster.close(timeout=1)
+
+        leaving = threading.Thread(target=leave, daemon=True)  # a scheduler that is gone keeps nobody waiting
+        leaving.start()
+        leaving.join(timeout=1.5)
+
+
+def _outcome(future: Future) -> Outcome | Lost:
+    if future.status not in ("finished", "error"):  # cancelled or lost with its scheduler
+        return GONE
+    try:
+        return future.result(timeout=_ANSWERS)
+    except KilledWorker:
+        return KILLER
+    except ImportError as missing:
+        return Refusal("code", f"a worker cannot load this package ({missing}); install it there", "a dask worker")
+    except Exception:  # its worker ended after it had finished
+        return GONE

@@ -1,0 +1,97 @@
+"""Processes of this machine, by joblib's loky: one executor a worker.
+
+With one executor for all workers the death of one breaks all of them, and nobody knows which task killed it.
+With one each, only the dead one is replaced, and its task is known.
+
+Workers are forked from a process that has loaded the simulator and its machine code (a fork server), so that a
+worker more costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager
+from types import ModuleType
+from typing import Any
+
+from joblib.externals.loky import ProcessPoolExecutor
+
+from dataset.workers.open_backend import LOST, Lost
+from dataset.workers.tasks import Outcome, Work, run_task
+
+
+class Processes:
+    """Workers on this machine."""
+
+    def __init__(self, count: int):
+        self._context = multiprocessing.get_context("forkserver")
+        self._context.set_forkserver_preload(["dataset.workers.warm"])
+        self._free: list[Any] = [None] * count  # executors; None: not started yet
+        self._count = count
+        self._busy: dict[Future[Outcome], tuple[int, Any]] = {}
+
+    def slots(self) -> int:
+        """Workers; a dead one is replaced."""
+        return self._count
+
+    def submit(self, number: int, task: Work) -> None:
+        """Hand a task to a free worker."""
+        executor = self._free.pop()
+        with _apart():
+            if executor is None:
+                executor = ProcessPoolExecutor(1, timeout=None, context=self._context, initializer=_begin)
+            self._busy[executor.submit(run_task, task)] = (number, executor)
+
+    def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
+        """What has ended."""
+        ended: list[tuple[int, Outcome | Lost]] = []
+        for future in wait(self._busy, timeout=seconds, return_when=FIRST_COMPLETED).done:
+            number, executor = self._busy.pop(future)
+            if future.exception() is None:
+                ended.append((number, future.result()))
+                self._free.append(executor)
+            else:
+                ended.append((number, LOST))
+                executor.shutdown(wait=False, kill_workers=True)
+                self._free.append(None)
+        return ended
+
+    def stop(self) -> None:
+        """Kill the workers."""
+        executors = [executor for _, executor in self._busy.values()] + [e for e in self._free if e is not None]
+        for executor in executors:
+            for process in list((executor._processes or {}).values()):
+                process.kill()
+        for executor in executors:  # wait, since a thread that dies with the program leaves semaphores behind
+            executor.shutdown(wait=True, kill_workers=True)
+        self._busy, self._free = {}, []
+
+
+@contextmanager
+def _apart() -> Iterator[None]:
+    """Processes that start inside do not run the user's script again, and do not see Ctrl-C, which is for us."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    script, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _begin() -> None:
+    """In a worker: end when the process that uses it does, however that ends."""
+    user = multiprocessing.parent_process()
+
+    def watch() -> None:
+        if user is not None:
+            user.join()
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

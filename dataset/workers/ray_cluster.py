@@ -1,0 +1,94 @@
+"""A ray cluster, by its own tasks: a running head's address (RAY_ADDRESS), or one started on this machine."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from typing import Any
+
+import ray
+from ray import exceptions
+
+from dataset.workers.open_backend import GONE, LOST, Lost
+from dataset.workers.tasks import Outcome, Refusal, Work, run_task
+from sim.io.errors import InputError
+
+ADDRESS = "RAY_ADDRESS"
+_LOOKED = 1.0  # seconds between two looks at the workers
+
+
+class RayCluster:
+    """Workers of a ray cluster."""
+
+    def __init__(self, address: str | None, count: int):
+        address = address or os.environ.get(ADDRESS)
+        self._head = _head(address)
+        os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+        if self._head and not self._answers():
+            raise InputError(
+                f"no ray cluster answers at {address}; start one with ray start --head, or give host:port"
+            )
+        settings: dict[str, Any] = {"address": address} if address else {"address": "local", "num_cpus": count}
+        try:
+            ray.init(**settings, log_to_driver=False, logging_level="CRITICAL", include_dashboard=None)
+        except (ConnectionError, RuntimeError, ValueError, OSError) as refusal:
+            raise InputError(f"no ray cluster at {address} ({str(refusal).splitlines()[0]})") from None
+        self._run = ray.remote(num_cpus=1, max_retries=0)(run_task)
+        self._busy: dict[Any, int] = {}
+        self._looked, self._slots = 0.0, 0
+
+    def slots(self) -> int:
+        """Processors of the nodes that live."""
+        if time.monotonic() - self._looked > _LOOKED:
+            there = not self._head or self._answers()
+            self._slots = int(ray.cluster_resources().get("CPU", 0)) if there else 0
+            self._looked = time.monotonic()
+        return self._slots
+
+    def submit(self, number: int, task: Work) -> None:
+        """Hand a task to the cluster."""
+        self._busy[self._run.remote(task)] = number
+
+    def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
+        """What has ended."""
+        if self._head and not self._slots:
+            time.sleep(seconds)  # ray waits for a lost head without limit
+            return []
+        if not self._busy:
+            time.sleep(seconds)
+            return []
+        done, _ = ray.wait(list(self._busy), num_returns=1, timeout=seconds)
+        return [(self._busy.pop(reference), _outcome(reference)) for reference in done]
+
+    def stop(self) -> None:
+        """Cancel the tasks under way and leave."""
+        if self._slots:
+            for reference in self._busy:
+                ray.cancel(reference, force=True)
+            ray.shutdown()
+
+    def _answers(self) -> bool:
+        try:
+            with socket.create_connection(self._head, timeout=1):  # type: ignore[arg-type]
+                return True
+        except OSError:
+            return False
+
+
+def _outcome(reference: Any) -> Outcome | Lost:
+    try:
+        return ray.get(reference)
+    except exceptions.WorkerCrashedError:
+        return LOST
+    except (exceptions.RayTaskError, exceptions.RaySystemError) as error:  # `run_task` itself raises nothing
+        words = str(error).strip().splitlines()[-1]
+        return Refusal("code", f"a worker cannot load this package ({words}); install it there", "a ray worker")
+    except exceptions.RayError:
+        return GONE
+
+
+def _head(address: str | None) -> tuple[str, int] | None:
+    """Host and port of a head's address; None where ray finds it by itself."""
+    host, _, port = (address or "").removeprefix("ray://").rpartition(":")
+    return (host, int(port)) if host and port.isdigit() else None

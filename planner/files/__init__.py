@@ -1,0 +1,1 @@
+"""What a plan is written to and read from."""

@@ -1,0 +1,85 @@
+"""Regions as words of a command or as files, and the files of a plan from pose to pose."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from planner.files.plan_files import write_plan
+from planner.goal.obstacles import Circle, Polygon, Region
+from planner.goal.to_goal import Voyage
+from planner.paths.path_files import read_path
+from planner.paths.units import in_tails
+from sim.io.errors import InputError
+from sim.io.files import whole_file, write_text
+from sim.model.robot import Robot
+
+FORMAT = 1
+_SHAPES = {"circle": "circle:X,Y,RADIUS", "box": "box:LEFT,LOW,RIGHT,HIGH"}
+
+
+def read_region(words: str, unit: str, robot: Robot) -> Region:
+    """A region in tail lengths.
+
+    Args:
+        words: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG with a closed outline.
+        unit: of the numbers: "l", "m", "cm" or "mm"; a drawing with physical units has its own.
+        robot: its tail length.
+
+    Raises:
+        InputError: the words are no region.
+    """
+    scale = in_tails(unit, robot)
+    shape, _, numbers = words.partition(":")
+    if shape in _SHAPES and numbers:
+        try:
+            values = [scale * float(number) for number in numbers.split(",")]
+        except ValueError:
+            values = []
+        if shape == "circle" and len(values) == 3:
+            return Circle(*values)
+        if shape == "box" and len(values) == 4:
+            left, low, right, high = values
+            return Polygon.of([[left, low], [right, low], [right, high], [left, high]])
+        raise InputError(f"{words!r}; write {_SHAPES[shape]}")
+    drawing = read_path(words, closed=True)
+    own = scale if drawing.unit is None else drawing.unit / robot.tail_length
+    return Polygon.of(drawing.path.scaled(own))
+
+
+def write_voyage(voyage: Voyage, folder: str | Path) -> list[Path]:
+    """The files of the plan, goal.json with goal and regions, and a picture of all; returns their paths."""
+    from planner.files.pictures import draw_voyage
+
+    paths = write_plan(voyage.plan, folder)
+    out = Path(folder)
+    write_text(out / "goal.json", json.dumps(voyage_record(voyage)) + "\n")
+    with whole_file(out / "goal.svg") as part:
+        draw_voyage(voyage).savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})
+    return [*paths, out / "goal.json", out / "goal.svg"]
+
+
+def voyage_record(voyage: Voyage) -> dict[str, Any]:
+    """What was asked for and what is predicted, as JSON-like content. Lengths in l, angles in rad."""
+    finite = voyage.clearance if voyage.clearance < float("inf") else None
+    walls = voyage.room.walls
+    return {
+        "format": FORMAT,
+        "start": voyage.plan.start,
+        "goal": voyage.goal,
+        "via": voyage.via,
+        "keep_out": [
+            {"circle": [region.x, region.y, region.radius]}
+            if isinstance(region, Circle)
+            else {"polygon": region.corners.tolist()}
+            for region in voyage.room.regions
+        ],
+        "walls": None if walls is None else walls.corners.tolist(),
+        "predicted_end": voyage.end,
+        "end_error_over_l": voyage.end_error[0],
+        "end_error_rad": voyage.end_error[1],
+        "length_over_l": voyage.length,
+        "margin_over_l": voyage.margin,
+        "predicted_clearance_over_l": finite,
+    }

@@ -1,0 +1,147 @@
+"""The files of a plan: plan.json, plan.csv, plan.svg; schedule.h and tracker.h for a microcontroller.
+
+schedule.h has dwell times in whole milliseconds as 16-bit numbers. The motor flips after each. The rounding error
+of a dwell is carried over to the next one, so no flip is more than half a millisecond early or late. A dwell that
+does not fit 16 bits is split by entries of 0 ms: two flips at once, so the direction stays. A dwell that rounds to
+0 ms is refused, because 0 has this other meaning.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from planner.files.plan_json import plan_record
+from planner.files.tracker_header import tracker_header
+from planner.planning.plan import Plan
+from sim.io.errors import InputError
+from sim.io.files import whole_file, write_text
+from sim.io.provenance import code_version
+
+_MOST_MS = 65_535
+_CHECKPOINTS = 32
+
+
+def write_plan(result: Plan, folder: str | Path) -> list[Path]:
+    """Write the five files of a plan; returns their paths.
+
+    Args:
+        result: the plan.
+        folder: it is made if it is missing.
+
+    Raises:
+        InputError: a dwell is too short for whole milliseconds, or the folder cannot be written.
+
+    Example:
+        >>> import tempfile
+        >>> from softflagella import circle, load_robot, plan, write_plan
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in write_plan(plan(circle(2.0), load_robot("paper-control")), folder)]
+        ['plan.json', 'plan.csv', 'schedule.h', 'tracker.h', 'plan.svg']
+    """
+    out = Path(folder)
+    header = controller_header(result)
+    record = {**plan_record(result), "code_version": code_version()}
+    paths = [out / name for name in ("plan.json", "plan.csv", "schedule.h", "tracker.h", "plan.svg")]
+    write_text(paths[0], json.dumps(record) + "\n")
+    with whole_file(paths[1]) as part:
+        dwell_table(result).to_csv(part, index=False, float_format="%.8g")
+    write_text(paths[2], header)
+    write_text(paths[3], tracker_header(result))
+    _picture(result, paths[4])
+    return paths
+
+
+def dwell_table(result: Plan) -> pd.DataFrame:
+    """One row for each dwell: its start, its direction and length, and the predicted pose."""
+    count = len(result.dwells)
+    start = np.concatenate([[0.0], np.cumsum(result.dwells)[:-1]])
+    return pd.DataFrame(
+        {
+            "start_s": start * result.robot.time_scale,
+            "direction": result.first_direction * (-1) ** np.arange(count),
+            "dwell_s": result.seconds,
+            "dwell_bar": result.dwells,
+            "x_over_l": result.poses[:-1, 0],
+            "y_over_l": result.poses[:-1, 1],
+            "heading_rad": result.poses[:-1, 2],
+        }
+    )
+
+
+def milliseconds(seconds: np.ndarray) -> list[int]:
+    """Dwells in whole ms, rounding errors carried over; long ones are split by zeros.
+
+    Raises:
+        InputError: a dwell rounds to 0 ms.
+    """
+    edges = np.round(1000 * np.cumsum(seconds)).astype(np.int64)
+    entries: list[int] = []
+    for index, whole in enumerate(np.diff(edges, prepend=0).tolist()):
+        if whole < 1:
+            raise InputError(
+                f"dwell {index + 1} is {1000 * seconds[index]:.3g} ms; the header counts whole milliseconds: "
+                "use a longer minimum dwell"
+            )
+        while whole > _MOST_MS:
+            entries += [_MOST_MS, 0]
+            whole -= _MOST_MS
+        entries.append(whole)
+    return entries
+
+
+def controller_header(result: Plan) -> str:
+    """schedule.h as text."""
+    entries = milliseconds(result.seconds)
+    lines = [", ".join(map(str, entries[i : i + 12])) for i in range(0, len(entries), 12)]
+    body = ",\n    ".join(lines)
+    name = "".join(c for c in result.robot.name if c.isalnum() or c in " -_.")
+    x, y, heading = result.start
+    checkpoints = _checkpoints(result)
+    places = ",\n    ".join(checkpoints)
+    return f"""/* Motor schedule for robot "{name}": turn in FIRST_DIRECTION for the first entry,
+ * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
+ * lengthens the dwell before it. Stop after the last entry. Look-up table {result.model}.
+ * Put the head's centre at START_X, START_Y with heading START_HEADING, at rest. Checkpoints say where it should
+ * be later. x and y in tail lengths, heading in rad from the x axis to the left. */
+#ifndef SCHEDULE_H
+#define SCHEDULE_H
+#include <stdint.h>
+#define SCHEDULE_FIRST_DIRECTION ({result.first_direction})
+#define SCHEDULE_COUNT {len(entries)}
+#define SCHEDULE_TOTAL_MS {sum(entries)}UL
+#define SCHEDULE_MOTOR_RPM {result.robot.motor_speed * 30 / np.pi:.3f}
+#define SCHEDULE_START_X {x:.6f}
+#define SCHEDULE_START_Y {y:.6f}
+#define SCHEDULE_START_HEADING {heading:.6f}
+#define SCHEDULE_CHECKPOINTS {len(checkpoints)}
+static const uint16_t schedule_ms[SCHEDULE_COUNT] = {{
+    {body}
+}};
+typedef struct {{ uint32_t ms; float x, y, heading; }} schedule_checkpoint;
+static const schedule_checkpoint schedule_checkpoints[SCHEDULE_CHECKPOINTS] = {{
+    {places}
+}};
+#endif
+"""
+
+
+def _checkpoints(result: Plan) -> list[str]:
+    """Time in ms and predicted pose of some flips and of the end, as C."""
+    ends = np.concatenate([[0.0], np.cumsum(result.seconds)])
+    places = np.unique(np.linspace(0, len(ends) - 1, min(len(ends), _CHECKPOINTS)).astype(int))
+    return [
+        f"{{{round(1000 * ends[i])}UL, {', '.join(f'{value:.5f}f' for value in result.poses[i])}}}"
+        for i in places.tolist()
+    ]
+
+
+def _picture(result: Plan, path: Path) -> None:
+    from planner.files.pictures import draw_plan
+
+    with whole_file(path) as part:
+        figure = draw_plan(result)
+        figure.savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})

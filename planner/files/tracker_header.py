@@ -1,0 +1,166 @@
+"""tracker.h: the tracker and the plan's tables as one C99 header for the robot's microcontroller.
+
+The code is that of `planner/c`, which mirrors `planner.planning.line_of_sight`, `planner.tracking.kalman_filter`
+and `planner.tracking.tracker`. Numbers that both need come from the Python side. Lags are 16-bit numbers with one
+unit for each column; it is 1e-7 l for the paper's robot. The path has nine digits. `rounded` is the plan with
+these numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planner.planning import line_of_sight as follower
+from planner.planning.plan import Plan
+from planner.tracking import kalman_filter as estimate
+from planner.tracking import tracker
+from planner.tracking.kalman_filter import prior
+from planner.vehicle.vehicle import BEFORE_KNOTS, STEP
+from sim.arrays import Floats
+
+_CODE = Path(__file__).parents[1] / "c"
+_PARTS = ("follower.h", "estimate.h", "tracker.h")
+_LARGEST = 32_767
+_FLOAT_EXACT = 3e-6  # rad; in single precision a smaller angle is lost in the rounding
+
+
+def tracker_header(result: Plan) -> str:
+    """tracker.h as text."""
+    code = "\n".join((_CODE / name).read_text() for name in _PARTS)
+    return f"{_intro(result)}\n{_numbers(result)}\n{_tables(result)}\n{code}#endif\n"
+
+
+def rounded(result: Plan) -> Plan:
+    """The plan with path and lags as tracker.h has them."""
+    unit = _lag_unit(result)
+    lag, rest = (np.round(table / unit) * unit for table in (result.vehicle.lag, result.vehicle.rest))
+    rows = np.array([[float(_nine(value)) for value in row] for row in _path(result)])
+    q, heading = rows[:, :2], rows[:, 2]
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q, axis=0), axis=1))])
+    guide = replace(result.guide, q=q, heading=heading, arc=arc)
+    return replace(result, vehicle=replace(result.vehicle, lag=lag, rest=rest), guide=guide)
+
+
+def table_bytes(result: Plan) -> int:
+    """Size of the tables in single precision."""
+    vehicle = result.vehicle
+    return 2 * (vehicle.lag.size + vehicle.rest.size) + 4 * 3 * len(result.guide.q)
+
+
+def _intro(result: Plan) -> str:
+    name = "".join(c for c in result.robot.name if c.isalnum() or c in " -_.")
+    return f"""/* Tracker for robot "{name}", look-up table {result.model}: keeps the robot on its plan
+ * with poses from a camera, and learns the robot. It is planner.Tracker in C99, with the same formulas in the same
+ * order. It needs <math.h> and <stdint.h>, and no heap. Tables: {table_bytes(result)} bytes in single precision.
+ *
+ *     static tracker keeper;
+ *     tracker_begin(&keeper, 0.01, 0.01, now);          noise of a pose, the time at which the motor starts
+ *     tracker_advice advice = tracker_feed(&keeper, now, 0, 0);              no pose
+ *     tracker_real pose[3] = {{x, y, heading}};
+ *     advice = tracker_feed(&keeper, now, pose, seen);                       a pose that was true at `seen`
+ *
+ * Turn the motor in advice.direction and flip it at advice.flip_at. Call tracker_feed after each flip, so that the
+ * next one is announced. Times are in seconds. x, y and their noise are in tail lengths, the heading and its noise
+ * in rad, from the x axis to the left. Before you include this file, define TRACKER_FLOAT for single precision;
+ * times stay double. Include it in one file only, since it holds the tables. */
+#ifndef TRACKER_H
+#define TRACKER_H
+#include <math.h>
+#include <stdint.h>
+
+#ifdef TRACKER_FLOAT
+typedef float tracker_real;
+#define TRACKER_EXACT ((tracker_real){_FLOAT_EXACT!r})
+#else
+typedef double tracker_real;
+#define TRACKER_EXACT {follower.EXACT!r}
+#endif
+"""
+
+
+def _numbers(result: Plan) -> str:
+    """What the code needs as macros: counts and times as they are, the rest as tracker_real."""
+    counts = {
+        "FIRST_DIRECTION": result.first_direction, "STATES": estimate.STATES, "POINTS": len(result.guide.q),
+        "TIMES": result.vehicle.rest.shape[1], "KNOTS": len(BEFORE_KNOTS),
+        "HALVINGS": follower.HALVINGS, "MOST_LOOKS": follower.MOST_LOOKS,
+        "KEPT": tracker.KEPT, "LOST": tracker.LOST, "WINDOW": tracker.WINDOW,
+    }  # fmt: skip
+    times = {"TIME_SCALE": result.robot.time_scale, "SLACK": tracker.SLACK, "LONGEST_GAP": tracker.LONGEST_GAP}
+    reals = {
+        "TAIL_LENGTH_M": result.robot.tail_length,
+        "STEP": STEP,
+        "SHORTEST": result.minimum_dwell,
+        "AHEAD": result.ahead,
+        "ROD": result.pivot_distance,
+        "OFFSET": result.offset,
+        "SWING": result.swing,
+        "SWING_ERROR": result.predicted_max,
+        "PIVOT_RADIUS": result.vehicle.pivot_radius,
+        "NET_SPEED": result.net_speed,
+        "LARGEST_STEP": follower.LARGEST_STEP,
+        "TURNS": follower.TURNS,
+        "MOST_BIAS": follower.MOST_BIAS,
+        "GATE": tracker.GATE,
+        "ALARM_AT": tracker.ALARM_AT,
+        "DISPLACED": tracker.DISPLACED,
+        "QUANTILE": tracker.QUANTILE,
+        "WALK": estimate.WALK,
+    }
+    lines = [f"#define TRACKER_{name} ({value})" for name, value in counts.items()]
+    lines += [f"#define TRACKER_{name} {value!r}" for name, value in times.items()]
+    lines += [f"#define TRACKER_{name} ((tracker_real){value!r})" for name, value in reals.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _tables(result: Plan) -> str:
+    vehicle, unit = result.vehicle, _lag_unit(result)
+    most = estimate.most(result)
+    lag, rest = (np.round(table / unit).astype(int) for table in (vehicle.lag, vehicle.rest))
+    real, short = "static const tracker_real tracker_", "static const int16_t tracker_"
+    return "\n".join(
+        [
+            f"{real}start[3] = {_row(result.start)};",
+            f"{real}twist[2][3] = {_nested(vehicle.twist.tolist())};",
+            f"{real}current[2] = {_row(vehicle.current.tolist())};",
+            f"{real}changes[4] = {_row(estimate.CHANGES)};",
+            f"{real}most[TRACKER_STATES - 3] = {_row(most)};",
+            f"{real}prior[TRACKER_STATES][TRACKER_STATES] = {_nested(prior(result))};",
+            f"{real}knots[TRACKER_KNOTS] = {_row(BEFORE_KNOTS.tolist())};",
+            f"{real}lag_unit[3] = {_row(unit.tolist())};",
+            f"{real}path[TRACKER_POINTS][3] = {_nested(_path(result).tolist(), _nine)};",
+            f"{short}rest[2][TRACKER_TIMES][3] = {_nested(rest.tolist())};",
+            f"{short}lag[2][TRACKER_KNOTS][TRACKER_TIMES][3] = {_nested(lag.tolist())};\n",
+        ]
+    )
+
+
+def _lag_unit(result: Plan) -> Floats:
+    vehicle = result.vehicle
+    largest = np.maximum(np.abs(vehicle.lag).max((0, 1, 2)), np.abs(vehicle.rest).max((0, 1)))
+    return np.asarray(np.maximum(largest, 1e-12) / _LARGEST)
+
+
+def _path(result: Plan) -> Floats:
+    """Place of the pivot and heading, (m, 3)."""
+    return np.column_stack([result.guide.q, result.guide.heading])
+
+
+def _nine(value: float) -> str:
+    return f"{value:.9g}"
+
+
+def _row(values: Iterable[float]) -> str:
+    return "{" + ", ".join(map(repr, values)) + "}"
+
+
+def _nested(table: Sequence[Any], write: Callable[[float], str] = repr) -> str:
+    """Nested rows as C, one line for each innermost row."""
+    if not isinstance(table[0], list):
+        return "{" + ", ".join(map(write, table)) + "}"
+    return "{\n" + ",\n".join(_nested(row, write) for row in table) + "}"

@@ -1,0 +1,181 @@
+"""Where the robot must not go: circles, polygons, and the tank's walls. And how much room is left.
+
+The body of the robot is a row of discs along its axis: head and straight tails. Its clearance is the smallest
+distance of any disc from any region, negative inside. Lengths in l.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from planner.paths.path import Path2D
+from sim.arrays import Floats, Integers
+from sim.io.errors import InputError
+from sim.model.robot import Robot
+
+_BLOCK = 2_000_000  # distances computed at once
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A round region: its centre and its radius, in l.
+
+    Example:
+        >>> import numpy as np
+        >>> from softflagella import Circle
+        >>> Circle(1.0, 0.0, 0.5).distance(np.array([[0.0, 0.0]])).tolist()
+        [0.5]
+    """
+
+    x: float
+    y: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.x) and math.isfinite(self.y) and 0 < self.radius < math.inf):
+            raise InputError(
+                f"circle {self.x:g}, {self.y:g}, {self.radius:g}; give a finite centre and a radius above 0"
+            )
+
+    def distance(self, points: Floats) -> Floats:
+        """Distance (M,) of points (M, 2), negative inside."""
+        return np.asarray(np.hypot(points[:, 0] - self.x, points[:, 1] - self.y) - self.radius)
+
+    @property
+    def box(self) -> Floats:
+        """Corners (2, 2): lowest and highest x, y."""
+        centre = np.array([self.x, self.y])
+        return np.stack([centre - self.radius, centre + self.radius])
+
+
+@dataclass(frozen=True)
+class Polygon:
+    """A region with straight edges, (n, 2) corners in order."""
+
+    corners: Floats
+
+    @staticmethod
+    def of(points: Path2D | ArrayLike) -> Polygon:
+        """A polygon from points (n, 2); three or more that are not on a line.
+
+        Raises:
+            InputError: the points enclose nothing.
+        """
+        path = points if isinstance(points, Path2D) else Path2D.of(points)
+        x, y = path.points.T
+        area = abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
+        if len(path.points) < 3 or area <= 1e-12 * path.length**2:
+            raise InputError("a region needs three or more points that are not on one line")
+        return Polygon(path.points)
+
+    def distance(self, points: Floats) -> Floats:
+        """Distance (M,) of points (M, 2) from the edges, negative inside."""
+        block = max(1, _BLOCK // len(self.corners))
+        parts = [self._distance(points[i : i + block]) for i in range(0, len(points), block)]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def _distance(self, points: Floats) -> Floats:
+        start, end = self.corners, np.roll(self.corners, -1, 0)
+        along = end - start
+        dx, dy = points[:, 0, None] - start[:, 0], points[:, 1, None] - start[:, 1]
+        share = np.clip((dx * along[:, 0] + dy * along[:, 1]) / (along**2).sum(1), 0, 1)
+        square = (dx - share * along[:, 0]) ** 2 + (dy - share * along[:, 1]) ** 2
+        y = points[:, 1, None]
+        crosses = (start[:, 1] <= y) != (end[:, 1] <= y)
+        rise = np.where(along[:, 1] == 0, 1.0, along[:, 1])
+        inside = (crosses & (dx < dy * along[:, 0] / rise)).sum(1) % 2 == 1
+        return np.where(inside, -1.0, 1.0) * np.sqrt(square.min(1))
+
+    @property
+    def box(self) -> Floats:
+        """Corners (2, 2): lowest and highest x, y."""
+        return np.stack([self.corners.min(0), self.corners.max(0)])
+
+
+Region = Circle | Polygon
+
+
+@dataclass(frozen=True)
+class Room:
+    """Free space: inside the walls, outside all regions."""
+
+    regions: tuple[Region, ...] = ()
+    walls: Polygon | None = None
+
+    @property
+    def empty(self) -> bool:
+        return not self.regions and self.walls is None
+
+    def distance(self, points: Floats) -> Floats:
+        """Distance (M,) of points (M, 2) from the nearest region or wall, negative where it is not free."""
+        found = np.full(len(points), np.inf)
+        for region in self.regions:
+            found = np.minimum(found, region.distance(points))
+        if self.walls is not None:
+            found = np.minimum(found, -self.walls.distance(points))
+        return found
+
+    def boxes(self) -> list[Floats]:
+        """The corners (2, 2) of what bounds the regions and walls."""
+        return [region.box for region in (*self.regions, *([self.walls] if self.walls else []))]
+
+
+@dataclass(frozen=True)
+class Body:
+    """Discs along the robot's axis."""
+
+    places: Floats  # (K,), of their centres, forward from a point of the axis
+    radius: float  # of all
+
+    @staticmethod
+    def of(robot: Robot, origin: float) -> Body:
+        """Head and straight tails; `origin` is the distance from the head's centre forward to the point."""
+        length = robot.tail_length
+        half, width = robot.head_length / 2 / length, robot.head_radius / length
+        width = max(width, ((robot.disc_offset or robot.head_radius) + robot.tail_radius) / length)
+        front, back = half, -half - 1.0
+        count = max(2, math.ceil((front - back) / width))
+        step = (front - back) / count
+        places = np.asarray(back + step * (np.arange(count) + 0.5) - origin, dtype=np.float64)
+        return Body(places, math.hypot(width, step / 2))
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of a point of the body from its origin."""
+        return float(np.abs(self.places).max()) + self.radius
+
+    def centres(self, poses: Floats) -> Floats:
+        """Centres (..., K, 2) of the discs of a body at poses (..., 3): origin and heading."""
+        axis = np.stack([np.cos(poses[..., 2]), np.sin(poses[..., 2])], -1)
+        return np.asarray(poses[..., None, :2] + self.places[:, None] * axis[..., None, :])
+
+    def clearance(self, poses: Floats, room: Room | Map) -> Floats:
+        """Room (...) between the body at poses (..., 3) and what is not free."""
+        centres = self.centres(poses)
+        found = room.distance(centres.reshape(-1, 2)).reshape(centres.shape[:-1])
+        return np.asarray(found.min(-1) - self.radius)
+
+
+class Map:
+    """Distances of a room on a grid, never larger than the true ones: quick for many points."""
+
+    def __init__(self, room: Room, low: Floats, high: Floats, step: float):
+        size = high - low
+        self._low, self.step = low, step
+        count = np.ceil(size / step).astype(int) + 1
+        x, y = (low[i] + step * np.arange(count[i]) for i in (0, 1))
+        points = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
+        self.table = room.distance(points.reshape(-1, 2)).reshape(points.shape[:2])
+        self.slack = step / math.sqrt(2)  # distances change by at most the way to the nearest grid point
+
+    def distance(self, points: Floats) -> Floats:
+        """A lower bound (M,) of the distance of points (M, 2); outside the map nothing is free."""
+        place = np.rint((points - self._low) / self.step).astype(int)
+        last: Integers = np.array([len(self.table) - 1, len(self.table.T) - 1])
+        inside = ((place >= 0) & (place <= last)).all(1)
+        i, j = np.clip(place, 0, last).T
+        return np.where(inside, self.table[i, j] - self.slack, -np.inf)

@@ -1,0 +1,259 @@
+"""The shortest track of bounded curvature through a few poses, around obstacles.
+
+Every stop is a choice of poses: one place with several courses, or just one pose. The courses are chosen for the
+shortest total length, first among some at equal steps, then more finely. Two poses are joined by Dubins' words.
+Where obstacles are in the way, a lattice (`planner.goal.lattice`) finds the way, and shorter joints are then
+sought between places on it. Lengths in l.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from planner.goal.dubins import TURNS, Shots, shots, words
+from planner.goal.lattice import Ground, Lattice
+from planner.goal.obstacles import Room
+from sim.arrays import Floats
+from sim.io.errors import InputError
+
+COURSES = 24  # tried at a stop without one
+LEVELS = ((0.6, 16), (0.3, 32))  # spacing of the lattice, in radii, and number of courses
+_FINER = 4  # times that the courses of stops are chosen again, among finer ones
+_ROUNDS = 3  # of looking for shorter joints
+_PLACES = 40  # on a way, between which shorter joints are sought
+_ENOUGH = 1.005  # a chain of words that is so near the shortest one without obstacles needs no lattice
+_THIN = 3  # of the courses at a stop, every third one is joined to the lattice
+_MOST_CHECKS = 300  # chains of words
+_AROUND = 6.0  # radii that the lattice reaches beyond stops and obstacles
+
+
+class NoWayError(InputError):
+    """There is no way to the goal."""
+
+    status = 3
+
+
+@dataclass(frozen=True)
+class Route:
+    """A track as a chain of words."""
+
+    tracks: Shots
+    radius: float
+
+    @property
+    def length(self) -> float:
+        return float(self.tracks.length.sum())
+
+    def poses(self, spacing: float) -> Floats:
+        """Poses (m, 3) at most `spacing` apart, courses without jumps."""
+        parts = [self.tracks.start[:1]]
+        for row, length in enumerate(self.tracks.length.tolist()):
+            if length > 0:
+                way = np.linspace(0, length, max(1, math.ceil(length / spacing)) + 1)[None, 1:]
+                parts.append(self.tracks.take(np.array([row])).poses(way, self.radius)[0])
+        poses = np.concatenate(parts)
+        poses[:, 2] = np.unwrap(poses[:, 2])
+        return poses
+
+
+Lattices = dict[tuple[float, int], Lattice]
+
+
+def route(stops: list[Floats], ground: Ground, margin: float, lattices: Lattices) -> Route:
+    """The shortest route that was found.
+
+    Args:
+        stops: poses (c, 3) to choose from at the start, at each place on the way, and at the goal.
+        ground: what the track must keep to.
+        margin: the room around the body.
+        lattices: those of this ground and these stops that were made before; new ones are added.
+
+    Raises:
+        NoWayError: a stop is not free, or no way was found on the finest lattice.
+    """
+    for number, stop in enumerate(stops):
+        _check(stop, number, len(stops), ground, margin)
+    direct = _direct(stops, ground, margin)
+    if ground.room.empty and direct is not None:
+        return direct
+    shortest = _direct(stops, replace(ground, room=Room()), margin)
+    if direct is not None and shortest is not None and direct.length < _ENOUGH * shortest.length:
+        return direct
+    for spacing, courses in LEVELS:
+        if (spacing, courses) not in lattices:
+            lattices[spacing, courses] = _lattice(stops, ground, spacing * ground.radius, courses)
+        found = _around(stops, lattices[spacing, courses], margin)
+        both = [one for one in (direct, found) if one is not None]
+        if both:
+            return min(both, key=lambda one: one.length)
+    raise NoWayError(
+        f"there is no way to the goal that leaves {margin:.3g} l around the robot and turns with a radius of "
+        f"{ground.radius:.3g} l, on a lattice with steps of {LEVELS[-1][0] * ground.radius:.2g} l and "
+        f"{360 / LEVELS[-1][1]:.0f} degrees; move the goal or the obstacles"
+    )
+
+
+def _check(stop: Floats, number: int, count: int, ground: Ground, margin: float) -> None:
+    clearance = ground.clearance(stop)
+    if clearance.max() >= margin:
+        return
+    name = "start" if number == 0 else "goal" if number == count - 1 else f"place {number} on the way"
+    x, y = stop[0, :2]
+    raise NoWayError(
+        f"there is no way: at the {name}, with its pivot at ({x:.3g}, {y:.3g}) l, the robot is "
+        + (
+            f"{-clearance.max():.2g} l inside"
+            if clearance.max() < 0
+            else f"only {clearance.max():.2g} l away from"
+        )
+        + f" what it must keep out of; it needs {margin:.3g} l, which is the plan's stated error"
+    )
+
+
+def _direct(stops: list[Floats], ground: Ground, margin: float) -> Route | None:
+    """One word between each two stops; the courses of the stops are chosen again among finer ones."""
+    chosen, best = stops, None
+    for finer in range(_FINER + 1):
+        found = _chosen(chosen, ground, margin)
+        if found is None:
+            return best
+        if best is None or found.length < best.length:
+            best = found
+        chosen = [_finer(stop, pose, finer) for stop, pose in zip(stops, _ends(best), strict=True)]
+        if all(len(stop) == len(own) for stop, own in zip(stops, chosen, strict=True)):
+            break
+    return best
+
+
+def _finer(stop: Floats, pose: Floats, level: int) -> Floats:
+    """Courses around that of a pose, if the stop leaves its course open."""
+    if len(stop) < COURSES:
+        return stop
+    step = 2 * math.pi / len(stop) / 3**level
+    poses = np.repeat(pose[None], 7, 0)
+    poses[:, 2] += step * np.arange(-3, 4) / 3
+    return poses
+
+
+def _ends(found: Route) -> list[Floats]:
+    """Poses at the starts of the tracks and at the end of the last one."""
+    last = found.tracks.take(np.array([-1]))
+    return [*found.tracks.start, last.poses(last.length[:, None], found.radius)[0, 0]]
+
+
+def _chosen(stops: list[Floats], ground: Ground, margin: float) -> Route | None:
+    """The shortest chain of one word between each two stops, among all their poses.
+
+    Words are checked when they are on the shortest chain. Those that are not free are taken out.
+    """
+    legs = [words(one[:, None], other[None], ground.radius) for one, other in pairwise(stops)]
+    lengths = [leg.sum(-1) for leg in legs]
+    for _ in range(_MOST_CHECKS):
+        costs, back = np.zeros(len(stops[0])), []
+        for length in lengths:
+            total = costs[:, None] + length.min(-1)
+            back.append(total.argmin(0))
+            costs = total.min(0)
+        at = int(costs.argmin())
+        if not np.isfinite(costs[at]):
+            return None
+        chain = []
+        for leg, length, before, one in zip(reversed(legs), reversed(lengths), reversed(back), stops[-2::-1],
+                                            strict=True):  # fmt: skip
+            came = int(before[at])
+            word = int(length[came, at].argmin())
+            track = Shots(one[came : came + 1], TURNS[word : word + 1], leg[came, at, word][None])
+            chain.append((track, length, (came, at, word)))
+            at = came
+        found = _chain([track for track, _, _ in chain[::-1]], ground.radius)
+        free = np.ones(len(chain), dtype=bool) if ground.room.empty else ground.free(found.tracks, margin)[::-1]
+        if free.all():
+            return found
+        for (_, length, place), good in zip(chain, free.tolist(), strict=True):
+            if not good:
+                length[place] = np.inf
+    return None
+
+
+def _chain(parts: list[Shots], radius: float) -> Route:
+    return Route(Shots(*(np.concatenate([part[i] for part in parts]) for i in range(3))), radius)
+
+
+def _lattice(stops: list[Floats], ground: Ground, spacing: float, courses: int) -> Lattice:
+    """A lattice that reaches around all obstacles, or to the walls."""
+    boxes = [*ground.room.boxes(), *(stop[:, :2] for stop in stops)]
+    reach = _AROUND * ground.radius + ground.body.reach
+    low = np.min([box.min(0) for box in boxes], 0) - reach
+    high = np.max([box.max(0) for box in boxes], 0) + reach
+    if ground.room.walls is not None:
+        low, high = ground.room.walls.box
+    return Lattice(ground, low, high, spacing, courses)
+
+
+def _around(stops: list[Floats], lattice: Lattice, margin: float) -> Route | None:
+    """A route over a lattice, made shorter; None where there is none on this lattice."""
+    ground = lattice.ground
+    stops = [stop[::_THIN] if len(stop) == COURSES else stop for stop in stops]
+    costs, chains = np.zeros(len(stops[0])), []
+    for one, other in pairwise(stops):
+        costs, found = lattice.ways(one, costs, other, margin)
+        if not np.isfinite(costs).any():
+            return None
+        chains.append(found)
+    at = int(costs.argmin())
+    parts: list[Shots] = []
+    for own, stop in zip(reversed(chains), reversed(stops[:-1]), strict=True):
+        leg = own[at]
+        parts.insert(0, _shorter(shots(leg[:-1], leg[1:], ground.radius), lattice, margin))
+        at = int(np.abs(stop - leg[0]).sum(1).argmin())
+    return _chain(parts, ground.radius)
+
+
+def _shorter(leg: Shots, lattice: Lattice, margin: float) -> Shots:
+    """A leg with joints between places on it, wherever one is free and shorter than the way along it."""
+    ground = lattice.ground
+    for again in range(_ROUNDS):
+        places = _cut(leg, max(float(leg.length.sum()) / _PLACES, ground.radius / 4) / (1 + again), ground.radius)
+        starts = places.start
+        last = places.take(np.array([-1]))
+        poses = np.concatenate([starts, last.poses(last.length[:, None], ground.radius)[:, 0]])
+        along = np.concatenate([[0.0], np.cumsum(places.length)])
+        i, j = np.triu_indices(len(poses), 2)
+        tracks = shots(poses[i], poses[j], ground.radius)
+        rows = np.flatnonzero(tracks.length < along[j] - along[i] - 1e-6)
+        rows = rows[ground.free(tracks.take(rows), margin, lattice.map)]
+        best, choice = np.full(len(poses), np.inf), np.full(len(poses), -1)
+        best[0] = 0.0
+        ends = [rows[j[rows] == k] for k in range(len(poses))]
+        for k in range(1, len(poses)):
+            best[k] = best[k - 1] + places.length[k - 1]
+            costs = best[i[ends[k]]] + tracks.length[ends[k]]
+            if len(costs) and costs.min() < best[k]:
+                best[k], choice[k] = costs.min(), ends[k][costs.argmin()]
+        parts, k = [], len(poses) - 1
+        while k > 0:
+            row = choice[k]
+            parts.append(places.take(np.array([k - 1])) if row < 0 else tracks.take(np.array([row])))
+            k = k - 1 if row < 0 else int(i[row])
+        leg = _chain(parts[::-1], ground.radius).tracks
+    return leg
+
+
+def _cut(leg: Shots, spacing: float, radius: float) -> Shots:
+    """The tracks of a leg in parts of at most `spacing`."""
+    parts = []
+    for row, length in enumerate(leg.length.tolist()):
+        if length == 0:
+            continue
+        edges = np.linspace(0, length, math.ceil(length / spacing) + 1)
+        ends = np.cumsum(leg.pieces[row])
+        before = np.concatenate([[0.0], ends[:-1]])
+        pieces = np.maximum(np.minimum(ends, edges[1:, None]) - np.maximum(before, edges[:-1, None]), 0.0)
+        own = leg.take(np.full(len(edges) - 1, row))
+        poses = leg.take(np.array([row])).poses(edges[None, :-1], radius)[0]
+        parts.append(Shots(poses, own.turns, pieces))
+    return Shots(*(np.concatenate([part[i] for part in parts]) for i in range(3)))

@@ -1,0 +1,1 @@
+"""The schedule corrected by measured poses."""

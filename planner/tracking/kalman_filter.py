@@ -1,0 +1,254 @@
+"""What a tracker knows of the robot: ten numbers and their covariance, from poses (a Kalman filter).
+
+    x, y, heading    of the head's centre at the last flip
+    yaw rates        relative errors of the plan's, left and right
+    surge, sway      relative errors of the speeds forward and to the side
+    lag angle        error of the angle that a flip adds to the heading
+    current x, y     beside the plan's
+
+A dwell moves the pose by lag and arc of the robot as it is learned so far. The learned numbers walk at random, a
+little in each dwell, so that changes are followed. All derivatives are exact, and nothing but arithmetic, sin, cos
+and sqrt is used: `planner/c/estimate.h` does the same in C. Lengths in l, times in μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from operator import mul
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.planning.line_of_sight import Follower, arc_of
+from planner.planning.plan import Plan
+
+POSE = tuple[float, float, float]
+ROWS = list[list[float]]
+NAMES = ("x", "y", "heading", "yaw rate, left", "yaw rate, right", "surge", "sway", "lag angle",
+         "current x", "current y")  # fmt: skip
+STATES = len(NAMES)
+DOUBT = (0.03, 0.03, 0.03, 0.03)  # standard deviations beside the plan's own: yaw rates, surge, sway
+CHANGES = (1.5e-3, 1.5e-3, 5e-4, 5e-4)  # what a dwell adds to them
+WALK = 3e-4  # l and rad that a dwell adds to what is unknown of the pose
+MOST = (0.5, 0.5, 0.5, 0.5, 0.3)  # largest yaw rates, surge, sway, lag angle that are learned
+MOST_CURRENT = 0.5  # of the net speed
+
+
+class Dwell(NamedTuple):
+    """A dwell of the past; `before` is None for the first one."""
+
+    start: float
+    sense: int
+    before: float | None
+    length: float
+
+
+class Estimate:
+    """State (10,) and covariance (10, 10) at the last flip.
+
+    Args:
+        plan: gives the robot and where it starts.
+        follower: of the same plan; it is told what is learned.
+        noise: standard deviations of a pose: of x and y [l], of the heading [rad].
+    """
+
+    def __init__(self, plan: Plan, follower: Follower, noise: tuple[float, float]):
+        self._twist: ROWS = plan.vehicle.twist.tolist()
+        self._current: list[float] = plan.vehicle.current.tolist()
+        self._speed = plan.net_speed
+        self._follower = follower
+        self._noise = (noise[0] ** 2, noise[0] ** 2, noise[1] ** 2)
+        self._most = most(plan)
+        self.state: list[float] = [*plan.start, *[0.0] * (STATES - 3)]
+        self.covariance = prior(plan)
+
+    @property
+    def pose(self) -> POSE:
+        return self.state[0], self.state[1], self.state[2]
+
+    def apply(self) -> None:
+        """Let the follower move like the learned robot."""
+        state = self.state
+        self._follower.set_robot(
+            [self._learned(0), self._learned(1)],
+            state[7],
+            [self._current[0] + state[8], self._current[1] + state[9]],
+            (self._sideways() / self._speed, state[8] / self._speed, state[9] / self._speed),
+        )
+
+    def advance(self, dwell: Dwell) -> None:
+        """To the flip at the end of a dwell."""
+        change = self._change(self.state[2], dwell, dwell.length)
+        self.covariance = _propagated(self.covariance, _after(_identity(), change))
+        for i in range(3):
+            self.state[i] += change.move[i]
+
+    def seen_from(self, when: float, now: Dwell, past: Sequence[Dwell]) -> tuple[POSE, ROWS] | None:
+        """Pose at the time `when`, and its derivatives (3, 10) by the state; None if it is too long ago.
+
+        Args:
+            when: the time.
+            now: the dwell that goes on; its length does not count.
+            past: dwells before, the latest last.
+        """
+        x, y, heading = self.pose
+        D, dwell, back = _identity(), now, len(past)
+        while when < dwell.start:
+            if back == 0:
+                return None
+            back -= 1
+            dwell = past[back]
+            heading -= self._change(0.0, dwell, dwell.length).move[2]
+            change = self._change(heading, dwell, dwell.length)
+            x, y = x - change.move[0], y - change.move[1]
+            D = _before(D, change)
+        change = self._change(heading, dwell, when - dwell.start)
+        return (x + change.move[0], y + change.move[1], heading + change.move[2]), _after(D, change)
+
+    def update(self, left: POSE, H: ROWS, largest: float) -> float:
+        """Learn from what a pose differs from the expected one, unless its size is above `largest`.
+
+        Args:
+            left: measured pose less the expected one.
+            H: derivatives (3, 10) of the expected pose.
+            largest: squared size from which the pose is left out.
+
+        Returns:
+            The squared size of `left`, in its standard deviations: χ² with three degrees of freedom.
+        """
+        P, size = [row[:] for row in self.covariance], 0.0
+        moved = [0.0] * STATES
+        for m in range(3):
+            h = H[m]
+            gain = [_dot(row, h) for row in P]
+            spread = _dot(h, gain) + self._noise[m]
+            rest = left[m] - _dot(h, moved)
+            size += rest * rest / spread
+            for i in range(STATES):
+                moved[i] += gain[i] * rest / spread
+                for j in range(STATES):
+                    P[i][j] -= gain[i] * gain[j] / spread
+        if size <= largest:
+            self.covariance = P
+            for i in range(STATES):
+                self.state[i] += moved[i]
+            for i, limit in enumerate(self._most):
+                self.state[3 + i] = min(max(self.state[3 + i], -limit), limit)
+        return size
+
+    def _learned(self, side: int) -> list[float]:
+        """Twist of a direction as it is learned."""
+        forward, left, rate = self._twist[side]
+        return [forward * (1 + self.state[5]), left * (1 + self.state[6]), rate * (1 + self.state[3 + side])]
+
+    def _sideways(self) -> float:
+        """Mean speed to the left, beside the plan's, that comes from unequal turns."""
+        (_, left, fast), (_, right, slow) = self._twist
+        a, b = fast * (1 + self.state[3]), -slow * (1 + self.state[4])
+        own = (b * left + a * right) * (1 + self.state[6]) / (a + b)
+        return own - (-slow * left + fast * right) / (fast - slow)
+
+    def _change(self, heading: float, dwell: Dwell, time: float) -> _Change:
+        """What a time in a dwell that began with `heading` adds to the pose."""
+        state, sense = self.state, dwell.sense
+        side = 0 if sense > 0 else 1
+        z, x, turned = self._follower.lag_of(side, dwell.before, time)
+        turned += sense * state[7]
+        forward, left, rate = self._learned(side)
+        along, across, angle = arc_of(rate, time)
+        more = 1 + state[3 + side]
+        along_r, across_r = (time * math.cos(angle) - along) / more, (time * math.sin(angle) - across) / more
+        ahead_r, aside_r = along_r * forward - across_r * left, across_r * forward + along_r * left
+        c, s = math.cos(heading), math.sin(heading)
+        lag_x, lag_y = c * z - s * x, s * z + c * x
+        c, s = math.cos(heading + turned), math.sin(heading + turned)
+        surge_x, surge_y = (c * along - s * across) * forward, (s * along + c * across) * forward
+        sway_x, sway_y = -(c * across + s * along) * left, (c * along - s * across) * left
+        arc_x, arc_y = surge_x + sway_x, surge_y + sway_y
+        B = [[0.0] * STATES for _ in range(3)]
+        B[0][3 + side], B[1][3 + side] = c * ahead_r - s * aside_r, s * ahead_r + c * aside_r
+        B[2][3 + side] = angle / more
+        B[0][5], B[1][5] = surge_x / (1 + state[5]), surge_y / (1 + state[5])
+        B[0][6], B[1][6] = sway_x / (1 + state[6]), sway_y / (1 + state[6])
+        B[0][7], B[1][7], B[2][7] = -sense * arc_y, sense * arc_x, float(sense)
+        B[0][8] = B[1][9] = time
+        x, y = lag_x + arc_x, lag_y + arc_y
+        current_x, current_y = self._current[0] + state[8], self._current[1] + state[9]
+        return _Change((x + current_x * time, y + current_y * time, turned + angle), (-y, x), B)
+
+
+class _Change(NamedTuple):
+    """What is added to a pose; its derivatives by the heading before (x, y), and by the state (3, 10)."""
+
+    move: POSE
+    lever: tuple[float, float]
+    B: ROWS
+
+
+def prior(plan: Plan) -> ROWS:
+    """Covariance (10, 10) before the first pose: how well the robot was put, and what the plan says."""
+    vehicle = plan.vehicle
+    P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in DOUBT), 1e-6, 1e-12, 1e-12])
+    speed = np.hypot(vehicle.twist[0, 0], vehicle.twist[0, 1])
+    for mode in vehicle.modes:
+        one = np.zeros(STATES)
+        one[3:5] = mode.twist[:, 2] / vehicle.twist[:, 2]
+        one[5:7] = (
+            mode.twist[0, :2] * vehicle.twist[0, :2] / np.maximum(vehicle.twist[0, :2] ** 2, 1e-6 * speed**2)
+        )
+        one[7] = mode.lag[0, 2]
+        one[8:] = mode.current
+        P += np.outer(one, one)
+    P[8, 8] += (0.05 * speed) ** 2 / 4
+    P[9, 9] += (0.05 * speed) ** 2 / 4
+    return [[float(value) for value in row] for row in P]
+
+
+def most(plan: Plan) -> tuple[float, ...]:
+    """Largest values (7,) of the learned numbers."""
+    return *MOST, MOST_CURRENT * plan.net_speed, MOST_CURRENT * plan.net_speed
+
+
+def _identity() -> ROWS:
+    return [[float(i == j) for j in range(STATES)] for i in range(3)]
+
+
+def _after(D: ROWS, change: _Change) -> ROWS:
+    """Derivatives of the pose after a change, from those before it."""
+    B, lever = change.B, change.lever
+    return [
+        [D[0][k] + B[0][k] + lever[0] * D[2][k] for k in range(STATES)],
+        [D[1][k] + B[1][k] + lever[1] * D[2][k] for k in range(STATES)],
+        [D[2][k] + B[2][k] for k in range(STATES)],
+    ]
+
+
+def _before(D: ROWS, change: _Change) -> ROWS:
+    """Derivatives of the pose before a change, from those after it."""
+    B, lever = change.B, change.lever
+    turned = [D[2][k] - B[2][k] for k in range(STATES)]
+    return [
+        [D[0][k] - B[0][k] - lever[0] * turned[k] for k in range(STATES)],
+        [D[1][k] - B[1][k] - lever[1] * turned[k] for k in range(STATES)],
+        turned,
+    ]
+
+
+def _propagated(P: ROWS, F: ROWS) -> ROWS:
+    """Covariance after a dwell: the first three rows of the transition are F, the others keep the state."""
+    n = STATES
+    half = [[sum(F[i][k] * P[k][j] for k in range(n)) for j in range(n)] for i in range(3)] + P[3:]
+    full = [row[:] for row in half]
+    for i in range(n):
+        for j in range(3):
+            full[i][j] = _dot(half[i], F[j])
+    for i in range(3):
+        full[i][i] += WALK**2
+    for i, change in enumerate(CHANGES):
+        full[3 + i][3 + i] += change**2
+    return full
+
+
+def _dot(a: list[float], b: list[float]) -> float:
+    return sum(map(mul, a, b))

@@ -1,0 +1,184 @@
+"""Tracker: keeps a robot on its plan with poses from a camera, and learns the robot while it swims.
+
+    tracker = Tracker(plan)
+    advice = tracker.feed(now)                              # no pose
+    advice = tracker.feed(now, (x, y, heading), seen_at)    # a pose, and when it was true
+
+Every call says the direction of the motor and when to flip next. At most one flip can have happened since the
+last call: the one that was announced. The tracker learns ten numbers of the robot
+(`planner.tracking.kalman_filter`). A pose may be late: it is compared with the place where the robot was then,
+counted back from now. A pose that cannot be is left out. So are values that are not finite, and times that go
+back. No pose for a long time does no harm but to the error.
+
+The alarm says that the robot behaves like no robot of this model. It compares WINDOW accepted poses with what was
+expected: for a robot of the model their sum of squares is below a limit with probability 1 − FALSE_ALARM. It also
+comes when LOST poses in a row were left out.
+
+The next flip is the root of the same equation as in planning (`planner.planning.schedule`), from the estimated
+pose and with the learned robot. It is never before the shortest dwell, whatever is fed.
+
+Poses are those of the head's centre in l and rad; times in μ0 l⁴/EI. `planner.tracking.pipe` has seconds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+from scipy.stats import chi2
+
+from planner.planning.line_of_sight import Follower
+from planner.planning.plan import Plan
+from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate
+from sim.io.errors import InputError
+
+FALSE_ALARM = 1e-3  # chance of an alarm per WINDOW poses, for a robot of this model
+WINDOW = 40
+ALARM_AT = float(chi2.ppf(1 - FALSE_ALARM, 3 * WINDOW))
+GATE = float(chi2.ppf(0.9999, 3))
+KEPT = 12  # dwells that are remembered for late poses
+SLACK = 1e-6  # time units; a time this close before the announced flip is the flip's own, rounded
+LONGEST_GAP = 1e5  # time units; a clock that jumps further is not believed
+LOST = 10  # poses left out one after another, from which the pose is taken to be unknown
+DISPLACED = 0.3  # standard deviation of the pose then [l, rad]
+QUANTILE = 1.96
+
+
+class Advice(NamedTuple):
+    """What the motor does now, and when it must flip next."""
+
+    direction: int  # +1 or −1; 0 at the end
+    flip_at: float  # time of the next flip, or of the end
+    finished: bool
+    alarm: bool  # the robot behaves like no robot of this model: calibrate again
+    error: float  # 95 % of the distance from the path that is now possible, zigzag included [l]
+
+
+class Tracker:
+    """See the module.
+
+    Args:
+        plan: the plan.
+        noise: standard deviations of a pose: of x and y [l], of the heading [rad].
+        latency: time from when a pose is true to when it is fed, if `seen_at` is not given.
+        begin: time at which the motor starts.
+
+    Example:
+        >>> from softflagella import Tracker, circle, load_robot, plan
+        >>> tracker = Tracker(plan(circle(2.0), load_robot("paper-control")))
+        >>> advice = tracker.feed(0.0)
+        >>> advice.direction, advice.flip_at > 0.2
+        (1, True)
+    """
+
+    def __init__(
+        self, plan: Plan, *, noise: tuple[float, float] = (0.01, 0.01), latency: float = 0.0, begin: float = 0.0
+    ):
+        self.shortest = plan.minimum_dwell
+        self._follower = Follower(
+            plan.guide, plan.vehicle, plan.ahead, plan.pivot_distance, plan.offset, plan.minimum_dwell, plan.swing
+        )
+        self._estimate = Estimate(plan, self._follower, noise)
+        self._latency = latency
+        self._swing_error = plan.predicted_max
+        self._now = begin
+        self._dwell = Dwell(begin, plan.first_direction, None, 0.0)
+        self._past: deque[Dwell] = deque(maxlen=KEPT)
+        self._finished = False
+        self._rejected = 0
+        self._score, self._scored = 0.0, 0
+        self.alarm = False
+        self._flip_at, self._ends = begin, False
+        self._plan_flip()
+
+    def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Advice:
+        """Tell the time, and a pose if there is one.
+
+        Args:
+            now: the time; one that goes back, jumps too far or is not finite is taken for the last one.
+            pose: x, y [l] and heading [rad] of the head's centre.
+            seen_at: when the pose was true; default: `latency` ago.
+        """
+        if self._now < now < self._now + LONGEST_GAP:
+            self._now = now
+        if not self._finished and self._now >= self._flip_at - SLACK:
+            self._flip()
+        if pose is not None and not self._finished:
+            when = self._now - self._latency if seen_at is None else seen_at
+            possible = len(pose) == 3 and all(map(math.isfinite, (*pose, when))) and when <= self._now
+            if possible and self._see(pose, when):
+                self._plan_flip()
+        return self.advice
+
+    @property
+    def advice(self) -> Advice:
+        """The same answer again."""
+        P = self._estimate.covariance
+        error = self._swing_error + QUANTILE * math.sqrt(max(P[0][0] + P[1][1], 0.0) / 2)
+        return Advice(0 if self._finished else self._dwell.sense, self._flip_at, self._finished, self.alarm, error)
+
+    @property
+    def learned(self) -> dict[str, float]:
+        """Estimates by name, see `planner.tracking.kalman_filter.NAMES`."""
+        return dict(zip(NAMES, self._estimate.state, strict=True))
+
+    def _flip(self) -> None:
+        """The announced flip, or the end of the path."""
+        if self._ends:
+            self._finished = True
+            return
+        done = self._dwell._replace(length=self._flip_at - self._dwell.start)
+        self._estimate.advance(done)
+        self._estimate.apply()
+        self._follower.learn(self._estimate.pose, done.sense)
+        self._past.append(done)
+        self._dwell = Dwell(self._flip_at, -done.sense, done.length, 0.0)
+        self._plan_flip()
+        self._finished = self._ends and self._flip_at <= self._now + SLACK  # the path ends at the flip
+
+    def _plan_flip(self) -> None:
+        """Time of the next flip, and whether the path ends there."""
+        self._estimate.apply()
+        place = self._follower.place
+        try:
+            length, self._ends = self._follower.next_dwell(
+                self._estimate.pose, self._dwell.sense, self._dwell.before
+            )
+        except InputError:  # far off the path: swim on
+            length, self._ends = self.shortest, False
+        self._follower.place = place
+        start = self._dwell.start
+        self._flip_at = max(start + length, self._now, start + (0.0 if self._ends else self.shortest))
+
+    def _see(self, pose: POSE, when: float) -> bool:
+        """Learn from a pose; false if it was left out."""
+        found = self._estimate.seen_from(when, self._dwell, self._past)
+        if found is None:
+            return False
+        expected, H = found
+        left = (pose[0] - expected[0], pose[1] - expected[1], _wrapped(pose[2] - expected[2]))
+        size = self._estimate.update(left, H, GATE)
+        if size <= GATE:
+            self._rejected = 0
+            self._judge(size)
+            return True
+        self._rejected += 1
+        if self._rejected >= LOST:  # many in a row: it is the estimate that is wrong
+            self._rejected = 0
+            self.alarm = True
+            for i in range(3):
+                self._estimate.covariance[i][i] += DISPLACED**2
+        return False
+
+    def _judge(self, size: float) -> None:
+        """Compare the sum over WINDOW poses with what a robot of this model gives."""
+        self._score += size
+        self._scored += 1
+        if self._scored == WINDOW:
+            self.alarm = self._score > ALARM_AT
+            self._score, self._scored = 0.0, 0
+
+
+def _wrapped(angle: float) -> float:
+    return angle - 2 * math.pi * math.floor((angle + math.pi) / (2 * math.pi))

@@ -1,0 +1,1 @@
+"""The robot as a vehicle with two twists."""

@@ -1,0 +1,81 @@
+"""The shortest dwell is chosen from what the user asks: time, error, or few flips.
+
+A longer dwell loses less speed to the turn-over of the tails, and swings further. So one number decides between
+speed and error. All figures here are of straight motion; the plan's own errors are checked
+against the tolerance afterwards. Times in μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, get_args
+
+import numpy as np
+
+from planner.vehicle.vehicle import SHORTEST, Vehicle
+from sim.arrays import Floats
+from sim.io.errors import InputError
+from sim.mechanics import planar
+
+Objective = Literal["error", "time", "flips"]
+QUICK = 0.3  # below this, two dwells before matter as well
+LONGEST = 4.0
+KEPT = {"error": 0.90, "flips": 0.95}  # share of the best net speed that is kept
+_WIDEST = 0.6  # rad that the heading swings to a side
+_COUNT = 100
+
+
+def dwells_for(vehicle: Vehicle, objective: Objective, least: float | None) -> list[float]:
+    """Dwells in the order of preference: the first one for itself, the others where a tolerance asks for less.
+
+    Args:
+        vehicle: both directions.
+        objective: "error": the shortest dwell that costs at most 10 % of the speed, then shorter ones; "time": the
+            fastest, then shorter ones; "flips": the longest that costs at most 5 % of the speed, then shorter
+            ones.
+        least: the shortest dwell that the motor or the user allows; None: QUICK.
+
+    Raises:
+        InputError: an unknown objective, or a dwell that the table does not cover.
+    """
+    if objective not in get_args(Objective):
+        raise InputError(f"objective {objective!r}; allowed are {', '.join(get_args(Objective))}")
+    least = check_least(least)
+    most = longest_dwell(vehicle, least)
+    if most == least:
+        return [least]
+    grid = np.geomspace(least, most, _COUNT)
+    speed = net_speeds(vehicle, grid)
+    good = np.flatnonzero(speed >= KEPT.get(objective, 1.0) * speed.max())
+    first = int(good[-1 if objective == "flips" else 0])
+    shorter = np.geomspace(least, grid[first], max(2, math.ceil(8 * math.log2(grid[first] / least)) + 1))
+    return shorter[::-1].tolist() if first else [least]
+
+
+def longest_dwell(vehicle: Vehicle, least: float) -> float:
+    """The longest dwell that is considered; not below `least`."""
+    return max(least, min(LONGEST, 2 * _WIDEST / float(np.abs(vehicle.twist[:, 2]).max())))
+
+
+def net_speeds(vehicle: Vehicle, dwells: Floats) -> Floats:
+    """Net speed (T,) of straight motion with shortest dwells (T,), as in `zigzag`; without the current."""
+    rates = np.abs(vehicle.twist[:, 2])
+    one, other = dwells * rates.max() / rates[0], dwells * rates.max() / rates[1]
+    pair = planar.compose(vehicle.motion(1, other, one), vehicle.motion(-1, one, other))
+    return np.asarray(np.hypot(pair[:, 0], pair[:, 1]) / (one + other))
+
+
+def check_least(least: float | None) -> float:
+    """The shortest dwell that is allowed.
+
+    Raises:
+        InputError: below what the curves of the response cover.
+    """
+    if least is None:
+        return QUICK
+    if not math.isfinite(least) or least < SHORTEST:
+        raise InputError(
+            f"minimum dwell {least:g} is below {SHORTEST:g} time units; for shorter dwells the response of the "
+            f"tails is not known: give at least {SHORTEST:g}"
+        )
+    return least

@@ -1,0 +1,169 @@
+"""The vehicle that a look-up table gives for a robot: both directions, what is uncertain, and the current."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from planner.vehicle.calibration_table import NUMBERS, Knowledge
+from planner.vehicle.vehicle import Mode, Vehicle, lags_of, resampled
+from sim.arrays import Floats
+from sim.effects import catalogue
+from sim.effects.tail_contact import EFFECT as CONTACT
+from sim.effects.tail_contact import least_gap
+from sim.io.errors import InputError
+from sim.mechanics import planar
+from sim.model.robot import Robot
+from surrogate.interface import LookupTable
+
+_STEADY = ("v_z", "v_x", "omega_yr_bar")
+_ODD = 0.2  # share of a table's error that has opposite signs in the two directions
+_STEP = 0.02  # of a coefficient, for derivatives
+
+
+def vehicle_of(robot: Robot, lookup: LookupTable, knowledge: Knowledge | None = None) -> Vehicle:
+    """The vehicle that the look-up table predicts for a robot.
+
+    Args:
+        robot: the robot.
+        lookup: a trained table, or the table of this robot.
+        knowledge: what a calibration found besides the robot: covariance of its coefficients, a current.
+
+    Raises:
+        InputError: the robot is outside the table's domain, or moves backwards on average.
+    """
+    knowledge = knowledge or Knowledge()
+    columns = _both_directions(robot.group_values())
+    found = lookup.query(columns)
+    twist = _twists(found)
+    curves = lookup.response(columns)
+    if curves.failed.any():
+        raise InputError("the response of this robot to a flip could not be found; turn its motor slower")
+    slow = twist[:, 0].mean()
+    if slow <= 0:
+        raise InputError(f"robot {robot.name!r} does not move forward (v_z = {slow:.3g}); turn its motor slower")
+    if (twist[:, 2] * [1.0, -1.0] <= 0).any():
+        raise InputError(f"robot {robot.name!r} turns to the same side in both directions of its motor; it cannot "
+                         "follow a path")  # fmt: skip
+    mirror = np.stack([np.ones(3), planar.MIRROR])
+    lag = (
+        np.stack([lags_of(curves.lag[i], curves.memory[i], curves.before) for i in (0, 1)]) * mirror[:, None, None]
+    )
+    unit = robot.time_scale / robot.tail_length  # from m/s
+    return Vehicle(
+        twist=twist,
+        lag=lag,
+        rest=resampled(curves.rest) * mirror[:, None],
+        spread=resampled(curves.spread),
+        modes=(*_table_modes(twist, lookup), *_coefficient_modes(robot, lookup, twist, knowledge)),
+        current=np.asarray(knowledge.current) * unit,
+        tail_gap=float(np.min(found["tail_gap"])),
+        least_gap=float(least_gap(robot.effects.get(CONTACT.name, 0.0))),
+    )
+
+
+def _both_directions(values: dict[str, float]) -> dict[str, Floats]:
+    """The robot twice: with its motor forward, and reversed."""
+    columns: dict[str, Floats] = {name: np.array([value, value]) for name, value in values.items()}
+    columns["omega_bar"] = columns["omega_bar"] * [1.0, -1.0]
+    return columns
+
+
+def _twists(found: Mapping[str, Floats]) -> Floats:
+    """Twists (2, 3) of both directions, from what a table answers."""
+    return np.stack([found[name] for name in _STEADY], -1)
+
+
+def _table_modes(twist: Floats, lookup: LookupTable) -> list[Mode]:
+    """The held-out errors of the table.
+
+    The two directions of a mirror-symmetric robot have the same errors. Those of other robots also have a part of
+    opposite signs.
+    """
+    error = {name: float(values["rms"]) for name, values in lookup.errors.items()}
+    speed, yaw = float(np.hypot(twist[0, 0], twist[0, 1])), abs(float(twist[0, 2]))
+    mirrored = np.allclose(twist[1], twist[0] * planar.MIRROR, rtol=1e-9, atol=0)
+    sides = [np.ones((2, 1))] if mirrored else [np.ones((2, 1)), _ODD * np.array([[1.0], [-1.0]])]
+    modes = []
+    for side in sides:
+        for i, name in enumerate(_STEADY):
+            size = np.zeros((2, 3))
+            size[:, i] = twist[:, i] * error[name] if i else error[name] * speed
+            modes.append(Mode(f"table: {name}", side * size, np.zeros((2, 3))))
+        for i, (name, scale) in enumerate((("lag_z", speed), ("lag_x", speed), ("lag_psi_rad", yaw))):
+            one = np.zeros(3)
+            one[i] = error[name] * scale
+            lag = np.stack([one, one * planar.MIRROR])
+            modes.append(Mode(f"table: {name}", np.zeros((2, 3)), side * lag))
+    return modes
+
+
+def _coefficient_modes(robot: Robot, lookup: LookupTable, twist: Floats, knowledge: Knowledge) -> list[Mode]:
+    """What the covariances of the robot's parameters and of the current do to its motion."""
+    modes: list[Mode] = []
+    if knowledge.names:
+        slopes = np.array([
+            _slope_of_number(robot, lookup, twist, name) if name in NUMBERS else _slope(robot, lookup, twist, name)
+            for name in knowledge.names
+        ])  # (p, 2, 3)  # fmt: skip
+        scale = np.sqrt(np.maximum(np.diag(knowledge.covariance), 1e-300))
+        values, vectors = np.linalg.eigh(knowledge.covariance / np.outer(scale, scale))
+        root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+        for k, column in enumerate(root.T):
+            move = np.tensordot(column, slopes, 1)
+            modes.append(Mode(f"coefficients: {k + 1}", move, np.zeros((2, 3))))
+    unit = robot.time_scale / robot.tail_length
+    for i, sigma in enumerate(knowledge.current_error):
+        if sigma > 0:
+            along = np.zeros(2)
+            along[i] = sigma * unit
+            modes.append(Mode(f"current {'xy'[i]}", np.zeros((2, 3)), np.zeros((2, 3)), along))
+    return modes
+
+
+def _slope_of_number(robot: Robot, lookup: LookupTable, twist: Floats, name: str) -> Floats:
+    """Derivative (2, 3) of the twists in ln of a number of the robot.
+
+    It changes groups, and the units of time and length. The schedule keeps its seconds, the path its metres.
+    """
+    given = robot.head_radius if getattr(robot, name) is None else getattr(robot, name)
+    moved: list[dict[str, Any]] = [{name: given * math.exp(sign * _STEP)} for sign in (1.0, -1.0)]
+    ends = [replace(robot, **one) for one in moved]
+    one, other = (end.group_values() for end in ends)
+    changes = {
+        group: math.log(one[group] / other[group]) / (2 * _STEP)
+        for group in one
+        if group not in catalogue() and one[group] != other[group]
+    }
+    faster = -math.log(ends[0].time_scale / ends[1].time_scale) / (2 * _STEP)
+    longer = math.log(ends[0].tail_length / ends[1].tail_length) / (2 * _STEP)
+    slope = twist * [faster + longer, faster + longer, faster]
+    for group, change in changes.items():
+        slope = slope + change * _slope(robot, lookup, twist, group)
+    return np.asarray(slope)
+
+
+def _slope(robot: Robot, lookup: LookupTable, twist: Floats, name: str) -> Floats:
+    """Derivative (2, 3) of the twists in ln of a coefficient or another group, or in the size of an effect."""
+    values = robot.group_values()
+    stored = getattr(lookup, "slopes", {})
+    if name in stored:
+        return np.asarray(stored[name])
+    effect = name in catalogue()
+    step = _STEP * catalogue()[name].typical if effect else _STEP
+    ends = []
+    for sign in (1.0, -1.0):
+        value = values.get(name, 0.0) + sign * step if effect else values[name] * np.exp(sign * step)
+        try:
+            ends.append((_twists(lookup.query(_both_directions({**values, name: value}))), sign * step))
+        except InputError:  # at the edge of the table
+            ends.append((twist, 0.0))
+    (one, at), (two, to) = ends
+    if at == to:
+        raise InputError(f"the table does not say what {name} changes; make the robot's own table, with "
+                         "python -m surrogate robot")  # fmt: skip
+    return np.asarray((one - two) / (at - to))

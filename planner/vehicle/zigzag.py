@@ -1,0 +1,86 @@
+"""How a vehicle moves along a straight line when the motor flips at even times.
+
+Two dwells, one in each direction, turn the robot by as much to the left as to the right. The shorter one of the
+two lasts T. The robot then moves along a line, and its heading swings about a middle. Robots whose two directions
+differ move at an angle to that middle: they drift sideways. Lengths in l, times in μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.planning.schedule import Switches, poses_at_flips, trace
+from planner.vehicle.vehicle import Vehicle
+from sim.arrays import Floats
+
+_PAIRS = 8  # simulated with the vehicle; the last one is taken
+_TRIES = 6
+
+
+@dataclass(frozen=True)
+class Zigzag:
+    """Straight motion with a shortest dwell T."""
+
+    dwells: tuple[float, float]  # in the positive and in the negative direction
+    speed: float  # net, along the heading's middle
+    swing: float  # of the heading, to and fro
+    sway: float  # of the pivot: from its mean line to where it is when the motor stops turning left
+    drift: float  # net, to the left of the heading's middle
+    rms: float  # distance of the tracked point from its mean line
+    largest: float
+
+    def hysteresis(self, ahead: float) -> float:
+        """2 h: what the heading swings past the line of sight, with look-ahead `ahead`."""
+        return max(self.swing + 2 * math.atan(self.sway / ahead), 0.2 * self.swing)
+
+    @property
+    def net_speed(self) -> float:
+        return math.hypot(self.speed, self.drift)
+
+
+def zigzag(vehicle: Vehicle, dwell: float, offset: float = 0.0) -> Zigzag:
+    """The zigzag of a vehicle with shortest dwell `dwell`; the current is left out."""
+    still = replace(vehicle, current=np.zeros(2))
+    fast = 0 if abs(vehicle.twist[0, 2]) >= abs(vehicle.twist[1, 2]) else 1
+    ratio = abs(vehicle.twist[fast, 2] / vehicle.twist[1 - fast, 2])
+    for _ in range(_TRIES):
+        pair = [0.0, 0.0]
+        pair[fast], pair[1 - fast] = dwell, dwell * ratio
+        switches, poses = _repeated(still, pair)
+        left = float(poses[-1, 2] - poses[-3, 2])
+        if abs(left) < 1e-10:
+            break
+        sign = 1 if fast == 1 else -1  # the slower direction turns to this side
+        ratio = max(ratio - sign * left / (abs(vehicle.twist[1 - fast, 2]) * dwell), 1e-3)
+    middle = float(poses[-1, 2] + poses[-2, 2]) / 2
+    move = poses[-1, :2] - poses[-3, :2]
+    duration = sum(pair)
+    c, s = math.cos(middle), math.sin(middle)
+    track = trace(still, switches, offset)[-17:-1]
+    length = max(float(np.hypot(*move)), 1e-300)
+    across = (track - track.mean(0)) @ (np.array([-move[1], move[0]]) / length)
+    return Zigzag(
+        dwells=(float(pair[0]), float(pair[1])),
+        speed=float(c * move[0] + s * move[1]) / duration,
+        swing=abs(float(poses[-1, 2] - poses[-2, 2])),
+        sway=_sway(vehicle, poses, move / length),
+        drift=float(c * move[1] - s * move[0]) / duration,
+        rms=float(across.std()),
+        largest=float(np.abs(across).max()),
+    )
+
+
+def _sway(vehicle: Vehicle, poses: Floats, along: Floats) -> float:
+    """Half of the distance between the pivot's places at flips to the right and at flips to the left."""
+    axis = np.stack([np.cos(poses[-3:, 2]), np.sin(poses[-3:, 2])], 1)
+    pivot = poses[-3:, :2] - vehicle.pivot_distance * axis
+    across = pivot @ np.array([-along[1], along[0]])
+    return float(across[1] - (across[0] + across[2]) / 2) / 2
+
+
+def _repeated(vehicle: Vehicle, pair: list[float]) -> tuple[Switches, Floats]:
+    switches = Switches(1, np.tile(pair, _PAIRS), np.zeros((1, 3)))
+    return switches, poses_at_flips(vehicle, switches)

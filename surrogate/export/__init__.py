@@ -1,0 +1,1 @@
+"""The look-up table for other programs."""

@@ -1,0 +1,213 @@
+"""A small copy of the look-up table, for a web page or a microcontroller: at most 150 kB of numbers.
+
+It has one member of each ensemble. Two tails and more, where the table is most exact, are in single precision. The
+rest is in half precision: one tail (but for its last layer), the gap, and the response to flips with equal dwells.
+What this loses against the whole table is measured on random robots and written into the file. Left out: effects,
+intervals, the memory of other dwells, and the joint support (only the ranges of the inputs and the limit of the
+yaw rate are checked). `surrogate.export.small_copy_files` writes its files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from sim.arrays import Floats
+from sim.inputs import check_columns
+from sim.io.errors import InputError
+from sim.mechanics import planar
+from sim.model.groups import DWELL
+from sim.model.response import DWELLS, at_equal_dwells
+from sim.motion.net_speed import twists
+from surrogate.input_ranges import ROBOT
+from surrogate.networks.ensemble import Ensemble
+from surrogate.table import response_table as curves
+from surrogate.table.errors import COMPARED, relative_errors, scale_of
+from surrogate.table.lookup import RESPONSE_OUTPUTS, Lookup, between_dwells, steady_outputs
+from surrogate.table.wrench_table import TailTable
+from surrogate.training.simulated import drawn
+
+MOST_BYTES = 150_000
+NETWORKS = ("one_tail", "two_tails", "more_tails", "gap", "lag", "memory")
+EXACT = ("shift", "scale", "mean", "spread")  # in single precision always
+_TRIED, _SEED = 4096, 20
+_VECTORS = 48
+_MOST_COMPONENTS = 30  # of the curves
+_MANIFEST_BYTES = 12_000  # room for the header of the file
+
+Arrays = dict[str, Any]  # by name, single or half precision
+
+
+@dataclass(frozen=True)
+class Small:
+    """The small copy: its numbers, and the table that they make."""
+
+    arrays: Arrays  # network.part, and curves.mean, curves.basis
+    table: Lookup  # with the same numbers in double precision; its curves are not used
+
+    @property
+    def has_response(self) -> bool:
+        """Whether the response to a flip is in it."""
+        return "curves.basis" in self.arrays
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of the numbers."""
+        return sum(array.nbytes for array in self.arrays.values())
+
+    def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        """What a reader answers, in double precision; with a column `dwell_bar` also the response to flips.
+
+        Args:
+            columns: robots without effects, each (M,).
+        """
+        values = check_columns({name: array for name, array in columns.items() if name != DWELL})
+        found = self.table.motions(values, flag=True)
+        result = steady_outputs(found, self.table.tails)
+        if DWELL in columns and self.has_response:
+            inputs = curves.inputs_of(found.tails, found.motion)
+            parts = [_network(self.arrays, name)(inputs) for name in NETWORKS[4:]]
+            mean, basis = (torch.tensor(self.arrays[f"curves.{name}"]).double() for name in ("mean", "basis"))
+            flat = (mean + torch.cat(parts, -1) @ basis).reshape(-1, len(DWELLS), 3)
+            lag = (flat * curves.speeds_of(found.heads, found.motion)[:, None, :]).numpy()
+            lag = between_dwells(lag, columns[DWELL])
+            twist = twists(result["v_z"], result["v_x"], result["omega_yr_bar"], found.heads.sense.numpy())
+            speed = planar.net_speed(twist, lag, columns[DWELL])
+            answers = zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True)
+            result |= {name: np.where(values["N"] > 1, answer, np.nan) for name, answer in answers}
+        return result
+
+
+def small_of(table: Lookup) -> Small:
+    """The small copy of a table: the most exact one that fits into MOST_BYTES.
+
+    Raises:
+        InputError: no copy fits.
+    """
+    several = set(NETWORKS[1:3])
+    for exact, response in ((several, True), (several, False), (set[str](), False)):
+        arrays: Arrays = {}
+        for name, network in zip(NETWORKS, (*table.tails.wrench, table.tails.gap), strict=False):
+            if network is not None:
+                arrays |= _arrays(name, network.member(0), half=name not in exact, last_exact=name == "one_tail")
+        if response:
+            arrays |= _curve_arrays(table)
+        numbers = TailTable(
+            tuple(
+                None if n is None else _network(arrays, k)
+                for k, n in zip(NETWORKS, table.tails.wrench, strict=False)
+            ),
+            _network(arrays, "gap"),
+        )
+        small = Small(arrays, replace(table, tails=numbers))
+        if small.bytes <= MOST_BYTES - _MANIFEST_BYTES:
+            return small
+    raise InputError(
+        f"the networks of this look-up table are too large for {MOST_BYTES / 1000:.0f} kB; train narrower ones"
+    )
+
+
+def losses_of(table: Lookup, small: Small) -> dict[str, dict[str, float]]:
+    """Median and 95th percentile of the small copy's difference from the table, by output.
+
+    Relative as in `surrogate.table.errors`, over random robots of the domain with two tails and more; for one tail
+    the names end with "one_tail".
+    """
+    robots = _robots(_TRIED, _SEED)
+    whole, own = table.query({k: v for k, v in robots.items() if k != DWELL}, flag=True), small.query(robots)
+    inside, several = ~whole["outside"], robots["N"] > 1
+    found: dict[str, dict[str, float]] = {}
+    parts = [("", inside & several), (" one_tail", inside & ~several)]
+    for words, rows in parts:
+        apart = relative_errors({k: v[rows] for k, v in own.items()}, {k: v[rows] for k, v in whole.items()})
+        found |= {f"{name}{words}": _figures(apart[name]) for name in COMPARED}
+    if small.has_response and (inside & several).any():
+        rows = inside & several
+        wanted = table.query({k: v[rows] for k, v in robots.items()}, flag=True)
+        apart = {n: (own[n][rows] - wanted[n]) / scale_of(n, wanted) for n in RESPONSE_OUTPUTS}
+        found |= {name: _figures(apart[name]) for name in RESPONSE_OUTPUTS}
+    return {name: figures for name, figures in found.items() if figures}
+
+
+def vectors_of(table: Lookup, small: Small) -> dict[str, Floats]:
+    """Robots of the domain with both directions and every N, and the answers of the small copy; NaN: no answer."""
+    robots = {
+        name: np.array([float(f"{v:.5g}") for v in values]) for name, values in _robots(4 * _VECTORS, 21).items()
+    }
+    inside = ~table.query({k: v for k, v in robots.items() if k != DWELL}, flag=True)["outside"]
+    chosen = {name: values[inside][:_VECTORS] for name, values in robots.items()}
+    return chosen | small.query(chosen)
+
+
+def _robots(count: int, seed: int) -> dict[str, Floats]:
+    """Random robots of the domain, every second one with a reversed motor, with dwells."""
+    robots = {name: np.array(values) for name, values in drawn(count, seed, wide=False).items() if name in ROBOT}
+    robots = {name: robots[name] for name in ROBOT}
+    robots["omega_bar"][::2] *= -1
+    return robots | {DWELL: 0.25 * 12 ** np.random.default_rng(seed).uniform(size=count)}
+
+
+def _figures(apart: Floats) -> dict[str, float]:
+    size = np.abs(apart[np.isfinite(apart)])
+    return {"median": float(np.median(size)), "p95": float(np.quantile(size, 0.95))} if len(size) else {}
+
+
+def _arrays(
+    name: str, network: Ensemble, *, half: bool, last_exact: bool = False, outputs: int | None = None
+) -> Arrays:
+    """The numbers of a network of one member, without the axis of members; the first `outputs` only.
+
+    Args:
+        last_exact: its last layer is in single precision in any case.
+    """
+    last = [f"{kind}.{network.shape['depth']}" for kind in ("weights", "biases")]
+    exact = (*EXACT, *last) if last_exact else EXACT
+    found: Arrays = {}
+    for part, tensor in network.state_dict().items():
+        values = tensor if part in EXACT else tensor[0]
+        if part in ("bypass", "mean", "spread", *last):
+            values = values[..., :outputs]
+        kind = np.float16 if half and part not in exact else np.float32
+        found[f"{name}.{part}"] = np.ascontiguousarray(values.detach().numpy(), dtype=kind)
+    return found
+
+
+def _curve_arrays(table: Lookup) -> Arrays:
+    """Networks and curves of the response to flips with equal dwells."""
+    lag, memory = table.curves.bases["lag"], table.curves.bases["memory"]
+    count = min(len(lag.vectors), len(memory.vectors), _MOST_COMPONENTS)
+    found: Arrays = {}
+    for name, network in zip(NETWORKS[4:], table.curves.networks, strict=True):
+        found |= _arrays(name, network.member(0), half=True, outputs=count)
+    vectors = torch.cat([lag.vectors[:count], _at_equal_dwells(memory.vectors[:count])])
+    mean = lag.mean + _at_equal_dwells(memory.mean[None])[0]
+    return found | {
+        "curves.mean": mean.numpy().astype(np.float32),
+        "curves.basis": vectors.numpy().astype(np.float16),
+    }
+
+
+def _at_equal_dwells(flat: Tensor) -> Tensor:
+    """Memories (C, K D 3) where the dwell before is as long as the dwell, (C, D 3)."""
+    whole = flat.reshape(-1, *curves.SHAPES["memory"]).numpy()
+    return torch.tensor(at_equal_dwells(whole)).reshape(len(flat), -1)
+
+
+def depth_of(arrays: Arrays, name: str) -> int:
+    return sum(part.startswith(f"{name}.weights.") for part in arrays) - 1
+
+
+def _network(arrays: Arrays, name: str) -> Ensemble:
+    """The network of a name, in double precision."""
+    inputs, outputs = arrays[f"{name}.bypass"].shape
+    width = arrays[f"{name}.weights.0"].shape[1]
+    network = Ensemble(inputs, outputs, width=width, depth=depth_of(arrays, name), members=1, seed=0)
+    own = {part.removeprefix(f"{name}."): torch.tensor(array).double() for part, array in arrays.items()
+           if part.startswith(f"{name}.")}  # fmt: skip
+    network.load_state_dict({part: value if part in EXACT else value[None] for part, value in own.items()})
+    return network.requires_grad_(False)

@@ -1,0 +1,61 @@
+"""The interface of a look-up table, which planner and calibration use.
+
+`surrogate.table.lookup.Lookup` (trained networks, a domain of robots) and
+`surrogate.one_robot.robot_table.SingleRobot` (one robot, simulated) are look-up tables.
+`surrogate.table.model_file.load_table` reads either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from sim.arrays import Floats
+from sim.model.response import Responses
+
+
+class LookupTable(Protocol):
+    """Gives the motion for a robot's dimensionless groups, without simulating.
+
+    Example:
+        >>> from softflagella import load_table
+        >>> load_table().domain["N"]
+        (1.0, 8.0)
+    """
+
+    @property
+    def domain(self) -> Mapping[str, tuple[float, float]]:
+        """Smallest and largest value of every input; `omega_bar` as a magnitude."""
+        ...
+
+    @property
+    def errors(self) -> Mapping[str, Mapping[str, float]]:
+        """Errors by output; each has at least "rms", see `surrogate.table.errors`."""
+        ...
+
+    @property
+    def identity(self) -> str:
+        """A hash of the numbers; it tells which table made a plan."""
+        ...
+
+    def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Outputs, each (M,), of robots given by column name, each (M,).
+
+        They are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`, `theta_deg` and
+        `tail_gap`.
+
+        Raises:
+            InputError: a robot that cannot be, or one outside the domain.
+        """
+        ...
+
+    def response(self, columns: Mapping[str, Floats]) -> Responses:
+        """Response to a flip of the motor, as `sim.motion.response.responses` would simulate it.
+
+        Args:
+            columns: robots by column name, each (M,); the sign of `omega_bar` is the direction after the flip.
+
+        Raises:
+            InputError: a robot that cannot be, or one outside the domain.
+        """
+        ...

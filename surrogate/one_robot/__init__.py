@@ -1,0 +1,1 @@
+"""A look-up table of one robot."""

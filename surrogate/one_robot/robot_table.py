@@ -1,0 +1,165 @@
+"""A table of one robot: its motion and its response to flips in both directions of the motor, simulated.
+
+The look-up table that comes with the package covers a domain of robots without odd effects. A corrected robot may
+lie outside this domain, or turn left and right at different rates. For the planner, the curves of that one robot
+are enough (`surrogate.one_robot.tabulate`). Planning simulates nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.io.errors import InputError
+from sim.io.files import write_text
+from sim.model.response import DWELLS, Responses
+from sim.motion.net_speed import net_speeds, twists
+from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.input_ranges import ROBOT
+
+FORMAT = 3
+_CURVES = {"lag": (2, len(DWELLS), 3), "memory": (2, -1, len(DWELLS), 3),
+           "rest": (2, len(DWELLS), 3), "spread": (2, len(DWELLS), 3)}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SingleRobot:
+    """Motion and response of one robot, with the interface of `surrogate.interface.LookupTable`.
+
+    Curves are those of `sim.model.response`; index 0 is the positive direction of the motor, index 1 the reversed
+    one.
+    """
+
+    robot: dict[str, float]  # dimensionless groups, effects among them
+    steady: dict[str, list[float]]  # columns of `sim steady`, both directions
+    lag: list[Any]  # (2, D, 3)
+    before: list[float]  # (K,), of `memory`
+    memory: list[Any]  # (2, K, D, 3)
+    rest: list[Any]  # (2, D, 3)
+    spread: list[Any]  # (2, D, 3)
+    slopes: dict[str, Any]  # d twist/d ln of a group, or /d size of an effect, (2, 3): forward, left, yaw rate
+    errors: dict[str, dict[str, float]]  # output -> {"rms"}, relative, see `surrogate.one_robot.tabulate`
+    provenance: dict[str, Any]
+
+    @property
+    def domain(self) -> dict[str, tuple[float, float]]:
+        """Range of every input: a single value."""
+        return {name: (value, value) for name, value in self.robot.items()}
+
+    @property
+    def identity(self) -> str:
+        """Hash of everything in the table."""
+        return _digest(asdict(self))[:16]
+
+    def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Outputs (M,) of this robot; the sign of `omega_bar` is the direction of the motor.
+
+        Raises:
+            InputError: the columns are another robot's.
+        """
+        side = self._side(columns)
+        return {name: np.array(values)[side] for name, values in self.steady.items()}
+
+    def response(self, columns: Mapping[str, Floats]) -> Responses:
+        """Response of this robot to a flip, for M rows; see `LookupTable.response`.
+
+        Raises:
+            InputError: the columns are another robot's.
+        """
+        side, before = self._side(columns), np.array(self.before)
+        lag, memory, rest, spread = (np.array(getattr(self, name))[side] for name in _CURVES)
+        found, sense = self.query(columns), np.where(side == 0, 1.0, -1.0)
+        twist = twists(found["v_z"], found["v_x"], found["omega_yr_bar"], sense)
+        speed = net_speeds(twist, lag, memory, before)
+        none = np.zeros(len(side), dtype=bool)
+        return Responses(lag, memory, rest, spread, speed, none, none, before)
+
+    def _side(self, columns: Mapping[str, Floats]) -> Any:
+        """0 or 1 for every row, by the direction of its motor."""
+        count = len(next(iter(columns.values())))
+        for name, values in columns.items():
+            own = self.robot.get(name, 0.0)
+            given = np.abs(values) if name == "omega_bar" else np.asarray(values, dtype=float)
+            for value in given[~(np.abs(given - own) <= 1e-9 * max(abs(own), 1.0))][:1]:
+                raise InputError(
+                    f"{name} = {value:g} is outside this robot's table ({own:g} only); make its own table with "
+                    "python -m surrogate robot"
+                )
+        omega = columns.get("omega_bar", np.ones(count))
+        return np.where(np.asarray(omega) < 0, 1, 0)
+
+
+def save_single(table: SingleRobot, path: str | Path) -> None:
+    """Write a table of one robot as JSON, with a hash over everything in it."""
+    content = asdict(table)
+    write_text(path, json.dumps({"format": FORMAT, "hash": _digest(content), **content}) + "\n")
+
+
+def load_single(path: str | Path) -> SingleRobot:
+    """Read a table of one robot.
+
+    Raises:
+        InputError: the file is not such a table, or one of another version, or it was changed.
+    """
+    remedy = "make one with python -m surrogate robot"
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as missing:
+        raise InputError(f"{path} cannot be read ({missing.strerror}); {remedy}") from None
+    except (ValueError, RecursionError):  # not UTF-8, or no JSON
+        content = None
+    if not isinstance(content, dict):
+        raise InputError(f"{path} is no table of a robot, or is damaged; {remedy}")
+    version = content.pop("format", 1)
+    if version != FORMAT:
+        raise InputError(f"{path} has format {str(version)[:20]}, this version reads {FORMAT}; {remedy}")
+    if content.pop("hash", "") != _digest(content):
+        raise InputError(f"{path} was changed after it was written; {remedy}")
+    lacking = [field.name for field in fields(SingleRobot) if field.name not in content]
+    if lacking or len(content) != len(fields(SingleRobot)):
+        raise InputError(f"{path} is no complete table of a robot{_listed(lacking)}; {remedy}")
+    try:
+        wrong = _wrong(SingleRobot(**content))
+    except (KeyError, TypeError, ValueError, AttributeError):
+        wrong = "its numbers have no such form"
+    if wrong:
+        raise InputError(f"{path} is no table of a robot: {wrong}; {remedy}")
+    return SingleRobot(**content)
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _listed(lacking: list[str]) -> str:
+    return f": it has no {lacking[0]!r}" if lacking else ""
+
+
+def _wrong(table: SingleRobot) -> str:
+    """What is wrong with the numbers of a table; empty if nothing is."""
+    for name, shape in _CURVES.items():
+        curves = np.array(getattr(table, name), dtype=float)
+        wanted = tuple(len(table.before) if size < 0 else size for size in shape)
+        if curves.shape != wanted or not np.isfinite(curves).all():
+            return f"it has no curves {name!r} of shape {wanted} in finite numbers"
+    missing = [name for name in STEADY_OUTPUTS if name not in table.steady]
+    if missing:
+        return f"it has no {missing[0]!r}"
+    motion = np.array([table.steady[name] for name in STEADY_OUTPUTS], dtype=float)
+    if motion.shape != (len(STEADY_OUTPUTS), 2) or np.isnan(motion).any():  # the gap of one tail is infinite
+        return "its steady motion is not two numbers for each output"
+    groups = np.array([table.robot[name] for name in {*ROBOT, *table.robot}], dtype=float)
+    slopes = [np.array(slope, dtype=float) for slope in table.slopes.values()]
+    if not np.isfinite(groups).all() or any(s.shape != (2, 3) or not np.isfinite(s).all() for s in slopes):
+        return "its robot or its slopes are not finite numbers"
+    if any(not math.isfinite(error["rms"]) for error in table.errors.values()):
+        return "its errors are not finite numbers"
+    return ""

@@ -1,0 +1,127 @@
+"""Simulate the table of one robot, see `robot_table`. Any robot: left and right turns may differ.
+
+The table states its own error. A random schedule is replayed in time steps and compared, dwell by dwell, with what
+the table predicts. The mean difference over the dwells, with its standard error, is the table's error of a lag.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.effects import catalogue
+from sim.io.errors import InputError
+from sim.io.provenance import provenance
+from sim.mechanics import planar
+from sim.model.groups import Groups
+from sim.model.response import BEFORE, DWELLS, LAGS, memory_after
+from sim.model.robot import Robot
+from sim.model.schedule import Schedule
+from sim.motion.replay import replay
+from sim.motion.response import responses
+from sim.motion.steady import steady
+from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.one_robot.robot_table import SingleRobot
+
+_STEP = 0.02  # in the logarithm of a group and in units of an effect's typical size, for derivatives
+_CHECKED = 24  # dwells of the random schedule
+_RANGE = (0.35, 1.8)  # of their lengths
+
+
+def tabulate(robot: Robot) -> SingleRobot:
+    """Simulate one robot's steady motion and its response to flips, in both directions of the motor.
+
+    Args:
+        robot: any robot, with or without effects.
+
+    Raises:
+        InputError: the robot's motion cannot be found, or a simulated flip breaks down.
+
+    Example:
+        >>> from dataclasses import replace
+        >>> from softflagella import circle, load_robot, plan, tabulate
+        >>> robot = replace(load_robot("paper-control"), effects={"left_right_bias": 0.2})
+        >>> plan(circle(2.0), robot, lookup=tabulate(robot)).predicted_rms < 0.03
+        True
+    """
+    values = robot.group_values()
+    both = {name: np.array([value, value]) for name, value in values.items()}
+    both["omega_bar"] = both["omega_bar"] * [1.0, -1.0]
+    groups = Groups.from_columns(both)
+    motion = steady(groups)
+    if not motion.converged.all():
+        raise InputError(f"{robot.name} has no steady motion to tabulate: {motion.note[0]}")
+    found = responses(groups, motion)
+    if found.failed.any():
+        raise InputError(f"{robot.name}: a simulated flip broke down; a slower motor may help")
+    columns = motion.columns()
+    table = SingleRobot(
+        robot=values,
+        steady={name: np.asarray(columns[name], dtype=float).tolist() for name in STEADY_OUTPUTS},
+        lag=found.lag.tolist(),
+        before=BEFORE.tolist(),
+        memory=found.memory.tolist(),
+        rest=found.rest.tolist(),
+        spread=found.spread.tolist(),
+        slopes=_slopes(values),
+        errors={},
+        provenance=provenance({"robot": robot.name}),
+    )
+    errors = {name: {"rms": float(motion.error.max())} for name in ("v_x", "v_z", "omega_yr_bar")}
+    own = {name: values[0] for name, values in table.steady.items()}
+    speed, yaw = float(np.hypot(own["v_x"], own["v_z"])), abs(own["omega_yr_bar"])
+    missed = _missed(table) / [speed, speed, yaw]
+    bias = np.sqrt(missed.mean(0) ** 2 + missed.var(0) / len(missed))
+    errors |= {name: {"rms": float(value)} for name, value in zip(LAGS, bias, strict=True)}
+    return replace(table, errors=errors)
+
+
+def _slopes(values: dict[str, float]) -> dict[str, Any]:
+    """Derivatives (2, 3) of the twists in ln of each group, and in the size of each effect, by differences."""
+    names = [name for name in values if name != "N"]
+    rows, widths = [], []
+    for name in names:
+        ends = _ends(name, values[name])
+        widths.append(ends[0][1] - ends[1][1])
+        rows += [{**values, name: value} for value, _ in ends for _ in (0, 1)]
+    columns = {name: np.array([row[name] for row in rows]) for name in values}
+    columns["omega_bar"] = columns["omega_bar"] * np.tile([1.0, -1.0], 2 * len(names))
+    motion = steady(Groups.from_columns(columns))
+    twist = np.stack([motion.v_z, motion.v_x, motion.omega_yr], -1).reshape(len(names), 2, 2, 3)
+    slopes = (twist[:, 0] - twist[:, 1]) / np.array(widths)[:, None, None]
+    found = dict(zip(names, slopes, strict=True))
+    return {name: slope.tolist() for name, slope in found.items() if np.isfinite(slope).all()}
+
+
+def _ends(name: str, value: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Two values beside `value`, each with its place on the scale of the derivative; within an effect's bounds."""
+    if name not in catalogue():
+        return (value * math.exp(_STEP), _STEP), (value * math.exp(-_STEP), -_STEP)
+    effect = catalogue()[name]
+    step = _STEP * abs(effect.typical - effect.null)
+    low, high = (min(max(value + sign * step, effect.bounds[0]), effect.bounds[1]) for sign in (-1, 1))
+    return (high, high), (low, low)
+
+
+def _missed(table: SingleRobot) -> Floats:
+    """Differences (M, 3) of lags between a replay in time steps and the table, seen as for a positive motor."""
+    dwells = np.exp(np.random.default_rng(0).uniform(math.log(_RANGE[0]), math.log(_RANGE[1]), _CHECKED))
+    track = replay([Schedule(table.robot, 1, dwells, (0.0, 0.0, 0.0), 1.0)])[0]
+    flips = track.groupby("dwell").last()[["x_over_l", "y_over_l", "heading_rad"]].to_numpy()
+    poses = np.concatenate([np.zeros((1, 3)), flips])
+    moved = planar.between(poses[:-1], poses[1:])
+    lag, memory = np.array(table.lag), np.array(table.memory)
+    missed = []
+    for i in range(1, len(dwells)):
+        side = i % 2
+        mirror = planar.MIRROR if side else np.ones(3)
+        twist = np.array([table.steady[name][side] for name in ("v_z", "v_x", "omega_yr_bar")]) * mirror
+        simulated = planar.compose(moved[i] * mirror, planar.inverse(planar.arc(twist, dwells[i])))
+        curve = lag[side] + memory_after(memory[side], float(dwells[i - 1]))
+        predicted = [np.interp(np.log(dwells[i]), np.log(DWELLS), column) for column in curve.T]
+        missed.append(simulated - predicted)
+    return np.array(missed)

@@ -1,0 +1,1 @@
+"""The look-up table and its query: what planning needs, nothing more."""

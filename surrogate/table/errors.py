@@ -1,0 +1,121 @@
+"""Held-out error of the look-up table, per output.
+
+For outputs that keep their sign, the error is relative. For θ it is in degrees. For v_z and for the response to
+a flip it is relative to the distance (or turn) of the robot in one unit of time. For the net speed it is
+relative to v_z, its limit for long dwells. Reported are the root mean square, the median, the 95th percentile
+and the largest error over rows whose tails do not touch, where the model is valid, and the same over all rows.
+Stated errors are those of robots with two tails and more; robots with one tail have errors ten times as large,
+and wider intervals. `coverage` is the share of rows inside their interval.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sim.arrays import Flags, Floats
+from sim.model.response import LAGS
+
+if TYPE_CHECKING:
+    from surrogate.table.lookup import Lookup
+
+Columns = Mapping[str, Any]
+
+RELATIVE = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "R_yr_over_l", "tail_gap")
+COMPARED = (*RELATIVE, "v_z", "theta_deg")
+_POOR = 0.05  # a 95th percentile from which on `shortcomings` speaks
+_UNITS = {"theta_deg": "deg", "lag_psi_rad": "of turn/unit", "v_z": "of speed", "lag_x": "of speed",
+          "lag_z": "of speed", "net_speed_bar": "of v_z"}  # fmt: skip
+
+
+def scale_of(name: str, truth: Columns) -> Floats | float:
+    """The number by which the error of an output is divided."""
+    if name in RELATIVE:
+        return np.abs(truth[name])
+    if name == "theta_deg":
+        return 1.0
+    if name == "lag_psi_rad":
+        return np.abs(truth["omega_yr_bar"])
+    if name == "net_speed_bar":
+        return np.abs(truth["v_z"])
+    return np.hypot(truth["v_x"], truth["v_z"])  # v_z, lag_x, lag_z
+
+
+def relative_errors(answer: Columns, truth: Columns) -> dict[str, Floats]:
+    """Errors of every steady output over its scale, (M,)."""
+    with np.errstate(invalid="ignore"):  # one tail has no gap
+        return {name: (answer[name] - truth[name]) / scale_of(name, truth) for name in COMPARED}
+
+
+def curve_errors(response: Any, truth: Columns) -> dict[str, Floats]:
+    """Errors of the response, (M, D) over the dwells.
+
+    Args:
+        response: of the table.
+        truth: columns of the steady motion; `lag` (M, D, 3) and `net_speed` (M, D) of the simulator.
+    """
+    found = {}
+    for i, name in enumerate(LAGS):
+        found[name] = (response.lag - truth["lag"])[..., i] / np.asarray(scale_of(name, truth))[:, None]
+    speed = np.asarray(scale_of("net_speed_bar", truth))[:, None]
+    return found | {"net_speed_bar": (response.net_speed - truth["net_speed"]) / speed}
+
+
+def summary(errors: Mapping[str, Floats], valid: Flags) -> dict[str, dict[str, float]]:
+    """Figures of errors (M, …) by output; `valid` (M,) marks rows whose tails do not touch."""
+    report: dict[str, dict[str, float]] = {}
+    for name, error in errors.items():
+        known = np.isfinite(error)
+        some = np.abs(error[valid & known] if error.ndim == 1 else error[valid][known[valid]])
+        every = np.abs(error[known])
+        if not len(every):
+            continue
+        some = some if len(some) else every
+        report[name] = {
+            "rms": float(np.sqrt(np.mean(some**2))),
+            "median": float(np.median(some)),
+            "p95": float(np.quantile(some, 0.95)),
+            "largest": float(some.max()),
+            "rms_with_touching": float(np.sqrt(np.mean(every**2))),
+            "p95_with_touching": float(np.quantile(every, 0.95)),
+        }
+    return report
+
+
+def coverage(answer: Columns, truth: Columns) -> dict[str, float]:
+    """Share of rows whose true value lies inside the interval, by output."""
+    found = {}
+    for name in COMPARED:
+        if f"{name}_low" in answer:
+            known = np.isfinite(truth[name])
+            inside = (truth[name] >= answer[f"{name}_low"]) & (truth[name] <= answer[f"{name}_high"])
+            found[name] = float(np.mean(inside[known]))
+    return found
+
+
+def shortcomings(lookup: Lookup) -> list[str]:
+    """What is poor about a table, in words; nothing where it is good enough to plan with."""
+    found = []
+    for name, words in (("omega_yr_bar", "the yaw rate"), ("net_speed_bar", "the net speed")):
+        error = lookup.errors.get(name)
+        if error and error["p95"] > _POOR:
+            found.append(
+                f"{words} is off by {100 * error['p95']:.0f} % at 95 % of the held-out rows; learn more rows, or "
+                "give robots tables of their own (python -m surrogate robot)"
+            )
+    return found
+
+
+def error_table(lookup: Lookup) -> str:
+    """The held-out errors as text."""
+    lines = [f"{'output':16}{'rms':>9}{'median':>9}{'95 %':>9}{'largest':>9}{'95 %, all':>11}"]
+    for name, error in lookup.errors.items():
+        percent = 1 if name == "theta_deg" else 100
+        figures = "".join(f"{percent * error[k]:9.4f}" for k in ("rms", "median", "p95"))
+        figures += f"{percent * error['largest']:9.2f}{percent * error['p95_with_touching']:11.4f}"
+        lines.append(
+            f"{name:16}{figures}  {_UNITS.get(name, '%') if percent == 1 else '% ' + _UNITS.get(name, '')}"
+        )
+    return "\n".join(line.rstrip() for line in lines)

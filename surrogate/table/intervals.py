@@ -1,0 +1,111 @@
+"""Intervals for the answers of the table: split-conformal, each output for itself, wider where the table is less
+sure.
+
+    answer ± q s(x),   s(x) = exp(c · features(x)),   q: quantile of |error|/s over robots that training did not
+    see
+
+s is fitted to the logarithm of errors by least squares. Its features are the inputs of the tails and their
+squares, how far the robot is from the middle of what was learned, how much the members differ, and N. q makes
+the intervals cover 90 % whether or not s is any good. There is one q for robots with one tail, and one for each
+octant of the others: low or high drag number, deflection and forward motion. So the intervals cover 90 % in each
+of these parts. s makes them cover about 90 % in smaller parts as well. Robots for s and robots for q are different
+ones. Sources: Lei et al., J. Am. Stat. Assoc. 113, 1094 (2018), section 5.2; Vovk, Gammerman and Shafer,
+Algorithmic Learning in a Random World (2005), section 4.5, for the parts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+COVERAGE = 0.90
+_TINY = 1e-9  # of the scale of an output
+_RIDGE = 1e-3
+_HALVED = (0, 3, 5)  # hints whose halves make the octants: drag number, deflection, forward motion
+_ONE_TAIL = -1  # the hint that is 1 for one tail
+PARTS = 2 ** len(_HALVED) + 1
+_FEWEST = 40  # robots in a part, for a q of its own
+_FIRMEST, _SOFTEST = 0.002, 0.998  # s is held between these quantiles of itself
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Half-widths of the outputs, as learned."""
+
+    shift: Tensor  # (F,)
+    scale: Tensor  # (F,)
+    weights: Mapping[str, Tensor]  # output -> (P,)
+    bounds: Mapping[str, tuple[float, float]]  # output -> smallest and largest ln s
+    middle: Tensor  # (3,), the halves meet here
+    factor: Mapping[str, Tensor]  # output -> q of each part, (PARTS,)
+
+    def half_widths(self, name: str, hints: Tensor, sizes: Tensor) -> Tensor:
+        """Half of the width of the interval of one output, (M,).
+
+        Args:
+            hints: (M, F), see `surrogate.table.lookup`.
+            sizes: (M,), what errors of this output are relative to.
+        """
+        return self.factor[name][self.part_of(hints)] * self._local(name, hints) * sizes
+
+    def part_of(self, hints: Tensor) -> Tensor:
+        """Which part each robot belongs to, (M,): 0 to 7 for octants, 8 for one tail."""
+        high = (hints[:, list(_HALVED)] > self.middle).long()
+        octant = (high * 2 ** torch.arange(len(_HALVED))).sum(1)
+        return torch.where(hints[:, _ONE_TAIL] > 0.5, PARTS - 1, octant)
+
+    def _local(self, name: str, hints: Tensor) -> Tensor:
+        low, high = self.bounds[name]
+        return torch.exp((_design((hints - self.shift) / self.scale) @ self.weights[name]).clamp(low, high))
+
+    @staticmethod
+    def learned(
+        hints: Tensor, errors: Mapping[str, Tensor], more_hints: Tensor, more_errors: Mapping[str, Tensor]
+    ) -> Intervals:
+        """From relative errors by output, (M,), of robots for s and of more robots, (M',), for q."""
+        shift, scale = hints.mean(0), torch.clamp(hints.std(0), min=1e-6)
+        design = _design((hints - shift) / scale)
+        weights, bounds, factor = {}, {}, {}
+        for name, error in errors.items():
+            known = torch.isfinite(error)
+            if not known.any():  # nothing to learn from: the interval is infinite
+                weights[name] = torch.zeros(design.shape[1], dtype=design.dtype)
+                bounds[name] = (0.0, 0.0)
+                continue
+            logs, rows = torch.log(error[known].abs() + _TINY), design[known]
+            matrix = rows.T @ rows + _RIDGE * len(rows) * torch.eye(rows.shape[1], dtype=rows.dtype)
+            weights[name] = torch.linalg.solve(matrix, rows.T @ logs)
+            low, high = (rows @ weights[name]).quantile(torch.tensor([_FIRMEST, _SOFTEST], dtype=rows.dtype))
+            bounds[name] = (float(low), float(high))
+        several = hints[hints[:, _ONE_TAIL] < 0.5]
+        middle = (several if len(several) else hints)[:, list(_HALVED)].median(0).values
+        plain = Intervals(shift, scale, weights, bounds, middle, {})
+        part = plain.part_of(more_hints)
+        for name, error in more_errors.items():
+            known = torch.isfinite(error)
+            scores = error[known].abs() / plain._local(name, more_hints[known])
+            each = [scores[part[known] == k] for k in range(PARTS)]
+            factor[name] = torch.tensor(
+                [_conformal_quantile(own if len(own) >= _FEWEST else scores) for own in each], dtype=torch.float64
+            )
+        return replace(plain, factor=factor)
+
+
+def _design(x: Tensor) -> Tensor:
+    """1, x and all products of two, (M, P), with x held to five standard deviations."""
+    x = x.clamp(-5, 5)
+    first, second = torch.triu_indices(x.shape[1], x.shape[1]).unbind(0)
+    return torch.cat([torch.ones_like(x[:, :1]), x, x[:, first] * x[:, second]], 1)
+
+
+def _conformal_quantile(scores: Tensor) -> float:
+    """The smallest score that covers a new row with a probability of at least COVERAGE."""
+    count = len(scores)
+    if not count:
+        return math.inf
+    rank = min(int(torch.ceil(torch.tensor((count + 1) * COVERAGE))), count)
+    return float(scores.sort().values[rank - 1])

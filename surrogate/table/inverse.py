@@ -1,0 +1,175 @@
+"""The table backwards: which robots have a wanted motion, and which of the allowed robots is best.
+
+`inverse` solves for the free inputs by damped least squares (Levenberg and Marquardt) from many starts at once,
+with the derivatives of the table. Several solutions are all returned. `design` maximises one output under limits
+on others, by Sobol points that close in on the best allowed one.
+
+Free inputs are varied as logarithms within their bounds. Left out: N, which is not continuous.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+from sim.arrays import Floats, Integers
+from sim.io.errors import InputError
+from surrogate.table.errors import scale_of
+from surrogate.table.lookup import OUTSIDE, Lookup
+
+Bounds = Mapping[str, tuple[float, float]]
+
+_STARTS, _STEPS = 16, 40
+_SOLVED = 1e-6  # misfit, relative, of a solution
+_SAME = 1e-3  # difference of ln(input) up to which two solutions are one
+_SHRINK, _ROUNDS, _CANDIDATES = 0.5, 6, 1024
+
+
+@dataclass(frozen=True)
+class Solutions:
+    """K solutions for M targets."""
+
+    target: Integers  # (K,) row of the target
+    inputs: dict[str, Floats]  # free inputs, each (K,)
+    misfit: Floats  # (K,) root mean square of the relative misfits; 0 for an exact solution
+    outside: Floats  # (K,) whether the solution is outside the table's domain
+
+
+def inverse(
+    lookup: Lookup, robots: Mapping[str, Floats], targets: Mapping[str, Floats], bounds: Bounds
+) -> Solutions:
+    """Inputs that give wanted outputs.
+
+    Args:
+        lookup: the table.
+        robots: the inputs that are given, each (M,).
+        targets: outputs by name, each (M,); errors are relative as in `surrogate.table.errors`.
+        bounds: free inputs and their ranges.
+
+    Returns:
+        All different solutions, the best of each target first. Where no start solves a target, its best attempt.
+
+    Raises:
+        InputError: fewer targets than free inputs, or names that cannot be.
+    """
+    names, wanted = list(bounds), list(targets)
+    if len(wanted) < len(names):
+        raise InputError(
+            f"{len(wanted)} targets for {len(names)} free inputs; give as many targets, or free fewer"
+        )
+    count = len(next(iter(targets.values())))
+    low, high = (np.log([bounds[name][i] for name in names]) for i in (0, 1))
+    starts = low + (high - low) * qmc.Sobol(len(names), rng=np.random.default_rng(0)).random(_STARTS)
+    p = np.tile(starts, (count, 1))  # (M starts, F)
+    row = np.repeat(np.arange(count), _STARTS)
+    given = {name: np.asarray(array, dtype=float)[row] for name, array in robots.items() if name not in names}
+    aim = {name: np.asarray(array, dtype=float)[row] for name, array in targets.items()}
+    size = _sizes(aim)
+
+    def misfits(p: Floats) -> tuple[Floats, Floats, Floats]:
+        columns = {**given, **{name: np.exp(p[:, i]) for i, name in enumerate(names)}}
+        found = lookup.query(columns, flag=True)
+        slopes = lookup.jacobian(columns, names, flag=True)
+        left = np.stack([(found[name] - aim[name]) / size[name] for name in wanted], -1)
+        J = np.stack(
+            [np.stack([slopes[o][n] * columns[n] for n in names], -1) / size[o][:, None] for o in wanted], 1
+        )
+        return left, J, found[OUTSIDE]
+
+    p, left, outside = _least_squares(misfits, p, low, high)
+    rms = np.sqrt((left**2).mean(-1))
+    return _different(row, p, rms, outside, names)
+
+
+def _sizes(targets: Mapping[str, Floats]) -> dict[str, Floats]:
+    """What misfits are relative to: themselves where the speed is not among the targets."""
+    sizes = {}
+    for name, value in targets.items():
+        try:
+            sizes[name] = np.broadcast_to(scale_of(name, targets), value.shape)
+        except KeyError:
+            sizes[name] = np.abs(value)
+    return sizes
+
+
+def _least_squares(
+    misfits: Callable[[Floats], tuple[Floats, Floats, Floats]], p: Floats, low: Floats, high: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Levenberg and Marquardt for all rows of p (B, F) at once, within bounds."""
+    damping = np.full(len(p), 1e-2)
+    left, J, outside = misfits(p)
+    for _ in range(_STEPS):
+        left, J = np.nan_to_num(left, nan=1e3), np.nan_to_num(J)
+        A = np.einsum("bof,bog->bfg", J, J)
+        diagonal = np.einsum("bff->bf", A)
+        damped = A + (damping[:, None] * diagonal + 1e-12)[:, :, None] * np.eye(p.shape[1])
+        step = np.linalg.solve(damped, np.einsum("bof,bo->bf", J, left)[..., None])[..., 0]
+        trial = np.clip(p - np.clip(step, -1, 1), low, high)
+        new_left, new_J, new_outside = misfits(trial)
+        better = np.nan_to_num((new_left**2).sum(-1), nan=np.inf) < (left**2).sum(-1)
+        p = np.where(better[:, None], trial, p)
+        left, J = np.where(better[:, None], new_left, left), np.where(better[:, None, None], new_J, J)
+        outside = np.where(better, new_outside, outside)
+        damping = np.where(better, damping / 5, damping * 4).clip(1e-9, 1e9)
+        if (np.abs(step).max() < 1e-9) or (np.sqrt((left**2).mean(-1)) < _SOLVED / 10).all():
+            break
+    return p, left, outside
+
+
+def _different(row: Integers, p: Floats, misfit: Floats, outside: Floats, names: list[str]) -> Solutions:
+    kept: list[int] = []
+    for target in np.unique(row):
+        own = np.flatnonzero(row == target)
+        own = own[np.argsort(misfit[own], kind="stable")]
+        chosen = [own[0]]
+        for i in own[1:]:
+            if misfit[i] < _SOLVED and min(np.abs(p[i] - p[j]).max() for j in chosen) > _SAME:
+                chosen.append(i)
+        kept += [int(i) for i in chosen]
+    inputs = {name: np.exp(p[kept, i]) for i, name in enumerate(names)}
+    return Solutions(row[kept], inputs, misfit[kept], outside[kept])
+
+
+def design(
+    lookup: Lookup, robot: Mapping[str, float], bounds: Bounds, *, best: str, limits: Bounds
+) -> dict[str, float]:
+    """The allowed robot with the highest output.
+
+    Args:
+        lookup: the table.
+        robot: the inputs that are given; with `dwell_bar` the net speed can be asked for.
+        bounds: free inputs and their ranges.
+        best: the output to make as large as possible.
+        limits: smallest and largest allowed value of outputs.
+
+    Returns:
+        Inputs and outputs of the best robot found.
+
+    Raises:
+        InputError: no robot within the bounds keeps the limits.
+    """
+    names = list(bounds)
+    low, high = (np.log([bounds[name][i] for name in names]) for i in (0, 1))
+    centre, width = (low + high) / 2, high - low
+    sampler = qmc.Sobol(len(names), rng=np.random.default_rng(0))
+    winner: dict[str, float] = {}
+    for _ in range(_ROUNDS):
+        p = np.clip(centre + width * (sampler.random(_CANDIDATES) - 0.5), low, high)
+        columns = {name: np.full(len(p), value) for name, value in robot.items()}
+        columns |= {name: np.exp(p[:, i]) for i, name in enumerate(names)}
+        found = lookup.query(columns, flag=True)
+        allowed = ~found[OUTSIDE]
+        for name, (least, most) in limits.items():
+            allowed &= (found[name] >= least) & (found[name] <= most)
+        score = np.where(allowed, found[best], -np.inf)
+        top = int(score.argmax())
+        if allowed.any() and score[top] > winner.get(best, -np.inf):
+            winner = {name: float(values[top]) for name, values in {**columns, **found}.items() if name != OUTSIDE}
+            centre = p[top]
+        width = width * _SHRINK
+    if not winner:
+        raise InputError("no robot within the bounds keeps the limits; widen one of them")
+    return winner

@@ -1,0 +1,68 @@
+"""Derivatives of the table's steady motion in the inputs of a robot.
+
+At a solution u of F(u; p) = 0, one more step of Newton's method, u(p) = u − F_u⁻¹ F(u; p) with F_u held, has the
+exact derivative du/dp = −F_u⁻¹ F_p. So the outputs are differentiated through that step (forward mode).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from sim.arrays import Floats
+from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.networks.ensemble import Ensemble
+from surrogate.table.wrench_table import TailTable, class_of
+from surrogate.wrench import heads as head
+
+
+def slopes(
+    table: TailTable, values: Mapping[str, Floats], motion: Tensor, parameters: Sequence[str]
+) -> dict[str, dict[str, Floats]]:
+    """∂(output)/∂(parameter), each (M,), of robots that the table solved.
+
+    Args:
+        table: of the tails.
+        values: checked columns of the robots, the parameters among them, each (M,).
+        motion: their motion, (M, 5).
+        parameters: names of columns.
+    """
+    found = {name: {p: np.full(len(motion), np.nan) for p in parameters} for name in STEADY_OUTPUTS}
+    columns = {name: head.as_tensor(array) for name, array in values.items()}
+    kind = class_of(columns["N"])
+    for k, network in enumerate(table.wrench):
+        rows = torch.nonzero(kind == k)[:, 0]
+        if len(rows) and network is not None:
+            own = {name: array[rows] for name, array in columns.items()}
+            for parameter, changes in _changes(table, network, own, motion[rows, :4], parameters).items():
+                for name, change in zip(STEADY_OUTPUTS, changes, strict=True):
+                    found[name][parameter][rows.numpy()] = change.numpy()
+    return found
+
+
+def _changes(
+    table: TailTable, network: Ensemble, columns: dict[str, Tensor], u: Tensor, parameters: Sequence[str]
+) -> dict[str, tuple[Tensor, ...]]:
+    """Derivatives of STEADY_OUTPUTS by parameter, of robots with one network and the solution u (M, 4)."""
+    heads, tails = head.robots_of(columns, keep=parameters)
+    _, slope = head.value_and_slope(lambda v: head.unbalanced(heads, tails, v, network), u)
+    inverse = torch.linalg.inv_ex(slope)[0]
+
+    def outputs(moved: dict[str, Tensor]) -> tuple[Tensor, ...]:
+        heads, tails = head.robots_of(moved, keep=parameters)
+        left = head.unbalanced(heads, tails, u, network)
+        motion = head.full_motion(heads, u - (inverse @ left[..., None])[..., 0])
+        return table.outputs(heads, motion, table.tail_gap(tails, motion))
+
+    found = {}
+    for parameter in parameters:
+        size = columns[parameter]
+
+        def along(value: Tensor, name: str = parameter) -> tuple[Tensor, ...]:
+            return outputs({**columns, name: value})
+
+        found[parameter] = torch.func.jvp(along, (size,), (torch.ones_like(size),))[1]
+    return found

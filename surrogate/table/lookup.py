@@ -1,0 +1,301 @@
+"""The look-up table: the tails' wrench is learned, the head's balance is solved for at each query.
+
+A query finds the motion in which the tails' mean wrench (`surrogate.table.wrench_table`) is in balance with head,
+disc and motor (`surrogate.wrench.heads`). So it answers for every head, every number of tails and every effect on
+head, disc and motor. Its response to a flip comes from learned curves (`surrogate.table.response_table`). Every
+output can have an interval (`surrogate.table.intervals`).
+
+Refused, or flagged on request: robots whose tails move as none of the learned ones do (`surrogate.table.support`),
+and robots that yaw more than BRANCHES times as fast as their tails turn, which may have several motions. Refused
+always: effects on the tails themselves. The table does not extrapolate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from sim.arrays import Flags, Floats, Integers
+from sim.effects import catalogue
+from sim.inputs import check_columns
+from sim.io.errors import InputError
+from sim.mechanics import planar
+from sim.model.groups import DWELL
+from sim.model.response import DWELLS, LAGS, Responses, at_equal_dwells
+from sim.motion.net_speed import net_speeds, twists
+from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.table.intervals import Intervals
+from surrogate.table.response_table import CurveTable
+from surrogate.table.support import Support
+from surrogate.table.wrench_table import TailTable, class_of, sensitivity_of
+from surrogate.wrench import heads as head
+from surrogate.wrench import tails as tail
+from surrogate.wrench.balance import inputs_rows
+from surrogate.wrench.heads import Heads
+from surrogate.wrench.tails import Tails
+
+RESPONSE_OUTPUTS = ("net_speed_bar", *LAGS[::-1])
+OUTSIDE = "outside"  # flag of robots that the table does not know
+BRANCHES = 0.6  # |ω_yr/ω_t| from which a robot may have several motions
+CERTIFIED = "certified_error"
+_REASONS = (  # why a robot is outside
+    "",
+    "none with as many tails were learned",
+    "its tails or its motor were not learned, or no motion was found",
+    "its tails move as none of the learned ones do",
+    "it yaws nearly as fast as its tails turn, and may have several motions",
+)
+_NOT_OF_HEAD = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
+
+
+class Motions(NamedTuple):
+    """What a query works with, for M robots."""
+
+    heads: Heads
+    tails: Tails
+    motion: Tensor  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor
+    inputs: Floats  # (M, 7) of the networks, see `surrogate.wrench.tails.inputs_of`
+    reason: list[str]  # why a robot is outside; else empty
+
+
+@dataclass(frozen=True)
+class Lookup:
+    """A trained table with its domain, its intervals and its held-out errors."""
+
+    tails: TailTable
+    curves: CurveTable
+    support: tuple[Support | None, ...]  # for each of the classes of `surrogate.table.wrench_table`
+    intervals: Intervals | None
+    ranges: dict[str, tuple[float, float]]  # of the robots that were learned, by input
+    errors: dict[str, dict[str, float]]  # output -> held-out error, see `surrogate.table.errors`
+    provenance: dict[str, Any]
+
+    @property
+    def domain(self) -> dict[str, tuple[float, float]]:
+        """Range of every input among the learned robots, and of the effects that need no learning.
+
+        What is refused is decided by the joint support, not by these ranges.
+        """
+        effects = {name: effect.bounds for name, effect in catalogue().items() if head.is_of_head(name)}
+        return {**self.ranges, **effects}
+
+    @property
+    def identity(self) -> str:
+        """Hash of all numbers."""
+        from surrogate.table.model_file import content_of
+        from surrogate.table.tensor_file import digest
+
+        return digest(content_of(self))[:16]
+
+    def query(
+        self, columns: Mapping[str, Floats], *, intervals: bool = False, flag: bool = False, certify: bool = False
+    ) -> dict[str, Any]:
+        """Predicted outputs, each (M,); with a column `dwell_bar` also RESPONSE_OUTPUTS for equal dwells.
+
+        Args:
+            columns: robots by column name, each (M,).
+            intervals: add `<name>_low` and `<name>_high`, which hold the simulator's value in 90 of 100 cases.
+            flag: answer for robots outside the domain as well; the column OUTSIDE says which.
+            certify: simulate each robot as well; the column CERTIFIED is the largest relative error of the spins,
+                the yaw rate and the velocities (these relative to the speed), with the simulator's own error.
+
+        Raises:
+            InputError: a robot that cannot be, or one outside the domain.
+        """
+        values = check_columns({name: array for name, array in columns.items() if name != DWELL})
+        if DWELL in columns:
+            _check_flips(values)
+        found = self.motions(values, flag=flag)
+        result: dict[str, Any] = steady_outputs(found, self.tails)
+        if DWELL in columns:
+            dwells = _checked_dwells(columns[DWELL])
+            result |= _at_dwells(self._responses(found, result), result, dwells, found.heads.sense.numpy())
+        if intervals:
+            result |= self._intervals(found, result)
+        if flag:
+            result[OUTSIDE] = np.array([bool(reason) for reason in found.reason])
+        if certify:
+            from surrogate.table.certify import certified_error
+
+            result[CERTIFIED] = certified_error(values, result)
+        return result
+
+    def response(self, columns: Mapping[str, Floats], *, flag: bool = False) -> Responses:
+        """Response to a flip of the motor, see `surrogate.interface.LookupTable.response`.
+
+        Raises:
+            InputError: a robot that cannot be, one outside the domain, or one whose left and right turns differ.
+        """
+        values = check_columns(columns)
+        _check_flips(values)
+        found = self.motions(values, flag=flag)
+        return self._responses(found, steady_outputs(found, self.tails))
+
+    def jacobian(
+        self, columns: Mapping[str, Floats], parameters: Sequence[str], *, flag: bool = False
+    ) -> dict[str, dict[str, Floats]]:
+        """∂(output)/∂(parameter) of STEADY_OUTPUTS, by output and parameter, each (M,).
+
+        Exact derivatives of the table: those of one more step of Newton's method at the solution.
+
+        Args:
+            columns: robots by column name, each (M,).
+            parameters: names of groups, without N, or of effects on the head.
+            flag: answer outside the domain as well.
+
+        Raises:
+            InputError: a robot that cannot be, or one outside the domain.
+        """
+        from surrogate.table.jacobian import slopes
+
+        values = check_columns({**columns, **{n: columns.get(n, 0.0 * columns["N"]) for n in parameters}})
+        return slopes(self.tails, values, self.motions(values, flag=flag).motion, parameters)
+
+    def motions(self, values: Mapping[str, Floats], *, flag: bool = False) -> Motions:
+        """Motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
+        heads, tails = head.robots_of(values)
+        motion, converged = self.tails.solve(heads, tails)
+        inputs = inputs_rows(tail.columns_of(tails), motion)
+        known = converged & self._within_ranges(values)
+        reasons = self._reasons(class_of(tails.number).numpy(), motion, inputs, known)
+        if any(reasons) and not flag:
+            row, reason = next((row, reason) for row, reason in enumerate(reasons) if reason)
+            raise InputError(self._refusal(values, row, reason))
+        return Motions(heads, tails, torch.from_numpy(motion), inputs, reasons)
+
+    def hints(self, found: Motions) -> Tensor:
+        """What the width of an interval may depend on, (M, 11)."""
+        heads, tails, motion = found.heads, found.tails, found.motion
+        inputs = torch.from_numpy(found.inputs)
+        remote, spread = torch.zeros(len(motion)).double(), torch.zeros(len(motion)).double()
+        weight = sensitivity_of(heads, tails, motion) @ tail.units_of(tails, motion)
+        kind = class_of(tails.number)
+        for k, network in enumerate(self.tails.wrench):
+            rows = torch.nonzero(kind == k)[:, 0]
+            support = self.support[k]
+            if len(rows) and network is not None and support is not None:
+                remote[rows] = torch.from_numpy(support.remoteness(found.inputs[rows.numpy()]))
+                members = network.members_at(torch.cat([inputs[rows], tails.head[rows]], -1))
+                apart = (weight[rows] @ (members - members.mean(0))[..., None])[..., 0]
+                spread[rows] = apart.norm(dim=-1).mean(0)
+        extra = [
+            torch.log(remote + 1e-12),
+            torch.log(spread + 1e-9),
+            torch.log(tails.number),
+            (kind == 0).double(),
+        ]
+        return torch.nan_to_num(torch.cat([inputs, torch.stack(extra, -1)], -1))
+
+    def _intervals(self, found: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
+        from surrogate.table.errors import scale_of
+
+        if self.intervals is None:
+            raise InputError("this look-up table has no intervals; train it again")
+        hints, added = self.hints(found), {}
+        for name in [name for name in result if name in self.intervals.factor]:
+            size = torch.tensor(np.broadcast_to(scale_of(name, result), result[name].shape))
+            half = self.intervals.half_widths(name, hints, size).numpy()
+            half = np.where(np.isfinite(result[name]), half, 0.0)
+            added[f"{name}_low"], added[f"{name}_high"] = result[name] - half, result[name] + half
+        return added
+
+    def _within_ranges(self, values: Mapping[str, Floats]) -> Flags:
+        """Whether tails and motor speed are within the learned ranges; heads may be any."""
+        within = np.ones(len(values["N"]), dtype=bool)
+        for name in _NOT_OF_HEAD:
+            low, high = self.ranges[name]
+            size = np.abs(values[name])
+            within &= (low * (1 - 1e-9) <= size) & (size <= high * (1 + 1e-9))
+        return within
+
+    def _reasons(self, kind: Integers, motion: Floats, inputs: Floats, known: Flags) -> list[str]:
+        remote, learned = np.full(len(motion), np.nan), np.zeros(len(motion), dtype=bool)
+        for k, support in enumerate(self.support):
+            rows = np.flatnonzero(kind == k)
+            if len(rows) and support is not None:
+                remote[rows], learned[rows] = support.remoteness(inputs[rows]), True
+        with np.errstate(divide="ignore", invalid="ignore"):
+            quick = np.abs(motion[:, 2] / motion[:, 4])
+        which = np.select([~learned, ~known, ~(remote <= 1), quick > BRANCHES], [1, 2, 3, 4])
+        return [_REASONS[number] for number in which.tolist()]
+
+    def _refusal(self, values: Mapping[str, Floats], row: int, reason: str) -> str:
+        for name, (low, high) in self.ranges.items():
+            value = abs(float(values[name][row]))
+            if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
+                reason += f"; {name} = {value:g}, learned were {low:g} to {high:g}"
+                break
+        return (
+            f"the robot in row {row + 1} is outside the look-up table: {reason}; change the robot, or simulate it "
+            "(python -m sim steady, python -m surrogate robot)"
+        )
+
+    def _responses(self, found: Motions, steady: Mapping[str, Floats]) -> Responses:
+        curves = self.curves.curves(found.heads, found.tails, found.motion)
+        sense = found.heads.sense.numpy()
+        twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
+        speed = net_speeds(twist, curves["lag"], curves["memory"])
+        none = np.zeros(len(sense), dtype=bool)
+        return Responses(**curves, net_speed=speed, failed=none, stepped=none)
+
+
+def _check_flips(values: Mapping[str, Floats]) -> None:
+    """Refuse robots whose response to a flip was not learned."""
+    for name, size in values.items():
+        if name in catalogue() and catalogue()[name].symmetry == "odd" and size.any():
+            raise InputError(
+                f"{name} makes left and right turns differ, which the look-up table has not learned; make the "
+                "robot a table of its own: python -m surrogate robot ROBOT.toml --out TABLE.json"
+            )
+    if (values["N"] < 2).any():
+        raise InputError(
+            "N = 1: the response of one tail depends too much on the phase of the disc, so the look-up table "
+            "has not learned it; simulate it (python -m sim replay)"
+        )
+
+
+def steady_outputs(found: Motions, tails: TailTable) -> dict[str, Floats]:
+    """STEADY_OUTPUTS of motions."""
+    values = tails.outputs(found.heads, found.motion, tails.quick_gap(found.tails, found.inputs))
+    return {name: np.asarray(value.numpy()) for name, value in zip(STEADY_OUTPUTS, values, strict=True)}
+
+
+def _checked_dwells(dwells: Floats) -> Floats:
+    try:
+        dwells = np.asarray(dwells, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{DWELL} has a value that is no number; give numbers") from None
+    for value in dwells[~(np.isfinite(dwells) & (dwells >= DWELLS[0] * (1 - 1e-9)))][:1]:
+        raise InputError(f"{DWELL} = {value:g}; give a dwell from {DWELLS[0]:g} on")
+    return dwells
+
+
+def _at_dwells(
+    response: Responses, steady: Mapping[str, Floats], dwells: Floats, sense: Floats
+) -> dict[str, Floats]:
+    """RESPONSE_OUTPUTS at one dwell for each robot, when all dwells are equal."""
+    curves = response.lag + at_equal_dwells(response.memory)
+    lag = between_dwells(curves, dwells)
+    twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
+    speed = planar.net_speed(twist, lag, dwells)
+    return dict(zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True))
+
+
+def between_dwells(curves: Floats, dwells: Floats) -> Floats:
+    """Curves (M, D, 3) at one dwell for each row (M,): cubic in ln T̄ through four neighbours, then constant."""
+    knots = np.log(DWELLS)
+    place = np.log(np.minimum(dwells, DWELLS[-1]))
+    first = np.clip(np.searchsorted(knots, place) - 2, 0, len(knots) - 4)
+    rows, total = np.arange(len(dwells)), np.zeros((len(dwells), 3))
+    for i in range(4):
+        weight = np.ones(len(dwells))
+        for j in range(4):
+            if j != i:
+                weight *= (place - knots[first + j]) / (knots[first + i] - knots[first + j])
+        total += weight[:, None] * curves[rows, first + i]
+    return total

@@ -1,0 +1,1 @@
+"""From rows of simulations to a trained look-up table."""

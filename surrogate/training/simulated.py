@@ -1,0 +1,166 @@
+"""Simulated robots as the look-up table learns them: from a data set's folder, or drawn and simulated here.
+
+The tails' wrench follows from a robot's own motion, whatever its head is. So robots with heads far wider than
+those of real robots make the best rows: `drawn` gives them. Columns have the names of the data set. Curves of
+the response to a flip are those of `sim.model.response`; rows without them have NaN.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.stats import qmc
+
+from dataset.storage.data_set import read, read_manifest, usable
+from sim.arrays import Flags, Floats, Integers
+from sim.effects import catalogue
+from sim.model.groups import Groups
+from sim.model.response import BEFORE, DWELLS, LAG_PARTS
+from sim.motion.batches import run_batches, split, steady_columns
+from sim.motion.response import responses
+from sim.motion.steady import orbits
+from surrogate.input_ranges import DOMAIN, MOST_TAILS, ROBOT, WIDE
+
+MOTION = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap", "error")
+_TAILS = (1, 1, 2, 2, 3, 4, 5, 7)  # N of eighths of the wide robots; half of the last two have one tail more
+_PHASES = {1: 8, 2: 12}  # to begin with, by N: with one or two tails the motion depends more on the disc's phase
+_BATCH, _CURVE_BATCH = 64, 8
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """M robots with their motion, and with their response curves if they were simulated."""
+
+    robots: dict[str, Floats]  # groups and effects, each (M,)
+    motion: dict[str, Floats]  # MOTION, each (M,)
+    curves: dict[str, Floats]  # lag, memory, rest, spread as in `sim.model.response`, net_speed; may be empty
+
+    def __len__(self) -> int:
+        return len(self.robots["N"])
+
+    def at(self, rows: Flags | Integers) -> Simulated:
+        """The robots at indices or flags."""
+        parts = [{name: array[rows] for name, array in part.items()} for part in vars(self).values()]
+        return Simulated(*parts)
+
+    def with_curves(self) -> Simulated:
+        """The robots whose response was simulated."""
+        if not self.curves:
+            return self.at(np.zeros(len(self), dtype=bool))
+        return self.at(np.flatnonzero(np.isfinite(self.curves["lag"]).all((1, 2))))
+
+
+def read_rows(folder: str) -> tuple[Simulated, Integers]:
+    """Usable rows of a data set's folder, and their numbers.
+
+    Raises:
+        InputError: there is no finished data set.
+    """
+    table = read(folder)
+    effects = list(read_manifest(folder)["effects"])
+    plain = table.select_dtypes(["number", "bool"])
+    table = table.loc[usable(plain).index]
+    robots = {name: table[name].to_numpy(dtype=float) for name in (*ROBOT, *effects)}
+    motion = {name: table[name].to_numpy(dtype=float) for name in MOTION}
+    return Simulated(robots, motion, _curves_in(table)), table["row"].to_numpy(dtype=np.int64)
+
+
+def joined(parts: Sequence[Simulated]) -> Simulated:
+    """The robots of all parts; effects that some do not have are at their null there."""
+    effects = {name for part in parts for name in part.robots if name in catalogue()}
+    full = [
+        {**{name: np.full(len(part), catalogue()[name].null) for name in sorted(effects)}, **part.robots}
+        for part in parts
+    ]
+    curves = [part.curves for part in parts] if all(part.curves for part in parts) else [{} for _ in parts]
+    together = (full, [part.motion for part in parts], curves)
+    return Simulated(*({name: np.concatenate([p[name] for p in kind]) for name in kind[0]} for kind in together))
+
+
+def _curves_in(table: pd.DataFrame) -> dict[str, Floats]:
+    """Response curves from lists in columns `lag_z`, …, `memory_psi_rad`; empty if there are none."""
+    if "memory_z" not in table:
+        return {}
+    dwells, before = len(DWELLS), len(BEFORE)
+    shapes = {"lag": (dwells,), "memory": (before, dwells), "rest": (dwells,), "spread": (dwells,)}
+    curves = {
+        name: np.stack([_lists(table[f"{name}_{part}"], shape) for part in LAG_PARTS], -1)
+        for name, shape in shapes.items()
+    }
+    return curves | {"net_speed": _lists(table["net_speed_bar"], (dwells,))}
+
+
+def _lists(column: Any, shape: Sequence[int]) -> Floats:
+    empty = np.full(shape, np.nan)
+    return np.array([empty if row is None else np.asarray(row, dtype=float).reshape(shape) for row in column])
+
+
+def drawn(count: int, seed: int, *, wide: bool) -> dict[str, Floats]:
+    """Robots of a scrambled Sobol sequence, even in the logarithms of DOMAIN.
+
+    Args:
+        count: number of robots. seed: of the scrambling. wide: from WIDE, half of them with effects on the head,
+        a quarter each with one and two tails; else robots of
+            DOMAIN, every N alike, without effects.
+    """
+    sampler = qmc.Sobol(len(DOMAIN) + 5, scramble=True, rng=np.random.default_rng(seed))
+    share = sampler.random_base2(math.ceil(math.log2(max(count, 2))))[:count]
+    ranges = WIDE if wide else DOMAIN
+    robots = {n: low * (high / low) ** share[:, i] for i, (n, (low, high)) in enumerate(ranges.items())}
+    eighth, more, turning, along, disc = share[:, len(DOMAIN) :].T
+    if not wide:
+        return robots | {"N": 1 + np.floor(MOST_TAILS * eighth)}
+    tails = np.array(_TAILS, dtype=float)[(8 * eighth).astype(int)]
+    robots["N"] = tails + (tails >= 5) * (more > 0.5)
+    robots["end_over_end_drag"] = np.where(turning < 0.5, 0.0, 0.1 * 150 ** (2 * turning - 1))
+    robots["anisotropic_head_drag"] = np.where(along < 0.5, 0.0, -0.5 + 1.5 * (2 * along - 1))
+    robots["disc_drag"] = np.where(disc < 0.6, 0.0, 3 * (disc - 0.6) / 0.4)
+    return robots
+
+
+def simulated(robots: Mapping[str, Floats], *, curves: bool = False, title: str = "") -> Simulated:
+    """Simulate robots; those without a direct solution are left out.
+
+    Args:
+        robots: groups and effects, each (M,).
+        curves: simulate the response to a flip, too; it takes a hundred times as long.
+        title: of the progress bar; empty for none.
+    """
+    batches = split(np.asarray(robots["N"]), _CURVE_BATCH if curves else _BATCH)
+    parts = [{name: array[rows] for name, array in robots.items()} for rows in batches]
+    work = _with_curves if curves else _motion
+    done = run_batches(work, parts, sizes=[len(b) for b in batches], title=title, threads=True)
+    order = np.argsort(np.concatenate(batches))
+    found = {name: np.concatenate([part[name] for part in done])[order] for name in done[0]}
+    motion = {name: found[name] for name in MOTION}
+    kept = {name: found[name] for name in found if name not in (*MOTION, "solved")}
+    everything = Simulated({name: np.asarray(array) for name, array in robots.items()}, motion, kept)
+    return everything.at(found["solved"])
+
+
+def as_reached(robots: Mapping[str, Floats], *, title: str = "") -> Simulated:
+    """Simulate robots as the data set does: the motion that straight tails reach, if it is steady."""
+    found = steady_columns(robots, title=title)
+    whole = Simulated(dict(robots), {name: found[name] for name in MOTION}, {})
+    return whole.at(np.asarray(found["converged"], dtype=bool))
+
+
+def _motion(robots: dict[str, Floats]) -> dict[str, Any]:
+    groups = Groups.from_columns(robots)
+    motion = orbits(groups, phases=_PHASES.get(groups.N, 3))
+    columns = motion.columns()
+    return {name: columns[name] for name in MOTION} | {"solved": motion.converged}
+
+
+def _with_curves(robots: dict[str, Floats]) -> dict[str, Any]:
+    groups = Groups.from_columns(robots)
+    motion = orbits(groups)
+    found = responses(groups, motion)
+    columns = _motion(robots)
+    curves = {name: getattr(found, name) for name in ("lag", "memory", "rest", "spread", "net_speed")}
+    return columns | curves | {"solved": columns["solved"] & ~found.failed & ~found.stepped}

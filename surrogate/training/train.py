@@ -1,0 +1,226 @@
+"""Train a look-up table: networks, domain, intervals and held-out errors.
+
+Rows of a data set are put into three sets by a fixed hash of their number: 80 % are learned, on 10 % the local
+widths of the intervals are fitted, and 10 % are held out. The held-out rows give the stated errors and the last
+factor of the intervals. Rows that failed or did not converge are left out. Rows whose tails touch are used.
+
+A data set need not have response curves. Then the flips of a part of its robots are simulated here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from dataset.storage.data_set import read_manifest
+from sim.arrays import Floats, Integers
+from sim.io.errors import InputError
+from sim.io.provenance import fingerprint, provenance
+from surrogate.input_ranges import ROBOT
+from surrogate.networks.checkpoints import Work, device_named
+from surrogate.networks.training_loop import Settings
+from surrogate.table import response_table as curves
+from surrogate.table import wrench_table as tails
+from surrogate.table.errors import curve_errors, relative_errors, summary
+from surrogate.table.intervals import Intervals
+from surrogate.table.lookup import BRANCHES, Lookup, steady_outputs
+from surrogate.table.response_table import learn_curves
+from surrogate.table.support import Support
+from surrogate.table.wrench_table import CLASSES, class_of, learn_tails, learnable, rows_of
+from surrogate.training.simulated import Simulated, joined, read_rows, simulated
+from surrogate.wrench import tails as tail
+
+_FEWEST_INSIDE = 10
+_FEWEST_ROWS, _FEWEST_OF_A_CLASS = 64, 16
+_QUIET = Work()
+
+
+def split(rows: Integers) -> Integers:
+    """0 learned, 1 for the widths of intervals, 2 held out: a fixed pseudo-random split by row number."""
+    mixed = (rows.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(40)
+    tenth = mixed % np.uint64(10)
+    return np.where(tenth == 8, 1, np.where(tenth == 9, 2, 0))
+
+
+def train(
+    folder: str | Sequence[str],
+    settings: Settings | None = None,
+    curve_settings: Settings | None = None,
+    *,
+    flips: int = 256,
+    title: str = "train",
+    device: str = "cpu",
+    states: str | Path | None = None,
+) -> Lookup:
+    """A look-up table from a finished data set, or from several.
+
+    Args:
+        folder: data set written by `python -m dataset build` or `python -m surrogate refine`, or several. A row
+            that is in two of them counts once.
+        settings: networks of the tails and their optimiser.
+        curve_settings: the same for the response to a flip.
+        flips: robots whose flips are simulated if the data set has no curves.
+        title: of the progress bars; empty for none.
+        device: "cpu", "cuda", or "auto" for the latter where there is one.
+        states: folder in which training keeps its states. Started again with the same arguments, it goes on
+            from there, to the same table. When the table is saved, `checkpoints.remove_states` removes
+            them.
+
+    Raises:
+        InputError: there is no data set, or it has too few usable rows, or there is no such device.
+
+    Example:
+        >>> from softflagella import train
+        >>> table = train("data/sweep")  # doctest: +SKIP
+    """
+    work = Work(title, device_named(device), None if states is None else Path(states))
+    folders = [folder] if isinstance(folder, str) else list(folder)
+    manifests = [read_manifest(one) for one in folders]
+    rows, numbers = _together(folders, manifests)
+    part = split(numbers)
+    if len(rows) < _FEWEST_ROWS:
+        raise InputError(f"{', '.join(folders)} has {len(rows)} usable rows; training needs {_FEWEST_ROWS}")
+    sets = [rows.at(part == i) for i in range(3)]
+    flipped = sets[0].with_curves()
+    if not len(flipped):
+        some = sets[0].at(np.flatnonzero(sets[0].robots["N"] > 1)[:flips])
+        flipped = simulated(some.robots, curves=True, title=title and f"{title}: flips simulated")
+    kept = {"data_hash": "config_hash", "data_code_version": "code_version", "data_chosen": "chosen"}
+    source = {name: "+".join(str(m.get(key, "")) for m in manifests) for name, key in kept.items()}
+    learned, widths, held_out = sets
+    return learn(learned, widths, held_out, flipped, settings, curve_settings, source=source, work=work)
+
+
+def held_out(folder: str | Sequence[str]) -> Simulated:
+    """The rows of data sets that `train` holds out."""
+    folders = [folder] if isinstance(folder, str) else list(folder)
+    rows, numbers = _together(folders, [read_manifest(one) for one in folders])
+    return rows.at(split(numbers) == 2)
+
+
+def _together(folders: Sequence[str], manifests: Sequence[dict[str, Any]]) -> tuple[Simulated, Integers]:
+    """Rows of several data sets and their numbers; the same point of the same sequence counts once."""
+    parts, numbers, seen = [], [], dict[str, Integers]()
+    for folder, manifest in zip(folders, manifests, strict=True):
+        part, number = read_rows(folder)
+        sequence = fingerprint(manifest["config"])
+        before = seen.get(sequence, np.empty(0, dtype=number.dtype))
+        fresh = ~np.isin(number, before)
+        parts.append(part.at(fresh))
+        numbers.append(number[fresh])
+        seen[sequence] = np.concatenate([before, number])
+    return joined(parts), np.concatenate(numbers)
+
+
+def learn(
+    learned: Simulated,
+    widths: Simulated,
+    held_out: Simulated,
+    flipped: Simulated,
+    settings: Settings | None = None,
+    curve_settings: Settings | None = None,
+    *,
+    flips_held_out: Simulated | None = None,
+    source: dict[str, Any] | None = None,
+    work: Work = _QUIET,
+) -> Lookup:
+    """A look-up table from simulated robots.
+
+    Args:
+        learned: steady motions for the tails.
+        widths: robots for the local widths of the intervals.
+        held_out: robots for the errors and the factor of the intervals.
+        flipped: robots with response curves.
+        flips_held_out: robots with curves for the errors of the response; by default a tenth of `flipped`.
+        source: more provenance.
+        work: device, progress bars, and where states are kept.
+    """
+    chosen, curves_chosen = settings or Settings(), curve_settings or curves.SETTINGS
+    if flips_held_out is None:
+        tenth = np.arange(len(flipped)) % 10 == 9
+        flipped, flips_held_out = flipped.at(~tenth), flipped.at(tenth)
+    rows = _learnable(learned)
+    table = learn_tails(rows, chosen, work)
+    kind = class_of(rows.tails.number)
+    inputs = tail.inputs_of(rows.tails, rows.motion)
+    flipped, flips_held_out = _several_tails(flipped), _several_tails(flips_held_out)
+    own = _learnable(flipped)
+    usable = np.flatnonzero(learnable(rows_of(flipped.robots, flipped.motion)))
+    known = flipped.at(usable).curves
+    response = learn_curves(own.heads, own.tails, own.motion, known, curves_chosen, work.part("flips"))
+    counts = {"train": len(rows.motion), "widths": len(widths), "held_out": len(held_out), "flips": len(usable)}
+    made = provenance({"tails": asdict(chosen), "curves": asdict(curves_chosen), "device": work.device})
+    lookup = Lookup(
+        tails=table,
+        curves=response,
+        support=tuple(
+            Support.of(inputs[kind == k]) if bool((kind == k).any()) else None for k in range(len(CLASSES))
+        ),
+        intervals=None,
+        ranges={name: _range(learned.robots[name]) for name in learned.robots if name in ROBOT},
+        errors={},
+        provenance={**made, **(source or {}), "rows": counts},
+    )
+    return _judged(lookup, widths, held_out, flips_held_out)
+
+
+def _judged(lookup: Lookup, widths: Simulated, held_out: Simulated, flips: Simulated) -> Lookup:
+    """The table with its intervals and held-out errors; the errors are those of robots with two tails and more."""
+    (first_hints, first, _), (hints, errors, inside) = (_errors(lookup, rows) for rows in (widths, held_out))
+    intervals = Intervals.learned(first_hints, first, hints, errors)
+    apart = held_out.motion["tail_gap"][inside] >= 1
+    several = held_out.robots["N"][inside] > 1
+    several = several if several.any() else ~several
+    report = summary({name: error.numpy()[several] for name, error in errors.items()}, apart[several])
+    flips = flips.at(np.abs(flips.motion["omega_yr_bar"]) < BRANCHES * np.abs(flips.motion["omega_t_bar"]))
+    found = lookup.response(flips.robots, flag=True)
+    truth = {**flips.motion, **flips.curves}
+    report |= summary(curve_errors(found, truth), flips.motion["tail_gap"] >= 1)
+    return replace(lookup, intervals=intervals, errors=report)
+
+
+def _errors(lookup: Lookup, rows: Simulated) -> tuple[torch.Tensor, dict[str, torch.Tensor], Floats]:
+    """Hints and relative errors of rows inside the domain, and which those are."""
+    found = lookup.motions(rows.robots, flag=True)
+    inside = np.array([not reason for reason in found.reason])
+    if inside.sum() < _FEWEST_INSIDE:  # a table of few rows has a domain that holds hardly any others: all count
+        inside[:] = True
+    truth = with_radius(rows.motion)
+    errors = relative_errors(steady_outputs(found, lookup.tails), truth)
+    return (
+        lookup.hints(found)[torch.as_tensor(inside)],
+        {name: torch.tensor(error[inside]) for name, error in errors.items()},
+        inside,
+    )
+
+
+def _several_tails(rows: Simulated) -> Simulated:
+    """Rows with two or more tails: the response of one tail depends too much on the phase of the disc."""
+    return rows.at(rows.robots["N"] > 1)
+
+
+def with_radius(motion: dict[str, Floats]) -> dict[str, Floats]:
+    """The motion with turn radius and slip angle."""
+    speed = np.hypot(motion["v_x"], motion["v_z"])
+    angle = np.degrees(np.arctan2(np.abs(motion["v_x"]), motion["v_z"]))
+    return {**motion, "R_yr_over_l": speed / np.abs(motion["omega_yr_bar"]), "theta_deg": angle}
+
+
+def _learnable(rows: Simulated) -> tails.Rows:
+    found = rows_of(rows.robots, rows.motion)
+    good = learnable(found)
+    kept = found.at(torch.as_tensor(np.flatnonzero(good)))
+    counts = [int((class_of(kept.tails.number) == k).sum()) for k in range(len(CLASSES))]
+    for count, number in zip(counts, ("N = 1", "N = 2", "N = 3 and more"), strict=True):
+        if 0 < count < _FEWEST_OF_A_CLASS:
+            raise InputError(f"{count} usable rows with {number}; training needs {_FEWEST_OF_A_CLASS} or none")
+    return kept
+
+
+def _range(values: Floats) -> tuple[float, float]:
+    return float(np.abs(values).min()), float(np.abs(values).max())

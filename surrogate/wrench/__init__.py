@@ -1,0 +1,1 @@
+"""The tails' and the head's wrench, and their balance: formulas only."""

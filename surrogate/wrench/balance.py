@@ -1,0 +1,200 @@
+"""Motions in balance as compiled loops, one robot at a time.
+
+The equations are those of `surrogate.wrench.heads` and `surrogate.wrench.tails`, written for one robot instead of
+for tensors. They are solved by Broyden's method. Its first derivative holds the network's numbers y fixed, so it
+needs no evaluation of the network; five or six evaluations are enough. The table of a single tail has second
+solutions near the true one. So there the equations are solved again with the exact first derivative, and of two
+different solutions that counts whose surge is nearer to the first guess (linear theory). Units: l, μ0 l⁴/EI,
+EI/l².
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.arrays import Flags, Floats
+from sim.compiling import compiled
+from sim.linear.dense import solve_dense
+from surrogate.networks.compiled import Packed, evaluate
+from surrogate.wrench.tails import SMALL_DEFLECTION, SMALL_SURGE, SOFT, TINY, thrust_of, torque_of
+
+STEPS, CORRECTION = 60, 1e-9  # of Broyden's method; the correction is relative
+_DIFFERENCE, _LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
+_FIRST_SPIN = 0.6  # ω_t/ω in the first guess
+_LONGEST = 0.5  # largest relative change of ω_t in one step
+
+
+@compiled
+def solve_rows(network: Packed, heads: Floats, resistances: Floats, tails: Floats) -> tuple[Floats, Flags]:
+    """(v_x, v_z, ω_yr, ω_h, ω_t) in balance, (M, 5), for a positive motor; and which robots converged, (M,).
+
+    Args:
+        network: of the tails.
+        heads: |ω| and gain, (M, 2).
+        resistances: of the heads, (M, 4, 5).
+        tails: columns of `surrogate.wrench.tails.columns_of`, (M, 13).
+    """
+    motions, converged = np.empty((len(heads), 5)), np.empty(len(heads), dtype=np.bool_)
+    y, guess, other = np.empty(len(network.mean)), np.empty(5), np.empty(5)
+    for row in range(len(heads)):
+        head, resistance, tail = heads[row], resistances[row], tails[row]
+        _first_guess(head, resistance, tail, guess)
+        motions[row] = guess
+        converged[row] = _solve(network, head, resistance, tail, y, motions[row], False)
+        if tail[4] == 1:
+            other[:] = guess
+            found = _solve(network, head, resistance, tail, y, other, True)
+            nearer = abs(other[1] - guess[1]) < abs(motions[row, 1] - guess[1])
+            if found and (nearer or not converged[row]):
+                motions[row] = other
+                converged[row] = True
+    return motions, converged
+
+
+@compiled
+def inputs_rows(tails: Floats, motions: Floats) -> Floats:
+    """`surrogate.wrench.tails.inputs_of`, (M, 7), of tails (M, 13) that move so (M, 5)."""
+    x = np.empty((len(tails), 7))
+    for row in range(len(tails)):
+        inputs_at(tails[row], motions[row], x[row])
+    return x
+
+
+@compiled
+def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
+    """`surrogate.wrench.tails.inputs_of` of one robot, written to x (7,), or `inputs_with_head`, to x (14,)."""
+    v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
+    drag_number = tail[0] * spin
+    deflection = np.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
+    x[0] = np.log(drag_number)
+    x[1] = np.log(tail[2])
+    x[2] = -np.log(tail[3])
+    x[3] = np.arcsinh(deflection / SMALL_DEFLECTION)
+    x[4] = np.arctan2(v_x, yaw)
+    x[5] = np.arcsinh(v_z / (tail[2] * spin) / SMALL_SURGE)
+    x[6] = np.log(tail[5] / (tail[4] * tail[0] * tail[2] ** 2))
+    for i in range(7, len(x)):
+        x[i] = tail[i - 1]
+
+
+@compiled
+def _unbalanced(head: Floats, resistance: Floats, tail: Floats, motion: Floats, y: Floats, left: Floats) -> None:
+    """`surrogate.wrench.heads.unbalanced` for numbers y of the tails, written to left (4,)."""
+    v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
+    perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
+    S = perp * spin
+    sideways = np.sqrt(v_x**2 + yaw**2 + TINY)
+    squared = (sideways / (a * spin)) ** 2
+    couple = number * spin * a**2
+    across = number * perp
+    left[0] = across * (yaw / 2 - v_x + sideways * y[0])
+    left[1] = -number * parallel * v_z + (perp - parallel) * couple * thrust_of(S) * (y[1] + squared * y[4])
+    left[2] = across * (v_x / 2 - yaw / 3 + sideways * y[2])
+    left[3] = -perp * couple * torque_of(S) * (y[3] + squared * y[5])
+    for i in range(4):
+        for j in range(5):
+            left[i] -= resistance[i, j] * motion[j]
+
+
+@compiled
+def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats) -> None:
+    """The motion with the torque and thrust of linear theory and the side forces of straight tails."""
+    speed, gain = head[0], head[1]
+    perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
+    spin = _FIRST_SPIN * speed
+    for _ in range(3):
+        torque = number * perp * a**2 * torque_of(perp * spin)
+        spin = speed * resistance[3, 3] / (resistance[3, 3] + gain * (torque + resistance[3, 4]))
+    head_spin = (spin - speed) / gain
+    matrix, push = resistance[:3, :3].copy(), np.empty((3, 1))
+    matrix[0, 0] += number * perp
+    matrix[1, 1] += number * parallel
+    matrix[2, 2] += number * perp / 3
+    matrix[0, 2] -= number * perp / 2
+    matrix[2, 0] -= number * perp / 2
+    for i in range(3):
+        push[i, 0] = -resistance[i, 3] * head_spin - resistance[i, 4] * spin
+    push[1, 0] += number * (perp - parallel) * spin * a**2 * thrust_of(perp * spin)
+    solve_dense(matrix, push)
+    motion[:3] = push[:, 0]
+    motion[3], motion[4] = head_spin, spin
+
+
+@compiled
+def _solve(
+    network: Packed, head: Floats, resistance: Floats, tail: Floats, y: Floats, motion: Floats, exact: bool
+) -> bool:
+    """Broyden's method for one robot, from the motion given; returns whether it converged.
+
+    Args:
+        y: room for the network's numbers, (6,).
+        motion: first guess, replaced by the result, (5,).
+        exact: the first derivative is that of the network, too.
+    """
+    x, left, before = np.empty(len(network.shift)), np.empty(4), np.empty(4)
+    step, change, moved = np.empty(4), np.empty(4), np.empty(5)
+    slope, inverse = np.empty((4, 4)), np.eye(4)
+    inputs_at(tail, motion, x)
+    evaluate(network, x, y)
+    _unbalanced(head, resistance, tail, motion, y, left)
+    largest = 0.0
+    for j in range(4):
+        largest = max(largest, abs(motion[j]))
+    for j in range(4):
+        width = _DIFFERENCE * (abs(motion[j]) + _LEAST_SHARE * largest)
+        moved[:] = motion
+        moved[j] += width
+        moved[4] = head[0] + head[1] * moved[3]
+        if exact:
+            inputs_at(tail, moved, x)
+            evaluate(network, x, y)
+        _unbalanced(head, resistance, tail, moved, y, before)
+        for i in range(4):
+            slope[i, j] = (before[i] - left[i]) / width
+    solve_dense(slope, inverse)
+    for _ in range(STEPS):
+        share = 1.0
+        for i in range(4):
+            step[i] = 0.0
+            for j in range(4):
+                step[i] -= inverse[i, j] * left[j]
+        turned = abs(head[1] * step[3]) / motion[4]
+        if turned > _LONGEST:
+            share = _LONGEST / turned
+        for i in range(4):
+            step[i] *= share
+            motion[i] += step[i]
+            before[i] = left[i]
+        motion[4] = head[0] + head[1] * motion[3]
+        if not motion[4] > 0:
+            return False
+        size = max(abs(step[0]), abs(step[1])) / (np.hypot(motion[0], motion[1]) + abs(motion[2]))
+        size = max(size, max(abs(step[2] / motion[2]), abs(step[3] / motion[3])))
+        if size < CORRECTION:
+            return True
+        if not np.isfinite(size):
+            return False
+        inputs_at(tail, motion, x)
+        evaluate(network, x, y)
+        _unbalanced(head, resistance, tail, motion, y, left)
+        for i in range(4):
+            change[i] = left[i] - before[i]
+        _update(inverse, step, change)
+    return False
+
+
+@compiled
+def _update(inverse: Floats, step: Floats, change: Floats) -> None:
+    """The inverse of the derivative after a step that changed the balance so (Broyden's good update)."""
+    predicted, along = np.zeros(4), np.zeros(4)
+    for i in range(4):
+        for j in range(4):
+            predicted[i] += inverse[i, j] * change[j]
+            along[j] += step[i] * inverse[i, j]
+    size = 0.0
+    for i in range(4):
+        size += along[i] * change[i]
+    if size != 0:
+        for i in range(4):
+            for j in range(4):
+                inverse[i, j] += (step[i] - predicted[i]) * along[j] / size

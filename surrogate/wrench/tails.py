@@ -1,0 +1,171 @@
+"""The mean wrench of the tails on the disc: what the table learns, and the numbers that it depends on.
+
+Head, disc and motor enter the balance of forces by algebra (`surrogate.wrench.heads`). What must be simulated is
+the mean wrench of one tail over a turn. In the units of the simulator it depends on
+
+    S = ζ⊥ ω_t              drag number: drag over bending stiffness
+    a, r0                   where the tail is clamped, and how thick it is
+    m = √(v_x² + ω_yr²)/(a ω_t)    sideways motion of the tail over the speed of its clamp
+    β = atan2(v_x, ω_yr)    about which point the tail turns
+    v_z/(a ω_t)             forward motion
+
+The network sees m as the deflection δ = m a S/(S + 12) that this motion makes. With three or more tails the
+velocities hardly change over a turn, and the wrench of one tail does not depend on N. With one or two tails they
+do. So N = 1 and N = 2 have networks of their own, with one more input: the head's spin drag over that of the
+tails. A single tail pushes the robot from side to side in each turn, and how far it goes depends on all drag of
+the head. So the network of N = 1 has HEAD_INPUTS, too.
+
+The network gives six numbers y, near (0, 1, 0, 1, 0, 0):
+
+    F_x = N ζ⊥ (ω_yr/2 − v_x + m a ω_t y_0)
+    F_z = N (−ζ∥ v_z + (ζ⊥ − ζ∥) ω_t a² T(S) (y_1 + m² y_4))
+    M_y = N ζ⊥ (v_x/2 − ω_yr/3 + m a ω_t y_2)
+    M_z = −N ζ⊥ ω_t a² Q(S) (y_3 + m² y_5)
+
+The terms without y are the drag of straight tails. T and Q are simple fits to thrust and torque in linear theory
+(`sim.reference.linear_theory`). The network learns what is left.
+
+Frame: body axes at the centre J of the disc, motor positive; a reversed motor mirrors the motion. Left out:
+effects on the tails themselves. Units: l, μ0 l⁴/EI, EI/l². Source: the paper's model (arXiv 2103.05712).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from sim.arrays import Floats
+from sim.linear.vectors import formula
+
+INPUTS = ("ln S", "ln a", "ln 1/r0", "asinh δ", "β", "asinh v_z", "ln spin drag of head over tails")
+HEAD_INPUTS = (
+    "ln sway drag", "ln surge drag", "ln drag against turning", "ln L", "coupling of sway and turn",
+    "ln side force", "spin drag of the disc over that of the head",
+)  # fmt: skip
+SMOOTHNESS = (0.7, 1.3, 8.0, 2.0, 4.0, 4.0, 5.0)  # over how many standard deviations the wrench changes
+HEAD_SMOOTHNESS = (3.0,) * len(HEAD_INPUTS)
+TYPICAL = ((0.0, 1.0, 0.0, 0.9, 0.2, 0.0), (0.04, 0.4, 0.03, 0.1, 0.3, 0.05))  # mean and spread of y
+SOFT = 12.0  # S from which a tail bends with the flow while it turns
+SMALL_DEFLECTION, SMALL_SURGE = 0.05, 0.05  # below, an input is linear; above, logarithmic
+TINY = 1e-30
+
+
+class Tails(NamedTuple):
+    """The tails of M robots; each (M,) where nothing else is said."""
+
+    zeta_perp: Tensor
+    zeta_parallel: Tensor
+    offset: Tensor  # a
+    radius: Tensor  # r0
+    number: Tensor  # N
+    head_spin_drag: Tensor  # moment on the head per ω_h
+    head: Tensor  # (M, 7) HEAD_INPUTS; drag over that of the tails
+
+
+def at(tails: Tails, rows: Tensor) -> Tails:
+    """The tails of the robots at `rows`."""
+    return Tails(*[part[rows] for part in tails])
+
+
+def columns_of(tails: Tails) -> Floats:
+    """The fields as columns, (M, 13)."""
+    return np.asarray(torch.cat([torch.stack(list(tails[:-1]), 1), tails.head], 1).numpy())
+
+
+def head_inputs(resistance: Tensor, length: Tensor, across: Tensor) -> Tensor:
+    """HEAD_INPUTS, (M, 7).
+
+    Args:
+        resistance: of head and disc, (M, 4, 5).
+        length: L, (M,).
+        across: N ζ⊥, (M,).
+    """
+    sway, surge, turn, spin = (resistance[:, i, i] for i in range(4))
+    return torch.stack(
+        [
+            torch.log(sway / across),
+            torch.log(surge / across),
+            torch.log(turn / across),
+            torch.log(length),
+            resistance[:, 0, 2] / torch.sqrt(sway * turn),
+            torch.log(resistance[:, 0, 3] / across),
+            resistance[:, 3, 4] / spin,
+        ],
+        -1,
+    )
+
+
+@formula
+def thrust_of(S: Any) -> Any:
+    """T: thrust/[(ζ⊥ − ζ∥) ω_t a²] of a tail in linear theory, roughly."""
+    return 0.125 * S / (1 + (S / 8) ** 1.35)
+
+
+@formula
+def torque_of(S: Any) -> Any:
+    """Q: torque/[ζ⊥ ω_t a²] of a tail in linear theory, roughly."""
+    return (1 + (S / 6) ** 2) ** -0.125
+
+
+def inputs_of(tails: Tails, motion: Tensor) -> Tensor:
+    """INPUTS, (M, 7).
+
+    Args:
+        motion: (v_x of J, v_z, ω_yr, ω_h, ω_t), (M, 5), for a positive motor.
+    """
+    v_x, v_z, yaw, _, spin = motion.unbind(-1)
+    drag_number, clamp = tails.zeta_perp * spin, tails.offset * spin
+    deflection = torch.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
+    return torch.stack(
+        [
+            torch.log(drag_number),
+            torch.log(tails.offset),
+            -torch.log(tails.radius),
+            torch.asinh(deflection / SMALL_DEFLECTION),
+            torch.atan2(v_x, yaw),
+            torch.asinh(v_z / clamp / SMALL_SURGE),
+            torch.log(tails.head_spin_drag / (tails.number * tails.zeta_perp * tails.offset**2)),
+        ],
+        -1,
+    )
+
+
+def inputs_with_head(tails: Tails, motion: Tensor) -> Tensor:
+    """INPUTS and HEAD_INPUTS, (M, 14)."""
+    return torch.cat([inputs_of(tails, motion), tails.head], -1)
+
+
+def straight_wrench(tails: Tails, motion: Tensor) -> Tensor:
+    """(F_x, F_z, M_y, M_z) about J of straight tails at zero spin, (M, 4)."""
+    v_x, v_z, yaw, _, _ = motion.unbind(-1)
+    across = tails.number * tails.zeta_perp
+    side, turn = across * (yaw / 2 - v_x), across * (v_x / 2 - yaw / 3)
+    return torch.stack([side, -tails.number * tails.zeta_parallel * v_z, turn, torch.zeros_like(side)], -1)
+
+
+def units_of(tails: Tails, motion: Tensor) -> Tensor:
+    """∂(wrench)/∂y at a motion, (M, 4, 6)."""
+    v_x, _, yaw, _, spin = motion.unbind(-1)
+    drag_number = tails.zeta_perp * spin
+    sideways = torch.sqrt(v_x**2 + yaw**2 + TINY)
+    squared = (sideways / (tails.offset * spin)) ** 2
+    couple = tails.number * spin * tails.offset**2
+    force = tails.number * tails.zeta_perp * sideways
+    thrust = (tails.zeta_perp - tails.zeta_parallel) * couple * thrust_of(drag_number)
+    torque = -tails.zeta_perp * couple * torque_of(drag_number)
+    none = torch.zeros_like(force)
+    rows = [
+        [force, none, none, none, none, none],
+        [none, thrust, none, none, thrust * squared, none],
+        [none, none, force, none, none, none],
+        [none, none, none, torque, none, torque * squared],
+    ]
+    return torch.stack([torch.stack(row, -1) for row in rows], -2)
+
+
+def wrench_of(tails: Tails, motion: Tensor, y: Tensor) -> Tensor:
+    """(F_x, F_z, M_y, M_z) of all tails on the disc about J, (M, 4), for the network's numbers y (M, 6)."""
+    return straight_wrench(tails, motion) + (units_of(tails, motion) @ y[..., None])[..., 0]
