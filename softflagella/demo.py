@@ -92,7 +92,7 @@ def run_demo(out: str | Path) -> None:
     print("3/4 a small sweep and a look-up table trained on it")
     data, model = folder / "sweep", folder / "model.safetensors"
     shutil.rmtree(data, ignore_errors=True)  # an earlier demo's rows, perhaps of another version
-    _command("dataset", "build", "--config", "demo.toml", "--out", str(data))
+    _command("dataset", "build", "--config", str(Path(__file__).with_name("demo.toml")), "--out", str(data))
     _command("surrogate", "train", str(data), "--out", str(model), "--epochs", "60")
     print("4/4 close the loop on two measured tables")
     loops = {name: _close(folder, name) for name in ("hidden effect", "nothing hidden")}

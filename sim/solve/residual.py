@@ -5,8 +5,8 @@
 `fill_residual` adds up all forces: local drag and the elastic forces of straight tails (`sim.mechanics.balance`),
 and the non-local effects. These are material frames (`frames`), flow between the parts (`flow`), contact
 between tails (`tail_contact`), friction of the contact line, and thinning of the fluid, which changes the drag on
-every node (`thinning`). A new non-local effect is called in `_surround` and adds to what `Surroundings` holds, which
-is zero before the first one. Units: l, μ0 l⁴/EI, EI/l².
+every node (`thinning`). A new non-local effect is called in `_surround` and adds to what `Surroundings` holds,
+which is zero before the first one. Units: l, μ0 l⁴/EI, EI/l².
 
 The Newton matrices of `sim.solve.linearise` leave the non-local effects out; GMRES takes them into account
 (`sim.solve.newton`).

@@ -51,10 +51,10 @@ def started(code: str, *, limit: int | None = None) -> subprocess.Popen[str]:
 def building(folder: Path, rows: int, rows_by: str, jobs: int = 2) -> str:
     """Code that builds as the command line does."""
     return (
-        "import sys; from dataset.build.exits import ended; "
+        "import sys; from dataset.build.signals import run_long_command; "
         "from sim.io.errors import run_command; "
-        f"sys.exit(run_command(lambda _: ended(lambda: build(design({rows}), {str(folder)!r}, jobs={jobs}, "
-        f"title='', simulate={rows_by}, resume='the same words'))))"
+        f"sys.exit(run_command(lambda _: run_long_command(lambda: build(design({rows}), {str(folder)!r}, "
+        f"jobs={jobs}, title='', simulate={rows_by}, resume='the same words'))))"
     )
 
 

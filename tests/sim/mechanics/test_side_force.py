@@ -33,9 +33,7 @@ def side_force_coefficient(steepness: float) -> float:
         return float(height * expit(-steepness * (height - DEPTH_OVER_R)))
 
     # Symmetric about ϑ = π/2: half the wall, with the step as a break point.
-    half, _ = quad(
-        traction, -np.pi / 2, np.pi / 2, points=[np.arcsin(DEPTH_OVER_R)], limit=200, epsabs=1e-12
-    )
+    half, _ = quad(traction, -np.pi / 2, np.pi / 2, points=[np.arcsin(DEPTH_OVER_R)], limit=200, epsabs=1e-12)
     return 2.0 * half
 
 
