@@ -17,7 +17,7 @@ from tests.docs.pages import DOCS, PAGES, ROOT, generator, name_of
 TOP = (*PACKAGES, "softflagella", "benchmarks", "tests")
 _MODULE = re.compile(rf"`((?:{'|'.join(TOP)})(?:\.\w+)+)`")
 _COMMAND = re.compile(rf"python -m ((?:{'|'.join(TOP)})(?:\.\w+)*)")
-_BENCHMARK = re.compile(r"python -m\s+benchmarks[ \n](\w+)")
+_BENCHMARK = re.compile(r"python -m\s+benchmarks[ \n]([a-z_]+)\b")
 _FILE = re.compile(rf"`((?:{'|'.join((*TOP, 'docs'))})/[\w/.-]+)`")
 SOURCES = sorted(file for top in (*PACKAGES, "softflagella", "benchmarks") for file in (ROOT / top).rglob("*.py"))
 
