@@ -9,7 +9,6 @@ import pytest
 import torch
 
 import surrogate
-from benchmarks.balance import linear_guess, solve
 from sim.compiling import folder_of_package
 from surrogate.networks.compiled import _tanh, evaluate_rows, packed
 from surrogate.networks.ensemble import Ensemble
@@ -20,6 +19,7 @@ from surrogate.training.simulated import draw_robots
 from surrogate.wrench.balance import inputs_rows, solve_rows
 from surrogate.wrench.heads import heads_and_tails, unbalanced
 from surrogate.wrench.tails import pack_tails, tail_inputs
+from tests.oracles.balance import linear_guess, solve
 from tests.surrogate.small import rows, table
 
 
