@@ -20,10 +20,9 @@ from matplotlib.figure import Figure
 
 from benchmarks.operating import wilson
 from benchmarks.swims import Blind, Camera, Swum, swim
-from planner import circle, plan
 from planner.files.pictures import DECLARED, REPLAYED
-from planner.paths.path import Path2D
-from planner.planning.plan import Plan
+from planner.paths.path import Path2D, circle
+from planner.planning.plan import Plan, plan
 from planner.tracking.tracker import FALSE_ALARM, WINDOW, Tracker
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot

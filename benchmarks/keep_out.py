@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cases import planned
-from planner.goal.obstacles import Body, Circle, Polygon
-from planner.goal.to_goal import Voyage
+from planner.goal.obstacles import Circle, Footprint, Polygon
+from planner.goal.to_goal import GoalPlan
 from sim.motion.replay import replay
 
 
@@ -24,24 +24,24 @@ def random_case(rng: np.random.Generator) -> dict[str, Any]:
     return {"start": start, "goal": goal, "keep_out": circles, "walls": walls}
 
 
-def replayed_clearance(voyage: Voyage) -> tuple[float, float, float]:
+def replayed_clearance(goal_plan: GoalPlan) -> tuple[float, float, float]:
     """Of the replay: smallest room around the body [l], distance from the goal [l], error of the heading [rad]."""
-    track = replay([voyage.plan.schedule()])[0]
+    track = replay([goal_plan.plan.schedule()])[0]
     poses = np.stack([track[name].to_numpy(float) for name in ("x_over_l", "y_over_l", "heading_rad")], 1)
-    clearance = Body.of(voyage.plan.robot, 0.0).clearance(poses, voyage.room).min()
-    turn = (poses[-1, 2] - voyage.goal[2] + np.pi) % (2 * np.pi) - np.pi
-    return float(clearance), float(np.hypot(*(poses[-1, :2] - voyage.goal[:2]))), float(abs(turn))
+    clearance = Footprint.of(goal_plan.plan.robot, 0.0).clearance(poses, goal_plan.free_space).min()
+    turn = (poses[-1, 2] - goal_plan.goal[2] + np.pi) % (2 * np.pi) - np.pi
+    return float(clearance), float(np.hypot(*(poses[-1, :2] - goal_plan.goal[:2]))), float(abs(turn))
 
 
 def main() -> None:
     rows = []
     heads = (f"{'way':>8}{'flips':>7}{'margin':>8}{'stated':>8}{'predicted':>11}{'replayed':>10}"
              f"{'off goal':>10}{'rad':>8}{'s':>7}")  # fmt: skip
-    for seed, voyage, spent in planned(random_case, 12, heads):
-        clearance, off, turned = replayed_clearance(voyage)
+    for seed, goal_plan, spent in planned(random_case, 12, heads):
+        clearance, off, turned = replayed_clearance(goal_plan)
         rows.append((clearance, off, turned))
-        print(f"{seed:5d}{voyage.length:8.2f}{len(voyage.plan.dwells):7d}{voyage.margin:8.3f}"
-              f"{voyage.plan.stated_error:8.3f}{voyage.clearance:11.3f}{clearance:10.3f}{off:10.4f}{turned:8.4f}"
+        print(f"{seed:5d}{goal_plan.length:8.2f}{len(goal_plan.plan.dwells):7d}{goal_plan.margin:8.3f}"
+              f"{goal_plan.plan.stated_error:8.3f}{goal_plan.clearance:11.3f}{clearance:10.3f}{off:10.4f}{turned:8.4f}"
               f"{spent:7.1f}", flush=True)  # fmt: skip
     found = np.array(rows)
     print(f"\n{len(found)} replays: smallest room {found[:, 0].min():.3f} l; {np.sum(found[:, 0] <= 0)} touch; "
