@@ -4,8 +4,8 @@ A shard is named by its rows, rows-<first>-<end>.parquet (end exclusive), and ca
 inputs, settings, code. So its name and key say what must be in it. Every page has a checksum. Small shards are
 joined to shards of SEGMENT rows; the bytes of a joined shard depend on its rows alone.
 
-The encodings are the smallest ones of a benchmark: numbers split into streams of bytes, then zstd; a dictionary
-only for words.
+The encodings are the smallest ones of the benchmark `data_sets`: numbers split into streams of bytes, then zstd; a
+dictionary only for words.
 """
 
 from __future__ import annotations
