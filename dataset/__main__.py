@@ -1,4 +1,4 @@
-"""Command line of data sets: `softflagella dataset build`, `report`, `verify`, `config`."""
+"""Command line of data sets: `softflagella sweep`, `report`, `verify`, `config`."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _build(arguments: Namespace) -> None:
 
 def _command(arguments: Namespace) -> str:
     """Write the command that continues a build."""
-    words = ["softflagella", "dataset", "build"]
+    words = ["softflagella", "sweep"]
     for name in ("config", "out", "rows", "jobs", "backend", "scheduler"):
         if getattr(arguments, name) is not None:
             words += [f"--{name}", str(getattr(arguments, name))]

@@ -1,10 +1,4 @@
-"""Command line of the planner.
-
-python -m planner plan PATH.{csv,svg} --robot robot.toml --out DIR     plan.json, plan.csv, schedule.h, plan.svg
-python -m planner goal --goal X Y DEGREES --robot robot.toml --out DIR  from a pose to a pose, around obstacles
-python -m planner track PATH --robot robot.toml                        poses on a pipe in, orders out
-python -m planner check PLAN.json TRACK.csv [--out OVERLAY.png]        tracking error of a replayed track
-"""
+"""Command line of the planner: `plan`, `goal`, `track`, `check`."""
 
 from __future__ import annotations
 
@@ -291,7 +285,7 @@ def _path(arguments: Namespace, robot: Robot) -> Path2D:
     "check",
     "tracking error of a replayed track",
     argument("plan", help="plan.json"),
-    argument("track", help="CSV written by python -m sim replay"),
+    argument("track", help="CSV written by softflagella replay"),
     out("overlay picture, PNG", default=None),
 )
 def _check(arguments: Namespace) -> None:

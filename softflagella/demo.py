@@ -127,7 +127,7 @@ def _plan_and_replay(folder: Path) -> dict[str, tuple[dict[str, Any], TrackingEr
         _command("sim", "replay", str(place / "plan.json"), "--out", str(place / "track.csv"), quiet=True)
 
     for case in CASES:
-        print(f"  python -m sim replay {folder / case.name / 'plan.json'} --out …/track.csv")
+        print(f"  softflagella replay {folder / case.name / 'plan.json'} --out …/track.csv")
     with (
         ThreadPoolExecutor(min(available_jobs(), len(CASES))) as pool,
         tqdm(total=len(CASES), desc="replay", unit="plan") as bar,

@@ -25,7 +25,9 @@ from tests.calibration.toy_tables import START, install_toy, toy_swimmer, toy_ta
 from tests.calibration.track import RADIUS, track
 from tests.dataset.sweeps import SMALL
 
-COMMANDS = [(package, name) for package in PACKAGES for name in import_module(f"{package}.__main__").program.names]
+COMMANDS = [
+    (package, name) for package in PACKAGES for name in import_module(f"{package}.__main__").program.commands
+]
 
 
 def done(*words: object) -> None:

@@ -1,6 +1,6 @@
 """Train the look-up table that comes with the package, and evaluate it on held-out robots.
 
-Usage: softflagella dataset build --config surrogate/shipped/domain.toml --out SWEEP
+Usage: softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
        python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
        python -m benchmarks shipped_table WORK --test MODEL   errors and coverage on the locked robots
 

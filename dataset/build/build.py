@@ -85,7 +85,7 @@ def mend(folder: str | Path, *, jobs: int | None = None, title: str = "mend", fo
     """
     storage = open_storage(folder)
     if not storage.names():
-        raise InputError(f"{storage.address} is no data set; make it with softflagella dataset build")
+        raise InputError(f"{storage.address} is no data set; make it with softflagella sweep")
     message = _Message(storage, f"softflagella dataset verify {storage.address} --mend")
     workers = _Workers(lambda: open_backend("loky", jobs=jobs), message)
     with interruptible(message.text), locked(storage, force=force):

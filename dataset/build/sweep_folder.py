@@ -247,7 +247,7 @@ def load_sweep(storage: Storage, *, same_version: bool = False) -> tuple[SweepDe
         InputError: the folder holds no sweep, its sweep.json has been edited, or its version is another.
     """
     if storage.size(SWEEP) is None:
-        raise InputError(f"{storage.address} is no data set (no {SWEEP}); make it with softflagella dataset build")
+        raise InputError(f"{storage.address} is no data set (no {SWEEP}); make it with softflagella sweep")
     sweep = _loaded(storage)
     if same_version:
         check_version(storage, sweep["code"])

@@ -105,7 +105,7 @@ def read_manifest(folder: Storage | str | Path) -> dict[str, Any]:
     path = storage.path(MANIFEST)
     if storage.size(MANIFEST) is None:
         raise InputError(
-            f"{storage.address} is no finished data set (no {MANIFEST}); make it with softflagella dataset build"
+            f"{storage.address} is no finished data set (no {MANIFEST}); make it with softflagella sweep"
         )
     try:
         content = json.loads(bytes(storage.read(MANIFEST)))

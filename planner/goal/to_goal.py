@@ -197,7 +197,7 @@ class _Trip:
             margin = max(_MORE * needed, margin * 1.02)
         raise NoWayError(
             f"there is no way that leaves the plan's stated error around the robot: it is {needed:.3g} l; plan "
-            "with feedback, make a table of this robot (python -m surrogate robot), or move goal or obstacles"
+            "with feedback, make a table of this robot (softflagella surrogate robot), or move goal or obstacles"
         )
 
     def _stops(self, drift: Drift) -> list[Floats]:

@@ -205,7 +205,7 @@ def plan(
         raise InputError(
             f"tolerance {tolerance:g} l cannot be kept: the smallest stated error is {best.stated_error:.3g} l, "
             f"with dwells from {best.minimum_dwell:.2g} time units; allow more, or make a table of this robot "
-            "with python -m surrogate robot"
+            "with softflagella surrogate robot"
         )
     return kept
 

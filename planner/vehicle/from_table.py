@@ -172,5 +172,5 @@ def _slope(robot: Robot, lookup: LookupTable, twist: Floats, name: str) -> Float
     (one, at), (two, to) = ends
     if at == to:
         raise InputError(f"the table does not say what {name} changes; make the robot's own table, with "
-                         "python -m surrogate robot")  # fmt: skip
+                         "softflagella surrogate robot")  # fmt: skip
     return np.asarray((one - two) / (at - to))

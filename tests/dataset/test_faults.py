@@ -98,11 +98,11 @@ def test_the_command_line_stops_and_goes_on(tmp_path: Path) -> None:
     line = error.strip().splitlines()[-1]
     assert line.startswith("stopped: ")
     command = line.split("go on with: ")[1].split()
-    assert command[1:] == ["-m", "dataset", *words]
+    assert command == ["softflagella", "sweep", *words[1:]]
     kept = {p.name for p in (tmp_path / "out" / "pending").iterdir() if p.name[0] != "."}
     assert kept
     calm = [str(tmp_path / "calm") if word == str(tmp_path / "out") else word for word in words]
-    for each in (command[3:], calm):
+    for each in (["build", *command[2:]], calm):
         again = started(f"import sys; sys.argv[1:] = {each}; program.exit()")
         assert "64 rows: 64 converged" in again.communicate()[0]
     assert without_cost(read(tmp_path / "out")).equals(without_cost(read(tmp_path / "calm")))

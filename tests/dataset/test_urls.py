@@ -75,9 +75,12 @@ def test_one_writer_behind_a_url(memory: str) -> None:
     there = open_storage(memory)
     with locked(there), pytest.raises(InputError, match="is being written by process"):
         build(design(9), memory, title="", simulate=invented)
-    old = {"host": "elsewhere", "pid": 1, "since": 0, "seen": time.time() - lock.STALE - 1, "token": "x"}
-    there.write(lock.LOCK, json.dumps(old))
-    build(design(9), memory, title="", simulate=invented)  # its owner has not been seen for too long
+    killed = {"host": "elsewhere", "pid": 1, "since": time.time() - 7200}
+    there.write(lock.LOCK, json.dumps(killed))
+    with pytest.raises(InputError, match=r"process 1 on elsewhere, for 120 min; .* take over with --force"):
+        build(design(9), memory, title="", simulate=invented)
+    assert json.loads(bytes(there.read(lock.LOCK))) == killed
+    build(design(9), memory, title="", simulate=invented, force=True)
     assert there.size(lock.LOCK) is None
 
 
