@@ -7,12 +7,12 @@ velocity relative to the fluid that the other parts move:
     q_k = −l_k [ζ⊥ I + (ζ∥ − ζ⊥) tt] (v_k − w_k),   w_k = Σ ∫ G(x_k − y) f/μ ds.
 
 The sum is over the edges of the other tails, over the head, and over images. The force of a node is spread evenly
-over the edges beside it, and the integral over a straight edge is exact at any distance. The head is represented by
-segments of its axis with equal parts of its drag, and rotlets for its spin. In balance, the force of a free node on the fluid is
-its elastic force and load. So w follows from the shape. Only the velocities of clamps and head are given, so their
-forces depend on each other's flow. They are found in a few rounds; each change is smaller than the last one. The
-head's drag, too, is relative to the fluid that the tails move. All of this is solved together with the balance,
-not one step later.
+over the edges beside it, and the integral over a straight edge is exact at any distance. The head is represented
+by segments of its axis with equal parts of its drag, and rotlets for its spin. In balance, the force of a free
+node on the fluid is its elastic force and load. So w follows from the shape. Only the velocities of clamps and
+head are given, so their forces depend on each other's flow. They are found in a few rounds; each change is smaller
+than the last one. The head's drag, too, is relative to the fluid that the tails move. All of this is solved
+together with the balance, not one step later.
 
 C_t is fitted and larger than that of a cylinder (about 1.4). With all of this drag on the fluid, the head would
 move the fluid at the clamps faster than it moves itself. So only a part of the drag moves the fluid: at most the
