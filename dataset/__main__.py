@@ -6,7 +6,7 @@ import os
 import shlex
 from argparse import Namespace
 
-from dataset.workers.open_backend import BACKENDS
+from dataset.workers import BACKENDS
 from sim.io.commands import JOBS, Program, argument, out
 
 program = Program("dataset", "Simulate sweeps of robots into data sets.")

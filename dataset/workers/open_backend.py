@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from importlib.util import find_spec
 
+from dataset.workers import BACKENDS
 from dataset.workers.backend import Backend
 from sim.io.errors import InputError
 
-BACKENDS = ("loky", "dask", "ray")
 _PACKAGES = {"dask": "distributed", "ray": "ray"}  # that a backend needs
 
 
