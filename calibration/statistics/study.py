@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
 
 from calibration.statistics.forward_model import ForwardModel, Runs, start_values
 from calibration.statistics.splits import Split
@@ -23,6 +26,11 @@ class Study:
     seed: int = 0  # of the bootstrap
     draws: int = DRAWS  # of the bootstrap
     progress: bool = False  # show progress bars
+
+    @classmethod
+    def fitted_to(cls, model: ForwardModel, used: Flags, **settings: Any) -> Study:
+        """Study a model on the runs in `used` (n,); all others are held out."""
+        return cls(model, Split(~used, np.zeros_like(used)), **settings)
 
     @property
     def runs(self) -> Runs:

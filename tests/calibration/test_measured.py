@@ -12,7 +12,7 @@ from calibration.examples.helices import read_helices, resistive, with_flow
 from calibration.examples.spheres import median_error, read_spheres
 from calibration.statistics.noise import repeat_covariance
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from tests.calibration.toy_tables import START
 
@@ -24,7 +24,7 @@ MEASURED = Path(__file__).parents[3] / "shared" / "measured"
 def test_measured_tables_are_read_whole(name: str) -> None:
     data = read_measurements(MEASURED / name)
     assert len(data) == 192
-    assert data.set_aside == ()
+    assert data.excluded == ()
     assert data.session_names == ("N = 2", "N = 3", "N = 4", "N = 5")
     spread = np.sqrt(np.diag(repeat_covariance(data.y, data.condition)))
     assert ((spread > 0.01) & (spread < 0.05)).all()
@@ -51,7 +51,7 @@ def test_spheres_in_glycerine_need_the_wall() -> None:
 )
 def test_what_came_out_of_the_measured_tables(name: str, effect: str, size: float) -> None:
     """docs/measured-tables.md; the others take longer and are written down there."""
-    result = calibrate(Swimmer(START, read_measurements(MEASURED / name)), progress=False)
+    result = calibrate(SwimmerModel(START, read_measurements(MEASURED / name)), progress=False)
     assert result.effects == (effect,)
     assert result.final.parameters[effect] == pytest.approx(size, rel=0.05)
     assert result.error_after < 1.15 * result.noise_ceiling
