@@ -31,10 +31,13 @@ from tqdm import tqdm
 
 from calibration.report.corrected_robot import corrected_robot, corrected_toml
 from calibration.report.report import draw_residuals
+from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.measured_table import Measurements, read_measurements
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
-from calibration.verdict.calibrate import Verdict, calibrate, verdict_record
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import Verdict
+from calibration.verdict.verdict_json import verdict_record
 from dataset.report.figures import draw_responses, draw_trends, plain_logarithms
 from dataset.report.report import usable_rows
 from dataset.storage.data_set import read
@@ -153,7 +156,7 @@ def _steer(verdict: Verdict) -> dict[str, Steered]:
     truth = replace(start, **HIDDEN, effects=HIDDEN_EFFECT)  # type: ignore[arg-type]
     models = {
         "calibrated": corrected_robot(start, verdict.base.parameters),
-        "corrected": corrected_robot(start, verdict.delivered.parameters),
+        "corrected": corrected_robot(start, verdict.fits.final_refit.parameters),
         "truth known": truth,
     }
     steered = steer(models, truth, polygon(4, 3.0))
@@ -172,10 +175,12 @@ def _calibrate(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     case.mkdir(exist_ok=True)
     table.to_csv(case / "table.csv", index=False, float_format="%.6g")
     data = read_measurements(case / "table.csv")
-    verdict = calibrate(Swimmer(start, data))
+    verdict = calibrate(SwimmerModel(start, data), correction=learn_head_correction)
     record = verdict_record(verdict, table="table.csv")
     write_text(case / "verdict.json", json.dumps(record, indent=1) + "\n")
-    write_text(case / "corrected.toml", corrected_toml(start, verdict.delivered, verdict.predictive))
+    write_text(
+        case / "corrected.toml", corrected_toml(start, verdict.fits.final_refit, verdict.corrections.learnt)
+    )
     print(f"  {name}: {verdict.sentence}")
     return verdict, data
 
