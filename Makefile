@@ -7,7 +7,6 @@ SOURCES := $(wildcard sim/*.py sim/*/*.py)
 
 CONFIG ?= sweep.toml
 DATA ?= data/sweep
-REFINED ?=
 MODEL ?= models/model.safetensors
 ROBOT ?= paper-control
 PLANPATH ?= square:3
@@ -70,9 +69,9 @@ dataset: $(STAMP) ## simulate CONFIG into DATA (goes on where it stopped; ROWS=â
 $(DATA)/manifest.json:
 	$(MAKE) dataset
 
-train: $(MODEL) ## train the look-up table MODEL on DATA (and on REFINED=â€¦, chosen rows; DEVICE=cuda or auto)
-$(MODEL): $(DATA)/manifest.json $(REFINED:%=%/manifest.json)
-	$(RUN) -m surrogate train $(DATA) $(REFINED) --out $(MODEL) --device $(DEVICE)
+train: $(MODEL) ## train the look-up table MODEL on DATA (DEVICE=cuda or auto)
+$(MODEL): $(DATA)/manifest.json
+	$(RUN) -m surrogate train $(DATA) --out $(MODEL) --device $(DEVICE)
 
 plan: $(STAMP) ## plan PLANPATH for ROBOT into reports/plan
 	$(RUN) -m planner plan $(PLANPATH) --robot $(ROBOT) --out reports/plan

@@ -115,16 +115,6 @@ def train(made: Path, out: Path) -> str:
     return "held-out error on"
 
 
-def refine(made: Path, out: Path) -> str:
-    done(
-        "surrogate", "refine", made / "sweep", "--model", SHIPPED, "--out", out / "more", "--rows", 3, "--jobs", 1
-    )
-    done("dataset", "verify", out / "more", "--rows", 1)
-    done("dataset", "report", out / "more", "--out", out / "page.html")
-    assert "chosen where a look-up table was unsure" in (out / "page.html").read_text()
-    return "3 chosen rows: 3 converged"
-
-
 def query(made: Path, out: Path) -> str:
     done("surrogate", "query", made / "points.csv", "--out", out / "found.csv")
     found = pd.read_csv(out / "found.csv")
@@ -253,7 +243,7 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "compile"): compiled, ("surrogate", "compile"): compiled_queries,
     ("dataset", "build"): build, ("dataset", "report"): report,
     ("dataset", "verify"): verify, ("surrogate", "train"): train, ("surrogate", "query"): query,
-    ("surrogate", "inverse"): inverse, ("surrogate", "refine"): refine, ("planner", "track"): follow,
+    ("surrogate", "inverse"): inverse, ("planner", "track"): follow,
     ("surrogate", "errors"): errors, ("surrogate", "export"): export,
     ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
     ("planner", "goal"): goal,
