@@ -5,7 +5,7 @@ RUN := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
 SOURCES := $(wildcard sim/*.py sim/*/*.py)
 
-CONFIG ?= sweep.toml
+CONFIG ?=
 DATA ?= data/sweep
 MODEL ?= models/model.safetensors
 ROBOT ?= paper-control
@@ -38,7 +38,7 @@ $(STAMP): pyproject.toml constraints.txt
 	touch $@
 
 demo: reports/demo.html ## the whole pipeline on the paper's robot, ends with reports/demo.html
-reports/demo.html: $(STAMP) $(SOURCES) $(wildcard $(foreach p,dataset surrogate planner calibration softflagella,$(p)/*.py $(p)/*/*.py) surrogate/shipped/*) demo.toml
+reports/demo.html: $(STAMP) $(SOURCES) $(wildcard $(foreach p,dataset surrogate planner calibration softflagella,$(p)/*.py $(p)/*/*.py) surrogate/shipped/*) softflagella/demo.toml
 	$(RUN) -m softflagella demo --out $@
 
 test: $(VENV)/.extras ## run the tests, those of clusters and of ONNX files included
@@ -62,10 +62,10 @@ $(VENV)/.docs: $(STAMP)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
 	touch $@
 
-# The build itself knows its sources and what is missing, so it always runs. It leaves the manifest of a finished
-# data set alone, so that `make train` does not run again.
+# Without CONFIG: the sweep that comes with the package. The build itself knows its sources and what is missing, so it
+# always runs. It leaves the manifest of a finished data set alone, so that `make train` does not run again.
 dataset: $(STAMP) ## simulate CONFIG into DATA (goes on where it stopped; ROWS=… for more or fewer rows)
-	$(RUN) -m dataset build --config "$(CONFIG)" --out "$(DATA)" $(if $(ROWS),--rows $(ROWS))
+	$(RUN) -m dataset build $(if $(CONFIG),--config "$(CONFIG)") --out "$(DATA)" $(if $(ROWS),--rows $(ROWS))
 $(DATA)/manifest.json:
 	$(MAKE) dataset
 

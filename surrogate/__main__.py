@@ -1,13 +1,4 @@
-"""Command line of the look-up table.
-
-python -m surrogate train DIR … --out MODEL            learn a data set, or several; goes on after a kill
-python -m surrogate query POINTS.csv --out OUT.csv     predict rows, with intervals, without simulating
-python -m surrogate inverse TARGETS.csv --out OUT.csv  which robots have these motions
-python -m surrogate errors [--model MODEL]             the stored held-out errors
-python -m surrogate robot ROBOT.toml --out T.json      the table of one robot with its effects, for the planner
-python -m surrogate export [MODEL] --onnx OUT.onnx     the whole query as one ONNX graph
-python -m surrogate export [MODEL] --small FOLDER      weights and readers for a web page or a microcontroller
-"""
+"""Command line of the look-up table: `train`, `query`, `inverse`, `errors`, `robot`, `export`, `compile`."""
 
 from __future__ import annotations
 
@@ -25,7 +16,7 @@ main = program.main
 @program.command(
     "train",
     "learn a data set",
-    argument("data", nargs="+", help="folders made by python -m dataset build"),
+    argument("data", nargs="+", help="folders made by softflagella sweep"),
     out("model file"),
     argument("--epochs", type=int, help="this many epochs, and as many iterations after them"),
     argument(
@@ -70,7 +61,7 @@ def _train(arguments: Namespace) -> None:
 @program.command(
     "query",
     "predict rows, with intervals, without simulating",
-    argument("points", help="CSV like that of python -m sim steady; dwell_bar optional"),
+    argument("points", help="CSV like that of softflagella sim steady; dwell_bar optional"),
     out("CSV"),
     MODEL,
     argument(
