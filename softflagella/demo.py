@@ -264,7 +264,7 @@ def _write_page(
         if verdict.verdict == "effect":
             page.figure(draw_residuals(verdict, data), "residuals before and after the effect is added")
         errors = [
-            ("coefficients as given", verdict.error_uncalibrated),
+            ("coefficients before calibration", verdict.error_uncalibrated),
             ("calibrated", verdict.error_before),
             ("calibrated, with the effect", verdict.error_after),
             ("noise of one run, from repeats", verdict.noise_ceiling),

@@ -43,18 +43,18 @@ def read_sigma(given: object, value: float, entry: str) -> Sigma:
     """
     try:
         if isinstance(given, str) and given.strip().endswith("%"):
-            found = Sigma(float(given.strip()[:-1]) / 100, True)
+            sigma = Sigma(float(given.strip()[:-1]) / 100, True)
         elif isinstance(given, int | float) and not isinstance(given, bool):
-            found = Sigma(float(given), False)
+            sigma = Sigma(float(given), False)
         else:
             raise ValueError
     except ValueError:
         raise InputError(
             f'{entry} = {given!r}; give a number in the unit of its key, or a text like "10 %"'
         ) from None
-    if not (math.isfinite(found.size) and 0 <= found.of(value) <= _LARGEST * abs(value)):
+    if not (math.isfinite(sigma.size) and 0 <= sigma.of(value) <= _LARGEST * abs(value)):
         raise InputError(f"{entry} = {given!r}; a standard deviation lies from 0 to half of the number itself")
-    return found
+    return sigma
 
 
 def sigma_text(sigma: Sigma) -> str:

@@ -46,11 +46,11 @@ def solve_orbits(
     """
     count = 0 if directions is None else directions.shape[1]
     slopes = np.full((len(rows), count, 5), np.nan)
-    found: list[Orbit] = []
+    orbits: list[Orbit] = []
     gap, grows = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
     for i, body in enumerate(unpacked(rows)):
         orbit = refined_orbit(body, tails, phases)
-        found.append(orbit)
+        orbits.append(orbit)
         if orbit.ended == SOLVED:
             gap[i] = smallest_gap(body, orbit.x[2], tails)
             if stability and body.nonlocal_terms.tail_contact != 0 and gap[i] < _NEAR:
@@ -58,10 +58,10 @@ def solve_orbits(
             if directions is not None and count:
                 slopes[i] = _slopes(body, rows[i], directions[i], orbit)
     return Orbits(
-        np.array([orbit.means for orbit in found]),
+        np.array([orbit.means for orbit in orbits]),
         slopes,
-        np.array([orbit.error for orbit in found]),
-        np.array([orbit.ended for orbit in found]),
+        np.array([orbit.error for orbit in orbits]),
+        np.array([orbit.ended for orbit in orbits]),
         gap,
         grows,
     )
@@ -70,12 +70,12 @@ def solve_orbits(
 def _slopes(body: Body, row: Floats, directions: Floats, orbit: Orbit) -> Floats:
     """Derivatives of the extrapolated means along `directions` (K, K'), (K, 5)."""
     moved = list(zip(unpacked(row - WIDTH * directions), unpacked(row + WIDTH * directions), strict=True))
-    found = np.empty((3, len(directions), 5))
+    slopes = np.empty((3, len(directions), 5))
     for i, (x, u) in enumerate(zip(orbit.x, orbit.u, strict=True)):
         ends = [[residual_on_orbit(robot, x, u) for robot in pair] for pair in moved]
         r, t = (np.array([above[c] - below[c] for below, above in ends]) / (2 * WIDTH) for c in (0, 1))
         changes = orbit_slopes(body, r, t, x, u)
         for k, (below, above) in enumerate(moved):
             rise = mean_motion(above, u + WIDTH * changes[k]) - mean_motion(below, u - WIDTH * changes[k])
-            found[i, k] = rise / (2 * WIDTH)
-    return extrapolate(found.reshape(3, -1)).reshape(-1, 5)
+            slopes[i, k] = rise / (2 * WIDTH)
+    return extrapolate(slopes.reshape(3, -1)).reshape(-1, 5)

@@ -61,7 +61,7 @@ def responses(
     motion = steady(groups) if motion is None else motion
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
     robots = bodies(groups)
-    found, stepped = [], np.zeros(len(robots), dtype=bool)
+    by_robot, stepped = [], np.zeros(len(robots), dtype=bool)
     for i, (body, reverse) in enumerate(zip(robots, reversed_bodies(groups), strict=True)):
         curves = _solved(body, reverse, groups.N, even, history, before)
         if curves is None:
@@ -70,8 +70,8 @@ def responses(
                 body, groups.N, DWELLS, before, reverse=reverse, history=history, settled=SETTLED
             )
             curves = Curves(*values)
-        found.append(curves)
-    lag, memory, rest, spread = (np.array(column) for column in zip(*found, strict=True))
+        by_robot.append(curves)
+    lag, memory, rest, spread = (np.array(column) for column in zip(*by_robot, strict=True))
     sense = np.sign([body.omega for body in robots])
     twist = twists(motion.v_z, motion.v_x, motion.omega_yr, sense)
     if not history:
@@ -134,18 +134,18 @@ def _on_mesh(
     curves = np.empty((len(starts), *lag.shape))
     for i, shape in enumerate(starts):
         until = _SAME if i < len(shapes) else SETTLED
-        found = transient(body, shape, first.copy(), twist, until, np.empty(0), _TOLERANCE)
-        if not found.solved:
+        flip = transient(body, shape, first.copy(), twist, until, np.empty(0), _TOLERANCE)
+        if not flip.solved:
             return None
-        curves[i] = lag_at(found, np.minimum(DWELLS, until)).mean(1)
+        curves[i] = lag_at(flip, np.minimum(DWELLS, until)).mean(1)
     same = lag_at(main, np.minimum(DWELLS, _SAME)).mean(1)
     return Curves(lag, curves[:-1] - same, curves[-1], spread)
 
 
 def _orbit(body: Body, tails: int, edges: int, instants: int = 0) -> tuple[Floats, Floats, Floats] | None:
     """Steady x (n, M, 3), u (P, 4) and (v_z, h_x, ω_yr) on as many instants a turn as the response needs."""
-    found, x, u = orbit_on_mesh(body, tails, edges)
-    if not found:
+    solved, x, u = orbit_on_mesh(body, tails, edges)
+    if not solved:
         return None
     wanted = instants or max(u.shape[0], _LEAST_INSTANTS.get(tails, 1))
     if tails in _LEAST_INSTANTS and wanted % 2 == 0:

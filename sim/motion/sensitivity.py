@@ -57,9 +57,9 @@ def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MA
     moved = [_direction(groups, name) for name in names]
     scales = np.stack([scale for _, scale in moved], 1) if names else np.empty((len(groups), 0))
     directions = np.stack([d for d, _ in moved], 1) if names else np.empty((len(groups), 0, rows.shape[1]))
-    found = solve_orbits(rows, groups.N, directions, phases=phases)
-    slopes = found.slopes / scales[:, :, None]  # (B, K, 5)
-    values = dict(zip(SLOPE_OUTPUTS, found.means.T, strict=False))
+    solution = solve_orbits(rows, groups.N, directions, phases=phases)
+    slopes = solution.slopes / scales[:, :, None]  # (B, K, 5)
+    values = dict(zip(SLOPE_OUTPUTS, solution.means.T, strict=False))
     derivatives = {name: slopes[:, :, i] for i, name in enumerate(SLOPE_OUTPUTS[:5])}
     sway, surge, yaw = values["v_x"], values["v_z"], values["omega_yr_bar"]
     speed = np.hypot(sway, surge)

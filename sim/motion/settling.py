@@ -67,9 +67,9 @@ def settle(
     ended = []
     for body in robots:
         chosen = resolution if isinstance(resolution, Resolution) else resolution(body.omega)
-        found = settle_one(body, groups.N, chosen)
-        again = found.failed == BROKE_DOWN
-        ended.append(settle_one(body, groups.N, chosen.refined()) if again else found)
+        settled = settle_one(body, groups.N, chosen)
+        again = settled.failed == BROKE_DOWN
+        ended.append(settle_one(body, groups.N, chosen.refined()) if again else settled)
     means = np.array([e.means for e in ended]).T
     return Steady(
         omega_t=means[0],

@@ -53,8 +53,8 @@ def at_phases(periodic: Floats, at: Floats) -> Floats:
 
 def state_on_orbit(body: Body, tails: int, edges: int, phase: float) -> State | None:
     """The state of a steadily swimming robot at a disc phase; None where there is no orbit."""
-    found, x, u = orbit_on_mesh(body, tails, edges)
-    if not found:
+    solved, x, u = orbit_on_mesh(body, tails, edges)
+    if not solved:
         return None
     each = phase + 2 * np.pi * np.arange(tails) / tails
     slope = np.einsum("ml,klc->kmc", differentiation(x.shape[1]), x)

@@ -87,23 +87,23 @@ def orbits(groups: Groups, *, phases: int = FEW) -> Steady:
 def _orbits(groups: Groups, phases: int, *, stability: bool) -> tuple[Steady, Floats]:
     """The direct solution, and how fast tails in contact leave it, (B,)."""
     rows = np.ascontiguousarray(numbers(groups).detach().cpu().numpy().T)
-    found = solve_orbits(rows, groups.N, phases=phases, stability=stability)
-    means = found.means.T
-    solved = found.ended == SOLVED
+    solution = solve_orbits(rows, groups.N, phases=phases, stability=stability)
+    means = solution.means.T
+    solved = solution.ended == SOLVED
     motion = Steady(
         omega_t=means[0],
         omega_h=means[1],
         omega_yr=means[2],
         v_x=means[3],
         v_z=means[4],
-        tail_gap=found.gap,
-        error=found.error,
+        tail_gap=solution.gap,
+        error=solution.error,
         converged=solved,
         failed=~solved,
         method=np.full(len(groups), DIRECT),
-        note=np.array([REASONS[k] for k in found.ended.tolist()]),
+        note=np.array([REASONS[k] for k in solution.ended.tolist()]),
     )
-    return motion, found.growth
+    return motion, solution.growth
 
 
 def stepped(groups: Groups, notes: list[str]) -> Steady:

@@ -87,12 +87,12 @@ def _after_short_dwells(run: Run, before: Floats, dwells: Floats, sense: float) 
     """Pose changes (K, D, 3) from a steady run: back for each of `before`, then forth."""
     back = run.copy()
     back.flip()
-    found, now = np.full((len(before), len(dwells), 3), np.nan), 0.0
+    lags, now = np.full((len(before), len(dwells), 3), np.nan), 0.0
     for k, time in enumerate(before):
         back.go(float(time - now))
         now = time
-        found[k] = _flipped_poses(back.copy(), dwells, sense)
-    return found
+        lags[k] = _flipped_poses(back.copy(), dwells, sense)
+    return lags
 
 
 def _flipped_poses(run: Run, dwells: Floats, sense: float) -> Floats:
@@ -103,11 +103,11 @@ def _flipped_poses(run: Run, dwells: Floats, sense: float) -> Floats:
 def _poses(run: Run, dwells: Floats, sense: float) -> Floats:
     """Pose changes after each dwell (D, 3), seen as for a positive motor; NaN where the run breaks down."""
     start, now = run.pose, 0.0
-    found = np.full((len(dwells), 3), np.nan)
+    poses = np.full((len(dwells), 3), np.nan)
     for i, time in enumerate(dwells):
         run.go(float(time - now))
         if run.failed:
-            return found
+            return poses
         now = time
-        found[i] = planar.between(start, run.pose)
-    return found if sense > 0 else found * planar.MIRROR
+        poses[i] = planar.between(start, run.pose)
+    return poses if sense > 0 else poses * planar.MIRROR

@@ -98,7 +98,7 @@ def test_one_flipped_bit_is_never_silent(built: Path, original: Path) -> None:
 
 
 def test_a_flipped_bit_in_a_page_is_found_without_the_manifest(original: Path) -> None:
-    """Pieces that wait to be joined have no digest yet: their pages have checksums."""
+    """Shards that wait to be joined have no digest yet: their pages have checksums."""
     there, key = open_storage(original), read_manifest(original)["config_hash"]
     (piece,) = shards_in(there, "rows")
     whole = part(original).read_bytes()
