@@ -59,18 +59,22 @@ def backwards(lookup: Lookup, rows: Simulated, title: str) -> None:
     truth = with_radius(rows.motion)
     robots = {name: values for name, values in rows.robots.items() if name in ROBOT}
     began = time.process_time()
-    found = inverse(lookup, robots, {n: truth[n] for n in given}, {n: BOUNDS[n] for n in free})
+    solutions = inverse(lookup, robots, {n: truth[n] for n in given}, {n: BOUNDS[n] for n in free})
     spent = time.process_time() - began
-    solved = np.flatnonzero((found.misfit < _SOLVED) & ~found.outside.astype(bool))
-    target = found.target[solved]
-    own = {n: values[target] for n, values in robots.items()} | {n: v[solved] for n, v in found.inputs.items()}
-    simulated = steady_columns(own, title="")
+    solved = np.flatnonzero((solutions.misfit < _SOLVED) & ~solutions.outside.astype(bool))
+    target = solutions.target[solved]
+    robots_found = {n: values[target] for n, values in robots.items()} | {
+        n: v[solved] for n, v in solutions.inputs.items()
+    }
+    simulated = steady_columns(robots_found, title="")
     missed = np.max([np.abs(simulated[n] / truth[n][target] - 1) for n in given], axis=0)
     missed[~np.asarray(simulated["converged"], dtype=bool)] = np.inf
     best = np.full(len(rows), np.inf)
     np.minimum.at(best, target, missed)
     away = np.full(len(rows), np.inf)
-    np.minimum.at(away, target, np.max([np.abs(own[n] / rows.robots[n][target] - 1) for n in free], axis=0))
+    np.minimum.at(
+        away, target, np.max([np.abs(robots_found[n] / rows.robots[n][target] - 1) for n in free], axis=0)
+    )
     known = np.isfinite(best)
     figures = [*np.quantile(missed[np.isfinite(missed)], (0.5, 0.95)), missed[np.isfinite(missed)].max()]
     print(f"{title}: {len(rows)} targets, {1e3 * spent / len(rows):.0f} ms each")
@@ -109,23 +113,23 @@ def fastest(lookup: Lookup) -> None:
         for length in LENGTHS:
             robot = replace(base, tails=tails, tail_length=float(length))
             try:
-                found = designed(lookup, robot)
+                outputs = designed(lookup, robot)
             except InputError:
                 continue
-            speed = 1e3 * found["net_speed_bar"] * robot.tail_length / robot.time_scale
+            speed = 1e3 * outputs["net_speed_bar"] * robot.tail_length / robot.time_scale
             if best is None or speed > best[0]:
-                best = speed, robot, found
+                best = speed, robot, outputs
         if best is None:
             print(f"{tails:3d}   no robot keeps the limits")
             continue
-        speed, robot, found = best
-        columns = {n: np.array([found[n]]) for n in ROBOT if n in found}
+        speed, robot, outputs = best
+        columns = {n: np.array([outputs[n]]) for n in ROBOT if n in outputs}
         motion = steady_columns(columns, title="")
         net = _first(responses(Groups.from_columns(columns)).net_speed[:, _AT])
         unit = 1e3 * robot.tail_length / robot.time_scale
-        head, rpm = found["L_over_R"] * robot.head_radius, found["omega_bar"] / robot.time_scale * 30 / np.pi
+        head, rpm = outputs["L_over_R"] * robot.head_radius, outputs["omega_bar"] / robot.time_scale * 30 / np.pi
         print(f"{tails:3d}{100 * robot.tail_length:7.1f}{100 * head:7.1f}{rpm:7.0f}{speed:8.3f}{unit * net:11.3f}"
-              f"{found['R_yr_over_l']:8.4f}{_first(motion['R_yr_over_l']):11.4f}{found['tail_gap']:7.2f}"
+              f"{outputs['R_yr_over_l']:8.4f}{_first(motion['R_yr_over_l']):11.4f}{outputs['tail_gap']:7.2f}"
               f"{_first(motion['tail_gap']):11.2f}", flush=True)  # fmt: skip
     print(f"{time.process_time() - began:.0f} s for {7 * len(LENGTHS)} tail lengths and numbers of tails")
 
