@@ -54,8 +54,8 @@ from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady
 from sim.motion.warm import compile_once
 from softflagella.replanning import Steered, draw_steered, gap_closed, steer
-from surrogate.table.errors import scale_of
-from surrogate.table.lookup import Lookup
+from surrogate.table.errors import error_scale
+from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
 
 
@@ -181,7 +181,7 @@ def _write_page(
     robot: Robot,
     motions: Sequence[Steady],
     rows: pd.DataFrame,
-    small: Lookup,
+    small: NeuralTable,
     tracks: dict[str, tuple[dict[str, Any], TrackingError]],
     loops: dict[str, tuple[Verdict, Measurements]],
     steered: dict[str, Steered],
@@ -338,7 +338,7 @@ def _draw_parity(rows: pd.DataFrame) -> Figure:
         axes.plot(truth[name], found[name], ".", ms=4, color="#2a7fba", alpha=0.7)
         ends = [np.nanmin(truth[name]), np.nanmax(truth[name])]
         axes.plot(ends, ends, color="#1c2733", lw=0.7)
-        error = np.nanmedian(np.abs(found[name] - truth[name]) / scale_of(name, truth))
+        error = np.nanmedian(np.abs(found[name] - truth[name]) / error_scale(name, truth))
         text = f"{error:.1g} deg" if name == "theta_deg" else f"{100 * error:.1g} %"
         axes.set_title(f"{label}: median error {text}", fontsize=9)
         axes.set_xlabel("simulated", fontsize=8)

@@ -46,8 +46,8 @@ def _train(arguments: Namespace) -> None:
     from surrogate.networks.training_loop import Settings
     from surrogate.table.errors import error_table, shortcomings
     from surrogate.table.model_file import save
-    from surrogate.table.response_table import SETTINGS
-    from surrogate.training.model_card import card_of
+    from surrogate.training.fit_response import SETTINGS
+    from surrogate.training.model_card import model_card
     from surrogate.training.train import held_out, train
 
     device, states = device_named(arguments.device), f"{arguments.out}.states"
@@ -60,12 +60,12 @@ def _train(arguments: Namespace) -> None:
     lookup = train(arguments.data, tails, curves, device=device, states=states)
     save(lookup, arguments.out)
     card = Path(arguments.out).with_suffix(".md")
-    write_text(card, card_of(lookup, held_out(arguments.data)))
+    write_text(card, model_card(lookup, held_out(arguments.data)))
     remove_states(states)
     rows = lookup.provenance["rows"]
     print(f"model {lookup.identity}: {rows['train']} rows, held-out error on {rows['held_out']}")
-    print(error_table(lookup))
-    for words in shortcomings(lookup):
+    print(error_table(lookup.errors))
+    for words in shortcomings(lookup.errors):
         print(f"warning: {words}", file=sys.stderr)
     print(f"-> {arguments.out}, {card}")
 
@@ -113,13 +113,13 @@ def _query(arguments: Namespace) -> None:
 
     from sim.io.files import write_csv
     from sim.io.tables import read_table
-    from surrogate.table.lookup import Lookup
+    from surrogate.table.lookup import NeuralTable
     from surrogate.table.model_file import load_table
 
     points = read_table(arguments.points)
     table = load_table(arguments.model)
     columns = {str(c): points[c].to_numpy() for c in points}
-    if isinstance(table, Lookup):
+    if isinstance(table, NeuralTable):
         result = table.query(columns, intervals=True, flag=arguments.flag, certify=arguments.certify)
     else:
         result = table.query(columns)
@@ -172,7 +172,7 @@ def _errors(arguments: Namespace) -> None:
     lookup = load(arguments.model)
     rows = lookup.provenance["rows"]
     print(f"model {lookup.identity}: {rows['train']} rows, held-out error on {rows['held_out']}")
-    print(error_table(lookup))
+    print(error_table(lookup.errors))
 
 
 @program.command(
@@ -183,11 +183,11 @@ def _errors(arguments: Namespace) -> None:
 )
 def _robot(arguments: Namespace) -> None:
     from sim.inputs import load_robot
-    from surrogate.one_robot.robot_table import save_single
+    from surrogate.one_robot.robot_table import save_robot_table
     from surrogate.one_robot.tabulate import tabulate
 
     table = tabulate(load_robot(arguments.robot))
-    save_single(table, arguments.out)
+    save_robot_table(table, arguments.out)
     worst = max(error["rms"] for error in table.errors.values())
     print(f"both directions of the motor, largest error {100 * worst:.2f} % -> {arguments.out}")
 
@@ -203,7 +203,7 @@ def _robot(arguments: Namespace) -> None:
 )
 def _export(arguments: Namespace) -> None:
     from surrogate.export.onnx_query import save_onnx
-    from surrogate.export.small_copy_files import save_small
+    from surrogate.export.small_copy_files import save_small_copy
     from surrogate.table.model_file import load
 
     if not (arguments.onnx or arguments.small):
@@ -213,13 +213,14 @@ def _export(arguments: Namespace) -> None:
         save_onnx(table, arguments.onnx)
         print(f"model {table.identity}, {Path(arguments.onnx).stat().st_size / 1000:.0f} kB -> {arguments.onnx}")
     if arguments.small:
-        print(save_small(table, arguments.small))
+        print(save_small_copy(table, arguments.small))
         print(f"model {table.identity} -> {arguments.small}")
 
 
 @program.command("compile", "compile the loops of queries now rather than on first use")
 def _compile(_: Namespace) -> None:
-    from surrogate.compile_loops import FOLDER, compile_all
+    from surrogate.compile_loops import compile_all
+    from surrogate.loops import FOLDER
 
     print(f"loops compiled in {compile_all():.0f} s -> {FOLDER}")
 

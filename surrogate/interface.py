@@ -1,7 +1,7 @@
 """The interface of a look-up table, which planner and calibration use.
 
-`surrogate.table.lookup.Lookup` (trained networks, a domain of robots) and
-`surrogate.one_robot.robot_table.SingleRobot` (one robot, simulated) are look-up tables.
+`surrogate.table.lookup.NeuralTable` (trained networks, a domain of robots) and
+`surrogate.one_robot.robot_table.RobotTable` (one robot, simulated) are look-up tables.
 `surrogate.table.model_file.load_table` reads either.
 """
 

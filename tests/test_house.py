@@ -11,10 +11,22 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-ORDER = ["sim", "dataset", "surrogate", "planner", "calibration", "softflagella"]
-# Folders of the simulator; each imports from those before it only. Single files of `sim` are listed as well.
-ROOMS = ["arrays", "compiling", "io", "model", "effects", "inputs", "linear", "mechanics", "solve", "reference",
-         "motion", "__main__"]  # fmt: skip
+# The rooms of each package, folders and single files; each imports only from those before it. Packages import only
+# from packages before them.
+ROOMS = {
+    "sim": ["arrays", "compiling", "io", "model", "effects", "inputs", "linear", "mechanics", "solve", "reference",
+            "motion", "__main__"],
+    "dataset": ["rows", "storage", "report", "workers", "build", "__main__"],
+    "surrogate": ["networks", "interface", "input_ranges", "loops", "wrench", "one_robot", "table", "training",
+                  "export", "compile_loops", "__main__"],
+    "planner": ["paths", "vehicle", "planning", "goal", "tracking", "files", "__init__", "__main__"],
+    "calibration": ["statistics", "attribution", "verdict", "swimmer", "report", "examples", "__main__"],
+    "softflagella": ["api", "replanning", "demo", "__init__", "__main__"],
+}  # fmt: skip
+ORDER = list(ROOMS)
+# Packages that still have circles of rooms or files.
+UNFINISHED = {"dataset", "planner", "calibration"}
+FINISHED = [package for package in ORDER if package not in UNFINISHED]
 
 
 def modules_imported(file: Path) -> set[str]:
@@ -33,18 +45,27 @@ def imported(file: Path) -> set[str]:
     return {name.split(".")[0] for name in modules_imported(file)} & set(ORDER)
 
 
-def room_of(file: Path) -> str:
-    """The folder of the simulator that a file is in, or the file's own name."""
-    return file.relative_to(ROOT / "sim").parts[0].removesuffix(".py")
+def room(package: str, file: Path) -> str:
+    """The folder of a package that a file is in, or the file's own name."""
+    return file.relative_to(ROOT / package).parts[0].removesuffix(".py")
 
 
-def rooms_imported() -> dict[str, set[str]]:
-    """Room -> other rooms that its files import."""
-    found: dict[str, set[str]] = {}
-    for file in (ROOT / "sim").rglob("*.py"):
-        names = {name.split(".")[1] for name in modules_imported(file) if name.startswith("sim.")}
-        found.setdefault(room_of(file), set()).update(names - {room_of(file)})
-    return found
+def rooms_imported(package: str) -> dict[str, set[str]]:
+    """Room -> other rooms that its files import, in functions and under TYPE_CHECKING, too."""
+    graph: dict[str, set[str]] = {}
+    for file in (ROOT / package).rglob("*.py"):
+        here = room(package, file)
+        names = [name.split(".")[1] for name in modules_imported(file) if name.startswith(f"{package}.")]
+        targets = {name if name in ROOMS[package] else "__init__" for name in names}
+        graph.setdefault(here, set()).update(targets - {here})
+    return graph
+
+
+def modules() -> dict[str, Path]:
+    """Every module of the packages by its full name; a package stands for its __init__.py."""
+    files = [file for package in ORDER for file in (ROOT / package).rglob("*.py")]
+    names = [".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for file in files]
+    return dict(zip(names, files, strict=True))
 
 
 @pytest.mark.parametrize("package", ORDER)
@@ -56,29 +77,31 @@ def test_imports_run_one_way(package: str) -> None:
         assert imported(file) <= allowed, file
 
 
-def test_rooms_of_the_simulator_import_one_way() -> None:
-    found = rooms_imported()
-    assert set(found) == {*ROOMS, "__init__"}
-    assert found.pop("__init__") == set()
-    for room, others in found.items():
-        assert others <= set(ROOMS[: ROOMS.index(room)]), room
-    assert "reference" not in found["motion"] | found["__main__"]  # for tests and teaching only
-    assert set(TopologicalSorter(found).static_order()) == set(ROOMS)  # raises where there is a circle
+@pytest.mark.parametrize("package", FINISHED)
+def test_rooms_of_a_package_import_one_way(package: str) -> None:
+    rooms, graph = ROOMS[package], rooms_imported(package)
+    assert set(graph) == {*rooms, "__init__"}
+    if "__init__" not in rooms:
+        assert graph.pop("__init__") == set()
+    for name, targets in graph.items():
+        assert targets <= set(rooms[: rooms.index(name)]), name
+    assert set(TopologicalSorter(graph).static_order()) == set(rooms)  # raises where there is a circle
 
 
-def test_files_of_a_package_do_not_import_in_a_circle() -> None:
-    files = {
-        ".".join(file.relative_to(ROOT).with_suffix("").parts): file
-        for package in ORDER
-        for file in (ROOT / package).rglob("*.py")
-    }
+def test_only_tests_and_teaching_use_the_reference() -> None:
+    graph = rooms_imported("sim")
+    assert "reference" not in graph["motion"] | graph["__main__"]
+
+
+def test_files_do_not_import_in_a_circle() -> None:
+    """Not even in functions or for type checkers alone."""
+    files = {name: file for name, file in modules().items() if name.split(".")[0] in FINISHED}
     graph = {}
     for name, file in files.items():
-        tops = {f"{n.module}.{a.name}" for n in ast.parse(file.read_text()).body if isinstance(n, ast.ImportFrom)
-                for a in n.names}  # fmt: skip
-        wanted = tops | {top.rpartition(".")[0] for top in tops}
-        graph[name] = {other for other in wanted if other in files} - {name}
-    assert sum(map(len, graph.values())) > 300
+        names = modules_imported(file)
+        targets = {target if target in files else target.rpartition(".")[0] for target in names}
+        graph[name] = {target for target in targets if target in files} - {name}
+    assert sum(map(len, graph.values())) > 200
     assert set(TopologicalSorter(graph).static_order()) == set(files)
 
 
@@ -139,3 +162,24 @@ def test_importing_softflagella_loads_none_of_the_other_packages() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     own = {name for name in done.stdout.split() if name.split(".")[0] in ORDER}
     assert own == {"softflagella"}
+
+
+def test_a_query_and_a_plan_load_no_training_code() -> None:
+    """Nor what training alone needs: data sets, pandas, joblib."""
+    code = """
+import sys
+from planner.paths.path import circle
+from planner.planning.plan import plan
+from sim.inputs import load_robot
+from surrogate.table.model_file import load_table
+table, robot = load_table(), load_robot("paper-control")
+table.query({name: [value] for name, value in robot.group_values().items()})
+plan(circle(2.0), robot, lookup=table)
+print(*sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    loaded = set(done.stdout.split())
+    assert "surrogate.table.wrench_table" in loaded
+    training = {f"surrogate.networks.{name}" for name in ("training_loop", "bfgs", "checkpoints")}
+    assert not loaded & (training | {"dataset", "surrogate.training", "surrogate.compile_loops"})
+    assert not loaded & {"joblib", "pandas"}

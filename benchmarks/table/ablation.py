@@ -23,14 +23,14 @@ from torch import Tensor
 
 from benchmarks.table.shipped_table import kept
 from dataset.report.figures import plain_logarithms
-from surrogate.networks import training_loop as fit
-from surrogate.networks.checkpoints import Work
+from surrogate.networks import training_loop
+from surrogate.networks.checkpoints import TrainingContext
 from surrogate.networks.ensemble import Ensemble
-from surrogate.networks.training_loop import Settings
-from surrogate.table import wrench_table as tails
-from surrogate.table.wrench_table import Rows, learnable, rows_of
-from surrogate.training.simulated import Simulated
-from surrogate.wrench import tails as tail
+from surrogate.networks.training_loop import _HARDEST, Problem, Settings
+from surrogate.training import fit_wrench
+from surrogate.training.fit_wrench import WrenchSamples, learnable, wrench_samples
+from surrogate.training.simulated import SimulatedRobots
+from surrogate.wrench.tails import SMOOTHNESS, straight_wrench, tail_inputs, wrench_slopes
 from tests.oracles.balance import solve
 
 SMALL = Settings(width=32, depth=3, members=1, epochs=60, iterations=600)
@@ -49,25 +49,25 @@ def main(*words: str) -> None:
     learned, tested = (_several(kept(options.work, name)) for name in ("tails", "widths"))
     tested = tested.at((tested.gap >= 1) & (tested.motion[:, 2] < 0.6 * tested.motion[:, 4]))
     tested = tested.at(torch.arange(min(_TESTED, len(tested.motion))))
-    rows = learned.at(torch.arange(options.rows))
-    results = [_network("as shipped, smaller", rows, tested)]
-    power, fit._POWER = fit._POWER, 1.0
-    results.append(_network("least squares", rows, tested))
-    fit._POWER = power
-    polish: Callable[..., None] = fit._polish
-    fit._polish = _lbfgs  # type: ignore[assignment]
+    samples = learned.at(torch.arange(options.rows))
+    results = [_network("as shipped, smaller", samples, tested)]
+    power, training_loop._POWER = training_loop._POWER, 1.0
+    results.append(_network("least squares", samples, tested))
+    training_loop._POWER = power
+    polish: Callable[..., None] = training_loop._polish
+    training_loop._polish = _lbfgs  # type: ignore[assignment]
     results.append(
-        _network("L-BFGS for BFGS", rows, tested, replace(SMALL, iterations=_LONGER * SMALL.iterations))
+        _network("L-BFGS for BFGS", samples, tested, replace(SMALL, iterations=_LONGER * SMALL.iterations))
     )
-    fit._polish = polish
-    results.append(_network("Adam alone", rows, tested, replace(SMALL, iterations=0)))
-    smooth, tail.SMOOTHNESS = tail.SMOOTHNESS, (1.5,) * 7
-    results.append(_network("inputs scaled alike", rows, tested))
-    tail.SMOOTHNESS = smooth
-    results.append(_network("single precision", rows, tested, single=True))
-    results.append(_network("half the rows", rows.at(torch.arange(options.rows // 2)), tested))
-    results.append(_kernel("Gaussian process", rows.at(torch.arange(min(_CENTRES, options.rows))), tested))
-    results.append(_nearest("nearest row", rows, tested))
+    training_loop._polish = polish
+    results.append(_network("Adam alone", samples, tested, replace(SMALL, iterations=0)))
+    smooth, fit_wrench.SMOOTHNESS = fit_wrench.SMOOTHNESS, (1.5,) * 7  # type: ignore[attr-defined]
+    results.append(_network("inputs scaled alike", samples, tested))
+    fit_wrench.SMOOTHNESS = smooth  # type: ignore[attr-defined]
+    results.append(_network("single precision", samples, tested, single=True))
+    results.append(_network("half the rows", samples.at(torch.arange(options.rows // 2)), tested))
+    results.append(_kernel("Gaussian process", samples.at(torch.arange(min(_CENTRES, options.rows))), tested))
+    results.append(_nearest("nearest row", samples, tested))
     print(f"{options.rows} rows, {len(tested.motion)} fresh robots; errors in %")
     print(f"{'':26}{'train s':>8}{'query µs':>9}{'numbers':>9}{'ω_yr median':>12}{'95 %':>8}{'v_z':>8}{'95 %':>8}")
     for name, train, query, size, errors in results:
@@ -77,13 +77,15 @@ def main(*words: str) -> None:
         _draw(results, options.picture)
 
 
-def _several(rows: Simulated) -> Rows:
+def _several(rows: SimulatedRobots) -> WrenchSamples:
     rows = rows.at(rows.robots["N"] > 2)
-    samples = rows_of(rows.robots, rows.motion)
+    samples = wrench_samples(rows.robots, rows.motion)
     return samples.at(torch.as_tensor(np.flatnonzero(learnable(samples))))
 
 
-def _judge(name: str, rows: Rows, numbers: Callable[[Tensor], Tensor], seconds: float, size: float) -> Result:
+def _judge(
+    name: str, rows: WrenchSamples, numbers: Callable[[Tensor], Tensor], seconds: float, size: float
+) -> Result:
     began = time.process_time()
     motion, _ = solve(rows.heads, rows.tails, numbers)
     query = 1e6 * (time.process_time() - began) / len(motion)
@@ -92,17 +94,19 @@ def _judge(name: str, rows: Rows, numbers: Callable[[Tensor], Tensor], seconds: 
     return name, seconds, query, size, tuple(float(q) for error in errors for q in error.quantile(levels))
 
 
-def _network(name: str, rows: Rows, tested: Rows, settings: Settings = SMALL, *, single: bool = False) -> Result:
+def _network(
+    name: str, rows: WrenchSamples, tested: WrenchSamples, settings: Settings = SMALL, *, single: bool = False
+) -> Result:
     began = time.process_time()
-    learn: Callable[..., Ensemble] = tails._learn_wrench
-    network = learn(rows, settings, Work(), 3)
+    learn: Callable[..., Ensemble] = fit_wrench._learn_wrench
+    network = learn(rows, settings, TrainingContext(), 3)
     if single:
         network = network.float().double()  # the weights rounded
     size = sum(part.numel() for part in network.parameters())
     return _judge(name, tested, network, time.process_time() - began, size)
 
 
-def _lbfgs(network: Ensemble, k: int, problem: fit.Problem, iterations: int, *others: object) -> None:
+def _lbfgs(network: Ensemble, k: int, problem: Problem, iterations: int, *others: object) -> None:
     """The last 80 steps only, not the whole matrix."""
     alone = network.member(k).requires_grad_(True)
     optimiser = torch.optim.LBFGS(
@@ -112,7 +116,7 @@ def _lbfgs(network: Ensemble, k: int, problem: fit.Problem, iterations: int, *ot
 
     def closure() -> Tensor:
         optimiser.zero_grad(set_to_none=True)
-        value = problem.loss(alone, problem.every(), fit._HARDEST)
+        value = problem.loss(alone, problem.every(), _HARDEST)
         value.backward()  # type: ignore[no-untyped-call]
         return value
 
@@ -120,11 +124,11 @@ def _lbfgs(network: Ensemble, k: int, problem: fit.Problem, iterations: int, *ot
     network.replace_member(k, alone)
 
 
-def _kernel(name: str, rows: Rows, tested: Rows) -> Result:
+def _kernel(name: str, rows: WrenchSamples, tested: WrenchSamples) -> Result:
     """A Gaussian process with the same prior smoothness, on y from the wrench (y_4 = y_5 = 0)."""
     began = time.process_time()
-    inputs, wanted = tail.inputs_of(rows.tails, rows.motion), _numbers(rows)
-    shift, scale = inputs.mean(0), inputs.std(0) * torch.tensor(tail.SMOOTHNESS)
+    inputs, wanted = tail_inputs(rows.tails, rows.motion), _numbers(rows)
+    shift, scale = inputs.mean(0), inputs.std(0) * torch.tensor(SMOOTHNESS)
     scale[-1] = 1e9
     mean, spread = wanted.mean(0), wanted.std(0) + 1e-12
 
@@ -139,9 +143,9 @@ def _kernel(name: str, rows: Rows, tested: Rows) -> Result:
     )
 
 
-def _nearest(name: str, rows: Rows, tested: Rows) -> Result:
-    inputs, wanted = tail.inputs_of(rows.tails, rows.motion), _numbers(rows)
-    scale = inputs.std(0) * torch.tensor(tail.SMOOTHNESS)
+def _nearest(name: str, rows: WrenchSamples, tested: WrenchSamples) -> Result:
+    inputs, wanted = tail_inputs(rows.tails, rows.motion), _numbers(rows)
+    scale = inputs.std(0) * torch.tensor(SMOOTHNESS)
     scale[-1] = 1e9
     return _judge(
         name,
@@ -152,11 +156,11 @@ def _nearest(name: str, rows: Rows, tested: Rows) -> Result:
     )
 
 
-def _numbers(rows: Rows) -> Tensor:
+def _numbers(rows: WrenchSamples) -> Tensor:
     """y (M, 6) of rows with y_4 = y_5 = 0."""
     wrench = (rows.heads.resistance @ rows.motion[..., None])[..., 0]
-    remainder = wrench - tail.straight_wrench(rows.tails, rows.motion)
-    units = tail.units_of(rows.tails, rows.motion)[:, :, :4].diagonal(dim1=1, dim2=2)
+    remainder = wrench - straight_wrench(rows.tails, rows.motion)
+    units = wrench_slopes(rows.tails, rows.motion)[:, :, :4].diagonal(dim1=1, dim2=2)
     return torch.cat([remainder / units, torch.zeros(len(remainder), 2, dtype=torch.float64)], 1)
 
 

@@ -27,9 +27,9 @@ from sim.motion.batches import steady_columns
 from sim.motion.response import responses
 from surrogate.input_ranges import BOUNDS, COEFFICIENTS, ROBOT
 from surrogate.table.inverse import design, inverse
-from surrogate.table.lookup import OUTSIDE, Lookup
+from surrogate.table.lookup import OUTSIDE, NeuralTable
 from surrogate.table.model_file import load
-from surrogate.training.simulated import Simulated, as_reached, drawn
+from surrogate.training.simulated import SimulatedRobots, as_reached, draw_robots
 from surrogate.training.train import with_radius
 
 KINDS = {  # free inputs, and the outputs that are given
@@ -45,15 +45,15 @@ RADIUS, RPM = 0.9, (20.0, 200.0)  # of the design: largest R_yr/l, motor
 LENGTHS = np.linspace(0.07, 0.15, 9)  # m, of the tails
 
 
-def targets(lookup: Lookup, count: int) -> Simulated:
+def targets(lookup: NeuralTable, count: int) -> SimulatedRobots:
     """Simulated robots inside the table's domain, with two tails and more that do not touch."""
-    rows = as_reached(drawn(_DRAWN, _SEED, wide=False))
+    rows = as_reached(draw_robots(_DRAWN, _SEED, wide=False))
     inside = ~lookup.query(rows.robots, flag=True)[OUTSIDE]
     good = inside & (rows.robots["N"] > 1) & (rows.motion["tail_gap"] >= 1)
     return rows.at(np.flatnonzero(good)[:count])
 
 
-def backwards(lookup: Lookup, rows: Simulated, title: str) -> None:
+def backwards(lookup: NeuralTable, rows: SimulatedRobots, title: str) -> None:
     """Solve for the free inputs, simulate every solution, and print how far it is from its target."""
     free, given = KINDS[title]
     truth = with_radius(rows.motion)
@@ -89,7 +89,7 @@ def backwards(lookup: Lookup, rows: Simulated, title: str) -> None:
           f"{100 * np.median(away[known]):.2g} %, {100 * np.quantile(away[known], 0.95):.2g} %")  # fmt: skip
 
 
-def designed(lookup: Lookup, robot: Robot) -> dict[str, float]:
+def designed(lookup: NeuralTable, robot: Robot) -> dict[str, float]:
     """Of one tail length and N: head length and motor speed for the highest net speed; outputs of the table."""
     groups = robot.group_values()
     low, high = (robot.time_scale * rpm * 2 * np.pi / 60 for rpm in RPM)
@@ -101,7 +101,7 @@ def designed(lookup: Lookup, robot: Robot) -> dict[str, float]:
     return design(lookup, groups | {"dwell_bar": DWELLS[_AT]}, bounds, best="net_speed_bar", limits=limits)
 
 
-def fastest(lookup: Lookup) -> None:
+def fastest(lookup: NeuralTable) -> None:
     """For every N the fastest allowed robot, beside the simulator."""
     base = PRESETS["paper-control"]
     print(f"\ndesign: highest net speed at dwells of {DWELLS[_AT]:.2f}, R_yr at most {RADIUS:g} l, tails apart")

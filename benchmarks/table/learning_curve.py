@@ -21,12 +21,13 @@ import numpy as np
 import torch
 
 from dataset.report.figures import plain_logarithms
-from surrogate.networks.checkpoints import Work
+from surrogate.networks.checkpoints import TrainingContext
 from surrogate.networks.training_loop import Settings
 from surrogate.table.errors import relative_errors
 from surrogate.table.lookup import BRANCHES
-from surrogate.table.wrench_table import Rows, TailTable, learn_tails, learnable, rows_of
-from surrogate.training.simulated import Simulated, read_rows
+from surrogate.table.wrench_table import WrenchTable
+from surrogate.training.fit_wrench import WrenchSamples, fit_wrench, learnable, wrench_samples
+from surrogate.training.simulated import SimulatedRobots, read_robots
 from surrogate.training.train import split, with_radius
 
 SETTINGS = {
@@ -46,15 +47,17 @@ class Found(NamedTuple):
     errors: dict[str, tuple[float, float]]  # output -> median and 95 %, in %
 
 
-def usable(rows: Simulated) -> tuple[Simulated, Rows]:
+def usable(rows: SimulatedRobots) -> tuple[SimulatedRobots, WrenchSamples]:
     """Robots with two tails and more which a table may learn, as simulated and as rows of tails."""
     rows = rows.at(rows.robots["N"] > 1)
-    samples = rows_of(rows.robots, rows.motion)
+    samples = wrench_samples(rows.robots, rows.motion)
     good = np.flatnonzero(learnable(samples))
     return rows.at(good), samples.at(torch.as_tensor(good))
 
 
-def test_errors(table: TailTable, tested: Simulated, rows: Rows) -> dict[str, tuple[float, float]]:
+def test_errors(
+    table: WrenchTable, tested: SimulatedRobots, rows: WrenchSamples
+) -> dict[str, tuple[float, float]]:
     """Median and 95 % of the relative errors, in %, by output."""
     motion = torch.from_numpy(table.solve(rows.heads, rows.tails)[0])
     values = table.outputs(rows.heads, motion, table.tail_gap(rows.tails, motion))
@@ -98,7 +101,7 @@ def main(*words: str) -> None:
     parser.add_argument("--picture", help="draw the errors into this file")
     options = parser.parse_args(words)
     torch.set_num_threads(1)
-    every, numbers = read_rows(options.data)
+    every, numbers = read_robots(options.data)
     part = split(numbers)
     tested, _ = usable(every.at(part == 2))
     slow = np.abs(tested.motion["omega_yr_bar"]) < BRANCHES * np.abs(tested.motion["omega_t_bar"])
@@ -113,7 +116,7 @@ def main(*words: str) -> None:
         for share in PARTS:
             samples = rows.at(torch.arange(round(share * len(learned))))
             began = time.process_time()
-            table = learn_tails(samples, settings, Work())
+            table = fit_wrench(samples, settings, TrainingContext())
             spent = time.process_time() - began
             point = Found(name, len(samples.motion), spent, test_errors(table, tested, held_out))
             curves.append(point)

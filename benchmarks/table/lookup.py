@@ -14,7 +14,7 @@ from benchmarks.timing import processor_time
 from sim.motion.batches import steady_columns
 from surrogate.table.errors import error_table
 from surrogate.table.model_file import load
-from surrogate.training.simulated import drawn
+from surrogate.training.simulated import draw_robots
 
 ROWS, SIMULATED, REPEATS = 16384, 64, 20
 
@@ -24,8 +24,8 @@ def main() -> None:
     lookup = load()
     rows = lookup.provenance["rows"]
     print(f"\nShipped look-up table: {rows['train']} rows learned, errors on {rows['held_out']} others")
-    print(error_table(lookup))
-    robots = drawn(ROWS, 5, wide=False)
+    print(error_table(lookup.errors))
+    robots = draw_robots(ROWS, 5, wide=False)
     few = {name: values[:SIMULATED] for name, values in robots.items()}
     single_robot = {name: values[:1] for name, values in robots.items()}
     lookup.query(few, flag=True)

@@ -24,9 +24,9 @@ from dataset.rows.design import Axis, Design
 from surrogate.input_ranges import DOMAIN, MOST_TAILS
 from surrogate.networks.training_loop import Settings
 from surrogate.table.errors import relative_errors
-from surrogate.table.lookup import Lookup, steady_outputs
+from surrogate.table.lookup import NeuralTable, steady_outputs
 from surrogate.training.refine import choose
-from surrogate.training.simulated import Simulated, as_reached, drawn, joined, simulated
+from surrogate.training.simulated import SimulatedRobots, as_reached, draw_robots, join_robots, simulate_robots
 from surrogate.training.train import learn, split, with_radius
 
 ROWS, TEST, FLIPS, SEEDS = 2048, 4096, 48, (1, 2)
@@ -40,7 +40,7 @@ def whole_domain() -> Design:
     return Design({**axes, "N": Axis(1, MOST_TAILS, "integer")}, 1, 7)
 
 
-def motions(design: Design, indices: Iterable[int]) -> tuple[Simulated, np.ndarray]:
+def motions(design: Design, indices: Iterable[int]) -> tuple[SimulatedRobots, np.ndarray]:
     """Rows of the design that converge, and their indices."""
     chosen = tuple(indices)
     points = replace(design, rows=len(chosen), chosen=chosen).points()
@@ -51,7 +51,7 @@ def motions(design: Design, indices: Iterable[int]) -> tuple[Simulated, np.ndarr
     return found, np.array(chosen)[place]
 
 
-def trained(rows: Simulated, numbers: np.ndarray, flips: Simulated, seed: int) -> Lookup:
+def trained(rows: SimulatedRobots, numbers: np.ndarray, flips: SimulatedRobots, seed: int) -> NeuralTable:
     """A table; its intervals are those of the rows that are held out."""
     settings = Settings(width=40, depth=2, epochs=60, iterations=300, seed=seed)
     once = Settings(width=8, depth=1, members=1, epochs=1, iterations=1)
@@ -60,7 +60,7 @@ def trained(rows: Simulated, numbers: np.ndarray, flips: Simulated, seed: int) -
     return learn(learned, widths, held_out, flips, settings, once)
 
 
-def errors(table: Lookup, test: Simulated) -> dict[str, np.ndarray]:
+def errors(table: NeuralTable, test: SimulatedRobots) -> dict[str, np.ndarray]:
     """Relative errors of robots, the root mean square over five outputs, (M,), by number of tails."""
     answer = steady_outputs(table.motions(test.robots, flag=True), table.tails)
     found = relative_errors(answer, with_radius(test.motion))
@@ -75,9 +75,10 @@ def main(*words: str) -> None:
     rows = parser.parse_args(words).rows
     torch.set_num_threads(1)
     design = whole_domain()
-    test = as_reached(drawn(TEST, 99, wide=False), title="")
-    flips = simulated(
-        {n: v[:FLIPS] for n, v in drawn(64, 98, wide=False).items()} | {"N": np.full(FLIPS, 3.0)}, curves=True
+    test = as_reached(draw_robots(TEST, 99, wide=False), title="")
+    flips = simulate_robots(
+        {n: v[:FLIPS] for n, v in draw_robots(64, 98, wide=False).items()} | {"N": np.full(FLIPS, 3.0)},
+        curves=True,
     )
     first, numbers = motions(design, range(rows))
     print(f"errors of {len(test)} robots [%], steady outputs: median, 95 %, rms without the worst 1 %, by N")
@@ -88,15 +89,15 @@ def main(*words: str) -> None:
         print(f"  … {time.process_time() - began:.0f} s", flush=True)
         for count in (2, 4):
             more, others = motions(design, range(rows, count * rows))
-            both = joined([first, more]), np.concatenate([numbers, others])
+            both = join_robots([first, more]), np.concatenate([numbers, others])
             _print(f"{count * rows} even", trained(*both, flips, seed), test)
         for power in POWERS:
             more, others = motions(design, choose(table, design, rows, rows, power=power))
-            both = joined([first, more]), np.concatenate([numbers, others])
+            both = join_robots([first, more]), np.concatenate([numbers, others])
             _print(f"{rows} even, {rows} chosen, power {power:g}", trained(*both, flips, seed), test)
 
 
-def _print(title: str, table: Lookup, test: Simulated) -> None:
+def _print(title: str, table: NeuralTable, test: SimulatedRobots) -> None:
     cells = []
     for name, found in errors(table, test).items():
         low = np.sort(found[np.isfinite(found)])

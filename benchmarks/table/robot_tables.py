@@ -38,7 +38,7 @@ from sim.motion.settling import steady_state
 from sim.motion.switching import MEMORY, steady_twist
 from sim.motion.warm import compile_once
 from sim.solve.assembly import bodies, reversed_bodies
-from surrogate.one_robot.robot_table import SingleRobot
+from surrogate.one_robot.robot_table import RobotTable
 from surrogate.one_robot.tabulate import tabulate
 
 AT = (8, 13, 18, 22)  # of DWELLS: 0.54, 1.0, 1.9, 3.1
@@ -71,7 +71,7 @@ def pairs(changes: Floats) -> Floats:
     return planar.compose(real, real[::-1])
 
 
-def tabulated(table: SingleRobot, robot: Robot) -> tuple[Floats, Floats]:
+def tabulated(table: RobotTable, robot: Robot) -> tuple[Floats, Floats]:
     """Pose changes (2, D, 3) over one of equal dwells as the planner sees them, and steady twists (2, 3)."""
     vehicle = table_vehicle(robot, table)
     dwells = DWELLS[list(AT)]

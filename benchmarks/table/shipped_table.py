@@ -23,12 +23,19 @@ import numpy as np
 from dataset.report.figures import plain_logarithms
 from dataset.storage.data_set import read_manifest
 from sim.arrays import Floats
-from surrogate.networks.checkpoints import Work, remove_states
+from surrogate.networks.checkpoints import TrainingContext, remove_states
 from surrogate.networks.training_loop import Settings
 from surrogate.table.errors import coverage, curve_errors, error_table, relative_errors, summary
-from surrogate.table.lookup import Lookup
+from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load, save
-from surrogate.training.simulated import Simulated, as_reached, drawn, joined, read_rows, simulated
+from surrogate.training.simulated import (
+    SimulatedRobots,
+    as_reached,
+    draw_robots,
+    join_robots,
+    read_robots,
+    simulate_robots,
+)
 from surrogate.training.train import learn, split, with_radius
 
 TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=3000)
@@ -44,24 +51,24 @@ def robots(name: str) -> dict[str, Floats]:
     if name in FLIPS:
         count, seed = FLIPS[name]
         if name != "flips":
-            return drawn(count, seed, wide=False)
+            return draw_robots(count, seed, wide=False)
         tails = 1.0 + np.arange(_FLIPS_DRAWN) % 8
         np.random.default_rng(seed).shuffle(tails)
-        every = {**drawn(_FLIPS_DRAWN, seed, wide=True), "N": tails}
+        every = {**draw_robots(_FLIPS_DRAWN, seed, wide=True), "N": tails}
         return {n: np.asarray(values[:count]) for n, values in every.items()}
     count, seed = ROWS[name]
-    return drawn(count, seed, wide=name == "tails")
+    return draw_robots(count, seed, wide=name == "tails")
 
 
-def kept(work: Path, name: str) -> Simulated:
+def kept(work: Path, name: str) -> SimulatedRobots:
     """One set, simulated, or read from the folder if it is there."""
     path = work / f"{name}.npz"
     if path.exists():
         with np.load(path) as file:
             parts = [{k.split("/")[1]: file[k] for k in file if k.startswith(f"{i}/")} for i in range(3)]
-        return Simulated(*parts)
+        return SimulatedRobots(*parts)
     began = time.process_time()
-    make: Callable[..., Simulated] = simulated if name == "tails" or name in FLIPS else as_reached
+    make: Callable[..., SimulatedRobots] = simulate_robots if name == "tails" or name in FLIPS else as_reached
     rows = make(robots(name), title=name, **({"curves": True} if name in FLIPS else {}))
     print(f"{name}: {len(rows)} rows, {time.process_time() - began:.0f} s")
     work.mkdir(parents=True, exist_ok=True)
@@ -70,11 +77,11 @@ def kept(work: Path, name: str) -> Simulated:
     return rows
 
 
-def swept(folder: str) -> tuple[Simulated, Simulated, Simulated]:
+def swept(folder: str) -> tuple[SimulatedRobots, SimulatedRobots, SimulatedRobots]:
     """Rows of a sweep: one tail; with response curves, to learn (with memory and rest, and _SWEPT without); and
     held out.
     """
-    rows, numbers = read_rows(folder)
+    rows, numbers = read_robots(folder)
     part, history = split(numbers), np.isfinite(rows.curves["rest"]).all((1, 2))
     lags = np.flatnonzero((part == 0) & ~history & (rows.robots["N"] > 1))[:_SWEPT]
     learned = np.union1d(lags, np.flatnonzero((part == 0) & history))
@@ -82,7 +89,7 @@ def swept(folder: str) -> tuple[Simulated, Simulated, Simulated]:
     return rows.at(single), rows.at(learned), rows.at(np.flatnonzero((part > 0) & history))
 
 
-def test(lookup: Lookup, rows: Simulated, flips: Simulated) -> None:
+def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> None:
     """Print errors and coverage on robots that were never used."""
     began = time.process_time()
     answer = lookup.query(rows.robots, intervals=True, flag=True)
@@ -111,7 +118,7 @@ def test(lookup: Lookup, rows: Simulated, flips: Simulated) -> None:
         print(f"  {name:16}" + "".join(f"  {k} {100 * v:.3f}" for k, v in figures.items()))
 
 
-def draw(lookup: Lookup, rows: Simulated, path: str) -> None:
+def draw(lookup: NeuralTable, rows: SimulatedRobots, path: str) -> None:
     """Error of the yaw rate against motor speed, of robots whose tails do not touch."""
     from matplotlib.figure import Figure
 
@@ -152,14 +159,14 @@ def main(*words: str) -> None:
         tails, widths, held_out, flips = (kept(given.work, n) for n in ("tails", "widths", "held_out", "flips"))
         source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(given.sweep)["config_hash"]}
         single, learned, others = swept(given.sweep)
-        tails = joined([tails, single])
+        tails = join_robots([tails, single])
         lookup = learn(
-            tails, widths, held_out, joined([flips, learned]), TAILS, CURVES, source=source, flips_held_out=others,
-            work=Work("train", folder=given.work / "states"),
+            tails, widths, held_out, join_robots([flips, learned]), TAILS, CURVES, source=source,
+            flips_held_out=others, work=TrainingContext("train", folder=given.work / "states"),
         )  # fmt: skip
         save(lookup, given.out)
         remove_states(given.work / "states")
-        print(error_table(lookup))
+        print(error_table(lookup.errors))
     if given.test:
         lookup, locked = load(given.test), kept(given.work, "locked")
         test(lookup, locked, kept(given.work, "locked_flips"))

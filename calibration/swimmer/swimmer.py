@@ -46,7 +46,7 @@ from sim.model.robot import Robot
 from sim.motion.batches import sensitivity_columns, steady_columns
 from sim.motion.sensitivity import Sensitivities
 from sim.solve.refinement import FEW, MANY
-from surrogate.table.lookup import Lookup
+from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ class Swimmer:
         both = len(np.unique(np.sign(self.runs.omega))) == 2
         return reason_untestable(influence, self._drivers, both, self.runs.outputs)
 
-    def predict(self, sets: Sequence[Parameters], *, title: str = "", lookup: Lookup | None = None) -> Floats:
+    def predict(self, sets: Sequence[Parameters], *, title: str = "", lookup: NeuralTable | None = None) -> Floats:
         """Predictions (P, n, k) for P parameter sets, all simulated together.
 
         With `lookup` the look-up table is used, not the simulator. That is good for a first guess only, because
@@ -230,7 +230,7 @@ class Swimmer:
         ]
         return min(found, key=lambda pair: pair[1])[0]
 
-    def _fit_lookup(self, lookup: Lookup, start: dict[str, float]) -> tuple[dict[str, float], float]:
+    def _fit_lookup(self, lookup: NeuralTable, start: dict[str, float]) -> tuple[dict[str, float], float]:
         """Coefficients from one start, and the sum of squares that they leave; infinite off the table."""
         data, parameters, left = self.runs, dict(start), math.inf
         whiten = Noise(repeat_covariance(data.y, data.condition), 0.0).whitener(data.session)
@@ -280,7 +280,7 @@ class Swimmer:
 
         return predictive(self, base, used, rows, test)
 
-    def _inside(self, lookup: Lookup, parameters: Parameters) -> Flags:
+    def _inside(self, lookup: NeuralTable, parameters: Parameters) -> Flags:
         """Which runs (n,) the look-up table covers at `parameters`."""
         runs, place = self._conditions(parameters)
         good = np.ones(len(runs), dtype=bool)

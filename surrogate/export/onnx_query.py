@@ -22,10 +22,10 @@ from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.input_ranges import ROBOT
 from surrogate.networks.ensemble import Ensemble
 from surrogate.table import lookup
-from surrogate.table.lookup import OUTSIDE, Lookup
+from surrogate.table.lookup import OUTSIDE, NeuralTable
 from surrogate.table.support import DEGREE
 from surrogate.wrench import balance
-from surrogate.wrench import tails as tail
+from surrogate.wrench.tails import SMALL_DEFLECTION, SMALL_SURGE, SOFT, TINY, TYPICAL, linear_thrust, linear_torque
 
 UNITS = {
     "C_t": "1", "C_r": "1", "C_yr": "1", "l_over_R": "1", "L_over_R": "1", "l_over_r0": "1",
@@ -36,7 +36,7 @@ UNITS = {
 }  # fmt: skip
 
 
-def save_onnx(table: Lookup, path: str | Path) -> None:
+def save_onnx(table: NeuralTable, path: str | Path) -> None:
     """Write the query of a table as an ONNX file.
 
     Raises:
@@ -59,7 +59,7 @@ class _Query:
     Robots are sorted by the network that they need. Values have the axes (K, M, …): K trial motions of M robots.
     """
 
-    def __init__(self, graph: Any, table: Lookup):
+    def __init__(self, graph: Any, table: NeuralTable):
         self.g, self.table = graph, table
         columns = {name: graph.input(name, ("robots",), UNITS[name]) for name in ROBOT}
         self._sort(columns["N"])
@@ -135,17 +135,17 @@ class _Query:
         g = self.g
         v_x, v_z, yaw, _, spin = motion
         drag_number = self.across * spin
-        sideways = g.sqrt(v_x * v_x + yaw * yaw + tail.TINY)
-        deflection = sideways / spin * drag_number / (drag_number + tail.SOFT)
+        sideways = g.sqrt(v_x * v_x + yaw * yaw + TINY)
+        deflection = sideways / spin * drag_number / (drag_number + SOFT)
         like = 0.0 * spin  # gives all inputs the same axes
         return g.stack(
             [
                 g.log(drag_number),
                 g.log(self.offset) + like,
                 g.log(self.own["l_over_r0"]) + like,
-                g.asinh(deflection / tail.SMALL_DEFLECTION),
+                g.asinh(deflection / SMALL_DEFLECTION),
                 g.atan2(v_x, yaw),
-                g.asinh(v_z / (self.offset * spin) / tail.SMALL_SURGE),
+                g.asinh(v_z / (self.offset * spin) / SMALL_SURGE),
                 g.log(self.spin_drag / (self.N * self.across * self.offset * self.offset)) + like,
             ]
         )
@@ -166,21 +166,21 @@ class _Query:
         """Numbers of the tails (K, M, 6) at the velocities u (K, M, 4)."""
         motion = self._motion(u)
         inputs = self.g.concat([self._tail_inputs(motion), self._head_inputs(0.0 * motion[4])], -1)
-        return self._networks(inputs, self.table.tails.wrench, len(tail.TYPICAL[0]))
+        return self._networks(inputs, self.table.tails.wrench, len(TYPICAL[0]))
 
     def _unbalanced(self, u: Any, numbers: Any) -> Any:
         """Forces and moments (K, M, 4) that are left at the velocities u (K, M, 4)."""
         g = self.g
         v_x, v_z, yaw, head_spin, spin = self._motion(u)
-        y = [g.gather(numbers, i) for i in range(len(tail.TYPICAL[0]))]
+        y = [g.gather(numbers, i) for i in range(len(TYPICAL[0]))]
         S, across = self.across * spin, self.N * self.across
-        sideways = g.sqrt(v_x * v_x + yaw * yaw + tail.TINY)
+        sideways = g.sqrt(v_x * v_x + yaw * yaw + TINY)
         squared = sideways / (self.offset * spin)
         squared = squared * squared
         couple = self.N * spin * self.offset * self.offset
         force = across * sideways
-        thrust = (self.across - self.along) * couple * tail.thrust_of(S)
-        torque = self.across * couple * tail.torque_of(S)
+        thrust = (self.across - self.along) * couple * linear_thrust(S)
+        torque = self.across * couple * linear_torque(S)
         lever = 0.5 * self.length
         on_head = self.drag * (v_x + lever * yaw) + self.side * head_spin
         return g.stack(
@@ -198,11 +198,11 @@ class _Query:
         across = self.N * self.across
         spin = balance._FIRST_SPIN * self.speed
         for _ in range(3):
-            torque = across * self.offset * self.offset * tail.torque_of(self.across * spin)
+            torque = across * self.offset * self.offset * linear_torque(self.across * spin)
             spin = self.speed * self.spin_drag / (self.spin_drag + torque)
         head_spin = spin - self.speed
         thrust = self.N * (self.across - self.along) * spin * self.offset * self.offset
-        v_z = thrust * tail.thrust_of(self.across * spin) / (self.drag + self.N * self.along)
+        v_z = thrust * linear_thrust(self.across * spin) / (self.drag + self.N * self.along)
         lever = 0.5 * self.length
         a, b, d = self.drag + across, self.drag * lever - 0.5 * across, self.drag * lever * lever + across / 3
         push = -(self.side * head_spin)

@@ -26,11 +26,11 @@ from sim.model.response import DWELLS, at_equal_dwells
 from sim.motion.net_speed import twists
 from surrogate.input_ranges import ROBOT
 from surrogate.networks.ensemble import Ensemble
-from surrogate.table import response_table as curves
-from surrogate.table.errors import COMPARED, relative_errors, scale_of
-from surrogate.table.lookup import RESPONSE_OUTPUTS, Lookup, between_dwells, steady_outputs
-from surrogate.table.wrench_table import TailTable
-from surrogate.training.simulated import drawn
+from surrogate.table.errors import COMPARED, error_scale, relative_errors
+from surrogate.table.lookup import RESPONSE_OUTPUTS, NeuralTable, steady_outputs
+from surrogate.table.response_table import SHAPES, between_dwells, curve_speeds, response_inputs
+from surrogate.table.wrench_table import WrenchTable
+from surrogate.training.simulated import draw_robots
 
 MOST_BYTES = 150_000
 NETWORKS = ("one_tail", "two_tails", "more_tails", "gap", "lag", "memory")
@@ -44,11 +44,11 @@ Arrays = dict[str, Any]  # by name, single or half precision
 
 
 @dataclass(frozen=True)
-class Small:
+class SmallCopy:
     """The small copy: its numbers, and the table that they make."""
 
     arrays: Arrays  # network.part, and curves.mean, curves.basis
-    table: Lookup  # with the same numbers in double precision; its curves are not used
+    table: NeuralTable  # with the same numbers in double precision; its curves are not used
 
     @property
     def has_response(self) -> bool:
@@ -70,11 +70,11 @@ class Small:
         found = self.table.motions(values, flag=True)
         result = steady_outputs(found, self.table.tails)
         if DWELL in columns and self.has_response:
-            inputs = curves.inputs_of(found.tails, found.motion)
+            inputs = response_inputs(found.tails, found.motion)
             parts = [_network(self.arrays, name)(inputs) for name in NETWORKS[4:]]
             mean, basis = (torch.tensor(self.arrays[f"curves.{name}"]).double() for name in ("mean", "basis"))
             flat = (mean + torch.cat(parts, -1) @ basis).reshape(-1, len(DWELLS), 3)
-            lag = (flat * curves.speeds_of(found.heads, found.motion)[:, None, :]).numpy()
+            lag = (flat * curve_speeds(found.heads, found.motion)[:, None, :]).numpy()
             lag = between_dwells(lag, columns[DWELL])
             twist = twists(result["v_z"], result["v_x"], result["omega_yr_bar"], found.heads.sense.numpy())
             speed = planar.net_speed(twist, lag, columns[DWELL])
@@ -83,7 +83,7 @@ class Small:
         return result
 
 
-def small_of(table: Lookup) -> Small:
+def make_small_copy(table: NeuralTable) -> SmallCopy:
     """The small copy of a table: the most exact one that fits into MOST_BYTES.
 
     Raises:
@@ -97,14 +97,14 @@ def small_of(table: Lookup) -> Small:
                 arrays |= _arrays(name, network.member(0), half=name not in exact, last_exact=name == "one_tail")
         if response:
             arrays |= _curve_arrays(table)
-        numbers = TailTable(
+        numbers = WrenchTable(
             tuple(
                 None if n is None else _network(arrays, k)
                 for k, n in zip(NETWORKS, table.tails.wrench, strict=False)
             ),
             _network(arrays, "gap"),
         )
-        small = Small(arrays, replace(table, tails=numbers))
+        small = SmallCopy(arrays, replace(table, tails=numbers))
         if small.bytes <= MOST_BYTES - _MANIFEST_BYTES:
             return small
     raise InputError(
@@ -112,7 +112,7 @@ def small_of(table: Lookup) -> Small:
     )
 
 
-def losses_of(table: Lookup, small: Small) -> dict[str, dict[str, float]]:
+def measure_losses(table: NeuralTable, small: SmallCopy) -> dict[str, dict[str, float]]:
     """Median and 95th percentile of the small copy's difference from the table, by output.
 
     Relative as in `surrogate.table.errors`, over random robots of the domain with two tails and more; for one tail
@@ -129,12 +129,12 @@ def losses_of(table: Lookup, small: Small) -> dict[str, dict[str, float]]:
     if small.has_response and (inside & several).any():
         rows = inside & several
         wanted = table.query({k: v[rows] for k, v in robots.items()}, flag=True)
-        apart = {n: (own[n][rows] - wanted[n]) / scale_of(n, wanted) for n in RESPONSE_OUTPUTS}
+        apart = {n: (own[n][rows] - wanted[n]) / error_scale(n, wanted) for n in RESPONSE_OUTPUTS}
         found |= {name: _figures(apart[name]) for name in RESPONSE_OUTPUTS}
     return {name: figures for name, figures in found.items() if figures}
 
 
-def vectors_of(table: Lookup, small: Small) -> dict[str, Floats]:
+def make_vectors(table: NeuralTable, small: SmallCopy) -> dict[str, Floats]:
     """Robots of the domain with both directions and every N, and the answers of the small copy; NaN: no answer."""
     robots = {
         name: np.array([float(f"{v:.5g}") for v in values]) for name, values in _robots(4 * _VECTORS, 21).items()
@@ -146,7 +146,9 @@ def vectors_of(table: Lookup, small: Small) -> dict[str, Floats]:
 
 def _robots(count: int, seed: int) -> dict[str, Floats]:
     """Random robots of the domain, every second one with a reversed motor, with dwells."""
-    robots = {name: np.array(values) for name, values in drawn(count, seed, wide=False).items() if name in ROBOT}
+    robots = {
+        name: np.array(values) for name, values in draw_robots(count, seed, wide=False).items() if name in ROBOT
+    }
     robots = {name: robots[name] for name in ROBOT}
     robots["omega_bar"][::2] *= -1
     return robots | {DWELL: 0.25 * 12 ** np.random.default_rng(seed).uniform(size=count)}
@@ -177,7 +179,7 @@ def _arrays(
     return found
 
 
-def _curve_arrays(table: Lookup) -> Arrays:
+def _curve_arrays(table: NeuralTable) -> Arrays:
     """Networks and curves of the response to flips with equal dwells."""
     lag, memory = table.curves.bases["lag"], table.curves.bases["memory"]
     count = min(len(lag.vectors), len(memory.vectors), _MOST_COMPONENTS)
@@ -194,11 +196,11 @@ def _curve_arrays(table: Lookup) -> Arrays:
 
 def _at_equal_dwells(flat: Tensor) -> Tensor:
     """Memories (C, K D 3) where the dwell before is as long as the dwell, (C, D 3)."""
-    whole = flat.reshape(-1, *curves.SHAPES["memory"]).numpy()
+    whole = flat.reshape(-1, *SHAPES["memory"]).numpy()
     return torch.tensor(at_equal_dwells(whole)).reshape(len(flat), -1)
 
 
-def depth_of(arrays: Arrays, name: str) -> int:
+def network_depth(arrays: Arrays, name: str) -> int:
     return sum(part.startswith(f"{name}.weights.") for part in arrays) - 1
 
 
@@ -206,7 +208,7 @@ def _network(arrays: Arrays, name: str) -> Ensemble:
     """The network of a name, in double precision."""
     inputs, outputs = arrays[f"{name}.bypass"].shape
     width = arrays[f"{name}.weights.0"].shape[1]
-    network = Ensemble(inputs, outputs, width=width, depth=depth_of(arrays, name), members=1, seed=0)
+    network = Ensemble(inputs, outputs, width=width, depth=network_depth(arrays, name), members=1, seed=0)
     own = {part.removeprefix(f"{name}."): torch.tensor(array).double() for part, array in arrays.items()
            if part.startswith(f"{name}.")}  # fmt: skip
     network.load_state_dict({part: value if part in EXACT else value[None] for part, value in own.items()})

@@ -23,9 +23,17 @@ from sim.model.groups import DWELL
 from sim.model.response import DWELLS
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.export.onnx_query import UNITS
-from surrogate.export.small_copy import EXACT, NETWORKS, Small, depth_of, losses_of, small_of, vectors_of
+from surrogate.export.small_copy import (
+    EXACT,
+    NETWORKS,
+    SmallCopy,
+    make_small_copy,
+    make_vectors,
+    measure_losses,
+    network_depth,
+)
 from surrogate.input_ranges import ROBOT
-from surrogate.table.lookup import RESPONSE_OUTPUTS, Lookup
+from surrogate.table.lookup import RESPONSE_OUTPUTS, NeuralTable
 
 READERS = Path(__file__).parents[1] / "readers"
 FORMAT = 1
@@ -35,15 +43,15 @@ _UNITS = {
 }  # fmt: skip
 
 
-def save_small(table: Lookup, folder: str | Path) -> str:
+def save_small_copy(table: NeuralTable, folder: str | Path) -> str:
     """Write the folder of the small copy; gives the losses in words.
 
     Raises:
         InputError: no copy fits into MOST_BYTES.
     """
-    small = small_of(table)
-    losses = losses_of(table, small)
-    vectors = vectors_of(table, small)
+    small = make_small_copy(table)
+    losses = measure_losses(table, small)
+    vectors = make_vectors(table, small)
     folder = Path(folder)
     with whole_file(folder / "lookup.safetensors") as part:
         manifest = json.dumps(_manifest(table, small, losses))
@@ -62,19 +70,19 @@ def save_small(table: Lookup, folder: str | Path) -> str:
     return "\n".join([f"{len(data) / 1000:.1f} kB; loss against the whole table: median, 95 %", *rows])
 
 
-def weights_header(table: Lookup, small: Small, losses: Mapping[str, Mapping[str, float]]) -> str:
+def weights_header(table: NeuralTable, small: SmallCopy, losses: Mapping[str, Mapping[str, float]]) -> str:
     """lookup_weights.h: the numbers as arrays of C."""
     arrays, lines, networks = small.arrays, [], []
     for name, array in arrays.items():
         kind = "float" if array.dtype == np.float32 else "uint16_t"
         lines.append(f"static const {kind} lookup_{name.replace('.', '_')}[{array.size}] = {{{_listed(array)}}};")
     present = [name for name in NETWORKS if f"{name}.bypass" in arrays]
-    depth = max(depth_of(arrays, name) for name in present)
+    depth = max(network_depth(arrays, name) for name in present)
     for name in NETWORKS[: 6 if small.has_response else 4]:
         if name not in present:
             networks.append("{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, {0}, {0}, 0}")
             continue
-        own, prefix = depth_of(arrays, name), f"lookup_{name}_"
+        own, prefix = network_depth(arrays, name), f"lookup_{name}_"
         inputs, outputs = arrays[f"{name}.bypass"].shape
         width = arrays[f"{name}.weights.0"].shape[1]
         half, half_last = (int(arrays[f"{name}.weights.{k}"].dtype == np.float16) for k in (0, own))
@@ -130,7 +138,7 @@ static const lookup_network lookup_networks[{len(networks)}] = {{
 """
 
 
-def _manifest(table: Lookup, small: Small, losses: Mapping[str, Any]) -> dict[str, Any]:
+def _manifest(table: NeuralTable, small: SmallCopy, losses: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "table": table.identity,

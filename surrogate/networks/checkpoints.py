@@ -51,14 +51,14 @@ def device_named(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Work:
+class TrainingContext:
     """How networks are trained."""
 
     title: str = ""  # of the progress bars; empty for none
     device: str = "cpu"
     folder: Path | None = None  # of the states; None: none are kept
 
-    def part(self, name: str) -> Work:
+    def part(self, name: str) -> TrainingContext:
         """The same for one part of the work, named in the title."""
         return replace(self, title=f"{self.title}: {name}" if self.title else "")
 

@@ -23,7 +23,7 @@ from torch.nn.utils import parameters_to_vector, vector_to_parameters
 from tqdm import tqdm
 
 from surrogate.networks.bfgs import Minimiser
-from surrogate.networks.checkpoints import Checkpoint, State, Work
+from surrogate.networks.checkpoints import Checkpoint, State, TrainingContext
 from surrogate.networks.ensemble import Ensemble
 
 Bar = Any  # tqdm is generic for type checkers only
@@ -82,7 +82,7 @@ def fit(
     data: Sequence[Tensor],
     residual: Residual,
     settings: Settings,
-    work: Work,
+    work: TrainingContext,
     *,
     weights: Tensor | None = None,
     unit: str = "%",

@@ -31,7 +31,7 @@ _CURVES = {"lag": (2, len(DWELLS), 3), "memory": (2, -1, len(DWELLS), 3),
 
 
 @dataclass(frozen=True)
-class SingleRobot:
+class RobotTable:
     """Motion and response of one robot, with the interface of `surrogate.interface.LookupTable`.
 
     Curves are those of `sim.model.response`; index 0 is the positive direction of the motor, index 1 the reversed
@@ -97,13 +97,13 @@ class SingleRobot:
         return np.where(np.asarray(omega) < 0, 1, 0)
 
 
-def save_single(table: SingleRobot, path: str | Path) -> None:
+def save_robot_table(table: RobotTable, path: str | Path) -> None:
     """Write a table of one robot as JSON, with a hash over everything in it."""
     content = asdict(table)
     write_text(path, json.dumps({"format": FORMAT, "hash": _digest(content), **content}) + "\n")
 
 
-def load_single(path: str | Path) -> SingleRobot:
+def load_robot_table(path: str | Path) -> RobotTable:
     """Read a table of one robot.
 
     Raises:
@@ -123,16 +123,16 @@ def load_single(path: str | Path) -> SingleRobot:
         raise InputError(f"{path} has format {str(version)[:20]}, this version reads {FORMAT}; {remedy}")
     if content.pop("hash", "") != _digest(content):
         raise InputError(f"{path} was changed after it was written; {remedy}")
-    lacking = [field.name for field in fields(SingleRobot) if field.name not in content]
-    if lacking or len(content) != len(fields(SingleRobot)):
+    lacking = [field.name for field in fields(RobotTable) if field.name not in content]
+    if lacking or len(content) != len(fields(RobotTable)):
         raise InputError(f"{path} is no complete table of a robot{_listed(lacking)}; {remedy}")
     try:
-        wrong = _wrong(SingleRobot(**content))
+        wrong = _wrong(RobotTable(**content))
     except (KeyError, TypeError, ValueError, AttributeError):
         wrong = "its numbers have no such form"
     if wrong:
         raise InputError(f"{path} is no table of a robot: {wrong}; {remedy}")
-    return SingleRobot(**content)
+    return RobotTable(**content)
 
 
 def _digest(content: Mapping[str, Any]) -> str:
@@ -143,7 +143,7 @@ def _listed(lacking: list[str]) -> str:
     return f": it has no {lacking[0]!r}" if lacking else ""
 
 
-def _wrong(table: SingleRobot) -> str:
+def _wrong(table: RobotTable) -> str:
     """What is wrong with the numbers of a table; empty if nothing is."""
     for name, shape in _CURVES.items():
         curves = np.array(getattr(table, name), dtype=float)

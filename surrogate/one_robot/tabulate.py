@@ -25,14 +25,14 @@ from sim.motion.replay import replay
 from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.motion.steady_motion import STEADY_OUTPUTS
-from surrogate.one_robot.robot_table import SingleRobot
+from surrogate.one_robot.robot_table import RobotTable
 
 _STEP = 0.02  # in the logarithm of a group and in units of an effect's typical size, for derivatives
 _CHECKED = 24  # dwells of the random schedule
 _RANGE = (0.35, 1.8)  # of their lengths
 
 
-def tabulate(robot: Robot) -> SingleRobot:
+def tabulate(robot: Robot) -> RobotTable:
     """Simulate one robot's steady motion and its response to flips, in both directions of the motor.
 
     Args:
@@ -59,7 +59,7 @@ def tabulate(robot: Robot) -> SingleRobot:
     if found.failed.any():
         raise InputError(f"{robot.name}: a simulated flip broke down; a slower motor may help")
     columns = motion.columns()
-    table = SingleRobot(
+    table = RobotTable(
         robot=values,
         steady={name: np.asarray(columns[name], dtype=float).tolist() for name in STEADY_OUTPUTS},
         lag=found.lag.tolist(),
@@ -107,7 +107,7 @@ def _ends(name: str, value: float) -> tuple[tuple[float, float], tuple[float, fl
     return (high, high), (low, low)
 
 
-def _missed(table: SingleRobot) -> Floats:
+def _missed(table: RobotTable) -> Floats:
     """Differences (M, 3) of lags between a replay in time steps and the table, seen as for a positive motor."""
     dwells = np.exp(np.random.default_rng(0).uniform(math.log(_RANGE[0]), math.log(_RANGE[1]), _CHECKED))
     track = replay([Schedule(table.robot, 1, dwells, (0.0, 0.0, 0.0), 1.0)])[0]

@@ -11,17 +11,15 @@ and wider intervals. `coverage` is the share of rows inside their interval.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from sim.arrays import Flags, Floats
 from sim.model.response import LAGS
 
-if TYPE_CHECKING:
-    from surrogate.table.lookup import Lookup
-
 Columns = Mapping[str, Any]
+Errors = Mapping[str, Mapping[str, float]]  # output -> figures of `summary`
 
 RELATIVE = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "R_yr_over_l", "tail_gap")
 COMPARED = (*RELATIVE, "v_z", "theta_deg")
@@ -30,7 +28,7 @@ _UNITS = {"theta_deg": "deg", "lag_psi_rad": "of turn/unit", "v_z": "of speed", 
           "lag_z": "of speed", "net_speed_bar": "of v_z"}  # fmt: skip
 
 
-def scale_of(name: str, truth: Columns) -> Floats | float:
+def error_scale(name: str, truth: Columns) -> Floats | float:
     """The number by which the error of an output is divided."""
     if name in RELATIVE:
         return np.abs(truth[name])
@@ -46,7 +44,7 @@ def scale_of(name: str, truth: Columns) -> Floats | float:
 def relative_errors(answer: Columns, truth: Columns) -> dict[str, Floats]:
     """Errors of every steady output over its scale, (M,)."""
     with np.errstate(invalid="ignore"):  # one tail has no gap
-        return {name: (answer[name] - truth[name]) / scale_of(name, truth) for name in COMPARED}
+        return {name: (answer[name] - truth[name]) / error_scale(name, truth) for name in COMPARED}
 
 
 def curve_errors(response: Any, truth: Columns) -> dict[str, Floats]:
@@ -58,8 +56,8 @@ def curve_errors(response: Any, truth: Columns) -> dict[str, Floats]:
     """
     found = {}
     for i, name in enumerate(LAGS):
-        found[name] = (response.lag - truth["lag"])[..., i] / np.asarray(scale_of(name, truth))[:, None]
-    speed = np.asarray(scale_of("net_speed_bar", truth))[:, None]
+        found[name] = (response.lag - truth["lag"])[..., i] / np.asarray(error_scale(name, truth))[:, None]
+    speed = np.asarray(error_scale("net_speed_bar", truth))[:, None]
     return found | {"net_speed_bar": (response.net_speed - truth["net_speed"]) / speed}
 
 
@@ -95,11 +93,11 @@ def coverage(answer: Columns, truth: Columns) -> dict[str, float]:
     return found
 
 
-def shortcomings(lookup: Lookup) -> list[str]:
+def shortcomings(errors: Errors) -> list[str]:
     """What is poor about a table, in words; nothing where it is good enough to plan with."""
     found = []
     for name, words in (("omega_yr_bar", "the yaw rate"), ("net_speed_bar", "the net speed")):
-        error = lookup.errors.get(name)
+        error = errors.get(name)
         if error and error["p95"] > _POOR:
             found.append(
                 f"{words} is off by {100 * error['p95']:.0f} % at 95 % of the held-out rows; learn more rows, or "
@@ -108,10 +106,10 @@ def shortcomings(lookup: Lookup) -> list[str]:
     return found
 
 
-def error_table(lookup: Lookup) -> str:
+def error_table(errors: Errors) -> str:
     """The held-out errors as text."""
     lines = [f"{'output':16}{'rms':>9}{'median':>9}{'95 %':>9}{'largest':>9}{'95 %, all':>11}"]
-    for name, error in lookup.errors.items():
+    for name, error in errors.items():
         percent = 1 if name == "theta_deg" else 100
         figures = "".join(f"{percent * error[k]:9.4f}" for k in ("rms", "median", "p95"))
         figures += f"{percent * error['largest']:9.2f}{percent * error['p95_with_touching']:11.4f}"

@@ -17,8 +17,8 @@ from scipy.stats import qmc
 
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
-from surrogate.table.errors import scale_of
-from surrogate.table.lookup import OUTSIDE, Lookup
+from surrogate.table.errors import error_scale
+from surrogate.table.lookup import OUTSIDE, NeuralTable
 
 Bounds = Mapping[str, tuple[float, float]]
 
@@ -39,7 +39,7 @@ class Solutions:
 
 
 def inverse(
-    lookup: Lookup, robots: Mapping[str, Floats], targets: Mapping[str, Floats], bounds: Bounds
+    lookup: NeuralTable, robots: Mapping[str, Floats], targets: Mapping[str, Floats], bounds: Bounds
 ) -> Solutions:
     """Inputs that give wanted outputs.
 
@@ -89,7 +89,7 @@ def _sizes(targets: Mapping[str, Floats]) -> dict[str, Floats]:
     sizes = {}
     for name, value in targets.items():
         try:
-            sizes[name] = np.broadcast_to(scale_of(name, targets), value.shape)
+            sizes[name] = np.broadcast_to(error_scale(name, targets), value.shape)
         except KeyError:
             sizes[name] = np.abs(value)
     return sizes
@@ -134,7 +134,7 @@ def _different(row: Integers, p: Floats, misfit: Floats, outside: Floats, names:
 
 
 def design(
-    lookup: Lookup, robot: Mapping[str, float], bounds: Bounds, *, best: str, limits: Bounds
+    lookup: NeuralTable, robot: Mapping[str, float], bounds: Bounds, *, best: str, limits: Bounds
 ) -> dict[str, float]:
     """The allowed robot with the highest output.
 

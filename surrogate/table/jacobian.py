@@ -15,12 +15,12 @@ from torch import Tensor
 from sim.arrays import Floats
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.networks.ensemble import Ensemble
-from surrogate.table.wrench_table import TailTable, class_of
-from surrogate.wrench import heads as head
+from surrogate.table.wrench_table import WrenchTable, network_index
+from surrogate.wrench.heads import as_tensor, full_motion, heads_and_tails, unbalanced, value_and_slope
 
 
 def slopes(
-    table: TailTable, values: Mapping[str, Floats], motion: Tensor, parameters: Sequence[str]
+    table: WrenchTable, values: Mapping[str, Floats], motion: Tensor, parameters: Sequence[str]
 ) -> dict[str, dict[str, Floats]]:
     """∂(output)/∂(parameter), each (M,), of robots that the table solved.
 
@@ -31,8 +31,8 @@ def slopes(
         parameters: names of columns.
     """
     found = {name: {p: np.full(len(motion), np.nan) for p in parameters} for name in STEADY_OUTPUTS}
-    columns = {name: head.as_tensor(array) for name, array in values.items()}
-    kind = class_of(columns["N"])
+    columns = {name: as_tensor(array) for name, array in values.items()}
+    kind = network_index(columns["N"])
     for k, network in enumerate(table.wrench):
         rows = torch.nonzero(kind == k)[:, 0]
         if len(rows) and network is not None:
@@ -44,17 +44,17 @@ def slopes(
 
 
 def _changes(
-    table: TailTable, network: Ensemble, columns: dict[str, Tensor], u: Tensor, parameters: Sequence[str]
+    table: WrenchTable, network: Ensemble, columns: dict[str, Tensor], u: Tensor, parameters: Sequence[str]
 ) -> dict[str, tuple[Tensor, ...]]:
     """Derivatives of STEADY_OUTPUTS by parameter, of robots with one network and the solution u (M, 4)."""
-    heads, tails = head.robots_of(columns, keep=parameters)
-    _, slope = head.value_and_slope(lambda v: head.unbalanced(heads, tails, v, network), u)
+    heads, tails = heads_and_tails(columns, keep=parameters)
+    _, slope = value_and_slope(lambda v: unbalanced(heads, tails, v, network), u)
     inverse = torch.linalg.inv_ex(slope)[0]
 
     def outputs(moved: dict[str, Tensor]) -> tuple[Tensor, ...]:
-        heads, tails = head.robots_of(moved, keep=parameters)
-        left = head.unbalanced(heads, tails, u, network)
-        motion = head.full_motion(heads, u - (inverse @ left[..., None])[..., 0])
+        heads, tails = heads_and_tails(moved, keep=parameters)
+        left = unbalanced(heads, tails, u, network)
+        motion = full_motion(heads, u - (inverse @ left[..., None])[..., 0])
         return table.outputs(heads, motion, table.tail_gap(tails, motion))
 
     found = {}

@@ -29,15 +29,17 @@ from sim.model.groups import DWELL
 from sim.model.response import DWELLS, LAGS, Responses, at_equal_dwells
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.networks.ensemble import Ensemble
+from surrogate.table.errors import error_scale
 from surrogate.table.intervals import Intervals
-from surrogate.table.response_table import CurveTable
+from surrogate.table.jacobian import slopes
+from surrogate.table.response_table import ResponseTable, between_dwells
 from surrogate.table.support import Support
-from surrogate.table.wrench_table import TailTable, class_of, sensitivity_of
-from surrogate.wrench import heads as head
-from surrogate.wrench import tails as tail
+from surrogate.table.tensor_file import digest
+from surrogate.table.wrench_table import WrenchTable, motion_sensitivity, network_index
 from surrogate.wrench.balance import inputs_rows
-from surrogate.wrench.heads import Heads
-from surrogate.wrench.tails import Tails
+from surrogate.wrench.heads import Heads, heads_and_tails, needs_no_learning
+from surrogate.wrench.tails import Tails, pack_tails, wrench_slopes
 
 RESPONSE_OUTPUTS = ("net_speed_bar", *LAGS[::-1])
 OUTSIDE = "outside"  # flag of robots that the table does not know
@@ -59,16 +61,16 @@ class Motions(NamedTuple):
     heads: Heads
     tails: Tails
     motion: Tensor  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor
-    inputs: Floats  # (M, 7) of the networks, see `surrogate.wrench.tails.inputs_of`
+    inputs: Floats  # (M, 7) of the networks, see `surrogate.wrench.tails.tail_inputs`
     reason: list[str]  # why a robot is outside; else empty
 
 
 @dataclass(frozen=True)
-class Lookup:
+class NeuralTable:
     """A trained table with its domain, its intervals and its held-out errors."""
 
-    tails: TailTable
-    curves: CurveTable
+    tails: WrenchTable
+    curves: ResponseTable
     support: tuple[Support | None, ...]  # for each of the classes of `surrogate.table.wrench_table`
     intervals: Intervals | None
     ranges: dict[str, tuple[float, float]]  # of the robots that were learned, by input
@@ -81,16 +83,13 @@ class Lookup:
 
         What is refused is decided by the joint support, not by these ranges.
         """
-        effects = {name: effect.bounds for name, effect in catalogue().items() if head.is_of_head(name)}
+        effects = {name: effect.bounds for name, effect in catalogue().items() if needs_no_learning(name)}
         return {**self.ranges, **effects}
 
     @property
     def identity(self) -> str:
         """Hash of all numbers."""
-        from surrogate.table.model_file import content_of
-        from surrogate.table.tensor_file import digest
-
-        return digest(content_of(self))[:16]
+        return digest(table_content(self))[:16]
 
     def query(
         self, columns: Mapping[str, Floats], *, intervals: bool = False, flag: bool = False, certify: bool = False
@@ -151,18 +150,16 @@ class Lookup:
         Raises:
             InputError: a robot that cannot be, or one outside the domain.
         """
-        from surrogate.table.jacobian import slopes
-
         values = check_columns({**columns, **{n: columns.get(n, 0.0 * columns["N"]) for n in parameters}})
         return slopes(self.tails, values, self.motions(values, flag=flag).motion, parameters)
 
     def motions(self, values: Mapping[str, Floats], *, flag: bool = False) -> Motions:
         """Motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
-        heads, tails = head.robots_of(values)
+        heads, tails = heads_and_tails(values)
         motion, converged = self.tails.solve(heads, tails)
-        inputs = inputs_rows(tail.columns_of(tails), motion)
+        inputs = inputs_rows(pack_tails(tails), motion)
         known = converged & self._within_ranges(values)
-        reasons = self._reasons(class_of(tails.number).numpy(), motion, inputs, known)
+        reasons = self._reasons(network_index(tails.number).numpy(), motion, inputs, known)
         if any(reasons) and not flag:
             row, reason = next((row, reason) for row, reason in enumerate(reasons) if reason)
             raise InputError(self._refusal(values, row, reason))
@@ -173,8 +170,8 @@ class Lookup:
         heads, tails, motion = found.heads, found.tails, found.motion
         inputs = torch.from_numpy(found.inputs)
         remote, spread = torch.zeros(len(motion)).double(), torch.zeros(len(motion)).double()
-        weight = sensitivity_of(heads, tails, motion) @ tail.units_of(tails, motion)
-        kind = class_of(tails.number)
+        weight = motion_sensitivity(heads, tails, motion) @ wrench_slopes(tails, motion)
+        kind = network_index(tails.number)
         for k, network in enumerate(self.tails.wrench):
             rows = torch.nonzero(kind == k)[:, 0]
             support = self.support[k]
@@ -192,13 +189,11 @@ class Lookup:
         return torch.nan_to_num(torch.cat([inputs, torch.stack(extra, -1)], -1))
 
     def _intervals(self, found: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
-        from surrogate.table.errors import scale_of
-
         if self.intervals is None:
             raise InputError("this look-up table has no intervals; train it again")
         hints, added = self.hints(found), {}
         for name in [name for name in result if name in self.intervals.factor]:
-            size = torch.tensor(np.broadcast_to(scale_of(name, result), result[name].shape))
+            size = torch.tensor(np.broadcast_to(error_scale(name, result), result[name].shape))
             half = self.intervals.half_widths(name, hints, size).numpy()
             half = np.where(np.isfinite(result[name]), half, 0.0)
             added[f"{name}_low"], added[f"{name}_high"] = result[name] - half, result[name] + half
@@ -259,7 +254,7 @@ def _check_flips(values: Mapping[str, Floats]) -> None:
         )
 
 
-def steady_outputs(found: Motions, tails: TailTable) -> dict[str, Floats]:
+def steady_outputs(found: Motions, tails: WrenchTable) -> dict[str, Floats]:
     """STEADY_OUTPUTS of motions."""
     values = tails.outputs(found.heads, found.motion, tails.quick_gap(found.tails, found.inputs))
     return {name: np.asarray(value.numpy()) for name, value in zip(STEADY_OUTPUTS, values, strict=True)}
@@ -286,16 +281,29 @@ def _at_dwells(
     return dict(zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True))
 
 
-def between_dwells(curves: Floats, dwells: Floats) -> Floats:
-    """Curves (M, D, 3) at one dwell for each row (M,): cubic in ln T̄ through four neighbours, then constant."""
-    knots = np.log(DWELLS)
-    place = np.log(np.minimum(dwells, DWELLS[-1]))
-    first = np.clip(np.searchsorted(knots, place) - 2, 0, len(knots) - 4)
-    rows, total = np.arange(len(dwells)), np.zeros((len(dwells), 3))
-    for i in range(4):
-        weight = np.ones(len(dwells))
-        for j in range(4):
-            if j != i:
-                weight *= (place - knots[first + j]) / (knots[first + i] - knots[first + j])
-        total += weight[:, None] * curves[rows, first + i]
-    return total
+def table_content(lookup: NeuralTable) -> dict[str, Any]:
+    """A table as nested dictionaries and lists of tensors and plain values."""
+    intervals = lookup.intervals
+    return {
+        "wrench": [None if network is None else _stored(network) for network in lookup.tails.wrench],
+        "gap": _stored(lookup.tails.gap),
+        "curves": [_stored(network) for network in lookup.curves.networks],
+        "bases": {name: {"mean": b.mean, "vectors": b.vectors} for name, b in lookup.curves.bases.items()},
+        "support": [None if support is None else vars(support) for support in lookup.support],
+        "intervals": None if intervals is None else {k: _plain(v) for k, v in vars(intervals).items()},
+        "ranges": {name: list(ends) for name, ends in lookup.ranges.items()},
+        "errors": lookup.errors,
+        "provenance": lookup.provenance,
+    }
+
+
+def _stored(network: Ensemble) -> dict[str, Any]:
+    state = {name: part.detach() for name, part in network.state_dict().items()}
+    return {"shape": network.shape, "state": state}
+
+
+def _plain(value: Any) -> Any:
+    """Mappings as dictionaries, and pairs as lists."""
+    if isinstance(value, Tensor):
+        return value
+    return {name: list(part) if isinstance(part, tuple) else part for name, part in dict(value).items()}

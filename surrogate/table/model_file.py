@@ -12,46 +12,29 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor
 
 from sim.io.errors import InputError
 from surrogate.input_ranges import ROBOT
 from surrogate.interface import LookupTable
 from surrogate.networks.ensemble import Ensemble
-from surrogate.one_robot.robot_table import load_single
+from surrogate.one_robot.robot_table import load_robot_table
 from surrogate.table import tensor_file
 from surrogate.table.intervals import Intervals
-from surrogate.table.lookup import Lookup
-from surrogate.table.response_table import PARTS, SHAPES, Basis, CurveTable
+from surrogate.table.lookup import NeuralTable, table_content
+from surrogate.table.response_table import PARTS, SHAPES, Basis, ResponseTable
 from surrogate.table.support import Support
-from surrogate.table.wrench_table import CLASSES, TailTable
+from surrogate.table.wrench_table import CLASSES, WrenchTable
 
 SHIPPED = Path(__file__).parents[1] / "shipped" / "model.safetensors"
 FORMAT = 5
 
 
-def content_of(lookup: Lookup) -> dict[str, Any]:
-    """A table as nested dictionaries and lists of tensors and plain values."""
-    intervals = lookup.intervals
-    return {
-        "wrench": [None if network is None else _stored(network) for network in lookup.tails.wrench],
-        "gap": _stored(lookup.tails.gap),
-        "curves": [_stored(network) for network in lookup.curves.networks],
-        "bases": {name: {"mean": b.mean, "vectors": b.vectors} for name, b in lookup.curves.bases.items()},
-        "support": [None if support is None else vars(support) for support in lookup.support],
-        "intervals": None if intervals is None else {k: _plain(v) for k, v in vars(intervals).items()},
-        "ranges": {name: list(ends) for name, ends in lookup.ranges.items()},
-        "errors": lookup.errors,
-        "provenance": lookup.provenance,
-    }
-
-
-def save(lookup: Lookup, path: str | Path) -> None:
+def save(lookup: NeuralTable, path: str | Path) -> None:
     """Write a model file completely or not at all."""
-    tensor_file.write(path, content_of(lookup), FORMAT)
+    tensor_file.write(path, table_content(lookup), FORMAT)
 
 
-def load(path: str | Path | None = None) -> Lookup:
+def load(path: str | Path | None = None) -> NeuralTable:
     """Read a model file; by default the one that comes with the package.
 
     Raises:
@@ -90,17 +73,17 @@ def load_table(path: str | Path | None = None) -> LookupTable:
         >>> load_table().query(groups)["omega_yr_bar"].round(3).tolist()
         [0.049]
     """
-    return load_single(path) if path is not None and Path(path).suffix == ".json" else load(path)
+    return load_robot_table(path) if path is not None and Path(path).suffix == ".json" else load(path)
 
 
-def _lookup(content: dict[str, Any]) -> Lookup:
+def _lookup(content: dict[str, Any]) -> NeuralTable:
     _check(content)
     intervals = content["intervals"]
-    return Lookup(
-        tails=TailTable(
+    return NeuralTable(
+        tails=WrenchTable(
             tuple(None if part is None else _network(part) for part in content["wrench"]), _network(content["gap"])
         ),
-        curves=CurveTable(
+        curves=ResponseTable(
             tuple(_network(part) for part in content["curves"]),
             {name: Basis(**part) for name, part in content["bases"].items()},
         ),
@@ -145,11 +128,6 @@ def _all_finite(part: Any) -> bool:
     return part is None or bool(torch.isfinite(torch.as_tensor(part)).all())
 
 
-def _stored(network: Ensemble) -> dict[str, Any]:
-    state = {name: part.detach() for name, part in network.state_dict().items()}
-    return {"shape": network.shape, "state": state}
-
-
 def _network(stored: Mapping[str, Any]) -> Ensemble:
     shape, state = stored["shape"], stored["state"]
     sizes = state["bypass"].shape + state["weights.0"].shape[2:]
@@ -162,10 +140,3 @@ def _network(stored: Mapping[str, Any]) -> Ensemble:
     for parameter in network.parameters():
         parameter.requires_grad_(False)
     return network
-
-
-def _plain(value: Any) -> Any:
-    """Mappings as dictionaries, and pairs as lists."""
-    if isinstance(value, Tensor):
-        return value
-    return {name: list(part) if isinstance(part, tuple) else part for name, part in dict(value).items()}

@@ -15,8 +15,8 @@ from sim.arrays import Flags, Floats
 from surrogate.input_ranges import ROBOT
 from surrogate.table.errors import COMPARED, relative_errors
 from surrogate.table.intervals import COVERAGE
-from surrogate.table.lookup import Lookup
-from surrogate.training.simulated import Simulated
+from surrogate.table.lookup import NeuralTable
+from surrogate.training.simulated import SimulatedRobots
 from surrogate.training.train import with_radius
 
 _WORST = 10
@@ -43,7 +43,7 @@ the shipped table the picture is in docs/figures.md, under "Error against rows".
 """
 
 
-def card_of(lookup: Lookup, held_out: Simulated) -> str:
+def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
     """The card of a table, from robots that it did not learn."""
     answer = lookup.query(held_out.robots, intervals=True, flag=True)
     truth = with_radius(held_out.motion)
@@ -88,7 +88,7 @@ def card_of(lookup: Lookup, held_out: Simulated) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _what(lookup: Lookup) -> str:
+def _what(lookup: NeuralTable) -> str:
     rows, made = lookup.provenance["rows"], lookup.provenance
     words = f"{rows['train']} robots learned for the steady motion, {rows['flips']} for the response to a flip."
     libraries = ", ".join(f"{name} {version}" for name, version in made.get("libraries", {}).items())
@@ -130,7 +130,7 @@ def _regions(robots: dict[str, Floats]) -> list[tuple[str, Flags]]:
     ]
 
 
-def _worst(rows: Simulated, answer: dict[str, Any], error: Floats, known: Flags) -> str:
+def _worst(rows: SimulatedRobots, answer: dict[str, Any], error: Floats, known: Flags) -> str:
     """The robots with the largest errors of the yaw rate, N > 1, and why."""
     size = np.where(known & (rows.robots["N"] > 1), error, -1.0)
     order = np.argsort(-size)[:_WORST]

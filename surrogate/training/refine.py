@@ -28,8 +28,8 @@ from dataset.storage.storage import place
 from dataset.workers.tasks import Simulate
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
-from surrogate.table.errors import scale_of
-from surrogate.table.lookup import Lookup
+from surrogate.table.errors import error_scale
+from surrogate.table.lookup import NeuralTable
 from surrogate.training.train import split
 
 CANDIDATES = 16  # points that are looked at for each one that is chosen
@@ -39,7 +39,7 @@ _JUDGED = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z")
 
 def refine(
     folder: str | Path,
-    table: Lookup,
+    table: NeuralTable,
     out: str | Path,
     rows: int,
     *,
@@ -81,7 +81,13 @@ def refine(
 
 
 def choose(
-    table: Lookup, design: Design, count: int, start: int, without: Sequence[int] = (), *, power: float = POWER
+    table: NeuralTable,
+    design: Design,
+    count: int,
+    start: int,
+    without: Sequence[int] = (),
+    *,
+    power: float = POWER,
 ) -> tuple[int, ...]:
     """Indices of `count` points of the sequence, from `start` on, that are worth simulating.
 
@@ -107,11 +113,11 @@ def _candidates(count: int, start: int) -> Integers:
     return found
 
 
-def doubt(table: Lookup, robots: dict[str, Floats]) -> Floats:
+def doubt(table: NeuralTable, robots: dict[str, Floats]) -> Floats:
     """How unsure the table is of robots, (M,), as a relative error; where it has no answer, as at its worst."""
     found = table.query(robots, intervals=True, flag=True)
     with np.errstate(invalid="ignore"):
-        parts = [(found[f"{n}_high"] - found[f"{n}_low"]) / (2 * np.abs(scale_of(n, found))) for n in _JUDGED]
+        parts = [(found[f"{n}_high"] - found[f"{n}_low"]) / (2 * np.abs(error_scale(n, found))) for n in _JUDGED]
         size = np.sqrt(np.mean(np.square(parts), axis=0))
     known = np.isfinite(size)
     if not known.any():

@@ -33,7 +33,7 @@ _BATCH, _CURVE_BATCH = 64, 8
 
 
 @dataclass(frozen=True)
-class Simulated:
+class SimulatedRobots:
     """M robots with their motion, and with their response curves if they were simulated."""
 
     robots: dict[str, Floats]  # groups and effects, each (M,)
@@ -43,19 +43,19 @@ class Simulated:
     def __len__(self) -> int:
         return len(self.robots["N"])
 
-    def at(self, rows: Flags | Integers) -> Simulated:
+    def at(self, rows: Flags | Integers) -> SimulatedRobots:
         """The robots at indices or flags."""
         parts = [{name: array[rows] for name, array in part.items()} for part in vars(self).values()]
-        return Simulated(*parts)
+        return SimulatedRobots(*parts)
 
-    def with_curves(self) -> Simulated:
+    def with_curves(self) -> SimulatedRobots:
         """The robots whose response was simulated."""
         if not self.curves:
             return self.at(np.zeros(len(self), dtype=bool))
         return self.at(np.flatnonzero(np.isfinite(self.curves["lag"]).all((1, 2))))
 
 
-def read_rows(folder: str) -> tuple[Simulated, Integers]:
+def read_robots(folder: str) -> tuple[SimulatedRobots, Integers]:
     """Usable rows of a data set's folder, and their numbers.
 
     Raises:
@@ -67,10 +67,10 @@ def read_rows(folder: str) -> tuple[Simulated, Integers]:
     table = table.loc[usable(plain).index]
     robots = {name: table[name].to_numpy(dtype=float) for name in (*ROBOT, *effects)}
     motion = {name: table[name].to_numpy(dtype=float) for name in MOTION}
-    return Simulated(robots, motion, _curves_in(table)), table["row"].to_numpy(dtype=np.int64)
+    return SimulatedRobots(robots, motion, _curves_in(table)), table["row"].to_numpy(dtype=np.int64)
 
 
-def joined(parts: Sequence[Simulated]) -> Simulated:
+def join_robots(parts: Sequence[SimulatedRobots]) -> SimulatedRobots:
     """The robots of all parts; effects that some do not have are at their null there."""
     effects = {name for part in parts for name in part.robots if name in catalogue()}
     full = [
@@ -79,7 +79,9 @@ def joined(parts: Sequence[Simulated]) -> Simulated:
     ]
     curves = [part.curves for part in parts] if all(part.curves for part in parts) else [{} for _ in parts]
     together = (full, [part.motion for part in parts], curves)
-    return Simulated(*({name: np.concatenate([p[name] for p in kind]) for name in kind[0]} for kind in together))
+    return SimulatedRobots(
+        *({name: np.concatenate([p[name] for p in kind]) for name in kind[0]} for kind in together)
+    )
 
 
 def _curves_in(table: pd.DataFrame) -> dict[str, Floats]:
@@ -100,7 +102,7 @@ def _lists(column: Any, shape: Sequence[int]) -> Floats:
     return np.array([empty if row is None else np.asarray(row, dtype=float).reshape(shape) for row in column])
 
 
-def drawn(count: int, seed: int, *, wide: bool) -> dict[str, Floats]:
+def draw_robots(count: int, seed: int, *, wide: bool) -> dict[str, Floats]:
     """Robots of a scrambled Sobol sequence, even in the logarithms of DOMAIN.
 
     Args:
@@ -123,7 +125,7 @@ def drawn(count: int, seed: int, *, wide: bool) -> dict[str, Floats]:
     return robots
 
 
-def simulated(robots: Mapping[str, Floats], *, curves: bool = False, title: str = "") -> Simulated:
+def simulate_robots(robots: Mapping[str, Floats], *, curves: bool = False, title: str = "") -> SimulatedRobots:
     """Simulate robots; those without a direct solution are left out.
 
     Args:
@@ -139,14 +141,14 @@ def simulated(robots: Mapping[str, Floats], *, curves: bool = False, title: str 
     found = {name: np.concatenate([part[name] for part in done])[order] for name in done[0]}
     motion = {name: found[name] for name in MOTION}
     kept = {name: found[name] for name in found if name not in (*MOTION, "solved")}
-    everything = Simulated({name: np.asarray(array) for name, array in robots.items()}, motion, kept)
+    everything = SimulatedRobots({name: np.asarray(array) for name, array in robots.items()}, motion, kept)
     return everything.at(found["solved"])
 
 
-def as_reached(robots: Mapping[str, Floats], *, title: str = "") -> Simulated:
+def as_reached(robots: Mapping[str, Floats], *, title: str = "") -> SimulatedRobots:
     """Simulate robots as the data set does: the motion that straight tails reach, if it is steady."""
     found = steady_columns(robots, title=title)
-    whole = Simulated(dict(robots), {name: found[name] for name in MOTION}, {})
+    whole = SimulatedRobots(dict(robots), {name: found[name] for name in MOTION}, {})
     return whole.at(np.asarray(found["converged"], dtype=bool))
 
 

@@ -22,22 +22,21 @@ from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
 from sim.io.provenance import fingerprint, provenance
 from surrogate.input_ranges import ROBOT
-from surrogate.networks.checkpoints import Work, device_named
+from surrogate.networks.checkpoints import TrainingContext, device_named
 from surrogate.networks.training_loop import Settings
-from surrogate.table import response_table as curves
-from surrogate.table import wrench_table as tails
 from surrogate.table.errors import curve_errors, relative_errors, summary
 from surrogate.table.intervals import Intervals
-from surrogate.table.lookup import BRANCHES, Lookup, steady_outputs
-from surrogate.table.response_table import learn_curves
+from surrogate.table.lookup import BRANCHES, NeuralTable, steady_outputs
 from surrogate.table.support import Support
-from surrogate.table.wrench_table import CLASSES, class_of, learn_tails, learnable, rows_of
-from surrogate.training.simulated import Simulated, joined, read_rows, simulated
-from surrogate.wrench import tails as tail
+from surrogate.table.wrench_table import CLASSES, network_index
+from surrogate.training.fit_response import SETTINGS, fit_response
+from surrogate.training.fit_wrench import WrenchSamples, fit_wrench, learnable, wrench_samples
+from surrogate.training.simulated import SimulatedRobots, join_robots, read_robots, simulate_robots
+from surrogate.wrench.tails import tail_inputs
 
 _FEWEST_INSIDE = 10
 _FEWEST_ROWS, _FEWEST_OF_A_CLASS = 64, 16
-_QUIET = Work()
+_QUIET = TrainingContext()
 
 
 def split(rows: Integers) -> Integers:
@@ -56,7 +55,7 @@ def train(
     title: str = "train",
     device: str = "cpu",
     states: str | Path | None = None,
-) -> Lookup:
+) -> NeuralTable:
     """A look-up table from a finished data set, or from several.
 
     Args:
@@ -78,7 +77,7 @@ def train(
         >>> from softflagella import train
         >>> table = train("data/sweep")  # doctest: +SKIP
     """
-    work = Work(title, device_named(device), None if states is None else Path(states))
+    work = TrainingContext(title, device_named(device), None if states is None else Path(states))
     folders = [folder] if isinstance(folder, str) else list(folder)
     manifests = [read_manifest(one) for one in folders]
     rows, numbers = _together(folders, manifests)
@@ -89,46 +88,46 @@ def train(
     flipped = sets[0].with_curves()
     if not len(flipped):
         some = sets[0].at(np.flatnonzero(sets[0].robots["N"] > 1)[:flips])
-        flipped = simulated(some.robots, curves=True, title=title and f"{title}: flips simulated")
+        flipped = simulate_robots(some.robots, curves=True, title=title and f"{title}: flips simulated")
     kept = {"data_hash": "config_hash", "data_code_version": "code_version", "data_chosen": "chosen"}
     source = {name: "+".join(str(m.get(key, "")) for m in manifests) for name, key in kept.items()}
     learned, widths, held_out = sets
     return learn(learned, widths, held_out, flipped, settings, curve_settings, source=source, work=work)
 
 
-def held_out(folder: str | Sequence[str]) -> Simulated:
+def held_out(folder: str | Sequence[str]) -> SimulatedRobots:
     """The rows of data sets that `train` holds out."""
     folders = [folder] if isinstance(folder, str) else list(folder)
     rows, numbers = _together(folders, [read_manifest(one) for one in folders])
     return rows.at(split(numbers) == 2)
 
 
-def _together(folders: Sequence[str], manifests: Sequence[dict[str, Any]]) -> tuple[Simulated, Integers]:
+def _together(folders: Sequence[str], manifests: Sequence[dict[str, Any]]) -> tuple[SimulatedRobots, Integers]:
     """Rows of several data sets and their numbers; the same point of the same sequence counts once."""
     parts, numbers, seen = [], [], dict[str, Integers]()
     for folder, manifest in zip(folders, manifests, strict=True):
-        part, number = read_rows(folder)
+        part, number = read_robots(folder)
         sequence = fingerprint(manifest["config"])
         before = seen.get(sequence, np.empty(0, dtype=number.dtype))
         fresh = ~np.isin(number, before)
         parts.append(part.at(fresh))
         numbers.append(number[fresh])
         seen[sequence] = np.concatenate([before, number])
-    return joined(parts), np.concatenate(numbers)
+    return join_robots(parts), np.concatenate(numbers)
 
 
 def learn(
-    learned: Simulated,
-    widths: Simulated,
-    held_out: Simulated,
-    flipped: Simulated,
+    learned: SimulatedRobots,
+    widths: SimulatedRobots,
+    held_out: SimulatedRobots,
+    flipped: SimulatedRobots,
     settings: Settings | None = None,
     curve_settings: Settings | None = None,
     *,
-    flips_held_out: Simulated | None = None,
+    flips_held_out: SimulatedRobots | None = None,
     source: dict[str, Any] | None = None,
-    work: Work = _QUIET,
-) -> Lookup:
+    work: TrainingContext = _QUIET,
+) -> NeuralTable:
     """A look-up table from simulated robots.
 
     Args:
@@ -140,22 +139,22 @@ def learn(
         source: more provenance.
         work: device, progress bars, and where states are kept.
     """
-    chosen, curves_chosen = settings or Settings(), curve_settings or curves.SETTINGS
+    chosen, curves_chosen = settings or Settings(), curve_settings or SETTINGS
     if flips_held_out is None:
         tenth = np.arange(len(flipped)) % 10 == 9
         flipped, flips_held_out = flipped.at(~tenth), flipped.at(tenth)
     rows = _learnable(learned)
-    table = learn_tails(rows, chosen, work)
-    kind = class_of(rows.tails.number)
-    inputs = tail.inputs_of(rows.tails, rows.motion)
+    table = fit_wrench(rows, chosen, work)
+    kind = network_index(rows.tails.number)
+    inputs = tail_inputs(rows.tails, rows.motion)
     flipped, flips_held_out = _several_tails(flipped), _several_tails(flips_held_out)
     own = _learnable(flipped)
-    usable = np.flatnonzero(learnable(rows_of(flipped.robots, flipped.motion)))
+    usable = np.flatnonzero(learnable(wrench_samples(flipped.robots, flipped.motion)))
     known = flipped.at(usable).curves
-    response = learn_curves(own.heads, own.tails, own.motion, known, curves_chosen, work.part("flips"))
+    response = fit_response(own.heads, own.tails, own.motion, known, curves_chosen, work.part("flips"))
     counts = {"train": len(rows.motion), "widths": len(widths), "held_out": len(held_out), "flips": len(usable)}
     made = provenance({"tails": asdict(chosen), "curves": asdict(curves_chosen), "device": work.device})
-    lookup = Lookup(
+    lookup = NeuralTable(
         tails=table,
         curves=response,
         support=tuple(
@@ -169,7 +168,9 @@ def learn(
     return _judged(lookup, widths, held_out, flips_held_out)
 
 
-def _judged(lookup: Lookup, widths: Simulated, held_out: Simulated, flips: Simulated) -> Lookup:
+def _judged(
+    lookup: NeuralTable, widths: SimulatedRobots, held_out: SimulatedRobots, flips: SimulatedRobots
+) -> NeuralTable:
     """The table with its intervals and held-out errors; the errors are those of robots with two tails and more."""
     (first_hints, first, _), (hints, errors, inside) = (_errors(lookup, rows) for rows in (widths, held_out))
     intervals = Intervals.learned(first_hints, first, hints, errors)
@@ -184,7 +185,7 @@ def _judged(lookup: Lookup, widths: Simulated, held_out: Simulated, flips: Simul
     return replace(lookup, intervals=intervals, errors=report)
 
 
-def _errors(lookup: Lookup, rows: Simulated) -> tuple[torch.Tensor, dict[str, torch.Tensor], Floats]:
+def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[torch.Tensor, dict[str, torch.Tensor], Floats]:
     """Hints and relative errors of rows inside the domain, and which those are."""
     found = lookup.motions(rows.robots, flag=True)
     inside = np.array([not reason for reason in found.reason])
@@ -199,7 +200,7 @@ def _errors(lookup: Lookup, rows: Simulated) -> tuple[torch.Tensor, dict[str, to
     )
 
 
-def _several_tails(rows: Simulated) -> Simulated:
+def _several_tails(rows: SimulatedRobots) -> SimulatedRobots:
     """Rows with two or more tails: the response of one tail depends too much on the phase of the disc."""
     return rows.at(rows.robots["N"] > 1)
 
@@ -211,11 +212,11 @@ def with_radius(motion: dict[str, Floats]) -> dict[str, Floats]:
     return {**motion, "R_yr_over_l": speed / np.abs(motion["omega_yr_bar"]), "theta_deg": angle}
 
 
-def _learnable(rows: Simulated) -> tails.Rows:
-    found = rows_of(rows.robots, rows.motion)
+def _learnable(rows: SimulatedRobots) -> WrenchSamples:
+    found = wrench_samples(rows.robots, rows.motion)
     good = learnable(found)
     kept = found.at(torch.as_tensor(np.flatnonzero(good)))
-    counts = [int((class_of(kept.tails.number) == k).sum()) for k in range(len(CLASSES))]
+    counts = [int((network_index(kept.tails.number) == k).sum()) for k in range(len(CLASSES))]
     for count, number in zip(counts, ("N = 1", "N = 2", "N = 3 and more"), strict=True):
         if 0 < count < _FEWEST_OF_A_CLASS:
             raise InputError(f"{count} usable rows with {number}; training needs {_FEWEST_OF_A_CLASS} or none")

@@ -16,7 +16,7 @@ from sim.arrays import Flags, Floats
 from sim.compiling import compiled
 from sim.linear.dense import solve_dense
 from surrogate.networks.compiled import Packed, evaluate
-from surrogate.wrench.tails import SMALL_DEFLECTION, SMALL_SURGE, SOFT, TINY, thrust_of, torque_of
+from surrogate.wrench.tails import SMALL_DEFLECTION, SMALL_SURGE, SOFT, TINY, linear_thrust, linear_torque
 
 STEPS, CORRECTION = 60, 1e-9  # of Broyden's method; the correction is relative
 _DIFFERENCE, _LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
@@ -32,7 +32,7 @@ def solve_rows(network: Packed, heads: Floats, resistances: Floats, tails: Float
         network: of the tails.
         heads: |ω| and gain, (M, 2).
         resistances: of the heads, (M, 4, 5).
-        tails: columns of `surrogate.wrench.tails.columns_of`, (M, 13).
+        tails: columns of `surrogate.wrench.tails.pack_tails`, (M, 13).
     """
     motions, converged = np.empty((len(heads), 5)), np.empty(len(heads), dtype=np.bool_)
     y, guess, other = np.empty(len(network.mean)), np.empty(5), np.empty(5)
@@ -53,7 +53,7 @@ def solve_rows(network: Packed, heads: Floats, resistances: Floats, tails: Float
 
 @compiled
 def inputs_rows(tails: Floats, motions: Floats) -> Floats:
-    """`surrogate.wrench.tails.inputs_of`, (M, 7), of tails (M, 13) that move so (M, 5)."""
+    """`surrogate.wrench.tails.tail_inputs`, (M, 7), of tails (M, 13) that move so (M, 5)."""
     x = np.empty((len(tails), 7))
     for row in range(len(tails)):
         inputs_at(tails[row], motions[row], x[row])
@@ -62,7 +62,7 @@ def inputs_rows(tails: Floats, motions: Floats) -> Floats:
 
 @compiled
 def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
-    """`surrogate.wrench.tails.inputs_of` of one robot, written to x (7,), or `inputs_with_head`, to x (14,)."""
+    """`surrogate.wrench.tails.tail_inputs` of one robot, written to x (7,), or `inputs_with_head`, to x (14,)."""
     v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
     drag_number = tail[0] * spin
     deflection = np.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
@@ -88,9 +88,9 @@ def _unbalanced(head: Floats, resistance: Floats, tail: Floats, motion: Floats, 
     couple = number * spin * a**2
     across = number * perp
     left[0] = across * (yaw / 2 - v_x + sideways * y[0])
-    left[1] = -number * parallel * v_z + (perp - parallel) * couple * thrust_of(S) * (y[1] + squared * y[4])
+    left[1] = -number * parallel * v_z + (perp - parallel) * couple * linear_thrust(S) * (y[1] + squared * y[4])
     left[2] = across * (v_x / 2 - yaw / 3 + sideways * y[2])
-    left[3] = -perp * couple * torque_of(S) * (y[3] + squared * y[5])
+    left[3] = -perp * couple * linear_torque(S) * (y[3] + squared * y[5])
     for i in range(4):
         for j in range(5):
             left[i] -= resistance[i, j] * motion[j]
@@ -103,7 +103,7 @@ def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats)
     perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
     spin = _FIRST_SPIN * speed
     for _ in range(3):
-        torque = number * perp * a**2 * torque_of(perp * spin)
+        torque = number * perp * a**2 * linear_torque(perp * spin)
         spin = speed * resistance[3, 3] / (resistance[3, 3] + gain * (torque + resistance[3, 4]))
     head_spin = (spin - speed) / gain
     matrix, push = resistance[:3, :3].copy(), np.empty((3, 1))
@@ -114,7 +114,7 @@ def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats)
     matrix[2, 0] -= number * perp / 2
     for i in range(3):
         push[i, 0] = -resistance[i, 3] * head_spin - resistance[i, 4] * spin
-    push[1, 0] += number * (perp - parallel) * spin * a**2 * thrust_of(perp * spin)
+    push[1, 0] += number * (perp - parallel) * spin * a**2 * linear_thrust(perp * spin)
     solve_dense(matrix, push)
     motion[:3] = push[:, 0]
     motion[3], motion[4] = head_spin, spin

@@ -26,8 +26,7 @@ from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.model.groups import Groups
 from sim.solve.assembly import assemble
-from surrogate.wrench import tails as tail
-from surrogate.wrench.tails import Tails
+from surrogate.wrench.tails import Tails, head_inputs, inputs_with_head, total_wrench
 
 Numbers = Callable[
     [Tensor], Tensor
@@ -46,13 +45,12 @@ class Heads(NamedTuple):
     length: Tensor  # (M,) L
     sense: Tensor  # (M,) sign of ω
 
+    def at(self, rows: Tensor) -> Heads:
+        """Return the heads of the robots at indices or flags (M',)."""
+        return Heads(*[part[rows] for part in self])
 
-def at(heads: Heads, rows: Tensor) -> Heads:
-    """The heads of the robots at `rows`."""
-    return Heads(*[part[rows] for part in heads])
 
-
-def robots_of(columns: Mapping[str, Floats | Tensor], keep: Collection[str] = ()) -> tuple[Heads, Tails]:
+def heads_and_tails(columns: Mapping[str, Floats | Tensor], keep: Collection[str] = ()) -> tuple[Heads, Tails]:
     """Heads and tails of robots by column name, each (M,), a_over_R and effects included; differentiable.
 
     Args:
@@ -67,7 +65,7 @@ def robots_of(columns: Mapping[str, Floats | Tensor], keep: Collection[str] = ()
     own = {name: tensors.pop(name) for name in Groups.__dataclass_fields__ if name in tensors}
     effects = {name: size for name, size in tensors.items() if name in keep or bool((size != 0).any())}
     for name in effects:
-        if not is_of_head(name):
+        if not needs_no_learning(name):
             raise InputError(
                 f"{name} changes more than head, disc and motor, so the look-up table does not know it; make the "
                 "robot a table of its own: python -m surrogate robot ROBOT.toml --out TABLE.json"
@@ -78,7 +76,7 @@ def robots_of(columns: Mapping[str, Floats | Tensor], keep: Collection[str] = ()
     mirror = torch.where(sense[:, None] < 0, torch.tensor(_SENSES, dtype=torch.float64), 1.0)
     resistance = body.resistance.permute(2, 0, 1) * mirror[:, :4, None] * mirror[:, None, :]
     heads = Heads(body.omega.abs(), 1 + body.droop * resistance[:, 3, 3], resistance, body.head_length, sense)
-    around = tail.head_inputs(resistance, body.head_length, count * body.zeta_perp)
+    around = head_inputs(resistance, body.head_length, count * body.zeta_perp)
     tails = Tails(
         body.zeta_perp, body.zeta_parallel, body.offset, body.tail_radius, count, resistance[:, 3, 3], around
     )
@@ -90,7 +88,7 @@ def as_tensor(values: Floats | Tensor) -> Tensor:
     return values if isinstance(values, Tensor) else torch.tensor(np.asarray(values), dtype=torch.float64)
 
 
-def is_of_head(effect: str) -> bool:
+def needs_no_learning(effect: str) -> bool:
     """Whether an effect enters the balance by algebra: it changes head, disc, motor, or all drag alike."""
     found = catalogue()[effect]
     return found.reach == "local" and effect not in _ON_TAILS
@@ -104,7 +102,7 @@ def full_motion(heads: Heads, u: Tensor) -> Tensor:
 def unbalanced(heads: Heads, tails: Tails, u: Tensor, numbers: Numbers) -> Tensor:
     """W − R (v_x, v_z, ω_yr, ω_h, ω_t), (M, 4)."""
     motion = full_motion(heads, u)
-    wrench = tail.wrench_of(tails, motion, numbers(tail.inputs_with_head(tails, motion)))
+    wrench = total_wrench(tails, motion, numbers(inputs_with_head(tails, motion)))
     return wrench - (heads.resistance @ motion[..., None])[..., 0]
 
 

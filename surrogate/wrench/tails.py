@@ -64,13 +64,12 @@ class Tails(NamedTuple):
     head_spin_drag: Tensor  # moment on the head per ω_h
     head: Tensor  # (M, 7) HEAD_INPUTS; drag over that of the tails
 
+    def at(self, rows: Tensor) -> Tails:
+        """Return the tails of the robots at indices or flags (M',)."""
+        return Tails(*[part[rows] for part in self])
 
-def at(tails: Tails, rows: Tensor) -> Tails:
-    """The tails of the robots at `rows`."""
-    return Tails(*[part[rows] for part in tails])
 
-
-def columns_of(tails: Tails) -> Floats:
+def pack_tails(tails: Tails) -> Floats:
     """The fields as columns, (M, 13)."""
     return np.asarray(torch.cat([torch.stack(list(tails[:-1]), 1), tails.head], 1).numpy())
 
@@ -99,18 +98,18 @@ def head_inputs(resistance: Tensor, length: Tensor, across: Tensor) -> Tensor:
 
 
 @formula
-def thrust_of(S: Any) -> Any:
+def linear_thrust(S: Any) -> Any:
     """T: thrust/[(ζ⊥ − ζ∥) ω_t a²] of a tail in linear theory, roughly."""
     return 0.125 * S / (1 + (S / 8) ** 1.35)
 
 
 @formula
-def torque_of(S: Any) -> Any:
+def linear_torque(S: Any) -> Any:
     """Q: torque/[ζ⊥ ω_t a²] of a tail in linear theory, roughly."""
     return (1 + (S / 6) ** 2) ** -0.125
 
 
-def inputs_of(tails: Tails, motion: Tensor) -> Tensor:
+def tail_inputs(tails: Tails, motion: Tensor) -> Tensor:
     """INPUTS, (M, 7).
 
     Args:
@@ -135,7 +134,7 @@ def inputs_of(tails: Tails, motion: Tensor) -> Tensor:
 
 def inputs_with_head(tails: Tails, motion: Tensor) -> Tensor:
     """INPUTS and HEAD_INPUTS, (M, 14)."""
-    return torch.cat([inputs_of(tails, motion), tails.head], -1)
+    return torch.cat([tail_inputs(tails, motion), tails.head], -1)
 
 
 def straight_wrench(tails: Tails, motion: Tensor) -> Tensor:
@@ -146,7 +145,7 @@ def straight_wrench(tails: Tails, motion: Tensor) -> Tensor:
     return torch.stack([side, -tails.number * tails.zeta_parallel * v_z, turn, torch.zeros_like(side)], -1)
 
 
-def units_of(tails: Tails, motion: Tensor) -> Tensor:
+def wrench_slopes(tails: Tails, motion: Tensor) -> Tensor:
     """∂(wrench)/∂y at a motion, (M, 4, 6)."""
     v_x, _, yaw, _, spin = motion.unbind(-1)
     drag_number = tails.zeta_perp * spin
@@ -154,8 +153,8 @@ def units_of(tails: Tails, motion: Tensor) -> Tensor:
     squared = (sideways / (tails.offset * spin)) ** 2
     couple = tails.number * spin * tails.offset**2
     force = tails.number * tails.zeta_perp * sideways
-    thrust = (tails.zeta_perp - tails.zeta_parallel) * couple * thrust_of(drag_number)
-    torque = -tails.zeta_perp * couple * torque_of(drag_number)
+    thrust = (tails.zeta_perp - tails.zeta_parallel) * couple * linear_thrust(drag_number)
+    torque = -tails.zeta_perp * couple * linear_torque(drag_number)
     none = torch.zeros_like(force)
     rows = [
         [force, none, none, none, none, none],
@@ -166,6 +165,6 @@ def units_of(tails: Tails, motion: Tensor) -> Tensor:
     return torch.stack([torch.stack(row, -1) for row in rows], -2)
 
 
-def wrench_of(tails: Tails, motion: Tensor, y: Tensor) -> Tensor:
+def total_wrench(tails: Tails, motion: Tensor, y: Tensor) -> Tensor:
     """(F_x, F_z, M_y, M_z) of all tails on the disc about J, (M, 4), for the network's numbers y (M, 6)."""
-    return straight_wrench(tails, motion) + (units_of(tails, motion) @ y[..., None])[..., 0]
+    return straight_wrench(tails, motion) + (wrench_slopes(tails, motion) @ y[..., None])[..., 0]

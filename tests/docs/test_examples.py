@@ -13,7 +13,7 @@ import pytest
 
 import softflagella as sf
 from sim.inputs import load_robot
-from surrogate.export.small_copy_files import save_small
+from surrogate.export.small_copy_files import save_small_copy
 from surrogate.table.model_file import load
 from tests.docs.pages import DOCS, PAGES, ROOT, blocks, name_of
 from tests.planner.compiled import compile_c
@@ -60,7 +60,7 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytes
 def test_c_on_pages_compiles(tmp_path: Path) -> None:
     robot = sf.load_robot("paper-control")
     sf.write_plan(sf.plan(sf.circle(2.0), robot), tmp_path)
-    save_small(load(), tmp_path)
+    save_small_copy(load(), tmp_path)
     found = [block for page in PAGES for block in blocks(page) if block.language == "c"]
     assert found
     for block in found:

@@ -9,10 +9,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from surrogate.wrench import heads as head
-from surrogate.wrench import tails as tail
 from surrogate.wrench.heads import Heads, Numbers, full_motion, straight_resistance, unbalanced
-from surrogate.wrench.tails import Tails
+from surrogate.wrench.tails import Tails, linear_thrust, linear_torque
 
 STEPS, CORRECTION = 40, 1e-9  # the correction is relative
 _RENEWED = 8  # steps after which the derivative is found again
@@ -45,7 +43,7 @@ def solve(heads: Heads, tails: Tails, numbers: Numbers, start: Tensor | None = N
         waiting = waiting[more]
         if not len(waiting):
             break
-        waiting_robots = head.at(waiting_robots[0], more), tail.at(waiting_robots[1], more)
+        waiting_robots = waiting_robots[0].at(more), waiting_robots[1].at(more)
         step, inverse, before = step[more], inverse[more], residual[more]
         residual = unbalanced(*waiting_robots, u[waiting], numbers)
         inverse = _updated(inverse, -step, residual - before)
@@ -91,7 +89,7 @@ def linear_guess(heads: Heads, tails: Tails) -> Tensor:
     """Velocities u (M, 4) with the torque of linear theory and the side forces of straight tails."""
     spin = _FIRST_SPIN * heads.speed
     for _ in range(3):
-        torque = tails.number * tails.zeta_perp * tails.offset**2 * tail.torque_of(tails.zeta_perp * spin)
+        torque = tails.number * tails.zeta_perp * tails.offset**2 * linear_torque(tails.zeta_perp * spin)
         head, disc = heads.resistance[:, 3, 3], heads.resistance[:, 3, 4]
         spin = heads.speed * head / (head + heads.gain * (torque + disc))
     head_spin = (spin - heads.speed) / heads.gain
@@ -99,6 +97,6 @@ def linear_guess(heads: Heads, tails: Tails) -> Tensor:
     matrix = matrix + straight_resistance(tails)
     push = -heads.resistance[:, :3, 3] * head_spin[:, None] - heads.resistance[:, :3, 4] * spin[:, None]
     thrust = (tails.zeta_perp - tails.zeta_parallel) * spin * tails.offset**2
-    thrust = tails.number * thrust * tail.thrust_of(tails.zeta_perp * spin)
+    thrust = tails.number * thrust * linear_thrust(tails.zeta_perp * spin)
     push = push + torch.stack([torch.zeros_like(thrust), thrust, torch.zeros_like(thrust)], -1)
     return torch.cat([torch.linalg.solve(matrix, push), head_spin[:, None]], 1)

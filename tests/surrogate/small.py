@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 
 from surrogate.networks.training_loop import Settings
-from surrogate.table.lookup import Lookup
-from surrogate.training.simulated import Simulated, drawn, simulated
+from surrogate.table.lookup import NeuralTable
+from surrogate.training.simulated import SimulatedRobots, draw_robots, simulate_robots
 from surrogate.training.train import learn
 
 TAILS = Settings(width=20, depth=2, members=2, epochs=40, iterations=60)
@@ -16,21 +16,21 @@ CURVES = Settings(width=16, depth=1, members=1, epochs=30, iterations=20)
 
 
 @cache
-def rows(count: int = 512, seed: int = 11, *, wide: bool = True) -> Simulated:
+def rows(count: int = 512, seed: int = 11, *, wide: bool = True) -> SimulatedRobots:
     """Simulated robots with three or four tails."""
-    robots = drawn(count, seed, wide=wide)
-    return simulated(robots | {"N": 3.0 + robots["N"] % 2})
+    robots = draw_robots(count, seed, wide=wide)
+    return simulate_robots(robots | {"N": 3.0 + robots["N"] % 2})
 
 
 @cache
-def flips() -> Simulated:
+def flips() -> SimulatedRobots:
     """Simulated robots with response curves."""
-    robots = drawn(32, 12, wide=False)
-    return simulated(robots | {"N": np.full(32, 3.0)}, curves=True)
+    robots = draw_robots(32, 12, wide=False)
+    return simulate_robots(robots | {"N": np.full(32, 3.0)}, curves=True)
 
 
 @cache
-def table() -> Lookup:
+def table() -> NeuralTable:
     """A table that learned them; its errors are some per cent."""
     held = rows(256, 13, wide=False)
     return learn(rows(), held.at(np.arange(len(held)) % 2 == 0), held, flips(), TAILS, CURVES)

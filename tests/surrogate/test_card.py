@@ -7,14 +7,14 @@ import re
 import numpy as np
 
 from surrogate.table.errors import relative_errors, shortcomings
-from surrogate.training.model_card import card_of
+from surrogate.training.model_card import model_card
 from surrogate.training.train import with_radius
 from tests.surrogate.small import rows, table
 
 
 def test_the_card_states_the_errors_of_the_held_out_robots() -> None:
     held = rows(256, 13, wide=False)
-    card = card_of(table(), held)
+    card = model_card(table(), held)
     answer = table().query(held.robots, flag=True)
     error = 100 * np.abs(relative_errors(answer, with_radius(held.motion))["omega_yr_bar"])
     stated = re.findall(r"\| yaw rate \| ([\d.e-]+) \| ([\d.e-]+)", card)
@@ -26,13 +26,13 @@ def test_the_card_states_the_errors_of_the_held_out_robots() -> None:
 
 def test_the_worst_robot_is_first() -> None:
     held = rows(256, 13, wide=False)
-    lines = card_of(table(), held).split("## The worst robots")[1].splitlines()
+    lines = model_card(table(), held).split("## The worst robots")[1].splitlines()
     sizes = [float(line.split("|")[1]) for line in lines if re.match(r"\| [\d.]", line)]
     assert len(sizes) == 10
     assert sizes == sorted(sizes, reverse=True)
 
 
 def test_a_table_of_few_rows_says_that_it_is_poor() -> None:
-    words = shortcomings(table())
+    words = shortcomings(table().errors)
     assert any("net speed" in line for line in words)
     assert all("learn more rows" in line for line in words)

@@ -15,17 +15,18 @@ import torch
 
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
-from surrogate.one_robot.robot_table import SingleRobot, load_single, save_single
+from surrogate.one_robot.robot_table import RobotTable, load_robot_table, save_robot_table
 from surrogate.one_robot.tabulate import tabulate
 from surrogate.table import tensor_file
-from surrogate.table.model_file import FORMAT, SHIPPED, content_of, load, load_table, save
+from surrogate.table.lookup import table_content
+from surrogate.table.model_file import FORMAT, SHIPPED, load, load_table, save
 from tests.surrogate.small import rows, table
 
 NO_PYTHON = re.compile(r"Error|Exception|Traceback|object|__|<class")
 
 
 @pytest.fixture(scope="module")
-def single() -> SingleRobot:
+def single() -> RobotTable:
     return tabulate(PRESETS["paper-control"])
 
 
@@ -53,7 +54,7 @@ def test_a_model_comes_back_as_it_was(tmp_path: Path) -> None:
 
 
 def test_the_same_table_makes_the_same_bytes() -> None:
-    content = content_of(load())
+    content = table_content(load())
     assert tensor_file.packed(content, FORMAT) == tensor_file.packed(content, FORMAT) == SHIPPED.read_bytes()
 
 
@@ -95,12 +96,12 @@ def test_a_file_of_torch_and_one_of_another_format_are_refused(tmp_path: Path) -
     path = tmp_path / "model.pt"
     torch.save({"format": 4, "content": {}}, path)
     assert "older version; train it again" in refusal(path)
-    tensor_file.write(path, content_of(load()), 7)
+    tensor_file.write(path, table_content(load()), 7)
     assert "has format 7, this version reads 5; train it again" in refusal(path)
 
 
 def edited(change: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
-    content = copy.deepcopy(content_of(load()))
+    content = copy.deepcopy(table_content(load()))
     change(content)
     return content
 
@@ -132,7 +133,7 @@ def test_a_content_that_cannot_answer_is_refused_though_its_hash_is_right(
     assert expected in refusal(path)
 
 
-@pytest.mark.parametrize("key", sorted(content_of(load())))
+@pytest.mark.parametrize("key", sorted(table_content(load())))
 def test_a_missing_key_is_named(key: str, tmp_path: Path) -> None:
     path = tmp_path / "m.safetensors"
     tensor_file.write(path, edited(lambda content: content.pop(key)), FORMAT)
@@ -151,17 +152,17 @@ def test_an_edited_domain_is_refused(tmp_path: Path) -> None:
     assert low < high
 
 
-def test_a_table_of_one_robot_comes_back_as_it_was(single: SingleRobot, tmp_path: Path) -> None:
-    save_single(single, tmp_path / "robot.json")
+def test_a_table_of_one_robot_comes_back_as_it_was(single: RobotTable, tmp_path: Path) -> None:
+    save_robot_table(single, tmp_path / "robot.json")
     again = load_table(tmp_path / "robot.json")
     assert again == single
     assert again.identity == single.identity
 
 
-def test_damaged_tables_of_one_robot_are_refused(single: SingleRobot, tmp_path: Path) -> None:
+def test_damaged_tables_of_one_robot_are_refused(single: RobotTable, tmp_path: Path) -> None:
     """Or hold the same numbers, as where 1e-5 has become 1E-5."""
     path = tmp_path / "robot.json"
-    save_single(single, path)
+    save_robot_table(single, path)
     whole = path.read_bytes()
     random = np.random.default_rng(6)
     same = 0
@@ -170,22 +171,22 @@ def test_damaged_tables_of_one_robot_are_refused(single: SingleRobot, tmp_path: 
         broken[place] ^= 1 << int(random.integers(8))
         path.write_bytes(broken)
         try:
-            found = load_single(path)
+            found = load_robot_table(path)
         except InputError:
-            refusal(path, load_single)
+            refusal(path, load_robot_table)
         else:
             same += 1
             assert found == single
     assert same < 4
     for size in [0, 1, len(whole) // 2, len(whole) - 3]:
         path.write_bytes(whole[:size])
-        refusal(path, load_single)
+        refusal(path, load_robot_table)
     for content in (b"\xff\xfe", b"[" * 100_000, b"[1]", b"9" * 10_000):
         path.write_bytes(content)
-        assert "no table of a robot" in refusal(path, load_single)
-    assert "cannot be read" in refusal(tmp_path / "absent.json", load_single)
+        assert "no table of a robot" in refusal(path, load_robot_table)
+    assert "cannot be read" in refusal(tmp_path / "absent.json", load_robot_table)
     path.write_text('{"robot": {}, "dwells": [1.0]}')
-    assert "has format 1, this version reads 3" in refusal(path, load_single)
+    assert "has format 1, this version reads 3" in refusal(path, load_robot_table)
 
 
 @pytest.mark.parametrize(
@@ -201,21 +202,21 @@ def test_damaged_tables_of_one_robot_are_refused(single: SingleRobot, tmp_path: 
     ],
 )
 def test_wrong_numbers_of_one_robot_are_refused_though_the_hash_is_right(
-    name: str, value: Any, expected: str, single: SingleRobot, tmp_path: Path
+    name: str, value: Any, expected: str, single: RobotTable, tmp_path: Path
 ) -> None:
     path = tmp_path / "robot.json"
-    save_single(SingleRobot(**{**vars(single), name: value}), path)
-    assert expected in refusal(path, load_single)
+    save_robot_table(RobotTable(**{**vars(single), name: value}), path)
+    assert expected in refusal(path, load_robot_table)
 
 
-def test_an_edited_number_and_a_missing_key_of_one_robot_are_refused(single: SingleRobot, tmp_path: Path) -> None:
+def test_an_edited_number_and_a_missing_key_of_one_robot_are_refused(single: RobotTable, tmp_path: Path) -> None:
     path = tmp_path / "robot.json"
-    save_single(single, path)
+    save_robot_table(single, path)
     content = json.loads(path.read_text())
     for name in content:
         less = {key: part for key, part in content.items() if key != name}
         path.write_text(json.dumps(less))
-        assert ("format" if name == "format" else "was changed") in refusal(path, load_single)
+        assert ("format" if name == "format" else "was changed") in refusal(path, load_robot_table)
     content["robot"]["omega_bar"] += 1
     path.write_text(json.dumps(content))
-    assert "was changed" in refusal(path, load_single)
+    assert "was changed" in refusal(path, load_robot_table)

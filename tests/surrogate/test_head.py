@@ -10,12 +10,12 @@ from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.motion.batches import steady_columns
 from surrogate.table.model_file import load
-from surrogate.wrench import heads as head
+from surrogate.wrench.heads import heads_and_tails, needs_no_learning, unbalanced, value_and_slope
 from tests.oracles.balance import linear_guess
 from tests.surrogate.small import rows, table
 
 
-@pytest.mark.parametrize("effect", [name for name in catalogue() if head.is_of_head(name)])
+@pytest.mark.parametrize("effect", [name for name in catalogue() if needs_no_learning(name)])
 def test_effects_on_head_disc_and_motor_need_no_learning(effect: str) -> None:
     """The shipped table is right with the effect, in both directions of the motor."""
     robot = {"C_t": 3.0, "C_r": 2.8, "C_yr": 2.0, "l_over_R": 6.875, "L_over_R": 3.75, "l_over_r0": 34.375,
@@ -34,18 +34,18 @@ def test_effects_on_the_tails_are_refused() -> None:
     robots = {name: values[:2] for name, values in rows().robots.items()}
     for effect in ("tail_sag", "tail_interaction", "natural_curvature"):
         with pytest.raises(InputError, match=f"{effect} changes more.*surrogate robot"):
-            head.robots_of({**robots, effect: np.full(2, 0.1)})
-        head.robots_of({**robots, effect: np.zeros(2)})
+            heads_and_tails({**robots, effect: np.full(2, 0.1)})
+        heads_and_tails({**robots, effect: np.zeros(2)})
 
 
 def test_the_derivative_is_that_of_differences() -> None:
     robots = {name: values[:5] for name, values in rows().robots.items()}
-    heads, tails = head.robots_of(robots)
+    heads, tails = heads_and_tails(robots)
     network = table().tails.wrench[2]
     assert network is not None
     u = linear_guess(heads, tails)
-    value, slope = head.value_and_slope(lambda v: head.unbalanced(heads, tails, v, network), u)
+    value, slope = value_and_slope(lambda v: unbalanced(heads, tails, v, network), u)
     direction = torch.tensor([0.3, -0.2, 0.5, 0.1]).double() * u
-    moved = head.unbalanced(heads, tails, u + 1e-6 * direction, network)
+    moved = unbalanced(heads, tails, u + 1e-6 * direction, network)
     wanted = (slope @ direction[..., None])[..., 0]
     assert torch.allclose((moved - value) / 1e-6, wanted, rtol=1e-3, atol=1e-4 * float(wanted.abs().max()))

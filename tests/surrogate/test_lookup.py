@@ -11,8 +11,8 @@ from sim.model.response import DWELLS, SETTLED
 from surrogate.table.certify import certified_error
 from surrogate.table.errors import summary
 from surrogate.table.inverse import design, inverse
-from surrogate.table.lookup import between_dwells
-from surrogate.training.simulated import drawn, simulated
+from surrogate.table.response_table import between_dwells
+from surrogate.training.simulated import draw_robots, simulate_robots
 from tests.surrogate.small import CURVES, TAILS, flips, rows, table
 
 
@@ -114,18 +114,18 @@ def test_odd_effects_and_single_tails_have_no_learned_response() -> None:
 
 
 def test_training_is_repeatable_and_reads_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
-    some = simulated(drawn(256, 11, wide=False) | {"N": np.full(256, 3.0)})
-    monkeypatch.setattr(training, "read_rows", lambda folder: (some, np.arange(len(some))))
+    some = simulate_robots(draw_robots(256, 11, wide=False) | {"N": np.full(256, 3.0)})
+    monkeypatch.setattr(training, "read_robots", lambda folder: (some, np.arange(len(some))))
     monkeypatch.setattr(
         training, "read_manifest", lambda folder: {"config_hash": "h", "code_version": "c", "config": {}}
     )
-    monkeypatch.setattr(training, "simulated", lambda robots, **kind: flips())
+    monkeypatch.setattr(training, "simulate_robots", lambda robots, **kind: flips())
     first, again = (training.train("folder", TAILS, CURVES, title="") for _ in range(2))
     assert first.identity == again.identity
     counts = first.provenance["rows"]
     assert counts["train"] + counts["widths"] + counts["held_out"] == len(some)
     few = some.at(np.arange(40))
-    monkeypatch.setattr(training, "read_rows", lambda folder: (few, np.arange(40)))
+    monkeypatch.setattr(training, "read_robots", lambda folder: (few, np.arange(40)))
     with pytest.raises(InputError, match="training needs 64"):
         training.train("folder", TAILS, CURVES, title="")
 

@@ -15,16 +15,16 @@ from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.__main__ import main
 from surrogate.export.onnx_query import save_onnx
 from surrogate.input_ranges import ROBOT
-from surrogate.table.lookup import Lookup
+from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
-from surrogate.training.simulated import drawn
+from surrogate.training.simulated import draw_robots
 from tests.docs.pages import DOCS, blocks
 from tests.surrogate.small import table
 
 REASON = "needs the packages onnx and onnxruntime: pip install 'softflagella[onnx]'"
 
 
-def session(lookup: Lookup, folder: Path) -> Any:
+def session(lookup: NeuralTable, folder: Path) -> Any:
     onnxruntime = pytest.importorskip("onnxruntime", reason=REASON)
     pytest.importorskip("onnx", reason=REASON)
     save_onnx(lookup, folder / "query.onnx")
@@ -39,7 +39,9 @@ def run(made: Any, robots: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def of(count: int, seed: int, *, wide: bool) -> dict[str, np.ndarray]:
-    robots = {name: np.array(values) for name, values in drawn(count, seed, wide=wide).items() if name in ROBOT}
+    robots = {
+        name: np.array(values) for name, values in draw_robots(count, seed, wide=wide).items() if name in ROBOT
+    }
     robots["omega_bar"][::2] *= -1
     return robots
 

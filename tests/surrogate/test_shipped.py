@@ -13,7 +13,7 @@ from sim.motion.batches import steady_columns
 from surrogate.__main__ import main
 from surrogate.table.errors import coverage, relative_errors
 from surrogate.table.model_file import SHIPPED, load
-from surrogate.training.simulated import drawn
+from surrogate.training.simulated import draw_robots
 from surrogate.training.train import train, with_radius
 from tests.reference.cases import CONTROL, STEADY_INPUTS, STEADY_POINTS
 
@@ -48,7 +48,7 @@ def test_the_shipped_table_states_its_errors() -> None:
 
 def test_fresh_robots_are_near_the_simulator_and_inside_their_intervals() -> None:
     """Robots of the whole domain with two tails and more; what the table states holds for them."""
-    robots = {name: values[::2] for name, values in drawn(512, 77, wide=False).items()}
+    robots = {name: values[::2] for name, values in draw_robots(512, 77, wide=False).items()}
     robots = {name: values[robots["N"] > 1] for name, values in robots.items()}
     simulated = steady_columns(robots, title="")
     truth = with_radius({name: np.asarray(simulated[name], dtype=float) for name in

@@ -20,7 +20,7 @@ from sim.model.robot import Robot
 from sim.motion.replay import replay
 from sim.motion.steady import steady
 from sim.motion.switching import switch_response
-from surrogate.one_robot.robot_table import SingleRobot, save_single
+from surrogate.one_robot.robot_table import RobotTable, save_robot_table
 from surrogate.one_robot.tabulate import tabulate
 from surrogate.table.model_file import load_table
 
@@ -28,7 +28,7 @@ ROBOT = replace(PRESETS["paper-control"], effects={"end_over_end_drag": 5.0})
 
 
 @pytest.fixture(scope="module")
-def table() -> SingleRobot:
+def table() -> RobotTable:
     return tabulate(ROBOT)
 
 
@@ -36,7 +36,7 @@ def columns(count: int = 1, robot: Robot = ROBOT) -> dict[str, np.ndarray]:
     return {k: np.full(count, v) for k, v in robot.group_values().items()}
 
 
-def test_it_answers_like_the_simulator(table: SingleRobot) -> None:
+def test_it_answers_like_the_simulator(table: RobotTable) -> None:
     """Net speed at equal dwells, against flips in time steps that go on until the motion repeats."""
     at = [7, 13, 22]
     dwells = DWELLS[at]
@@ -69,9 +69,9 @@ def test_a_robot_that_turns_unequally_is_planned_and_stays_within_the_stated_err
 
 
 def test_a_robot_with_an_effect_is_planned_and_stays_within_the_stated_error(
-    table: SingleRobot, tmp_path: Path
+    table: RobotTable, tmp_path: Path
 ) -> None:
-    save_single(table, tmp_path / "robot.json")
+    save_robot_table(table, tmp_path / "robot.json")
     result = plan(polygon(4, 2.5), ROBOT, lookup=load_table(tmp_path / "robot.json"))
     track = replay([result.schedule()])[0]
     error = tracking_error(plan_record(result), track)
@@ -79,14 +79,14 @@ def test_a_robot_with_an_effect_is_planned_and_stays_within_the_stated_error(
     assert error.rms < 0.03
 
 
-def test_another_robot_is_refused(table: SingleRobot) -> None:
+def test_another_robot_is_refused(table: RobotTable) -> None:
     with pytest.raises(InputError, match="end_over_end_drag"):
         plan(polygon(4, 3.0), replace(ROBOT, effects={"end_over_end_drag": 4.0}), lookup=table)
     with pytest.raises(InputError, match="C_t = 9"):
         table.query({**columns(), "C_t": np.array([9.0])})
 
 
-def test_its_slopes_are_those_of_the_simulator(table: SingleRobot) -> None:
+def test_its_slopes_are_those_of_the_simulator(table: RobotTable) -> None:
     """In every group and in the robot's effect."""
     values = ROBOT.group_values()
     assert set(table.slopes) == set(values) - {"N"}

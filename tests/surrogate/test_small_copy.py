@@ -17,13 +17,13 @@ from sim.io.errors import InputError, run_command
 from sim.model.groups import DWELL
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.__main__ import main
-from surrogate.export.small_copy import MOST_BYTES, Small, losses_of, small_of
-from surrogate.export.small_copy_files import save_small
+from surrogate.export.small_copy import MOST_BYTES, SmallCopy, make_small_copy, measure_losses
+from surrogate.export.small_copy_files import save_small_copy
 from surrogate.input_ranges import ROBOT
-from surrogate.table.errors import scale_of
+from surrogate.table.errors import error_scale
 from surrogate.table.lookup import RESPONSE_OUTPUTS
 from surrogate.table.model_file import load
-from surrogate.training.simulated import drawn
+from surrogate.training.simulated import draw_robots
 from tests.planner.compiled import compile_c
 from tests.surrogate.small import table
 
@@ -57,12 +57,14 @@ writeFileSync("answers.json", JSON.stringify(answers, (key, value) => (value ===
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("small")
-    save_small(load(), made)
+    save_small_copy(load(), made)
     return made
 
 
 def robots_of(count: int, seed: int) -> dict[str, np.ndarray]:
-    robots = {name: np.array(values) for name, values in drawn(count, seed, wide=False).items() if name in ROBOT}
+    robots = {
+        name: np.array(values) for name, values in draw_robots(count, seed, wide=False).items() if name in ROBOT
+    }
     robots["omega_bar"][::2] *= -1
     robots[DWELL] = np.geomspace(0.2, 5.0, count)
     return {name: robots[name] for name in (*ROBOT, DWELL)}
@@ -91,7 +93,7 @@ def apart(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray]) -> dict[s
     for name in OUTPUTS:
         same = (found[name] == wanted[name]) | (np.isnan(found[name]) & np.isnan(wanted[name]))
         with np.errstate(invalid="ignore"):
-            result[name] = np.where(same, 0.0, np.abs(found[name] - wanted[name]) / scale_of(name, wanted))
+            result[name] = np.where(same, 0.0, np.abs(found[name] - wanted[name]) / error_scale(name, wanted))
     return result
 
 
@@ -102,7 +104,7 @@ def vectors(folder: Path) -> dict[str, np.ndarray]:
 def test_it_is_small_and_states_its_loss(folder: Path) -> None:
     assert (folder / "lookup.safetensors").stat().st_size <= MOST_BYTES
     arrays = safetensors.numpy.load_file(folder / "lookup.safetensors")
-    assert sum(array.nbytes for array in arrays.values()) == small_of(load()).bytes
+    assert sum(array.nbytes for array in arrays.values()) == make_small_copy(load()).bytes
     data = (folder / "lookup.safetensors").read_bytes()
     header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
     manifest = json.loads(header["__metadata__"]["manifest"])
@@ -122,9 +124,9 @@ def test_it_is_small_and_states_its_loss(folder: Path) -> None:
 
 def test_the_stated_loss_holds_for_other_robots(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("surrogate.export.small_copy._SEED", 91)
-    small = small_of(load())
+    small = make_small_copy(load())
     stated = json.loads(manifest_of(folder))["loss"]
-    for name, figures in losses_of(load(), small).items():
+    for name, figures in measure_losses(load(), small).items():
         assert figures["p95"] < 2 * stated[name]["p95"], name
 
 
@@ -147,7 +149,7 @@ def test_the_reader_in_c_gives_the_vectors(folder: Path) -> None:
 def test_the_reader_in_c_answers_for_all_robots(folder: Path) -> None:
     """In double precision as the table of the same numbers, in single precision nearly."""
     robots = robots_of(1024, 92)
-    wanted = small_of(load()).query(robots)
+    wanted = make_small_copy(load()).query(robots)
     inside = ~load().query({name: robots[name] for name in ROBOT}, flag=True)["outside"]
     found, states = answers(library(folder), robots)
     assert (states[inside] == 0).all()
@@ -197,7 +199,7 @@ def test_the_reader_in_javascript_gives_the_same(folder: Path) -> None:
 
 
 def test_a_table_that_learned_some_tails_only(tmp_path: Path) -> None:
-    save_small(table(), tmp_path)  # three and more tails, two members
+    save_small_copy(table(), tmp_path)  # three and more tails, two members
     made, wanted = library(tmp_path), vectors(tmp_path)
     assert (wanted["N"] > 2).all()
     found, states = answers(made, wanted)
@@ -207,10 +209,10 @@ def test_a_table_that_learned_some_tails_only(tmp_path: Path) -> None:
 
 
 def test_where_the_response_does_not_fit_it_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole: Small = small_of(load())
+    whole: SmallCopy = make_small_copy(load())
     monkeypatch.setattr("surrogate.export.small_copy.MOST_BYTES", 120_000)
-    save_small(load(), tmp_path)
-    less = small_of(load())
+    save_small_copy(load(), tmp_path)
+    less = make_small_copy(load())
     assert whole.has_response
     assert not less.has_response
     lines = (
@@ -223,7 +225,7 @@ def test_where_the_response_does_not_fit_it_is_left_out(tmp_path: Path, monkeypa
     subprocess.run([tmp_path / "only"], check=True)
     monkeypatch.setattr("surrogate.export.small_copy.MOST_BYTES", 30_000)
     with pytest.raises(InputError, match="too large for 30 kB"):
-        small_of(load())
+        make_small_copy(load())
 
 
 def test_the_command_prints_the_loss(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

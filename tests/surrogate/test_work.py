@@ -16,10 +16,9 @@ from torch.utils._pytree import tree_leaves
 
 import surrogate.networks.checkpoints
 from sim.io.errors import InputError
-from surrogate.networks import training_loop as fit
-from surrogate.networks.checkpoints import Checkpoint, Work, device_named, remove_states
+from surrogate.networks.checkpoints import Checkpoint, TrainingContext, device_named, remove_states
 from surrogate.networks.ensemble import Ensemble
-from surrogate.networks.training_loop import Problem, Settings, Watch
+from surrogate.networks.training_loop import Problem, Settings, Watch, _adam, fit
 from tests.surrogate.small import table
 
 SMALL = Settings(width=8, depth=2, members=2, epochs=6, batch=16, iterations=12)
@@ -81,12 +80,12 @@ def problem(count: int = 64) -> tuple[torch.Tensor, torch.Tensor]:
     return x, torch.stack([x[:, 0].sin(), x[:, 1] * x[:, 2]], -1)
 
 
-def trained(work: Work, settings: Settings = SMALL, wanted: torch.Tensor | None = None) -> Ensemble:
+def trained(work: TrainingContext, settings: Settings = SMALL, wanted: torch.Tensor | None = None) -> Ensemble:
     x, y = problem()
     network = Ensemble(
         3, 2, width=settings.width, depth=settings.depth, members=settings.members, seed=settings.seed
     )
-    fit.fit(network, x, (y if wanted is None else wanted,), lambda y, wanted: y - wanted, settings, work)
+    fit(network, x, (y if wanted is None else wanted,), lambda y, wanted: y - wanted, settings, work)
     return network
 
 
@@ -121,26 +120,29 @@ def test_every_state_leads_to_the_same_numbers(stop: int, tmp_path: Path, monkey
 
     monkeypatch.setattr(Checkpoint, "write", stopping)
     with pytest.raises(KeyboardInterrupt):
-        trained(Work(folder=tmp_path))
+        trained(TrainingContext(folder=tmp_path))
     monkeypatch.setattr(Checkpoint, "write", write)
-    resumed, whole = trained(Work(folder=tmp_path)).state_dict(), trained(Work()).state_dict()
+    resumed, whole = (
+        trained(TrainingContext(folder=tmp_path)).state_dict(),
+        trained(TrainingContext()).state_dict(),
+    )
     for name, part in whole.items():
         assert torch.equal(resumed[name], part), name
 
 
 def test_a_state_of_other_data_or_settings_is_not_used(tmp_path: Path) -> None:
-    work = Work(folder=tmp_path)
+    work = TrainingContext(folder=tmp_path)
     trained(work)
     _, y = problem()
     for settings, wanted in ((SMALL, y + 1e-9), (replace(SMALL, epochs=7), y)):
         with_others = trained(work, settings, wanted).state_dict()
-        alone = trained(Work(), settings, wanted).state_dict()
+        alone = trained(TrainingContext(), settings, wanted).state_dict()
         assert all(torch.equal(with_others[name], part) for name, part in alone.items())
     assert len(list(tmp_path.iterdir())) == 3
 
 
 def test_a_broken_state_is_not_used(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    work = Work(folder=tmp_path)
+    work = TrainingContext(folder=tmp_path)
     whole = trained(work).state_dict()
     (state,) = tmp_path.iterdir()
     state.write_bytes(state.read_bytes()[:500])
@@ -151,7 +153,7 @@ def test_a_broken_state_is_not_used(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 def test_states_are_removed_and_nothing_else(tmp_path: Path) -> None:
     folder = tmp_path / "states"
-    trained(Work(folder=folder))
+    trained(TrainingContext(folder=folder))
     (folder / "notes.txt").write_text("mine")
     remove_states(folder)
     assert [file.name for file in folder.iterdir()] == ["notes.txt"]
@@ -180,7 +182,7 @@ def test_no_tensor_of_the_training_stays_on_the_processor() -> None:
     own = Problem(x, (y,), torch.ones(len(x), dtype=x.dtype, device="meta"), lambda y, wanted: y - wanted)
     bar = type("Bar", (), {"disable": True})
     with OneDevice():
-        fit._adam(network, own, SMALL, Watch(own, Checkpoint(None), bar, "%"), {"stage": "start"})
+        _adam(network, own, SMALL, Watch(own, Checkpoint(None), bar, "%"), {"stage": "start"})
         assert own.loss(network.member(1), own.every(), 0.1).device.type == "meta"
         assert own.errors(network, own.every()).device.type == "meta"
     assert {part.device.type for part in network.state_dict().values()} == {"meta"}
@@ -188,7 +190,7 @@ def test_no_tensor_of_the_training_stays_on_the_processor() -> None:
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no CUDA device here")
 def test_training_on_a_cuda_device_ends_like_that_on_the_processor() -> None:
-    here, there = trained(Work()), trained(Work(device="cuda"))
+    here, there = trained(TrainingContext()), trained(TrainingContext(device="cuda"))
     x, _ = problem()
     assert {part.device.type for part in there.state_dict().values()} == {"cpu"}
     assert torch.allclose(here(x), there(x), atol=0.05)

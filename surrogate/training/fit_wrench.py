@@ -1,0 +1,157 @@
+"""Fit the networks of the tails: their mean wrench and the gap between them, from simulated robots.
+
+Samples are steady motions of robots with any heads. The wrench needs no simulation of its own: the head's balance
+gives it from the robot's motion, W = R (v_x, v_z, ω_yr, ω_h, ω_t). So heads may be drawn far wider than
+robots are.
+
+The residual of a sample is the change of the robot's motion that a wrong wrench makes,
+
+    r = K⁻¹ (W_table − W),   relative to v, v_z, ω_yr, ω_h,
+
+where K is the resistance of head and straight tails. So the networks learn what a query asks for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from sim.arrays import Flags, Floats
+from surrogate.networks.checkpoints import TrainingContext
+from surrogate.networks.ensemble import Ensemble
+from surrogate.networks.training_loop import Settings, fit
+from surrogate.table.wrench_table import (
+    CLASSES,
+    WrenchTable,
+    clamp_distance,
+    gap_inputs,
+    motion_sensitivity,
+    network_index,
+)
+from surrogate.wrench.heads import Heads, heads_and_tails
+from surrogate.wrench.tails import (
+    HEAD_SMOOTHNESS,
+    SMOOTHNESS,
+    TYPICAL,
+    Tails,
+    inputs_with_head,
+    straight_wrench,
+    tail_inputs,
+    wrench_slopes,
+)
+
+TURNS = 1.3  # largest |ω_yr/ω_t| that is learned
+_OUTLIER = 10.0  # rows that weigh more than this many times the median weigh only so much
+_GAP = Settings(width=24, depth=2, members=1, epochs=60, iterations=200)
+
+
+class WrenchSamples(NamedTuple):
+    """Simulated steady motions of M robots: what is learned."""
+
+    heads: Heads
+    tails: Tails
+    motion: Tensor  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), positive motor
+    gap: Tensor  # (M,)
+
+    def at(self, rows: Tensor) -> WrenchSamples:
+        """The rows at indices or flags (M',)."""
+        return WrenchSamples(
+            self.heads.at(rows),
+            self.tails.at(rows),
+            self.motion[rows],
+            self.gap[rows],
+        )
+
+
+def wrench_samples(robots: Mapping[str, Floats], motion: Mapping[str, Floats]) -> WrenchSamples:
+    """Rows from columns of robots, effects included, and of their steady motion, each (M,)."""
+    heads, tails = heads_and_tails(robots)
+    found = {name: torch.as_tensor(np.asarray(motion[name]), dtype=torch.float64) for name in
+             ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap")}  # fmt: skip
+    sense, yaw = heads.sense, found["omega_yr_bar"]
+    at_disc = found["v_x"] - yaw * heads.length / 2
+    parts = [
+        sense * at_disc,
+        found["v_z"],
+        sense * yaw,
+        sense * found["omega_h_bar"],
+        sense * found["omega_t_bar"],
+    ]
+    return WrenchSamples(heads, tails, torch.stack(parts, -1), found["tail_gap"])
+
+
+def learnable(rows: WrenchSamples) -> Flags:
+    """Rows that a table may learn, (M,): tails that turn with the motor, faster than the robot yaws."""
+    _, _, yaw, _, spin = rows.motion.unbind(-1)
+    return np.asarray(((spin > 0) & (yaw > 0) & (yaw < TURNS * spin)).numpy())
+
+
+def fit_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext) -> WrenchTable:
+    """Networks of all CLASSES from rows that are `learnable`."""
+    kind = network_index(rows.tails.number)
+    networks: list[Ensemble | None] = []
+    for k, count in enumerate(CLASSES):
+        part = work.part(f"tails of N = {count}{' and more' if count == CLASSES[-1] else ''}")
+        some = rows.at(kind == k)
+        known = len(some.motion) > 0
+        networks.append(_learn_wrench(some, settings, part, count) if known else None)
+    many = rows.at(rows.tails.number > 1)
+    gap = _learn_gap(many, _GAP, work.part("gap"))
+    return WrenchTable(tuple(networks), gap)
+
+
+def _learn_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext, count: int) -> Ensemble:
+    """The network of one of CLASSES."""
+    inputs = (inputs_with_head if count == 1 else tail_inputs)(rows.tails, rows.motion)
+    weight = motion_sensitivity(rows.heads, rows.tails, rows.motion)
+    matrix = weight @ wrench_slopes(rows.tails, rows.motion)
+    wrench = (rows.heads.resistance @ rows.motion[..., None])[..., 0]
+    wanted = (weight @ (wrench - straight_wrench(rows.tails, rows.motion))[..., None])[..., 0]
+    mean, spread = (torch.tensor(part, dtype=torch.float64) for part in TYPICAL)
+    size = torch.linalg.matrix_norm(matrix * spread)
+    share = torch.clamp(_OUTLIER * size.median() / size, max=1.0)
+    network = _new(settings, inputs, outputs=len(mean))
+    _prepare(network, mean, spread, count)
+
+    def residual(y: Tensor, matrix: Tensor, wanted: Tensor) -> Tensor:
+        return (matrix @ y[..., None])[..., 0] - wanted
+
+    fit(network, inputs, (matrix, wanted), residual, settings, work, weights=share, unit="% of their motion")
+    return network
+
+
+def _prepare(network: Ensemble, mean: Tensor, spread: Tensor, count: int) -> None:
+    network.mean.copy_(mean)
+    network.spread.copy_(spread)
+    smoothness = (*SMOOTHNESS, *HEAD_SMOOTHNESS)[: len(network.scale)]
+    network.scale.mul_(torch.tensor(smoothness, dtype=torch.float64) / 1.5)
+    if count == CLASSES[-1]:
+        network.scale[-1] = 1e9  # the head's spin drag plays no part
+
+
+def _new(settings: Settings, inputs: Tensor, outputs: int) -> Ensemble:
+    network = Ensemble(
+        inputs.shape[1], outputs, width=settings.width, depth=settings.depth, members=settings.members,
+        seed=settings.seed,
+    )  # fmt: skip
+    network.shift.copy_(inputs.mean(0))
+    network.scale.copy_(torch.clamp(inputs.std(0), min=1e-6))
+    return network
+
+
+def _learn_gap(rows: WrenchSamples, settings: Settings, work: TrainingContext) -> Ensemble:
+    inputs = gap_inputs(rows.tails, rows.motion)
+    share = rows.gap * 2 * rows.tails.radius / clamp_distance(rows.tails)
+    network = _new(settings, inputs, outputs=1)
+    network.mean.fill_(0.5)
+    network.spread.fill_(0.3)
+
+    def residual(y: Tensor, share: Tensor) -> Tensor:
+        return y - share[:, None]
+
+    fit(network, inputs, (share,), residual, settings, work, unit="% of the distance between the clamps")
+    return network
