@@ -19,7 +19,13 @@ from tests.docs.pages import DOCS, PAGES, ROOT, blocks, name_of
 from tests.planner.compiled import compile_c
 
 RUN = ("sh", "python")
-SLOW = {"tutorial/closing.md", "tutorial/schedule.md", "howto/effect.md", "howto/cluster.md", "howto/tracker.md"}
+SLOW = {
+    "tutorial/calibration.md",
+    "tutorial/schedule.md",
+    "howto/effect.md",
+    "howto/cluster.md",
+    "howto/tracker.md",
+}
 SHOWN = {*RUN, "toml", "text", "c", "js"}
 
 
