@@ -27,7 +27,8 @@ from benchmarks.parallel import in_parallel
 from benchmarks.proportions import per_cent
 from calibration.statistics.residual_tests import TESTABLE
 from calibration.swimmer.measured_table import read_measurements
-from calibration.verdict.calibrate import Verdict, calibrate
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import Verdict
 from sim.arrays import Floats, Integers
 
 TAILS, LENGTH, RPM, DAYS = (2, 3, 4), 9.0, (110.0, 150.0), 3
