@@ -114,7 +114,9 @@ def ways(model: Linear) -> dict[str, Found]:
     generic = base + regress_residual(model.runs, base, sets.used).correction
     results["generic correction"] = Found((), sets.error(generic))
     verdict = calibrate(model, progress=False)
-    named = tuple(frozenset(e.name for e in c.claimed) for c in (*verdict.explaining, *verdict.instead))
+    named = tuple(
+        frozenset(e.name for e in c.claimed) for c in (*verdict.explaining, *verdict.evidence.rival_effects)
+    )
     results["this procedure"] = Found(named, verdict.error_after / verdict.noise_ceiling)
     return results
 
