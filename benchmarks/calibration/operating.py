@@ -147,8 +147,8 @@ def main(count: str = "500", repeats: str = "6", first: str = "0") -> None:
     parts = [
         "## By kind, linear model\n\n" + summary(results, by_level),
         "## By effect, λ = 8, linear model\n\n" + summary(eights, lambda s: s),
-        "## Intervals\n\nHow often a 95 % interval contains the planted value: of effects that were named alone, and "
-        "of the three coefficients where nothing was planted.\n\n"
+        "## Intervals\n\nHow often a 95 % interval contains the planted value: of effects that were named alone, "
+        "and of the three coefficients where nothing was planted.\n\n"
         + "\n".join([heading("case", "intervals", "contain it (95 %)"), *filter(None, coverage)]),
         f"Held-out error over the noise of a run, where the effect was named: median {np.median(named):.3f}, "
         f"95 % of {len(named)} tables below {np.quantile(named, 0.95):.3f}.",
