@@ -50,13 +50,13 @@ class Minimiser:
 
     def step(self) -> bool:
         """One iteration; False where no step along the gradient makes the value smaller."""
-        found = self._search()
-        if found is None and self._matrix is not None:
+        line = self._search()
+        if line is None and self._matrix is not None:
             self._forget()
-            found = self._search()
-        if found is None:
+            line = self._search()
+        if line is None:
             return False
-        length, value, gradient = found
+        length, value, gradient = line
         self._update(length * self._direction, gradient, length)
         self.value, self.gradient = value, gradient
         return True

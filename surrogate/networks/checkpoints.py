@@ -44,10 +44,10 @@ def device_named(name: str) -> str:
     """
     if name not in DEVICES:
         raise InputError(f"device {name}; allowed are {', '.join(DEVICES)}")
-    there = torch.cuda.is_available()
-    if name == "cuda" and not there:
+    has_cuda = torch.cuda.is_available()
+    if name == "cuda" and not has_cuda:
         raise InputError("there is no CUDA device that torch can use; choose the device cpu")
-    return "cuda" if there and name != "cpu" else "cpu"
+    return "cuda" if has_cuda and name != "cpu" else "cpu"
 
 
 @dataclass(frozen=True)
@@ -125,5 +125,5 @@ def _code() -> str:
 
 
 def _hashed(part: Tensor) -> str:
-    whole = part.detach().cpu().contiguous()
-    return hashlib.sha256(f"{whole.dtype} {tuple(whole.shape)}".encode() + whole.numpy().tobytes()).hexdigest()
+    array = part.detach().cpu().contiguous()
+    return hashlib.sha256(f"{array.dtype} {tuple(array.shape)}".encode() + array.numpy().tobytes()).hexdigest()

@@ -63,15 +63,15 @@ def evaluate(network: Packed, x: Floats, y: Floats) -> None:
     """The mean of the members at inputs x (F,), written to y (O,)."""
     inputs, outputs, width = len(x), len(y), network.width
     first, total = (x - network.shift) / network.scale, np.zeros(outputs)
-    hidden, other = np.empty(width), np.empty(width)
+    hidden, next_hidden = np.empty(width), np.empty(width)
     at = 0
     for _ in range(network.members):
         at = _layer(network.numbers, at, first, hidden)
         _tanh(hidden)
         for _ in range(network.depth - 1):
-            at = _layer(network.numbers, at, hidden, other)
-            _tanh(other)
-            hidden, other = other, hidden
+            at = _layer(network.numbers, at, hidden, next_hidden)
+            _tanh(next_hidden)
+            hidden, next_hidden = next_hidden, hidden
         at = _layer(network.numbers, at, hidden, y)
         for i in range(inputs):
             for j in range(outputs):

@@ -57,8 +57,10 @@ class Ensemble(nn.Module):
         """A network of one member: a copy of member k."""
         alone = Ensemble(**{**self.shape, "members": 1}, seed=0).to(self.shift.device)
         state = self.state_dict()
-        own = {name for name, _ in self.named_parameters()}
-        alone.load_state_dict({name: part[k : k + 1] if name in own else part for name, part in state.items()})
+        parameters = {name for name, _ in self.named_parameters()}
+        alone.load_state_dict(
+            {name: part[k : k + 1] if name in parameters else part for name, part in state.items()}
+        )
         return alone
 
     def replace_member(self, k: int, alone: Ensemble) -> None:

@@ -76,8 +76,8 @@ class RobotTable:
         """
         side, before = self._side(columns), np.array(self.before)
         lag, memory, rest, spread = (np.array(getattr(self, name))[side] for name in _CURVES)
-        found, sense = self.query(columns), np.where(side == 0, 1.0, -1.0)
-        twist = twists(found["v_z"], found["v_x"], found["omega_yr_bar"], sense)
+        outputs, sense = self.query(columns), np.where(side == 0, 1.0, -1.0)
+        twist = twists(outputs["v_z"], outputs["v_x"], outputs["omega_yr_bar"], sense)
         speed = net_speeds(twist, lag, memory, before)
         none = np.zeros(len(side), dtype=bool)
         return Responses(lag, memory, rest, spread, speed, none, none, before)
@@ -86,12 +86,12 @@ class RobotTable:
         """0 or 1 for every row, by the direction of its motor."""
         count = len(next(iter(columns.values())))
         for name, values in columns.items():
-            own = self.robot.get(name, 0.0)
+            expected = self.robot.get(name, 0.0)
             given = np.abs(values) if name == "omega_bar" else np.asarray(values, dtype=float)
-            for value in given[~(np.abs(given - own) <= 1e-9 * max(abs(own), 1.0))][:1]:
+            for value in given[~(np.abs(given - expected) <= 1e-9 * max(abs(expected), 1.0))][:1]:
                 raise InputError(
-                    f"{name} = {value:g} is outside this robot's table ({own:g} only); make its own table with "
-                    "softflagella surrogate robot"
+                    f"{name} = {value:g} is outside this robot's table ({expected:g} only); make its own "
+                    "table with softflagella surrogate robot"
                 )
         omega = columns.get("omega_bar", np.ones(count))
         return np.where(np.asarray(omega) < 0, 1, 0)

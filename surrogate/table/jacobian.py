@@ -30,17 +30,17 @@ def slopes(
         motion: their motion, (M, 5).
         parameters: names of columns.
     """
-    found = {name: {p: np.full(len(motion), np.nan) for p in parameters} for name in STEADY_OUTPUTS}
+    derivatives = {name: {p: np.full(len(motion), np.nan) for p in parameters} for name in STEADY_OUTPUTS}
     columns = {name: as_tensor(array) for name, array in values.items()}
     kind = network_index(columns["N"])
     for k, network in enumerate(table.wrench):
         rows = torch.nonzero(kind == k)[:, 0]
         if len(rows) and network is not None:
-            own = {name: array[rows] for name, array in columns.items()}
-            for parameter, changes in _changes(table, network, own, motion[rows, :4], parameters).items():
+            robots = {name: array[rows] for name, array in columns.items()}
+            for parameter, changes in _changes(table, network, robots, motion[rows, :4], parameters).items():
                 for name, change in zip(STEADY_OUTPUTS, changes, strict=True):
-                    found[name][parameter][rows.numpy()] = change.numpy()
-    return found
+                    derivatives[name][parameter][rows.numpy()] = change.numpy()
+    return derivatives
 
 
 def _changes(
@@ -53,16 +53,16 @@ def _changes(
 
     def outputs(moved: dict[str, Tensor]) -> tuple[Tensor, ...]:
         heads, tails = heads_and_tails(moved, keep=parameters)
-        left = unbalanced(heads, tails, u, network)
-        motion = full_motion(heads, u - (inverse @ left[..., None])[..., 0])
+        residual = unbalanced(heads, tails, u, network)
+        motion = full_motion(heads, u - (inverse @ residual[..., None])[..., 0])
         return table.outputs(heads, motion, table.tail_gap(tails, motion))
 
-    found = {}
+    derivatives = {}
     for parameter in parameters:
         size = columns[parameter]
 
-        def along(value: Tensor, name: str = parameter) -> tuple[Tensor, ...]:
+        def outputs_at(value: Tensor, name: str = parameter) -> tuple[Tensor, ...]:
             return outputs({**columns, name: value})
 
-        found[parameter] = torch.func.jvp(along, (size,), (torch.ones_like(size),))[1]
-    return found
+        derivatives[parameter] = torch.func.jvp(outputs_at, (size,), (torch.ones_like(size),))[1]
+    return derivatives

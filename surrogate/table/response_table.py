@@ -58,15 +58,15 @@ class ResponseTable:
     def curves(self, heads: Heads, tails: Tails, motion: Tensor) -> dict[str, Floats]:
         """Lag, memory, rest and spread, each (M, …, 3) as in SHAPES, in l, l, rad, for a positive motor."""
         inputs, speeds = response_inputs(tails, motion), curve_speeds(heads, motion)
-        found = {}
+        curves = {}
         for names, network in zip(PARTS, self.networks, strict=True):
             sizes = [len(self.bases[name].vectors) for name in names]
             for name, components in zip(names, network(inputs).split(sizes, -1), strict=True):
                 curve = self.bases[name].mean + components @ self.bases[name].vectors
                 scaled = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name])
-                found[name] = np.asarray(scaled.numpy())
-        found["spread"] = np.maximum(found["spread"], 0.0)
-        return found
+                curves[name] = np.asarray(scaled.numpy())
+        curves["spread"] = np.maximum(curves["spread"], 0.0)
+        return curves
 
 
 def response_inputs(tails: Tails, motion: Tensor) -> Tensor:

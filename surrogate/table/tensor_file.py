@@ -61,11 +61,11 @@ def read(path: str | Path, version: int, remedy: str) -> dict[str, Any]:
         tensors = safetensors.torch.load(data)
         metadata = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])["__metadata__"]
         manifest = json.loads(metadata["manifest"])
-        found, written, plain = manifest["format"], manifest["hash"], manifest["content"]
+        found_version, written, plain = manifest["format"], manifest["hash"], manifest["content"]
     except (SafetensorError, KeyError, TypeError, ValueError, RecursionError):
         raise InputError(f"{path} is not a model file, or is damaged; {remedy}") from None
-    if found != version:
-        raise InputError(f"{path} has format {str(found)[:20]}, this version reads {version}; {remedy}")
+    if found_version != version:
+        raise InputError(f"{path} has format {str(found_version)[:20]}, this version reads {version}; {remedy}")
     try:
         names: set[str] = set()
         content = _with_tensors(plain, tensors, names)
@@ -85,25 +85,25 @@ def read(path: str | Path, version: int, remedy: str) -> dict[str, Any]:
 
 def digest(content: Any) -> str:
     """Hash of nested dictionaries and lists of tensors and plain values."""
-    found = hashlib.sha256()
+    total = hashlib.sha256()
 
     def take(part: Any) -> None:
         if isinstance(part, Tensor):
-            found.update(str((part.dtype, tuple(part.shape))).encode())
-            found.update(part.detach().contiguous().numpy().tobytes())
+            total.update(str((part.dtype, tuple(part.shape))).encode())
+            total.update(part.detach().contiguous().numpy().tobytes())
         elif isinstance(part, Mapping):
             for key in sorted(part):
-                found.update(json.dumps(key).encode())
+                total.update(json.dumps(key).encode())
                 take(part[key])
         elif isinstance(part, list | tuple):
-            found.update(f"[{len(part)}".encode())
+            total.update(f"[{len(part)}".encode())
             for item in part:
                 take(item)
         else:
-            found.update(json.dumps(part).encode())
+            total.update(json.dumps(part).encode())
 
     take(content)
-    return found.hexdigest()
+    return total.hexdigest()
 
 
 def _text(manifest: Any) -> str:

@@ -70,18 +70,18 @@ class WrenchSamples(NamedTuple):
 def wrench_samples(robots: Mapping[str, Floats], motion: Mapping[str, Floats]) -> WrenchSamples:
     """Rows from columns of robots, effects included, and of their steady motion, each (M,)."""
     heads, tails = heads_and_tails(robots)
-    found = {name: torch.as_tensor(np.asarray(motion[name]), dtype=torch.float64) for name in
+    columns = {name: torch.as_tensor(np.asarray(motion[name]), dtype=torch.float64) for name in
              ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap")}  # fmt: skip
-    sense, yaw = heads.sense, found["omega_yr_bar"]
-    at_disc = found["v_x"] - yaw * heads.length / 2
+    sense, yaw = heads.sense, columns["omega_yr_bar"]
+    at_disc = columns["v_x"] - yaw * heads.length / 2
     parts = [
         sense * at_disc,
-        found["v_z"],
+        columns["v_z"],
         sense * yaw,
-        sense * found["omega_h_bar"],
-        sense * found["omega_t_bar"],
+        sense * columns["omega_h_bar"],
+        sense * columns["omega_t_bar"],
     ]
-    return WrenchSamples(heads, tails, torch.stack(parts, -1), found["tail_gap"])
+    return WrenchSamples(heads, tails, torch.stack(parts, -1), columns["tail_gap"])
 
 
 def learnable(rows: WrenchSamples) -> Flags:
@@ -95,12 +95,12 @@ def fit_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext) -
     kind = network_index(rows.tails.number)
     networks: list[Ensemble | None] = []
     for k, count in enumerate(CLASSES):
-        part = work.part(f"tails of N = {count}{' and more' if count == CLASSES[-1] else ''}")
-        some = rows.at(kind == k)
-        known = len(some.motion) > 0
-        networks.append(_learn_wrench(some, settings, part, count) if known else None)
-    many = rows.at(rows.tails.number > 1)
-    gap = _learn_gap(many, _GAP, work.part("gap"))
+        context = work.part(f"tails of N = {count}{' and more' if count == CLASSES[-1] else ''}")
+        samples = rows.at(kind == k)
+        known = len(samples.motion) > 0
+        networks.append(_learn_wrench(samples, settings, context, count) if known else None)
+    several_tails = rows.at(rows.tails.number > 1)
+    gap = _learn_gap(several_tails, _GAP, work.part("gap"))
     return WrenchTable(tuple(networks), gap)
 
 

@@ -110,7 +110,7 @@ def _row(
 def _regions(robots: dict[str, Floats]) -> list[tuple[str, Flags]]:
     """Robots by N, by thirds of each input's range, near a face and in a corner of the ranges; N > 1."""
     several = robots["N"] > 1
-    found = [(f"N = {count:.0f}", robots["N"] == count) for count in np.unique(robots["N"])]
+    regions = [(f"N = {count:.0f}", robots["N"] == count) for count in np.unique(robots["N"])]
     faces = np.zeros(len(several), dtype=int)
     for name in ROBOT:
         values = np.log(np.abs(robots[name]))
@@ -122,9 +122,9 @@ def _regions(robots: dict[str, Floats]) -> list[tuple[str, Flags]]:
         for third, words in enumerate(("low", "middle", "high")):
             part = several & (share >= third / 3) & (share <= (third + 1) / 3)
             ends = np.exp(low + (high - low) * np.array([third, third + 1]) / 3)
-            found.append((f"{name} {words}: {ends[0]:.3g} to {ends[1]:.3g}", part))
+            regions.append((f"{name} {words}: {ends[0]:.3g} to {ends[1]:.3g}", part))
     return [
-        *found,
+        *regions,
         ("one input or more near its end", several & (faces > 0)),
         ("three or more", several & (faces > 2)),
     ]

@@ -62,7 +62,7 @@ def heads_and_tails(columns: Mapping[str, Floats | Tensor], keep: Collection[str
     """
     tensors = {name: as_tensor(values) for name, values in columns.items()}
     count = tensors.pop("N")
-    own = {name: tensors.pop(name) for name in Groups.__dataclass_fields__ if name in tensors}
+    groups = {name: tensors.pop(name) for name in Groups.__dataclass_fields__ if name in tensors}
     effects = {name: size for name, size in tensors.items() if name in keep or bool((size != 0).any())}
     for name in effects:
         if not needs_no_learning(name):
@@ -71,7 +71,7 @@ def heads_and_tails(columns: Mapping[str, Floats | Tensor], keep: Collection[str
                 "robot a table of its own: softflagella surrogate robot ROBOT.toml --out TABLE.json"
             )
     tails_of_each: Any = count  # a batch of the simulator has one N, formulas take N by row as well
-    body = assemble(Groups(**own, N=tails_of_each, effects=effects))
+    body = assemble(Groups(**groups, N=tails_of_each, effects=effects))
     sense = torch.sign(body.omega)
     mirror = torch.where(sense[:, None] < 0, torch.tensor(_SENSES, dtype=torch.float64), 1.0)
     resistance = body.resistance.permute(2, 0, 1) * mirror[:, :4, None] * mirror[:, None, :]
@@ -90,8 +90,8 @@ def as_tensor(values: Floats | Tensor) -> Tensor:
 
 def needs_no_learning(effect: str) -> bool:
     """Whether an effect enters the balance by algebra: it changes head, disc, motor, or all drag alike."""
-    found = catalogue()[effect]
-    return found.reach == "local" and effect not in _ON_TAILS
+    entry = catalogue()[effect]
+    return entry.reach == "local" and effect not in _ON_TAILS
 
 
 def full_motion(heads: Heads, u: Tensor) -> Tensor:
