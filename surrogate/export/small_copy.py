@@ -61,7 +61,7 @@ class SmallCopy:
         return sum(array.nbytes for array in self.arrays.values())
 
     def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        """What a reader answers, in double precision; with a column `dwell_bar` also the response to flips.
+        """Return what a reader answers, in double precision; with a column `dwell_bar` also the response to flips.
 
         Args:
             columns: robots without effects, each (M,).
@@ -84,7 +84,7 @@ class SmallCopy:
 
 
 def make_small_copy(table: NeuralTable) -> SmallCopy:
-    """The small copy of a table: the most exact one that fits into MOST_BYTES.
+    """Make the small copy of a table: the most exact one that fits into MOST_BYTES.
 
     Raises:
         InputError: no copy fits.
@@ -113,7 +113,7 @@ def make_small_copy(table: NeuralTable) -> SmallCopy:
 
 
 def measure_losses(table: NeuralTable, small: SmallCopy) -> dict[str, dict[str, float]]:
-    """Median and 95th percentile of the small copy's difference from the table, by output.
+    """Measure the median and 95th percentile of the small copy's difference from the table, by output.
 
     Relative as in `surrogate.table.errors`, over random robots of the domain with two tails and more; for one tail
     the names end with "one_tail".
@@ -150,7 +150,7 @@ def make_vectors(table: NeuralTable, small: SmallCopy) -> dict[str, Floats]:
 
 
 def _robots(count: int, seed: int) -> dict[str, Floats]:
-    """Random robots of the domain, every second one with a reversed motor, with dwells."""
+    """Return random robots of the domain, every second one with a reversed motor, with dwells."""
     robots = {
         name: np.array(values) for name, values in draw_robots(count, seed, wide=False).items() if name in ROBOT
     }
@@ -167,7 +167,7 @@ def _figures(apart: Floats) -> dict[str, float]:
 def _arrays(
     name: str, network: Ensemble, *, half: bool, last_exact: bool = False, outputs: int | None = None
 ) -> Arrays:
-    """The numbers of a network of one member, without the axis of members; the first `outputs` only.
+    """Return the numbers of a network of one member, without the axis of members; the first `outputs` only.
 
     Args:
         last_exact: its last layer is in single precision in any case.
@@ -185,7 +185,7 @@ def _arrays(
 
 
 def _curve_arrays(table: NeuralTable) -> Arrays:
-    """Networks and curves of the response to flips with equal dwells."""
+    """Return networks and curves of the response to flips with equal dwells."""
     lag, memory = table.curves.bases["lag"], table.curves.bases["memory"]
     count = min(len(lag.vectors), len(memory.vectors), _MOST_COMPONENTS)
     arrays: Arrays = {}
@@ -200,7 +200,7 @@ def _curve_arrays(table: NeuralTable) -> Arrays:
 
 
 def _at_equal_dwells(flat: Tensor) -> Tensor:
-    """Memories (C, K D 3) where the dwell before is as long as the dwell, (C, D 3)."""
+    """Return memories (C, K D 3) where the dwell before is as long as the dwell, (C, D 3)."""
     whole = flat.reshape(-1, *SHAPES["memory"]).numpy()
     return torch.tensor(at_equal_dwells(whole)).reshape(len(flat), -1)
 
@@ -210,7 +210,7 @@ def network_depth(arrays: Arrays, name: str) -> int:
 
 
 def _network(arrays: Arrays, name: str) -> Ensemble:
-    """The network of a name, in double precision."""
+    """Return the network of a name, in double precision."""
     inputs, outputs = arrays[f"{name}.bypass"].shape
     width = arrays[f"{name}.weights.0"].shape[1]
     network = Ensemble(inputs, outputs, width=width, depth=network_depth(arrays, name), members=1, seed=0)

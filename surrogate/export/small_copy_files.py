@@ -73,7 +73,7 @@ def save_small_copy(table: NeuralTable, folder: str | Path) -> str:
 
 
 def weights_header(table: NeuralTable, small: SmallCopy, losses: Mapping[str, Mapping[str, float]]) -> str:
-    """lookup_weights.h: the numbers as arrays of C."""
+    """Write lookup_weights.h: the numbers as arrays of C."""
     arrays, lines, networks = small.arrays, [], []
     for name, array in arrays.items():
         kind = "float" if array.dtype == np.float32 else "uint16_t"

@@ -34,7 +34,7 @@ State = dict[str, Any]  # tensors and plain values
 
 
 def device_named(name: str) -> str:
-    """The device to train on, "cpu" or "cuda".
+    """Return the device to train on, "cpu" or "cuda".
 
     Args:
         name: one of DEVICES; auto is cuda where there is one.
@@ -59,11 +59,11 @@ class TrainingContext:
     folder: Path | None = None  # of the states; None: none are kept
 
     def part(self, name: str) -> TrainingContext:
-        """The same for one part of the work, named in the title."""
+        """Return the same for one part of the work, named in the title."""
         return replace(self, title=f"{self.title}: {name}" if self.title else "")
 
     def checkpoint(self, network: Mapping[str, Tensor], data: Sequence[Tensor], settings: object) -> Checkpoint:
-        """The place of the state of a network that starts from these numbers."""
+        """Return the place of the state of a network that starts from these numbers."""
         if self.folder is None:
             return Checkpoint(None)
         numbers = [_hashed(part) for part in (*network.values(), *data)]
@@ -94,7 +94,7 @@ class Checkpoint:
         self._next = time.monotonic() + EVERY
 
     def read(self) -> State | None:
-        """The state that was written last; None where there is none that can be read."""
+        """Return the state that was written last; None where there is none that can be read."""
         if self.path is None or not self.path.is_file():
             return None
         try:
@@ -117,7 +117,7 @@ class Checkpoint:
 
 @cache
 def _code() -> str:
-    """Hash of the code that trains, and of what it runs on."""
+    """Return the hash of the code that trains, and of what it runs on."""
     digest = hashlib.sha256(f"{torch.__version__} {platform.machine()}".encode())
     for file in sorted(Path(__file__).parents[1].rglob("*.py")):
         digest.update(file.read_bytes())

@@ -60,7 +60,7 @@ class RobotTable:
         return _digest(asdict(self))[:16]
 
     def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Outputs (M,) of this robot; the sign of `omega_bar` is the direction of the motor.
+        """Return outputs (M,) of this robot; the sign of `omega_bar` is the direction of the motor.
 
         Raises:
             InputError: the columns are another robot's.
@@ -69,7 +69,7 @@ class RobotTable:
         return {name: np.array(values)[side] for name, values in self.steady.items()}
 
     def response(self, columns: Mapping[str, Floats]) -> Responses:
-        """Response of this robot to a flip, for M rows; see `LookupTable.response`.
+        """Return the response of this robot to a flip, for M rows; see `LookupTable.response`.
 
         Raises:
             InputError: the columns are another robot's.
@@ -144,7 +144,7 @@ def _listed(lacking: list[str]) -> str:
 
 
 def _wrong(table: RobotTable) -> str:
-    """What is wrong with the numbers of a table; empty if nothing is."""
+    """Return what is wrong with the numbers of a table; empty if nothing is."""
     for name, shape in _CURVES.items():
         curves = np.array(getattr(table, name), dtype=float)
         wanted = tuple(len(table.before) if size < 0 else size for size in shape)

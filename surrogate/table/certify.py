@@ -20,7 +20,7 @@ _RATES = ("omega_t_bar", "omega_h_bar", "omega_yr_bar")
 
 
 def certified_error(robots: Mapping[str, Floats], answer: Mapping[str, Any]) -> Floats:
-    """Certified relative error of each robot's answer, (M,); NaN where the simulator finds no steady motion."""
+    """Certify the relative error of each robot's answer, (M,); NaN where the simulator finds no steady motion."""
     simulated = steady_columns(robots, title="certify")
     speed = np.hypot(simulated["v_x"], simulated["v_z"])
     apart = [np.abs(answer[name] / simulated[name] - 1) for name in _RATES]

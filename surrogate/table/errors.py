@@ -29,7 +29,7 @@ _UNITS = {"theta_deg": "deg", "lag_psi_rad": "of turn/unit", "v_z": "of speed", 
 
 
 def error_scale(name: str, truth: Columns) -> Floats | float:
-    """The number by which the error of an output is divided."""
+    """Return the number by which the error of an output is divided."""
     if name in RELATIVE:
         return np.abs(truth[name])
     if name == "theta_deg":
@@ -42,13 +42,13 @@ def error_scale(name: str, truth: Columns) -> Floats | float:
 
 
 def relative_errors(answer: Columns, truth: Columns) -> dict[str, Floats]:
-    """Errors of every steady output over its scale, (M,)."""
+    """Return errors of every steady output over its scale, (M,)."""
     with np.errstate(invalid="ignore"):  # one tail has no gap
         return {name: (answer[name] - truth[name]) / error_scale(name, truth) for name in COMPARED}
 
 
 def curve_errors(response: Any, truth: Columns) -> dict[str, Floats]:
-    """Errors of the response, (M, D) over the dwells.
+    """Return errors of the response, (M, D) over the dwells.
 
     Args:
         response: of the table.
@@ -62,7 +62,7 @@ def curve_errors(response: Any, truth: Columns) -> dict[str, Floats]:
 
 
 def summary(errors: Mapping[str, Floats], valid: Flags) -> dict[str, dict[str, float]]:
-    """Figures of errors (M, …) by output; `valid` (M,) marks rows whose tails do not touch."""
+    """Return figures of errors (M, …) by output; `valid` (M,) marks rows whose tails do not touch."""
     report: dict[str, dict[str, float]] = {}
     for name, error in errors.items():
         known = np.isfinite(error)
@@ -83,7 +83,7 @@ def summary(errors: Mapping[str, Floats], valid: Flags) -> dict[str, dict[str, f
 
 
 def coverage(answer: Columns, truth: Columns) -> dict[str, float]:
-    """Share of rows whose true value lies inside the interval, by output."""
+    """Return the share of rows whose true value lies inside the interval, by output."""
     shares = {}
     for name in COMPARED:
         if f"{name}_low" in answer:
@@ -94,7 +94,7 @@ def coverage(answer: Columns, truth: Columns) -> dict[str, float]:
 
 
 def shortcomings(errors: Errors) -> list[str]:
-    """What is poor about a table, in words; nothing where it is good enough to plan with."""
+    """List warnings about a table that is too inaccurate for planning."""
     warnings = []
     for name, words in (("omega_yr_bar", "the yaw rate"), ("net_speed_bar", "the net speed")):
         error = errors.get(name)
@@ -107,7 +107,7 @@ def shortcomings(errors: Errors) -> list[str]:
 
 
 def error_table(errors: Errors) -> str:
-    """The held-out errors as text."""
+    """Format the held-out errors as text."""
     lines = [f"{'output':16}{'rms':>9}{'median':>9}{'95 %':>9}{'largest':>9}{'95 %, all':>11}"]
     for name, error in errors.items():
         percent = 1 if name == "theta_deg" else 100

@@ -44,7 +44,7 @@ class Intervals:
     factor: Mapping[str, Tensor]  # output -> q of each part, (PARTS,)
 
     def half_widths(self, name: str, features: Tensor, sizes: Tensor) -> Tensor:
-        """Half of the width of the interval of one output, (M,).
+        """Return half of the width of the interval of one output, (M,).
 
         Args:
             features: (M, F), see `surrogate.table.lookup`.
@@ -53,7 +53,7 @@ class Intervals:
         return self.factor[name][self.part(features)] * self._local(name, features) * sizes
 
     def part(self, features: Tensor) -> Tensor:
-        """Which part each robot belongs to, (M,): 0 to 7 for octants, 8 for one tail."""
+        """Return which part each robot belongs to, (M,): 0 to 7 for octants, 8 for one tail."""
         high = (features[:, list(_HALVED)] > self.middle).long()
         octant = (high * 2 ** torch.arange(len(_HALVED))).sum(1)
         return torch.where(features[:, _ONE_TAIL] > 0.5, PARTS - 1, octant)
@@ -66,7 +66,7 @@ class Intervals:
     def learned(
         features: Tensor, errors: Mapping[str, Tensor], more_features: Tensor, more_errors: Mapping[str, Tensor]
     ) -> Intervals:
-        """From relative errors by output, (M,), of robots for s and of more robots, (M',), for q."""
+        """Learn from relative errors by output, (M,), of robots for s and of more robots, (M',), for q."""
         shift, scale = features.mean(0), torch.clamp(features.std(0), min=1e-6)
         design = _design((features - shift) / scale)
         weights, bounds, factor = {}, {}, {}
@@ -107,7 +107,7 @@ def _design(x: Tensor) -> Tensor:
 
 
 def _conformal_quantile(scores: Tensor) -> float:
-    """The smallest score that covers a new row with a probability of at least COVERAGE."""
+    """Return the smallest score that covers a new row with a probability of at least COVERAGE."""
     count = len(scores)
     if not count:
         return math.inf

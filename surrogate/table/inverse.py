@@ -39,7 +39,7 @@ class Solutions:
 def inverse(
     lookup: NeuralTable, robots: Mapping[str, Floats], targets: Mapping[str, Floats], bounds: Bounds
 ) -> Solutions:
-    """Inputs that give wanted outputs.
+    """Find inputs that give wanted outputs.
 
     Args:
         lookup: the table.
@@ -83,7 +83,7 @@ def inverse(
 
 
 def _sizes(targets: Mapping[str, Floats]) -> dict[str, Floats]:
-    """What misfits are relative to: themselves where the speed is not among the targets."""
+    """Return what misfits are relative to: themselves where the speed is not among the targets."""
     sizes = {}
     for name, value in targets.items():
         try:
@@ -96,7 +96,7 @@ def _sizes(targets: Mapping[str, Floats]) -> dict[str, Floats]:
 def _least_squares(
     misfits: Callable[[Floats], tuple[Floats, Floats, Floats]], p: Floats, low: Floats, high: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Levenberg and Marquardt for all rows of p (B, F) at once, within bounds."""
+    """Minimise by Levenberg and Marquardt's method, for all rows of p (B, F) at once, within bounds."""
     damping = np.full(len(p), 1e-2)
     residual, J, outside = misfits(p)
     for _ in range(_STEPS):

@@ -22,7 +22,7 @@ from surrogate.wrench.heads import as_tensor, full_motion, heads_and_tails, unba
 def slopes(
     table: WrenchTable, values: Mapping[str, Floats], motion: Tensor, parameters: Sequence[str]
 ) -> dict[str, dict[str, Floats]]:
-    """∂(output)/∂(parameter), each (M,), of robots that the table solved.
+    """Return ∂(output)/∂(parameter), each (M,), of robots that the table solved.
 
     Args:
         table: of the tails.
@@ -46,7 +46,7 @@ def slopes(
 def _changes(
     table: WrenchTable, network: Ensemble, columns: dict[str, Tensor], u: Tensor, parameters: Sequence[str]
 ) -> dict[str, tuple[Tensor, ...]]:
-    """Derivatives of STEADY_OUTPUTS by parameter, of robots with one network and the solution u (M, 4)."""
+    """Return derivatives of STEADY_OUTPUTS by parameter, of robots with one network and the solution u (M, 4)."""
     heads, tails = heads_and_tails(columns, keep=parameters)
     _, slope = value_and_slope(lambda v: unbalanced(heads, tails, v, network), u)
     inverse = torch.linalg.inv_ex(slope)[0]

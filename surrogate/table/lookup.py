@@ -94,7 +94,7 @@ class NeuralTable:
     def query(
         self, columns: Mapping[str, Floats], *, intervals: bool = False, flag: bool = False, certify: bool = False
     ) -> dict[str, Any]:
-        """Predicted outputs, each (M,); with a column `dwell_bar` also RESPONSE_OUTPUTS for equal dwells.
+        """Predict outputs, each (M,); with a column `dwell_bar` also RESPONSE_OUTPUTS for equal dwells.
 
         Args:
             columns: robots by column name, each (M,).
@@ -125,7 +125,7 @@ class NeuralTable:
         return result
 
     def response(self, columns: Mapping[str, Floats], *, flag: bool = False) -> Responses:
-        """Response to a flip of the motor, see `surrogate.interface.LookupTable.response`.
+        """Return the response to a flip of the motor, see `surrogate.interface.LookupTable.response`.
 
         Raises:
             InputError: a robot that cannot be, one outside the domain, or one whose left and right turns differ.
@@ -138,7 +138,7 @@ class NeuralTable:
     def jacobian(
         self, columns: Mapping[str, Floats], parameters: Sequence[str], *, flag: bool = False
     ) -> dict[str, dict[str, Floats]]:
-        """∂(output)/∂(parameter) of STEADY_OUTPUTS, by output and parameter, each (M,).
+        """Return ∂(output)/∂(parameter) of STEADY_OUTPUTS, by output and parameter, each (M,).
 
         Exact derivatives of the table: those of one more step of Newton's method at the solution.
 
@@ -154,7 +154,7 @@ class NeuralTable:
         return slopes(self.tails, values, self.motions(values, flag=flag).motion, parameters)
 
     def motions(self, values: Mapping[str, Floats], *, flag: bool = False) -> Motions:
-        """Motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
+        """Return the motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
         heads, tails = heads_and_tails(values)
         motion, converged = self.tails.solve(heads, tails)
         inputs = inputs_rows(pack_tails(tails), motion)
@@ -166,7 +166,7 @@ class NeuralTable:
         return Motions(heads, tails, torch.from_numpy(motion), inputs, reasons)
 
     def width_features(self, motions: Motions) -> Tensor:
-        """What the width of an interval may depend on, (M, 11)."""
+        """Return what the width of an interval may depend on, (M, 11)."""
         heads, tails, motion = motions.heads, motions.tails, motions.motion
         inputs = torch.from_numpy(motions.inputs)
         novelty, spread = torch.zeros(len(motion)).double(), torch.zeros(len(motion)).double()
@@ -200,7 +200,7 @@ class NeuralTable:
         return added
 
     def _within_ranges(self, values: Mapping[str, Floats]) -> Flags:
-        """Whether tails and motor speed are within the learned ranges; heads may be any."""
+        """Return whether tails and motor speed are within the learned ranges; heads may be any."""
         within = np.ones(len(values["N"]), dtype=bool)
         for name in _NOT_OF_HEAD:
             low, high = self.ranges[name]
@@ -255,7 +255,7 @@ def _check_flips(values: Mapping[str, Floats]) -> None:
 
 
 def steady_outputs(motions: Motions, tails: WrenchTable) -> dict[str, Floats]:
-    """STEADY_OUTPUTS of motions."""
+    """Return STEADY_OUTPUTS of motions."""
     values = tails.outputs(motions.heads, motions.motion, tails.quick_gap(motions.tails, motions.inputs))
     return {name: np.asarray(value.numpy()) for name, value in zip(STEADY_OUTPUTS, values, strict=True)}
 
@@ -273,7 +273,7 @@ def _checked_dwells(dwells: Floats) -> Floats:
 def _at_dwells(
     response: Responses, steady: Mapping[str, Floats], dwells: Floats, sense: Floats
 ) -> dict[str, Floats]:
-    """RESPONSE_OUTPUTS at one dwell for each robot, when all dwells are equal."""
+    """Return RESPONSE_OUTPUTS at one dwell for each robot, when all dwells are equal."""
     curves = response.lag + at_equal_dwells(response.memory)
     lag = between_dwells(curves, dwells)
     twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
@@ -282,7 +282,7 @@ def _at_dwells(
 
 
 def table_content(lookup: NeuralTable) -> dict[str, Any]:
-    """A table as nested dictionaries and lists of tensors and plain values."""
+    """Return a table as nested dictionaries and lists of tensors and plain values."""
     intervals = lookup.intervals
     return {
         "wrench": [None if network is None else _stored(network) for network in lookup.tails.wrench],
@@ -303,7 +303,7 @@ def _stored(network: Ensemble) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Mappings as dictionaries, and pairs as lists."""
+    """Return mappings as dictionaries, and pairs as lists."""
     if isinstance(value, Tensor):
         return value
     return {name: list(part) if isinstance(part, tuple) else part for name, part in dict(value).items()}

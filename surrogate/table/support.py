@@ -37,7 +37,7 @@ class Support:
 
     @staticmethod
     def learned(inputs: Tensor) -> Support:
-        """The support of rows (M, F)."""
+        """Learn the support of rows (M, F)."""
         low, high = inputs.min(0).values, inputs.max(0).values
         shift, scale = (low + high) / 2, torch.clamp((high - low) / 2, min=1e-6)
         features = _monomials((inputs - shift) / scale)
@@ -48,7 +48,7 @@ class Support:
         return Support(shift, scale, plain.factor, limit)
 
     def novelty(self, inputs: Floats) -> Floats:
-        """q over its limit, (M,), at inputs (M, F): at most 1 inside."""
+        """Return q over its limit, (M,), at inputs (M, F): at most 1 inside."""
         shift, scale, factor = (np.asarray(part.numpy()) for part in (self.shift, self.scale, self.factor))
         return _novelty_rows(shift, scale, factor, *_products(len(shift)), inputs) / self.limit
 
@@ -69,7 +69,7 @@ def _products(inputs: int) -> tuple[Integers, Integers]:
 
 
 def _monomials(x: Tensor) -> Tensor:
-    """All monomials up to DEGREE of x (M, F), (M, P)."""
+    """Return all monomials up to DEGREE of x (M, F), (M, P)."""
     columns = [torch.ones_like(x[:, 0])]
     for parent, factor in list(zip(*_products(x.shape[1]), strict=True))[1:]:
         columns.append(columns[parent] * x[:, factor])
@@ -80,7 +80,7 @@ def _monomials(x: Tensor) -> Tensor:
 def _novelty_rows(
     shift: Floats, scale: Floats, factor: Floats, parents: Integers, last: Integers, inputs: Floats
 ) -> Floats:
-    """q of the module's head, (M,), at inputs (M, F)."""
+    """Return q of the module's head, (M,), at inputs (M, F)."""
     novelty, count = np.zeros(len(inputs)), len(parents)
     features, solved = np.ones(count), np.empty(count)
     for row in range(len(inputs)):

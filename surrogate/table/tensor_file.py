@@ -38,7 +38,7 @@ def write(path: str | Path, content: Mapping[str, Any], version: int) -> None:
 
 
 def packed(content: Mapping[str, Any], version: int) -> bytes:
-    """The bytes of a file."""
+    """Return the bytes of a file."""
     tensors: dict[str, Tensor] = {}
     plain = _without_tensors(content, "", tensors)
     manifest = {"format": version, "hash": digest(content), "content": plain}
@@ -46,7 +46,7 @@ def packed(content: Mapping[str, Any], version: int) -> bytes:
 
 
 def read(path: str | Path, version: int, remedy: str) -> dict[str, Any]:
-    """The content of a file.
+    """Read the content of a file.
 
     Raises:
         InputError: the file is of another kind or version, or was changed after it was written.
@@ -84,7 +84,7 @@ def read(path: str | Path, version: int, remedy: str) -> dict[str, Any]:
 
 
 def digest(content: Any) -> str:
-    """Hash of nested dictionaries and lists of tensors and plain values."""
+    """Return the hash of nested dictionaries and lists of tensors and plain values."""
     total = hashlib.sha256()
 
     def take(part: Any) -> None:
@@ -111,7 +111,7 @@ def _text(manifest: Any) -> str:
 
 
 def _without_tensors(part: Any, name: str, tensors: dict[str, Tensor]) -> Any:
-    """`part` as JSON; its tensors are put into `tensors` under their places."""
+    """Return `part` as JSON; its tensors are put into `tensors` under their places."""
     if isinstance(part, Tensor):
         tensors[name] = part.detach().to("cpu", copy=True, memory_format=torch.contiguous_format)
         return {_REFERENCE: name}
@@ -123,7 +123,7 @@ def _without_tensors(part: Any, name: str, tensors: dict[str, Tensor]) -> Any:
 
 
 def _with_tensors(part: Any, tensors: Mapping[str, Tensor], names: set[str]) -> Any:
-    """The content again; the names of its tensors are put into `names`."""
+    """Rebuild the content; the names of its tensors are put into `names`."""
     if isinstance(part, dict) and set(part) == {_REFERENCE}:
         names.add(part[_REFERENCE])
         return tensors[part[_REFERENCE]]

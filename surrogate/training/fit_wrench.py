@@ -58,7 +58,7 @@ class WrenchSamples(NamedTuple):
     gap: Tensor  # (M,)
 
     def at(self, rows: Tensor) -> WrenchSamples:
-        """The rows at indices or flags (M',)."""
+        """Return the rows at indices or flags (M',)."""
         return WrenchSamples(
             self.heads.at(rows),
             self.tails.at(rows),
@@ -68,7 +68,7 @@ class WrenchSamples(NamedTuple):
 
 
 def wrench_samples(robots: Mapping[str, Floats], motion: Mapping[str, Floats]) -> WrenchSamples:
-    """Rows from columns of robots, effects included, and of their steady motion, each (M,)."""
+    """Return samples from columns of robots, effects included, and of their steady motion, each (M,)."""
     heads, tails = heads_and_tails(robots)
     columns = {name: torch.as_tensor(np.asarray(motion[name]), dtype=torch.float64) for name in
              ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap")}  # fmt: skip
@@ -85,13 +85,13 @@ def wrench_samples(robots: Mapping[str, Floats], motion: Mapping[str, Floats]) -
 
 
 def learnable(rows: WrenchSamples) -> Flags:
-    """Rows that a table may learn, (M,): tails that turn with the motor, faster than the robot yaws."""
+    """Return rows that a table may learn, (M,): tails that turn with the motor, faster than the robot yaws."""
     _, _, yaw, _, spin = rows.motion.unbind(-1)
     return np.asarray(((spin > 0) & (yaw > 0) & (yaw < TURNS * spin)).numpy())
 
 
 def fit_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext) -> WrenchTable:
-    """Networks of all CLASSES from rows that are `learnable`."""
+    """Fit the networks of all CLASSES to samples that are `learnable`."""
     kind = network_index(rows.tails.number)
     networks: list[Ensemble | None] = []
     for k, count in enumerate(CLASSES):
@@ -105,7 +105,7 @@ def fit_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext) -
 
 
 def _learn_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext, count: int) -> Ensemble:
-    """The network of one of CLASSES."""
+    """Fit the network of one of CLASSES."""
     inputs = (inputs_with_head if count == 1 else tail_inputs)(rows.tails, rows.motion)
     weight = motion_sensitivity(rows.heads, rows.tails, rows.motion)
     matrix = weight @ wrench_slopes(rows.tails, rows.motion)

@@ -44,19 +44,19 @@ class SimulatedRobots:
         return len(self.robots["N"])
 
     def at(self, rows: Flags | Integers) -> SimulatedRobots:
-        """The robots at indices or flags."""
+        """Return the robots at indices or flags."""
         parts = [{name: array[rows] for name, array in part.items()} for part in vars(self).values()]
         return SimulatedRobots(*parts)
 
     def with_curves(self) -> SimulatedRobots:
-        """The robots whose response was simulated."""
+        """Return the robots whose response was simulated."""
         if not self.curves:
             return self.at(np.zeros(len(self), dtype=bool))
         return self.at(np.flatnonzero(np.isfinite(self.curves["lag"]).all((1, 2))))
 
 
 def read_robots(folder: str) -> tuple[SimulatedRobots, Integers]:
-    """Usable rows of a data set's folder, and their numbers.
+    """Read the usable rows of a data set's folder, and their numbers.
 
     Raises:
         InputError: there is no finished data set.
@@ -71,7 +71,7 @@ def read_robots(folder: str) -> tuple[SimulatedRobots, Integers]:
 
 
 def join_robots(parts: Sequence[SimulatedRobots]) -> SimulatedRobots:
-    """The robots of all parts; effects that some do not have are at their null there."""
+    """Join the robots of all parts; effects that some do not have are at their null there."""
     effects = {name for part in parts for name in part.robots if name in catalogue()}
     full = [
         {**{name: np.full(len(part), catalogue()[name].null) for name in sorted(effects)}, **part.robots}
@@ -85,7 +85,7 @@ def join_robots(parts: Sequence[SimulatedRobots]) -> SimulatedRobots:
 
 
 def _curves_in(table: pd.DataFrame) -> dict[str, Floats]:
-    """Response curves from lists in columns `lag_z`, …, `memory_psi_rad`; empty if there are none."""
+    """Return the response curves from lists in columns `lag_z`, …, `memory_psi_rad`; empty if there are none."""
     if "memory_z" not in table:
         return {}
     dwells, before = len(DWELLS), len(BEFORE)
@@ -103,7 +103,7 @@ def _lists(column: Any, shape: Sequence[int]) -> Floats:
 
 
 def draw_robots(count: int, seed: int, *, wide: bool) -> dict[str, Floats]:
-    """Robots of a scrambled Sobol sequence, even in the logarithms of DOMAIN.
+    """Draw robots of a scrambled Sobol sequence, even in the logarithms of DOMAIN.
 
     Args:
         count: number of robots. seed: of the scrambling. wide: from WIDE, half of them with effects on the head,

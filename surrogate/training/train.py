@@ -56,7 +56,7 @@ def train(
     device: str = "cpu",
     states: str | Path | None = None,
 ) -> NeuralTable:
-    """A look-up table from a finished data set, or from several.
+    """Train a look-up table on a finished data set, or on several.
 
     Args:
         folder: data set written by `softflagella sweep`, or several. A row that is in two of them counts once.
@@ -95,14 +95,14 @@ def train(
 
 
 def held_out(folder: str | Sequence[str]) -> SimulatedRobots:
-    """The rows of data sets that `train` holds out."""
+    """Return the rows of data sets that `train` holds out."""
     folders = [folder] if isinstance(folder, str) else list(folder)
     rows, numbers = _together(folders, [read_manifest(one) for one in folders])
     return rows.at(split(numbers) == 2)
 
 
 def _together(folders: Sequence[str], manifests: Sequence[dict[str, Any]]) -> tuple[SimulatedRobots, Integers]:
-    """Rows of several data sets and their numbers; the same point of the same sequence counts once."""
+    """Return rows of several data sets and their numbers; the same point of the same sequence counts once."""
     parts, numbers, seen = [], [], dict[str, Integers]()
     for folder, manifest in zip(folders, manifests, strict=True):
         part, number = read_robots(folder)
@@ -127,7 +127,7 @@ def learn(
     source: dict[str, Any] | None = None,
     work: TrainingContext = _QUIET,
 ) -> NeuralTable:
-    """A look-up table from simulated robots.
+    """Train a look-up table on simulated robots.
 
     Args:
         learned: steady motions for the tails.
@@ -179,7 +179,7 @@ def learn(
 def _judged(
     lookup: NeuralTable, width_rows: SimulatedRobots, held_out: SimulatedRobots, flips: SimulatedRobots
 ) -> NeuralTable:
-    """The table with its intervals and held-out errors; the errors are those of robots with two tails and more."""
+    """Add intervals and held-out errors to a table; the errors are those of robots with two tails and more."""
     (first_features, first, _), (features, errors, inside) = (
         _errors(lookup, rows) for rows in (width_rows, held_out)
     )
@@ -196,7 +196,7 @@ def _judged(
 
 
 def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[torch.Tensor, dict[str, torch.Tensor], Floats]:
-    """Features and relative errors of rows inside the domain, and which those are."""
+    """Return features and relative errors of rows inside the domain, and which those are."""
     motions = lookup.motions(rows.robots, flag=True)
     inside = np.array([not reason for reason in motions.reason])
     if inside.sum() < _FEWEST_INSIDE:  # a table of few rows has a domain that holds hardly any others: all count
@@ -211,12 +211,12 @@ def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[torch.Tensor, d
 
 
 def _several_tails(rows: SimulatedRobots) -> SimulatedRobots:
-    """Rows with two or more tails: the response of one tail depends too much on the phase of the disc."""
+    """Return rows with two or more tails: the response of one tail depends too much on the phase of the disc."""
     return rows.at(rows.robots["N"] > 1)
 
 
 def with_radius(motion: dict[str, Floats]) -> dict[str, Floats]:
-    """The motion with turn radius and slip angle."""
+    """Return the motion with turn radius and slip angle."""
     speed = np.hypot(motion["v_x"], motion["v_z"])
     angle = np.degrees(np.arctan2(np.abs(motion["v_x"]), motion["v_z"]))
     return {**motion, "R_yr_over_l": speed / np.abs(motion["omega_yr_bar"]), "theta_deg": angle}

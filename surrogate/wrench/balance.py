@@ -53,7 +53,7 @@ def solve_rows(network: Packed, heads: Floats, resistances: Floats, tails: Float
 
 @compiled
 def inputs_rows(tails: Floats, motions: Floats) -> Floats:
-    """`surrogate.wrench.tails.tail_inputs`, (M, 7), of tails (M, 13) that move so (M, 5)."""
+    """Return `surrogate.wrench.tails.tail_inputs`, (M, 7), of tails (M, 13) that move so (M, 5)."""
     x = np.empty((len(tails), 7))
     for row in range(len(tails)):
         inputs_at(tails[row], motions[row], x[row])
@@ -62,7 +62,7 @@ def inputs_rows(tails: Floats, motions: Floats) -> Floats:
 
 @compiled
 def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
-    """`surrogate.wrench.tails.tail_inputs` of one robot, written to x (7,), or `inputs_with_head`, to x (14,)."""
+    """Write `surrogate.wrench.tails.tail_inputs` of one robot to x (7,), or `inputs_with_head` to x (14,)."""
     v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
     drag_number = tail[0] * spin
     deflection = np.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
@@ -81,7 +81,7 @@ def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
 def _unbalanced(
     head: Floats, resistance: Floats, tail: Floats, motion: Floats, y: Floats, residual: Floats
 ) -> None:
-    """`surrogate.wrench.heads.unbalanced` for numbers y of the tails, written to left (4,)."""
+    """Write `surrogate.wrench.heads.unbalanced` for numbers y of the tails to residual (4,)."""
     v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
     perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
     S = perp * spin
@@ -102,7 +102,7 @@ def _unbalanced(
 
 @compiled
 def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats) -> None:
-    """The motion with the torque and thrust of linear theory and the side forces of straight tails."""
+    """Write the motion with the torque and thrust of linear theory and the side forces of straight tails."""
     speed, gain = head[0], head[1]
     perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
     spin = _FIRST_SPIN * speed
@@ -128,7 +128,7 @@ def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats)
 def _solve(
     network: Packed, head: Floats, resistance: Floats, tail: Floats, y: Floats, motion: Floats, exact: bool
 ) -> bool:
-    """Broyden's method for one robot, from the motion given; returns whether it converged.
+    """Solve by Broyden's method for one robot, from the motion given; return whether it converged.
 
     Args:
         y: room for the network's numbers, (6,).
@@ -189,7 +189,7 @@ def _solve(
 
 @compiled
 def _update(inverse: Floats, step: Floats, change: Floats) -> None:
-    """The inverse of the derivative after a step that changed the balance so (Broyden's good update)."""
+    """Update the inverse of the derivative after a step that changed the balance so (Broyden's good update)."""
     predicted, along = np.zeros(4), np.zeros(4)
     for i in range(4):
         for j in range(4):
