@@ -88,7 +88,7 @@ def along_axes(speeds: Tensor, shape: tuple[int, ...]) -> Tensor:
 
 
 def between_dwells(curves: Floats, dwells: Floats) -> Floats:
-    """Interpolate curves (M, D, 3) at a dwell for each row (M,): cubic in ln T̄ through four knots, then constant."""
+    """Interpolate curves (M, D, 3), one dwell a row (M,): cubic in ln T̄ through four knots, then constant."""
     knots = np.log(DWELLS)
     place = np.log(np.minimum(dwells, DWELLS[-1]))
     first = np.clip(np.searchsorted(knots, place) - 2, 0, len(knots) - 4)
