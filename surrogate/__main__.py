@@ -84,9 +84,9 @@ def _query(arguments: Namespace) -> None:
         result = table.query(columns, intervals=True, flag=arguments.flag, certify=arguments.certify)
     else:
         result = table.query(columns)
-    found = pd.concat([points, pd.DataFrame(result)], axis=1)
-    write_csv(found, arguments.out)
-    print(f"{len(found)} rows -> {arguments.out}")
+    answers = pd.concat([points, pd.DataFrame(result)], axis=1)
+    write_csv(answers, arguments.out)
+    print(f"{len(answers)} rows -> {arguments.out}")
 
 
 @program.command(
@@ -117,9 +117,15 @@ def _inverse(arguments: Namespace) -> None:
     if not targets:
         raise InputError(f"{arguments.targets} has no outputs; give at least one of {', '.join(STEADY_OUTPUTS)}")
     robots = {name: array for name, array in columns.items() if name not in targets}
-    found = inverse(load(arguments.model), robots, targets, {name: BOUNDS[name] for name in names})
+    bounds = {name: BOUNDS[name] for name in names}
+    solutions = inverse(load(arguments.model), robots, targets, bounds)
     table = pd.DataFrame(
-        {"target": found.target + 1, **found.inputs, "misfit": found.misfit, "outside": found.outside}
+        {
+            "target": solutions.target + 1,
+            **solutions.inputs,
+            "misfit": solutions.misfit,
+            "outside": solutions.outside,
+        }
     )
     write_csv(table, arguments.out)
     print(f"{len(table)} solutions of {len(points)} targets -> {arguments.out}")

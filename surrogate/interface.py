@@ -39,7 +39,7 @@ class LookupTable(Protocol):
         ...
 
     def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Outputs, each (M,), of robots given by column name, each (M,).
+        """Return outputs, each (M,), of robots given by column name, each (M,).
 
         They are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`, `theta_deg` and
         `tail_gap`.
@@ -50,7 +50,7 @@ class LookupTable(Protocol):
         ...
 
     def response(self, columns: Mapping[str, Floats]) -> Responses:
-        """Response to a flip of the motor, as `sim.motion.response.responses` would simulate it.
+        """Return the response to a flip of the motor, as `sim.motion.response.responses` would simulate it.
 
         Args:
             columns: robots by column name, each (M,); the sign of `omega_bar` is the direction after the flip.

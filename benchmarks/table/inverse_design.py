@@ -15,12 +15,13 @@ import time
 import numpy as np
 import torch
 
+from benchmarks.table.shipped_table import as_reached
 from sim.motion.batches import steady_columns
 from surrogate.input_ranges import BOUNDS, COEFFICIENTS, ROBOT
 from surrogate.table.inverse import inverse
 from surrogate.table.lookup import OUTSIDE, NeuralTable
 from surrogate.table.model_file import load
-from surrogate.training.simulated import SimulatedRobots, as_reached, draw_robots
+from surrogate.training.simulated import SimulatedRobots, draw_robots
 from surrogate.training.train import with_radius
 
 KINDS = {  # free inputs, and the outputs that are given

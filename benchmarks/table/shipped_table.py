@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -23,14 +23,15 @@ import numpy as np
 from dataset.report.figures import plain_logarithms
 from dataset.storage.data_set import read_manifest
 from sim.arrays import Floats
+from sim.motion.batches import steady_columns
 from surrogate.networks.checkpoints import TrainingContext, remove_states
 from surrogate.networks.training_loop import Settings
 from surrogate.table.errors import coverage, curve_errors, error_table, relative_errors, summary
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load, save
 from surrogate.training.simulated import (
+    MOTION,
     SimulatedRobots,
-    as_reached,
     draw_robots,
     join_robots,
     read_robots,
@@ -143,6 +144,13 @@ def draw(lookup: NeuralTable, rows: SimulatedRobots, path: str) -> None:
     axes.set_ylabel("error of the yaw rate [%]")
     axes.legend(frameon=False, markerscale=4)
     figure.savefig(path, dpi=100)
+
+
+def as_reached(robots: Mapping[str, Floats], *, title: str = "") -> SimulatedRobots:
+    """Simulate robots as a data set does: the motion that straight tails reach, if it is steady."""
+    columns = steady_columns(robots, title=title)
+    reached = SimulatedRobots(dict(robots), {name: columns[name] for name in MOTION}, {})
+    return reached.at(np.asarray(columns["converged"], dtype=bool))
 
 
 def main(*words: str) -> None:

@@ -61,22 +61,22 @@ class SmallCopy:
         return sum(array.nbytes for array in self.arrays.values())
 
     def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        """What a reader answers, in double precision; with a column `dwell_bar` also the response to flips.
+        """Return what a reader answers, in double precision; with a column `dwell_bar` also the response to flips.
 
         Args:
             columns: robots without effects, each (M,).
         """
         values = check_columns({name: array for name, array in columns.items() if name != DWELL})
-        found = self.table.motions(values, flag=True)
-        result = steady_outputs(found, self.table.tails)
+        motions = self.table.motions(values, flag=True)
+        result = steady_outputs(motions, self.table.tails)
         if DWELL in columns and self.has_response:
-            inputs = response_inputs(found.tails, found.motion)
+            inputs = response_inputs(motions.tails, motions.motion)
             parts = [_network(self.arrays, name)(inputs) for name in NETWORKS[4:]]
             mean, basis = (torch.tensor(self.arrays[f"curves.{name}"]).double() for name in ("mean", "basis"))
             flat = (mean + torch.cat(parts, -1) @ basis).reshape(-1, len(DWELLS), 3)
-            lag = (flat * curve_speeds(found.heads, found.motion)[:, None, :]).numpy()
+            lag = (flat * curve_speeds(motions.heads, motions.motion)[:, None, :]).numpy()
             lag = between_dwells(lag, columns[DWELL])
-            twist = twists(result["v_z"], result["v_x"], result["omega_yr_bar"], found.heads.sense.numpy())
+            twist = twists(result["v_z"], result["v_x"], result["omega_yr_bar"], motions.heads.sense.numpy())
             speed = planar.net_speed(twist, lag, columns[DWELL])
             answers = zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True)
             result |= {name: np.where(values["N"] > 1, answer, np.nan) for name, answer in answers}
@@ -84,7 +84,7 @@ class SmallCopy:
 
 
 def make_small_copy(table: NeuralTable) -> SmallCopy:
-    """The small copy of a table: the most exact one that fits into MOST_BYTES.
+    """Make the small copy of a table: the most exact one that fits into MOST_BYTES.
 
     Raises:
         InputError: no copy fits.
@@ -113,25 +113,30 @@ def make_small_copy(table: NeuralTable) -> SmallCopy:
 
 
 def measure_losses(table: NeuralTable, small: SmallCopy) -> dict[str, dict[str, float]]:
-    """Median and 95th percentile of the small copy's difference from the table, by output.
+    """Measure the median and 95th percentile of the small copy's difference from the table, by output.
 
     Relative as in `surrogate.table.errors`, over random robots of the domain with two tails and more; for one tail
     the names end with "one_tail".
     """
     robots = _robots(_TRIED, _SEED)
-    whole, own = table.query({k: v for k, v in robots.items() if k != DWELL}, flag=True), small.query(robots)
-    inside, several = ~whole["outside"], robots["N"] > 1
-    found: dict[str, dict[str, float]] = {}
+    wanted_steady, answer = (
+        table.query({k: v for k, v in robots.items() if k != DWELL}, flag=True),
+        small.query(robots),
+    )
+    inside, several = ~wanted_steady["outside"], robots["N"] > 1
+    losses: dict[str, dict[str, float]] = {}
     parts = [("", inside & several), (" one_tail", inside & ~several)]
     for words, rows in parts:
-        apart = relative_errors({k: v[rows] for k, v in own.items()}, {k: v[rows] for k, v in whole.items()})
-        found |= {f"{name}{words}": _figures(apart[name]) for name in COMPARED}
+        errors = relative_errors(
+            {k: v[rows] for k, v in answer.items()}, {k: v[rows] for k, v in wanted_steady.items()}
+        )
+        losses |= {f"{name}{words}": _figures(errors[name]) for name in COMPARED}
     if small.has_response and (inside & several).any():
         rows = inside & several
         wanted = table.query({k: v[rows] for k, v in robots.items()}, flag=True)
-        apart = {n: (own[n][rows] - wanted[n]) / error_scale(n, wanted) for n in RESPONSE_OUTPUTS}
-        found |= {name: _figures(apart[name]) for name in RESPONSE_OUTPUTS}
-    return {name: figures for name, figures in found.items() if figures}
+        errors = {n: (answer[n][rows] - wanted[n]) / error_scale(n, wanted) for n in RESPONSE_OUTPUTS}
+        losses |= {name: _figures(errors[name]) for name in RESPONSE_OUTPUTS}
+    return {name: figures for name, figures in losses.items() if figures}
 
 
 def make_vectors(table: NeuralTable, small: SmallCopy) -> dict[str, Floats]:
@@ -145,7 +150,7 @@ def make_vectors(table: NeuralTable, small: SmallCopy) -> dict[str, Floats]:
 
 
 def _robots(count: int, seed: int) -> dict[str, Floats]:
-    """Random robots of the domain, every second one with a reversed motor, with dwells."""
+    """Return random robots of the domain, every second one with a reversed motor, with dwells."""
     robots = {
         name: np.array(values) for name, values in draw_robots(count, seed, wide=False).items() if name in ROBOT
     }
@@ -162,40 +167,40 @@ def _figures(apart: Floats) -> dict[str, float]:
 def _arrays(
     name: str, network: Ensemble, *, half: bool, last_exact: bool = False, outputs: int | None = None
 ) -> Arrays:
-    """The numbers of a network of one member, without the axis of members; the first `outputs` only.
+    """Return the numbers of a network of one member, without the axis of members; the first `outputs` only.
 
     Args:
         last_exact: its last layer is in single precision in any case.
     """
     last = [f"{kind}.{network.shape['depth']}" for kind in ("weights", "biases")]
     exact = (*EXACT, *last) if last_exact else EXACT
-    found: Arrays = {}
+    arrays: Arrays = {}
     for part, tensor in network.state_dict().items():
         values = tensor if part in EXACT else tensor[0]
         if part in ("bypass", "mean", "spread", *last):
             values = values[..., :outputs]
         kind = np.float16 if half and part not in exact else np.float32
-        found[f"{name}.{part}"] = np.ascontiguousarray(values.detach().numpy(), dtype=kind)
-    return found
+        arrays[f"{name}.{part}"] = np.ascontiguousarray(values.detach().numpy(), dtype=kind)
+    return arrays
 
 
 def _curve_arrays(table: NeuralTable) -> Arrays:
-    """Networks and curves of the response to flips with equal dwells."""
+    """Return networks and curves of the response to flips with equal dwells."""
     lag, memory = table.curves.bases["lag"], table.curves.bases["memory"]
     count = min(len(lag.vectors), len(memory.vectors), _MOST_COMPONENTS)
-    found: Arrays = {}
+    arrays: Arrays = {}
     for name, network in zip(NETWORKS[4:], table.curves.networks, strict=True):
-        found |= _arrays(name, network.member(0), half=True, outputs=count)
+        arrays |= _arrays(name, network.member(0), half=True, outputs=count)
     vectors = torch.cat([lag.vectors[:count], _at_equal_dwells(memory.vectors[:count])])
     mean = lag.mean + _at_equal_dwells(memory.mean[None])[0]
-    return found | {
+    return arrays | {
         "curves.mean": mean.numpy().astype(np.float32),
         "curves.basis": vectors.numpy().astype(np.float16),
     }
 
 
 def _at_equal_dwells(flat: Tensor) -> Tensor:
-    """Memories (C, K D 3) where the dwell before is as long as the dwell, (C, D 3)."""
+    """Return memories (C, K D 3) where the dwell before is as long as the dwell, (C, D 3)."""
     whole = flat.reshape(-1, *SHAPES["memory"]).numpy()
     return torch.tensor(at_equal_dwells(whole)).reshape(len(flat), -1)
 
@@ -205,11 +210,11 @@ def network_depth(arrays: Arrays, name: str) -> int:
 
 
 def _network(arrays: Arrays, name: str) -> Ensemble:
-    """The network of a name, in double precision."""
+    """Return the network of a name, in double precision."""
     inputs, outputs = arrays[f"{name}.bypass"].shape
     width = arrays[f"{name}.weights.0"].shape[1]
     network = Ensemble(inputs, outputs, width=width, depth=network_depth(arrays, name), members=1, seed=0)
-    own = {part.removeprefix(f"{name}."): torch.tensor(array).double() for part, array in arrays.items()
+    state = {part.removeprefix(f"{name}."): torch.tensor(array).double() for part, array in arrays.items()
            if part.startswith(f"{name}.")}  # fmt: skip
-    network.load_state_dict({part: value if part in EXACT else value[None] for part, value in own.items()})
+    network.load_state_dict({part: value if part in EXACT else value[None] for part, value in state.items()})
     return network.requires_grad_(False)

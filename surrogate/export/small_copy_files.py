@@ -73,7 +73,7 @@ def save_small_copy(table: NeuralTable, folder: str | Path) -> str:
 
 
 def weights_header(table: NeuralTable, small: SmallCopy, losses: Mapping[str, Mapping[str, float]]) -> str:
-    """lookup_weights.h: the numbers as arrays of C."""
+    """Write lookup_weights.h: the numbers as arrays of C."""
     arrays, lines, networks = small.arrays, [], []
     for name, array in arrays.items():
         kind = "float" if array.dtype == np.float32 else "uint16_t"
@@ -84,14 +84,16 @@ def weights_header(table: NeuralTable, small: SmallCopy, losses: Mapping[str, Ma
         if name not in present:
             networks.append("{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, {0}, {0}, 0}")
             continue
-        own, prefix = network_depth(arrays, name), f"lookup_{name}_"
+        layer_count, prefix = network_depth(arrays, name), f"lookup_{name}_"
         inputs, outputs = arrays[f"{name}.bypass"].shape
         width = arrays[f"{name}.weights.0"].shape[1]
-        half, half_last = (int(arrays[f"{name}.weights.{k}"].dtype == np.float16) for k in (0, own))
+        half, half_last = (int(arrays[f"{name}.weights.{k}"].dtype == np.float16) for k in (0, layer_count))
         exact = ", ".join(prefix + part for part in EXACT)
-        layers = [", ".join(f"{prefix}{part}_{i}" for i in range(own + 1)) for part in ("weights", "biases")]
+        layers = [
+            ", ".join(f"{prefix}{part}_{i}" for i in range(layer_count + 1)) for part in ("weights", "biases")
+        ]
         networks.append(
-            f"{{{inputs}, {outputs}, {width}, {own}, {half}, {half_last}, {exact},\n"
+            f"{{{inputs}, {outputs}, {width}, {layer_count}, {half}, {half_last}, {exact},\n"
             f"     {{{layers[0]}}},\n     {{{layers[1]}}}, {prefix}bypass}}"
         )
     widest = max(arrays[f"{name}.weights.0"].shape[1] for name in present)
@@ -103,11 +105,11 @@ def weights_header(table: NeuralTable, small: SmallCopy, losses: Mapping[str, Ma
         dwells = ", ".join(repr(dwell) for dwell in DWELLS.tolist())
         lines.append(f"static const double lookup_dwells[{len(DWELLS)}] = {{{dwells}}};")
     numbers = "\n".join(lines).replace("lookup_curves_", "lookup_curve_")
-    listed = ",\n    ".join(networks)
-    told = "\n".join(f"   {name}: {f['median']:.1e}, {f['p95']:.1e}" for name, f in losses.items())
+    network_list = ",\n    ".join(networks)
+    loss_lines = "\n".join(f"   {name}: {f['median']:.1e}, {f['p95']:.1e}" for name, f in losses.items())
     return f"""/* Numbers of a small look-up table, for lookup.h; written by softflagella.
    Table {table.identity}; {small.bytes} bytes. Loss against the whole table, median and 95 %:
-{told} */
+{loss_lines} */
 #ifndef LOOKUP_WEIGHTS_H
 #define LOOKUP_WEIGHTS_H
 
@@ -134,7 +136,7 @@ static const float lookup_high[9] = {{{_listed(np.array(ends[1], dtype=np.float3
 {numbers}
 
 static const lookup_network lookup_networks[{len(networks)}] = {{
-    {listed}}};
+    {network_list}}};
 
 #endif
 """

@@ -39,7 +39,7 @@ class Minimiser:
         self._direction = -self.gradient / self.gradient.abs().sum().clamp(min=1e-300)
 
     def state_dict(self) -> dict[str, Any]:
-        """All that the next step depends on."""
+        """Return all that the next step depends on."""
         return {name: getattr(self, name) for name in _STATE}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
@@ -49,20 +49,20 @@ class Minimiser:
             setattr(self, name, value.to(self.x.device) if isinstance(value, Tensor) else value)
 
     def step(self) -> bool:
-        """One iteration; False where no step along the gradient makes the value smaller."""
-        found = self._search()
-        if found is None and self._matrix is not None:
+        """Do one iteration; return False where no step along the gradient makes the value smaller."""
+        line = self._search()
+        if line is None and self._matrix is not None:
             self._forget()
-            found = self._search()
-        if found is None:
+            line = self._search()
+        if line is None:
             return False
-        length, value, gradient = found
+        length, value, gradient = line
         self._update(length * self._direction, gradient, length)
         self.value, self.gradient = value, gradient
         return True
 
     def _search(self) -> tuple[float, float, Tensor] | None:
-        """Step length, value and gradient there; None where there is none."""
+        """Return the step length, value and gradient there; None where there is none."""
         if not float(self.gradient @ self._direction) < 0:
             return None
         tried: dict[bytes, tuple[float, Tensor]] = {}
@@ -93,7 +93,7 @@ class Minimiser:
         self._direction = -self.gradient / self.gradient.abs().sum().clamp(min=1e-300)
 
     def _update(self, step: Tensor, gradient: Tensor, length: float) -> None:
-        """The matrix after a step, and the next direction."""
+        """Update the matrix after a step, and the next direction."""
         self.x = self.x + step
         change = gradient - self.gradient
         curvature = float(step @ change)

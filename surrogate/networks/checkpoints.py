@@ -34,7 +34,7 @@ State = dict[str, Any]  # tensors and plain values
 
 
 def device_named(name: str) -> str:
-    """The device to train on, "cpu" or "cuda".
+    """Return the device to train on, "cpu" or "cuda".
 
     Args:
         name: one of DEVICES; auto is cuda where there is one.
@@ -44,10 +44,10 @@ def device_named(name: str) -> str:
     """
     if name not in DEVICES:
         raise InputError(f"device {name}; allowed are {', '.join(DEVICES)}")
-    there = torch.cuda.is_available()
-    if name == "cuda" and not there:
+    has_cuda = torch.cuda.is_available()
+    if name == "cuda" and not has_cuda:
         raise InputError("there is no CUDA device that torch can use; choose the device cpu")
-    return "cuda" if there and name != "cpu" else "cpu"
+    return "cuda" if has_cuda and name != "cpu" else "cpu"
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,11 @@ class TrainingContext:
     folder: Path | None = None  # of the states; None: none are kept
 
     def part(self, name: str) -> TrainingContext:
-        """The same for one part of the work, named in the title."""
+        """Return the same for one part of the work, named in the title."""
         return replace(self, title=f"{self.title}: {name}" if self.title else "")
 
     def checkpoint(self, network: Mapping[str, Tensor], data: Sequence[Tensor], settings: object) -> Checkpoint:
-        """The place of the state of a network that starts from these numbers."""
+        """Return the place of the state of a network that starts from these numbers."""
         if self.folder is None:
             return Checkpoint(None)
         numbers = [_hashed(part) for part in (*network.values(), *data)]
@@ -94,7 +94,7 @@ class Checkpoint:
         self._next = time.monotonic() + EVERY
 
     def read(self) -> State | None:
-        """The state that was written last; None where there is none that can be read."""
+        """Return the state that was written last; None where there is none that can be read."""
         if self.path is None or not self.path.is_file():
             return None
         try:
@@ -117,7 +117,7 @@ class Checkpoint:
 
 @cache
 def _code() -> str:
-    """Hash of the code that trains, and of what it runs on."""
+    """Return the hash of the code that trains, and of what it runs on."""
     digest = hashlib.sha256(f"{torch.__version__} {platform.machine()}".encode())
     for file in sorted(Path(__file__).parents[1].rglob("*.py")):
         digest.update(file.read_bytes())
@@ -125,5 +125,5 @@ def _code() -> str:
 
 
 def _hashed(part: Tensor) -> str:
-    whole = part.detach().cpu().contiguous()
-    return hashlib.sha256(f"{whole.dtype} {tuple(whole.shape)}".encode() + whole.numpy().tobytes()).hexdigest()
+    array = part.detach().cpu().contiguous()
+    return hashlib.sha256(f"{array.dtype} {tuple(array.shape)}".encode() + array.numpy().tobytes()).hexdigest()

@@ -36,7 +36,7 @@ class Packed(NamedTuple):
 
 
 def packed(network: Ensemble) -> Packed:
-    """The numbers of an ensemble, copied."""
+    """Return the numbers of an ensemble, copied."""
     shape, parts = network.shape, []
     for k in range(shape["members"]):
         for weight, bias in zip(network.weights, network.biases, strict=True):
@@ -51,7 +51,7 @@ def packed(network: Ensemble) -> Packed:
 
 @compiled
 def evaluate_rows(network: Packed, x: Floats) -> Floats:
-    """The mean of the members, (M, O), at inputs x (M, F)."""
+    """Return the mean of the members, (M, O), at inputs x (M, F)."""
     y = np.empty((len(x), len(network.mean)))
     for row in range(len(x)):
         evaluate(network, x[row], y[row])
@@ -60,18 +60,18 @@ def evaluate_rows(network: Packed, x: Floats) -> Floats:
 
 @compiled
 def evaluate(network: Packed, x: Floats, y: Floats) -> None:
-    """The mean of the members at inputs x (F,), written to y (O,)."""
+    """Write the mean of the members at inputs x (F,) to y (O,)."""
     inputs, outputs, width = len(x), len(y), network.width
     first, total = (x - network.shift) / network.scale, np.zeros(outputs)
-    hidden, other = np.empty(width), np.empty(width)
+    hidden, next_hidden = np.empty(width), np.empty(width)
     at = 0
     for _ in range(network.members):
         at = _layer(network.numbers, at, first, hidden)
         _tanh(hidden)
         for _ in range(network.depth - 1):
-            at = _layer(network.numbers, at, hidden, other)
-            _tanh(other)
-            hidden, other = other, hidden
+            at = _layer(network.numbers, at, hidden, next_hidden)
+            _tanh(next_hidden)
+            hidden, next_hidden = next_hidden, hidden
         at = _layer(network.numbers, at, hidden, y)
         for i in range(inputs):
             for j in range(outputs):
@@ -84,7 +84,7 @@ def evaluate(network: Packed, x: Floats, y: Floats) -> None:
 
 @compiled
 def _layer(numbers: Floats, at: int, x: Floats, y: Floats) -> int:
-    """y = Wᵀ x + b with the numbers from place `at` on; returns the place behind them."""
+    """Write y = Wᵀ x + b with the numbers from place `at` on; return the place behind them."""
     n, m = len(x), len(y)
     y[:] = numbers[at + n * m : at + n * m + m]
     whole = n - n % 4
@@ -102,7 +102,7 @@ def _layer(numbers: Floats, at: int, x: Floats, y: Floats) -> int:
 
 @compiled
 def _tanh(x: Floats) -> None:
-    """tanh in place, to the last digits: 1 − 2/(e^2x + 1), with e^r as its Taylor series for |r| < ln(2)/2."""
+    """Take tanh in place, exact to rounding: 1 − 2/(e^2x + 1), with e^r as its Taylor series for |r| < ln(2)/2."""
     n = len(x)
     power = np.empty(n)
     shifted = power.view(np.int64)

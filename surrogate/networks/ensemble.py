@@ -54,11 +54,13 @@ class Ensemble(nn.Module):
         }
 
     def member(self, k: int) -> Ensemble:
-        """A network of one member: a copy of member k."""
+        """Return a network of one member: a copy of member k."""
         alone = Ensemble(**{**self.shape, "members": 1}, seed=0).to(self.shift.device)
         state = self.state_dict()
-        own = {name for name, _ in self.named_parameters()}
-        alone.load_state_dict({name: part[k : k + 1] if name in own else part for name, part in state.items()})
+        parameters = {name for name, _ in self.named_parameters()}
+        alone.load_state_dict(
+            {name: part[k : k + 1] if name in parameters else part for name, part in state.items()}
+        )
         return alone
 
     def replace_member(self, k: int, alone: Ensemble) -> None:
@@ -68,7 +70,7 @@ class Ensemble(nn.Module):
                 mine[k] = other[0]
 
     def standardised(self, x: Tensor) -> Tensor:
-        """Outputs of every member before `mean` and `spread`, (K, M, O), for standardised inputs (M, F)."""
+        """Return outputs of every member before `mean` and `spread`, (K, M, O), for standardised inputs (M, F)."""
         first = x.expand(self.bypass.shape[0], -1, -1)
         hidden = first
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
@@ -76,11 +78,11 @@ class Ensemble(nn.Module):
         return torch.matmul(hidden, self.weights[-1]) + self.biases[-1] + torch.matmul(first, self.bypass)
 
     def members_at(self, inputs: Tensor) -> Tensor:
-        """Outputs of every member, (K, M, O); of more inputs than it has, a network takes the first."""
+        """Return outputs of every member, (K, M, O); of more inputs than it has, a network takes the first."""
         return (
             self.standardised((inputs[..., : len(self.shift)] - self.shift) / self.scale) * self.spread + self.mean
         )
 
     def forward(self, inputs: Tensor) -> Tensor:
-        """Mean of the members, (M, O)."""
+        """Return the mean of the members, (M, O)."""
         return self.members_at(inputs).mean(0)

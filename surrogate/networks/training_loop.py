@@ -63,12 +63,12 @@ class Problem:
         return self._residuals(network, rows).norm(dim=-1)
 
     def loss(self, network: Ensemble, rows: Tensor, soft: float) -> Tensor:
-        """The loss over rows (m,), summed over the members."""
+        """Return the loss over rows (m,), summed over the members."""
         weighted = self._residuals(network, rows) * self.weights[rows, None]
         return ((weighted.square().sum(-1) + soft**2) ** _POWER).mean(1).sum()
 
     def every(self) -> Tensor:
-        """Indices of all rows, (M,)."""
+        """Return indices of all rows, (M,)."""
         return torch.arange(len(self.x), device=self.x.device)
 
     def _residuals(self, network: Ensemble, rows: Tensor) -> Tensor:
@@ -151,7 +151,7 @@ class Watch:
 
 
 def _adam(network: Ensemble, problem: Problem, settings: Settings, watch: Watch, state: State) -> None:
-    """Small batches, all members side by side."""
+    """Train in small batches, all members side by side."""
     network.requires_grad_(True)
     generator = torch.Generator().manual_seed(settings.seed)
     adam = torch.optim.Adam(network.parameters(), lr=settings.learning_rate)
@@ -176,7 +176,7 @@ def _adam(network: Ensemble, problem: Problem, settings: Settings, watch: Watch,
 
 
 def _polish(network: Ensemble, k: int, problem: Problem, iterations: int, watch: Watch, state: State) -> None:
-    """All rows at once, one member."""
+    """Train one member on all rows at once."""
     alone = network.member(k).requires_grad_(True)
     parameters, everything = list(alone.parameters()), problem.every()
 
@@ -209,7 +209,7 @@ def _states(parts: Mapping[str, Any]) -> State:
 
 
 def _steps(state: State, settings: Settings) -> int:
-    """Steps of the progress bar that a state has behind it."""
+    """Return the steps of the progress bar that a state has behind it."""
     if state["stage"] != "BFGS":
         return int(state.get("epoch", 0))
     stages = -(-settings.iterations // _STAGE)
@@ -217,7 +217,7 @@ def _steps(state: State, settings: Settings) -> int:
 
 
 def _resumed(state: State, settings: Settings) -> str:
-    """Where training goes on, in words."""
+    """Return where training goes on, in words."""
     if state["stage"] == "done":
         return "was finished before, and is taken from there"
     if state["stage"] == "Adam":

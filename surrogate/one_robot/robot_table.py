@@ -60,7 +60,7 @@ class RobotTable:
         return _digest(asdict(self))[:16]
 
     def query(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Outputs (M,) of this robot; the sign of `omega_bar` is the direction of the motor.
+        """Return outputs (M,) of this robot; the sign of `omega_bar` is the direction of the motor.
 
         Raises:
             InputError: the columns are another robot's.
@@ -69,15 +69,15 @@ class RobotTable:
         return {name: np.array(values)[side] for name, values in self.steady.items()}
 
     def response(self, columns: Mapping[str, Floats]) -> Responses:
-        """Response of this robot to a flip, for M rows; see `LookupTable.response`.
+        """Return the response of this robot to a flip, for M rows; see `LookupTable.response`.
 
         Raises:
             InputError: the columns are another robot's.
         """
         side, before = self._side(columns), np.array(self.before)
         lag, memory, rest, spread = (np.array(getattr(self, name))[side] for name in _CURVES)
-        found, sense = self.query(columns), np.where(side == 0, 1.0, -1.0)
-        twist = twists(found["v_z"], found["v_x"], found["omega_yr_bar"], sense)
+        outputs, sense = self.query(columns), np.where(side == 0, 1.0, -1.0)
+        twist = twists(outputs["v_z"], outputs["v_x"], outputs["omega_yr_bar"], sense)
         speed = net_speeds(twist, lag, memory, before)
         none = np.zeros(len(side), dtype=bool)
         return Responses(lag, memory, rest, spread, speed, none, none, before)
@@ -86,12 +86,12 @@ class RobotTable:
         """0 or 1 for every row, by the direction of its motor."""
         count = len(next(iter(columns.values())))
         for name, values in columns.items():
-            own = self.robot.get(name, 0.0)
+            expected = self.robot.get(name, 0.0)
             given = np.abs(values) if name == "omega_bar" else np.asarray(values, dtype=float)
-            for value in given[~(np.abs(given - own) <= 1e-9 * max(abs(own), 1.0))][:1]:
+            for value in given[~(np.abs(given - expected) <= 1e-9 * max(abs(expected), 1.0))][:1]:
                 raise InputError(
-                    f"{name} = {value:g} is outside this robot's table ({own:g} only); make its own table with "
-                    "softflagella surrogate robot"
+                    f"{name} = {value:g} is outside this robot's table ({expected:g} only); make its own "
+                    "table with softflagella surrogate robot"
                 )
         omega = columns.get("omega_bar", np.ones(count))
         return np.where(np.asarray(omega) < 0, 1, 0)
@@ -144,7 +144,7 @@ def _listed(lacking: list[str]) -> str:
 
 
 def _wrong(table: RobotTable) -> str:
-    """What is wrong with the numbers of a table; empty if nothing is."""
+    """Return what is wrong with the numbers of a table; empty if nothing is."""
     for name, shape in _CURVES.items():
         curves = np.array(getattr(table, name), dtype=float)
         wanted = tuple(len(table.before) if size < 0 else size for size in shape)

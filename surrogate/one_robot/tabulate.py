@@ -55,25 +55,25 @@ def tabulate(robot: Robot) -> RobotTable:
     motion = steady(groups)
     if not motion.converged.all():
         raise InputError(f"{robot.name} has no steady motion to tabulate: {motion.note[0]}")
-    found = responses(groups, motion)
-    if found.failed.any():
+    response = responses(groups, motion)
+    if response.failed.any():
         raise InputError(f"{robot.name}: a simulated flip broke down; a slower motor may help")
     columns = motion.columns()
     table = RobotTable(
         robot=values,
         steady={name: np.asarray(columns[name], dtype=float).tolist() for name in STEADY_OUTPUTS},
-        lag=found.lag.tolist(),
+        lag=response.lag.tolist(),
         before=BEFORE.tolist(),
-        memory=found.memory.tolist(),
-        rest=found.rest.tolist(),
-        spread=found.spread.tolist(),
+        memory=response.memory.tolist(),
+        rest=response.rest.tolist(),
+        spread=response.spread.tolist(),
         slopes=_slopes(values),
         errors={},
         provenance=provenance({"robot": robot.name}),
     )
     errors = {name: {"rms": float(motion.error.max())} for name in ("v_x", "v_z", "omega_yr_bar")}
-    own = {name: values[0] for name, values in table.steady.items()}
-    speed, yaw = float(np.hypot(own["v_x"], own["v_z"])), abs(own["omega_yr_bar"])
+    forward = {name: values[0] for name, values in table.steady.items()}
+    speed, yaw = float(np.hypot(forward["v_x"], forward["v_z"])), abs(forward["omega_yr_bar"])
     missed = _missed(table) / [speed, speed, yaw]
     bias = np.sqrt(missed.mean(0) ** 2 + missed.var(0) / len(missed))
     errors |= {name: {"rms": float(value)} for name, value in zip(LAGS, bias, strict=True)}
@@ -93,8 +93,8 @@ def _slopes(values: dict[str, float]) -> dict[str, Any]:
     motion = steady(Groups.from_columns(columns))
     twist = np.stack([motion.v_z, motion.v_x, motion.omega_yr], -1).reshape(len(names), 2, 2, 3)
     slopes = (twist[:, 0] - twist[:, 1]) / np.array(widths)[:, None, None]
-    found = dict(zip(names, slopes, strict=True))
-    return {name: slope.tolist() for name, slope in found.items() if np.isfinite(slope).all()}
+    by_name = dict(zip(names, slopes, strict=True))
+    return {name: slope.tolist() for name, slope in by_name.items() if np.isfinite(slope).all()}
 
 
 def _ends(name: str, value: float) -> tuple[tuple[float, float], tuple[float, float]]:

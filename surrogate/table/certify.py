@@ -20,10 +20,10 @@ _RATES = ("omega_t_bar", "omega_h_bar", "omega_yr_bar")
 
 
 def certified_error(robots: Mapping[str, Floats], answer: Mapping[str, Any]) -> Floats:
-    """Certified relative error of each robot's answer, (M,); NaN where the simulator finds no steady motion."""
-    found = steady_columns(robots, title="certify")
-    speed = np.hypot(found["v_x"], found["v_z"])
-    apart = [np.abs(answer[name] / found[name] - 1) for name in _RATES]
-    apart += [np.abs(answer[name] - found[name]) / speed for name in ("v_x", "v_z")]
-    error = np.max(apart, axis=0) + found["error"]
-    return np.where(found["converged"], error, np.nan)
+    """Certify the relative error of each robot's answer, (M,); NaN where the simulator finds no steady motion."""
+    simulated = steady_columns(robots, title="certify")
+    speed = np.hypot(simulated["v_x"], simulated["v_z"])
+    apart = [np.abs(answer[name] / simulated[name] - 1) for name in _RATES]
+    apart += [np.abs(answer[name] - simulated[name]) / speed for name in ("v_x", "v_z")]
+    error = np.max(apart, axis=0) + simulated["error"]
+    return np.where(simulated["converged"], error, np.nan)

@@ -29,7 +29,7 @@ _UNITS = {"theta_deg": "deg", "lag_psi_rad": "of turn/unit", "v_z": "of speed", 
 
 
 def error_scale(name: str, truth: Columns) -> Floats | float:
-    """The number by which the error of an output is divided."""
+    """Return the number by which the error of an output is divided."""
     if name in RELATIVE:
         return np.abs(truth[name])
     if name == "theta_deg":
@@ -42,40 +42,40 @@ def error_scale(name: str, truth: Columns) -> Floats | float:
 
 
 def relative_errors(answer: Columns, truth: Columns) -> dict[str, Floats]:
-    """Errors of every steady output over its scale, (M,)."""
+    """Return errors of every steady output over its scale, (M,)."""
     with np.errstate(invalid="ignore"):  # one tail has no gap
         return {name: (answer[name] - truth[name]) / error_scale(name, truth) for name in COMPARED}
 
 
 def curve_errors(response: Any, truth: Columns) -> dict[str, Floats]:
-    """Errors of the response, (M, D) over the dwells.
+    """Return errors of the response, (M, D) over the dwells.
 
     Args:
         response: of the table.
         truth: columns of the steady motion; `lag` (M, D, 3) and `net_speed` (M, D) of the simulator.
     """
-    found = {}
+    errors = {}
     for i, name in enumerate(LAGS):
-        found[name] = (response.lag - truth["lag"])[..., i] / np.asarray(error_scale(name, truth))[:, None]
+        errors[name] = (response.lag - truth["lag"])[..., i] / np.asarray(error_scale(name, truth))[:, None]
     speed = np.asarray(error_scale("net_speed_bar", truth))[:, None]
-    return found | {"net_speed_bar": (response.net_speed - truth["net_speed"]) / speed}
+    return errors | {"net_speed_bar": (response.net_speed - truth["net_speed"]) / speed}
 
 
 def summary(errors: Mapping[str, Floats], valid: Flags) -> dict[str, dict[str, float]]:
-    """Figures of errors (M, …) by output; `valid` (M,) marks rows whose tails do not touch."""
+    """Return figures of errors (M, …) by output; `valid` (M,) marks rows whose tails do not touch."""
     report: dict[str, dict[str, float]] = {}
     for name, error in errors.items():
         known = np.isfinite(error)
-        some = np.abs(error[valid & known] if error.ndim == 1 else error[valid][known[valid]])
+        untouched = np.abs(error[valid & known] if error.ndim == 1 else error[valid][known[valid]])
         every = np.abs(error[known])
         if not len(every):
             continue
-        some = some if len(some) else every
+        untouched = untouched if len(untouched) else every
         report[name] = {
-            "rms": float(np.sqrt(np.mean(some**2))),
-            "median": float(np.median(some)),
-            "p95": float(np.quantile(some, 0.95)),
-            "largest": float(some.max()),
+            "rms": float(np.sqrt(np.mean(untouched**2))),
+            "median": float(np.median(untouched)),
+            "p95": float(np.quantile(untouched, 0.95)),
+            "largest": float(untouched.max()),
             "rms_with_touching": float(np.sqrt(np.mean(every**2))),
             "p95_with_touching": float(np.quantile(every, 0.95)),
         }
@@ -83,31 +83,31 @@ def summary(errors: Mapping[str, Floats], valid: Flags) -> dict[str, dict[str, f
 
 
 def coverage(answer: Columns, truth: Columns) -> dict[str, float]:
-    """Share of rows whose true value lies inside the interval, by output."""
-    found = {}
+    """Return the share of rows whose true value lies inside the interval, by output."""
+    shares = {}
     for name in COMPARED:
         if f"{name}_low" in answer:
             known = np.isfinite(truth[name])
             inside = (truth[name] >= answer[f"{name}_low"]) & (truth[name] <= answer[f"{name}_high"])
-            found[name] = float(np.mean(inside[known]))
-    return found
+            shares[name] = float(np.mean(inside[known]))
+    return shares
 
 
 def shortcomings(errors: Errors) -> list[str]:
-    """What is poor about a table, in words; nothing where it is good enough to plan with."""
-    found = []
+    """List warnings about a table that is too inaccurate for planning."""
+    warnings = []
     for name, words in (("omega_yr_bar", "the yaw rate"), ("net_speed_bar", "the net speed")):
         error = errors.get(name)
         if error and error["p95"] > _POOR:
-            found.append(
+            warnings.append(
                 f"{words} is off by {100 * error['p95']:.0f} % at 95 % of the held-out rows; learn more rows, or "
                 "give robots tables of their own (softflagella surrogate robot)"
             )
-    return found
+    return warnings
 
 
 def error_table(errors: Errors) -> str:
-    """The held-out errors as text."""
+    """Format the held-out errors as text."""
     lines = [f"{'output':16}{'rms':>9}{'median':>9}{'95 %':>9}{'largest':>9}{'95 %, all':>11}"]
     for name, error in errors.items():
         percent = 1 if name == "theta_deg" else 100

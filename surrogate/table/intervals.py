@@ -25,7 +25,7 @@ from torch import Tensor
 COVERAGE = 0.90
 _TINY = 1e-9  # of the scale of an output
 _RIDGE = 1e-3
-_HALVED = (0, 3, 5)  # hints whose halves make the octants: drag number, deflection, forward motion
+_HALVED = (0, 3, 5)  # features whose halves make the octants: drag number, deflection, forward motion
 _ONE_TAIL = -1  # the hint that is 1 for one tail
 PARTS = 2 ** len(_HALVED) + 1
 _FEWEST = 40  # robots in a part, for a q of its own
@@ -43,32 +43,32 @@ class Intervals:
     middle: Tensor  # (3,), the halves meet here
     factor: Mapping[str, Tensor]  # output -> q of each part, (PARTS,)
 
-    def half_widths(self, name: str, hints: Tensor, sizes: Tensor) -> Tensor:
-        """Half of the width of the interval of one output, (M,).
+    def half_widths(self, name: str, features: Tensor, sizes: Tensor) -> Tensor:
+        """Return half of the width of the interval of one output, (M,).
 
         Args:
-            hints: (M, F), see `surrogate.table.lookup`.
+            features: (M, F), see `surrogate.table.lookup`.
             sizes: (M,), what errors of this output are relative to.
         """
-        return self.factor[name][self.part_of(hints)] * self._local(name, hints) * sizes
+        return self.factor[name][self.part(features)] * self._local(name, features) * sizes
 
-    def part_of(self, hints: Tensor) -> Tensor:
-        """Which part each robot belongs to, (M,): 0 to 7 for octants, 8 for one tail."""
-        high = (hints[:, list(_HALVED)] > self.middle).long()
+    def part(self, features: Tensor) -> Tensor:
+        """Return which part each robot belongs to, (M,): 0 to 7 for octants, 8 for one tail."""
+        high = (features[:, list(_HALVED)] > self.middle).long()
         octant = (high * 2 ** torch.arange(len(_HALVED))).sum(1)
-        return torch.where(hints[:, _ONE_TAIL] > 0.5, PARTS - 1, octant)
+        return torch.where(features[:, _ONE_TAIL] > 0.5, PARTS - 1, octant)
 
-    def _local(self, name: str, hints: Tensor) -> Tensor:
+    def _local(self, name: str, features: Tensor) -> Tensor:
         low, high = self.bounds[name]
-        return torch.exp((_design((hints - self.shift) / self.scale) @ self.weights[name]).clamp(low, high))
+        return torch.exp((_design((features - self.shift) / self.scale) @ self.weights[name]).clamp(low, high))
 
     @staticmethod
     def learned(
-        hints: Tensor, errors: Mapping[str, Tensor], more_hints: Tensor, more_errors: Mapping[str, Tensor]
+        features: Tensor, errors: Mapping[str, Tensor], more_features: Tensor, more_errors: Mapping[str, Tensor]
     ) -> Intervals:
-        """From relative errors by output, (M,), of robots for s and of more robots, (M',), for q."""
-        shift, scale = hints.mean(0), torch.clamp(hints.std(0), min=1e-6)
-        design = _design((hints - shift) / scale)
+        """Learn from relative errors by output, (M,), of robots for s and of more robots, (M',), for q."""
+        shift, scale = features.mean(0), torch.clamp(features.std(0), min=1e-6)
+        design = _design((features - shift) / scale)
         weights, bounds, factor = {}, {}, {}
         for name, error in errors.items():
             known = torch.isfinite(error)
@@ -81,16 +81,20 @@ class Intervals:
             weights[name] = torch.linalg.solve(matrix, rows.T @ logs)
             low, high = (rows @ weights[name]).quantile(torch.tensor([_FIRMEST, _SOFTEST], dtype=rows.dtype))
             bounds[name] = (float(low), float(high))
-        several = hints[hints[:, _ONE_TAIL] < 0.5]
-        middle = (several if len(several) else hints)[:, list(_HALVED)].median(0).values
+        several = features[features[:, _ONE_TAIL] < 0.5]
+        middle = (several if len(several) else features)[:, list(_HALVED)].median(0).values
         plain = Intervals(shift, scale, weights, bounds, middle, {})
-        part = plain.part_of(more_hints)
+        part = plain.part(more_features)
         for name, error in more_errors.items():
             known = torch.isfinite(error)
-            scores = error[known].abs() / plain._local(name, more_hints[known])
+            scores = error[known].abs() / plain._local(name, more_features[known])
             each = [scores[part[known] == k] for k in range(PARTS)]
             factor[name] = torch.tensor(
-                [_conformal_quantile(own if len(own) >= _FEWEST else scores) for own in each], dtype=torch.float64
+                [
+                    _conformal_quantile(part_scores if len(part_scores) >= _FEWEST else scores)
+                    for part_scores in each
+                ],
+                dtype=torch.float64,
             )
         return replace(plain, factor=factor)
 
@@ -103,7 +107,7 @@ def _design(x: Tensor) -> Tensor:
 
 
 def _conformal_quantile(scores: Tensor) -> float:
-    """The smallest score that covers a new row with a probability of at least COVERAGE."""
+    """Return the smallest score that covers a new row with a probability of at least COVERAGE."""
     count = len(scores)
     if not count:
         return math.inf

@@ -39,7 +39,7 @@ class Solutions:
 def inverse(
     lookup: NeuralTable, robots: Mapping[str, Floats], targets: Mapping[str, Floats], bounds: Bounds
 ) -> Solutions:
-    """Inputs that give wanted outputs.
+    """Find inputs that give wanted outputs.
 
     Args:
         lookup: the table.
@@ -64,26 +64,26 @@ def inverse(
     p = np.tile(starts, (count, 1))  # (M starts, F)
     row = np.repeat(np.arange(count), _STARTS)
     given = {name: np.asarray(array, dtype=float)[row] for name, array in robots.items() if name not in names}
-    aim = {name: np.asarray(array, dtype=float)[row] for name, array in targets.items()}
-    size = _sizes(aim)
+    target_values = {name: np.asarray(array, dtype=float)[row] for name, array in targets.items()}
+    size = _sizes(target_values)
 
     def misfits(p: Floats) -> tuple[Floats, Floats, Floats]:
         columns = {**given, **{name: np.exp(p[:, i]) for i, name in enumerate(names)}}
-        found = lookup.query(columns, flag=True)
+        outputs = lookup.query(columns, flag=True)
         slopes = lookup.jacobian(columns, names, flag=True)
-        left = np.stack([(found[name] - aim[name]) / size[name] for name in wanted], -1)
+        residual = np.stack([(outputs[name] - target_values[name]) / size[name] for name in wanted], -1)
         J = np.stack(
             [np.stack([slopes[o][n] * columns[n] for n in names], -1) / size[o][:, None] for o in wanted], 1
         )
-        return left, J, found[OUTSIDE]
+        return residual, J, outputs[OUTSIDE]
 
-    p, left, outside = _least_squares(misfits, p, low, high)
-    rms = np.sqrt((left**2).mean(-1))
+    p, residual, outside = _least_squares(misfits, p, low, high)
+    rms = np.sqrt((residual**2).mean(-1))
     return _different(row, p, rms, outside, names)
 
 
 def _sizes(targets: Mapping[str, Floats]) -> dict[str, Floats]:
-    """What misfits are relative to: themselves where the speed is not among the targets."""
+    """Return what misfits are relative to: themselves where the speed is not among the targets."""
     sizes = {}
     for name, value in targets.items():
         try:
@@ -96,36 +96,36 @@ def _sizes(targets: Mapping[str, Floats]) -> dict[str, Floats]:
 def _least_squares(
     misfits: Callable[[Floats], tuple[Floats, Floats, Floats]], p: Floats, low: Floats, high: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Levenberg and Marquardt for all rows of p (B, F) at once, within bounds."""
+    """Minimise by Levenberg and Marquardt's method, for all rows of p (B, F) at once, within bounds."""
     damping = np.full(len(p), 1e-2)
-    left, J, outside = misfits(p)
+    residual, J, outside = misfits(p)
     for _ in range(_STEPS):
-        left, J = np.nan_to_num(left, nan=1e3), np.nan_to_num(J)
+        residual, J = np.nan_to_num(residual, nan=1e3), np.nan_to_num(J)
         A = np.einsum("bof,bog->bfg", J, J)
         diagonal = np.einsum("bff->bf", A)
         damped = A + (damping[:, None] * diagonal + 1e-12)[:, :, None] * np.eye(p.shape[1])
-        step = np.linalg.solve(damped, np.einsum("bof,bo->bf", J, left)[..., None])[..., 0]
+        step = np.linalg.solve(damped, np.einsum("bof,bo->bf", J, residual)[..., None])[..., 0]
         trial = np.clip(p - np.clip(step, -1, 1), low, high)
-        new_left, new_J, new_outside = misfits(trial)
-        better = np.nan_to_num((new_left**2).sum(-1), nan=np.inf) < (left**2).sum(-1)
+        new_residual, new_J, new_outside = misfits(trial)
+        better = np.nan_to_num((new_residual**2).sum(-1), nan=np.inf) < (residual**2).sum(-1)
         p = np.where(better[:, None], trial, p)
-        left, J = np.where(better[:, None], new_left, left), np.where(better[:, None, None], new_J, J)
+        residual, J = np.where(better[:, None], new_residual, residual), np.where(better[:, None, None], new_J, J)
         outside = np.where(better, new_outside, outside)
         damping = np.where(better, damping / 5, damping * 4).clip(1e-9, 1e9)
-        if (np.abs(step).max() < 1e-9) or (np.sqrt((left**2).mean(-1)) < _SOLVED / 10).all():
+        if (np.abs(step).max() < 1e-9) or (np.sqrt((residual**2).mean(-1)) < _SOLVED / 10).all():
             break
-    return p, left, outside
+    return p, residual, outside
 
 
 def _different(row: Integers, p: Floats, misfit: Floats, outside: Floats, names: list[str]) -> Solutions:
     kept: list[int] = []
     for target in np.unique(row):
-        own = np.flatnonzero(row == target)
-        own = own[np.argsort(misfit[own], kind="stable")]
-        chosen = [own[0]]
-        for i in own[1:]:
-            if misfit[i] < _SOLVED and min(np.abs(p[i] - p[j]).max() for j in chosen) > _SAME:
-                chosen.append(i)
-        kept += [int(i) for i in chosen]
+        rows = np.flatnonzero(row == target)
+        rows = rows[np.argsort(misfit[rows], kind="stable")]
+        distinct = [rows[0]]
+        for i in rows[1:]:
+            if misfit[i] < _SOLVED and min(np.abs(p[i] - p[j]).max() for j in distinct) > _SAME:
+                distinct.append(i)
+        kept += [int(i) for i in distinct]
     inputs = {name: np.exp(p[kept, i]) for i, name in enumerate(names)}
     return Solutions(row[kept], inputs, misfit[kept], outside[kept])

@@ -22,7 +22,7 @@ from surrogate.wrench.heads import as_tensor, full_motion, heads_and_tails, unba
 def slopes(
     table: WrenchTable, values: Mapping[str, Floats], motion: Tensor, parameters: Sequence[str]
 ) -> dict[str, dict[str, Floats]]:
-    """∂(output)/∂(parameter), each (M,), of robots that the table solved.
+    """Return ∂(output)/∂(parameter), each (M,), of robots that the table solved.
 
     Args:
         table: of the tails.
@@ -30,39 +30,39 @@ def slopes(
         motion: their motion, (M, 5).
         parameters: names of columns.
     """
-    found = {name: {p: np.full(len(motion), np.nan) for p in parameters} for name in STEADY_OUTPUTS}
+    derivatives = {name: {p: np.full(len(motion), np.nan) for p in parameters} for name in STEADY_OUTPUTS}
     columns = {name: as_tensor(array) for name, array in values.items()}
     kind = network_index(columns["N"])
     for k, network in enumerate(table.wrench):
         rows = torch.nonzero(kind == k)[:, 0]
         if len(rows) and network is not None:
-            own = {name: array[rows] for name, array in columns.items()}
-            for parameter, changes in _changes(table, network, own, motion[rows, :4], parameters).items():
+            robots = {name: array[rows] for name, array in columns.items()}
+            for parameter, changes in _changes(table, network, robots, motion[rows, :4], parameters).items():
                 for name, change in zip(STEADY_OUTPUTS, changes, strict=True):
-                    found[name][parameter][rows.numpy()] = change.numpy()
-    return found
+                    derivatives[name][parameter][rows.numpy()] = change.numpy()
+    return derivatives
 
 
 def _changes(
     table: WrenchTable, network: Ensemble, columns: dict[str, Tensor], u: Tensor, parameters: Sequence[str]
 ) -> dict[str, tuple[Tensor, ...]]:
-    """Derivatives of STEADY_OUTPUTS by parameter, of robots with one network and the solution u (M, 4)."""
+    """Return derivatives of STEADY_OUTPUTS by parameter, of robots with one network and the solution u (M, 4)."""
     heads, tails = heads_and_tails(columns, keep=parameters)
     _, slope = value_and_slope(lambda v: unbalanced(heads, tails, v, network), u)
     inverse = torch.linalg.inv_ex(slope)[0]
 
     def outputs(moved: dict[str, Tensor]) -> tuple[Tensor, ...]:
         heads, tails = heads_and_tails(moved, keep=parameters)
-        left = unbalanced(heads, tails, u, network)
-        motion = full_motion(heads, u - (inverse @ left[..., None])[..., 0])
+        residual = unbalanced(heads, tails, u, network)
+        motion = full_motion(heads, u - (inverse @ residual[..., None])[..., 0])
         return table.outputs(heads, motion, table.tail_gap(tails, motion))
 
-    found = {}
+    derivatives = {}
     for parameter in parameters:
         size = columns[parameter]
 
-        def along(value: Tensor, name: str = parameter) -> tuple[Tensor, ...]:
+        def outputs_at(value: Tensor, name: str = parameter) -> tuple[Tensor, ...]:
             return outputs({**columns, name: value})
 
-        found[parameter] = torch.func.jvp(along, (size,), (torch.ones_like(size),))[1]
-    return found
+        derivatives[parameter] = torch.func.jvp(outputs_at, (size,), (torch.ones_like(size),))[1]
+    return derivatives

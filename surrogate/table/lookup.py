@@ -94,7 +94,7 @@ class NeuralTable:
     def query(
         self, columns: Mapping[str, Floats], *, intervals: bool = False, flag: bool = False, certify: bool = False
     ) -> dict[str, Any]:
-        """Predicted outputs, each (M,); with a column `dwell_bar` also RESPONSE_OUTPUTS for equal dwells.
+        """Predict outputs, each (M,); with a column `dwell_bar` also RESPONSE_OUTPUTS for equal dwells.
 
         Args:
             columns: robots by column name, each (M,).
@@ -109,15 +109,15 @@ class NeuralTable:
         values = check_columns({name: array for name, array in columns.items() if name != DWELL})
         if DWELL in columns:
             _check_flips(values)
-        found = self.motions(values, flag=flag)
-        result: dict[str, Any] = steady_outputs(found, self.tails)
+        motions = self.motions(values, flag=flag)
+        result: dict[str, Any] = steady_outputs(motions, self.tails)
         if DWELL in columns:
             dwells = _checked_dwells(columns[DWELL])
-            result |= _at_dwells(self._responses(found, result), result, dwells, found.heads.sense.numpy())
+            result |= _at_dwells(self._responses(motions, result), result, dwells, motions.heads.sense.numpy())
         if intervals:
-            result |= self._intervals(found, result)
+            result |= self._intervals(motions, result)
         if flag:
-            result[OUTSIDE] = np.array([bool(reason) for reason in found.reason])
+            result[OUTSIDE] = np.array([bool(reason) for reason in motions.reason])
         if certify:
             from surrogate.table.certify import certified_error
 
@@ -125,20 +125,20 @@ class NeuralTable:
         return result
 
     def response(self, columns: Mapping[str, Floats], *, flag: bool = False) -> Responses:
-        """Response to a flip of the motor, see `surrogate.interface.LookupTable.response`.
+        """Return the response to a flip of the motor, see `surrogate.interface.LookupTable.response`.
 
         Raises:
             InputError: a robot that cannot be, one outside the domain, or one whose left and right turns differ.
         """
         values = check_columns(columns)
         _check_flips(values)
-        found = self.motions(values, flag=flag)
-        return self._responses(found, steady_outputs(found, self.tails))
+        motions = self.motions(values, flag=flag)
+        return self._responses(motions, steady_outputs(motions, self.tails))
 
     def jacobian(
         self, columns: Mapping[str, Floats], parameters: Sequence[str], *, flag: bool = False
     ) -> dict[str, dict[str, Floats]]:
-        """∂(output)/∂(parameter) of STEADY_OUTPUTS, by output and parameter, each (M,).
+        """Return ∂(output)/∂(parameter) of STEADY_OUTPUTS, by output and parameter, each (M,).
 
         Exact derivatives of the table: those of one more step of Newton's method at the solution.
 
@@ -154,7 +154,7 @@ class NeuralTable:
         return slopes(self.tails, values, self.motions(values, flag=flag).motion, parameters)
 
     def motions(self, values: Mapping[str, Floats], *, flag: bool = False) -> Motions:
-        """Motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
+        """Return the motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
         heads, tails = heads_and_tails(values)
         motion, converged = self.tails.solve(heads, tails)
         inputs = inputs_rows(pack_tails(tails), motion)
@@ -165,42 +165,42 @@ class NeuralTable:
             raise InputError(self._refusal(values, row, reason))
         return Motions(heads, tails, torch.from_numpy(motion), inputs, reasons)
 
-    def hints(self, found: Motions) -> Tensor:
-        """What the width of an interval may depend on, (M, 11)."""
-        heads, tails, motion = found.heads, found.tails, found.motion
-        inputs = torch.from_numpy(found.inputs)
-        remote, spread = torch.zeros(len(motion)).double(), torch.zeros(len(motion)).double()
+    def width_features(self, motions: Motions) -> Tensor:
+        """Return what the width of an interval may depend on, (M, 11)."""
+        heads, tails, motion = motions.heads, motions.tails, motions.motion
+        inputs = torch.from_numpy(motions.inputs)
+        novelty, spread = torch.zeros(len(motion)).double(), torch.zeros(len(motion)).double()
         weight = motion_sensitivity(heads, tails, motion) @ wrench_slopes(tails, motion)
         kind = network_index(tails.number)
         for k, network in enumerate(self.tails.wrench):
             rows = torch.nonzero(kind == k)[:, 0]
             support = self.support[k]
             if len(rows) and network is not None and support is not None:
-                remote[rows] = torch.from_numpy(support.remoteness(found.inputs[rows.numpy()]))
+                novelty[rows] = torch.from_numpy(support.novelty(motions.inputs[rows.numpy()]))
                 members = network.members_at(torch.cat([inputs[rows], tails.head[rows]], -1))
                 apart = (weight[rows] @ (members - members.mean(0))[..., None])[..., 0]
                 spread[rows] = apart.norm(dim=-1).mean(0)
         extra = [
-            torch.log(remote + 1e-12),
+            torch.log(novelty + 1e-12),
             torch.log(spread + 1e-9),
             torch.log(tails.number),
             (kind == 0).double(),
         ]
         return torch.nan_to_num(torch.cat([inputs, torch.stack(extra, -1)], -1))
 
-    def _intervals(self, found: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
+    def _intervals(self, motions: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
         if self.intervals is None:
             raise InputError("this look-up table has no intervals; train it again")
-        hints, added = self.hints(found), {}
+        features, added = self.width_features(motions), {}
         for name in [name for name in result if name in self.intervals.factor]:
             size = torch.tensor(np.broadcast_to(error_scale(name, result), result[name].shape))
-            half = self.intervals.half_widths(name, hints, size).numpy()
+            half = self.intervals.half_widths(name, features, size).numpy()
             half = np.where(np.isfinite(result[name]), half, 0.0)
             added[f"{name}_low"], added[f"{name}_high"] = result[name] - half, result[name] + half
         return added
 
     def _within_ranges(self, values: Mapping[str, Floats]) -> Flags:
-        """Whether tails and motor speed are within the learned ranges; heads may be any."""
+        """Return whether tails and motor speed are within the learned ranges; heads may be any."""
         within = np.ones(len(values["N"]), dtype=bool)
         for name in _NOT_OF_HEAD:
             low, high = self.ranges[name]
@@ -209,14 +209,14 @@ class NeuralTable:
         return within
 
     def _reasons(self, kind: Integers, motion: Floats, inputs: Floats, known: Flags) -> list[str]:
-        remote, learned = np.full(len(motion), np.nan), np.zeros(len(motion), dtype=bool)
+        novelty, learned = np.full(len(motion), np.nan), np.zeros(len(motion), dtype=bool)
         for k, support in enumerate(self.support):
             rows = np.flatnonzero(kind == k)
             if len(rows) and support is not None:
-                remote[rows], learned[rows] = support.remoteness(inputs[rows]), True
+                novelty[rows], learned[rows] = support.novelty(inputs[rows]), True
         with np.errstate(divide="ignore", invalid="ignore"):
             quick = np.abs(motion[:, 2] / motion[:, 4])
-        which = np.select([~learned, ~known, ~(remote <= 1), quick > BRANCHES], [1, 2, 3, 4])
+        which = np.select([~learned, ~known, ~(novelty <= 1), quick > BRANCHES], [1, 2, 3, 4])
         return [_REASONS[number] for number in which.tolist()]
 
     def _refusal(self, values: Mapping[str, Floats], row: int, reason: str) -> str:
@@ -230,9 +230,9 @@ class NeuralTable:
             "(softflagella sim steady, softflagella surrogate robot)"
         )
 
-    def _responses(self, found: Motions, steady: Mapping[str, Floats]) -> Responses:
-        curves = self.curves.curves(found.heads, found.tails, found.motion)
-        sense = found.heads.sense.numpy()
+    def _responses(self, motions: Motions, steady: Mapping[str, Floats]) -> Responses:
+        curves = self.curves.curves(motions.heads, motions.tails, motions.motion)
+        sense = motions.heads.sense.numpy()
         twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
         speed = net_speeds(twist, curves["lag"], curves["memory"])
         none = np.zeros(len(sense), dtype=bool)
@@ -254,9 +254,9 @@ def _check_flips(values: Mapping[str, Floats]) -> None:
         )
 
 
-def steady_outputs(found: Motions, tails: WrenchTable) -> dict[str, Floats]:
-    """STEADY_OUTPUTS of motions."""
-    values = tails.outputs(found.heads, found.motion, tails.quick_gap(found.tails, found.inputs))
+def steady_outputs(motions: Motions, tails: WrenchTable) -> dict[str, Floats]:
+    """Return STEADY_OUTPUTS of motions."""
+    values = tails.outputs(motions.heads, motions.motion, tails.quick_gap(motions.tails, motions.inputs))
     return {name: np.asarray(value.numpy()) for name, value in zip(STEADY_OUTPUTS, values, strict=True)}
 
 
@@ -273,7 +273,7 @@ def _checked_dwells(dwells: Floats) -> Floats:
 def _at_dwells(
     response: Responses, steady: Mapping[str, Floats], dwells: Floats, sense: Floats
 ) -> dict[str, Floats]:
-    """RESPONSE_OUTPUTS at one dwell for each robot, when all dwells are equal."""
+    """Return RESPONSE_OUTPUTS at one dwell for each robot, when all dwells are equal."""
     curves = response.lag + at_equal_dwells(response.memory)
     lag = between_dwells(curves, dwells)
     twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
@@ -282,7 +282,7 @@ def _at_dwells(
 
 
 def table_content(lookup: NeuralTable) -> dict[str, Any]:
-    """A table as nested dictionaries and lists of tensors and plain values."""
+    """Return a table as nested dictionaries and lists of tensors and plain values."""
     intervals = lookup.intervals
     return {
         "wrench": [None if network is None else _stored(network) for network in lookup.tails.wrench],
@@ -303,7 +303,7 @@ def _stored(network: Ensemble) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Mappings as dictionaries, and pairs as lists."""
+    """Return mappings as dictionaries, and pairs as lists."""
     if isinstance(value, Tensor):
         return value
     return {name: list(part) if isinstance(part, tuple) else part for name, part in dict(value).items()}

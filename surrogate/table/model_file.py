@@ -58,7 +58,7 @@ class _IncompleteError(Exception):
 
 
 def load_table(path: str | Path | None = None) -> LookupTable:
-    """A model file, or the table of one robot (.json); by default the one that comes with the package.
+    """Read a model file, or the table of one robot (.json); by default the one that comes with the package.
 
     Args:
         path: a file written by `surrogate train` or `surrogate robot`.

@@ -56,39 +56,39 @@ class ResponseTable:
     bases: Mapping[str, Basis]
 
     def curves(self, heads: Heads, tails: Tails, motion: Tensor) -> dict[str, Floats]:
-        """Lag, memory, rest and spread, each (M, …, 3) as in SHAPES, in l, l, rad, for a positive motor."""
+        """Return lag, memory, rest and spread, each (M, …, 3) as in SHAPES, in l, l, rad, for a positive motor."""
         inputs, speeds = response_inputs(tails, motion), curve_speeds(heads, motion)
-        found = {}
+        curves = {}
         for names, network in zip(PARTS, self.networks, strict=True):
             sizes = [len(self.bases[name].vectors) for name in names]
             for name, components in zip(names, network(inputs).split(sizes, -1), strict=True):
                 curve = self.bases[name].mean + components @ self.bases[name].vectors
                 scaled = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name])
-                found[name] = np.asarray(scaled.numpy())
-        found["spread"] = np.maximum(found["spread"], 0.0)
-        return found
+                curves[name] = np.asarray(scaled.numpy())
+        curves["spread"] = np.maximum(curves["spread"], 0.0)
+        return curves
 
 
 def response_inputs(tails: Tails, motion: Tensor) -> Tensor:
-    """Inputs of the network, (M, 15)."""
+    """Return inputs of the network, (M, 15)."""
     extra = [torch.log(tails.number), (tails.number == 2).double()]
     return torch.cat([tail_inputs(tails, motion), tails.head[:, _OF_HEAD], torch.stack(extra, -1)], -1)
 
 
 def curve_speeds(heads: Heads, motion: Tensor) -> Tensor:
-    """(w, v_x, ω_yr) of the head's centre, (M, 3): what the curves are divided by."""
+    """Return (w, v_x, ω_yr) of the head's centre, (M, 3): what the curves are divided by."""
     v_x, v_z, yaw = motion[:, 0], motion[:, 1], motion[:, 2]
     sway = v_x + yaw * heads.length / 2
     return torch.stack([torch.hypot(v_z, _SMALL_SURGE * sway), sway, yaw], -1)
 
 
 def along_axes(speeds: Tensor, shape: tuple[int, ...]) -> Tensor:
-    """Speeds (M, 3) with axes of length 1 between, to multiply curves (M, *shape)."""
+    """Return speeds (M, 3) with axes of length 1 between, to multiply curves (M, *shape)."""
     return speeds.reshape(len(speeds), *[1] * (len(shape) - 1), 3)
 
 
 def between_dwells(curves: Floats, dwells: Floats) -> Floats:
-    """Curves (M, D, 3) at one dwell for each row (M,): cubic in ln T̄ through four neighbours, then constant."""
+    """Interpolate curves (M, D, 3), one dwell a row (M,): cubic in ln T̄ through four knots, then constant."""
     knots = np.log(DWELLS)
     place = np.log(np.minimum(dwells, DWELLS[-1]))
     first = np.clip(np.searchsorted(knots, place) - 2, 0, len(knots) - 4)

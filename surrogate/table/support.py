@@ -36,21 +36,21 @@ class Support:
     limit: float
 
     @staticmethod
-    def of(inputs: Tensor) -> Support:
-        """The support of rows (M, F)."""
+    def learned(inputs: Tensor) -> Support:
+        """Learn the support of rows (M, F)."""
         low, high = inputs.min(0).values, inputs.max(0).values
         shift, scale = (low + high) / 2, torch.clamp((high - low) / 2, min=1e-6)
         features = _monomials((inputs - shift) / scale)
         moments = features.T @ features / len(inputs)
         moments = moments + _REGULAR * torch.eye(len(moments), dtype=moments.dtype)
         plain = Support(shift, scale, torch.linalg.cholesky(moments), 1.0)
-        limit = _SLACK * float(np.quantile(plain.remoteness(inputs.numpy()), _KEPT))
+        limit = _SLACK * float(np.quantile(plain.novelty(inputs.numpy()), _KEPT))
         return Support(shift, scale, plain.factor, limit)
 
-    def remoteness(self, inputs: Floats) -> Floats:
-        """q over its limit, (M,), at inputs (M, F): at most 1 inside."""
+    def novelty(self, inputs: Floats) -> Floats:
+        """Return q over its limit, (M,), at inputs (M, F): at most 1 inside."""
         shift, scale, factor = (np.asarray(part.numpy()) for part in (self.shift, self.scale, self.factor))
-        return _remoteness(shift, scale, factor, *_products(len(shift)), inputs) / self.limit
+        return _novelty_rows(shift, scale, factor, *_products(len(shift)), inputs) / self.limit
 
 
 @cache
@@ -69,7 +69,7 @@ def _products(inputs: int) -> tuple[Integers, Integers]:
 
 
 def _monomials(x: Tensor) -> Tensor:
-    """All monomials up to DEGREE of x (M, F), (M, P)."""
+    """Return all monomials up to DEGREE of x (M, F), (M, P)."""
     columns = [torch.ones_like(x[:, 0])]
     for parent, factor in list(zip(*_products(x.shape[1]), strict=True))[1:]:
         columns.append(columns[parent] * x[:, factor])
@@ -77,21 +77,21 @@ def _monomials(x: Tensor) -> Tensor:
 
 
 @compiled
-def _remoteness(
+def _novelty_rows(
     shift: Floats, scale: Floats, factor: Floats, parents: Integers, last: Integers, inputs: Floats
 ) -> Floats:
-    """q of the module's head, (M,), at inputs (M, F)."""
-    found, count = np.zeros(len(inputs)), len(parents)
+    """Return q of the module's head, (M,), at inputs (M, F)."""
+    novelty, count = np.zeros(len(inputs)), len(parents)
     features, solved = np.ones(count), np.empty(count)
     for row in range(len(inputs)):
         x = (inputs[row] - shift) / scale
         for p in range(1, count):
             features[p] = features[parents[p]] * x[last[p]]
         for i in range(count):
-            left = features[i]
+            remainder = features[i]
             for j in range(i):
-                left -= factor[i, j] * solved[j]
-            solved[i] = left / factor[i, i]
-            found[row] += solved[i] ** 2
-        found[row] /= count
-    return found
+                remainder -= factor[i, j] * solved[j]
+            solved[i] = remainder / factor[i, i]
+            novelty[row] += solved[i] ** 2
+        novelty[row] /= count
+    return novelty

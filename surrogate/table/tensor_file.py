@@ -38,7 +38,7 @@ def write(path: str | Path, content: Mapping[str, Any], version: int) -> None:
 
 
 def packed(content: Mapping[str, Any], version: int) -> bytes:
-    """The bytes of a file."""
+    """Return the bytes of a file."""
     tensors: dict[str, Tensor] = {}
     plain = _without_tensors(content, "", tensors)
     manifest = {"format": version, "hash": digest(content), "content": plain}
@@ -46,7 +46,7 @@ def packed(content: Mapping[str, Any], version: int) -> bytes:
 
 
 def read(path: str | Path, version: int, remedy: str) -> dict[str, Any]:
-    """The content of a file.
+    """Read the content of a file.
 
     Raises:
         InputError: the file is of another kind or version, or was changed after it was written.
@@ -61,11 +61,11 @@ def read(path: str | Path, version: int, remedy: str) -> dict[str, Any]:
         tensors = safetensors.torch.load(data)
         metadata = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])["__metadata__"]
         manifest = json.loads(metadata["manifest"])
-        found, written, plain = manifest["format"], manifest["hash"], manifest["content"]
+        found_version, written, plain = manifest["format"], manifest["hash"], manifest["content"]
     except (SafetensorError, KeyError, TypeError, ValueError, RecursionError):
         raise InputError(f"{path} is not a model file, or is damaged; {remedy}") from None
-    if found != version:
-        raise InputError(f"{path} has format {str(found)[:20]}, this version reads {version}; {remedy}")
+    if found_version != version:
+        raise InputError(f"{path} has format {str(found_version)[:20]}, this version reads {version}; {remedy}")
     try:
         names: set[str] = set()
         content = _with_tensors(plain, tensors, names)
@@ -84,26 +84,26 @@ def read(path: str | Path, version: int, remedy: str) -> dict[str, Any]:
 
 
 def digest(content: Any) -> str:
-    """Hash of nested dictionaries and lists of tensors and plain values."""
-    found = hashlib.sha256()
+    """Return the hash of nested dictionaries and lists of tensors and plain values."""
+    total = hashlib.sha256()
 
     def take(part: Any) -> None:
         if isinstance(part, Tensor):
-            found.update(str((part.dtype, tuple(part.shape))).encode())
-            found.update(part.detach().contiguous().numpy().tobytes())
+            total.update(str((part.dtype, tuple(part.shape))).encode())
+            total.update(part.detach().contiguous().numpy().tobytes())
         elif isinstance(part, Mapping):
             for key in sorted(part):
-                found.update(json.dumps(key).encode())
+                total.update(json.dumps(key).encode())
                 take(part[key])
         elif isinstance(part, list | tuple):
-            found.update(f"[{len(part)}".encode())
+            total.update(f"[{len(part)}".encode())
             for item in part:
                 take(item)
         else:
-            found.update(json.dumps(part).encode())
+            total.update(json.dumps(part).encode())
 
     take(content)
-    return found.hexdigest()
+    return total.hexdigest()
 
 
 def _text(manifest: Any) -> str:
@@ -111,7 +111,7 @@ def _text(manifest: Any) -> str:
 
 
 def _without_tensors(part: Any, name: str, tensors: dict[str, Tensor]) -> Any:
-    """`part` as JSON; its tensors are put into `tensors` under their places."""
+    """Return `part` as JSON; its tensors are put into `tensors` under their places."""
     if isinstance(part, Tensor):
         tensors[name] = part.detach().to("cpu", copy=True, memory_format=torch.contiguous_format)
         return {_REFERENCE: name}
@@ -123,7 +123,7 @@ def _without_tensors(part: Any, name: str, tensors: dict[str, Tensor]) -> Any:
 
 
 def _with_tensors(part: Any, tensors: Mapping[str, Tensor], names: set[str]) -> Any:
-    """The content again; the names of its tensors are put into `names`."""
+    """Rebuild the content; the names of its tensors are put into `names`."""
     if isinstance(part, dict) and set(part) == {_REFERENCE}:
         names.add(part[_REFERENCE])
         return tensors[part[_REFERENCE]]

@@ -25,7 +25,7 @@ _LEAST_SURGE = 0.05  # of the speed: errors of v_z are relative to this at least
 
 
 def network_index(count: Tensor) -> Tensor:
-    """Index in CLASSES of robots with N tails, (M,)."""
+    """Return the index in CLASSES of robots with N tails, (M,)."""
     return torch.clamp(count, max=float(CLASSES[-1])).long() - 1
 
 
@@ -68,22 +68,22 @@ class WrenchTable:
         return (*spins, yaw, sway, surge, radius, angle, gap)
 
     def quick_gap(self, tails: Tails, inputs: Floats) -> Tensor:
-        """`tail_gap` with known inputs (M, 7) of the networks; without derivatives."""
+        """Return `tail_gap` with known inputs (M, 7) of the networks; without derivatives."""
         inputs = np.column_stack([inputs, np.log(tails.number.numpy())])
         return _gap(tails, torch.from_numpy(evaluate_rows(self._packed_gap, inputs)[:, 0]))
 
     def tail_gap(self, tails: Tails, motion: Tensor) -> Tensor:
-        """Smallest distance between tails over 2 r0, (M,); infinite for one tail."""
+        """Return the smallest distance between tails over 2 r0, (M,); infinite for one tail."""
         return _gap(tails, self.gap(gap_inputs(tails, motion))[:, 0])
 
 
 def _gap(tails: Tails, share: Tensor) -> Tensor:
-    """The gap over 2 r0 from its share of the distance of the clamps."""
+    """Return the gap over 2 r0 from its share of the distance of the clamps."""
     return torch.where(tails.number > 1, share * clamp_distance(tails) / (2 * tails.radius), torch.inf)
 
 
 def motion_sensitivity(heads: Heads, tails: Tails, motion: Tensor) -> Tensor:
-    """∂(relative motion)/∂(wrench) with the drag of straight tails, (M, 4, 4)."""
+    """Return ∂(relative motion)/∂(wrench) with the drag of straight tails, (M, 4, 4)."""
     matrix = heads.resistance[:, :, :4].clone()
     matrix[:, :, 3] += heads.gain[:, None] * heads.resistance[:, :, 4]
     matrix[:, :3, :3] += straight_resistance(tails)

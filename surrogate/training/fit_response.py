@@ -37,7 +37,7 @@ def fit_response(
     settings: Settings,
     work: TrainingContext,
 ) -> ResponseTable:
-    """A table from the curves of robots, by name as in SHAPES, each (M, …, 3); NaN where one was not simulated."""
+    """Fit a table to curves of robots, by name as in SHAPES, each (M, …, 3); NaN where one was not simulated."""
     inputs, speeds = response_inputs(tails, motion), curve_speeds(heads, motion)
     networks: list[Ensemble] = []
     bases: dict[str, Basis] = {}
@@ -56,7 +56,7 @@ def fit_response(
 
 
 def _basis(flat: Tensor, count: int) -> Basis:
-    """Mean and the first components of curves (M, D)."""
+    """Return the mean and the first components of curves (M, D)."""
     mean = flat.median(0).values
     vectors = torch.linalg.svd(_without_outliers(flat - mean), full_matrices=False)[2]
     return Basis(mean, vectors[:count].clone())
@@ -65,7 +65,7 @@ def _basis(flat: Tensor, count: int) -> Basis:
 def _learned(
     inputs: Tensor, wanted: Tensor, weights: Tensor, settings: Settings, work: TrainingContext
 ) -> Ensemble:
-    """A network that gives components (M, C)."""
+    """Fit a network that gives components (M, C)."""
     network = Ensemble(
         inputs.shape[1], wanted.shape[1], width=settings.width, depth=settings.depth, members=settings.members,
         seed=settings.seed,
@@ -84,12 +84,12 @@ def _learned(
 
 
 def _without_outliers(flat: Tensor) -> Tensor:
-    """Rows (M, D) with their size limited, so that a few of them do not choose the components."""
+    """Return rows (M, D) with their size limited, so that a few of them do not choose the components."""
     size = flat.norm(dim=1, keepdim=True)
     return flat * torch.clamp(5 * size.median() / torch.clamp(size, min=1e-12), max=1.0)
 
 
 def _spread(wanted: Tensor) -> Tensor:
-    """Half the range between the 16th and the 84th percentile, (C,)."""
+    """Return half the range between the 16th and the 84th percentile, (C,)."""
     low, high = wanted.quantile(torch.tensor([0.16, 0.84], dtype=wanted.dtype), dim=0)
     return torch.clamp((high - low) / 2, min=1e-8)

@@ -58,7 +58,7 @@ class WrenchSamples(NamedTuple):
     gap: Tensor  # (M,)
 
     def at(self, rows: Tensor) -> WrenchSamples:
-        """The rows at indices or flags (M',)."""
+        """Return the rows at indices or flags (M',)."""
         return WrenchSamples(
             self.heads.at(rows),
             self.tails.at(rows),
@@ -68,44 +68,44 @@ class WrenchSamples(NamedTuple):
 
 
 def wrench_samples(robots: Mapping[str, Floats], motion: Mapping[str, Floats]) -> WrenchSamples:
-    """Rows from columns of robots, effects included, and of their steady motion, each (M,)."""
+    """Return samples from columns of robots, effects included, and of their steady motion, each (M,)."""
     heads, tails = heads_and_tails(robots)
-    found = {name: torch.as_tensor(np.asarray(motion[name]), dtype=torch.float64) for name in
+    columns = {name: torch.as_tensor(np.asarray(motion[name]), dtype=torch.float64) for name in
              ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap")}  # fmt: skip
-    sense, yaw = heads.sense, found["omega_yr_bar"]
-    at_disc = found["v_x"] - yaw * heads.length / 2
+    sense, yaw = heads.sense, columns["omega_yr_bar"]
+    at_disc = columns["v_x"] - yaw * heads.length / 2
     parts = [
         sense * at_disc,
-        found["v_z"],
+        columns["v_z"],
         sense * yaw,
-        sense * found["omega_h_bar"],
-        sense * found["omega_t_bar"],
+        sense * columns["omega_h_bar"],
+        sense * columns["omega_t_bar"],
     ]
-    return WrenchSamples(heads, tails, torch.stack(parts, -1), found["tail_gap"])
+    return WrenchSamples(heads, tails, torch.stack(parts, -1), columns["tail_gap"])
 
 
 def learnable(rows: WrenchSamples) -> Flags:
-    """Rows that a table may learn, (M,): tails that turn with the motor, faster than the robot yaws."""
+    """Return rows that a table may learn, (M,): tails that turn with the motor, faster than the robot yaws."""
     _, _, yaw, _, spin = rows.motion.unbind(-1)
     return np.asarray(((spin > 0) & (yaw > 0) & (yaw < TURNS * spin)).numpy())
 
 
 def fit_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext) -> WrenchTable:
-    """Networks of all CLASSES from rows that are `learnable`."""
+    """Fit the networks of all CLASSES to samples that are `learnable`."""
     kind = network_index(rows.tails.number)
     networks: list[Ensemble | None] = []
     for k, count in enumerate(CLASSES):
-        part = work.part(f"tails of N = {count}{' and more' if count == CLASSES[-1] else ''}")
-        some = rows.at(kind == k)
-        known = len(some.motion) > 0
-        networks.append(_learn_wrench(some, settings, part, count) if known else None)
-    many = rows.at(rows.tails.number > 1)
-    gap = _learn_gap(many, _GAP, work.part("gap"))
+        context = work.part(f"tails of N = {count}{' and more' if count == CLASSES[-1] else ''}")
+        samples = rows.at(kind == k)
+        known = len(samples.motion) > 0
+        networks.append(_learn_wrench(samples, settings, context, count) if known else None)
+    several_tails = rows.at(rows.tails.number > 1)
+    gap = _learn_gap(several_tails, _GAP, work.part("gap"))
     return WrenchTable(tuple(networks), gap)
 
 
 def _learn_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext, count: int) -> Ensemble:
-    """The network of one of CLASSES."""
+    """Fit the network of one of CLASSES."""
     inputs = (inputs_with_head if count == 1 else tail_inputs)(rows.tails, rows.motion)
     weight = motion_sensitivity(rows.heads, rows.tails, rows.motion)
     matrix = weight @ wrench_slopes(rows.tails, rows.motion)

@@ -44,7 +44,7 @@ the shipped table the picture is in docs/figures.md, under "Error against rows".
 
 
 def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
-    """The card of a table, from robots that it did not learn."""
+    """Write the card of a table, from robots that it did not learn."""
     answer = lookup.query(held_out.robots, intervals=True, flag=True)
     truth = with_radius(held_out.motion)
     known = ~answer["outside"]
@@ -98,7 +98,7 @@ def _what(lookup: NeuralTable) -> str:
 def _row(
     words: str, name: str, errors: dict[str, Floats], inside: dict[str, Flags], kind: Flags
 ) -> tuple[str, ...] | None:
-    """Figures of one output over some robots; None where there are too few."""
+    """Return figures of one output over some robots; None where there are too few."""
     kind = kind & np.isfinite(errors[name])
     if np.count_nonzero(kind) < _FEWEST:
         return None
@@ -108,9 +108,9 @@ def _row(
 
 
 def _regions(robots: dict[str, Floats]) -> list[tuple[str, Flags]]:
-    """Robots by N, by thirds of each input's range, near a face and in a corner of the ranges; N > 1."""
+    """Return robots by N, by thirds of each input's range, near a face and in a corner of the ranges; N > 1."""
     several = robots["N"] > 1
-    found = [(f"N = {count:.0f}", robots["N"] == count) for count in np.unique(robots["N"])]
+    regions = [(f"N = {count:.0f}", robots["N"] == count) for count in np.unique(robots["N"])]
     faces = np.zeros(len(several), dtype=int)
     for name in ROBOT:
         values = np.log(np.abs(robots[name]))
@@ -122,16 +122,16 @@ def _regions(robots: dict[str, Floats]) -> list[tuple[str, Flags]]:
         for third, words in enumerate(("low", "middle", "high")):
             part = several & (share >= third / 3) & (share <= (third + 1) / 3)
             ends = np.exp(low + (high - low) * np.array([third, third + 1]) / 3)
-            found.append((f"{name} {words}: {ends[0]:.3g} to {ends[1]:.3g}", part))
+            regions.append((f"{name} {words}: {ends[0]:.3g} to {ends[1]:.3g}", part))
     return [
-        *found,
+        *regions,
         ("one input or more near its end", several & (faces > 0)),
         ("three or more", several & (faces > 2)),
     ]
 
 
 def _worst(rows: SimulatedRobots, answer: dict[str, Any], error: Floats, known: Flags) -> str:
-    """The robots with the largest errors of the yaw rate, N > 1, and why."""
+    """Return the robots with the largest errors of the yaw rate, N > 1, and why."""
     size = np.where(known & (rows.robots["N"] > 1), error, -1.0)
     order = np.argsort(-size)[:_WORST]
     names = [name for name in ROBOT if np.ptp(rows.robots[name]) > 0]
@@ -152,6 +152,6 @@ def _worst(rows: SimulatedRobots, answer: dict[str, Any], error: Floats, known: 
 
 
 def _lines(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table in Markdown."""
+    """Format a table in Markdown."""
     every = [head, ["---"] * len(head), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in every)

@@ -21,7 +21,7 @@ from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, LAG_PARTS
-from sim.motion.batches import run_batches, split, steady_columns
+from sim.motion.batches import run_batches, split
 from sim.motion.response import responses
 from sim.motion.steady import orbits
 from surrogate.input_ranges import DOMAIN, MOST_TAILS, ROBOT, WIDE
@@ -44,19 +44,19 @@ class SimulatedRobots:
         return len(self.robots["N"])
 
     def at(self, rows: Flags | Integers) -> SimulatedRobots:
-        """The robots at indices or flags."""
+        """Return the robots at indices or flags."""
         parts = [{name: array[rows] for name, array in part.items()} for part in vars(self).values()]
         return SimulatedRobots(*parts)
 
     def with_curves(self) -> SimulatedRobots:
-        """The robots whose response was simulated."""
+        """Return the robots whose response was simulated."""
         if not self.curves:
             return self.at(np.zeros(len(self), dtype=bool))
         return self.at(np.flatnonzero(np.isfinite(self.curves["lag"]).all((1, 2))))
 
 
 def read_robots(folder: str) -> tuple[SimulatedRobots, Integers]:
-    """Usable rows of a data set's folder, and their numbers.
+    """Read the usable rows of a data set's folder, and their numbers.
 
     Raises:
         InputError: there is no finished data set.
@@ -71,7 +71,7 @@ def read_robots(folder: str) -> tuple[SimulatedRobots, Integers]:
 
 
 def join_robots(parts: Sequence[SimulatedRobots]) -> SimulatedRobots:
-    """The robots of all parts; effects that some do not have are at their null there."""
+    """Join the robots of all parts; effects that some do not have are at their null there."""
     effects = {name for part in parts for name in part.robots if name in catalogue()}
     full = [
         {**{name: np.full(len(part), catalogue()[name].null) for name in sorted(effects)}, **part.robots}
@@ -85,7 +85,7 @@ def join_robots(parts: Sequence[SimulatedRobots]) -> SimulatedRobots:
 
 
 def _curves_in(table: pd.DataFrame) -> dict[str, Floats]:
-    """Response curves from lists in columns `lag_z`, …, `memory_psi_rad`; empty if there are none."""
+    """Return the response curves from lists in columns `lag_z`, …, `memory_psi_rad`; empty if there are none."""
     if "memory_z" not in table:
         return {}
     dwells, before = len(DWELLS), len(BEFORE)
@@ -103,7 +103,7 @@ def _lists(column: Any, shape: Sequence[int]) -> Floats:
 
 
 def draw_robots(count: int, seed: int, *, wide: bool) -> dict[str, Floats]:
-    """Robots of a scrambled Sobol sequence, even in the logarithms of DOMAIN.
+    """Draw robots of a scrambled Sobol sequence, even in the logarithms of DOMAIN.
 
     Args:
         count: number of robots. seed: of the scrambling. wide: from WIDE, half of them with effects on the head,
@@ -114,13 +114,13 @@ def draw_robots(count: int, seed: int, *, wide: bool) -> dict[str, Floats]:
     share = sampler.random_base2(math.ceil(math.log2(max(count, 2))))[:count]
     ranges = WIDE if wide else DOMAIN
     robots = {n: low * (high / low) ** share[:, i] for i, (n, (low, high)) in enumerate(ranges.items())}
-    eighth, more, turning, along, disc = share[:, len(DOMAIN) :].T
+    eighth, more, end_over_end, axial, disc = share[:, len(DOMAIN) :].T
     if not wide:
         return robots | {"N": 1 + np.floor(MOST_TAILS * eighth)}
     tails = np.array(_TAILS, dtype=float)[(8 * eighth).astype(int)]
     robots["N"] = tails + (tails >= 5) * (more > 0.5)
-    robots["end_over_end_drag"] = np.where(turning < 0.5, 0.0, 0.1 * 150 ** (2 * turning - 1))
-    robots["anisotropic_head_drag"] = np.where(along < 0.5, 0.0, -0.5 + 1.5 * (2 * along - 1))
+    robots["end_over_end_drag"] = np.where(end_over_end < 0.5, 0.0, 0.1 * 150 ** (2 * end_over_end - 1))
+    robots["anisotropic_head_drag"] = np.where(axial < 0.5, 0.0, -0.5 + 1.5 * (2 * axial - 1))
     robots["disc_drag"] = np.where(disc < 0.6, 0.0, 3 * (disc - 0.6) / 0.4)
     return robots
 
@@ -138,18 +138,11 @@ def simulate_robots(robots: Mapping[str, Floats], *, curves: bool = False, title
     work = _with_curves if curves else _motion
     done = run_batches(work, parts, sizes=[len(b) for b in batches], title=title, threads=True)
     order = np.argsort(np.concatenate(batches))
-    found = {name: np.concatenate([part[name] for part in done])[order] for name in done[0]}
-    motion = {name: found[name] for name in MOTION}
-    kept = {name: found[name] for name in found if name not in (*MOTION, "solved")}
+    columns = {name: np.concatenate([part[name] for part in done])[order] for name in done[0]}
+    motion = {name: columns[name] for name in MOTION}
+    kept = {name: columns[name] for name in columns if name not in (*MOTION, "solved")}
     everything = SimulatedRobots({name: np.asarray(array) for name, array in robots.items()}, motion, kept)
-    return everything.at(found["solved"])
-
-
-def as_reached(robots: Mapping[str, Floats], *, title: str = "") -> SimulatedRobots:
-    """Simulate robots as the data set does: the motion that straight tails reach, if it is steady."""
-    found = steady_columns(robots, title=title)
-    whole = SimulatedRobots(dict(robots), {name: found[name] for name in MOTION}, {})
-    return whole.at(np.asarray(found["converged"], dtype=bool))
+    return everything.at(columns["solved"])
 
 
 def _motion(robots: dict[str, Floats]) -> dict[str, Any]:
@@ -162,7 +155,7 @@ def _motion(robots: dict[str, Floats]) -> dict[str, Any]:
 def _with_curves(robots: dict[str, Floats]) -> dict[str, Any]:
     groups = Groups.from_columns(robots)
     motion = orbits(groups)
-    found = responses(groups, motion)
+    response = responses(groups, motion)
     columns = _motion(robots)
-    curves = {name: getattr(found, name) for name in ("lag", "memory", "rest", "spread", "net_speed")}
-    return columns | curves | {"solved": columns["solved"] & ~found.failed & ~found.stepped}
+    curves = {name: getattr(response, name) for name in ("lag", "memory", "rest", "spread", "net_speed")}
+    return columns | curves | {"solved": columns["solved"] & ~response.failed & ~response.stepped}

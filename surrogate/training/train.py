@@ -56,7 +56,7 @@ def train(
     device: str = "cpu",
     states: str | Path | None = None,
 ) -> NeuralTable:
-    """A look-up table from a finished data set, or from several.
+    """Train a look-up table on a finished data set, or on several.
 
     Args:
         folder: data set written by `softflagella sweep`, or several. A row that is in two of them counts once.
@@ -78,7 +78,7 @@ def train(
     """
     work = TrainingContext(title, device_named(device), None if states is None else Path(states))
     folders = [folder] if isinstance(folder, str) else list(folder)
-    manifests = [read_manifest(one) for one in folders]
+    manifests = [read_manifest(path) for path in folders]
     rows, numbers = _together(folders, manifests)
     part = split(numbers)
     if len(rows) < _FEWEST_ROWS:
@@ -86,23 +86,23 @@ def train(
     sets = [rows.at(part == i) for i in range(3)]
     flipped = sets[0].with_curves()
     if not len(flipped):
-        some = sets[0].at(np.flatnonzero(sets[0].robots["N"] > 1)[:flips])
-        flipped = simulate_robots(some.robots, curves=True, title=title and f"{title}: flips simulated")
+        unflipped = sets[0].at(np.flatnonzero(sets[0].robots["N"] > 1)[:flips])
+        flipped = simulate_robots(unflipped.robots, curves=True, title=title and f"{title}: flips simulated")
     kept = {"data_hash": "config_hash", "data_code_version": "code_version"}
     source = {name: "+".join(str(m.get(key, "")) for m in manifests) for name, key in kept.items()}
-    learned, widths, held_out = sets
-    return learn(learned, widths, held_out, flipped, settings, curve_settings, source=source, work=work)
+    learned, width_rows, held_out = sets
+    return learn(learned, width_rows, held_out, flipped, settings, curve_settings, source=source, work=work)
 
 
 def held_out(folder: str | Sequence[str]) -> SimulatedRobots:
-    """The rows of data sets that `train` holds out."""
+    """Return the rows of data sets that `train` holds out."""
     folders = [folder] if isinstance(folder, str) else list(folder)
     rows, numbers = _together(folders, [read_manifest(one) for one in folders])
     return rows.at(split(numbers) == 2)
 
 
 def _together(folders: Sequence[str], manifests: Sequence[dict[str, Any]]) -> tuple[SimulatedRobots, Integers]:
-    """Rows of several data sets and their numbers; the same point of the same sequence counts once."""
+    """Return rows of several data sets and their numbers; the same point of the same sequence counts once."""
     parts, numbers, seen = [], [], dict[str, Integers]()
     for folder, manifest in zip(folders, manifests, strict=True):
         part, number = read_robots(folder)
@@ -117,7 +117,7 @@ def _together(folders: Sequence[str], manifests: Sequence[dict[str, Any]]) -> tu
 
 def learn(
     learned: SimulatedRobots,
-    widths: SimulatedRobots,
+    width_rows: SimulatedRobots,
     held_out: SimulatedRobots,
     flipped: SimulatedRobots,
     settings: Settings | None = None,
@@ -127,94 +127,105 @@ def learn(
     source: dict[str, Any] | None = None,
     work: TrainingContext = _QUIET,
 ) -> NeuralTable:
-    """A look-up table from simulated robots.
+    """Train a look-up table on simulated robots.
 
     Args:
         learned: steady motions for the tails.
-        widths: robots for the local widths of the intervals.
+        width_rows: robots for the local widths of the intervals.
         held_out: robots for the errors and the factor of the intervals.
         flipped: robots with response curves.
         flips_held_out: robots with curves for the errors of the response; by default a tenth of `flipped`.
         source: more provenance.
         work: device, progress bars, and where states are kept.
     """
-    chosen, curves_chosen = settings or Settings(), curve_settings or SETTINGS
+    wrench_settings, response_settings = settings or Settings(), curve_settings or SETTINGS
     if flips_held_out is None:
         tenth = np.arange(len(flipped)) % 10 == 9
         flipped, flips_held_out = flipped.at(~tenth), flipped.at(tenth)
     rows = _learnable(learned)
-    table = fit_wrench(rows, chosen, work)
+    table = fit_wrench(rows, wrench_settings, work)
     kind = network_index(rows.tails.number)
     inputs = tail_inputs(rows.tails, rows.motion)
     flipped, flips_held_out = _several_tails(flipped), _several_tails(flips_held_out)
-    own = _learnable(flipped)
+    flip_samples = _learnable(flipped)
     usable = np.flatnonzero(learnable(wrench_samples(flipped.robots, flipped.motion)))
     known = flipped.at(usable).curves
-    response = fit_response(own.heads, own.tails, own.motion, known, curves_chosen, work.part("flips"))
-    counts = {"train": len(rows.motion), "widths": len(widths), "held_out": len(held_out), "flips": len(usable)}
-    made = provenance({"tails": asdict(chosen), "curves": asdict(curves_chosen), "device": work.device})
+    response = fit_response(
+        flip_samples.heads, flip_samples.tails, flip_samples.motion, known, response_settings, work.part("flips")
+    )
+    counts = {
+        "train": len(rows.motion),
+        "widths": len(width_rows),
+        "held_out": len(held_out),
+        "flips": len(usable),
+    }
+    made = provenance(
+        {"tails": asdict(wrench_settings), "curves": asdict(response_settings), "device": work.device}
+    )
     lookup = NeuralTable(
         tails=table,
         curves=response,
         support=tuple(
-            Support.of(inputs[kind == k]) if bool((kind == k).any()) else None for k in range(len(CLASSES))
+            Support.learned(inputs[kind == k]) if bool((kind == k).any()) else None for k in range(len(CLASSES))
         ),
         intervals=None,
         ranges={name: _range(learned.robots[name]) for name in learned.robots if name in ROBOT},
         errors={},
         provenance={**made, **(source or {}), "rows": counts},
     )
-    return _judged(lookup, widths, held_out, flips_held_out)
+    return _judged(lookup, width_rows, held_out, flips_held_out)
 
 
 def _judged(
-    lookup: NeuralTable, widths: SimulatedRobots, held_out: SimulatedRobots, flips: SimulatedRobots
+    lookup: NeuralTable, width_rows: SimulatedRobots, held_out: SimulatedRobots, flips: SimulatedRobots
 ) -> NeuralTable:
-    """The table with its intervals and held-out errors; the errors are those of robots with two tails and more."""
-    (first_hints, first, _), (hints, errors, inside) = (_errors(lookup, rows) for rows in (widths, held_out))
-    intervals = Intervals.learned(first_hints, first, hints, errors)
+    """Add intervals and held-out errors to a table; the errors are those of robots with two tails and more."""
+    (first_features, first, _), (features, errors, inside) = (
+        _errors(lookup, rows) for rows in (width_rows, held_out)
+    )
+    intervals = Intervals.learned(first_features, first, features, errors)
     apart = held_out.motion["tail_gap"][inside] >= 1
     several = held_out.robots["N"][inside] > 1
     several = several if several.any() else ~several
     report = summary({name: error.numpy()[several] for name, error in errors.items()}, apart[several])
     flips = flips.at(np.abs(flips.motion["omega_yr_bar"]) < BRANCHES * np.abs(flips.motion["omega_t_bar"]))
-    found = lookup.response(flips.robots, flag=True)
+    response = lookup.response(flips.robots, flag=True)
     truth = {**flips.motion, **flips.curves}
-    report |= summary(curve_errors(found, truth), flips.motion["tail_gap"] >= 1)
+    report |= summary(curve_errors(response, truth), flips.motion["tail_gap"] >= 1)
     return replace(lookup, intervals=intervals, errors=report)
 
 
 def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[torch.Tensor, dict[str, torch.Tensor], Floats]:
-    """Hints and relative errors of rows inside the domain, and which those are."""
-    found = lookup.motions(rows.robots, flag=True)
-    inside = np.array([not reason for reason in found.reason])
+    """Return features and relative errors of rows inside the domain, and which those are."""
+    motions = lookup.motions(rows.robots, flag=True)
+    inside = np.array([not reason for reason in motions.reason])
     if inside.sum() < _FEWEST_INSIDE:  # a table of few rows has a domain that holds hardly any others: all count
         inside[:] = True
     truth = with_radius(rows.motion)
-    errors = relative_errors(steady_outputs(found, lookup.tails), truth)
+    errors = relative_errors(steady_outputs(motions, lookup.tails), truth)
     return (
-        lookup.hints(found)[torch.as_tensor(inside)],
+        lookup.width_features(motions)[torch.as_tensor(inside)],
         {name: torch.tensor(error[inside]) for name, error in errors.items()},
         inside,
     )
 
 
 def _several_tails(rows: SimulatedRobots) -> SimulatedRobots:
-    """Rows with two or more tails: the response of one tail depends too much on the phase of the disc."""
+    """Return rows with two or more tails: the response of one tail depends too much on the phase of the disc."""
     return rows.at(rows.robots["N"] > 1)
 
 
 def with_radius(motion: dict[str, Floats]) -> dict[str, Floats]:
-    """The motion with turn radius and slip angle."""
+    """Return the motion with turn radius and slip angle."""
     speed = np.hypot(motion["v_x"], motion["v_z"])
     angle = np.degrees(np.arctan2(np.abs(motion["v_x"]), motion["v_z"]))
     return {**motion, "R_yr_over_l": speed / np.abs(motion["omega_yr_bar"]), "theta_deg": angle}
 
 
 def _learnable(rows: SimulatedRobots) -> WrenchSamples:
-    found = wrench_samples(rows.robots, rows.motion)
-    good = learnable(found)
-    kept = found.at(torch.as_tensor(np.flatnonzero(good)))
+    samples = wrench_samples(rows.robots, rows.motion)
+    good = learnable(samples)
+    kept = samples.at(torch.as_tensor(np.flatnonzero(good)))
     counts = [int((network_index(kept.tails.number) == k).sum()) for k in range(len(CLASSES))]
     for count, number in zip(counts, ("N = 1", "N = 2", "N = 3 and more"), strict=True):
         if 0 < count < _FEWEST_OF_A_CLASS:

@@ -35,25 +35,25 @@ def solve_rows(network: Packed, heads: Floats, resistances: Floats, tails: Float
         tails: columns of `surrogate.wrench.tails.pack_tails`, (M, 13).
     """
     motions, converged = np.empty((len(heads), 5)), np.empty(len(heads), dtype=np.bool_)
-    y, guess, other = np.empty(len(network.mean)), np.empty(5), np.empty(5)
+    y, guess, second = np.empty(len(network.mean)), np.empty(5), np.empty(5)
     for row in range(len(heads)):
         head, resistance, tail = heads[row], resistances[row], tails[row]
         _first_guess(head, resistance, tail, guess)
         motions[row] = guess
         converged[row] = _solve(network, head, resistance, tail, y, motions[row], False)
         if tail[4] == 1:
-            other[:] = guess
-            found = _solve(network, head, resistance, tail, y, other, True)
-            nearer = abs(other[1] - guess[1]) < abs(motions[row, 1] - guess[1])
-            if found and (nearer or not converged[row]):
-                motions[row] = other
+            second[:] = guess
+            second_found = _solve(network, head, resistance, tail, y, second, True)
+            nearer = abs(second[1] - guess[1]) < abs(motions[row, 1] - guess[1])
+            if second_found and (nearer or not converged[row]):
+                motions[row] = second
                 converged[row] = True
     return motions, converged
 
 
 @compiled
 def inputs_rows(tails: Floats, motions: Floats) -> Floats:
-    """`surrogate.wrench.tails.tail_inputs`, (M, 7), of tails (M, 13) that move so (M, 5)."""
+    """Return `surrogate.wrench.tails.tail_inputs`, (M, 7), of tails (M, 13) that move so (M, 5)."""
     x = np.empty((len(tails), 7))
     for row in range(len(tails)):
         inputs_at(tails[row], motions[row], x[row])
@@ -62,7 +62,7 @@ def inputs_rows(tails: Floats, motions: Floats) -> Floats:
 
 @compiled
 def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
-    """`surrogate.wrench.tails.tail_inputs` of one robot, written to x (7,), or `inputs_with_head`, to x (14,)."""
+    """Write `surrogate.wrench.tails.tail_inputs` of one robot to x (7,), or `inputs_with_head` to x (14,)."""
     v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
     drag_number = tail[0] * spin
     deflection = np.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
@@ -78,8 +78,10 @@ def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
 
 
 @compiled
-def _unbalanced(head: Floats, resistance: Floats, tail: Floats, motion: Floats, y: Floats, left: Floats) -> None:
-    """`surrogate.wrench.heads.unbalanced` for numbers y of the tails, written to left (4,)."""
+def _unbalanced(
+    head: Floats, resistance: Floats, tail: Floats, motion: Floats, y: Floats, residual: Floats
+) -> None:
+    """Write `surrogate.wrench.heads.unbalanced` for numbers y of the tails to residual (4,)."""
     v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
     perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
     S = perp * spin
@@ -87,18 +89,20 @@ def _unbalanced(head: Floats, resistance: Floats, tail: Floats, motion: Floats, 
     squared = (sideways / (a * spin)) ** 2
     couple = number * spin * a**2
     across = number * perp
-    left[0] = across * (yaw / 2 - v_x + sideways * y[0])
-    left[1] = -number * parallel * v_z + (perp - parallel) * couple * linear_thrust(S) * (y[1] + squared * y[4])
-    left[2] = across * (v_x / 2 - yaw / 3 + sideways * y[2])
-    left[3] = -perp * couple * linear_torque(S) * (y[3] + squared * y[5])
+    residual[0] = across * (yaw / 2 - v_x + sideways * y[0])
+    residual[1] = -number * parallel * v_z + (perp - parallel) * couple * linear_thrust(S) * (
+        y[1] + squared * y[4]
+    )
+    residual[2] = across * (v_x / 2 - yaw / 3 + sideways * y[2])
+    residual[3] = -perp * couple * linear_torque(S) * (y[3] + squared * y[5])
     for i in range(4):
         for j in range(5):
-            left[i] -= resistance[i, j] * motion[j]
+            residual[i] -= resistance[i, j] * motion[j]
 
 
 @compiled
 def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats) -> None:
-    """The motion with the torque and thrust of linear theory and the side forces of straight tails."""
+    """Write the motion with the torque and thrust of linear theory and the side forces of straight tails."""
     speed, gain = head[0], head[1]
     perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
     spin = _FIRST_SPIN * speed
@@ -124,19 +128,19 @@ def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats)
 def _solve(
     network: Packed, head: Floats, resistance: Floats, tail: Floats, y: Floats, motion: Floats, exact: bool
 ) -> bool:
-    """Broyden's method for one robot, from the motion given; returns whether it converged.
+    """Solve by Broyden's method for one robot, from the motion given; return whether it converged.
 
     Args:
         y: room for the network's numbers, (6,).
         motion: first guess, replaced by the result, (5,).
         exact: the first derivative is that of the network, too.
     """
-    x, left, before = np.empty(len(network.shift)), np.empty(4), np.empty(4)
+    x, residual, before = np.empty(len(network.shift)), np.empty(4), np.empty(4)
     step, change, moved = np.empty(4), np.empty(4), np.empty(5)
     slope, inverse = np.empty((4, 4)), np.eye(4)
     inputs_at(tail, motion, x)
     evaluate(network, x, y)
-    _unbalanced(head, resistance, tail, motion, y, left)
+    _unbalanced(head, resistance, tail, motion, y, residual)
     largest = 0.0
     for j in range(4):
         largest = max(largest, abs(motion[j]))
@@ -150,21 +154,21 @@ def _solve(
             evaluate(network, x, y)
         _unbalanced(head, resistance, tail, moved, y, before)
         for i in range(4):
-            slope[i, j] = (before[i] - left[i]) / width
+            slope[i, j] = (before[i] - residual[i]) / width
     solve_dense(slope, inverse)
     for _ in range(STEPS):
         share = 1.0
         for i in range(4):
             step[i] = 0.0
             for j in range(4):
-                step[i] -= inverse[i, j] * left[j]
+                step[i] -= inverse[i, j] * residual[j]
         turned = abs(head[1] * step[3]) / motion[4]
         if turned > _LONGEST:
             share = _LONGEST / turned
         for i in range(4):
             step[i] *= share
             motion[i] += step[i]
-            before[i] = left[i]
+            before[i] = residual[i]
         motion[4] = head[0] + head[1] * motion[3]
         if not motion[4] > 0:
             return False
@@ -176,16 +180,16 @@ def _solve(
             return False
         inputs_at(tail, motion, x)
         evaluate(network, x, y)
-        _unbalanced(head, resistance, tail, motion, y, left)
+        _unbalanced(head, resistance, tail, motion, y, residual)
         for i in range(4):
-            change[i] = left[i] - before[i]
+            change[i] = residual[i] - before[i]
         _update(inverse, step, change)
     return False
 
 
 @compiled
 def _update(inverse: Floats, step: Floats, change: Floats) -> None:
-    """The inverse of the derivative after a step that changed the balance so (Broyden's good update)."""
+    """Update the inverse of the derivative after a step that changed the balance so (Broyden's good update)."""
     predicted, along = np.zeros(4), np.zeros(4)
     for i in range(4):
         for j in range(4):

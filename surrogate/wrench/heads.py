@@ -51,7 +51,7 @@ class Heads(NamedTuple):
 
 
 def heads_and_tails(columns: Mapping[str, Floats | Tensor], keep: Collection[str] = ()) -> tuple[Heads, Tails]:
-    """Heads and tails of robots by column name, each (M,), a_over_R and effects included; differentiable.
+    """Return heads and tails of robots by column name, each (M,), a_over_R and effects included; differentiable.
 
     Args:
         columns: robots.
@@ -62,7 +62,7 @@ def heads_and_tails(columns: Mapping[str, Floats | Tensor], keep: Collection[str
     """
     tensors = {name: as_tensor(values) for name, values in columns.items()}
     count = tensors.pop("N")
-    own = {name: tensors.pop(name) for name in Groups.__dataclass_fields__ if name in tensors}
+    groups = {name: tensors.pop(name) for name in Groups.__dataclass_fields__ if name in tensors}
     effects = {name: size for name, size in tensors.items() if name in keep or bool((size != 0).any())}
     for name in effects:
         if not needs_no_learning(name):
@@ -71,7 +71,7 @@ def heads_and_tails(columns: Mapping[str, Floats | Tensor], keep: Collection[str
                 "robot a table of its own: softflagella surrogate robot ROBOT.toml --out TABLE.json"
             )
     tails_of_each: Any = count  # a batch of the simulator has one N, formulas take N by row as well
-    body = assemble(Groups(**own, N=tails_of_each, effects=effects))
+    body = assemble(Groups(**groups, N=tails_of_each, effects=effects))
     sense = torch.sign(body.omega)
     mirror = torch.where(sense[:, None] < 0, torch.tensor(_SENSES, dtype=torch.float64), 1.0)
     resistance = body.resistance.permute(2, 0, 1) * mirror[:, :4, None] * mirror[:, None, :]
@@ -84,30 +84,30 @@ def heads_and_tails(columns: Mapping[str, Floats | Tensor], keep: Collection[str
 
 
 def as_tensor(values: Floats | Tensor) -> Tensor:
-    """Tensors as they are, arrays copied."""
+    """Return tensors as they are, arrays copied."""
     return values if isinstance(values, Tensor) else torch.tensor(np.asarray(values), dtype=torch.float64)
 
 
 def needs_no_learning(effect: str) -> bool:
-    """Whether an effect enters the balance by algebra: it changes head, disc, motor, or all drag alike."""
-    found = catalogue()[effect]
-    return found.reach == "local" and effect not in _ON_TAILS
+    """Return whether an effect enters the balance by algebra: it changes head, disc, motor, or all drag alike."""
+    entry = catalogue()[effect]
+    return entry.reach == "local" and effect not in _ON_TAILS
 
 
 def full_motion(heads: Heads, u: Tensor) -> Tensor:
-    """(v_x, v_z, ω_yr, ω_h, ω_t), (M, 5), from the four velocities u (M, 4)."""
+    """Return (v_x, v_z, ω_yr, ω_h, ω_t), (M, 5), from the four velocities u (M, 4)."""
     return torch.cat([u, (heads.speed + heads.gain * u[:, 3])[:, None]], 1)
 
 
 def unbalanced(heads: Heads, tails: Tails, u: Tensor, numbers: Numbers) -> Tensor:
-    """W − R (v_x, v_z, ω_yr, ω_h, ω_t), (M, 4)."""
+    """Return W − R (v_x, v_z, ω_yr, ω_h, ω_t), (M, 4)."""
     motion = full_motion(heads, u)
     wrench = total_wrench(tails, motion, numbers(inputs_with_head(tails, motion)))
     return wrench - (heads.resistance @ motion[..., None])[..., 0]
 
 
 def straight_resistance(tails: Tails) -> Tensor:
-    """Resistance of straight tails to (v_x, v_z, ω_yr), (M, 3, 3)."""
+    """Return the resistance of straight tails to (v_x, v_z, ω_yr), (M, 3, 3)."""
     across, along = tails.number * tails.zeta_perp, tails.number * tails.zeta_parallel
     none = torch.zeros_like(across)
     rows = [[across, none, -across / 2], [none, along, none], [-across / 2, none, across / 3]]
@@ -115,7 +115,7 @@ def straight_resistance(tails: Tails) -> Tensor:
 
 
 def value_and_slope(function: Callable[[Tensor], Tensor], u: Tensor) -> tuple[Tensor, Tensor]:
-    """f(u) (M, 4) and ∂f/∂u (M, 4, 4) of a function that takes every row alone."""
+    """Return f(u) (M, 4) and ∂f/∂u (M, 4, 4) of a function that takes every row alone."""
     unit = torch.eye(u.shape[1], dtype=u.dtype)
 
     def along(direction: Tensor) -> Tensor:

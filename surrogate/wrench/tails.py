@@ -70,12 +70,12 @@ class Tails(NamedTuple):
 
 
 def pack_tails(tails: Tails) -> Floats:
-    """The fields as columns, (M, 13)."""
+    """Return the fields as columns, (M, 13)."""
     return np.asarray(torch.cat([torch.stack(list(tails[:-1]), 1), tails.head], 1).numpy())
 
 
 def head_inputs(resistance: Tensor, length: Tensor, across: Tensor) -> Tensor:
-    """HEAD_INPUTS, (M, 7).
+    """Return HEAD_INPUTS, (M, 7).
 
     Args:
         resistance: of head and disc, (M, 4, 5).
@@ -99,18 +99,18 @@ def head_inputs(resistance: Tensor, length: Tensor, across: Tensor) -> Tensor:
 
 @formula
 def linear_thrust(S: Any) -> Any:
-    """T: thrust/[(ζ⊥ − ζ∥) ω_t a²] of a tail in linear theory, roughly."""
+    """Return T: thrust/[(ζ⊥ − ζ∥) ω_t a²] of a tail in linear theory, roughly."""
     return 0.125 * S / (1 + (S / 8) ** 1.35)
 
 
 @formula
 def linear_torque(S: Any) -> Any:
-    """Q: torque/[ζ⊥ ω_t a²] of a tail in linear theory, roughly."""
+    """Return Q: torque/[ζ⊥ ω_t a²] of a tail in linear theory, roughly."""
     return (1 + (S / 6) ** 2) ** -0.125
 
 
 def tail_inputs(tails: Tails, motion: Tensor) -> Tensor:
-    """INPUTS, (M, 7).
+    """Return INPUTS, (M, 7).
 
     Args:
         motion: (v_x of J, v_z, ω_yr, ω_h, ω_t), (M, 5), for a positive motor.
@@ -133,12 +133,12 @@ def tail_inputs(tails: Tails, motion: Tensor) -> Tensor:
 
 
 def inputs_with_head(tails: Tails, motion: Tensor) -> Tensor:
-    """INPUTS and HEAD_INPUTS, (M, 14)."""
+    """Return INPUTS and HEAD_INPUTS, (M, 14)."""
     return torch.cat([tail_inputs(tails, motion), tails.head], -1)
 
 
 def straight_wrench(tails: Tails, motion: Tensor) -> Tensor:
-    """(F_x, F_z, M_y, M_z) about J of straight tails at zero spin, (M, 4)."""
+    """Return (F_x, F_z, M_y, M_z) about J of straight tails at zero spin, (M, 4)."""
     v_x, v_z, yaw, _, _ = motion.unbind(-1)
     across = tails.number * tails.zeta_perp
     side, turn = across * (yaw / 2 - v_x), across * (v_x / 2 - yaw / 3)
@@ -146,7 +146,7 @@ def straight_wrench(tails: Tails, motion: Tensor) -> Tensor:
 
 
 def wrench_slopes(tails: Tails, motion: Tensor) -> Tensor:
-    """∂(wrench)/∂y at a motion, (M, 4, 6)."""
+    """Return ∂(wrench)/∂y at a motion, (M, 4, 6)."""
     v_x, _, yaw, _, spin = motion.unbind(-1)
     drag_number = tails.zeta_perp * spin
     sideways = torch.sqrt(v_x**2 + yaw**2 + TINY)
@@ -166,5 +166,5 @@ def wrench_slopes(tails: Tails, motion: Tensor) -> Tensor:
 
 
 def total_wrench(tails: Tails, motion: Tensor, y: Tensor) -> Tensor:
-    """(F_x, F_z, M_y, M_z) of all tails on the disc about J, (M, 4), for the network's numbers y (M, 6)."""
+    """Return (F_x, F_z, M_y, M_z) of all tails on the disc about J, (M, 4), for the network's numbers y (M, 6)."""
     return straight_wrench(tails, motion) + (wrench_slopes(tails, motion) @ y[..., None])[..., 0]

@@ -52,7 +52,7 @@ halves = held.at(np.arange(len(held)) % 2 == 0)
 context = checkpoints.TrainingContext("train", folder=Path(sys.argv[1]))
 found = learn(rows(), halves, held, flips(), TAILS, CURVES, work=context)
 print(found.identity)
-loops = (compiled.evaluate_rows, balance.solve_rows, balance.inputs_rows, support._remoteness)
+loops = (compiled.evaluate_rows, balance.solve_rows, balance.inputs_rows, support._novelty_rows)
 print(sum(loop.stats.cache_hits.total() for loop in loops), sum(loop.stats.cache_misses.total() for loop in loops))
 """
 

@@ -13,14 +13,14 @@ from tests.surrogate.small import rows, table
 
 
 def sampled(count: int, generator: torch.Generator, size: Callable[[Tensor], Tensor]) -> tuple[Tensor, Tensor]:
-    """Hints with values from 0 to 1, a fifth of them with one tail, and errors of that size."""
-    hints = torch.rand(count, 8, generator=generator).double()
-    hints[:, -1] = (hints[:, -1] < 0.2).double()
-    return hints, size(hints) * torch.randn(count, generator=generator).double()
+    """Features with values from 0 to 1, a fifth of them with one tail, and errors of that size."""
+    features = torch.rand(count, 8, generator=generator).double()
+    features[:, -1] = (features[:, -1] < 0.2).double()
+    return features, size(features) * torch.randn(count, generator=generator).double()
 
 
 def covered(size: Callable[[Tensor], Tensor]) -> tuple[Intervals, Tensor, Tensor]:
-    """Intervals learned from such errors, fresh hints, and which of their errors are inside."""
+    """Intervals learned from such errors, fresh features, and which of their errors are inside."""
     generator = torch.Generator().manual_seed(2)
     (x, error), (more, other), (test, last) = (sampled(n, generator, size) for n in (3000, 3000, 20000))
     found = Intervals.learned(x, {"v": error}, more, {"v": other})
@@ -41,7 +41,7 @@ def test_intervals_cover_in_each_part() -> None:
     found, test, inside = covered(
         lambda x: 1 + 8 * (x[:, [0, 3, 5]] > 0.5).all(1).double() + 20 * (x[:, -1] > 0.5).double()
     )
-    part = found.part_of(test)
+    part = found.part(test)
     assert sorted(set(part.tolist())) == list(range(9))
     for k in range(9):
         assert 0.85 < float(inside[part == k].mean()) < 0.95

@@ -16,9 +16,9 @@ def test_the_support_is_joint() -> None:
     generator = torch.Generator().manual_seed(1)
     x = torch.randn(4000, 1, generator=generator).double()
     noise = 0.05 * torch.randn(4000, 2, generator=generator).double()
-    support = Support.of(torch.cat([x, x], 1) + noise)
+    support = Support.learned(torch.cat([x, x], 1) + noise)
     points = torch.tensor([[0.0, 0.0], [1.5, 1.5], [-1.0, -1.05], [1.0, -1.0], [6.0, 6.0]]).double()
-    assert (support.remoteness(points.numpy()) <= 1).tolist() == [True, True, True, False, False]
+    assert (support.novelty(points.numpy()) <= 1).tolist() == [True, True, True, False, False]
 
 
 def one_robot(**changes: float) -> dict[str, np.ndarray]:
