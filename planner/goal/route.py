@@ -49,7 +49,7 @@ class Route:
         return float(self.tracks.length.sum())
 
     def poses(self, spacing: float) -> Floats:
-        """Poses (m, 3) at most `spacing` apart, courses without jumps."""
+        """Sample poses (m, 3) at most `spacing` apart, courses without jumps."""
         parts = [self.tracks.start[:1]]
         for row, length in enumerate(self.tracks.length.tolist()):
             if length > 0:
@@ -64,7 +64,7 @@ Lattices = dict[tuple[float, int], Lattice]
 
 
 def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lattices) -> Route:
-    """The shortest route that was found.
+    """Find a short route through the stops.
 
     Args:
         stops: poses (c, 3) to choose from at the start, at each place on the way, and at the goal.
@@ -115,7 +115,7 @@ def _check(stop: Floats, number: int, count: int, limits: RouteLimits, margin: f
 
 
 def _direct(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | None:
-    """One word between each two stops; the courses of the stops are chosen again among finer ones."""
+    """Join each two stops by one word; choose the courses of the stops again among finer ones."""
     chosen, best = stops, None
     for finer in range(_FINER + 1):
         found = _chosen(chosen, limits, margin)
@@ -130,7 +130,7 @@ def _direct(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | 
 
 
 def _finer(stop: Floats, pose: Floats, level: int) -> Floats:
-    """Courses around that of a pose, if the stop leaves its course open."""
+    """Refine the courses around that of a pose, if the stop leaves its course open."""
     if len(stop) < COURSES:
         return stop
     step = 2 * math.pi / len(stop) / 3**level
@@ -140,13 +140,13 @@ def _finer(stop: Floats, pose: Floats, level: int) -> Floats:
 
 
 def _ends(found: Route) -> list[Floats]:
-    """Poses at the starts of the tracks and at the end of the last one."""
+    """Return the poses at the starts of the tracks and at the end of the last one."""
     last = found.tracks.take(np.array([-1]))
     return [*found.tracks.start, last.poses(last.length[:, None], found.radius)[0, 0]]
 
 
 def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | None:
-    """The shortest chain of one word between each two stops, among all their poses.
+    """Find the shortest chain of one word between each two stops, among all their poses.
 
     Words are checked when they are on the shortest chain. Those that are not free are taken out.
     """
@@ -184,7 +184,7 @@ def _chain(parts: list[DubinsPaths], radius: float) -> Route:
 
 
 def _lattice(stops: list[Floats], limits: RouteLimits, spacing: float, courses: int) -> Lattice:
-    """A lattice that reaches around all obstacles, or to the walls."""
+    """Make a lattice that reaches around all obstacles, or to the walls."""
     boxes = [*limits.space.boxes(), *(stop[:, :2] for stop in stops)]
     reach = _AROUND * limits.radius + limits.body.reach
     low = np.min([box.min(0) for box in boxes], 0) - reach
@@ -195,7 +195,7 @@ def _lattice(stops: list[Floats], limits: RouteLimits, spacing: float, courses: 
 
 
 def _around(stops: list[Floats], lattice: Lattice, margin: float) -> Route | None:
-    """A route over a lattice, made shorter; None where there is none on this lattice."""
+    """Find a route over a lattice and shorten it; None where there is none on this lattice."""
     limits = lattice.limits
     stops = [stop[::_THIN] if len(stop) == COURSES else stop for stop in stops]
     costs, chains = np.zeros(len(stops[0])), []
@@ -214,7 +214,7 @@ def _around(stops: list[Floats], lattice: Lattice, margin: float) -> Route | Non
 
 
 def _shorter(leg: DubinsPaths, lattice: Lattice, margin: float) -> DubinsPaths:
-    """A leg with joints between places on it, wherever one is free and shorter than the way along it."""
+    """Shorten a leg by joints between places on it, wherever one is free and shorter than the way along it."""
     limits = lattice.limits
     for again in range(_ROUNDS):
         places = _cut(leg, max(float(leg.length.sum()) / _PLACES, limits.radius / 4) / (1 + again), limits.radius)
@@ -244,7 +244,7 @@ def _shorter(leg: DubinsPaths, lattice: Lattice, margin: float) -> DubinsPaths:
 
 
 def _cut(leg: DubinsPaths, spacing: float, radius: float) -> DubinsPaths:
-    """The tracks of a leg in parts of at most `spacing`."""
+    """Cut the tracks of a leg into parts of at most `spacing`."""
     parts = []
     for row, length in enumerate(leg.length.tolist()):
         if length == 0:

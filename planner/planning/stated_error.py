@@ -44,7 +44,7 @@ def look_ahead(vehicle: Vehicle, curvature: float, straight: Zigzag | None = Non
 
 
 def guaranteed(vehicle: Vehicle, pivot_distance: float, swing: float, ahead: float) -> float:
-    """Bound on the distance from the reference [l] for a vehicle without errors; see the module."""
+    """Bound the distance from the reference [l] for a vehicle without errors; see the module."""
     lag = np.abs(vehicle.lag[:, :, round(SHORTEST / STEP) :]).max((0, 1, 2))
     flip = float(np.hypot(lag[0], lag[1]) + (ahead + 2 * pivot_distance) * lag[2])
     return swing * (ahead + 2 * pivot_distance) + flip
@@ -65,13 +65,13 @@ class Predicted:
 
 
 def rms_in_time(distance: Floats, dwells: Floats) -> float:
-    """Root mean square over time of distances (M s + 1,), sampled s times in each dwell (M,), as `trace` does."""
+    """Compute the rms over time of distances (M s + 1,), sampled s times in each dwell (M,), as `trace` does."""
     each = (distance[1:].reshape(len(dwells), -1) ** 2).mean(1)
     return float(np.sqrt((each * dwells).sum() / dwells.sum()))
 
 
 def predicted_error(declared: Floats, track: Floats, *, closed: bool) -> Predicted:
-    """Distances of a track (K, 2) from the declared path (m, 2)."""
+    """Compute the distances of a track (K, 2) from the declared path (m, 2)."""
     distance, segment, share = nearest(declared, track)
     along = np.diff(declared, axis=0)[segment]
     tangent = along / np.maximum(np.hypot(*along.T), 1e-300)[:, None]
@@ -84,7 +84,7 @@ def predicted_error(declared: Floats, track: Floats, *, closed: bool) -> Predict
 def stated_error(
     vehicle: Vehicle, switches: Switches, track: Floats, predicted: Predicted, *, every: int = 0, seed: int = 0
 ) -> float:
-    """Quantile LEVEL of the largest distance from the declared path [l], over what is uncertain.
+    """Compute the quantile LEVEL of the largest distance from the declared path [l], over what is uncertain.
 
     Args:
         vehicle: with its modes and its spread.
@@ -157,7 +157,7 @@ def _deviations(vehicle: Vehicle, switches: Switches, edges: Floats) -> tuple[Fl
 
 
 def _extremes(predicted: Predicted, edges: Floats, samples: int) -> tuple[Floats, Floats, Floats]:
-    """Lowest and highest signed distance in each block, (E − 1,), and the normal at its end, (E − 1, 2)."""
+    """Find lowest and highest signed distance in each block, (E − 1,), and the normal at its end, (E − 1, 2)."""
     signed = np.copysign(predicted.distance, predicted.signed)
     starts = (edges[:-1] * samples).astype(int)
     low, high = np.minimum.reduceat(signed, starts), np.maximum.reduceat(signed, starts)
@@ -165,5 +165,5 @@ def _extremes(predicted: Predicted, edges: Floats, samples: int) -> tuple[Floats
 
 
 def _left(vector: Floats) -> Floats:
-    """Vectors (..., 2) turned by a right angle to the left."""
+    """Turn vectors (..., 2) by a right angle to the left."""
     return np.stack([-vector[..., 1], vector[..., 0]], -1)

@@ -68,7 +68,7 @@ class Estimate:
         return self.state[0], self.state[1], self.state[2]
 
     def apply(self) -> None:
-        """Let the follower move like the learned robot."""
+        """Let the guidance law use the learned robot."""
         state = self.state
         self._law.update_vehicle(
             [self._learned(0), self._learned(1)],
@@ -78,14 +78,14 @@ class Estimate:
         )
 
     def advance(self, dwell: Dwell) -> None:
-        """To the flip at the end of a dwell."""
+        """Advance to the flip at the end of a dwell."""
         change = self._change(self.state[2], dwell, dwell.length)
         self.covariance = _propagated(self.covariance, _after(_identity(), change))
         for i in range(3):
             self.state[i] += change.move[i]
 
     def seen_from(self, when: float, now: Dwell, past: Sequence[Dwell]) -> tuple[POSE, ROWS] | None:
-        """Pose at the time `when`, and its derivatives (3, 10) by the state; None if it is too long ago.
+        """Predict the pose at `when`, and its derivatives (3, 10) by the state; None if it is too long ago.
 
         Args:
             when: the time.
@@ -215,7 +215,7 @@ def _identity() -> ROWS:
 
 
 def _after(D: ROWS, change: _Change) -> ROWS:
-    """Derivatives of the pose after a change, from those before it."""
+    """Compute derivatives of the pose after a change from those before it."""
     B, lever = change.B, change.lever
     return [
         [D[0][k] + B[0][k] + lever[0] * D[2][k] for k in range(STATES)],
@@ -225,7 +225,7 @@ def _after(D: ROWS, change: _Change) -> ROWS:
 
 
 def _before(D: ROWS, change: _Change) -> ROWS:
-    """Derivatives of the pose before a change, from those after it."""
+    """Compute derivatives of the pose before a change from those after it."""
     B, lever = change.B, change.lever
     turned = [D[2][k] - B[2][k] for k in range(STATES)]
     return [
@@ -236,7 +236,7 @@ def _before(D: ROWS, change: _Change) -> ROWS:
 
 
 def _propagated(P: ROWS, F: ROWS) -> ROWS:
-    """Covariance after a dwell: the first three rows of the transition are F, the others keep the state."""
+    """Propagate a covariance: the first three rows of the transition are F, the others keep the state."""
     n = STATES
     half = [[sum(F[i][k] * P[k][j] for k in range(n)) for j in range(n)] for i in range(3)] + P[3:]
     full = [row[:] for row in half]

@@ -7,8 +7,8 @@
 Every call says the direction of the motor and when to flip next. At most one flip can have happened since the
 last call: the one that was announced. The tracker learns ten numbers of the robot
 (`planner.tracking.kalman_filter`). A pose may be late: it is compared with the place where the robot was then,
-counted back from now. A pose that cannot be is left out. So are values that are not finite, and times that go
-back. No pose for a long time does no harm but to the error.
+counted back from now. Implausible poses, values that are not finite, and timestamps that run
+backwards are ignored. Long gaps between poses only increase the error.
 
 The alarm says that the robot behaves like no robot of this model. It compares WINDOW accepted poses with what was
 expected: for a robot of the model their sum of squares is below a limit with probability 1 − FALSE_ALARM. It also
@@ -93,7 +93,7 @@ class Tracker:
         self._plan_flip()
 
     def update(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command:
-        """Tell the time, and a pose if there is one.
+        """Advance to time `now`, and fuse a pose measurement if there is one.
 
         Args:
             now: the time; one that goes back, jumps too far or is not finite is taken for the last one.
@@ -113,7 +113,7 @@ class Tracker:
 
     @property
     def command(self) -> Command:
-        """The same answer again."""
+        """Return the present command again."""
         P = self._estimate.covariance
         error = self._swing_error + QUANTILE * math.sqrt(max(P[0][0] + P[1][1], 0.0) / 2)
         return Command(
@@ -137,7 +137,7 @@ class Tracker:
         return dict(zip(NAMES, self._estimate.state, strict=True))
 
     def _flip(self) -> None:
-        """The announced flip, or the end of the path."""
+        """Carry out the announced flip, or end the path."""
         if self._ends:
             self._finished = True
             return
@@ -151,7 +151,7 @@ class Tracker:
         self._finished = self._ends and self._flip_at <= self._now + SLACK  # the path ends at the flip
 
     def _plan_flip(self) -> None:
-        """Time of the next flip, and whether the path ends there."""
+        """Compute the time of the next flip, and whether the path ends there."""
         self._estimate.apply()
         place = self._law.place
         try:
@@ -163,7 +163,7 @@ class Tracker:
         self._flip_at = max(start + length, self._now, start + (0.0 if self._ends else self.shortest))
 
     def _see(self, pose: POSE, when: float) -> bool:
-        """Learn from a pose; false if it was left out."""
+        """Learn from a pose; return false if it was left out."""
         found = self._estimate.seen_from(when, self._dwell, self._past)
         if found is None:
             return False
