@@ -95,8 +95,8 @@ def _add_numbers(page: Page, result: Verdict) -> None:
     said = "; ".join(wrong) if wrong else "none is"
     page.text(
         "What was given is known to a tolerance only. So these parameters are fitted, too, each with the "
-        "tolerance that was stated for it. The pull is how far the runs move a parameter, in standard deviations of "
-        f"what chance would do. Beyond {WRONG:g} the value as given is taken to be wrong: {said}.",
+        "tolerance that was stated for it. The pull is how far the runs move a parameter, in standard deviations "
+        f"of what chance would do. Beyond {WRONG:g} the value as given is taken to be wrong: {said}.",
         tone="bad" if wrong else "good",
     )
     rows = []
