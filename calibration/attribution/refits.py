@@ -240,6 +240,7 @@ def pairs(
     *,
     level: float,
     seed: int,
+    draws: int,
     progress: bool = True,
 ) -> list[Candidate]:
     """Second effects, added to the best fits with a single one."""
@@ -250,7 +251,7 @@ def pairs(
         title = "second effects" if progress else ""
         others = tuple(e for e in model.effects if e.name != first.effect.name)
         along = directions(model, first.refit.parameters, others, title=title)
-        misfit = check_misfit(first.refit, model.runs, used, along, level=level, seed=seed + 2)
+        misfit = check_misfit(first.refit, model.runs, used, along, level=level, seed=seed + 2, draws=draws)
         second += examine(
             model,
             first.refit,

@@ -71,6 +71,7 @@ class _Task:
     model: Model
     level: float
     seed: int
+    draws: int
     progress: bool
     locked: Flags  # (n,) kept for the test
     locked_names: str
@@ -130,6 +131,7 @@ def calibrate(
     locked: Flags | None = None,
     level: float = LEVEL,
     seed: int = 0,
+    draws: int = DRAWS,
     progress: bool = True,
 ) -> Verdict:
     """Calibrate a model with its runs, and find what it lacks.
@@ -139,9 +141,10 @@ def calibrate(
         locked: (n,) runs kept for the test, whole sessions; default `locked.middle_session`.
         level: α of every claim.
         seed: of the bootstrap; the same seed gives the same result.
+        draws: of the bootstrap. It resolves no smaller p-value than 2/(draws + 1).
         progress: show progress bars.
     """
-    task = _prepare(model, locked, level, seed, progress)
+    task = _prepare(model, locked, level, seed, draws, progress)
     found = _explain(task)
     final = found.final
     base_intervals = profile_intervals(model, found.base, task.used, title=task.title("intervals"))
@@ -175,6 +178,7 @@ def calibrate(
         misfit=found.misfit,
         candidates=found.candidates,
         numbers=pulls(final, model.given),
+        draws=draws,
         instead=found.instead,
         generic=generic,
         predictive=predictive,
@@ -202,7 +206,7 @@ def calibrate(
     )
 
 
-def _prepare(model: Model, locked: Flags | None, level: float, seed: int, progress: bool) -> _Task:
+def _prepare(model: Model, locked: Flags | None, level: float, seed: int, draws: int, progress: bool) -> _Task:
     """Lock sessions away, set gross errors aside, refuse runs in wrong units."""
     data = model.runs
     locked = middle_session(data) if locked is None else locked
@@ -212,7 +216,9 @@ def _prepare(model: Model, locked: Flags | None, level: float, seed: int, progre
     model.check(uncalibrated)
     gross, reasons = gross_errors(data, uncalibrated)
     locked_names = ", ".join(names[g] for g in np.unique(group[locked]))
-    return _Task(model, level, seed, progress, locked, locked_names, start, uncalibrated, gross, tuple(reasons))
+    return _Task(
+        model, level, seed, draws, progress, locked, locked_names, start, uncalibrated, gross, tuple(reasons)
+    )
 
 
 def _explain(task: _Task) -> _Explained:
@@ -225,8 +231,8 @@ def _explain(task: _Task) -> _Explained:
     fitted = time.monotonic()
     along = directions(model, base.parameters, model.effects, title=task.title("derivatives"))
     derived = time.monotonic()
-    misfit = check_misfit(base, task.runs, used, along, level=level, seed=seed)
-    without = freed(model, base, used, along, level=level, seed=seed, draws=DRAWS)
+    misfit = check_misfit(base, task.runs, used, along, level=level, seed=seed, draws=task.draws)
+    without = freed(model, base, used, along, level=level, seed=seed, draws=task.draws)
     if misfit.p_value >= level and without is None:
         return _Explained(base, misfit, _unexamined(misfit, model.effects), ())
     tested = misfit
@@ -245,7 +251,9 @@ def _explain(task: _Task) -> _Explained:
     if not best:
         best = explaining(beside_wrong_numbers(model, base, found, used, along, level=level, seed=seed))
     if not best:
-        found_pairs = pairs(model, found, used, task.start, level=level, seed=seed, progress=task.progress)
+        found_pairs = pairs(
+            model, found, used, task.start, level=level, seed=seed, draws=task.draws, progress=task.progress
+        )
         best = explaining(found_pairs)
     best = with_doubts(model, best, base, used, seed)
     return _Explained(base, misfit, tuple(found) or _unexamined(misfit, model.effects), tuple(best))

@@ -15,7 +15,7 @@ from calibration.statistics.fit import Fit
 from calibration.statistics.forward_model import Predictive
 from calibration.statistics.held_out import Delivered
 from calibration.statistics.priors import Pull, likeliest, rivals
-from calibration.statistics.residual_tests import DRAWS, Misfit
+from calibration.statistics.residual_tests import Misfit
 from calibration.verdict.next_runs import Batch, NextRun
 from calibration.verdict.residual_regression import Generic
 from calibration.verdict.sequential_test import Explanation
@@ -44,6 +44,7 @@ class Verdict:
     base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
     final_intervals: dict[str, tuple[float, float]]
     misfit: Misfit
+    draws: int  # of its bootstrap
     candidates: tuple[Candidate, ...]
     numbers: tuple[Pull, ...]  # every number as given in the final model, the farthest first
     instead: tuple[Candidate, ...]  # effects that explain as much as the number that is wrong
@@ -114,7 +115,7 @@ class Verdict:
     @property
     def _effect_words(self) -> str:
         # The bootstrap resolves no smaller p than 2/(draws + 1).
-        relation = "≤" if self.misfit.p_value <= 2.01 / (DRAWS + 1) else "="
+        relation = "≤" if self.misfit.p_value <= 2.01 / (self.draws + 1) else "="
         p = f"p {relation} {self.misfit.p_value:.2g}"
         if self.verdict == "none":
             return f"No effect is missing that these runs can show ({p})."
