@@ -103,7 +103,7 @@ def test_what_comes_nearest_is_said_where_nothing_explains() -> None:
 
 @shares_verdicts
 def test_coefficients_are_recovered_with_their_intervals_and_nothing_is_claimed() -> None:
-    result = calibrated_toy(5)
+    result = calibrated_toy(3)
     assert result.verdict == "none"
     assert result.effects == ()
     for name in ("C_t", "C_r", "C_yr"):

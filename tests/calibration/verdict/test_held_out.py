@@ -41,8 +41,8 @@ def test_the_result_is_deterministic() -> None:
 @pytest.mark.usefixtures("toy_model")
 def test_the_locked_session_is_judged_and_used_in_the_end() -> None:
     """p is nothing for a bad model; the last fit has all runs."""
-    ruined = toy_table(5)
-    good = calibrated_toy(5)
+    ruined = toy_table(3)
+    good = calibrated_toy(3)
     assert good.locked_p > 0.01
     ruined.loc[ruined["session"] == good.locked, "omega_yr_rad_s"] *= 1.5
     result = calibrated(ruined)
