@@ -1,1 +1,1 @@
-"""Figures that the README claims, one script each; `python -m benchmarks.run` runs them all."""
+"""Programs that print the figures in the documentation, in rooms; `python -m benchmarks` lists and runs them."""

@@ -84,6 +84,14 @@ def test_files_of_a_package_do_not_import_in_a_circle() -> None:
     assert set(TopologicalSorter(graph).static_order()) == set(files)
 
 
+def test_tests_do_not_import_benchmarks() -> None:
+    """What both need is an oracle: it lives in `tests.oracles`, or in `sim.reference`."""
+    files = list((ROOT / "tests").rglob("*.py"))
+    assert len(files) > 100
+    for file in files:
+        assert "benchmarks" not in {name.split(".")[0] for name in modules_imported(file)}, file
+
+
 def test_files_stay_readable() -> None:
     files = [file for folder in (*ORDER, "tests", "benchmarks") for file in (ROOT / folder).rglob("*.py")]
     assert len(files) > 150

@@ -4,7 +4,7 @@ A piece is named by its rows, rows-<first>-<end>.parquet (end exclusive), and ca
 inputs, settings, code. So its name and key say what must be in it. Every page has a checksum. Small pieces are
 joined to pieces of SEGMENT rows; the bytes of a joined piece depend on its rows alone.
 
-Encodings are what was smallest (`python -m benchmarks.dataset`): numbers split into streams of bytes, then zstd;
+Encodings are what was smallest (`python -m benchmarks data_sets`): numbers split into streams of bytes, then zstd;
 a dictionary only for words.
 """
 

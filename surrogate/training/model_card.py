@@ -38,7 +38,7 @@ _NO_TRUST = """
 
 
 _MORE_ROWS = """
-How errors fall with the number of rows is drawn by `python -m benchmarks.learning_curve DATA`. For the domain of
+How errors fall with the number of rows is drawn by `python -m benchmarks learning_curve DATA`. For the domain of
 the shipped table the picture is in docs/figures.md, under "Error against rows".
 """
 

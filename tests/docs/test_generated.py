@@ -17,6 +17,7 @@ from tests.docs.pages import DOCS, PAGES, ROOT, generator, name_of
 TOP = (*PACKAGES, "softflagella", "benchmarks", "tests")
 _MODULE = re.compile(rf"`((?:{'|'.join(TOP)})(?:\.\w+)+)`")
 _COMMAND = re.compile(rf"python -m ((?:{'|'.join(TOP)})(?:\.\w+)*)")
+_BENCHMARK = re.compile(r"python -m\s+benchmarks[ \n]([a-z_]+)\b")
 _FILE = re.compile(rf"`((?:{'|'.join((*TOP, 'docs'))})/[\w/.-]+)`")
 SOURCES = sorted(file for top in (*PACKAGES, "softflagella", "benchmarks") for file in (ROOT / top).rglob("*.py"))
 
@@ -77,6 +78,8 @@ def test_what_is_named_exists(file: Path) -> None:
     text = file.read_text()
     for name in {*_MODULE.findall(text), *_COMMAND.findall(text)}:
         assert exists(name), f"{file.relative_to(ROOT)} names {name}"
+    for name in _BENCHMARK.findall(text):
+        assert list((ROOT / "benchmarks").glob(f"*/{name}.py")), f"{file.relative_to(ROOT)} names benchmark {name}"
     for path in _FILE.findall(text):
         assert (ROOT / path).exists(), f"{file.relative_to(ROOT)} names {path}"
 

@@ -10,8 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.goals import brute_force, random_goal
-from benchmarks.keep_out import random_case, replayed_clearance
 from planner.files.plan_json import load_plan, plan_record
 from planner.goal.obstacles import Circle, Polygon
 from planner.goal.route import NoWayError
@@ -22,6 +20,8 @@ from sim.io.errors import InputError, run_command
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
 from surrogate.one_robot.tabulate import tabulate
+from tests.oracles.quickest import brute_force
+from tests.oracles.random_tasks import goal_behind_circles, random_goal, replayed_clearance
 
 CONTROL = PRESETS["paper-control"]
 BOX = [[-2, -4], [9, -4], [9, 4], [-2, 4]]
@@ -111,7 +111,7 @@ def test_a_narrow_gap_is_passed_with_shorter_dwells() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 3])
 def test_a_replay_in_the_simulator_stays_out(seed: int) -> None:
-    voyage = to_goal(robot=CONTROL, **random_case(np.random.default_rng(seed)))
+    voyage = to_goal(robot=CONTROL, **goal_behind_circles(np.random.default_rng(seed)))
     clearance, off, turned = replayed_clearance(voyage)
     assert clearance > 0
     assert off < voyage.plan.stated_error

@@ -9,7 +9,6 @@ import pytest
 import torch
 
 import surrogate
-from benchmarks.balance import linear_guess, solve
 from sim.compiling import folder_of_package
 from surrogate.networks import compiled as perceptron
 from surrogate.networks.compiled import evaluate_rows, packed
@@ -20,6 +19,7 @@ from surrogate.training.simulated import drawn
 from surrogate.wrench import heads as head
 from surrogate.wrench import tails as tail
 from surrogate.wrench.balance import inputs_rows, solve_rows
+from tests.oracles.balance import linear_guess, solve
 from tests.surrogate.small import rows, table
 
 

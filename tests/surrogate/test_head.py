@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks.balance import linear_guess
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.motion.batches import steady_columns
 from surrogate.table.model_file import load
 from surrogate.wrench import heads as head
+from tests.oracles.balance import linear_guess
 from tests.surrogate.small import rows, table
 
 

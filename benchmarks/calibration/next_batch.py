@@ -1,0 +1,126 @@
+"""Ambiguous tables decided by a batch of eight proposed runs.
+
+The runs of these tables cannot tell two effects apart: a small table (N = 2 to 4, one tail length, two motor
+speeds, both directions, three days: 36 runs) of the linear stand-in with one effect at λ = 8, as often as it takes
+to find tables with the verdict "ambiguous" and the truth in the set. The whole procedure then runs on the table
+with the proposed batch added, as a new day. For comparison it runs with a factorial of 16 runs: fewest and most
+tails, shortest and longest, slow and fast, both directions.
+
+Usage: python -m benchmarks next_batch [TABLES] [FIRST_SEED]      a table on the screen
+
+Takes 15 minutes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed
+
+from benchmarks.calibration.planted import Linear, Signals, linearised, scatter, with_values
+from benchmarks.proportions import per_cent
+from calibration.statistics.residual_tests import TESTABLE
+from calibration.swimmer.measured_table import read_measurements
+from calibration.verdict.calibrate import Verdict, calibrate
+from sim.arrays import Floats, Integers
+from sim.motion.batches import available_jobs
+
+TAILS, LENGTH, RPM, DAYS = (2, 3, 4), 9.0, (110.0, 150.0), 3
+GRID_TAILS = (2, 3, 4, 5)
+GRID_LENGTHS = (7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
+GRID_RPM = (60.0, 105.0, 150.0)
+LEVEL = 8.0
+_AT_ONCE = 20  # tables that are tried together
+
+
+def table() -> Linear:
+    """The runs that were made, then those that can be made next."""
+    made = [(n, LENGTH, s * w, f"day {d}") for d in range(DAYS) for n in TAILS for w in RPM for s in (1, -1)]
+    possible = [(n, a, s * w, "next") for n in GRID_TAILS for a in GRID_LENGTHS for w in GRID_RPM for s in (1, -1)]
+    rows = pd.DataFrame([*made, *possible], columns=["N", "l_cm", "omega_rpm", "session"])
+    whole = linearised(read_measurements(with_values(rows, np.random.default_rng(0))))
+    new = np.arange(len(made), len(rows))
+    return replace(whole, next=whole.subset(new))
+
+
+def made(whole: Linear) -> Integers:
+    """Places of the runs that were made."""
+    assert whole.next is not None
+    return np.arange(len(whole.runs) - len(whole.next.runs))
+
+
+def factorial(whole: Linear) -> Integers:
+    """Places of 16 runs."""
+    ends = [GRID_TAILS[::3], GRID_LENGTHS[::5], GRID_RPM[::2], (1, -1)]
+    grid: list[tuple[float, ...]] = list(itertools.product(GRID_TAILS, GRID_LENGTHS, GRID_RPM, (1, -1)))
+    return np.array([grid.index(setting) for setting in itertools.product(*ends)]) + len(made(whole))
+
+
+def close(whole: Linear, signal: Floats, seed: int, more: Integers | None = None) -> Verdict:
+    """The verdict on the runs that were made, and on `more`; a run that comes twice is measured twice."""
+    parts = [made(whole)] if more is None else [made(whole), more]
+    k = whole.prediction.shape[1]
+    noise = np.concatenate([scatter(whole.subset(p).runs, k, seed + i * 10**6) for i, p in enumerate(parts)])
+    rows = np.concatenate(parts)
+    model = whole.subset(rows)
+    y = model.prediction + signal[rows] + noise
+    return calibrate(replace(model, runs=replace(model.runs, y=y)), progress=False)
+
+
+def outcome(verdict: Verdict, truth: str) -> str:
+    sets = [{e.name for e in c.claimed} for c in verdict.explaining]
+    if len(sets) == 1:
+        return "right" if sets[0] == {truth} else "wrong"
+    if sets:
+        return "still ambiguous" if {truth} in sets else "wrong"
+    return verdict.verdict
+
+
+def one(whole: Linear, effect: int, size: float, seed: int) -> dict[str, str] | None:
+    """What the new runs say; None if the table is not ambiguous."""
+    truth, signal, own = whole.effects[effect].name, whole.D[..., effect] * size, made(whole)
+    first = close(whole, signal, seed)
+    if first.verdict != "ambiguous" or outcome(first, truth) == "wrong" or first.next_batch is None:
+        return None
+    batch = np.array([s["run"] for s in first.next_batch.settings]) + len(own)
+    found = {"truth": truth, "set": " or ".join("+".join(e.name for e in c.claimed) for c in first.explaining)}
+    for name, more in (("8 proposed runs", batch), ("factorial of 16", factorial(whole))):
+        found[name] = outcome(close(whole, signal, seed, more), truth)
+    return found
+
+
+def main(count: str = "20", first: str = "0") -> None:
+    whole = table()
+    signals = Signals(whole.subset(made(whole)))
+    lengths = np.linalg.norm(signals.effects, axis=0)
+    survived = signals.survived(whole.subset(made(whole)).D)
+    todo = [
+        (j, LEVEL / float(lengths[j]))
+        for j, e in enumerate(whole.effects)
+        if survived[j] >= TESTABLE and e.start + LEVEL / lengths[j] <= e.bounds[1]
+    ]
+    found: list[dict[str, str]] = []
+    tried, seed = 0, int(first)
+    parallel = Parallel(n_jobs=available_jobs())
+    while len(found) < int(count) and tried < 50 * int(count):
+        work = [(*todo[(tried + k) % len(todo)], seed + tried + k) for k in range(_AT_ONCE)]
+        done = parallel(delayed(one)(whole, *w) for w in work)
+        found += [d for d in done if d]
+        tried += _AT_ONCE
+        print(f"{len(found)} of {tried} tables are ambiguous", file=sys.stderr)
+    found = found[: int(count)]
+    print("| truth, and what the table says | tables | 8 proposed runs | factorial of 16 |\n|---|---|---|---|")
+    for pair in dict.fromkeys((d["truth"], d["set"]) for d in found):
+        of = [d for d in found if (d["truth"], d["set"]) == pair]
+        said = [", ".join(f"{k} {v}" for k, v in Counter(d[w] for d in of).items())
+                for w in ("8 proposed runs", "factorial of 16")]  # fmt: skip
+        print(f"| {pair[0]}: {pair[1]} | {len(of)} | {said[0]} | {said[1]} |")
+    for way in ("8 proposed runs", "factorial of 16"):
+        counts = Counter(d[way] for d in found)
+        decided = counts["right"] + counts["wrong"]
+        print(f"{way}: decided {per_cent(decided, len(found))}, wrong {per_cent(counts['wrong'], len(found))}")

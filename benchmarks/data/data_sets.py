@@ -1,0 +1,199 @@
+"""Data sets: overhead of the engine, bytes a row, speed of reading.
+
+1. Rows a second of one core, and the engine's processor time over that of the bare simulation.
+2. Bytes a row by encoding: Parquet as it comes, without dictionaries, numbers split into streams of bytes.
+3. A million synthetic rows: stored, joined, opened, scanned, read.
+4. What 10⁶ and 10⁸ rows take on n cores, by the measured cost.
+
+Usage: python -m benchmarks data_sets [--rows N]
+
+Takes 5 minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from dataset.build.build import build
+from dataset.rows.design import load_design
+from dataset.storage import shards as pieces
+from dataset.storage.data_set import batches, read, read_manifest
+from dataset.storage.shards import SEGMENT
+from dataset.storage.storage import place
+from tests.dataset import sweeps
+
+ROWS = 2048
+_BARE = """
+import sys
+from dataset.rows.design import load_design
+from dataset.rows.simulate import simulate
+from sim.motion.batches import one_thread
+with one_thread():
+    design = load_design("sweep.toml").with_rows(int(sys.argv[1]))
+    rows = simulate({**design.points(), "history": design.history()})
+print(rows["cost_s"].sum())
+"""
+_ENGINE = """
+import sys
+from dataset.rows.design import load_design
+from dataset.build.build import build
+build(load_design("sweep.toml").with_rows(int(sys.argv[1])), sys.argv[2], jobs=int(sys.argv[3]), title="")
+"""
+_SYNTHETIC = """
+import sys
+from dataset.build.build import build
+from tests.dataset import sweeps
+build(sweeps.design(int(sys.argv[1])), sys.argv[2], title="", simulate=sweeps.invented)
+"""
+
+
+def processor_seconds(code: str, *words: str) -> tuple[float, str]:
+    """Processor time of a process and of all that it starts, however they are related; and what it prints."""
+    with TemporaryDirectory() as folder:
+        log = Path(folder, "spent")
+        # every process adds its own time to the file when it ends, workers included
+        environment = {**os.environ, "SPENT": str(log), "PYTHONPATH": os.pathsep.join([folder, *sys.path])}
+        Path(folder, "sitecustomize.py").write_text(_SPENT)
+        done = subprocess.run(
+            [sys.executable, "-c", code, *words], env=environment, check=True, stdout=subprocess.PIPE, text=True
+        )
+        time.sleep(1.0)
+        last: dict[str, float] = {}
+        for line in log.read_text().splitlines():
+            process, seconds = line.split()
+            last[process] = float(seconds)
+        return sum(last.values()), done.stdout
+
+
+# Workers are killed in the end, so each writes what it has used so far, ten times a second.
+_SPENT = """
+import os, threading, time
+def _write():
+    while True:
+        with open(os.environ["SPENT"], "a") as log:
+            log.write(f"{os.getpid()} {time.process_time()}\\n")
+        time.sleep(0.1)
+def _start():
+    threading.Thread(target=_write, daemon=True).start()
+_start()
+os.register_at_fork(after_in_child=_start)
+"""
+
+
+def overhead(rows: int) -> float:
+    """Prints the engine's overhead; returns seconds a row.
+
+    The time of a row changes by ten per cent with what else the machine does. So both are compared in what they
+    take beside the rows.
+    """
+    bare, printed = processor_seconds(_BARE, str(rows))
+    own = float(printed)
+    print(f"{rows} rows of sweep.toml, processor seconds: all, the rows themselves, all the rest")
+    print(f"  bare simulation in one process {bare:8.1f} {own:8.1f} {bare - own:8.1f}")
+    for jobs in (1, 2):
+        with TemporaryDirectory() as folder:
+            engine, _ = processor_seconds(_ENGINE, str(rows), f"{folder}/out", str(jobs))
+            cost = float(read_manifest(f"{folder}/out")["cost_s"])
+        more = (engine - cost) - (bare - own)
+        print(f"  engine, workers: {jobs}             {engine:8.1f} {cost:8.1f} {engine - cost:8.1f}   "
+              f"{100 * more / cost:+.1f} % of the rows")  # fmt: skip
+    return cost / rows
+
+
+def encodings() -> None:
+    """Prints bytes a row of simulated and synthetic rows, by encoding."""
+    with TemporaryDirectory() as folder:
+        build(load_design("sweep.toml").with_rows(512), f"{folder}/out", title="")
+        rows = pa.Table.from_batches(list(batches(f"{folder}/out")))
+        whole = Path(folder, "out/rows").iterdir().__next__().stat().st_size
+    words = {"use_dictionary": ["reason"]}
+    print(f"\nBytes a row, {len(rows)} simulated rows ({whole / len(rows):.0f} with the footer)")
+    choices: dict[str, dict[str, Any]] = {
+        "as it comes (snappy)": {},
+        "zstd": {"compression": "zstd"},
+        "zstd, no dictionary": {"compression": "zstd", **words},
+        "zstd, numbers split": {"compression": "zstd", **pieces.encodings(rows.schema)},
+        "zstd 9, numbers split": {
+            "compression": "zstd", "compression_level": 9, **pieces.encodings(rows.schema),
+        },
+    }  # fmt: skip
+    for name, options in choices.items():
+        sink = io.BytesIO()
+        pq.write_table(rows, sink, **options)
+        group = pq.ParquetFile(sink).metadata.row_group(0)
+        pages = sum(group.column(i).total_compressed_size for i in range(group.num_columns))
+        print(f"  {name:24} {pages / len(rows):6.1f}")
+
+
+def reading(rows: int) -> None:
+    """Prints times of storing and reading many synthetic rows."""
+    with TemporaryDirectory() as folder:
+        out = f"{folder}/out"
+        spent, _ = processor_seconds(_SYNTHETIC, str(rows), out)
+        files = sorted(Path(out, "rows").iterdir())
+        size = sum(path.stat().st_size for path in files)
+        form = pq.read_schema(files[0])
+        plain = [field.name for field in form if not pa.types.is_fixed_size_list(field.type)]
+        print(f"\n{rows} synthetic rows with all curves: {len(files)} files, {size / rows:.0f} bytes a row; "
+              "processor seconds")  # fmt: skip
+        print(f"  made, stored and joined                  {spent:6.1f}")
+        print(f"  of that, joined                          {_timed(lambda: _joined(out, form)):6.1f}")
+        print(f"  manifest opened and checked              {_timed(lambda: read_manifest(out)):6.2f}")
+        two = ["omega_bar", "omega_yr_bar"]
+        print(f"  two columns scanned, all checked         {_timed(lambda: _scanned(out, two)):6.2f}")
+        print(f"  all columns scanned in batches           {_timed(lambda: _scanned(out, None)):6.2f}")
+        print(f"  all columns but curves read into pandas  {_timed(lambda: read(out, plain)):6.2f}")
+        print(f"  unchanged build                          {_timed(lambda: _again(rows, out)):6.2f}")
+
+
+def _again(rows: int, out: str) -> None:
+    build(sweeps.design(rows), out, title="", simulate=sweeps.invented)
+
+
+def _scanned(out: str, columns: list[str] | None) -> None:
+    for _ in batches(out, columns):
+        pass
+
+
+def _joined(out: str, form: pa.Schema) -> None:
+    """Join the files again, elsewhere."""
+    there, key = place(out), read_manifest(out)["config_hash"]
+    some = pieces.pieces(there, "rows")
+    name = pieces.piece_name("../again", some[0].start, some[-1].stop)
+    pieces.join(there, some, name, form.remove_metadata(), key)
+
+
+def projection(cost: float) -> None:
+    """Prints what long sweeps take."""
+    print(f"\nProjected from {1e3 * cost:.1f} ms a row")
+    for rows in (10**6, 10**8):
+        hours = [f"{cost * rows / cores / 3600:.3g} h on {cores}" for cores in (2, 64, 1024)]
+        print(f"  {rows:.0e} rows: {-(-rows // SEGMENT)} files; {', '.join(hours)} cores")
+
+
+def _timed(work: Callable[[], object]) -> float:
+    began = time.process_time()
+    work()
+    return time.process_time() - began
+
+
+def main(*words: str) -> None:
+    parser = argparse.ArgumentParser(description="Benchmarks of data sets.")
+    parser.add_argument("--rows", type=int, default=ROWS, help=f"rows that are simulated (default: {ROWS})")
+    rows = parser.parse_args(words).rows
+    cost = overhead(rows)
+    encodings()
+    reading(SEGMENT)
+    projection(cost)

@@ -1,0 +1,30 @@
+"""Clearance of the robot's body on routes around obstacles, replayed in the simulator.
+
+Usage: python -m benchmarks obstacles [CASES] [FIRST SEED]
+
+Takes a minute.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.planner.random_goals import planned
+from tests.oracles.random_tasks import goal_behind_circles, replayed_clearance
+
+
+def main(cases: str = "12", first: str = "0") -> None:
+    seeds = range(int(first), int(first) + int(cases))
+    rows = []
+    heads = (f"{'way':>8}{'flips':>7}{'margin':>8}{'stated':>8}{'predicted':>11}{'replayed':>10}"
+             f"{'off goal':>10}{'rad':>8}{'s':>7}")  # fmt: skip
+    for seed, voyage, spent in planned(goal_behind_circles, seeds, heads):
+        clearance, off, turned = replayed_clearance(voyage)
+        rows.append((clearance, off, turned))
+        print(f"{seed:5d}{voyage.length:8.2f}{len(voyage.plan.dwells):7d}{voyage.margin:8.3f}"
+              f"{voyage.plan.stated_error:8.3f}{voyage.clearance:11.3f}{clearance:10.3f}{off:10.4f}{turned:8.4f}"
+              f"{spent:7.1f}", flush=True)  # fmt: skip
+    found = np.array(rows)
+    print(f"\n{len(found)} replays: smallest room {found[:, 0].min():.3f} l; {np.sum(found[:, 0] <= 0)} touch; "
+          f"from the goal {np.median(found[:, 1]):.3f} l and {np.median(found[:, 2]):.3f} rad at the median, "
+          f"{found[:, 1].max():.3f} l and {found[:, 2].max():.3f} rad at most")  # fmt: skip

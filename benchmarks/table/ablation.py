@@ -1,0 +1,174 @@
+"""Ablations of the look-up table, and other methods: error, training and query time, size.
+
+Robots with three tails and more. Rows are learned from wide robots; errors are those of the yaw rate and the
+forward velocity (of itself), median and 95 %, on fresh robots of the domain whose tails do not touch.
+
+Usage: python -m benchmarks ablation WORK [--rows 4096] [--picture docs/lookup.png]
+       (WORK as in benchmarks.table.shipped_table)
+
+Takes half an hour.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from benchmarks.table.shipped_table import kept
+from dataset.report.figures import plain_logarithms
+from surrogate.networks import training_loop as fit
+from surrogate.networks.checkpoints import Work
+from surrogate.networks.ensemble import Ensemble
+from surrogate.networks.training_loop import Settings
+from surrogate.table import wrench_table as tails
+from surrogate.table.wrench_table import Rows, learnable, rows_of
+from surrogate.training.simulated import Simulated
+from surrogate.wrench import tails as tail
+from tests.oracles.balance import solve
+
+SMALL = Settings(width=32, depth=3, members=1, epochs=60, iterations=600)
+_CENTRES, _TESTED = 1000, 1000
+_LONGER = 2  # iterations of L-BFGS for one of BFGS
+Result = tuple[str, float, float, float, tuple[float, ...]]  # name, train s, query µs, numbers, errors
+
+
+def main(*words: str) -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("work", type=Path)
+    parser.add_argument("--rows", type=int, default=4096)
+    parser.add_argument("--picture")
+    given = parser.parse_args(words)
+    torch.set_num_threads(1)
+    learned, tested = (_several(kept(given.work, name)) for name in ("tails", "widths"))
+    tested = tested.at((tested.gap >= 1) & (tested.motion[:, 2] < 0.6 * tested.motion[:, 4]))
+    tested = tested.at(torch.arange(min(_TESTED, len(tested.motion))))
+    some = learned.at(torch.arange(given.rows))
+    found = [_network("as shipped, smaller", some, tested)]
+    power, fit._POWER = fit._POWER, 1.0
+    found.append(_network("least squares", some, tested))
+    fit._POWER = power
+    polish: Callable[..., None] = fit._polish
+    fit._polish = _lbfgs  # type: ignore[assignment]
+    found.append(_network("L-BFGS for BFGS", some, tested, replace(SMALL, iterations=_LONGER * SMALL.iterations)))
+    fit._polish = polish
+    found.append(_network("Adam alone", some, tested, replace(SMALL, iterations=0)))
+    smooth, tail.SMOOTHNESS = tail.SMOOTHNESS, (1.5,) * 7
+    found.append(_network("inputs scaled alike", some, tested))
+    tail.SMOOTHNESS = smooth
+    found.append(_network("single precision", some, tested, single=True))
+    found.append(_network("half the rows", some.at(torch.arange(given.rows // 2)), tested))
+    found.append(_kernel("Gaussian process", some.at(torch.arange(min(_CENTRES, given.rows))), tested))
+    found.append(_nearest("nearest row", some, tested))
+    print(f"{given.rows} rows, {len(tested.motion)} fresh robots; errors in %")
+    print(f"{'':26}{'train s':>8}{'query µs':>9}{'numbers':>9}{'ω_yr median':>12}{'95 %':>8}{'v_z':>8}{'95 %':>8}")
+    for name, train, query, size, errors in found:
+        figures = f"{errors[0]:12.4f}{errors[1]:8.3f}{errors[2]:8.4f}{errors[3]:8.3f}"
+        print(f"{name:26}{train:8.0f}{query:9.1f}{size:9.0f}{figures}")
+    if given.picture:
+        _draw(found, given.picture)
+
+
+def _several(rows: Simulated) -> Rows:
+    rows = rows.at(rows.robots["N"] > 2)
+    found = rows_of(rows.robots, rows.motion)
+    return found.at(torch.as_tensor(np.flatnonzero(learnable(found))))
+
+
+def _judge(name: str, rows: Rows, numbers: Callable[[Tensor], Tensor], seconds: float, size: float) -> Result:
+    began = time.process_time()
+    motion, _ = solve(rows.heads, rows.tails, numbers)
+    query = 1e6 * (time.process_time() - began) / len(motion)
+    errors = [(motion[:, i] / rows.motion[:, i] - 1).abs().nan_to_num(9.0) * 100 for i in (2, 1)]
+    levels = torch.tensor([0.5, 0.95], dtype=torch.float64)
+    return name, seconds, query, size, tuple(float(q) for error in errors for q in error.quantile(levels))
+
+
+def _network(name: str, rows: Rows, tested: Rows, settings: Settings = SMALL, *, single: bool = False) -> Result:
+    began = time.process_time()
+    learn: Callable[..., Ensemble] = tails._learn_wrench
+    network = learn(rows, settings, Work(), 3)
+    if single:
+        network = network.float().double()  # the weights rounded
+    size = sum(part.numel() for part in network.parameters())
+    return _judge(name, tested, network, time.process_time() - began, size)
+
+
+def _lbfgs(network: Ensemble, k: int, problem: fit.Problem, iterations: int, *others: object) -> None:
+    """The last 80 steps only, not the whole matrix."""
+    alone = network.member(k).requires_grad_(True)
+    optimiser = torch.optim.LBFGS(
+        alone.parameters(), max_iter=iterations, max_eval=2 * iterations, history_size=80,
+        line_search_fn="strong_wolfe", tolerance_change=0.0, tolerance_grad=0.0,
+    )  # fmt: skip
+
+    def closure() -> Tensor:
+        optimiser.zero_grad(set_to_none=True)
+        value = problem.loss(alone, problem.every(), fit._HARDEST)
+        value.backward()  # type: ignore[no-untyped-call]
+        return value
+
+    optimiser.step(closure)  # type: ignore[no-untyped-call]
+    network.replace_member(k, alone)
+
+
+def _kernel(name: str, rows: Rows, tested: Rows) -> Result:
+    """A Gaussian process with the same prior smoothness, on y from the wrench (y_4 = y_5 = 0)."""
+    began = time.process_time()
+    inputs, wanted = tail.inputs_of(rows.tails, rows.motion), _numbers(rows)
+    shift, scale = inputs.mean(0), inputs.std(0) * torch.tensor(tail.SMOOTHNESS)
+    scale[-1] = 1e9
+    mean, spread = wanted.mean(0), wanted.std(0) + 1e-12
+
+    def kernel(a: Tensor, b: Tensor) -> Tensor:
+        return torch.exp(-0.5 * torch.cdist((a - shift) / scale, (b - shift) / scale).square())
+
+    matrix = kernel(inputs, inputs) + 1e-8 * torch.eye(len(inputs), dtype=torch.float64)
+    weights = torch.linalg.solve(matrix, (wanted - mean) / spread)
+    seconds = time.process_time() - began
+    return _judge(
+        name, tested, lambda x: kernel(x[:, :7], inputs) @ weights * spread + mean, seconds, weights.numel()
+    )
+
+
+def _nearest(name: str, rows: Rows, tested: Rows) -> Result:
+    inputs, wanted = tail.inputs_of(rows.tails, rows.motion), _numbers(rows)
+    scale = inputs.std(0) * torch.tensor(tail.SMOOTHNESS)
+    scale[-1] = 1e9
+    return _judge(
+        name,
+        tested,
+        lambda x: wanted[torch.cdist(x[:, :7] / scale, inputs / scale).argmin(1)],
+        0.0,
+        wanted.numel(),
+    )
+
+
+def _numbers(rows: Rows) -> Tensor:
+    """y (M, 6) of rows with y_4 = y_5 = 0."""
+    wrench = (rows.heads.resistance @ rows.motion[..., None])[..., 0]
+    left = wrench - tail.straight_wrench(rows.tails, rows.motion)
+    units = tail.units_of(rows.tails, rows.motion)[:, :, :4].diagonal(dim1=1, dim2=2)
+    return torch.cat([left / units, torch.zeros(len(left), 2, dtype=torch.float64)], 1)
+
+
+def _draw(found: list[Result], path: str) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.5, 3.8), layout="constrained")
+    axes = figure.add_subplot()
+    for place, (_, _, _, _, errors) in enumerate(reversed(found)):
+        axes.plot(errors[:2], [place, place], "-", color="#9fb8cc", lw=5, solid_capstyle="round")
+        axes.plot(errors[0], place, "o", color="#2a7fba", ms=7)
+    axes.set_xscale("log")
+    plain_logarithms(axes.xaxis)
+    axes.set_yticks(range(len(found)), [name for name, *_ in reversed(found)])
+    axes.set_xlabel("error of the yaw rate [%]: median (dot) to 95 %")
+    axes.grid(axis="x", alpha=0.3)
+    figure.savefig(path, dpi=110)

@@ -1,0 +1,141 @@
+"""Cost and error of tables of one robot, for each effect of the catalogue at its typical size.
+
+For each robot: the processor time of `surrogate.one_robot.tabulate.tabulate`, and the error of the net motion that
+its table predicts. The net motion is the change of the robot's pose over two equal dwells, one in each direction
+of the motor, once earlier dwells are forgotten; first with the motor forwards, then with the motor backwards. The
+error is the distance between the two ends over the net distance, or, where it is larger, the difference of the
+headings over the angle by which the robot turns in one dwell.
+
+The reference is time steps on two meshes, extrapolated, as the mean over the phases of the disc at the flip. The
+steady motion of both sides is that of the direct solution, whose stated error is in the table, too.
+
+Usage: python -m benchmarks robot_tables [EFFECT …]
+
+Takes 5 minutes.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from planner.vehicle.from_table import vehicle_of
+from sim.arrays import Floats
+from sim.effects import catalogue
+from sim.mechanics import planar
+from sim.mechanics.flow import has_flow
+from sim.model.body import Body
+from sim.model.groups import Groups
+from sim.model.presets import PRESETS
+from sim.model.response import DWELLS
+from sim.model.robot import Robot
+from sim.motion.resolution import Resolution
+from sim.motion.run import Run
+from sim.motion.settling import steady_state
+from sim.motion.switching import MEMORY, steady_twist
+from sim.motion.warm import compile_once
+from sim.solve.assembly import bodies, reversed_bodies
+from surrogate.one_robot.robot_table import SingleRobot
+from surrogate.one_robot.tabulate import tabulate
+
+AT = (8, 13, 18, 22)  # of DWELLS: 0.54, 1.0, 1.9, 3.1
+_MESHES = (Resolution(16, 48), Resolution(24, 72))
+_MESHES_WITH_FLOW = (Resolution(12, 36), Resolution(16, 48))  # within 0.03 % of the others where there is no flow
+_PHASES = 6
+_ADAPTS, _WINDOW = 1.0, 1.5  # time units for the mesh to settle, and for the steady twist
+_SENSES = (1.0, -1.0)
+_VIEW = np.stack([np.ones(3), planar.MIRROR])  # a motion in each direction, seen as for a positive motor
+
+
+def robots() -> dict[str, Robot]:
+    """The control robot, plain and with each effect (beside the one that it needs)."""
+    base, found = PRESETS["paper-control"], {"none": PRESETS["paper-control"]}
+    for name, effect in catalogue().items():
+        partner = {effect.beside: catalogue()[effect.beside].typical} if effect.beside else {}
+        found[name] = replace(base, effects={**partner, name: effect.typical})
+    return found
+
+
+def both(robot: Robot) -> Groups:
+    """The robot with its motor forwards and backwards."""
+    columns = {name: np.array([value, value]) for name, value in robot.group_values().items()}
+    return Groups.from_columns(columns | {"omega_bar": columns["omega_bar"] * _SENSES})
+
+
+def pairs(changes: Floats) -> Floats:
+    """Pose changes (2, …, 3) over two dwells, the first in each direction, from those over one dwell."""
+    real = changes * _VIEW.reshape(2, *[1] * (changes.ndim - 2), 3)
+    return planar.compose(real, real[::-1])
+
+
+def tabulated(table: SingleRobot, robot: Robot) -> tuple[Floats, Floats]:
+    """Pose changes (2, D, 3) over one of equal dwells as the planner sees them, and steady twists (2, 3)."""
+    vehicle = vehicle_of(robot, table)
+    dwells = DWELLS[list(AT)]
+    changes = np.stack([vehicle.motion(int(sense), dwells, dwells) for sense in _SENSES])
+    return changes * _VIEW[:, None], vehicle.twist * _VIEW
+
+
+def stepped(robot: Robot, twist: Floats) -> Floats:
+    """The same pose changes (2, D, 3) by time steps, with the arcs of `twist`."""
+    groups = both(robot)
+    body, reverse = bodies(groups)[0], reversed_bodies(groups)[0]
+    meshes = _MESHES_WITH_FLOW if has_flow(body) else _MESHES
+    coarse, fine = (
+        np.stack([_lags(body, reverse, groups.N, float(DWELLS[i]), mesh) for i in AT], 1) for mesh in meshes
+    )
+    a, b = (mesh.edges for mesh in meshes)
+    lag = fine + (fine - coarse) * a**2 / (b**2 - a**2)
+    return planar.compose(lag, planar.arc(twist[:, None], DWELLS[list(AT)]))
+
+
+def _lags(body: Body, reverse: Body, tails: int, dwell: float, mesh: Resolution) -> Floats:
+    """Lags (2, 3) of equal dwells in each direction, mean over phases of the disc."""
+    runs = [
+        Run(own, tails, mesh, steady_state(own, tails, mesh), reverse=other, most_work=np.inf)
+        for own, other in ((body, reverse), (reverse, body))
+    ]
+    found = [
+        steady_twist(run, tails, sense, adapts=_ADAPTS, window=_WINDOW)
+        for run, sense in zip(runs, _SENSES, strict=True)
+    ]
+    twists, (turn, _) = zip(*found, strict=True)
+    count = 2 * int(np.ceil((1 + MEMORY / dwell) / 2)) + 1
+    changes = np.zeros((2, 3))
+    for phase in range(_PHASES):
+        run = runs[0].copy()
+        if phase:
+            run.go(turn * phase / _PHASES)
+        for flip in range(1, count + 1):  # the second one is forwards again
+            run.flip()
+            before = run.pose
+            run.go(dwell)
+            if flip >= count - 1:
+                changes[flip % 2] += planar.between(before, run.pose) * _VIEW[flip % 2] / _PHASES
+    return planar.compose(changes, planar.inverse(planar.arc(np.array(twists), dwell)))
+
+
+def main(*effects: str) -> None:
+    torch.set_num_threads(1)
+    compile_once()
+    tabulate(PRESETS["paper-control"])  # load the machine code
+    print(f"{'':24}{'s':>6}{'steady':>8}{'':4}error of the net motion [%], dwells "
+          + ", ".join(f"{DWELLS[i]:.2f}" for i in AT))  # fmt: skip
+    print(f"{'':24}{'':6}{'[%]':>8}{'':4}{'first forwards':28}{'first backwards':28}")
+    for name, robot in robots().items():
+        if effects and name not in effects:
+            continue
+        began = time.process_time()
+        table = tabulate(robot)
+        spent = time.process_time() - began
+        mine, twist = tabulated(table, robot)
+        own, reference = pairs(mine), pairs(stepped(robot, twist))
+        away = np.hypot(*np.moveaxis(own - reference, -1, 0)[:2]) / np.hypot(*np.moveaxis(reference, -1, 0)[:2])
+        turned = np.abs(own - reference)[..., 2] / np.abs(twist[:, 2]).mean() / DWELLS[list(AT)]
+        error = 100 * np.maximum(away, turned)
+        figures = "".join(" ".join(f"{one:6.3f}" for one in row) + " " for row in error)
+        stated = 100 * table.errors["omega_yr_bar"]["rms"]
+        print(f"{name:24}{spent:6.1f}{stated:8.3f}{'':4}{figures}", flush=True)

@@ -1,0 +1,167 @@
+"""Train the look-up table that comes with the package, and evaluate it on held-out robots.
+
+Usage: python -m dataset build --config sweeps/domain.toml --out SWEEP
+       python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
+       python -m benchmarks shipped_table WORK --test MODEL   errors and coverage on the locked robots
+
+The tails are learned from robots with heads far wider than those of the sweep, a single tail from robots of the
+sweep as well. The response to a flip is learned from the sweep, and from some of these wide robots. All robots are
+drawn from Sobol sequences with the seeds below. The locked robots led to no choice of any kind.
+
+Takes a day with its simulations.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from dataset.report.figures import plain_logarithms
+from dataset.storage.data_set import read_manifest
+from sim.arrays import Floats
+from surrogate.networks.checkpoints import Work, remove_states
+from surrogate.networks.training_loop import Settings
+from surrogate.table.errors import coverage, curve_errors, error_table, relative_errors, summary
+from surrogate.table.lookup import Lookup
+from surrogate.table.model_file import load, save
+from surrogate.training.simulated import Simulated, as_reached, drawn, joined, read_rows, simulated
+from surrogate.training.train import learn, split, with_radius
+
+TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=3000)
+CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)
+ROWS = {"tails": (32768, 101), "widths": (4096, 202), "held_out": (4096, 402), "locked": (4096, 20261201)}
+FLIPS = {"flips": (1400, 301), "locked_flips": (400, 20261202)}
+_SWEPT = 16384  # rows of the sweep without history whose lags are learned
+_FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated
+
+
+def robots(name: str) -> dict[str, Floats]:
+    """The robots of one set."""
+    if name in FLIPS:
+        count, seed = FLIPS[name]
+        if name != "flips":
+            return drawn(count, seed, wide=False)
+        tails = 1.0 + np.arange(_FLIPS_DRAWN) % 8
+        np.random.default_rng(seed).shuffle(tails)
+        every = {**drawn(_FLIPS_DRAWN, seed, wide=True), "N": tails}
+        return {n: np.asarray(values[:count]) for n, values in every.items()}
+    count, seed = ROWS[name]
+    return drawn(count, seed, wide=name == "tails")
+
+
+def kept(work: Path, name: str) -> Simulated:
+    """One set, simulated, or read from the folder if it is there."""
+    path = work / f"{name}.npz"
+    if path.exists():
+        with np.load(path) as file:
+            parts = [{k.split("/")[1]: file[k] for k in file if k.startswith(f"{i}/")} for i in range(3)]
+        return Simulated(*parts)
+    began = time.process_time()
+    make: Callable[..., Simulated] = simulated if name == "tails" or name in FLIPS else as_reached
+    found = make(robots(name), title=name, **({"curves": True} if name in FLIPS else {}))
+    print(f"{name}: {len(found)} rows, {time.process_time() - began:.0f} s")
+    work.mkdir(parents=True, exist_ok=True)
+    named = {f"{i}/{k}": values for i, part in enumerate(vars(found).values()) for k, values in part.items()}
+    np.savez(path, allow_pickle=False, **named)
+    return found
+
+
+def swept(folder: str) -> tuple[Simulated, Simulated, Simulated]:
+    """Rows of a sweep: one tail; with response curves, to learn (with memory and rest, and _SWEPT without); and
+    held out.
+    """
+    rows, numbers = read_rows(folder)
+    part, history = split(numbers), np.isfinite(rows.curves["rest"]).all((1, 2))
+    lags = np.flatnonzero((part == 0) & ~history & (rows.robots["N"] > 1))[:_SWEPT]
+    learned = np.union1d(lags, np.flatnonzero((part == 0) & history))
+    single = np.flatnonzero((part == 0) & (rows.robots["N"] == 1))
+    return rows.at(single), rows.at(learned), rows.at(np.flatnonzero((part > 0) & history))
+
+
+def test(lookup: Lookup, rows: Simulated, flips: Simulated) -> None:
+    """Print errors and coverage on robots that were never used."""
+    began = time.process_time()
+    answer = lookup.query(rows.robots, intervals=True, flag=True)
+    seconds = time.process_time() - began
+    inside = ~answer["outside"]
+    truth = with_radius(rows.motion)
+    apart = rows.motion["tail_gap"] >= 1
+    print(f"\n{len(rows)} locked robots, {1e6 * seconds / len(rows):.0f} µs each with intervals; outside: "
+          f"{np.count_nonzero(~inside)}")  # fmt: skip
+    errors = {name: error[inside] for name, error in relative_errors(answer, truth).items()}
+    errors["v_z of itself"] = (answer["v_z"] / truth["v_z"] - 1)[inside]
+    several = rows.robots["N"][inside] > 1
+    for words, kind in (("all", several | True), ("two tails and more", several), ("one tail", ~several)):
+        print(words)
+        for name, figures in summary({n: e[kind] for n, e in errors.items()}, apart[inside][kind]).items():
+            print(f"  {name:16}" + "".join(f"  {k} {100 * v:.4f}" for k, v in figures.items()))
+    own = {name: values[inside] for name, values in answer.items()}
+    print("coverage:", coverage(own, {name: values[inside] for name, values in truth.items()}))
+    flips = flips.at(flips.robots["N"] > 1)
+    found = lookup.response(flips.robots, flag=True)
+    known = ~lookup.query(flips.robots, flag=True)["outside"]
+    report = curve_errors(found, {**flips.motion, **flips.curves})
+    print(f"response to a flip, {np.count_nonzero(known)} robots:")
+    valid = flips.motion["tail_gap"] >= 1
+    for name, figures in summary({n: e[known] for n, e in report.items()}, valid[known]).items():
+        print(f"  {name:16}" + "".join(f"  {k} {100 * v:.3f}" for k, v in figures.items()))
+
+
+def draw(lookup: Lookup, rows: Simulated, path: str) -> None:
+    """Error of the yaw rate against motor speed, of robots whose tails do not touch."""
+    from matplotlib.figure import Figure
+
+    answer = lookup.query(rows.robots, flag=True)
+    error = 100 * np.abs(answer["omega_yr_bar"] / rows.motion["omega_yr_bar"] - 1)
+    shown = ~answer["outside"] & (rows.motion["tail_gap"] >= 1)
+    figure = Figure(figsize=(7.5, 4.2), layout="constrained")
+    axes = figure.add_subplot()
+    kinds = (
+        ("one tail", rows.robots["N"] == 1, "#d9a441"),
+        ("two tails and more", rows.robots["N"] > 1, "#2a7fba"),
+    )
+    for label, kind, colour in kinds:
+        some = shown & kind
+        axes.plot(rows.robots["omega_bar"][some], error[some], ".", ms=3, color=colour, alpha=0.6, label=label)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_ylim(1e-4, 20)
+    plain_logarithms(axes.xaxis)
+    plain_logarithms(axes.yaxis)
+    axes.set_xlabel("motor speed ω̄")
+    axes.set_ylabel("error of the yaw rate [%]")
+    axes.legend(frameon=False, markerscale=4)
+    figure.savefig(path, dpi=100)
+
+
+def main(*words: str) -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("work", type=Path)
+    parser.add_argument("--out")
+    parser.add_argument("--sweep", help="data set built from sweeps/domain.toml")
+    parser.add_argument("--test")
+    parser.add_argument("--picture", help="with --test: draw the errors of the locked robots")
+    given = parser.parse_args(words)
+    if given.out:
+        if not given.sweep:
+            parser.error("--out needs --sweep")
+        tails, widths, held_out, flips = (kept(given.work, n) for n in ("tails", "widths", "held_out", "flips"))
+        source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(given.sweep)["config_hash"]}
+        single, learned, others = swept(given.sweep)
+        tails = joined([tails, single])
+        lookup = learn(
+            tails, widths, held_out, joined([flips, learned]), TAILS, CURVES, source=source, flips_held_out=others,
+            work=Work("train", folder=given.work / "states"),
+        )  # fmt: skip
+        save(lookup, given.out)
+        remove_states(given.work / "states")
+        print(error_table(lookup))
+    if given.test:
+        lookup, locked = load(given.test), kept(given.work, "locked")
+        test(lookup, locked, kept(given.work, "locked_flips"))
+        if given.picture:
+            draw(lookup, locked, given.picture)
