@@ -137,7 +137,7 @@ def _say(result: Plan) -> None:
     out("folder"),
 )  # fmt: skip
 def _goal(arguments: Namespace) -> None:
-    from planner.files.goal_files import read_region, write_voyage
+    from planner.files.goal_files import read_region, write_goal_plan
     from planner.goal.obstacles import Polygon
     from planner.goal.to_goal import to_goal
     from planner.vehicle.calibration_table import read_knowledge
@@ -152,7 +152,7 @@ def _goal(arguments: Namespace) -> None:
     walls = None if arguments.walls is None else read_region(arguments.walls, unit, robot)
     if walls is not None and not isinstance(walls, Polygon):
         raise InputError(f"--walls {arguments.walls!r}; give a box or an outline")
-    voyage = to_goal(
+    goal_plan = to_goal(
         start,
         goal,
         robot,
@@ -167,16 +167,16 @@ def _goal(arguments: Namespace) -> None:
         feedback=arguments.feedback,
         knowledge=read_knowledge(arguments.robot),
     )
-    paths = write_voyage(voyage, arguments.out)
-    _say(voyage.plan)
-    off, turned = voyage.end_error
-    x, y, heading = voyage.end
+    paths = write_goal_plan(goal_plan, arguments.out)
+    _say(goal_plan.plan)
+    off, turned = goal_plan.end_error
+    x, y, heading = goal_plan.end
     print(
         f"end: ({x:.3f}, {y:.3f}) l, heading {math.degrees(math.remainder(heading, math.tau)):.1f} degrees; "
         f"from the goal {off:.1g} l and {math.degrees(turned):.1g} degrees as predicted"
     )
-    if not voyage.room.empty:
-        print(f"margin {voyage.margin:.3f} l around the body; predicted clearance {voyage.clearance:.3f} l")
+    if not goal_plan.free_space.empty:
+        print(f"margin {goal_plan.margin:.3f} l around the body; predicted clearance {goal_plan.clearance:.3f} l")
     print(f"-> {', '.join(map(str, paths))}")
 
 

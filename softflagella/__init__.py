@@ -15,13 +15,14 @@ from __future__ import annotations
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+from warnings import warn
 
 if TYPE_CHECKING:
     from calibration.swimmer.synthetic_table import make_table
     from calibration.verdict.verdict import Verdict
     from planner.files.plan_files import write_plan
     from planner.goal.obstacles import Circle
-    from planner.goal.to_goal import Voyage, to_goal
+    from planner.goal.to_goal import GoalPlan, to_goal
     from planner.paths.path import Path2D, circle, polygon
     from planner.paths.path_files import read_path
     from planner.planning.plan import Plan, plan
@@ -44,13 +45,13 @@ if TYPE_CHECKING:
 _HOMES = {
     "Circle": "planner.goal.obstacles",
     "Effect": "sim.model.effect",
+    "GoalPlan": "planner.goal.to_goal",
     "InputError": "sim.io.errors",
     "LookupTable": "surrogate.interface",
     "Path2D": "planner.paths.path",
     "Plan": "planner.planning.plan",
     "Robot": "sim.model.robot",
     "Schedule": "sim.model.schedule",
-    "Voyage": "planner.goal.to_goal",
     "Verdict": "calibration.verdict.verdict",
     "__version__": "sim.io.provenance",
     "calibrate": "softflagella.api.calibrate",
@@ -79,15 +80,21 @@ _HOMES = {
 }
 
 __all__ = [
-    "Circle", "Effect", "InputError", "LookupTable", "Path2D", "Plan", "Robot", "Schedule", "Tracker", "Verdict",
-    "Voyage", "__version__", "calibrate", "circle", "effects", "load_robot", "load_schedule", "load_table",
+    "Circle", "Effect", "GoalPlan", "InputError", "LookupTable", "Path2D", "Plan", "Robot", "Schedule", "Tracker",
+    "Verdict", "__version__", "calibrate", "circle", "effects", "load_robot", "load_schedule", "load_table",
     "make_table", "plan", "polygon", "read_path", "read_sweep", "replay", "response", "save_robot",
     "sensitivities", "steady", "sweep", "switch_response", "tabulate", "to_goal", "train",
     "write_plan",
 ]  # fmt: skip
 
 
+_RENAMED = {"Voyage": "GoalPlan"}  # old name -> new name, for one release
+
+
 def __getattr__(name: str) -> Any:
+    if name in _RENAMED:
+        warn(f"{name} is now {_RENAMED[name]}", DeprecationWarning, stacklevel=2)
+        name = _RENAMED[name]
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, _, attribute = _HOMES[name].partition(":")

@@ -122,10 +122,8 @@ SIMULATOR = {"sim.linear", "sim.motion", "sim.reference", "sim.solve"}
 @pytest.mark.parametrize(
     ("module", "may_load"),
     [
-        *((package, set()) for package in ORDER if package != "planner"),
-        ("planner", {"numpy", "scipy", "surrogate"}),  # its interface is the package itself
-        *((f"{package}.__main__", set()) for package in ORDER if package != "planner"),
-        ("planner.__main__", {"numpy", "scipy", "surrogate"}),
+        *((package, set()) for package in ORDER),
+        *((f"{package}.__main__", set()) for package in ORDER),
     ],
 )
 def test_importing_loads_only_what_is_used(module: str, may_load: set[str]) -> None:

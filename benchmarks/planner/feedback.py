@@ -21,10 +21,9 @@ from matplotlib.figure import Figure
 
 from benchmarks.planner.simulated_swim import Blind, Camera, Swum, swim
 from benchmarks.proportions import wilson
-from planner import circle, plan
 from planner.files.pictures import DECLARED, REPLAYED
-from planner.paths.path import Path2D
-from planner.planning.plan import Plan
+from planner.paths.path import Path2D, circle
+from planner.planning.plan import Plan, plan
 from planner.tracking.tracker import FALSE_ALARM, WINDOW, Tracker
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot

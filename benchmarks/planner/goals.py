@@ -20,12 +20,12 @@ def main(cases: str = "100", first: str = "0") -> None:
     seeds = range(int(first), int(first) + int(cases))
     ratios = []
     heads = f"{'x':>7}{'y':>7}{'heading':>9}{'plan':>9}{'optimum':>9}{'/':>8}{'end':>10}{'s':>7}"
-    for seed, voyage, spent in planned(goal_alone, seeds, heads):
-        goal = voyage.goal
-        least = brute_force(voyage.plan.vehicle, goal)
-        ratios.append(voyage.plan.duration / least)
-        print(f"{seed:5d}{goal[0]:7.2f}{goal[1]:7.2f}{goal[2]:9.2f}{voyage.plan.duration:9.1f}{least:9.1f}"
-              f"{ratios[-1]:8.3f}{max(voyage.end_error):10.1e}{spent:7.2f}", flush=True)  # fmt: skip
+    for seed, goal_plan, spent in planned(goal_alone, seeds, heads):
+        goal = goal_plan.goal
+        least = brute_force(goal_plan.plan.vehicle, goal)
+        ratios.append(goal_plan.plan.duration / least)
+        print(f"{seed:5d}{goal[0]:7.2f}{goal[1]:7.2f}{goal[2]:9.2f}{goal_plan.plan.duration:9.1f}{least:9.1f}"
+              f"{ratios[-1]:8.3f}{max(goal_plan.end_error):10.1e}{spent:7.2f}", flush=True)  # fmt: skip
     found = np.array(ratios)
     print(f"\n{len(found)} goals: time by the optimum's {np.median(found):.3f} at the median, "
           f"{np.quantile(found, 0.95):.3f} at 95 %, {found.max():.3f} at most; within 5 %: "

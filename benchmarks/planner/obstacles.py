@@ -18,11 +18,11 @@ def main(cases: str = "12", first: str = "0") -> None:
     rows = []
     heads = (f"{'way':>8}{'flips':>7}{'margin':>8}{'stated':>8}{'predicted':>11}{'replayed':>10}"
              f"{'off goal':>10}{'rad':>8}{'s':>7}")  # fmt: skip
-    for seed, voyage, spent in planned(goal_behind_circles, seeds, heads):
-        clearance, off, turned = replayed_clearance(voyage)
+    for seed, goal_plan, spent in planned(goal_behind_circles, seeds, heads):
+        clearance, off, turned = replayed_clearance(goal_plan)
         rows.append((clearance, off, turned))
-        print(f"{seed:5d}{voyage.length:8.2f}{len(voyage.plan.dwells):7d}{voyage.margin:8.3f}"
-              f"{voyage.plan.stated_error:8.3f}{voyage.clearance:11.3f}{clearance:10.3f}{off:10.4f}{turned:8.4f}"
+        print(f"{seed:5d}{goal_plan.length:8.2f}{len(goal_plan.plan.dwells):7d}{goal_plan.margin:8.3f}"
+              f"{goal_plan.plan.stated_error:8.3f}{goal_plan.clearance:11.3f}{clearance:10.3f}{off:10.4f}{turned:8.4f}"
               f"{spent:7.1f}", flush=True)  # fmt: skip
     found = np.array(rows)
     print(f"\n{len(found)} replays: smallest room {found[:, 0].min():.3f} l; {np.sum(found[:, 0] <= 0)} touch; "

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from planner.goal.route import NoWayError
-from planner.goal.to_goal import Voyage, to_goal
+from planner.goal.to_goal import GoalPlan, to_goal
 from sim.model.presets import PRESETS
 from surrogate.table.model_file import load
 
@@ -19,7 +19,7 @@ class Trip(NamedTuple):
     """One planned case."""
 
     seed: int
-    voyage: Voyage
+    goal_plan: GoalPlan
     seconds: float  # of processor time
 
 
@@ -37,8 +37,8 @@ def planned(case: Callable[[np.random.Generator], dict[str, Any]], seeds: range,
     for seed in seeds:
         began = time.process_time()
         try:
-            voyage = to_goal(robot=robot, lookup=lookup, **case(np.random.default_rng(seed)))
+            goal_plan = to_goal(robot=robot, lookup=lookup, **case(np.random.default_rng(seed)))
         except NoWayError as none:
             print(f"{seed:5d} {none} ({time.process_time() - began:.1f} s)")
             continue
-        yield Trip(seed, voyage, time.process_time() - began)
+        yield Trip(seed, goal_plan, time.process_time() - began)

@@ -14,7 +14,7 @@ import numpy as np
 from planner.paths.distance import distance_to
 from planner.planning.plan import Plan
 from planner.tracking.kalman_filter import POSE
-from planner.tracking.tracker import Advice
+from planner.tracking.tracker import Command
 from sim.arrays import Floats
 from sim.inputs import check_columns
 from sim.mechanics import planar
@@ -33,7 +33,7 @@ _STRIDE = 4  # steps between two kept points
 class Pilot(Protocol):
     """`planner.tracking.tracker`, or what is fed like it."""
 
-    def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Advice: ...
+    def update(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command: ...
 
 
 class Blind:
@@ -44,13 +44,13 @@ class Blind:
         self._flips = np.cumsum(plan.dwells).tolist()
         self._done = 0
 
-    def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Advice:
+    def update(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command:
         if self._done < len(self._flips) and now >= self._flips[self._done] - _SAME / 2:
             self._done += 1
         if self._done == len(self._flips):
-            return Advice(0, self._flips[-1], True, False, self._plan.stated_error)
+            return Command(0, self._flips[-1], True, False, self._plan.stated_error)
         direction = self._plan.first_direction * (-1) ** self._done
-        return Advice(direction, self._flips[self._done], False, False, self._plan.stated_error)
+        return Command(direction, self._flips[self._done], False, False, self._plan.stated_error)
 
 
 @dataclass
@@ -137,19 +137,19 @@ def swim(
     pose = start
     waiting: list[tuple[float, POSE, float]] = []
     times, poses, alarms = [np.zeros(1)], [start[None]], []
-    advice, rang, fed = pilot.feed(0.0), False, 0
-    while not advice.finished and now < limit:
+    command, rang, fed = pilot.update(0.0), False, 0
+    while not command.finished and now < limit:
         until = min(look, change, waiting[0][0] if waiting else np.inf)
-        until = advice.flip_at if advice.flip_at <= until + _SAME else until
+        until = command.flip_at if command.flip_at <= until + _SAME else until
         if until > now:
             spent, moved = swimmer.go(until - now)
             moved = planar.compose(start, moved)
             times.append(now + spent[_STRIDE - 1 :: _STRIDE])
             poses.append(moved[_STRIDE - 1 :: _STRIDE])
             now, pose = until, moved[-1]
-        if until == advice.flip_at:
-            advice = pilot.feed(now)
-            if not advice.finished:
+        if until == command.flip_at:
+            command = pilot.update(now)
+            if not command.finished:
                 swimmer.flip()
         elif until == change and later is not None:
             swimmer.become(later)
@@ -161,10 +161,10 @@ def swim(
             look += every
         else:
             _, found, seen = waiting.pop(0)
-            advice = pilot.feed(now, found, seen)
+            command = pilot.update(now, found, seen)
             fed += 1
-        if advice.alarm and not rang:
+        if command.alarm and not rang:
             alarms.append(now)
-        rang = advice.alarm
+        rang = command.alarm
     track = planar.compose(np.concatenate(poses), np.array([plan.offset, 0.0, 0.0]))[:, :2]
     return Swum(np.concatenate(times), track, distance_to(plan.reference, track), fed, tuple(alarms))

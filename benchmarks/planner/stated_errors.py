@@ -22,12 +22,12 @@ import torch
 from joblib import Parallel, delayed
 
 from benchmarks.proportions import wilson
-from planner import Path2D, circle, plan, polygon
 from planner.files.plan_json import plan_record
 from planner.files.tracking_error import tracking_error
 from planner.paths.distance import distance_to
-from planner.planning.plan import Plan
-from planner.vehicle.calibration_table import COEFFICIENTS, Knowledge
+from planner.paths.path import Path2D, circle, polygon
+from planner.planning.plan import Plan, plan
+from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
@@ -100,7 +100,7 @@ def swum(seed: int) -> Swum | str:
     torch.set_num_threads(1)
     rng = np.random.default_rng(seed)
     robot = random_robot(rng)
-    knowledge = Knowledge(COEFFICIENTS, SIGMA**2 * np.eye(3))
+    knowledge = CalibrationKnowledge(COEFFICIENTS, SIGMA**2 * np.eye(3))
     try:
         table = tabulate(robot) if robot.effects else load()
         path = random_path(rng, plan(circle(4.0), robot, lookup=table).vehicle.turn_radius)

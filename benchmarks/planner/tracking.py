@@ -13,9 +13,10 @@ import pandas as pd
 import torch
 from tqdm import tqdm
 
-from planner import circle, plan, polygon
 from planner.files.plan_json import plan_record
 from planner.files.tracking_error import tracking_error
+from planner.paths.path import circle, polygon
+from planner.planning.plan import plan
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay

@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from planner.vehicle.from_table import vehicle_of
+from planner.vehicle.from_table import table_vehicle
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.mechanics import planar
@@ -73,7 +73,7 @@ def pairs(changes: Floats) -> Floats:
 
 def tabulated(table: SingleRobot, robot: Robot) -> tuple[Floats, Floats]:
     """Pose changes (2, D, 3) over one of equal dwells as the planner sees them, and steady twists (2, 3)."""
-    vehicle = vehicle_of(robot, table)
+    vehicle = table_vehicle(robot, table)
     dwells = DWELLS[list(AT)]
     changes = np.stack([vehicle.motion(int(sense), dwells, dwells) for sense in _SENSES])
     return changes * _VIEW[:, None], vehicle.twist * _VIEW

@@ -22,7 +22,7 @@ from calibration.swimmer.candidate_effects import CURRENT
 from calibration.swimmer.head_correction import Corrected
 from calibration.swimmer.nuisance_numbers import LENGTH
 from calibration.swimmer.swimmer import robot_numbers
-from planner.vehicle.calibration_table import COEFFICIENTS, NUMBERS, Knowledge, knowledge_toml
+from planner.vehicle.calibration_table import COEFFICIENTS, NUMBERS, CalibrationKnowledge, knowledge_toml
 from sim.effects import catalogue
 from sim.inputs import robot_toml
 from sim.io.errors import InputError
@@ -52,7 +52,7 @@ def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
     return replace(robot, **own, effects={**robot.effects, **sizes})
 
 
-def knowledge_of(robot: Robot, delivered: Delivered) -> Knowledge:
+def knowledge_of(robot: Robot, delivered: Delivered) -> CalibrationKnowledge:
     """Covariance of the corrected robot's coefficients, numbers and effects, and the current in the tank.
 
     Args:
@@ -69,7 +69,7 @@ def knowledge_of(robot: Robot, delivered: Delivered) -> Knowledge:
     places = {one.name: i for i, one in enumerate(delivered.fitted)}
     current = [(delivered.parameters[n], places[n]) if n in places else (0.0, None) for n in CURRENT]
     errors = [0.0 if at is None else math.sqrt(delivered.covariance[at, at]) for _, at in current]
-    return Knowledge(
+    return CalibrationKnowledge(
         names=tuple(names),
         covariance=(covariance + covariance.T) / 2,  # rounding
         current=(current[0][0], current[1][0]),
@@ -88,7 +88,7 @@ def corrected_toml(robot: Robot, delivered: Delivered, predictive: Predictive | 
     return robot_toml(corrected) + "\n" + knowledge_toml(known)
 
 
-def _with_correction(known: Knowledge, learnt: Corrected, robot: Robot) -> Knowledge:
+def _with_correction(known: CalibrationKnowledge, learnt: Corrected, robot: Robot) -> CalibrationKnowledge:
     """With the uncertainty of the correction at this robot; as it is if the robot is outside the runs."""
     values = robot.group_values()
     try:

@@ -8,7 +8,7 @@ from typing import Any
 
 from planner.files.plan_files import write_plan
 from planner.goal.obstacles import Circle, Polygon, Region
-from planner.goal.to_goal import Voyage
+from planner.goal.to_goal import GoalPlan
 from planner.paths.path_files import read_path
 from planner.paths.units import in_tails
 from sim.io.errors import InputError
@@ -48,38 +48,38 @@ def read_region(words: str, unit: str, robot: Robot) -> Region:
     return Polygon.of(drawing.path.scaled(own))
 
 
-def write_voyage(voyage: Voyage, folder: str | Path) -> list[Path]:
+def write_goal_plan(goal_plan: GoalPlan, folder: str | Path) -> list[Path]:
     """The files of the plan, goal.json with goal and regions, and a picture of all; returns their paths."""
-    from planner.files.pictures import draw_voyage
+    from planner.files.pictures import draw_goal_plan
 
-    paths = write_plan(voyage.plan, folder)
+    paths = write_plan(goal_plan.plan, folder)
     out = Path(folder)
-    write_text(out / "goal.json", json.dumps(voyage_record(voyage)) + "\n")
+    write_text(out / "goal.json", json.dumps(goal_record(goal_plan)) + "\n")
     with whole_file(out / "goal.svg") as part:
-        draw_voyage(voyage).savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})
+        draw_goal_plan(goal_plan).savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})
     return [*paths, out / "goal.json", out / "goal.svg"]
 
 
-def voyage_record(voyage: Voyage) -> dict[str, Any]:
+def goal_record(goal_plan: GoalPlan) -> dict[str, Any]:
     """What was asked for and what is predicted, as JSON-like content. Lengths in l, angles in rad."""
-    finite = voyage.clearance if voyage.clearance < float("inf") else None
-    walls = voyage.room.walls
+    finite = goal_plan.clearance if goal_plan.clearance < float("inf") else None
+    walls = goal_plan.free_space.walls
     return {
         "format": FORMAT,
-        "start": voyage.plan.start,
-        "goal": voyage.goal,
-        "via": voyage.via,
+        "start": goal_plan.plan.start,
+        "goal": goal_plan.goal,
+        "via": goal_plan.via,
         "keep_out": [
             {"circle": [region.x, region.y, region.radius]}
             if isinstance(region, Circle)
             else {"polygon": region.corners.tolist()}
-            for region in voyage.room.regions
+            for region in goal_plan.free_space.regions
         ],
         "walls": None if walls is None else walls.corners.tolist(),
-        "predicted_end": voyage.end,
-        "end_error_over_l": voyage.end_error[0],
-        "end_error_rad": voyage.end_error[1],
-        "length_over_l": voyage.length,
-        "margin_over_l": voyage.margin,
+        "predicted_end": goal_plan.end,
+        "end_error_over_l": goal_plan.end_error[0],
+        "end_error_rad": goal_plan.end_error[1],
+        "length_over_l": goal_plan.length,
+        "margin_over_l": goal_plan.margin,
         "predicted_clearance_over_l": finite,
     }

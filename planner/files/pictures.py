@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle as Patch
 
-from planner.goal.obstacles import Body, Circle
-from planner.goal.to_goal import Voyage
+from planner.goal.obstacles import Circle, Footprint
+from planner.goal.to_goal import GoalPlan
 from planner.planning.plan import Plan
 from sim.arrays import Floats
 
@@ -35,30 +35,30 @@ def draw_plan(result: Plan) -> Figure:
     return figure
 
 
-def draw_voyage(voyage: Voyage) -> Figure:
+def draw_goal_plan(goal_plan: GoalPlan) -> Figure:
     """One panel: a plan from pose to pose, with what the robot must keep out of."""
-    figure = draw_plan(voyage.plan)
+    figure = draw_plan(goal_plan.plan)
     axes = figure.axes[0]
-    for region in voyage.room.regions:
+    for region in goal_plan.free_space.regions:
         if isinstance(region, Circle):
             axes.add_patch(Patch((region.x, region.y), region.radius, color=KEEP_OUT, lw=0))
         else:
             axes.fill(*region.corners.T, color=KEEP_OUT, lw=0)
-    if voyage.room.walls is not None:
-        corners = voyage.room.walls.corners
+    if goal_plan.free_space.walls is not None:
+        corners = goal_plan.free_space.walls.corners
         axes.plot(*np.concatenate([corners, corners[:1]]).T, color=KEEP_OUT, lw=3)
-    body = Body.of(voyage.plan.robot, 0.0)
-    for x, y, heading in (voyage.plan.start, voyage.goal):
+    body = Footprint.of(goal_plan.plan.robot, 0.0)
+    for x, y, heading in (goal_plan.plan.start, goal_plan.goal):
         along = np.array([body.places.min() - body.radius, body.places.max() + body.radius])
         axes.plot(x + along * math.cos(heading), y + along * math.sin(heading), color=DECLARED, lw=3, alpha=0.3)
         axes.plot(x, y, "o", color=DECLARED, ms=5)
-    for x, y in voyage.via:
+    for x, y in goal_plan.via:
         axes.plot(x, y, "+", color=REPLAYED, ms=10)
     axes.autoscale_view()
-    minutes = voyage.plan.seconds.sum() / 60
+    minutes = goal_plan.plan.seconds.sum() / 60
     axes.set_title(
-        f"{voyage.plan.robot.name}: {len(voyage.plan.dwells)} dwells, {minutes:.1f} min\n"
-        f"way {voyage.length:.2f} l, stated error {voyage.plan.stated_error:.2f} l",
+        f"{goal_plan.plan.robot.name}: {len(goal_plan.plan.dwells)} dwells, {minutes:.1f} min\n"
+        f"way {goal_plan.length:.2f} l, stated error {goal_plan.plan.stated_error:.2f} l",
         fontsize=10,
     )
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, fontsize=8, frameon=False)

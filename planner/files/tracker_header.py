@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from planner.planning import line_of_sight as follower
+from planner.planning import line_of_sight
 from planner.planning.plan import Plan
-from planner.tracking import kalman_filter as estimate
-from planner.tracking import tracker
+from planner.tracking import kalman_filter, tracker
 from planner.tracking.kalman_filter import prior
 from planner.vehicle.vehicle import BEFORE_KNOTS, STEP
 from sim.arrays import Floats
@@ -78,7 +77,7 @@ typedef float tracker_real;
 #define TRACKER_EXACT ((tracker_real){_FLOAT_EXACT!r})
 #else
 typedef double tracker_real;
-#define TRACKER_EXACT {follower.EXACT!r}
+#define TRACKER_EXACT {line_of_sight.EXACT!r}
 #endif
 """
 
@@ -86,9 +85,9 @@ typedef double tracker_real;
 def _numbers(result: Plan) -> str:
     """What the code needs as macros: counts and times as they are, the rest as tracker_real."""
     counts = {
-        "FIRST_DIRECTION": result.first_direction, "STATES": estimate.STATES, "POINTS": len(result.guide.q),
+        "FIRST_DIRECTION": result.first_direction, "STATES": kalman_filter.STATES, "POINTS": len(result.guide.q),
         "TIMES": result.vehicle.rest.shape[1], "KNOTS": len(BEFORE_KNOTS),
-        "HALVINGS": follower.HALVINGS, "MOST_LOOKS": follower.MOST_LOOKS,
+        "HALVINGS": line_of_sight.HALVINGS, "MOST_LOOKS": line_of_sight.MOST_LOOKS,
         "KEPT": tracker.KEPT, "LOST": tracker.LOST, "WINDOW": tracker.WINDOW,
     }  # fmt: skip
     times = {"TIME_SCALE": result.robot.time_scale, "SLACK": tracker.SLACK, "LONGEST_GAP": tracker.LONGEST_GAP}
@@ -103,14 +102,14 @@ def _numbers(result: Plan) -> str:
         "SWING_ERROR": result.predicted_max,
         "PIVOT_RADIUS": result.vehicle.pivot_radius,
         "NET_SPEED": result.net_speed,
-        "LARGEST_STEP": follower.LARGEST_STEP,
-        "TURNS": follower.TURNS,
-        "MOST_BIAS": follower.MOST_BIAS,
+        "LARGEST_STEP": line_of_sight.LARGEST_STEP,
+        "TURNS": line_of_sight.TURNS,
+        "MOST_BIAS": line_of_sight.MOST_BIAS,
         "GATE": tracker.GATE,
         "ALARM_AT": tracker.ALARM_AT,
         "DISPLACED": tracker.DISPLACED,
         "QUANTILE": tracker.QUANTILE,
-        "WALK": estimate.WALK,
+        "WALK": kalman_filter.WALK,
     }
     lines = [f"#define TRACKER_{name} ({value})" for name, value in counts.items()]
     lines += [f"#define TRACKER_{name} {value!r}" for name, value in times.items()]
@@ -120,7 +119,7 @@ def _numbers(result: Plan) -> str:
 
 def _tables(result: Plan) -> str:
     vehicle, unit = result.vehicle, _lag_unit(result)
-    most = estimate.most(result)
+    most = kalman_filter.most(result)
     lag, rest = (np.round(table / unit).astype(int) for table in (vehicle.lag, vehicle.rest))
     real, short = "static const tracker_real tracker_", "static const int16_t tracker_"
     return "\n".join(
@@ -128,7 +127,7 @@ def _tables(result: Plan) -> str:
             f"{real}start[3] = {_row(result.start)};",
             f"{real}twist[2][3] = {_nested(vehicle.twist.tolist())};",
             f"{real}current[2] = {_row(vehicle.current.tolist())};",
-            f"{real}changes[4] = {_row(estimate.CHANGES)};",
+            f"{real}changes[4] = {_row(kalman_filter.CHANGES)};",
             f"{real}most[TRACKER_STATES - 3] = {_row(most)};",
             f"{real}prior[TRACKER_STATES][TRACKER_STATES] = {_nested(prior(result))};",
             f"{real}knots[TRACKER_KNOTS] = {_row(BEFORE_KNOTS.tolist())};",

@@ -19,7 +19,7 @@ _CIRCLE = 2 * np.pi
 _ROUNDING = 1e-9
 
 
-class Shots(NamedTuple):
+class DubinsPaths(NamedTuple):
     """M tracks: a start pose (M, 3), the turns (M, 3) of its pieces (+1 left, 0, −1) and their lengths (M, 3)."""
 
     start: Floats
@@ -30,8 +30,8 @@ class Shots(NamedTuple):
     def length(self) -> Floats:
         return np.asarray(self.pieces.sum(-1))
 
-    def take(self, rows: Integers) -> Shots:
-        return Shots(self.start[rows], self.turns[rows], self.pieces[rows])
+    def take(self, rows: Integers) -> DubinsPaths:
+        return DubinsPaths(self.start[rows], self.turns[rows], self.pieces[rows])
 
     def poses(self, way: Floats, radius: float) -> Floats:
         """Poses (M, K, 3) after ways (M, K) along the tracks; beyond the end, that of the end."""
@@ -76,11 +76,11 @@ def words(start: Floats, goal: Floats, radius: float) -> Floats:
     return found * radius
 
 
-def shots(start: Floats, goal: Floats, radius: float) -> Shots:
+def shortest_paths(start: Floats, goal: Floats, radius: float) -> DubinsPaths:
     """The shortest tracks between M pairs of poses (M, 3)."""
     pieces = words(start, goal, radius)
     best = pieces.sum(-1).argmin(-1)
-    return Shots(start, TURNS[best], pieces[np.arange(len(best)), best])
+    return DubinsPaths(start, TURNS[best], pieces[np.arange(len(best)), best])
 
 
 def _turn(angle: Floats) -> Floats:

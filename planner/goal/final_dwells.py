@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from planner.paths.distance import distance_to
-from planner.planning.schedule import Switches, poses_at_flips
+from planner.vehicle.rollout import Switches, poses_at_flips
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
 from sim.mechanics import planar

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from planner.goal.dubins import Shots, shots
-from planner.goal.obstacles import Body, Map, Room
+from planner.goal.dubins import DubinsPaths, shortest_paths
+from planner.goal.obstacles import Footprint, FreeSpace, Map
 from planner.paths.tractrix import Drift, slips
 from sim.arrays import Flags, Floats, Integers
 
@@ -32,21 +32,23 @@ _MOST_POSES = 400_000
 
 
 @dataclass(frozen=True)
-class Ground:
+class RouteLimits:
     """What a track must keep to: its least radius, and the room for a body whose origin is on the track."""
 
     radius: float
-    body: Body
-    room: Room
+    body: Footprint
+    room: FreeSpace
     drift: Drift
 
-    def clearance(self, poses: Floats, room: Room | Map | None = None) -> Floats:
-        """Room (...) that the body has left at poses (..., 3): place and course."""
+    def clearance(self, poses: Floats, room: FreeSpace | Map | None = None) -> Floats:
+        """Compute the distance (...) of the body from what is not free, at poses (..., 3): place and course."""
         heading = poses[..., 2] - slips(poses[..., 2], self.drift)
         placed = np.concatenate([poses[..., :2], heading[..., None]], -1)
         return self.body.clearance(placed, self.room if room is None else room)
 
-    def free(self, tracks: Shots, margin: float, room: Room | Map | None = None, step: float = _STEP) -> Flags:
+    def free(
+        self, tracks: DubinsPaths, margin: float, room: FreeSpace | Map | None = None, step: float = _STEP
+    ) -> Flags:
         """Whether the body keeps a margin all along each of M tracks."""
         result = np.zeros(len(tracks.start), dtype=bool)
         length = tracks.length
@@ -64,15 +66,15 @@ class Ground:
 
 
 class Lattice:
-    """The joined poses of a ground within a box."""
+    """Poses at equal distances within a box, joined by the paths that keep to the limits."""
 
-    def __init__(self, ground: Ground, low: Floats, high: Floats, spacing: float, courses: int):
-        self.ground, self.courses = ground, courses
+    def __init__(self, limits: RouteLimits, low: Floats, high: Floats, spacing: float, courses: int):
+        self.limits, self.courses = limits, courses
         area = float((high - low).prod())
         self.spacing = spacing = max(spacing, math.sqrt(area * courses / _MOST_POSES))
         nx, ny = (np.floor((high - low) / spacing).astype(int) + 1).tolist()
-        pad = math.ceil(ground.body.reach / spacing) + _RANGE + 3
-        self.map = Map(ground.room, low - pad * spacing, high + pad * spacing, spacing / _CELLS)
+        pad = math.ceil(limits.body.reach / spacing) + _RANGE + 3
+        self.map = Map(limits.room, low - pad * spacing, high + pad * spacing, spacing / _CELLS)
         self._shape, self._pad = (nx, ny), pad
         x, y = low[0] + spacing * np.arange(nx), low[1] + spacing * np.arange(ny)
         self.course = 2 * math.pi * np.arange(courses) / courses
@@ -90,9 +92,11 @@ class Lattice:
         goals = np.stack([i * self.spacing, j * self.spacing, self.course[k]], 1)
         start, end, length, room = [], [], [], []
         for own in range(n):
-            tracks = shots(np.repeat([[0.0, 0.0, self.course[own]]], len(goals), 0), goals, self.ground.radius)
+            tracks = shortest_paths(
+                np.repeat([[0.0, 0.0, self.course[own]]], len(goals), 0), goals, self.limits.radius
+            )
             turn = np.abs((self.course[k] - self.course[own] + math.pi) % (2 * math.pi) - math.pi)
-            least = np.maximum(np.hypot(goals[:, 0], goals[:, 1]), self.ground.radius * turn)
+            least = np.maximum(np.hypot(goals[:, 0], goals[:, 1]), self.limits.radius * turn)
             rows = np.flatnonzero((tracks.length <= _DETOUR * least) & (tracks.length > 0))
             for row in rows.tolist():
                 di, dj = int(i[row]), int(j[row])
@@ -108,18 +112,18 @@ class Lattice:
                 room.append(left[good])
         return np.concatenate(start), np.concatenate(end), np.concatenate(length), np.concatenate(room)
 
-    def _clearance(self, track: Shots) -> Floats:
+    def _clearance(self, track: DubinsPaths) -> Floats:
         """Clearance (nx, ny) along the track of one joint, by its place in the lattice; a lower bound."""
         count = max(2, math.ceil(float(track.length[0]) / _STEP) + 1)
-        poses = track.poses(np.linspace(0, track.length, count).T, self.ground.radius)[0]
-        heading = poses[:, 2] - slips(poses[:, 2], self.ground.drift)
-        centres = self.ground.body.centres(np.stack([poses[:, 0], poses[:, 1], heading], 1)).reshape(-1, 2)
+        poses = track.poses(np.linspace(0, track.length, count).T, self.limits.radius)[0]
+        heading = poses[:, 2] - slips(poses[:, 2], self.limits.drift)
+        centres = self.limits.body.centres(np.stack([poses[:, 0], poses[:, 1], heading], 1)).reshape(-1, 2)
         offsets = np.rint(centres / self.map.step).astype(int) + self._pad * _CELLS
         (nx, ny) = self._shape
         room = np.full(self._shape, np.inf, dtype=np.float32)
         for (i, j), (pi, pj) in zip(*_distinct(offsets), strict=True):
             np.minimum(room, self._table[pi, pj, i : i + nx, j : j + ny], out=room)
-        return np.asarray(room, dtype=float) - self.ground.body.radius - self.map.slack
+        return np.asarray(room, dtype=float) - self.limits.body.radius - self.map.slack
 
     def _split(self) -> NDArray[np.float32]:
         """The map's table, (cells, cells, ., .), by the place between two poses of the lattice."""
@@ -164,13 +168,13 @@ class Lattice:
 
     def _links(self, pose: Floats, margin: float, onward: bool) -> tuple[Integers, Floats]:
         """Poses of the lattice that a pose can be joined to, or that can be joined to it; lengths."""
-        radius = self.ground.radius
+        radius = self.limits.radius
         reach = max(_LINK * radius, 2 * self.spacing)
         near = np.flatnonzero(np.hypot(*(self.poses[:, :2] - pose[:2]).T) <= reach)
         one, other = np.repeat(pose[None], len(near), 0), self.poses[near]
-        tracks = shots(one, other, radius) if onward else shots(other, one, radius)
+        tracks = shortest_paths(one, other, radius) if onward else shortest_paths(other, one, radius)
         rows = np.flatnonzero(tracks.length <= _LONGEST_LINK * radius + self.spacing)
-        rows = rows[self.ground.free(tracks.take(rows), margin, self.map)]
+        rows = rows[self.limits.free(tracks.take(rows), margin, self.map)]
         return near[rows], tracks.length[rows]
 
 

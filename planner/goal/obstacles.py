@@ -100,7 +100,7 @@ Region = Circle | Polygon
 
 
 @dataclass(frozen=True)
-class Room:
+class FreeSpace:
     """Free space: inside the walls, outside all regions."""
 
     regions: tuple[Region, ...] = ()
@@ -125,14 +125,14 @@ class Room:
 
 
 @dataclass(frozen=True)
-class Body:
+class Footprint:
     """Discs along the robot's axis."""
 
     places: Floats  # (K,), of their centres, forward from a point of the axis
     radius: float  # of all
 
     @staticmethod
-    def of(robot: Robot, origin: float) -> Body:
+    def of(robot: Robot, origin: float) -> Footprint:
         """Head and straight tails; `origin` is the distance from the head's centre forward to the point."""
         length = robot.tail_length
         half, width = robot.head_length / 2 / length, robot.head_radius / length
@@ -141,7 +141,7 @@ class Body:
         count = max(2, math.ceil((front - back) / width))
         step = (front - back) / count
         places = np.asarray(back + step * (np.arange(count) + 0.5) - origin, dtype=np.float64)
-        return Body(places, math.hypot(width, step / 2))
+        return Footprint(places, math.hypot(width, step / 2))
 
     @property
     def reach(self) -> float:
@@ -153,8 +153,8 @@ class Body:
         axis = np.stack([np.cos(poses[..., 2]), np.sin(poses[..., 2])], -1)
         return np.asarray(poses[..., None, :2] + self.places[:, None] * axis[..., None, :])
 
-    def clearance(self, poses: Floats, room: Room | Map) -> Floats:
-        """Room (...) between the body at poses (..., 3) and what is not free."""
+    def clearance(self, poses: Floats, room: FreeSpace | Map) -> Floats:
+        """Distance (...) between the body at poses (..., 3) and what is not free."""
         centres = self.centres(poses)
         found = room.distance(centres.reshape(-1, 2)).reshape(centres.shape[:-1])
         return np.asarray(found.min(-1) - self.radius)
@@ -163,7 +163,7 @@ class Body:
 class Map:
     """Distances of a room on a grid, never larger than the true ones: quick for many points."""
 
-    def __init__(self, room: Room, low: Floats, high: Floats, step: float):
+    def __init__(self, room: FreeSpace, low: Floats, high: Floats, step: float):
         size = high - low
         self._low, self.step = low, step
         count = np.ceil(size / step).astype(int) + 1

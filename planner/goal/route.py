@@ -14,9 +14,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from planner.goal.dubins import TURNS, Shots, shots, words
-from planner.goal.lattice import Ground, Lattice
-from planner.goal.obstacles import Room
+from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, words
+from planner.goal.lattice import Lattice, RouteLimits
+from planner.goal.obstacles import FreeSpace
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
@@ -41,7 +41,7 @@ class NoWayError(InputError):
 class Route:
     """A track as a chain of words."""
 
-    tracks: Shots
+    tracks: DubinsPaths
     radius: float
 
     @property
@@ -63,42 +63,42 @@ class Route:
 Lattices = dict[tuple[float, int], Lattice]
 
 
-def route(stops: list[Floats], ground: Ground, margin: float, lattices: Lattices) -> Route:
+def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lattices) -> Route:
     """The shortest route that was found.
 
     Args:
         stops: poses (c, 3) to choose from at the start, at each place on the way, and at the goal.
-        ground: what the track must keep to.
+        limits: what the track must keep to.
         margin: the room around the body.
-        lattices: those of this ground and these stops that were made before; new ones are added.
+        lattices: those of this limits and these stops that were made before; new ones are added.
 
     Raises:
         NoWayError: a stop is not free, or no way was found on the finest lattice.
     """
     for number, stop in enumerate(stops):
-        _check(stop, number, len(stops), ground, margin)
-    direct = _direct(stops, ground, margin)
-    if ground.room.empty and direct is not None:
+        _check(stop, number, len(stops), limits, margin)
+    direct = _direct(stops, limits, margin)
+    if limits.room.empty and direct is not None:
         return direct
-    shortest = _direct(stops, replace(ground, room=Room()), margin)
+    shortest = _direct(stops, replace(limits, room=FreeSpace()), margin)
     if direct is not None and shortest is not None and direct.length < _ENOUGH * shortest.length:
         return direct
     for spacing, courses in LEVELS:
         if (spacing, courses) not in lattices:
-            lattices[spacing, courses] = _lattice(stops, ground, spacing * ground.radius, courses)
+            lattices[spacing, courses] = _lattice(stops, limits, spacing * limits.radius, courses)
         found = _around(stops, lattices[spacing, courses], margin)
         both = [one for one in (direct, found) if one is not None]
         if both:
             return min(both, key=lambda one: one.length)
     raise NoWayError(
         f"there is no way to the goal that leaves {margin:.3g} l around the robot and turns with a radius of "
-        f"{ground.radius:.3g} l, on a lattice with steps of {LEVELS[-1][0] * ground.radius:.2g} l and "
+        f"{limits.radius:.3g} l, on a lattice with steps of {LEVELS[-1][0] * limits.radius:.2g} l and "
         f"{360 / LEVELS[-1][1]:.0f} degrees; move the goal or the obstacles"
     )
 
 
-def _check(stop: Floats, number: int, count: int, ground: Ground, margin: float) -> None:
-    clearance = ground.clearance(stop)
+def _check(stop: Floats, number: int, count: int, limits: RouteLimits, margin: float) -> None:
+    clearance = limits.clearance(stop)
     if clearance.max() >= margin:
         return
     name = "start" if number == 0 else "goal" if number == count - 1 else f"place {number} on the way"
@@ -114,11 +114,11 @@ def _check(stop: Floats, number: int, count: int, ground: Ground, margin: float)
     )
 
 
-def _direct(stops: list[Floats], ground: Ground, margin: float) -> Route | None:
+def _direct(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | None:
     """One word between each two stops; the courses of the stops are chosen again among finer ones."""
     chosen, best = stops, None
     for finer in range(_FINER + 1):
-        found = _chosen(chosen, ground, margin)
+        found = _chosen(chosen, limits, margin)
         if found is None:
             return best
         if best is None or found.length < best.length:
@@ -145,12 +145,12 @@ def _ends(found: Route) -> list[Floats]:
     return [*found.tracks.start, last.poses(last.length[:, None], found.radius)[0, 0]]
 
 
-def _chosen(stops: list[Floats], ground: Ground, margin: float) -> Route | None:
+def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | None:
     """The shortest chain of one word between each two stops, among all their poses.
 
     Words are checked when they are on the shortest chain. Those that are not free are taken out.
     """
-    legs = [words(one[:, None], other[None], ground.radius) for one, other in pairwise(stops)]
+    legs = [words(one[:, None], other[None], limits.radius) for one, other in pairwise(stops)]
     lengths = [leg.sum(-1) for leg in legs]
     for _ in range(_MOST_CHECKS):
         costs, back = np.zeros(len(stops[0])), []
@@ -166,11 +166,11 @@ def _chosen(stops: list[Floats], ground: Ground, margin: float) -> Route | None:
                                             strict=True):  # fmt: skip
             came = int(before[at])
             word = int(length[came, at].argmin())
-            track = Shots(one[came : came + 1], TURNS[word : word + 1], leg[came, at, word][None])
+            track = DubinsPaths(one[came : came + 1], TURNS[word : word + 1], leg[came, at, word][None])
             chain.append((track, length, (came, at, word)))
             at = came
-        found = _chain([track for track, _, _ in chain[::-1]], ground.radius)
-        free = np.ones(len(chain), dtype=bool) if ground.room.empty else ground.free(found.tracks, margin)[::-1]
+        found = _chain([track for track, _, _ in chain[::-1]], limits.radius)
+        free = np.ones(len(chain), dtype=bool) if limits.room.empty else limits.free(found.tracks, margin)[::-1]
         if free.all():
             return found
         for (_, length, place), good in zip(chain, free.tolist(), strict=True):
@@ -179,24 +179,24 @@ def _chosen(stops: list[Floats], ground: Ground, margin: float) -> Route | None:
     return None
 
 
-def _chain(parts: list[Shots], radius: float) -> Route:
-    return Route(Shots(*(np.concatenate([part[i] for part in parts]) for i in range(3))), radius)
+def _chain(parts: list[DubinsPaths], radius: float) -> Route:
+    return Route(DubinsPaths(*(np.concatenate([part[i] for part in parts]) for i in range(3))), radius)
 
 
-def _lattice(stops: list[Floats], ground: Ground, spacing: float, courses: int) -> Lattice:
+def _lattice(stops: list[Floats], limits: RouteLimits, spacing: float, courses: int) -> Lattice:
     """A lattice that reaches around all obstacles, or to the walls."""
-    boxes = [*ground.room.boxes(), *(stop[:, :2] for stop in stops)]
-    reach = _AROUND * ground.radius + ground.body.reach
+    boxes = [*limits.room.boxes(), *(stop[:, :2] for stop in stops)]
+    reach = _AROUND * limits.radius + limits.body.reach
     low = np.min([box.min(0) for box in boxes], 0) - reach
     high = np.max([box.max(0) for box in boxes], 0) + reach
-    if ground.room.walls is not None:
-        low, high = ground.room.walls.box
-    return Lattice(ground, low, high, spacing, courses)
+    if limits.room.walls is not None:
+        low, high = limits.room.walls.box
+    return Lattice(limits, low, high, spacing, courses)
 
 
 def _around(stops: list[Floats], lattice: Lattice, margin: float) -> Route | None:
     """A route over a lattice, made shorter; None where there is none on this lattice."""
-    ground = lattice.ground
+    limits = lattice.limits
     stops = [stop[::_THIN] if len(stop) == COURSES else stop for stop in stops]
     costs, chains = np.zeros(len(stops[0])), []
     for one, other in pairwise(stops):
@@ -205,27 +205,27 @@ def _around(stops: list[Floats], lattice: Lattice, margin: float) -> Route | Non
             return None
         chains.append(found)
     at = int(costs.argmin())
-    parts: list[Shots] = []
+    parts: list[DubinsPaths] = []
     for own, stop in zip(reversed(chains), reversed(stops[:-1]), strict=True):
         leg = own[at]
-        parts.insert(0, _shorter(shots(leg[:-1], leg[1:], ground.radius), lattice, margin))
+        parts.insert(0, _shorter(shortest_paths(leg[:-1], leg[1:], limits.radius), lattice, margin))
         at = int(np.abs(stop - leg[0]).sum(1).argmin())
-    return _chain(parts, ground.radius)
+    return _chain(parts, limits.radius)
 
 
-def _shorter(leg: Shots, lattice: Lattice, margin: float) -> Shots:
+def _shorter(leg: DubinsPaths, lattice: Lattice, margin: float) -> DubinsPaths:
     """A leg with joints between places on it, wherever one is free and shorter than the way along it."""
-    ground = lattice.ground
+    limits = lattice.limits
     for again in range(_ROUNDS):
-        places = _cut(leg, max(float(leg.length.sum()) / _PLACES, ground.radius / 4) / (1 + again), ground.radius)
+        places = _cut(leg, max(float(leg.length.sum()) / _PLACES, limits.radius / 4) / (1 + again), limits.radius)
         starts = places.start
         last = places.take(np.array([-1]))
-        poses = np.concatenate([starts, last.poses(last.length[:, None], ground.radius)[:, 0]])
+        poses = np.concatenate([starts, last.poses(last.length[:, None], limits.radius)[:, 0]])
         along = np.concatenate([[0.0], np.cumsum(places.length)])
         i, j = np.triu_indices(len(poses), 2)
-        tracks = shots(poses[i], poses[j], ground.radius)
+        tracks = shortest_paths(poses[i], poses[j], limits.radius)
         rows = np.flatnonzero(tracks.length < along[j] - along[i] - 1e-6)
-        rows = rows[ground.free(tracks.take(rows), margin, lattice.map)]
+        rows = rows[limits.free(tracks.take(rows), margin, lattice.map)]
         best, choice = np.full(len(poses), np.inf), np.full(len(poses), -1)
         best[0] = 0.0
         ends = [rows[j[rows] == k] for k in range(len(poses))]
@@ -239,11 +239,11 @@ def _shorter(leg: Shots, lattice: Lattice, margin: float) -> Shots:
             row = choice[k]
             parts.append(places.take(np.array([k - 1])) if row < 0 else tracks.take(np.array([row])))
             k = k - 1 if row < 0 else int(i[row])
-        leg = _chain(parts[::-1], ground.radius).tracks
+        leg = _chain(parts[::-1], limits.radius).tracks
     return leg
 
 
-def _cut(leg: Shots, spacing: float, radius: float) -> Shots:
+def _cut(leg: DubinsPaths, spacing: float, radius: float) -> DubinsPaths:
     """The tracks of a leg in parts of at most `spacing`."""
     parts = []
     for row, length in enumerate(leg.length.tolist()):
@@ -255,5 +255,5 @@ def _cut(leg: Shots, spacing: float, radius: float) -> Shots:
         pieces = np.maximum(np.minimum(ends, edges[1:, None]) - np.maximum(before, edges[:-1, None]), 0.0)
         own = leg.take(np.full(len(edges) - 1, row))
         poses = leg.take(np.array([row])).poses(edges[None, :-1], radius)[0]
-        parts.append(Shots(poses, own.turns, pieces))
-    return Shots(*(np.concatenate([part[i] for part in parts]) for i in range(3)))
+        parts.append(DubinsPaths(poses, own.turns, pieces))
+    return DubinsPaths(*(np.concatenate([part[i] for part in parts]) for i in range(3)))

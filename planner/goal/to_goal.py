@@ -20,17 +20,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planner.goal.final_dwells import ending_at
-from planner.goal.lattice import Ground
-from planner.goal.obstacles import Body, Circle, Polygon, Room
+from planner.goal.lattice import RouteLimits
+from planner.goal.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.goal.route import COURSES, Lattices, NoWayError, Route, route
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift, Reference, slips
 from planner.paths.units import LONGEST
 from planner.planning.declared_path import Declared
-from planner.planning.plan import Plan, Swimmer, drift_of, least_dwell, scheduled, swimmer_of
-from planner.planning.schedule import Start, pose_changes
-from planner.vehicle.calibration_table import Knowledge
+from planner.planning.plan import Plan, TrackedVehicle, least_dwell, scheduled, tracked_vehicle, zigzag_drift
+from planner.planning.schedule import Start
+from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import Objective, check_least, dwells_for
+from planner.vehicle.rollout import pose_changes
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError
@@ -48,15 +49,15 @@ _FARTHEST = 1e6  # l
 
 
 @dataclass(frozen=True)
-class Voyage:
+class GoalPlan:
     """A plan from a pose to a pose. Lengths in l, angles in rad.
 
     Poses are x, y and heading of the head's centre.
 
     Example:
         >>> from softflagella import load_robot, to_goal
-        >>> voyage = to_goal((0, 0, 0), (3, 1, 1), load_robot("paper-control"))
-        >>> voyage.end_error[0] < 0.01
+        >>> goal_plan = to_goal((0, 0, 0), (3, 1, 1), load_robot("paper-control"))
+        >>> goal_plan.end_error[0] < 0.01
         True
     """
 
@@ -64,7 +65,7 @@ class Voyage:
     goal: Pose
     end: Pose  # predicted
     via: tuple[tuple[float, float], ...]
-    room: Room
+    free_space: FreeSpace
     length: float  # of the pivot's track
     margin: float  # kept around the body on the declared path; 0 without obstacles
     clearance: float  # smallest, of the body on the predicted track; infinite without obstacles
@@ -90,9 +91,9 @@ def to_goal(
     minimum_seconds: float | None = None,
     tolerance: float | None = None,
     feedback: bool = False,
-    knowledge: Knowledge | None = None,
+    knowledge: CalibrationKnowledge | None = None,
     seed: int = 0,
-) -> Voyage:
+) -> GoalPlan:
     """Plan the motor's switching times from one pose to another.
 
     Args:
@@ -119,25 +120,21 @@ def to_goal(
 
     Example:
         >>> from softflagella import load_robot, to_goal
-        >>> voyage = to_goal((0, 0, 0), (4, 1, 0), load_robot("paper-control"))
-        >>> voyage.end_error[0] < 0.01
+        >>> goal_plan = to_goal((0, 0, 0), (4, 1, 0), load_robot("paper-control"))
+        >>> goal_plan.end_error[0] < 0.01
         True
     """
-    if lookup is None:
-        from surrogate.table.model_file import load
-
-        lookup = load()
     first, last = _pose(start, "start"), _pose(goal, "goal")
     places = tuple(_place(place) for place in via)
     regions = tuple(one if isinstance(one, Circle | Polygon) else Polygon.of(one) for one in keep_out)
     outline = walls if isinstance(walls, Polygon) or walls is None else Polygon.of(walls)
-    room = Room(regions, outline)
-    swimmer = swimmer_of(robot, lookup, "head_centre", knowledge)
-    vehicle = swimmer.vehicle
+    room = FreeSpace(regions, outline)
+    tracked = tracked_vehicle(robot, lookup, "head_centre", knowledge)
+    vehicle = tracked.vehicle
     least = least_dwell(minimum_dwell, minimum_seconds, robot)
     dwells = dwells_for(vehicle, objective, least)
     tried = [dwells[i] for i in np.unique(np.linspace(0, len(dwells) - 1, _DWELLS).astype(int))]
-    trip = _Trip(swimmer, first, last, places, room, objective, check_least(least), feedback, seed)
+    trip = _Trip(tracked, first, last, places, room, objective, check_least(least), feedback, seed)
     refusal: InputError | None = None
     for dwell in tried:
         try:
@@ -178,22 +175,22 @@ def _finite(values: Sequence[float], count: int, wanted: str) -> list[float]:
 class _Trip:
     """What is asked for, with the lattices that were made for it."""
 
-    def __init__(self, swimmer: Swimmer, start: Pose, goal: Pose, via: tuple[tuple[float, float], ...],
-                 room: Room, objective: Objective, least: float, feedback: bool, seed: int):  # fmt: skip
-        self.swimmer, self.start, self.goal, self.via, self.room = swimmer, start, goal, via, room
+    def __init__(self, tracked: TrackedVehicle, start: Pose, goal: Pose, via: tuple[tuple[float, float], ...],
+                 room: FreeSpace, objective: Objective, least: float, feedback: bool, seed: int):  # fmt: skip
+        self.tracked, self.start, self.goal, self.via, self.room = tracked, start, goal, via, room
         self.objective, self.least, self.feedback, self.seed = objective, least, feedback, seed
-        self.body = Body.of(swimmer.robot, -swimmer.vehicle.pivot_distance)
+        self.body = Footprint.of(tracked.robot, -tracked.vehicle.pivot_distance)
         self._lattices: dict[Drift, Lattices] = {}
 
-    def with_dwell(self, dwell: float) -> Voyage:
-        """The voyage with one shortest dwell; the margin is raised to what its plan states."""
-        straight = zigzag(self.swimmer.vehicle, dwell)
-        drift = drift_of(self.swimmer.vehicle, straight, dwell)
-        ground = Ground(self.swimmer.vehicle.pivot_radius, self.body, self.room, drift)
+    def with_dwell(self, dwell: float) -> GoalPlan:
+        """The goal_plan with one shortest dwell; the margin is raised to what its plan states."""
+        straight = zigzag(self.tracked.vehicle, dwell)
+        drift = zigzag_drift(self.tracked.vehicle, straight, dwell)
+        limits = RouteLimits(self.tracked.vehicle.pivot_radius, self.body, self.room, drift)
         margin = 0.0 if self.room.empty else 1.5 * straight.largest
         for _ in range(_MARGINS):
-            way = route(self._stops(drift), ground, margin, self._lattices.setdefault(drift, {}))
-            found = self._follow(way, ground, straight, dwell, margin)
+            way = route(self._stops(drift), limits, margin, self._lattices.setdefault(drift, {}))
+            found = self._follow(way, limits, straight, dwell, margin)
             needed = found.plan.feedback_error if self.feedback else found.plan.stated_error
             if self.room.empty or (needed <= margin and found.clearance > 0):
                 return found
@@ -212,29 +209,29 @@ class _Trip:
 
     def _pivot(self, pose: Pose, drift: Drift) -> Floats:
         x, y, heading = pose
-        a = self.swimmer.vehicle.pivot_distance
+        a = self.tracked.vehicle.pivot_distance
         # The course is the direction in which the pivot moves while the robot has this heading.
         course = heading + float(_slip_at(np.array(heading), drift))
         return np.array([x - a * math.cos(heading), y - a * math.sin(heading), course])
 
-    def _follow(self, way: Route, ground: Ground, straight: Zigzag, dwell: float, margin: float) -> Voyage:
-        swimmer, vehicle = self.swimmer, self.swimmer.vehicle
+    def _follow(self, way: Route, limits: RouteLimits, straight: Zigzag, dwell: float, margin: float) -> GoalPlan:
+        tracked, vehicle = self.tracked, self.tracked.vehicle
         if way.length > LONGEST:
             raise InputError(f"the way is {way.length:.3g} l long; at most {LONGEST:g} l can be planned")
         poses = way.poses(_SPACING)
         if len(poses) < 2:
             raise InputError("start and goal are the same; nothing to do")
-        heading = poses[:, 2] - slips(poses[:, 2], ground.drift)
+        heading = poses[:, 2] - slips(poses[:, 2], limits.drift)
         heading += self.start[2] - heading[0]
         q = poses[:, :2]
-        p = q + swimmer.rod * np.stack([np.cos(heading), np.sin(heading)], 1)
+        p = q + tracked.rod * np.stack([np.cos(heading), np.sin(heading)], 1)
         arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(q, axis=0).T))])
         guide = Reference(p, q, heading, arc, False)
         declared = Declared(guide, 0.0, 0.0, 0.0, ())
         turning = np.flatnonzero(np.abs(np.diff(heading)) > 1e-9)
         sense = 1 if not len(turning) or np.diff(heading)[turning[0]] > 0 else -1
         plan = scheduled(
-            swimmer,
+            tracked,
             Path2D(p, False),
             declared,
             straight,
@@ -249,9 +246,9 @@ class _Trip:
         x, y, angle = plan.poses[-1].tolist()
         clearance = math.inf
         if not self.room.empty:
-            body = Body.of(swimmer.robot, 0.0)
+            body = Footprint.of(tracked.robot, 0.0)
             clearance = float(body.clearance(_swum(plan), self.room).min())
-        return Voyage(plan, self.goal, (x, y, angle), self.via, self.room, way.length, margin, clearance)
+        return GoalPlan(plan, self.goal, (x, y, angle), self.via, self.room, way.length, margin, clearance)
 
 
 def _slip_at(heading: Floats, drift: Drift) -> Floats:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from planner.paths.path import Path2D
+from typing import TYPE_CHECKING
+
 from sim.io.errors import InputError
-from sim.model.robot import Robot
+
+if TYPE_CHECKING:  # the command needs UNITS before it loads NumPy
+    from planner.paths.path import Path2D
+    from sim.model.robot import Robot
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 LONGEST = 1500.0  # l

@@ -38,7 +38,7 @@ _SCALES = (1.5, 2.0, 2.5, 3.5, 5.0, 7.5, 12.0, 20.0)  # tried for a message
 _NOISY = 1.5  # times as long as when it is smoothed
 
 
-class Follower(NamedTuple):
+class Feasibility(NamedTuple):
     """What decides which paths can be followed, and which is chosen."""
 
     vehicle: Vehicle  # its pivot radius limits the curvature
@@ -59,7 +59,7 @@ class Declared:
     warnings: tuple[str, ...]
 
 
-def declare(raw: Path2D, own: Follower) -> Declared:
+def declare(raw: Path2D, own: Feasibility) -> Declared:
     """Choose what the robot will follow of the path as drawn.
 
     Raises:
@@ -92,7 +92,7 @@ def declare(raw: Path2D, own: Follower) -> Declared:
     return Declared(found, curvature, off, missed, tuple(warnings))
 
 
-def _try(raw: Path2D, own: Follower) -> Reference | None:
+def _try(raw: Path2D, own: Feasibility) -> Reference | None:
     """A reference that can be followed, or none."""
     vehicle, distance, drift, corner, time_weight = own
     limit = TIGHTEST / vehicle.pivot_radius
@@ -139,7 +139,7 @@ def _refuse_corner(raw: Path2D) -> None:
         )
 
 
-def _rounded(raw: Path2D, own: Follower) -> Path2D:
+def _rounded(raw: Path2D, own: Feasibility) -> Path2D:
     """Corners rounded by the smallest radius that leaves the pivot some room."""
     limit = _FILLET_ROOM / own.vehicle.pivot_radius
     low, high = 0.0, min(largest_fillet(raw), math.hypot(own.distance, 1 / limit))
@@ -156,7 +156,7 @@ def _rounded(raw: Path2D, own: Follower) -> Path2D:
     return fillet(raw, high)
 
 
-def _too_tight(raw: Path2D, own: Follower) -> str:
+def _too_tight(raw: Path2D, own: Feasibility) -> str:
     vehicle = own.vehicle
     drawn = reference(raw, own.distance, _spacing(raw), own.drift)
     curvature = np.abs(drawn.curvature)
@@ -172,7 +172,7 @@ def _too_tight(raw: Path2D, own: Follower) -> str:
     )
 
 
-def _working_scale(raw: Path2D, own: Follower) -> float | None:
+def _working_scale(raw: Path2D, own: Feasibility) -> float | None:
     """The first of some scales at which the path is accepted, tried; or none."""
 
     def works(factor: float) -> bool:

@@ -30,7 +30,7 @@ def hysteresis(reference: Reference, vehicle: Vehicle, swing: float) -> Floats:
     return np.asarray(swing * (1 + bend) / 2)
 
 
-class Follower:
+class LineOfSight:
     """A vehicle, a reference, and the place on it."""
 
     def __init__(self, reference: Reference, vehicle: Vehicle, ahead: float, rod: float,
@@ -70,10 +70,10 @@ class Follower:
     ) -> tuple[float, float, float]:
         """Pose of the head's centre after `time` in direction `sense`."""
         side = 0 if sense > 0 else 1
-        z, x, turned = self.lag_of(side, before, time)
+        z, x, turned = self.lag_after(side, before, time)
         turned += sense * self._lag_angle
         forward, left, rate = self._twist[side]
-        along, across, angle = arc_of(rate, time)
+        along, across, angle = arc_terms(rate, time)
         ahead, aside = along * forward - across * left, across * forward + along * left
         c, s = math.cos(turned), math.sin(turned)
         z, x = z + c * ahead - s * aside, x + s * ahead + c * aside
@@ -84,7 +84,7 @@ class Follower:
             pose[2] + turned + angle,
         )
 
-    def lag_of(self, side: int, before: float | None, time: float) -> tuple[float, float, float]:
+    def lag_after(self, side: int, before: float | None, time: float) -> tuple[float, float, float]:
         """Lag after `time` in direction `side` (0: positive, 1: negative); before None: from rest."""
         u = time / STEP
         i = int(u)
@@ -215,7 +215,7 @@ class Follower:
         return high
 
 
-def arc_of(rate: float, time: float) -> tuple[float, float, float]:
+def arc_terms(rate: float, time: float) -> tuple[float, float, float]:
     """sin Ω T/Ω, (1 − cos Ω T)/Ω and Ω T."""
     angle = rate * time
     half = math.sin(angle / 2)

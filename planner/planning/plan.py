@@ -30,12 +30,13 @@ from planner.paths.distance import distance_to
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import check_size
-from planner.planning.declared_path import Corner, Declared, Follower, declare
-from planner.planning.schedule import Start, Switches, follow, trace
+from planner.planning.declared_path import Corner, Declared, Feasibility, declare
+from planner.planning.schedule import Start, follow
 from planner.planning.stated_error import guaranteed, look_ahead, predicted_error, rms_in_time, stated_error
-from planner.vehicle.calibration_table import Knowledge
+from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import QUICK, Objective, check_least, dwells_for
-from planner.vehicle.from_table import vehicle_of
+from planner.vehicle.from_table import default_table, table_vehicle
+from planner.vehicle.rollout import Switches, trace
 from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
@@ -133,7 +134,7 @@ def plan(
     minimum_seconds: float | None = None,
     dwell: float | None = None,
     tolerance: float | None = None,
-    knowledge: Knowledge | None = None,
+    knowledge: CalibrationKnowledge | None = None,
     seed: int = 0,
     progress: Callable[[float], object] | None = None,
 ) -> Plan:
@@ -168,14 +169,10 @@ def plan(
         >>> len(result.dwells) > 100, result.predicted_rms < 0.03
         (True, True)
     """
-    if lookup is None:
-        from surrogate.table.model_file import load
-
-        lookup = load()
     if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0):
         raise InputError(f"tolerance {tolerance:g} l; give a number above 0")
-    swimmer = swimmer_of(robot, lookup, point, knowledge)
-    vehicle = swimmer.vehicle
+    tracked = tracked_vehicle(robot, lookup, point, knowledge)
+    vehicle = tracked.vehicle
     raw = path if isinstance(path, Path2D) else Path2D.of(path)
     check_size(raw, robot, vehicle.turn_radius)
     least = least_dwell(minimum_dwell, minimum_seconds, robot)
@@ -183,12 +180,12 @@ def plan(
 
     @cache
     def declared(drift: Drift) -> Declared:
-        return declare(raw, Follower(vehicle, swimmer.rod, drift, corner, time_weight))
+        return declare(raw, Feasibility(vehicle, tracked.rod, drift, corner, time_weight))
 
     def made(dwell: float) -> Plan:
-        straight = zigzag(vehicle, dwell, swimmer.offset)
-        found = declared(drift_of(vehicle, straight, dwell))
-        return scheduled(swimmer, raw, found, straight, objective, dwell, seed=seed, progress=progress)
+        straight = zigzag(vehicle, dwell, tracked.offset)
+        found = declared(zigzag_drift(vehicle, straight, dwell))
+        return scheduled(tracked, raw, found, straight, objective, dwell, seed=seed, progress=progress)
 
     best = made(dwells[0])
     if tolerance is None or best.stated_error <= tolerance:
@@ -213,7 +210,7 @@ def plan(
     return kept
 
 
-class Swimmer(NamedTuple):
+class TrackedVehicle(NamedTuple):
     """Who follows a path: the robot, its vehicle, and the point of its axis that must be on the path."""
 
     robot: Robot
@@ -228,13 +225,16 @@ class Swimmer(NamedTuple):
         return self.vehicle.pivot_distance + self.offset
 
 
-def swimmer_of(robot: Robot, lookup: LookupTable, point: Point, knowledge: Knowledge | None) -> Swimmer:
-    """The vehicle that a table gives for a robot, with the tracked point."""
-    vehicle = vehicle_of(robot, lookup, knowledge)
-    return Swimmer(robot, vehicle, point, _offset(point, robot, vehicle), lookup.identity)
+def tracked_vehicle(
+    robot: Robot, lookup: LookupTable | None, point: Point, knowledge: CalibrationKnowledge | None
+) -> TrackedVehicle:
+    """Ask a table for the vehicle of a robot, and add the tracked point; default: the shipped table."""
+    lookup = default_table() if lookup is None else lookup
+    vehicle = table_vehicle(robot, lookup, knowledge)
+    return TrackedVehicle(robot, vehicle, point, _offset(point, robot, vehicle), lookup.identity)
 
 
-def drift_of(vehicle: Vehicle, straight: Zigzag, dwell: float) -> Drift:
+def zigzag_drift(vehicle: Vehicle, straight: Zigzag, dwell: float) -> Drift:
     """What carries the robot off its heading, with one shortest dwell.
 
     Raises:
@@ -246,7 +246,7 @@ def drift_of(vehicle: Vehicle, straight: Zigzag, dwell: float) -> Drift:
 
 
 def scheduled(
-    swimmer: Swimmer,
+    tracked: TrackedVehicle,
     raw: Path2D,
     declared: Declared,
     straight: Zigzag,
@@ -261,7 +261,7 @@ def scheduled(
     """The plan that follows a declared path with one shortest dwell.
 
     Args:
-        swimmer: who follows.
+        tracked: who follows.
         raw: the path as drawn.
         declared: the path that is followed, with the pivot's poses.
         straight: the zigzag with this dwell.
@@ -272,8 +272,8 @@ def scheduled(
         start: where the schedule begins, from the swing of the zigzag; default: as the path begins.
         finish: changes the schedule before its errors are computed.
     """
-    robot, vehicle, point, offset, model = swimmer
-    guide, distance = declared.reference, swimmer.rod
+    robot, vehicle, point, offset, model = tracked
+    guide, distance = declared.reference, tracked.rod
     ahead = look_ahead(vehicle, declared.curvature, straight)
     swing = straight.hysteresis(ahead)
     switches = follow(

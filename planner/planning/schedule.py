@@ -28,24 +28,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.paths.tractrix import Reference
-from planner.planning.line_of_sight import Follower, hysteresis
+from planner.planning.line_of_sight import LineOfSight, hysteresis
+from planner.vehicle.rollout import Switches
 from planner.vehicle.vehicle import Vehicle
-from sim.arrays import Floats
 from sim.io.errors import InputError
-from sim.mechanics import planar
 
 MOST_SWITCHES = 200_000
 _PATIENCE = 30.0  # ways of the size of the robot's motion that may be made without getting ahead
 _EVERY = 2_000  # switches between two calls of `progress`
-
-
-@dataclass(frozen=True)
-class Switches:
-    """First direction and dwell times; poses of the head's centre at the flips and the end."""
-
-    first_direction: int
-    dwells: Floats  # (M,)
-    poses: Floats  # (M + 1, 3)
 
 
 @dataclass(frozen=True)
@@ -92,8 +82,8 @@ def follow(
         InputError: the path needs too many switches, or the robot turns in circles.
     """
     swing = float(np.abs(vehicle.twist[:, 2]).max()) * dwell if swing is None else swing
-    start = start or start_of(reference, vehicle, offset, swing)
-    follower = Follower(reference, vehicle, ahead, pivot_distance, offset, dwell, swing)
+    start = start or start_at_rest(reference, vehicle, offset, swing)
+    follower = LineOfSight(reference, vehicle, ahead, pivot_distance, offset, dwell, swing)
     follower.place = start.place
     follower.begin()
     pose, sense, before = start.pose, start.sense, start.before
@@ -126,7 +116,7 @@ def follow(
     return Switches(start.sense, np.array(dwells), np.array(poses))
 
 
-def start_of(reference: Reference, vehicle: Vehicle, offset: float, swing: float) -> Start:
+def start_at_rest(reference: Reference, vehicle: Vehicle, offset: float, swing: float) -> Start:
     """At rest, where the reference begins.
 
     The robot turns first to the side to which the reference turns first. So it must look to the other side of the
@@ -140,39 +130,3 @@ def start_of(reference: Reference, vehicle: Vehicle, offset: float, swing: float
     rod = math.hypot(*ahead.tolist()) - offset
     x, y = (reference.q[0] + rod * np.array([math.cos(heading), math.sin(heading)])).tolist()
     return Start((x, y, heading), 0, sense)
-
-
-def poses_at_flips(vehicle: Vehicle, switches: Switches) -> Floats:
-    """Poses (M + 1, 3) of the head's centre at the flips, if `vehicle` carries out the schedule."""
-    changes = pose_changes(vehicle, switches.first_direction, switches.dwells, switches.dwells[:, None])[:, 0]
-    return _chain(switches.poses[0], changes, vehicle.current * switches.dwells[:, None])
-
-
-def trace(vehicle: Vehicle, switches: Switches, offset: float, *, samples: int = 8) -> Floats:
-    """Predicted track of the tracked point, (M samples + 1, 2), at equal times within each dwell."""
-    share = np.arange(1, samples + 1) / samples
-    times = switches.dwells[:, None] * share
-    changes = pose_changes(vehicle, switches.first_direction, switches.dwells, times)
-    flips = _chain(switches.poses[0], changes[:, -1], vehicle.current * switches.dwells[:, None])
-    within = planar.compose(flips[:-1, None], changes)
-    within[..., :2] += vehicle.current * times[..., None]
-    poses = np.concatenate([flips[:1], within.reshape(-1, 3)])
-    return planar.compose(poses, np.array([offset, 0.0, 0.0]))[:, :2]
-
-
-def pose_changes(vehicle: Vehicle, first_direction: int, dwells: Floats, times: Floats) -> Floats:
-    """Pose changes (M, K, 3) of each dwell after times (M, K), from rest."""
-    before = np.concatenate([dwells[:1], dwells[:-1]])[:, None] + np.zeros_like(times)
-    changes = np.empty((*times.shape, 3))
-    for first, sense in ((0, first_direction), (1, -first_direction)):
-        changes[first::2] = vehicle.motion(sense, before[first::2], times[first::2])
-    changes[0] = vehicle.motion(first_direction, None, times[0])
-    return changes
-
-
-def _chain(start: Floats, changes: Floats, drift: Floats) -> Floats:
-    """Poses (M + 1, 3) from a start, pose changes (M, 3) and moves in the lab (M, 2)."""
-    heading = start[2] + np.concatenate([[0.0], np.cumsum(changes[:, 2])])
-    moves = planar.turn(changes[:, :2], heading[:-1]) + drift
-    position = start[:2] + np.concatenate([[[0.0, 0.0]], np.cumsum(moves, 0)])
-    return np.concatenate([position, heading[:, None]], 1)

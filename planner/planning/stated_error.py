@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.paths.distance import nearest
-from planner.planning.schedule import Switches, pose_changes, poses_at_flips
+from planner.vehicle.rollout import Switches, pose_changes, poses_at_flips
 from planner.vehicle.vehicle import SHORTEST, STEP, Vehicle
 from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats
@@ -148,7 +148,7 @@ def _deviations(vehicle: Vehicle, switches: Switches, edges: Floats) -> tuple[Fl
         deviation[:, p], turned[:, p] = position[edges], heading[edges]
     spread = np.empty((count, 3))
     for index in (0, 1):
-        spread[side == index] = vehicle.noise_of(1 - 2 * index, dwells[side == index])
+        spread[side == index] = vehicle.lag_noise(1 - 2 * index, dwells[side == index])
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(spread**2, 0)])[edges]
     variance = np.diff(total, axis=0)
     across = variance[:, :2].mean(1)  # x and y of the body are mixed in the lab

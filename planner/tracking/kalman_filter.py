@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.planning.line_of_sight import Follower, arc_of
+from planner.planning.line_of_sight import LineOfSight, arc_terms
 from planner.planning.plan import Plan
 
 POSE = tuple[float, float, float]
@@ -53,7 +53,7 @@ class Estimate:
         noise: standard deviations of a pose: of x and y [l], of the heading [rad].
     """
 
-    def __init__(self, plan: Plan, follower: Follower, noise: tuple[float, float]):
+    def __init__(self, plan: Plan, follower: LineOfSight, noise: tuple[float, float]):
         self._twist: ROWS = plan.vehicle.twist.tolist()
         self._current: list[float] = plan.vehicle.current.tolist()
         self._speed = plan.net_speed
@@ -153,10 +153,10 @@ class Estimate:
         """What a time in a dwell that began with `heading` adds to the pose."""
         state, sense = self.state, dwell.sense
         side = 0 if sense > 0 else 1
-        z, x, turned = self._follower.lag_of(side, dwell.before, time)
+        z, x, turned = self._follower.lag_after(side, dwell.before, time)
         turned += sense * state[7]
         forward, left, rate = self._learned(side)
-        along, across, angle = arc_of(rate, time)
+        along, across, angle = arc_terms(rate, time)
         more = 1 + state[3 + side]
         along_r, across_r = (time * math.cos(angle) - along) / more, (time * math.sin(angle) - across) / more
         ahead_r, aside_r = along_r * forward - across_r * left, across_r * forward + along_r * left

@@ -36,9 +36,9 @@ def answers(tracker: Tracker, lines: Iterable[str], time_scale: float) -> Iterat
         now = numbers[0] / time_scale if numbers else math.nan
         pose = (numbers[1], numbers[2], numbers[3]) if len(numbers) in (4, 5) else None
         seen = numbers[4] / time_scale if len(numbers) == 5 else None
-        advice = tracker.feed(now, pose, seen)
-        yield f"{advice.direction} {advice.flip_at * time_scale:.9f} {advice.error:.4f} {int(advice.alarm)}"
-        if advice.finished:
+        command = tracker.update(now, pose, seen)
+        yield f"{command.direction} {command.flip_at * time_scale:.9f} {command.error:.4f} {int(command.alarm)}"
+        if command.finished:
             return
 
 

@@ -1,8 +1,8 @@
 """Tracker: keeps a robot on its plan with poses from a camera, and learns the robot while it swims.
 
     tracker = Tracker(plan)
-    advice = tracker.feed(now)                              # no pose
-    advice = tracker.feed(now, (x, y, heading), seen_at)    # a pose, and when it was true
+    command = tracker.update(now)                              # no pose
+    command = tracker.update(now, (x, y, heading), seen_at)    # a pose, and when it was true
 
 Every call says the direction of the motor and when to flip next. At most one flip can have happened since the
 last call: the one that was announced. The tracker learns ten numbers of the robot
@@ -25,10 +25,11 @@ from __future__ import annotations
 import math
 from collections import deque
 from typing import NamedTuple
+from warnings import warn
 
 from scipy.stats import chi2
 
-from planner.planning.line_of_sight import Follower
+from planner.planning.line_of_sight import LineOfSight
 from planner.planning.plan import Plan
 from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate
 from sim.io.errors import InputError
@@ -45,7 +46,7 @@ DISPLACED = 0.3  # standard deviation of the pose then [l, rad]
 QUANTILE = 1.96
 
 
-class Advice(NamedTuple):
+class Command(NamedTuple):
     """What the motor does now, and when it must flip next."""
 
     direction: int  # +1 or −1; 0 at the end
@@ -67,8 +68,8 @@ class Tracker:
     Example:
         >>> from softflagella import Tracker, circle, load_robot, plan
         >>> tracker = Tracker(plan(circle(2.0), load_robot("paper-control")))
-        >>> advice = tracker.feed(0.0)
-        >>> advice.direction, advice.flip_at > 0.2
+        >>> command = tracker.update(0.0)
+        >>> command.direction, command.flip_at > 0.2
         (1, True)
     """
 
@@ -76,7 +77,7 @@ class Tracker:
         self, plan: Plan, *, noise: tuple[float, float] = (0.01, 0.01), latency: float = 0.0, begin: float = 0.0
     ):
         self.shortest = plan.minimum_dwell
-        self._follower = Follower(
+        self._follower = LineOfSight(
             plan.guide, plan.vehicle, plan.ahead, plan.pivot_distance, plan.offset, plan.minimum_dwell, plan.swing
         )
         self._estimate = Estimate(plan, self._follower, noise)
@@ -92,7 +93,7 @@ class Tracker:
         self._flip_at, self._ends = begin, False
         self._plan_flip()
 
-    def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Advice:
+    def update(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command:
         """Tell the time, and a pose if there is one.
 
         Args:
@@ -109,14 +110,27 @@ class Tracker:
             possible = len(pose) == 3 and all(map(math.isfinite, (*pose, when))) and when <= self._now
             if possible and self._see(pose, when):
                 self._plan_flip()
-        return self.advice
+        return self.command
 
     @property
-    def advice(self) -> Advice:
+    def command(self) -> Command:
         """The same answer again."""
         P = self._estimate.covariance
         error = self._swing_error + QUANTILE * math.sqrt(max(P[0][0] + P[1][1], 0.0) / 2)
-        return Advice(0 if self._finished else self._dwell.sense, self._flip_at, self._finished, self.alarm, error)
+        return Command(
+            0 if self._finished else self._dwell.sense, self._flip_at, self._finished, self.alarm, error
+        )
+
+    def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command:
+        """Call `update`, of which this is the old name, for one release."""
+        warn("Tracker.feed is now Tracker.update", DeprecationWarning, stacklevel=2)
+        return self.update(now, pose, seen_at)
+
+    @property
+    def advice(self) -> Command:
+        """Return `command`, of which this is the old name, for one release."""
+        warn("Tracker.advice is now Tracker.command", DeprecationWarning, stacklevel=2)
+        return self.command
 
     @property
     def learned(self) -> dict[str, float]:

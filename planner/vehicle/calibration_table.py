@@ -32,7 +32,7 @@ NUMBERS = tuple(DEFAULTS)  # fields of `Robot` that are not exact
 
 
 @dataclass(frozen=True)
-class Knowledge:
+class CalibrationKnowledge:
     """Covariance (p, p) of ln C, ln numbers and effect sizes; current and its standard deviation [m/s]."""
 
     names: tuple[str, ...] = ()
@@ -56,14 +56,14 @@ class Knowledge:
             )
 
 
-def read_knowledge(path: str | Path) -> Knowledge:
+def read_knowledge(path: str | Path) -> CalibrationKnowledge:
     """The table [calibration] of a robot.toml; nothing is known where there is no such file or table.
 
     Raises:
         InputError: the table is not as described above.
     """
     if not Path(path).is_file():
-        return Knowledge()
+        return CalibrationKnowledge()
     try:
         found: dict[str, Any] = tomllib.loads(Path(path).read_text()).get("calibration", {})
         names = tuple(str(name) for name in found.get("names", ()))
@@ -71,10 +71,10 @@ def read_knowledge(path: str | Path) -> Knowledge:
         current, error = (_pair(found.get(key, (0.0, 0.0))) for key in ("current_m_s", "current_error_m_s"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, TypeError, ValueError, AttributeError) as broken:
         raise InputError(f"{path}: [calibration] cannot be read: {broken}") from None
-    return Knowledge(names, covariance, current, error)
+    return CalibrationKnowledge(names, covariance, current, error)
 
 
-def knowledge_toml(knowledge: Knowledge) -> str:
+def knowledge_toml(knowledge: CalibrationKnowledge) -> str:
     """The table [calibration] that `read_knowledge` reads back."""
     rows = ",\n".join(f"    {[float(f'{value:.12g}') for value in row]}" for row in knowledge.covariance.tolist())
     lines = ["[calibration]", f"names = {json.dumps(knowledge.names)}", f"covariance = [\n{rows},\n]"]

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from planner.vehicle.calibration_table import NUMBERS, Knowledge
-from planner.vehicle.vehicle import Mode, Vehicle, lags_of, resampled
+from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge
+from planner.vehicle.vehicle import Mode, Vehicle, lag_table, resampled
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.effects.tail_contact import EFFECT as CONTACT
@@ -25,7 +25,14 @@ _ODD = 0.2  # share of a table's error that has opposite signs in the two direct
 _STEP = 0.02  # of a coefficient, for derivatives
 
 
-def vehicle_of(robot: Robot, lookup: LookupTable, knowledge: Knowledge | None = None) -> Vehicle:
+def default_table() -> LookupTable:
+    """Load the table that comes with the package."""
+    from surrogate.table.model_file import load  # loads PyTorch, which the import of a plan does not need
+
+    return load()
+
+
+def table_vehicle(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowledge | None = None) -> Vehicle:
     """The vehicle that the look-up table predicts for a robot.
 
     Args:
@@ -36,7 +43,7 @@ def vehicle_of(robot: Robot, lookup: LookupTable, knowledge: Knowledge | None = 
     Raises:
         InputError: the robot is outside the table's domain, or moves backwards on average.
     """
-    knowledge = knowledge or Knowledge()
+    knowledge = knowledge or CalibrationKnowledge()
     columns = _both_directions(robot.group_values())
     found = lookup.query(columns)
     twist = _twists(found)
@@ -50,13 +57,11 @@ def vehicle_of(robot: Robot, lookup: LookupTable, knowledge: Knowledge | None = 
         raise InputError(f"robot {robot.name!r} turns to the same side in both directions of its motor; it cannot "
                          "follow a path")  # fmt: skip
     mirror = np.stack([np.ones(3), planar.MIRROR])
-    lag = (
-        np.stack([lags_of(curves.lag[i], curves.memory[i], curves.before) for i in (0, 1)]) * mirror[:, None, None]
-    )
+    lag = np.stack([lag_table(curves.lag[i], curves.memory[i], curves.before) for i in (0, 1)])
     unit = robot.time_scale / robot.tail_length  # from m/s
     return Vehicle(
         twist=twist,
-        lag=lag,
+        lag=lag * mirror[:, None, None],
         rest=resampled(curves.rest) * mirror[:, None],
         spread=resampled(curves.spread),
         modes=(*_table_modes(twist, lookup), *_coefficient_modes(robot, lookup, twist, knowledge)),
@@ -102,7 +107,9 @@ def _table_modes(twist: Floats, lookup: LookupTable) -> list[Mode]:
     return modes
 
 
-def _coefficient_modes(robot: Robot, lookup: LookupTable, twist: Floats, knowledge: Knowledge) -> list[Mode]:
+def _coefficient_modes(
+    robot: Robot, lookup: LookupTable, twist: Floats, knowledge: CalibrationKnowledge
+) -> list[Mode]:
     """What the covariances of the robot's parameters and of the current do to its motion."""
     modes: list[Mode] = []
     if knowledge.names:

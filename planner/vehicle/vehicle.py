@@ -45,7 +45,7 @@ class Vehicle:
     tail_gap: float = 10.0  # in diameters
     least_gap: float = 1.0  # below it the model does not hold, because tails touch
 
-    def lag_of(self, sense: int, before: ArrayLike | None, time: ArrayLike) -> Floats:
+    def lag_after(self, sense: int, before: ArrayLike | None, time: ArrayLike) -> Floats:
         """Lag (..., 3) after `time` (...), where the dwell before had length `before` (...); None: from rest."""
         side = 0 if sense > 0 else 1
         time = np.asarray(time, dtype=float)
@@ -66,9 +66,9 @@ class Vehicle:
     def motion(self, sense: int, before: ArrayLike | None, time: ArrayLike) -> Floats:
         """Pose change E_σ(time | before), (..., 3), without the current."""
         twist = self.twist[0 if sense > 0 else 1]
-        return planar.compose(self.lag_of(sense, before, time), planar.arc(twist, time))
+        return planar.compose(self.lag_after(sense, before, time), planar.arc(twist, time))
 
-    def noise_of(self, sense: int, time: ArrayLike) -> Floats:
+    def lag_noise(self, sense: int, time: ArrayLike) -> Floats:
         """One standard deviation (..., 3) of the lag after `time`, over the phase of the disc at the flip."""
         table = self.spread[0 if sense > 0 else 1]
         time = np.asarray(time, dtype=float)
@@ -123,7 +123,7 @@ def resampled(curve: Floats) -> Floats:
     return np.asarray(spline * np.minimum(TIMES / DWELLS[0], 1.0)[:, None])
 
 
-def lags_of(lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
+def lag_table(lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
     """Lags (K, T, 3) after dwells of BEFORE_KNOTS, from curves of `sim.model.response`."""
     knots = np.log(np.append(before, FORGOTTEN))
     known = np.concatenate([memory, np.zeros_like(memory[:1])])

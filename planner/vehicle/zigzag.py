@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.planning.schedule import Switches, poses_at_flips, trace
+from planner.vehicle.rollout import Switches, poses_at_flips, trace
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
 

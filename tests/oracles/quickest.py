@@ -14,8 +14,8 @@ from scipy.optimize import minimize
 
 from planner.goal.dubins import TURNS, words
 from planner.goal.final_dwells import flips_after
-from planner.planning.schedule import Switches
 from planner.vehicle.dwell_choice import QUICK
+from planner.vehicle.rollout import Switches
 from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from planner.goal.obstacles import Body, Circle, Polygon
-from planner.goal.to_goal import Voyage
+from planner.goal.obstacles import Circle, Footprint, Polygon
+from planner.goal.to_goal import GoalPlan
 from sim.motion.replay import replay
 
 
@@ -31,10 +31,10 @@ def goal_behind_circles(rng: np.random.Generator) -> dict[str, Any]:
     return {"start": start, "goal": goal, "keep_out": circles, "walls": walls}
 
 
-def replayed_clearance(voyage: Voyage) -> tuple[float, float, float]:
+def replayed_clearance(goal_plan: GoalPlan) -> tuple[float, float, float]:
     """Replay a plan; return least clearance [l], distance from the goal [l] and error of the heading [rad]."""
-    track = replay([voyage.plan.schedule()])[0]
+    track = replay([goal_plan.plan.schedule()])[0]
     poses = np.stack([track[name].to_numpy(float) for name in ("x_over_l", "y_over_l", "heading_rad")], 1)
-    clearance = Body.of(voyage.plan.robot, 0.0).clearance(poses, voyage.room).min()
-    turn = (poses[-1, 2] - voyage.goal[2] + np.pi) % (2 * np.pi) - np.pi
-    return float(clearance), float(np.hypot(*(poses[-1, :2] - voyage.goal[:2]))), float(abs(turn))
+    clearance = Footprint.of(goal_plan.plan.robot, 0.0).clearance(poses, goal_plan.free_space).min()
+    turn = (poses[-1, 2] - goal_plan.goal[2] + np.pi) % (2 * np.pi) - np.pi
+    return float(clearance), float(np.hypot(*(poses[-1, :2] - goal_plan.goal[:2]))), float(abs(turn))

@@ -13,7 +13,7 @@ import pytest
 from planner.files.tracker_header import tracker_header
 from planner.planning.plan import Plan
 from planner.tracking.kalman_filter import STATES
-from planner.tracking.tracker import Advice
+from planner.tracking.tracker import Command
 from tests.processes import LIMIT
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2")
@@ -68,13 +68,13 @@ class CompiledTracker:
         self._library.begin(0.01, 0.01)
         self.state = np.zeros(STATES)
 
-    def feed(
+    def update(
         self, now: float, pose: tuple[float, float, float] | None = None, seen_at: float | None = None
-    ) -> Advice:
+    ) -> Command:
         own = None if pose is None else np.array(pose, dtype=float)
         seen = now if seen_at is None else seen_at
         out = np.zeros(5 + STATES)
         address = None if own is None else own.ctypes.data
         self._library.feed(now * self._scale, address, seen * self._scale, out.ctypes.data)
         self.state = out[5:]
-        return Advice(int(out[0]), float(out[1]) / self._scale, bool(out[2]), bool(out[3]), float(out[4]))
+        return Command(int(out[0]), float(out[1]) / self._scale, bool(out[2]), bool(out[3]), float(out[4]))

@@ -10,7 +10,7 @@ import numpy as np
 
 from planner.paths.distance import distance_to
 from planner.planning.plan import Plan
-from planner.tracking.tracker import Advice
+from planner.tracking.tracker import Command
 from planner.vehicle.vehicle import Vehicle
 from sim.mechanics import planar
 
@@ -18,9 +18,9 @@ from sim.mechanics import planar
 class Tracks(Protocol):
     """`planner.Tracker`, or what is fed like it."""
 
-    def feed(
+    def update(
         self, now: float, pose: tuple[float, float, float] | None = None, seen_at: float | None = None
-    ) -> Advice: ...
+    ) -> Command: ...
 
 
 @dataclass
@@ -52,28 +52,28 @@ def swim(tracker: Tracks, plan: Plan, truth: Vehicle, camera: Camera, *, changes
          most: int = 5000) -> tuple[np.ndarray, list[float]]:  # fmt: skip
     """Distances from the declared path at many instants, and the dwells that were ordered."""
     pose, before, start, seen, waiting = np.array(plan.start), None, 0.0, 0.0, []
-    advice, dwells, track = tracker.feed(0.0), [], []
+    command, dwells, track = tracker.update(0.0), [], []
     half = len(plan.dwells) // 2
-    while not advice.finished and len(dwells) < most:
-        sense, known = advice.direction, advice.flip_at
+    while not command.finished and len(dwells) < most:
+        sense, known = command.direction, command.flip_at
         car = changes_to if changes_to is not None and len(dwells) > half else truth
 
         at = partial(_moved, car, pose, sense, before, start)
         while seen + camera.every <= known or (waiting and waiting[0][0] <= known):
             if waiting and waiting[0][0] <= min(known, seen + camera.every):
                 when, found, taken = waiting.pop(0)
-                advice = tracker.feed(when, found, taken)
+                command = tracker.update(when, found, taken)
             else:
                 seen += camera.every
                 found = camera.sees(at(seen))
                 if found is not None:
                     waiting.append((seen + camera.delay, found, seen))
                     waiting.sort(key=lambda item: item[0])
-            known = advice.flip_at
+            known = command.flip_at
         track += [at(start + share * (known - start)) for share in np.linspace(0.2, 1, 5)]
         dwells.append(known - start)
         pose, before, start = at(known), known - start, known
-        advice = tracker.feed(known)
+        command = tracker.update(known)
     followed = planar.compose(np.array(track), np.array([plan.offset, 0.0, 0.0]))
     return distance_to(plan.reference, followed[:, :2]), dwells
 

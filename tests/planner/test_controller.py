@@ -13,7 +13,7 @@ import pytest
 from planner.files.tracker_header import rounded, table_bytes, tracker_header
 from planner.paths.path import circle
 from planner.planning.plan import Plan, plan
-from planner.tracking.tracker import POSE, SLACK, Advice, Tracker
+from planner.tracking.tracker import POSE, SLACK, Command, Tracker
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker, compile_c
 from tests.planner.swimming import Camera, rms, swim
@@ -42,16 +42,16 @@ class Both:
     def __init__(self, one: Tracker, other: CompiledTracker):
         self.one, self.other, self.calls = one, other, 0
         other.restart()
-        self.last, self.told, self.flipped_at = one.advice, other.feed(0.0), 0.0
+        self.last, self.told, self.flipped_at = one.command, other.update(0.0), 0.0
 
-    def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Advice:
+    def update(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command:
         seen = now if seen_at is None else seen_at
         flips = now >= self.last.flip_at - SLACK
-        one = self.one.feed(now, pose, seen)
+        one = self.one.update(now, pose, seen)
         if self.one._now > SHORT:
             self.last = one
             return one
-        other = self.other.feed(max(now, self.told.flip_at) if flips else now, pose, seen)
+        other = self.other.update(max(now, self.told.flip_at) if flips else now, pose, seen)
         assert (one.direction, one.finished, one.alarm) == (other.direction, other.finished, other.alarm)
         assert other.flip_at == pytest.approx(one.flip_at, rel=ROUNDING)
         assert other.error == pytest.approx(one.error, rel=ROUNDING)
@@ -81,7 +81,7 @@ def test_the_same_orders_as_in_python(compiled: CompiledTracker, camera: Camera)
     both = Both(Tracker(planned()), compiled)
     swim(both, planned(), truth, camera)
     assert both.calls > 50
-    assert both.one.advice.finished
+    assert both.one.command.finished
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -97,7 +97,7 @@ def test_the_same_orders_from_nonsense(compiled: CompiledTracker, seed: int) -> 
         pose = tuple(float(v) if rng.random() < 0.97 else float(rng.choice(odd)) for v in near)
         time = now if rng.random() < 0.95 else float(rng.choice(odd))
         seen = float(now - rng.exponential(rng.choice([0.1, 2.0, 20.0])))
-        both.feed(time, pose if rng.random() < 0.7 else None, seen)  # type: ignore[arg-type]
+        both.update(time, pose if rng.random() < 0.7 else None, seen)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("precise", [True, False], ids=["double", "single"])
@@ -134,6 +134,6 @@ def test_sixteen_bits_are_enough() -> None:
     exact = plan(circle(2.0), PRESETS["paper-control"])
     one, other = Tracker(exact), Tracker(rounded(exact))
     for _ in range(200):
-        assert one.advice.flip_at == pytest.approx(other.advice.flip_at, abs=4e-4)
-        one.feed(one.advice.flip_at)
-        other.feed(other.advice.flip_at)
+        assert one.command.flip_at == pytest.approx(other.command.flip_at, abs=4e-4)
+        one.update(one.command.flip_at)
+        other.update(other.command.flip_at)

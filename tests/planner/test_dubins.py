@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planner.goal.dubins import TURNS, Shots, shots, words
-from planner.goal.lattice import Ground
-from planner.goal.obstacles import Body, Circle, Polygon, Room
+from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, words
+from planner.goal.lattice import RouteLimits
+from planner.goal.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.goal.route import COURSES, NoWayError, route
 from planner.paths.tractrix import STILL
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
 RADIUS = 0.37
-BODY = Body(np.linspace(-0.3, 1.0, 8), 0.2)
+BODY = Footprint(np.linspace(-0.3, 1.0, 8), 0.2)
 
 
 def poses(rng: np.random.Generator, count: int) -> Floats:
@@ -28,7 +28,7 @@ def test_every_word_ends_at_its_goal(word: int) -> None:
     pieces = words(start, goal, RADIUS)[:, word]
     exists = np.isfinite(pieces.sum(-1))
     assert exists.sum() > 40
-    tracks = Shots(start[exists], np.repeat(TURNS[word][None], exists.sum(), 0), pieces[exists])
+    tracks = DubinsPaths(start[exists], np.repeat(TURNS[word][None], exists.sum(), 0), pieces[exists])
     missed = tracks.poses(tracks.length[:, None], RADIUS)[:, 0] - goal[exists]
     missed[:, 2] = (missed[:, 2] + np.pi) % (2 * np.pi) - np.pi
     assert np.abs(missed).max() < 1e-9
@@ -41,9 +41,9 @@ def test_no_random_track_is_shorter() -> None:
     end, length = start, np.zeros(3000)
     for _ in range(4):
         turn, piece = rng.integers(-1, 2, (3000, 1)), rng.uniform(0, 1, (3000, 1))
-        track = Shots(end, np.repeat(turn, 3, 1), np.concatenate([piece, 0 * piece, 0 * piece], 1))
+        track = DubinsPaths(end, np.repeat(turn, 3, 1), np.concatenate([piece, 0 * piece, 0 * piece], 1))
         end, length = track.poses(piece, RADIUS)[:, 0], length + piece[:, 0]
-    assert (shots(start, end, RADIUS).length <= length + 1e-9).all()
+    assert (shortest_paths(start, end, RADIUS).length <= length + 1e-9).all()
 
 
 def stop(*pose: float) -> Floats:
@@ -55,7 +55,7 @@ def box(left: float, low: float, right: float, high: float) -> Polygon:
 
 
 def test_distances_of_regions() -> None:
-    room = Room((Circle(0, 0, 1),), box(-3, -2, 3, 2))
+    room = FreeSpace((Circle(0, 0, 1),), box(-3, -2, 3, 2))
     found = room.distance(np.array([[0, 0], [2, 0], [0, 1.75], [0, 3.0], [-2.9, 0]]))
     assert found == pytest.approx([-1, 1, 0.25, -1, 0.1])
     notch = Polygon.of([[0, 0], [4, 0], [4, 3], [2, 1], [0, 3]])
@@ -68,22 +68,22 @@ def test_distances_of_regions() -> None:
 def test_a_route_keeps_its_distance_and_its_radius(seed: int) -> None:
     rng = np.random.default_rng(seed)
     circles = tuple(Circle(x, y, 0.5) for x, y in rng.uniform([1.5, -2], [4.5, 2], (3, 2)))
-    ground = Ground(RADIUS, BODY, Room(circles), STILL)
-    found = route([stop(0, 0, 0), stop(6.5, 0, 1.0)], ground, 0.1, {})
+    limits = RouteLimits(RADIUS, BODY, FreeSpace(circles), STILL)
+    found = route([stop(0, 0, 0), stop(6.5, 0, 1.0)], limits, 0.1, {})
     track = found.poses(0.01)
-    assert ground.clearance(track).min() >= 0.1 - 1e-3
+    assert limits.clearance(track).min() >= 0.1 - 1e-3
     assert track[-1] == pytest.approx([6.5, 0, 1.0 + 2 * np.pi * round((track[-1, 2] - 1) / 2 / np.pi)], abs=1e-6)
     steps = np.hypot(*np.diff(track[:, :2], axis=0).T)
     assert np.abs(np.diff(track[:, 2]) / steps).max() < 1.01 / RADIUS
 
 
 def test_a_route_through_places_is_as_short_as_with_the_best_courses() -> None:
-    ground = Ground(RADIUS, BODY, Room(), STILL)
+    limits = RouteLimits(RADIUS, BODY, FreeSpace(), STILL)
     course = 2 * np.pi * np.arange(COURSES) / COURSES
     places = [(2.0, 1.0), (1.0, 3.0)]
     free = [np.stack([0 * course + x, 0 * course + y, course], 1) for x, y in places]
     ends = stop(0, 0, 0), stop(-1, 1, -2)
-    found = route([ends[0], *free, ends[1]], ground, 0.0, {})
+    found = route([ends[0], *free, ends[1]], limits, 0.0, {})
     fine = 2 * np.pi * np.arange(720) / 720
     (one, other) = (np.stack([0 * fine + x, 0 * fine + y, fine], 1) for x, y in places)
     first = words(ends[0], one, RADIUS).sum(-1).min(-1)
@@ -96,16 +96,16 @@ def test_a_route_through_places_is_as_short_as_with_the_best_courses() -> None:
 
 def test_a_wall_without_a_gap_leaves_no_way() -> None:
     for gap, passes in ((1.4, True), (0.3, False)):
-        room = Room((box(2, -3, 2.5, -gap / 2), box(2, gap / 2, 2.5, 3)), box(-2, -3, 7, 3))
-        ground = Ground(RADIUS, BODY, room, STILL)
+        room = FreeSpace((box(2, -3, 2.5, -gap / 2), box(2, gap / 2, 2.5, 3)), box(-2, -3, 7, 3))
+        limits = RouteLimits(RADIUS, BODY, room, STILL)
         if passes:
-            assert route([stop(0, 0, 0), stop(5, 0, 0)], ground, 0.05, {}).length == pytest.approx(5.0, rel=0.05)
+            assert route([stop(0, 0, 0), stop(5, 0, 0)], limits, 0.05, {}).length == pytest.approx(5.0, rel=0.05)
         else:
             with pytest.raises(NoWayError, match="there is no way to the goal"):
-                route([stop(0, 0, 0), stop(5, 0, 0)], ground, 0.05, {})
+                route([stop(0, 0, 0), stop(5, 0, 0)], limits, 0.05, {})
 
 
 def test_a_goal_inside_a_region_is_refused_with_the_distance() -> None:
-    ground = Ground(RADIUS, BODY, Room((Circle(5, 0, 1),)), STILL)
+    limits = RouteLimits(RADIUS, BODY, FreeSpace((Circle(5, 0, 1),)), STILL)
     with pytest.raises(NoWayError, match=r"at the goal, .* inside what it must keep out of; it needs 0.1 l"):
-        route([stop(0, 0, 0), stop(5, 0, 0)], ground, 0.1, {})
+        route([stop(0, 0, 0), stop(5, 0, 0)], limits, 0.1, {})

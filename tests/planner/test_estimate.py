@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from planner.paths.path import circle
-from planner.planning.line_of_sight import Follower
+from planner.planning.line_of_sight import LineOfSight
 from planner.planning.plan import Plan, plan
 from planner.tracking.kalman_filter import MOST, STATES, Dwell, Estimate
 from sim.mechanics import planar
@@ -26,7 +26,7 @@ def planned() -> Plan:
 
 @pytest.fixture
 def estimate(planned: Plan) -> Estimate:
-    follower = Follower(planned.guide, planned.vehicle, planned.ahead, planned.pivot_distance, planned.offset,
+    follower = LineOfSight(planned.guide, planned.vehicle, planned.ahead, planned.pivot_distance, planned.offset,
                         planned.minimum_dwell, planned.swing)  # fmt: skip
     found = Estimate(planned, follower, (0.01, 0.01))
     found.state = list(STATE)
@@ -69,7 +69,7 @@ def test_counting_back_and_going_forward_end_at_the_same_pose(estimate: Estimate
     twist = car.twist * np.array([[1.04, 0.95, 1.03], [1.04, 0.95, 0.98]])
 
     def change(dwell: Dwell, time: float) -> np.ndarray:
-        lag = car.lag_of(dwell.sense, dwell.before, time) + np.array([0, 0, dwell.sense * state[7]])
+        lag = car.lag_after(dwell.sense, dwell.before, time) + np.array([0, 0, dwell.sense * state[7]])
         return planar.compose(lag, planar.arc(twist[0 if dwell.sense > 0 else 1], time))
 
     def drift(time: float) -> np.ndarray:

@@ -13,9 +13,9 @@ import pytest
 from planner.files.plan_json import load_plan, plan_record
 from planner.goal.obstacles import Circle, Polygon
 from planner.goal.route import NoWayError
-from planner.goal.to_goal import Voyage, to_goal
-from planner.planning.schedule import Switches, poses_at_flips
-from planner.vehicle.calibration_table import Knowledge
+from planner.goal.to_goal import GoalPlan, to_goal
+from planner.vehicle.calibration_table import CalibrationKnowledge
+from planner.vehicle.rollout import Switches, poses_at_flips
 from sim.io.errors import InputError, run_command
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
@@ -27,9 +27,9 @@ CONTROL = PRESETS["paper-control"]
 BOX = [[-2, -4], [9, -4], [9, 4], [-2, 4]]
 
 
-def end_of(voyage: Voyage) -> np.ndarray:
+def end_of(goal_plan: GoalPlan) -> np.ndarray:
     """The end of the schedule from the start that was asked for, computed anew."""
-    plan = voyage.plan
+    plan = goal_plan.plan
     return poses_at_flips(plan.vehicle, Switches(plan.first_direction, plan.dwells, np.array([plan.start])))[-1]
 
 
@@ -37,21 +37,21 @@ def end_of(voyage: Voyage) -> np.ndarray:
 def test_the_motion_begins_and_ends_as_asked(seed: int) -> None:
     rng = np.random.default_rng(seed)
     start, goal = (rng.uniform([-2, -2, -3], [2, 2, 3]).tolist() for _ in range(2))
-    voyage = to_goal(start, goal, CONTROL, objective=("time", "error")[seed % 2])
-    assert voyage.plan.start == pytest.approx(tuple(start))
-    end = end_of(voyage)
+    goal_plan = to_goal(start, goal, CONTROL, objective=("time", "error")[seed % 2])
+    assert goal_plan.plan.start == pytest.approx(tuple(start))
+    end = end_of(goal_plan)
     assert end[:2] == pytest.approx(goal[:2], abs=1e-3)
     assert math.cos(end[2] - goal[2]) > 1 - 1e-6
-    assert max(voyage.end_error) < 1e-3
-    assert voyage.plan.dwells.min() >= voyage.plan.minimum_dwell * (1 - 1e-9)
+    assert max(goal_plan.end_error) < 1e-3
+    assert goal_plan.plan.dwells.min() >= goal_plan.plan.minimum_dwell * (1 - 1e-9)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 6])
 def test_time_is_within_5_percent_of_brute_force(seed: int) -> None:
     goal = random_goal(np.random.default_rng(seed))
-    voyage = to_goal((0, 0, 0), goal, CONTROL)
-    assert voyage.plan.duration < 1.05 * brute_force(voyage.plan.vehicle, goal)
+    goal_plan = to_goal((0, 0, 0), goal, CONTROL)
+    assert goal_plan.plan.duration < 1.05 * brute_force(goal_plan.plan.vehicle, goal)
 
 
 def test_a_plan_to_a_goal_gives_no_guarantee_and_is_read_again(tmp_path: Path) -> None:
@@ -74,47 +74,47 @@ def test_moved_and_mirrored_tasks_give_moved_and_mirrored_plans() -> None:
 
 def test_a_robot_that_turns_unequally_in_a_current_arrives() -> None:
     robot = replace(CONTROL, effects={"left_right_bias": 0.2})
-    drifting = Knowledge(current=(2e-5, -1e-5))
-    voyage = to_goal((0, 0, 0.3), (3, 2, -1), robot, lookup=tabulate(robot), knowledge=drifting)
-    assert np.abs(voyage.plan.vehicle.current).max() > 0
-    assert end_of(voyage)[:2] == pytest.approx([3, 2], abs=1e-3)
+    drifting = CalibrationKnowledge(current=(2e-5, -1e-5))
+    goal_plan = to_goal((0, 0, 0.3), (3, 2, -1), robot, lookup=tabulate(robot), knowledge=drifting)
+    assert np.abs(goal_plan.plan.vehicle.current).max() > 0
+    assert end_of(goal_plan)[:2] == pytest.approx([3, 2], abs=1e-3)
 
 
 def test_a_shortest_dwell_in_seconds_holds_to_the_end() -> None:
-    voyage = to_goal((0, 0, 0), (2, 2, 1), CONTROL, minimum_seconds=4.0)
-    assert voyage.plan.seconds.min() >= 4.0 * (1 - 1e-9)
-    assert max(voyage.end_error) < 1e-3
+    goal_plan = to_goal((0, 0, 0), (2, 2, 1), CONTROL, minimum_seconds=4.0)
+    assert goal_plan.plan.seconds.min() >= 4.0 * (1 - 1e-9)
+    assert max(goal_plan.end_error) < 1e-3
 
 
 def test_it_passes_places_on_the_way() -> None:
-    voyage = to_goal((0, 0, 0), (0, 3, math.pi), CONTROL, via=[(2, 1), (2, 3)], objective="error")
-    for place in voyage.via:
-        assert np.hypot(*(voyage.plan.guide.q - place).T).min() < 0.02
+    goal_plan = to_goal((0, 0, 0), (0, 3, math.pi), CONTROL, via=[(2, 1), (2, 3)], objective="error")
+    for place in goal_plan.via:
+        assert np.hypot(*(goal_plan.plan.guide.q - place).T).min() < 0.02
 
 
 def test_the_margin_is_the_stated_error() -> None:
-    voyage = to_goal((0, 0, 0), (6, 0, 0), CONTROL, keep_out=[Circle(3, 0, 0.8)], walls=BOX)
-    assert voyage.plan.stated_error <= voyage.margin
-    assert voyage.clearance > 0
+    goal_plan = to_goal((0, 0, 0), (6, 0, 0), CONTROL, keep_out=[Circle(3, 0, 0.8)], walls=BOX)
+    assert goal_plan.plan.stated_error <= goal_plan.margin
+    assert goal_plan.clearance > 0
     direct = to_goal((0, 0, 0), (6, 0, 0), CONTROL)
-    assert voyage.length > direct.length * 1.02
+    assert goal_plan.length > direct.length * 1.02
 
 
 def test_a_narrow_gap_is_passed_with_shorter_dwells() -> None:
     gate = [Polygon.of([[2, low], [2.5, low], [2.5, high], [2, high]]) for low, high in ((-4, -0.3), (0.3, 4))]
-    voyage = to_goal((0, 0, 0), (6, 0, 0), CONTROL, keep_out=gate, walls=BOX)
+    goal_plan = to_goal((0, 0, 0), (6, 0, 0), CONTROL, keep_out=gate, walls=BOX)
     wide = to_goal((0, 0, 0), (6, 0, 0), CONTROL, walls=BOX)
-    assert voyage.plan.stated_error < 0.6 * wide.plan.stated_error
-    assert len(voyage.plan.dwells) > len(wide.plan.dwells)
+    assert goal_plan.plan.stated_error < 0.6 * wide.plan.stated_error
+    assert len(goal_plan.plan.dwells) > len(wide.plan.dwells)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 3])
 def test_a_replay_in_the_simulator_stays_out(seed: int) -> None:
-    voyage = to_goal(robot=CONTROL, **goal_behind_circles(np.random.default_rng(seed)))
-    clearance, off, turned = replayed_clearance(voyage)
+    goal_plan = to_goal(robot=CONTROL, **goal_behind_circles(np.random.default_rng(seed)))
+    clearance, off, turned = replayed_clearance(goal_plan)
     assert clearance > 0
-    assert off < voyage.plan.stated_error
+    assert off < goal_plan.plan.stated_error
     assert turned < 0.1
 
 

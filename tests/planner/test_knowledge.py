@@ -12,8 +12,14 @@ import pytest
 
 from planner.paths.path import Path2D, circle, smoothed
 from planner.planning.plan import plan
-from planner.vehicle.calibration_table import COEFFICIENTS, NUMBERS, Knowledge, knowledge_toml, read_knowledge
-from planner.vehicle.from_table import vehicle_of
+from planner.vehicle.calibration_table import (
+    COEFFICIENTS,
+    NUMBERS,
+    CalibrationKnowledge,
+    knowledge_toml,
+    read_knowledge,
+)
+from planner.vehicle.from_table import table_vehicle
 from sim.inputs import load_robot, robot_toml
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
@@ -57,8 +63,8 @@ def test_wrong_tables_are_refused(tmp_path: Path, line: str, expected: str) -> N
 def test_the_covariance_widens_the_stated_error_by_what_the_table_says() -> None:
     """One standard deviation of C_yr moves the twist as the table moves between two robots."""
     lookup = load()
-    sure = Knowledge(("C_yr",), np.array([[1e-4]]))
-    (mode,) = [m for m in vehicle_of(CONTROL, lookup, sure).modes if m.name.startswith("coefficients")]
+    sure = CalibrationKnowledge(("C_yr",), np.array([[1e-4]]))
+    (mode,) = [m for m in table_vehicle(CONTROL, lookup, sure).modes if m.name.startswith("coefficients")]
     groups = {k: np.array([v]) for k, v in CONTROL.group_values().items()}
     ends = [lookup.query({**groups, "C_yr": groups["C_yr"] * np.exp(s)}) for s in (0.01, -0.01)]
     expected = (ends[0]["omega_yr_bar"] - ends[1]["omega_yr_bar"]) / 2
@@ -71,15 +77,15 @@ def test_the_covariance_widens_the_stated_error_by_what_the_table_says() -> None
 def test_a_number_of_the_robot_moves_the_twist_in_seconds_and_metres(name: str) -> None:
     """The mode of a number is the difference between two robots, in the units of the first."""
     lookup = load()
-    sure = Knowledge((name,), np.array([[1e-4]]))
-    (mode,) = [m for m in vehicle_of(CONTROL, lookup, sure).modes if m.name.startswith("coefficients")]
+    sure = CalibrationKnowledge((name,), np.array([[1e-4]]))
+    (mode,) = [m for m in table_vehicle(CONTROL, lookup, sure).modes if m.name.startswith("coefficients")]
     ends = []
     for sign in (0.01, -0.01):
         value = getattr(CONTROL, name) or CONTROL.head_radius
         moved: dict[str, Any] = {name: value * np.exp(sign)}
         robot = replace(CONTROL, **moved)
         time, length = robot.time_scale / CONTROL.time_scale, robot.tail_length / CONTROL.tail_length
-        ends.append(vehicle_of(robot, lookup).twist * [length / time, length / time, 1 / time])
+        ends.append(table_vehicle(robot, lookup).twist * [length / time, length / time, 1 / time])
     assert abs(mode.twist) == pytest.approx(abs(ends[0] - ends[1]) / 2, rel=0.05, abs=1e-5)
 
 
@@ -95,7 +101,7 @@ def test_another_robot_carries_a_plan_out_in_the_same_seconds_and_metres() -> No
 
 def test_the_table_is_written_as_it_is_read(tmp_path: Path) -> None:
     V = np.array([[2e-3, -1e-4], [-1e-4, 0.04]])
-    known = Knowledge(("viscosity", "end_over_end_drag"), V, (1e-5, 0.0), (2e-6, 3e-6))
+    known = CalibrationKnowledge(("viscosity", "end_over_end_drag"), V, (1e-5, 0.0), (2e-6, 3e-6))
     (tmp_path / "robot.toml").write_text(robot_toml(CONTROL) + knowledge_toml(known))
     found = read_knowledge(tmp_path / "robot.toml")
     assert found.names == known.names
@@ -106,13 +112,13 @@ def test_the_table_is_written_as_it_is_read(tmp_path: Path) -> None:
 def test_a_current_is_steered_against() -> None:
     """Across a line: the robot looks upstream, and its track stays on the line."""
     unit = CONTROL.tail_length / CONTROL.time_scale
-    flow = Knowledge(current=(0.0, 0.004 * unit))
+    flow = CalibrationKnowledge(current=(0.0, 0.004 * unit))
     result = plan(Path2D.of([[0, 0], [12, 0]]), CONTROL, knowledge=flow)
     assert result.predicted_rms < 1.4 * result.zigzag_rms
     middle = result.poses[len(result.poses) // 2 :, 2].mean()
     assert middle == pytest.approx(-math.asin(0.004 / result.net_speed), abs=0.01)
     with pytest.raises(InputError, match="as fast as the robot"):
-        plan(circle(3.0), CONTROL, knowledge=Knowledge(current=(0.0, 0.5 * unit)))
+        plan(circle(3.0), CONTROL, knowledge=CalibrationKnowledge(current=(0.0, 0.5 * unit)))
 
 
 def test_smoothing_takes_camera_noise_out_and_says_what_it_moves() -> None:

@@ -12,15 +12,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner import Path2D, circle, plan, polygon
 from planner.files.plan_files import milliseconds, write_plan
 from planner.files.plan_json import plan_record
 from planner.paths.distance import distance_to
 from planner.paths.fillets import fillet
+from planner.paths.path import Path2D, circle, polygon
 from planner.paths.tractrix import reference
-from planner.planning.schedule import follow, trace
+from planner.planning.plan import plan
+from planner.planning.schedule import follow
 from planner.planning.stated_error import guaranteed, look_ahead
-from planner.vehicle.from_table import vehicle_of
+from planner.vehicle.from_table import table_vehicle
+from planner.vehicle.rollout import trace
 from planner.vehicle.zigzag import zigzag
 from sim.io.errors import InputError, run_command
 from sim.mechanics import planar
@@ -154,7 +156,7 @@ def test_planning_never_calls_the_simulator(monkeypatch: pytest.MonkeyPatch) -> 
 def test_planning_does_not_even_load_the_simulator() -> None:
     simulator = ("sim.solve.newton", "sim.motion.steady", "sim.motion.replay", "sim.motion.run", "sim.solve.orbit")
     code = (
-        "import sys; from planner import plan, circle; from sim.model.presets import PRESETS;"
+        "import sys; from softflagella import plan, circle; from sim.model.presets import PRESETS;"
         "plan(circle(2.0), PRESETS['paper-control']);"
         f"print([m for m in {simulator} if m in sys.modules])"
     )
@@ -314,6 +316,6 @@ def test_milliseconds_carry_rounding_and_split_long_dwells() -> None:
 
 def test_vehicle_of_the_shipped_table_matches_the_reference_robot() -> None:
     """ω̄_yr, v_x, v_z of the control example from an independent solver."""
-    car = vehicle_of(CONTROL, load())
+    car = table_vehicle(CONTROL, load())
     assert car.twist[0] == pytest.approx([0.0180, 0.0425, 0.0490], rel=0.02)
     assert zigzag(car, 2.0).net_speed == pytest.approx(0.0169, rel=0.02)

@@ -11,8 +11,9 @@ import pytest
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
-from planner.planning.schedule import Switches, follow, trace
+from planner.planning.schedule import follow
 from planner.planning.stated_error import look_ahead, predicted_error, rms_in_time, stated_error
+from planner.vehicle.rollout import Switches, trace
 from planner.vehicle.vehicle import TIMES, Vehicle
 from tests.planner.vehicles import vehicle
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from planner.paths.path import circle, polygon
 from planner.planning.plan import Plan, plan
-from planner.tracking.tracker import Advice, Tracker
+from planner.tracking.tracker import Command, Tracker
 from planner.vehicle.vehicle import Vehicle
 from sim.model.presets import PRESETS
 from tests.planner.swimming import Camera, rms, swim
@@ -83,15 +83,15 @@ def test_it_learns_the_robot() -> None:
 def alarmed(car: Vehicle, camera: Camera) -> bool:
     """Whether the alarm came at any pose of a swim."""
     tracker, rang = Tracker(planned()), False
-    feed = tracker.feed
+    update = tracker.update
 
-    def spy(*event: Any) -> Advice:
+    def spy(*event: Any) -> Command:
         nonlocal rang
-        advice = feed(*event)
-        rang |= advice.alarm
-        return advice
+        command = update(*event)
+        rang |= command.alarm
+        return command
 
-    tracker.feed = spy  # type: ignore[method-assign]
+    tracker.update = spy  # type: ignore[method-assign]
     swim(tracker, planned(), car, camera)
     return rang
 
@@ -113,10 +113,18 @@ def test_no_flip_just_before_the_end(late: float) -> None:
     """Where the path ended at a flip, the motor was told to turn the other way for no time at all."""
     square = plan(polygon(4, 2.0), PRESETS["paper-control"], minimum_dwell=0.6, point="head_tip")
     tracker = Tracker(square)
-    advice = tracker.advice
-    while not advice.finished:
-        last, advice = advice, tracker.feed(advice.flip_at + late)
-        assert advice.finished or advice.flip_at > last.flip_at + late
+    command = tracker.command
+    while not command.finished:
+        last, command = command, tracker.update(command.flip_at + late)
+        assert command.finished or command.flip_at > last.flip_at + late
+
+
+def test_old_names_warn_and_work() -> None:
+    tracker = Tracker(planned())
+    with pytest.warns(DeprecationWarning, match=r"now Tracker\.update"):
+        assert tracker.feed(0.0) == tracker.command
+    with pytest.warns(DeprecationWarning, match=r"now Tracker\.command"):
+        assert tracker.advice == tracker.command
 
 
 VALUES = st.one_of(st.floats(-1e3, 1e3), st.sampled_from([math.nan, math.inf, -math.inf, 1e300, -1e300, 0.0]))
@@ -127,15 +135,15 @@ VALUES = st.one_of(st.floats(-1e3, 1e3), st.sampled_from([math.nan, math.inf, -m
 def test_it_never_flips_before_the_shortest_dwell(events: list[tuple[float, float, float, float, float]]) -> None:
     """Any numbers: times that jump and go back, poses from anywhere."""
     tracker = Tracker(planned())
-    now, last, direction, began = 0.0, tracker.advice, tracker.advice.direction, 0.0
+    now, last, direction, began = 0.0, tracker.command, tracker.command.direction, 0.0
     for step, x, y, heading, seen in events:
         now += step if math.isfinite(step) else 0.0
-        advice = tracker.feed(step if not math.isfinite(step) else now, (x, y, heading), seen)
-        if advice.finished:
+        command = tracker.update(step if not math.isfinite(step) else now, (x, y, heading), seen)
+        if command.finished:
             break
-        if advice.direction != direction:  # the flip that was announced has happened
+        if command.direction != direction:  # the flip that was announced has happened
             assert last.flip_at - began >= planned().minimum_dwell * (1 - 1e-12)
-            direction, began = advice.direction, last.flip_at
-        assert math.isfinite(advice.flip_at)
-        assert advice.flip_at - began >= planned().minimum_dwell * (1 - 1e-12)
-        last = advice
+            direction, began = command.direction, last.flip_at
+        assert math.isfinite(command.flip_at)
+        assert command.flip_at - began >= planned().minimum_dwell * (1 - 1e-12)
+        last = command

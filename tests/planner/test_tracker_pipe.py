@@ -26,12 +26,17 @@ def test_it_answers_like_the_tracker_in_seconds() -> None:
         "3 1",
     ]
     found = [line.split() for line in answers(one, lines, scale)]
-    expected = [other.feed(0.0), other.feed(1.0 / scale, result.start)]
-    expected += [other.feed(other._now), other.feed(other._now), other.feed(2.5 / scale), other.feed(3 / scale)]
+    expected = [other.update(0.0), other.update(1.0 / scale, result.start)]
+    expected += [
+        other.update(other._now),
+        other.update(other._now),
+        other.update(2.5 / scale),
+        other.update(3 / scale),
+    ]
     assert len(found) == len(lines)
-    for words, advice in zip(found, expected, strict=True):
-        assert int(words[0]) == advice.direction
-        assert float(words[1]) == pytest.approx(advice.flip_at * scale, abs=1e-5)
+    for words, command in zip(found, expected, strict=True):
+        assert int(words[0]) == command.direction
+        assert float(words[1]) == pytest.approx(command.flip_at * scale, abs=1e-5)
 
 
 def test_a_line_with_the_announced_time_is_the_flip() -> None:

@@ -9,9 +9,10 @@ import pytest
 
 from planner.paths.path import circle
 from planner.paths.tractrix import Drift, reference
-from planner.planning.schedule import Switches, follow, poses_at_flips, trace
+from planner.planning.schedule import follow
 from planner.planning.stated_error import look_ahead
-from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, lags_of
+from planner.vehicle.rollout import Switches, poses_at_flips, trace
+from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, lag_table
 from planner.vehicle.zigzag import zigzag
 from sim.mechanics import planar
 from sim.model.response import BEFORE, DWELLS, memory_after
@@ -23,22 +24,22 @@ def test_lags_are_those_of_the_curves() -> None:
     rng = np.random.default_rng(0)
     lag = rng.normal(size=(len(DWELLS), 3))
     memory = np.exp(-BEFORE / 0.3)[:, None, None] * rng.normal(size=(len(DWELLS), 3))
-    table = lags_of(lag, memory)
+    table = lag_table(lag, memory)
     car = replace(vehicle(), lag=np.stack([table, table * planar.MIRROR]))
     at = DWELLS[TIMES[-1] > DWELLS][-1]
     i = int(np.flatnonzero(at == DWELLS)[0])
     for before in (0.2, 0.27, 0.42, 0.7, 1.1, 1.4, 3.0):
         expected = lag[i] + memory_after(memory, before)[i]
-        near = car.lag_of(1, before, np.array([at - 0.01, at + 0.01]))
-        assert car.lag_of(1, before, at) == pytest.approx(expected, abs=2 * np.abs(np.diff(near, axis=0)).max())
-        assert car.lag_of(-1, before, at) == pytest.approx(car.lag_of(1, before, at) * planar.MIRROR)
+        near = car.lag_after(1, before, np.array([at - 0.01, at + 0.01]))
+        assert car.lag_after(1, before, at) == pytest.approx(expected, abs=2 * np.abs(np.diff(near, axis=0)).max())
+        assert car.lag_after(-1, before, at) == pytest.approx(car.lag_after(1, before, at) * planar.MIRROR)
 
 
 def test_nothing_has_happened_at_a_flip_and_nothing_changes_after_settling() -> None:
     car = vehicle()
     for before in (None, 0.3, 2.0):
-        assert car.lag_of(1, before, 0.0) == pytest.approx(np.zeros(3))
-        assert car.lag_of(1, before, 50.0) == pytest.approx(car.lag_of(1, before, TIMES[-1]))
+        assert car.lag_after(1, before, 0.0) == pytest.approx(np.zeros(3))
+        assert car.lag_after(1, before, 50.0) == pytest.approx(car.lag_after(1, before, TIMES[-1]))
 
 
 @pytest.mark.parametrize("bias", [0.0, 0.2])
@@ -62,7 +63,7 @@ def test_the_schedule_predicts_what_the_vehicle_does(bias: float) -> None:
 
 def test_the_longest_memory_is_none() -> None:
     car = vehicle()
-    assert car.lag_of(1, float(BEFORE_KNOTS[-1]), 0.5) == pytest.approx(car.lag_of(1, 9.0, 0.5))
+    assert car.lag_after(1, float(BEFORE_KNOTS[-1]), 0.5) == pytest.approx(car.lag_after(1, 9.0, 0.5))
 
 
 def test_an_even_robot_swims_straight_and_a_lopsided_one_at_an_angle() -> None:

@@ -58,6 +58,11 @@ def test_a_name_that_is_not_there() -> None:
         sf.swim  # noqa: B018
 
 
+def test_an_old_name_warns_and_works() -> None:
+    with pytest.warns(DeprecationWarning, match="Voyage is now GoalPlan"):
+        assert sf.Voyage is sf.GoalPlan
+
+
 def test_importing_the_package_loads_nothing_heavy() -> None:
     heavy = ("numpy", "torch", "numba", "pandas", "matplotlib", "scipy", "pyarrow", "sim")
     code = f"import sys, softflagella; print([name for name in {heavy!r} if name in sys.modules])"

@@ -15,7 +15,7 @@ from calibration.verdict.calibrate import Verdict, verdict_record
 from planner.paths.path import circle
 from planner.planning.plan import plan
 from planner.vehicle.calibration_table import read_knowledge
-from planner.vehicle.from_table import vehicle_of
+from planner.vehicle.from_table import table_vehicle
 from sim.inputs import load_robot, robot_toml
 from sim.io.errors import InputError, run_command
 from sim.model.correction import Correction
@@ -148,7 +148,7 @@ def test_outside_its_range_it_refuses() -> None:
 
 def test_the_planner_steers_with_it() -> None:
     robot = replace(CONTROL, correction=correction())
-    turned, plain = (vehicle_of(one, load()).yaw_rate for one in (robot, CONTROL))
+    turned, plain = (table_vehicle(one, load()).yaw_rate for one in (robot, CONTROL))
     exact = abs(steady(robot.groups()).omega_yr[0])
     assert turned == pytest.approx(exact, rel=0.01)
     assert turned > 1.1 * plain
