@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
+from typing import TypeVar
 
 import pandas as pd
 import pytest
@@ -21,6 +24,15 @@ from tests.calibration import toy
 START = PRESETS["paper-measured"]
 TRUTH = replace(START, C_t=3.1, C_r=2.4, C_yr=4.4)
 
+Test = TypeVar("Test", bound=Callable[..., None])
+LENGTHS_CM = (5.0, 8.0, 11.0)
+FEW_DRAWS = 200  # of the bootstrap, where no rate is asserted
+
+
+def shares_verdicts(test: Test) -> Test:
+    """Mark a test that uses `calibrated_toy`: all such tests run in one process."""
+    return pytest.mark.slow(pytest.mark.xdist_group("verdicts")(test))
+
 
 def install_toy(patch: pytest.MonkeyPatch) -> None:
     """The toy in place of the simulator: for tables, and for every Swimmer that is not told otherwise."""
@@ -36,7 +48,7 @@ def refuse_to_simulate(*_: object, **__: object) -> None:
     raise AssertionError("a test on the toy simulated")
 
 
-def toy_table(seed: int, *, lengths_cm: tuple[float, ...] = (5.0, 8.0, 11.0), **effects: float) -> pd.DataFrame:
+def toy_table(seed: int, *, lengths_cm: tuple[float, ...] = LENGTHS_CM, **effects: float) -> pd.DataFrame:
     return make_table(replace(TRUTH, effects=effects), seed=seed, lengths_cm=lengths_cm, title="")
 
 
@@ -44,5 +56,13 @@ def toy_swimmer(table: pd.DataFrame, robot: Robot = START, own: Owned | None = N
     return Swimmer(robot, read_measurements(table), solver=toy.SOLVER, own=own or {})
 
 
-def closed(table: pd.DataFrame, seed: int = 0) -> Verdict:
-    return calibrate(toy_swimmer(table), seed=seed, progress=False)
+def calibrated(table: pd.DataFrame, *, seed: int = 0, draws: int = FEW_DRAWS) -> Verdict:
+    return calibrate(toy_swimmer(table), seed=seed, draws=draws, progress=False)
+
+
+@cache
+def calibrated_toy(seed: int, *, lengths_cm: tuple[float, ...] = LENGTHS_CM, **effects: float) -> Verdict:
+    """The verdict of a toy table, found once a process; for tests with the mark `shares_verdicts`."""
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        return calibrated(toy_table(seed, lengths_cm=lengths_cm, **effects))

@@ -17,16 +17,17 @@ from surrogate.export.small_copy_files import save_small_copy
 from surrogate.table.model_file import load
 from tests.docs.pages import DOCS, PAGES, ROOT, blocks, name_of
 from tests.planner.compiled import compile_c
+from tests.processes import LIMIT
 
 RUN = ("sh", "python")
-SLOW = {"tutorial/closing.md", "tutorial/schedule.md", "howto/effect.md", "howto/cluster.md", "howto/tracker.md"}
+LONG = {"tutorial/closing.md", "howto/cluster.md"}
 SHOWN = {*RUN, "toml", "text", "c", "js"}
 
 
 def marked() -> list[Any]:
-    """Pages with something to run; the slow ones are marked."""
+    """Return the pages with something to run."""
     pages = [p for p in PAGES if any(b.language in RUN and not b.reason for b in blocks(p))]
-    return [pytest.param(p, id=name_of(p), marks=[pytest.mark.slow] if name_of(p) in SLOW else []) for p in pages]
+    return [pytest.param(p, id=name_of(p), marks=[pytest.mark.long] if name_of(p) in LONG else []) for p in pages]
 
 
 def environment(folder: Path) -> dict[str, str]:
@@ -38,6 +39,8 @@ def environment(folder: Path) -> dict[str, str]:
     return {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)}
 
 
+@pytest.mark.page
+@pytest.mark.slow  # so that each page goes to whichever process is free
 @pytest.mark.parametrize("page", marked())
 def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     commands, work = tmp_path / "bin", tmp_path / "work"
@@ -52,7 +55,13 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytes
             exec(compile(block.code, name_of(page), "exec"), names)
         else:
             done = subprocess.run(
-                ["sh", "-e", "-c", block.code], env=shell, cwd=work, capture_output=True, text=True, check=False
+                ["sh", "-e", "-c", block.code],
+                env=shell,
+                cwd=work,
+                capture_output=True,
+                text=True,
+                check=False,
+                timeout=LIMIT,
             )
             assert done.returncode == 0, f"{block.code}\n{done.stdout}\n{done.stderr}"
 

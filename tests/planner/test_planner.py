@@ -30,6 +30,7 @@ from sim.model.presets import PRESETS
 from sim.model.schedule import load_schedule
 from surrogate.table.model_file import load
 from tests.planner.vehicles import vehicle
+from tests.processes import LIMIT
 
 CONTROL = PRESETS["paper-control"]
 
@@ -159,7 +160,7 @@ def test_planning_does_not_even_load_the_simulator() -> None:
         "plan(circle(2.0), PRESETS['paper-control']);"
         f"print([m for m in {simulator} if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=LIMIT)
     assert done.stdout.strip() == "[]"
 
 
@@ -289,8 +290,14 @@ def test_the_header_compiles(tmp_path: Path) -> None:
         'printf("%ld %ld %f %f %ld",s,(long)SCHEDULE_TOTAL_MS,SCHEDULE_START_X,SCHEDULE_START_HEADING,'
         "(long)schedule_checkpoints[SCHEDULE_CHECKPOINTS-1].ms);return 0;}"
     )
-    subprocess.run([compiler, "-Wall", "-Werror", "-o", str(tmp_path / "a"), str(tmp_path / "main.c")], check=True)
-    words = subprocess.run([str(tmp_path / "a")], capture_output=True, text=True, check=True).stdout.split()
+    subprocess.run(
+        [compiler, "-Wall", "-Werror", "-o", str(tmp_path / "a"), str(tmp_path / "main.c")],
+        check=True,
+        timeout=LIMIT,
+    )
+    words = subprocess.run(
+        [str(tmp_path / "a")], capture_output=True, text=True, check=True, timeout=LIMIT
+    ).stdout.split()
     total = int(words[0])
     content = json.loads((header.parent / "plan.json").read_text())
     seconds = content["dwell_s"]

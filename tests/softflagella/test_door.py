@@ -14,6 +14,7 @@ import pytest
 import softflagella as sf
 from sim.io.errors import run_command
 from softflagella.__main__ import PACKAGES, main
+from tests.processes import LIMIT
 
 SOURCE = Path(sf.__file__)
 NAMES = [name for name in sf.__all__ if not name.startswith("_")]
@@ -65,7 +66,7 @@ def test_an_old_name_warns_and_works() -> None:
 def test_importing_the_package_loads_nothing_heavy() -> None:
     heavy = ("numpy", "torch", "numba", "pandas", "matplotlib", "scipy", "pyarrow", "sim")
     code = f"import sys, softflagella; print([name for name in {heavy!r} if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=LIMIT)
     assert done.stdout.strip() == "[]"
 
 

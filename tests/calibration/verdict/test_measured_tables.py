@@ -16,7 +16,7 @@ from calibration.swimmer.swimmer import Swimmer
 from calibration.verdict.calibrate import calibrate
 from tests.calibration.toy_tables import START
 
-MEASURED = Path(__file__).parents[3] / "shared" / "measured"
+MEASURED = Path(__file__).parents[4] / "shared" / "measured"
 
 
 @pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.report.corrected_robot import corrected_toml
+from calibration.report.corrected_robot import corrected_robot, corrected_toml
 from calibration.swimmer.swimmer import Swimmer
 from calibration.verdict.calibrate import Verdict, verdict_record
 from planner.paths.path import circle
@@ -22,7 +22,7 @@ from sim.model.correction import Correction
 from sim.model.presets import PRESETS
 from sim.motion.steady import steady
 from surrogate.table.model_file import load
-from tests.calibration.toy_tables import START, closed, install_toy, toy_swimmer, toy_table
+from tests.calibration.toy_tables import START, calibrated, install_toy, toy_swimmer, toy_table
 
 CONTROL = PRESETS["paper-control"]
 
@@ -41,7 +41,7 @@ def table() -> pd.DataFrame:
 def result(table: pd.DataFrame) -> Verdict:
     with pytest.MonkeyPatch.context() as patch:
         install_toy(patch)
-        return closed(table)
+        return calibrated(table)
 
 
 def correction(**changes: object) -> Correction:
@@ -56,6 +56,8 @@ def correction(**changes: object) -> Correction:
     return replace(plain, **changes)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
+@pytest.mark.xdist_group("head correction")
 def test_it_predicts_runs_that_it_was_not_learnt_from(result: Verdict) -> None:
     assert result.verdict == "unexplained"
     assert result.predictive is not None
@@ -67,6 +69,21 @@ def test_it_predicts_runs_that_it_was_not_learnt_from(result: Verdict) -> None:
     assert verdict_record(result, table="t")["error_predictive"] == result.error_predictive
 
 
+@pytest.mark.slow
+@pytest.mark.xdist_group("head correction")
+def test_what_no_effect_does_is_left_unexplained(result: Verdict, table: pd.DataFrame) -> None:
+    """No effect is claimed; a correction of the predictions, of no effect's form, helps by itself."""
+    assert result.effects == ()
+    assert corrected_robot(START, result.final.parameters).effects == {}
+    assert "no effect and no pair" in result.sentence
+    assert any("ln l" in name for name in result.generic.features)
+    residual = (toy_swimmer(table).runs.y - result.base.prediction)[result.used]
+    corrected = residual - result.generic.correction[result.used]
+    assert (corrected**2).mean() < 0.7 * (residual**2).mean()
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("head correction")
 def test_the_corrected_robot_simulates_what_was_predicted(
     result: Verdict, table: pd.DataFrame, tmp_path: Path
 ) -> None:
@@ -85,6 +102,8 @@ def test_the_corrected_robot_simulates_what_was_predicted(
     assert (left**2).mean() < 0.6 * (before**2).mean()
 
 
+@pytest.mark.slow
+@pytest.mark.xdist_group("head correction")
 def test_its_uncertainty_is_in_the_covariance(result: Verdict, tmp_path: Path) -> None:
     assert result.predictive is not None
     (tmp_path / "with.toml").write_text(corrected_toml(START, result.delivered, result.predictive))

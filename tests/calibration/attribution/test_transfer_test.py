@@ -17,7 +17,7 @@ from calibration.swimmer.swimmer import COEFFICIENTS, Swimmer
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import verdict_record
 from sim.arrays import Flags, Floats
-from tests.calibration.toy_tables import TRUTH, toy_swimmer, toy_table
+from tests.calibration.toy_tables import FEW_DRAWS, TRUTH, toy_swimmer, toy_table
 
 EFFECT = "end_over_end_drag"
 SIZE = 3.0
@@ -74,12 +74,11 @@ def test_runs_that_are_all_alike_say_nothing() -> None:
     assert transfer_p(claimed(own), own.runs, few, seed=1) == 1.0
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_a_claim_that_does_not_carry_over_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     there = planted(model(), np.full(len(model().runs), 2.0))
     monkeypatch.setattr(calibration.attribution.refits, "transfer_p", lambda *_, **__: 0.001)
-    doubted = calibrate(there, progress=False)
+    doubted = calibrate(there, draws=FEW_DRAWS, progress=False)
     assert doubted.effects == (EFFECT,)
     assert "or something outside the catalogue" in doubted.sentence
     assert verdict_record(doubted, table="")["transfer_p"] == [0.001]

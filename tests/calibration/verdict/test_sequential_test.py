@@ -25,7 +25,7 @@ from calibration.verdict.sequential_test import (
     standings,
 )
 from sim.io.errors import InputError
-from tests.calibration.toy_tables import closed, install_toy, toy_swimmer, toy_table
+from tests.calibration.toy_tables import calibrated_toy, install_toy, shares_verdicts, toy_swimmer, toy_table
 
 
 @pytest.fixture(scope="module")
@@ -34,13 +34,13 @@ def undecided(tmp_path_factory: pytest.TempPathFactory) -> tuple[pd.DataFrame, P
     with pytest.MonkeyPatch.context() as patch:
         install_toy(patch)
         table = toy_table(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
-        verdict = closed(table)
+    verdict = calibrated_toy(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
     path = tmp_path_factory.mktemp("decide") / "verdict.json"
     path.write_text(json.dumps(verdict_record(verdict, table="t")))
     return table, path
 
 
-@pytest.mark.slow
+@shares_verdicts
 @pytest.mark.usefixtures("toy_model")
 def test_new_runs_of_other_lengths_decide_for_the_truth(undecided: tuple[pd.DataFrame, Path]) -> None:
     table, path = undecided
@@ -56,7 +56,7 @@ def test_new_runs_of_other_lengths_decide_for_the_truth(undecided: tuple[pd.Data
     assert sentence(found).startswith("Decided: head's end-over-end drag.")
 
 
-@pytest.mark.slow
+@shares_verdicts
 @pytest.mark.usefixtures("toy_model")
 def test_eight_runs_like_the_old_ones_decide_nothing(undecided: tuple[pd.DataFrame, Path]) -> None:
     table, path = undecided

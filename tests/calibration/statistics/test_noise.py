@@ -13,10 +13,10 @@ from calibration.statistics.held_out import middle_session
 from calibration.statistics.input_features import features
 from calibration.statistics.noise import Design, Noise, inverse_root, least_squares, repeat_covariance, sums
 from calibration.statistics.priors import changes, precisions
-from calibration.statistics.residual_tests import check_misfit
+from calibration.statistics.residual_tests import DRAWS, check_misfit
 from calibration.statistics.score_directions import Directions
 from calibration.swimmer.measured_table import read_measurements
-from tests.calibration.toy_tables import closed, toy_swimmer, toy_table
+from tests.calibration.toy_tables import calibrated, toy_swimmer, toy_table
 
 
 def test_whitener_is_the_inverse_root_of_the_block_covariance() -> None:
@@ -105,14 +105,14 @@ def test_noise_is_recovered_from_repeats_and_sessions() -> None:
     assert np.mean(shares) == pytest.approx(0.1, rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.rates
 @pytest.mark.usefixtures("toy_model")
 def test_p_values_of_nulls_are_spread_evenly() -> None:
     """The bootstrap accounts for the fit: p-values of pure noise are neither small nor large on the whole."""
     table = toy_table(11)
     data = read_measurements(table)
     used = ~middle_session(data)
-    base = closed(table).base
+    base = calibrated(table, draws=DRAWS).base
     rng = np.random.default_rng(0)
     p = []
     for seed in range(40):

@@ -23,12 +23,12 @@ from sim.model.robot import Robot
 from sim.model.schedule import Schedule, load_schedule
 from sim.motion.replay import replay
 from surrogate.table.model_file import load_table
-from tests.calibration.toy_tables import START, closed, toy_table
+from tests.calibration.toy_tables import START, calibrated_toy, shares_verdicts
 
 
-@pytest.mark.usefixtures("toy_model")
+@shares_verdicts
 def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -> None:
-    result = closed(toy_table(5, end_over_end_drag=5.0))
+    result = calibrated_toy(5, end_over_end_drag=5.0)
     assert result.effects == ("end_over_end_drag",)
     path = tmp_path / "corrected.toml"
     path.write_text(corrected_toml(START, result.delivered))
@@ -42,9 +42,9 @@ def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -
     assert sigma["tail_length"] == pytest.approx(1e-3 / START.tail_length, rel=0.5)  # of ln l, by its prior
 
 
-@pytest.mark.usefixtures("toy_model")
+@shares_verdicts
 def test_a_current_is_handed_on_with_its_error() -> None:
-    delivered = closed(toy_table(5)).delivered
+    delivered = calibrated_toy(3).delivered
     one = replace(delivered.fitted[0], name=CURRENT[1], logarithmic=False)
     found = knowledge_of(
         START,

@@ -17,7 +17,7 @@ from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import Swimmer
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
-from tests.calibration.toy_tables import START, TRUTH, closed, toy_swimmer, toy_table
+from tests.calibration.toy_tables import START, TRUTH, calibrated, toy_swimmer, toy_table
 
 SIZE, TIME = "shear_thinning", "shear_thinning_time"
 HIDDEN = {SIZE: 0.45, TIME: 0.6}
@@ -77,20 +77,19 @@ def test_leaving_an_effect_out_leaves_all_its_columns_out() -> None:
     assert left.table[0, 0].tolist() == [0.0, 3.0]
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [4, pytest.param(3, marks=pytest.mark.long)])
 def test_size_and_time_are_recovered_from_the_toy(seed: int) -> None:
     truth = replace(TRUTH, effects=HIDDEN)
     table = make_table(truth, seed=seed, lengths_cm=(5.0, 8.0, 11.0), motor_rpm=SPEEDS, title="")
-    result = closed(table)
+    result = calibrated(table)
     assert SIZE in result.effects
     refit = next(c.refit for c in result.explaining if c.effect.name == SIZE)
     recovered(refit)
     assert result.error_after < 1.15 * result.noise_ceiling
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_local_thinning_is_found_by_the_simulator() -> None:
     """Truth by time steps on a finer mesh."""
     truth = replace(TRUTH, effects=HIDDEN)
