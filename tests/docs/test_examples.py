@@ -70,9 +70,9 @@ def test_c_on_pages_compiles(tmp_path: Path) -> None:
     robot = sf.load_robot("paper-control")
     sf.write_plan(sf.plan(sf.circle(2.0), robot), tmp_path)
     save_small_copy(load(), tmp_path)
-    found = [block for page in PAGES for block in blocks(page) if block.language == "c"]
-    assert found
-    for block in found:
+    c_blocks = [block for page in PAGES for block in blocks(page) if block.language == "c"]
+    assert c_blocks
+    for block in c_blocks:
         (tmp_path / "page.c").write_text(block.code)
         compile_c(tmp_path / "page.c", tmp_path / "page.o", "-c")
 
@@ -82,9 +82,9 @@ def test_every_block_is_of_a_known_language() -> None:
     for page in PAGES:
         fences = [line for line in page.read_text().splitlines() if line.startswith("```") and line != "```"]
         directives = [line for line in fences if line.startswith("```{")]
-        found = blocks(page)
-        assert len(found) == len(fences) - len(directives), name_of(page)
-        assert {block.language for block in found} <= SHOWN, name_of(page)
+        page_blocks = blocks(page)
+        assert len(page_blocks) == len(fences) - len(directives), name_of(page)
+        assert {block.language for block in page_blocks} <= SHOWN, name_of(page)
 
 
 def test_the_robot_on_the_page_of_files_is_one(tmp_path: Path) -> None:

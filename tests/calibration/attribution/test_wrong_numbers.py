@@ -147,10 +147,10 @@ def test_pulls_are_those_of_the_textbook() -> None:
                 pull.alone * sigma**2 / (sigma**2 + pull.alone_error**2), rel=1e-6, abs=1e-12
             )
     free = fit(model, bound.parameters, names, used, free=(CAMERA,), title="")
-    own = {p.parameter.name: p for p in pulls(bound, model.given)}[CAMERA]
+    bound_pull = {p.parameter.name: p for p in pulls(bound, model.given)}[CAMERA]
     alone = {p.parameter.name: p for p in pulls(free, model.given)}[CAMERA]
     assert alone.freed
-    assert alone.change == pytest.approx(own.alone, abs=0.1 * own.alone_error)
+    assert alone.change == pytest.approx(bound_pull.alone, abs=0.1 * bound_pull.alone_error)
 
 
 def test_exact_numbers_are_not_fitted_and_the_table_states_its_own() -> None:

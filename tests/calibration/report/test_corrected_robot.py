@@ -45,22 +45,22 @@ def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -
 @shares_verdicts
 def test_a_current_is_handed_on_with_its_error() -> None:
     delivered = calibrated_toy(3).delivered
-    one = replace(delivered.fitted[0], name=CURRENT[1], logarithmic=False)
-    found = knowledge_of(
+    current = replace(delivered.fitted[0], name=CURRENT[1], logarithmic=False)
+    handed_on = knowledge_of(
         START,
         replace(
             delivered,
             parameters={**delivered.parameters, CURRENT[1]: 2e-4},
-            fitted=(*delivered.fitted, one),
+            fitted=(*delivered.fitted, current),
             covariance=np.block([
                 [delivered.covariance, np.zeros((len(delivered.fitted), 1))],
                 [np.zeros((1, len(delivered.fitted))), np.array([[1e-10]])],
             ]),
         ),
     )  # fmt: skip
-    assert found.current == (0.0, 2e-4)
-    assert found.current_error == (0.0, pytest.approx(1e-5))
-    assert CURRENT[1] not in found.names
+    assert handed_on.current == (0.0, 2e-4)
+    assert handed_on.current_error == (0.0, pytest.approx(1e-5))
+    assert CURRENT[1] not in handed_on.names
 
 
 @pytest.mark.slow
@@ -97,10 +97,10 @@ def _swum(schedule: Schedule, planned: Robot, truth: Robot):  # type: ignore[no-
     """The track of the true robot, in units of the planned one: seconds and metres are the same."""
     time, length = planned.time_scale / truth.time_scale, planned.tail_length / truth.tail_length
     x, y, heading = schedule.start
-    own = Schedule(
+    schedule_of_truth = Schedule(
         truth.group_values(), schedule.first_direction, schedule.dwells * time, (x * length, y * length, heading),
         truth.time_scale,
     )  # fmt: skip
-    track = replay([own])[0]
+    track = replay([schedule_of_truth])[0]
     track[["x_over_l", "y_over_l"]] /= length
     return track

@@ -32,9 +32,9 @@ def table() -> pd.DataFrame:
     """A yaw rate that bends with the tails' length, of no effect's form."""
     with pytest.MonkeyPatch.context() as patch:
         install_toy(patch)
-        found = toy_table(9, lengths_cm=(5.0, 6.5, 8.0, 9.5, 11.0))
-    found["omega_yr_rad_s"] *= np.exp(0.02 * (found["l_cm"] - 8.0) ** 2)
-    return found
+        bent = toy_table(9, lengths_cm=(5.0, 6.5, 8.0, 9.5, 11.0))
+    bent["omega_yr_rad_s"] *= np.exp(0.02 * (bent["l_cm"] - 8.0) ** 2)
+    return bent
 
 
 @pytest.fixture(scope="module")
@@ -63,8 +63,8 @@ def test_it_predicts_runs_that_it_was_not_learnt_from(result: Verdict) -> None:
     assert result.predictive is not None
     assert result.error_predictive is not None
     assert any("ln l/R" in term for term in result.predictive.terms)
-    left = result.error_before**2 - result.noise_ceiling**2
-    assert result.error_predictive**2 - result.noise_ceiling**2 < 0.4 * left
+    excess = result.error_before**2 - result.noise_ceiling**2
+    assert result.error_predictive**2 - result.noise_ceiling**2 < 0.4 * excess
     assert f"{100 * result.error_predictive:.1f} % on runs" in result.sentence
     assert verdict_record(result, table="t")["error_predictive"] == result.error_predictive
 
@@ -93,13 +93,13 @@ def test_the_corrected_robot_simulates_what_was_predicted(
     robot = load_robot(tmp_path / "corrected.toml")
     assert robot.correction == result.predictive.content.correction
     model = toy_swimmer(table)
-    own = Swimmer(replace(robot, tail_length=START.tail_length), model.runs, solver=model.solver)
-    start = {p.name: p.start for p in (*own.coefficients, *own.given, *own.effects)}
+    corrected = Swimmer(replace(robot, tail_length=START.tail_length), model.runs, solver=model.solver)
+    start = {p.name: p.start for p in (*corrected.coefficients, *corrected.given, *corrected.effects)}
     start["tail_length_offset"] = robot.tail_length - START.tail_length
     start |= {k: result.delivered.parameters[k] for k in ("camera_scale", "heading_zero", "tachometer")}
-    left = (model.runs.y - own.predict([start])[0])[result.used]
-    before = (model.runs.y - result.base.prediction)[result.used]
-    assert (left**2).mean() < 0.6 * (before**2).mean()
+    residual = (model.runs.y - corrected.predict([start])[0])[result.used]
+    uncorrected = (model.runs.y - result.base.prediction)[result.used]
+    assert (residual**2).mean() < 0.6 * (uncorrected**2).mean()
 
 
 @pytest.mark.slow
@@ -117,9 +117,9 @@ def test_its_uncertainty_is_in_the_covariance(result: Verdict, tmp_path: Path) -
 def test_a_robot_with_a_correction_is_that_with_other_drag() -> None:
     robot = replace(CONTROL, correction=correction())
     longer = replace(robot, tail_length=1.1 * CONTROL.tail_length)
-    for one in (robot, longer):
-        plain, values = replace(one, correction=None).group_values(), one.group_values()
-        g = 0.2 + 0.1 * np.log(one.tail_length / CONTROL.tail_length) / 0.2
+    for corrected in (robot, longer):
+        plain, values = replace(corrected, correction=None).group_values(), corrected.group_values()
+        g = 0.2 + 0.1 * np.log(corrected.tail_length / CONTROL.tail_length) / 0.2
         assert values["C_yr"] == pytest.approx(plain["C_yr"] * np.exp(1.5 * np.tanh(g / 1.5)))
         assert values["surface_couple"] == pytest.approx(2 * np.tanh(0.025))
         assert {k: v for k, v in values.items() if k not in ("C_yr", "surface_couple")} == {
@@ -148,7 +148,7 @@ def test_outside_its_range_it_refuses() -> None:
 
 def test_the_planner_steers_with_it() -> None:
     robot = replace(CONTROL, correction=correction())
-    turned, plain = (table_vehicle(one, load()).yaw_rate for one in (robot, CONTROL))
+    turned, plain = (table_vehicle(swimmer, load()).yaw_rate for swimmer in (robot, CONTROL))
     exact = abs(steady(robot.groups()).omega_yr[0])
     assert turned == pytest.approx(exact, rel=0.01)
     assert turned > 1.1 * plain

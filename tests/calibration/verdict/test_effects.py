@@ -120,11 +120,11 @@ def test_fits_arrive_along_a_valley() -> None:
     table = toy_table(6, **{hidden: 5.0}).drop(columns=["omega_h_rpm", "omega_yr_rad_s", "theta_deg"])
     model, true_model = toy_swimmer(table), toy_swimmer(table, TRUTH)
     names, every = (*(p.name for p in model.coefficients), hidden), np.ones(len(table), bool)
-    here = fit(model, {**start_values(model), hidden: 5.0}, names, every)
-    there = fit(true_model, {**start_values(true_model), hidden: 5.0}, names, every)
-    assert here.arrived
-    assert there.arrived
-    assert here.deviance == pytest.approx(there.deviance, abs=0.5)
+    from_preset = fit(model, {**start_values(model), hidden: 5.0}, names, every)
+    from_truth = fit(true_model, {**start_values(true_model), hidden: 5.0}, names, every)
+    assert from_preset.arrived
+    assert from_truth.arrived
+    assert from_preset.deviance == pytest.approx(from_truth.deviance, abs=0.5)
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -152,12 +152,12 @@ def in_thinning_fluid(table: pd.DataFrame, rate: float) -> pd.DataFrame:
             for n, length, rpm, h in zip(table["N"], table["l_cm"], table["omega_rpm"], hours, strict=True)
         ]  # fmt: skip
         groups = [robot.group_values() for robot in robots]
-        found = toy.steady_columns({name: np.array([g[name] for g in groups]) for name in groups[0]})
+        motion = toy.steady_columns({name: np.array([g[name] for g in groups]) for name in groups[0]})
         time = np.array([robot.time_scale for robot in robots])
         return {
-            "omega_h_rpm": found["omega_h_bar"] / time, "omega_t_rpm": found["omega_t_bar"] / time,
-            "omega_yr_rad_s": found["omega_yr_bar"] / time, "R_yr_cm": found["R_yr_over_l"],
-            "theta_deg": found["theta_deg"],
+            "omega_h_rpm": motion["omega_h_bar"] / time, "omega_t_rpm": motion["omega_t_bar"] / time,
+            "omega_yr_rad_s": motion["omega_yr_bar"] / time, "R_yr_cm": motion["R_yr_over_l"],
+            "theta_deg": motion["theta_deg"],
         }  # fmt: skip
 
     before, after = outputs(0.0), outputs(rate)
@@ -212,10 +212,10 @@ def test_the_generic_correction_helps_where_no_effect_explains() -> None:
     table["omega_yr_rad_s"] *= 1 + 0.02 * (table["l_cm"] - 8.0) ** 2
     model = toy_swimmer(table)
     result = calibrated(table)
-    left = (model.runs.y - result.base.prediction)[result.used]
-    corrected = left - result.generic.correction[result.used]
+    residual = (model.runs.y - result.base.prediction)[result.used]
+    corrected = residual - result.generic.correction[result.used]
     assert any("ln l" in name for name in result.generic.features)
-    assert (corrected**2).mean() < 0.7 * (left**2).mean()
+    assert (corrected**2).mean() < 0.7 * (residual**2).mean()
 
 
 @shares_verdicts

@@ -64,8 +64,8 @@ def test_intervals_of_coefficients_cover(name: str, nulls: list[Verdict]) -> Non
     assert missed <= binom.isf(0.01, len(nulls), 0.05)
     place = nulls[0].base.names.index(name)
     stated = np.sqrt(np.mean([null.base.covariance[place, place] for null in nulls]))
-    found = np.std([math.log(null.base.parameters[name]) for null in nulls])
-    assert 0.7 < stated / found < 3.0  # 2.4 for C_r
+    scatter = np.std([math.log(null.base.parameters[name]) for null in nulls])
+    assert 0.7 < stated / scatter < 3.0  # 2.4 for C_r
 
 
 @pytest.mark.rates

@@ -47,34 +47,35 @@ def test_scores_are_taken_at_several_values_and_the_largest_counts() -> None:
     model = toy_swimmer(toy_table(5, **HIDDEN))
     used = np.ones(len(model.runs), bool)
     base = fit(model, start_values(model), ("C_t", "C_r", "C_yr"), used, title="")
-    along = directions(model, base.parameters, model.effects)
+    candidates = directions(model, base.parameters, model.effects)
     place = [e.name for e in model.effects].index(SIZE)
-    own = along.table[..., along.owner == place]
+    columns = candidates.table[..., candidates.owner == place]
     grid = influences()[SIZE].parameter.second.grid  # type: ignore[union-attr]
-    assert own.shape[-1] == len(grid)
-    for column, value in zip(np.moveaxis(own, -1, 0), grid, strict=True):
+    assert columns.shape[-1] == len(grid)
+    for column, value in zip(np.moveaxis(columns, -1, 0), grid, strict=True):
         expected = by_differences(model, {**base.parameters, TIME: value, SIZE: 1e-6}, [SIZE])[1][..., 0]
         assert column == pytest.approx(expected, rel=0.05, abs=1e-4)
-    found = check_misfit(base, model.runs, used, along, level=0.05, seed=0, draws=50)
+    misfit = check_misfit(base, model.runs, used, candidates, level=0.05, seed=0, draws=50)
     alone = [
-        check_misfit(base, model.runs, used, Directions.plain(own[..., [j]]), level=0.05, seed=0, draws=50)
+        check_misfit(base, model.runs, used, Directions.plain(columns[..., [j]]), level=0.05, seed=0, draws=50)
         for j in range(len(grid))
     ]
-    z = np.array([abs(one.scores.z[0]) for one in alone])
-    assert abs(found.scores.z[place]) == pytest.approx(z.max())
-    assert found.second[place] == grid[int(np.argmax(z))]
-    assert len(found.scores.z) == len(model.effects)
-    together = check_misfit(base, model.runs, used, Directions(own, np.zeros(3, int), np.array(grid)), level=0.05,
-                            seed=0, draws=200)  # fmt: skip
-    first = check_misfit(base, model.runs, used, Directions.plain(own[..., [0]]), level=0.05, seed=0, draws=200)
+    z = np.array([abs(single.scores.z[0]) for single in alone])
+    assert abs(misfit.scores.z[place]) == pytest.approx(z.max())
+    assert misfit.second[place] == grid[int(np.argmax(z))]
+    assert len(misfit.scores.z) == len(model.effects)
+    all_values = Directions(columns, np.zeros(3, int), np.array(grid))
+    together = check_misfit(base, model.runs, used, all_values, level=0.05, seed=0, draws=200)
+    first_value = Directions.plain(columns[..., [0]])
+    first = check_misfit(base, model.runs, used, first_value, level=0.05, seed=0, draws=200)
     assert together.critical_z >= first.critical_z  # the bootstrap takes the largest, too
 
 
 def test_leaving_an_effect_out_leaves_all_its_columns_out() -> None:
     table = np.arange(4.0) * np.ones((2, 1, 4))
-    left = Directions(table, np.array([0, 1, 1, 2]), np.array([np.nan, 0.0, 1.0, np.nan])).without(1)
-    assert left.owner.tolist() == [0, 1]
-    assert left.table[0, 0].tolist() == [0.0, 3.0]
+    remaining = Directions(table, np.array([0, 1, 1, 2]), np.array([np.nan, 0.0, 1.0, np.nan])).without(1)
+    assert remaining.owner.tolist() == [0, 1]
+    assert remaining.table[0, 0].tolist() == [0.0, 3.0]
 
 
 @pytest.mark.usefixtures("toy_model")
