@@ -171,7 +171,7 @@ def runs() -> pd.DataFrame:
     return found.assign(elapsed_min=4.0 * np.arange(len(found)), v_cm_s=1.0 + 0.01 * np.arange(len(found)))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @few
 @given(data=st.data())
 def test_any_table_of_runs(
