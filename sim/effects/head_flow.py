@@ -2,7 +2,7 @@
 
     v → v − ε (Stokeslets of the head's drag, rotlet of its spin) at the tails, and of the tails at the head
 
-The head is represented by pieces of its axis. Each has an equal part of the head's drag, spread over R. ε = 1 is
+The head is represented by segments of its axis. Each has an equal part of the head's drag, spread over R. ε = 1 is
 the full flow. The effect is large for short tails.
 """
 

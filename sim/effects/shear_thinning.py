@@ -2,7 +2,7 @@
 
     ζ∥, ζ⊥ × (1 + (λ γ̇)²)^(−ε/2),   γ̇ = |v|/r0,   ε = 1 − n
 
-Carreau's law with exponent n. The rate of shear γ̇ at a piece of tail is its own speed through the fluid over its
+Carreau's law with exponent n. The rate of shear γ̇ at a segment of tail is its own speed through the fluid over its
 radius, so the part that moves most thins most. λ is the relaxation time of the fluid. It is a number of its own,
 `shear_thinning_time`; at its null, λ γ̇ is 1 at the clamps of the paper's control example. Pure glycerol does not
 thin, so a verdict should not name this effect there. Left out: thinning at the head, which turns more slowly, and

@@ -7,16 +7,16 @@ velocity relative to the fluid that the other parts move:
     q_k = −l_k [ζ⊥ I + (ζ∥ − ζ⊥) tt] (v_k − w_k),   w_k = Σ ∫ G(x_k − y) f/μ ds.
 
 The sum is over the edges of the other tails, over the head, and over images. The force of a node is spread evenly
-over the edges beside it, and the integral over a straight edge is exact at any distance. The head is pieces of its
-axis with equal parts of its drag, and rotlets for its spin. In balance, the force of a free node on the fluid is
-its elastic force and load. So w follows from the shape. Only the velocities of clamps and head are given, so their
-forces depend on each other's flow. They are found in a few rounds; each change is smaller than the last one. The
-head's drag, too, is relative to the fluid that the tails move. All of this is solved together with the balance,
-not one step later.
+over the edges beside it, and the integral over a straight edge is exact at any distance. The head is represented
+by segments of its axis with equal parts of its drag, and rotlets for its spin. In balance, the force of a free
+node on the fluid is its elastic force and load. So w follows from the shape. Only the velocities of clamps and
+head are given, so their forces depend on each other's flow. They are found in a few rounds; each change is smaller
+than the last one. The head's drag, too, is relative to the fluid that the tails move. All of this is solved
+together with the balance, not one step later.
 
 C_t is fitted and larger than that of a cylinder (about 1.4). With all of this drag on the fluid, the head would
 move the fluid at the clamps faster than it moves itself. So only a part of the drag moves the fluid: at most the
-drag with which the head's pieces would move with the fluid on the axis. The rest of the drag has other causes.
+drag with which the head's segments would move with the fluid on the axis. The rest of the drag has other causes.
 
 Surface: a flat plane without shear and without flow through it, at a height of HEIGHT times the larger of R and a
 above the axis. The image of f at (x, y, z) is (f_x, −f_y, f_z) at (x, 2H − y, z); the image of a spin about z
@@ -50,10 +50,10 @@ _ROUNDS = 3
 
 
 class Scene(NamedTuple):
-    """A robot at one instant in the body frame: places where the flow is computed, and pieces that make it.
+    """A robot at one instant in the body frame: places where the flow is computed, and segments that produce it.
 
-    Places: nodes 0..n of each tail, then the middles of the head's pieces. Pieces: edges of the tails under the
-    forces of free nodes, first edges under the drag of the clamps, then the head's pieces.
+    Places: nodes 0..n of each tail, then the midpoints of the head's segments. Segments: edges of the tails under
+    the forces of free nodes, first edges under the drag of the clamps, then the head's segments.
     """
 
     place: Floats  # (K, 3)
@@ -61,7 +61,7 @@ class Scene(NamedTuple):
     start: Floats  # (S, 3)
     end: Floats  # (S, 3)
     force: Floats  # (S, 3) on the fluid
-    by: Integers  # (S,) tail of a piece, or N for the head
+    by: Integers  # (S,) tail of a segment, or N for the head
 
 
 @compiled
@@ -155,7 +155,7 @@ def _place_tail(
 
 @compiled
 def _place_head(scene: Scene, body: Body, n: int, tails: int) -> None:
-    """The head's pieces, which follow the nodes and edges of the tails."""
+    """Add the head's segments, which follow the nodes and edges of the tails."""
     first, piece = (n + 1) * tails, body.head_length / _PIECES
     for i in range(_PIECES):
         scene.place[first + i, 2] = (i + 0.5) * piece
@@ -211,7 +211,7 @@ def _in_tail(motion: Motion, v: Vector) -> Vector:
 
 @compiled
 def _add_stokeslets(body: Body, scene: Scene, places: Integers, pieces: Integers, flow: Floats) -> None:
-    """Add to `flow` (K, 3), at some places, the flow of the forces of some pieces."""
+    """Add to `flow` (K, 3), at some places, the flow of the forces of some segments."""
     height = HEIGHT * max(body.offset, body.head_radius)
     head = scene.of[len(scene.of) - 1]
     for i in places:
@@ -245,7 +245,7 @@ def _shares(body: Body, on: int, by: int, head: int) -> tuple[float, float]:
 def _head_resistance(body: Body) -> tuple[float, float]:
     """The part of the head's drag that moves the fluid, across and along the axis.
 
-    It is at most the drag with which the head's pieces would move with the flow that they make.
+    It is at most the drag with which the head's segments would move with the flow that they produce.
     """
     end, across, along = (0.0, 0.0, body.head_length), 0.0, 0.0
     for i in range(_PIECES):

@@ -12,9 +12,9 @@ from sim.linear.vectors import Vector, cross, dot, formula, minus, plus, times
 
 @formula
 def stokeslets(at: Vector, start: Vector, end: Vector, force: Vector, spread: float) -> Vector:
-    """Velocity at a point, from a force on the fluid that is constant on a straight piece, spread over a length.
+    """Velocity at a point, from a force on the fluid that is constant on a straight segment, spread over a length.
 
-    With σ along the piece from the foot of the perpendicular c, and R² = σ² + |c|² + spread²:
+    With σ along the segment from the foot of the perpendicular c, and R² = σ² + |c|² + spread²:
     ∫ [(1/R + spread²/R³) f + (r·f) r/R³] dσ/8π, r = c − σ t.
     """
     piece = minus(end, start)

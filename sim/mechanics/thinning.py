@@ -1,4 +1,4 @@
-"""Drag that a shear-thinning fluid takes from a tail, piece by piece.
+"""Drag that a shear-thinning fluid takes from a tail, segment by segment.
 
     q → f q,   f = (1 + (λ |v|/r0)²)^(−ε/2)
 

@@ -47,9 +47,16 @@ def glossary() -> dict[str, str]:
             header = cells
         elif not cells[0].startswith("---"):
             row = dict(zip(header, cells, strict=True))
-            for name in _NAME.findall(row["in code"] if "in code" in row else row["name"]):
+            for name in _NAME.findall(row.get("in code", row.get("name", ""))):
                 units.setdefault(name, row.get("unit", ""))
     return units
+
+
+def replaced_words() -> list[str]:
+    """The words that the glossary replaces by terms."""
+    _, _, section = (DOCS / "reference" / "glossary.md").read_text().partition("## Replaced words")
+    rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("|")]
+    return [word.strip() for cell in rows[2:] for word in cell.split(",")]
 
 
 def generator() -> ModuleType:

@@ -20,7 +20,7 @@ from tests.planner.compiled import compile_c
 from tests.processes import LIMIT
 
 RUN = ("sh", "python")
-LONG = {"tutorial/closing.md", "howto/cluster.md"}
+LONG = {"tutorial/calibration.md", "howto/cluster.md"}
 SHOWN = {*RUN, "toml", "text", "c", "js"}
 
 

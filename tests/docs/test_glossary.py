@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import re
+from collections.abc import Iterator
+from pathlib import Path
 from typing import get_type_hints
 
 import numpy as np
@@ -19,7 +22,12 @@ from sim.effects import catalogue
 from sim.model.body import Body
 from sim.model.groups import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS
-from tests.docs.pages import glossary
+from tests.docs.pages import DOCS, PAGES, ROOT, glossary, replaced_words
+
+TEXTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
+HISTORY = {DOCS / "log.md", DOCS / "reference" / "glossary.md", DOCS / "figures.md", DOCS / "operating.md"}
+HISTORY |= set((DOCS / "decisions").iterdir())
+SOURCES = sorted(file for top in ("sim",) for file in (ROOT / top).rglob("*.py"))
 
 
 def plan_names() -> set[str]:
@@ -63,3 +71,36 @@ def test_a_robots_numbers_have_their_unit() -> None:
         (meaning,) = hint.__metadata__
         given = {part.removesuffix(" inside").strip() for part in re.split(";", units[name])}
         assert meaning.unit in given, name
+
+
+def prose(text: str) -> str:
+    """Remove blocks of code and names in back-ticks."""
+    return re.sub(r"```.*?```|`[^`]*`", "", text, flags=re.DOTALL)
+
+
+def literals(file: Path) -> Iterator[str]:
+    """Yield the docstrings and messages of a module: all literals with a space in them."""
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
+            yield prose(node.value)
+
+
+def replaced(text: str) -> set[str]:
+    """Find the words of a text that the glossary has replaced by a term."""
+    pattern = "|".join(sorted(map(re.escape, replaced_words()), key=len, reverse=True))
+    return {match.lower() for match in re.findall(rf"\b(?:{pattern})\b", " ".join(text.split()), re.IGNORECASE)}
+
+
+def test_replaced_words_are_found() -> None:
+    assert replaced("The Locked\nsession holds; unlocked doors") == {"locked session", "doors"}
+    assert prose("the `pieces` of\n```\nvoyage\n```\nit").split() == ["the", "of", "it"]
+
+
+@pytest.mark.parametrize("page", [page for page in TEXTS if page not in HISTORY], ids=lambda p: p.name)
+def test_pages_use_the_terms_of_the_glossary(page: Path) -> None:
+    assert replaced(prose(page.read_text())) == set()
+
+
+@pytest.mark.parametrize("file", SOURCES, ids=lambda f: f.relative_to(ROOT).as_posix())
+def test_docstrings_and_messages_use_the_terms_of_the_glossary(file: Path) -> None:
+    assert {word for text in literals(file) for word in replaced(text)} == set()
