@@ -183,7 +183,9 @@ table.query({name: [value] for name, value in robot.group_values().items()})
 plan(circle(2.0), robot, lookup=table)
 print(*sys.modules)
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT, timeout=LIMIT
+    )
     loaded = set(done.stdout.split())
     assert "surrogate.table.wrench_table" in loaded
     training = {f"surrogate.networks.{name}" for name in ("training_loop", "bfgs", "checkpoints")}
