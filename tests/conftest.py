@@ -24,7 +24,7 @@ import torch  # noqa: E402
 torch.set_num_threads(1)
 
 DURATIONS = Path(__file__).parent / "durations.json"
-NOTED, SLOW = 0.5, 3.0  # s of processor time
+NOTED, SLOW = 0.5, 1.0  # s of processor time
 _measured: dict[str, float] = defaultdict(float)
 _last = 0.0
 

@@ -82,7 +82,7 @@ def changed(draw: st.DrawFn, table: pd.DataFrame) -> pd.DataFrame:
 CIRCLE = pd.DataFrame({"x": 2 * np.cos(np.linspace(0, 5, 60)), "y": 2 * np.sin(np.linspace(0, 5, 60))})
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @few
 @given(table=changed(CIRCLE), options=st.dictionaries(
     st.sampled_from(["--scale", "--min-dwell", "--tolerance"]), number, max_size=2))  # fmt: skip

@@ -101,6 +101,7 @@ def test_the_margin_is_the_stated_error() -> None:
     assert goal_plan.length > direct.length * 1.02
 
 
+@pytest.mark.long
 def test_a_narrow_gap_is_passed_with_shorter_dwells() -> None:
     gate = [Polygon.of([[2, low], [2.5, low], [2.5, high], [2, high]]) for low, high in ((-4, -0.3), (0.3, 4))]
     goal_plan = to_goal((0, 0, 0), (6, 0, 0), CONTROL, keep_out=gate, walls=BOX)

@@ -63,7 +63,7 @@ def test_a_current_is_handed_on_with_its_error() -> None:
     assert CURRENT[1] not in handed_on.names
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_from_a_table_to_a_path_whose_stated_error_holds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

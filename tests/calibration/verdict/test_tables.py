@@ -137,12 +137,20 @@ def test_any_two_outputs_are_enough(kept: tuple[str, str]) -> None:
 
 @pytest.mark.usefixtures("toy_model")
 def test_a_slipped_decimal_point_is_named_and_set_aside() -> None:
-    """The run, not its repeat; and the verdict is that of the table without it."""
+    """The run, not its repeat."""
     table = toy_table(12)
     table.loc[17, "omega_yr_rad_s"] *= 10
     result = calibrated(table)
     assert [line.split(" is ")[0] for line in result.set_aside] == ["row 18: omega_yr"]
     assert not result.used[17]
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("toy_model")
+def test_the_verdict_is_that_of_the_table_without_the_slipped_decimal_point() -> None:
+    table = toy_table(12)
+    table.loc[17, "omega_yr_rad_s"] *= 10
+    result = calibrated(table)
     without = calibrated(table.drop(index=17))
     assert result.verdict == without.verdict
     assert result.noise_ceiling == pytest.approx(without.noise_ceiling, rel=0.05)
@@ -174,6 +182,7 @@ def test_runs_of_one_robot_give_a_weaker_conclusion_that_is_stated() -> None:
     assert verdict_record(result, table="t")["limits"] == list(result.limits)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("toy_model")
 def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five() -> None:
     data, locked = PROTOCOLS["paper"](read_measurements(toy_table(16, end_over_end_drag=5.0)))
