@@ -12,11 +12,13 @@ import pytest
 
 import calibration.swimmer.synthetic_table
 import sim.motion.batches
+from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.lab_settings import Owned
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.swimmer import DIRECT, Swimmer
+from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
-from calibration.verdict.calibrate import Verdict, calibrate
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import Verdict
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from tests.calibration import toy
@@ -39,7 +41,7 @@ def install_toy(patch: pytest.MonkeyPatch) -> None:
     defaults = Swimmer.__init__.__defaults__
     patch.setattr(Swimmer.__init__, "__defaults__", tuple(toy.SOLVER if d is DIRECT else d for d in defaults))
     patch.setattr(calibration.swimmer.synthetic_table, "stepped_columns", toy.steady_columns)
-    patch.setattr(Swimmer, "guess", lambda model, start, used: start)
+    patch.setattr(SwimmerModel, "guess", lambda model, start, used: start)
     for name in ("steady", "sensitivities", "settle"):  # what all of the simulator's batches call
         patch.setattr(sim.motion.batches, name, refuse_to_simulate)
 
@@ -52,8 +54,8 @@ def toy_table(seed: int, *, lengths_cm: tuple[float, ...] = LENGTHS_CM, **effect
     return make_table(replace(TRUTH, effects=effects), seed=seed, lengths_cm=lengths_cm, title="")
 
 
-def toy_swimmer(table: pd.DataFrame, robot: Robot = START, own: Owned | None = None) -> Swimmer:
-    return Swimmer(robot, read_measurements(table), solver=toy.SOLVER, own=own or {})
+def toy_swimmer(table: pd.DataFrame, robot: Robot = START, own: Owned | None = None) -> SwimmerModel:
+    return SwimmerModel(robot, read_measurements(table), solver=toy.SOLVER, own=own or {})
 
 
 def calibrated(table: pd.DataFrame, *, seed: int = 0, draws: int = FEW_DRAWS) -> Verdict:

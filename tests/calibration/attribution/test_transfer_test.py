@@ -7,15 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import calibration.attribution.refits
-from calibration.attribution.refits import Candidate
+import calibration.attribution.doubts
+from calibration.attribution.candidate import Candidate
 from calibration.attribution.transfer_test import SURE, fitted_again, transfer_p
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward_model import parameter, start_values
-from calibration.statistics.priors import pulls
-from calibration.swimmer.swimmer import COEFFICIENTS, Swimmer
+from calibration.statistics.pulls import pulls
+from calibration.statistics.study import Study
+from calibration.swimmer.swimmer import COEFFICIENTS, SwimmerModel
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.verdict import verdict_record
+from calibration.verdict.verdict_json import verdict_record
 from sim.arrays import Flags, Floats
 from tests.calibration.toy_tables import FEW_DRAWS, TRUTH, toy_swimmer, toy_table
 
@@ -23,15 +24,15 @@ EFFECT = "end_over_end_drag"
 SIZE = 3.0
 
 
-def model() -> Swimmer:
+def model() -> SwimmerModel:
     return toy_swimmer(toy_table(8))
 
 
-def everywhere(swimmer: Swimmer) -> Flags:
+def everywhere(swimmer: SwimmerModel) -> Flags:
     return np.ones(len(swimmer.runs), dtype=bool)
 
 
-def planted(swimmer: Swimmer, share: Floats) -> Swimmer:
+def planted(swimmer: SwimmerModel, share: Floats) -> SwimmerModel:
     """The effect on each run by this share (n,)."""
     truth = {**start_values(swimmer), **{name: getattr(TRUTH, name) for name in COEFFICIENTS}}
     clean, present = swimmer.predict([truth, {**truth, EFFECT: SIZE}])
@@ -39,11 +40,11 @@ def planted(swimmer: Swimmer, share: Floats) -> Swimmer:
     return replace(swimmer, runs=replace(swimmer.runs, y=y))
 
 
-def names(swimmer: Swimmer) -> tuple[str, ...]:
-    return tuple(p.name for p in (*swimmer.coefficients, *swimmer.given))
+def names(swimmer: SwimmerModel) -> tuple[str, ...]:
+    return tuple(p.name for p in (*swimmer.coefficients, *swimmer.nuisances))
 
 
-def claimed(swimmer: Swimmer) -> Fit:
+def claimed(swimmer: SwimmerModel) -> Fit:
     start = {**start_values(swimmer), EFFECT: SIZE}
     return fit(swimmer, start, (*COEFFICIENTS, EFFECT), everywhere(swimmer), title="")
 

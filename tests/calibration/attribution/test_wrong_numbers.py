@@ -13,12 +13,13 @@ from scipy.stats import binom
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import fit
 from calibration.statistics.forward_model import by_differences, start_values
-from calibration.statistics.priors import pulls
+from calibration.statistics.pulls import pulls
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, LENGTH, TACHOMETER
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
-from calibration.verdict.calibrate import calibrate, verdict_record
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError
 from sim.model.robot import Robot
 from sim.model.uncertainty import Sigma
@@ -39,11 +40,11 @@ def table_of(robot: Robot, seed: int) -> pd.DataFrame:
 def test_a_stiffness_that_was_given_too_high_is_no_inertia(seed: int) -> None:
     """Tail drag 25 % above the formula is Young's modulus 20 % below; with the simulator on both sides."""
     softer = replace(TRUTH, youngs_modulus=0.8 * TRUTH.youngs_modulus)
-    model = Swimmer(START, read_measurements(make_table(softer, seed=seed, title="")))
+    model = SwimmerModel(START, read_measurements(make_table(softer, seed=seed, title="")))
     result = calibrate(model, progress=False)
     assert "inertia" not in result.effects
     assert result.verdict != "number"
-    stiffness = next(p for p in result.numbers if p.parameter.name == "youngs_modulus")
+    stiffness = next(p for p in result.fits.pulls if p.parameter.name == "youngs_modulus")
     assert stiffness.alone == pytest.approx(math.log(0.8), abs=2 * stiffness.alone_error)
     assert stiffness.z < -1
 
@@ -62,7 +63,7 @@ def test_numbers_drawn_from_their_priors_are_no_effects() -> None:
         table["l_cm"] += rng.normal(scale=0.1)
         table["R_yr_cm"] *= math.exp(rng.normal(scale=0.01))
         table["theta_deg"] += rng.normal() * np.sign(table["omega_rpm"])
-        result = calibrate(Swimmer(START, read_measurements(table)), progress=False)
+        result = calibrate(SwimmerModel(START, read_measurements(table)), progress=False)
         claimed += bool(result.effects) or result.verdict == "unexplained"
         low, high = result.base.interval("youngs_modulus")
         covered += low < drawn["youngs_modulus"] < high
@@ -114,7 +115,7 @@ def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
     table["v_cm_s"] = (
         table["R_yr_cm"] * table["omega_yr_rad_s"].abs() * np.random.default_rng(0).uniform(0.9, 1.1, len(table))
     )
-    model = Swimmer(START, read_measurements(table), solver=toy.SOLVER)
+    model = SwimmerModel(START, read_measurements(table), solver=toy.SOLVER)
     at = {
         **start_values(model),
         "tracked_point": 0.2,
@@ -123,7 +124,7 @@ def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
         LENGTH: 0.001,
         TACHOMETER: 1.01,
     }
-    names = [p.name for p in model.given]
+    names = [p.name for p in model.nuisances]
     assert len(names) == 10
     ours, J = model.derivatives(at, names)
     theirs, differences = by_differences(model, at, names)
@@ -134,11 +135,11 @@ def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
 
 def test_pulls_are_those_of_the_textbook() -> None:
     """One number, one measurement: x = y σ²/(σ² + s²), pull y/√(σ² + s²), alone y."""
-    model = Swimmer(START, read_measurements(toy_table(8)), solver=toy.SOLVER)
+    model = SwimmerModel(START, read_measurements(toy_table(8)), solver=toy.SOLVER)
     used = np.ones(len(model.runs), bool)
-    names = tuple(p.name for p in (*model.coefficients, *model.given))
+    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     bound = fit(model, start_values(model), names, used, title="")
-    for pull in pulls(bound, model.given):
+    for pull in pulls(bound, model.nuisances):
         if pull.learnt:
             sigma = pull.parameter.sigma
             assert sigma is not None
@@ -155,8 +156,8 @@ def test_pulls_are_those_of_the_textbook() -> None:
 
 def test_exact_numbers_are_not_fitted_and_the_table_states_its_own() -> None:
     table = toy_table(9).assign(camera_scale_sigma_percent=2.0, heading_zero_sigma_deg=0.0)
-    model = Swimmer(replace(START, sigmas=EXACT), read_measurements(table), solver=toy.SOLVER)
-    sigmas = {p.name: p.sigma for p in model.given}
+    model = SwimmerModel(replace(START, sigmas=EXACT), read_measurements(table), solver=toy.SOLVER)
+    sigmas = {p.name: p.sigma for p in model.nuisances}
     assert sigmas == {"youngs_modulus": pytest.approx(0.1), CAMERA: 0.02, TACHOMETER: 0.005}
     for bad in (-1.0, np.arange(len(table), dtype=float)):
         with pytest.raises(InputError, match="camera_scale_sigma_percent"):

@@ -21,7 +21,7 @@ def falls(diameter: np.ndarray, session: np.ndarray, truth: dict[str, float], se
         outputs=("v",), y=np.zeros((len(diameter), 1)), condition=np.unique(diameter, return_inverse=True)[1],
         session=session, session_names=tuple(f"round {i + 1}" for i in range(session.max() + 1)),
         inputs=np.log(diameter)[:, None], input_names=("ln d",), rows=np.arange(len(diameter)),
-        set_aside=(), limits=(),
+        excluded=(), caveats=(),
     )  # fmt: skip
     model = Spheres(runs, diameter)
     speed = model.predict([{"viscosity": 1.3, "wall": 0.0, "inertia": 0.0, **truth}])[0]

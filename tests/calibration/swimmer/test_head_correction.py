@@ -60,7 +60,7 @@ def correction(**changes: object) -> Correction:
 @pytest.mark.xdist_group("head correction")
 def test_it_predicts_runs_that_it_was_not_learnt_from(result: Verdict) -> None:
     assert result.verdict == "unexplained"
-    assert result.predictive is not None
+    assert result.corrections.learnt is not None
     assert result.error_predictive is not None
     assert any("ln l/R" in term for term in result.predictive.terms)
     excess = result.error_before**2 - result.noise_ceiling**2
@@ -88,10 +88,12 @@ def test_the_corrected_robot_simulates_what_was_predicted(
     result: Verdict, table: pd.DataFrame, tmp_path: Path
 ) -> None:
     """The file's robot, with the table's settings, moves as the correction that was learnt from all runs says."""
-    assert result.predictive is not None
-    (tmp_path / "corrected.toml").write_text(corrected_toml(START, result.delivered, result.predictive))
+    assert result.corrections.learnt is not None
+    (tmp_path / "corrected.toml").write_text(
+        corrected_toml(START, result.fits.final_refit, result.corrections.learnt)
+    )
     robot = load_robot(tmp_path / "corrected.toml")
-    assert robot.correction == result.predictive.content.correction
+    assert robot.correction == result.corrections.learnt.correction
     model = toy_swimmer(table)
     corrected = Swimmer(replace(robot, tail_length=START.tail_length), model.runs, solver=model.solver)
     start = {p.name: p.start for p in (*corrected.coefficients, *corrected.given, *corrected.effects)}
@@ -105,9 +107,9 @@ def test_the_corrected_robot_simulates_what_was_predicted(
 @pytest.mark.slow
 @pytest.mark.xdist_group("head correction")
 def test_its_uncertainty_is_in_the_covariance(result: Verdict, tmp_path: Path) -> None:
-    assert result.predictive is not None
-    (tmp_path / "with.toml").write_text(corrected_toml(START, result.delivered, result.predictive))
-    (tmp_path / "without.toml").write_text(corrected_toml(START, result.delivered))
+    assert result.corrections.learnt is not None
+    (tmp_path / "with.toml").write_text(corrected_toml(START, result.fits.final_refit, result.corrections.learnt))
+    (tmp_path / "without.toml").write_text(corrected_toml(START, result.fits.final_refit))
     known, plain = (read_knowledge(tmp_path / f"{name}.toml") for name in ("with", "without"))
     assert {"surface_couple", "anisotropic_head_drag"} <= set(known.names)
     place = known.names.index("C_yr")

@@ -176,7 +176,7 @@ def test_a_drift_with_time_is_found_where_there_is_a_clock(seed: int) -> None:
     assert calibrated(table).verdict == "none"
     result = calibrated(in_thinning_fluid(table, rate))
     assert result.effects == ("viscosity_with_time",)
-    low, high = result.final_intervals["viscosity_with_time"]
+    low, high = result.fits.final_intervals["viscosity_with_time"]
     assert low < rate < high < 2 * rate
     assert low > 0.5 * rate
     assert result.error_after < result.error_before
@@ -190,7 +190,10 @@ def test_without_a_clock_a_drift_is_no_effect_of_the_robot() -> None:
     table["elapsed_min"] = 4.0 * np.arange(len(table))
     result = calibrated(in_thinning_fluid(table, 0.06).drop(columns="elapsed_min"))
     assert "viscosity_with_time" not in result.effects
-    assert result.untestable["viscosity drifting with time"] == "needs elapsed_min, differing between the runs"
+    assert (
+        result.evidence.untestable["viscosity drifting with time"]
+        == "needs elapsed_min, differing between the runs"
+    )
 
 
 @pytest.mark.usefixtures("toy_model")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibration.statistics.held_out import middle_session
 from calibration.statistics.profile_intervals import least_determined
 from calibration.statistics.residual_tests import DRAWS
 from calibration.swimmer.measured_table import read_measurements

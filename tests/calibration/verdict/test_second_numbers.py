@@ -10,11 +10,12 @@ import pytest
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward_model import by_differences, start_values
-from calibration.statistics.residual_tests import check_misfit
+from calibration.statistics.residual_tests import examine_residual
 from calibration.statistics.score_directions import Directions, directions
+from calibration.statistics.study import Study
 from calibration.swimmer.candidate_effects import influences
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from tests.calibration.toy_tables import START, TRUTH, calibrated, toy_swimmer, toy_table
@@ -95,7 +96,7 @@ def test_local_thinning_is_found_by_the_simulator() -> None:
     """Truth by time steps on a finer mesh."""
     truth = replace(TRUTH, effects=HIDDEN)
     table = make_table(truth, seed=4, tails=(2, 3, 4), lengths_cm=(5.0, 8.0), motor_rpm=SPEEDS, title="")
-    result = calibrate(Swimmer(START, read_measurements(table)), progress=False)
+    result = calibrate(SwimmerModel(START, read_measurements(table)), progress=False)
     assert SIZE in result.effects
     assert result.error_after < 1.2 * result.noise_ceiling
     refit = next(c.refit for c in result.explaining if c.effect.name == SIZE)

@@ -8,12 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.statistics.held_out import middle_session
 from calibration.statistics.noise import SESSION_SHARE
+from calibration.statistics.splits import middle_session
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.protocols import PROTOCOLS
-from calibration.swimmer.swimmer import Swimmer
-from calibration.verdict.calibrate import calibrate, verdict_record
+from calibration.swimmer.swimmer import SwimmerModel
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError, run_command
 from tests.calibration import toy
 from tests.calibration.toy_tables import FEW_DRAWS, START, calibrated, calibrated_toy, shares_verdicts, toy_table
@@ -60,8 +61,8 @@ def test_bad_rows_are_named_and_set_aside(toy_model: None) -> None:
     table.loc[2, "omega_h_rpm"] *= -1
     data = read_measurements(table)
     assert len(data) == len(table) - 3
-    assert [line.split(":")[0] for line in data.set_aside] == ["row 1", "row 2", "row 3"]
-    assert read_measurements(table.assign(colour="red")).set_aside[-1] == "column colour: not known, left out"
+    assert [line.split(":")[0] for line in data.excluded] == ["row 1", "row 2", "row 3"]
+    assert read_measurements(table.assign(colour="red")).excluded[-1] == "column colour: not known, left out"
     with pytest.raises(InputError, match="unknown"):
         read_measurements(table.rename(columns={"trial": "tri al"}))
 
@@ -80,8 +81,8 @@ def test_few_sessions_give_a_weaker_conclusion(names: tuple[str, ...]) -> None:
             assert len(set(locked[(data.condition == condition) & (within == name)])) <= 1
     result = calibrated(table)
     assert result.effects == ("end_over_end_drag",)
-    assert any(f"{len(names)} session" in limit for limit in result.limits)
-    assert "block" in result.locked
+    assert any(f"{len(names)} session" in limit for limit in result.conditions.caveats)
+    assert "block" in result.conditions.split.names
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -110,7 +111,7 @@ def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
     table = pd.concat([t[t["N"] == 3] for t in (toy_table(5), toy_table(6))])
     result = calibrated(table)
     assert result.verdict == "none"
-    assert [("N = 3" in limit, "1 session only" in limit) for limit in result.limits] == [
+    assert [("N = 3" in limit, "1 session only" in limit) for limit in result.conditions.caveats] == [
         (True, False),
         (False, True),
     ]
@@ -167,7 +168,7 @@ def test_an_output_that_follows_from_others_is_counted_once() -> None:
     table["v_cm_s"] = table["R_yr_cm"] * table["omega_yr_rad_s"].abs()
     data = read_measurements(table)
     assert "v" not in data.outputs
-    assert any("v_cm_s: follows from" in line for line in data.set_aside)
+    assert any("v_cm_s: follows from" in line for line in data.excluded)
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -185,7 +186,7 @@ def test_runs_of_one_robot_give_a_weaker_conclusion_that_is_stated() -> None:
 @pytest.mark.long
 @pytest.mark.usefixtures("toy_model")
 def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five() -> None:
-    data, locked = PROTOCOLS["paper"](read_measurements(toy_table(16, end_over_end_drag=5.0)))
+    data, held_out = PROTOCOLS["paper"](read_measurements(toy_table(16, end_over_end_drag=5.0)))
     assert data.outputs == ("omega_h", "omega_yr")
     assert set(data.tails[locked]) == {2.0, 5.0}
     result = calibrate(Swimmer(START, data, solver=toy.SOLVER), locked=locked, draws=FEW_DRAWS, progress=False)
