@@ -37,9 +37,9 @@ def shares_verdicts(test: Test) -> Test:
 
 
 def install_toy(patch: pytest.MonkeyPatch) -> None:
-    """The toy in place of the simulator: for tables, and for every Swimmer that is not told otherwise."""
-    defaults = Swimmer.__init__.__defaults__
-    patch.setattr(Swimmer.__init__, "__defaults__", tuple(toy.SOLVER if d is DIRECT else d for d in defaults))
+    """The toy in place of the simulator: for tables, and for every SwimmerModel that is not told otherwise."""
+    defaults = SwimmerModel.__init__.__defaults__
+    patch.setattr(SwimmerModel.__init__, "__defaults__", tuple(toy.SOLVER if d is DIRECT else d for d in defaults))
     patch.setattr(calibration.swimmer.synthetic_table, "stepped_columns", toy.steady_columns)
     patch.setattr(SwimmerModel, "guess", lambda model, start, used: start)
     for name in ("steady", "sensitivities", "settle"):  # what all of the simulator's batches call
@@ -59,7 +59,8 @@ def toy_swimmer(table: pd.DataFrame, robot: Robot = START, own: Owned | None = N
 
 
 def calibrated(table: pd.DataFrame, *, seed: int = 0, draws: int = FEW_DRAWS) -> Verdict:
-    return calibrate(toy_swimmer(table), seed=seed, draws=draws, progress=False)
+    correction = learn_head_correction
+    return calibrate(toy_swimmer(table), correction=correction, seed=seed, draws=draws, progress=False)
 
 
 @cache

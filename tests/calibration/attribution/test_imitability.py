@@ -50,5 +50,6 @@ def test_pairs_pay_for_their_number() -> None:
     names = tuple(p.name for p in model.coefficients)
     fitted = fit(model, start_values(model), names, used, title="")
     count = len(model.effects)
-    cost = ebic(fitted, 2, model, used) - ebic(fitted, 1, model, used)
+    study = Study.fitted_to(model, used)
+    cost = ebic(study, fitted, 2) - ebic(study, fitted, 1)
     assert cost == pytest.approx(2 * math.log((count - 1) / 2))

@@ -63,7 +63,7 @@ def test_an_effect_carries_over_and_a_mimic_does_not() -> None:
     further_runs = ~fitted_again(plain.runs, everywhere(plain))
     for further, carries in ((1.0, True), (3.0, False)):
         swimmer = planted(plain, np.where(further_runs, further, 1.0))
-        p = transfer_p(claimed(swimmer), swimmer.runs, everywhere(swimmer), seed=1)
+        p = transfer_p(Study.fitted_to(swimmer, everywhere(swimmer), seed=1), claimed(swimmer))
         assert (p >= SURE) == carries
 
 
@@ -72,13 +72,13 @@ def test_runs_that_are_all_alike_say_nothing() -> None:
     swimmer = planted(model(), np.ones(len(model().runs)))
     short = swimmer.runs.length < 0.06
     few = short & (swimmer.runs.tails <= 4)
-    assert transfer_p(claimed(swimmer), swimmer.runs, few, seed=1) == 1.0
+    assert transfer_p(Study.fitted_to(swimmer, few, seed=1), claimed(swimmer)) == 1.0
 
 
 @pytest.mark.usefixtures("toy_model")
 def test_a_claim_that_does_not_carry_over_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     swimmer = planted(model(), np.full(len(model().runs), 2.0))
-    monkeypatch.setattr(calibration.attribution.refits, "transfer_p", lambda *_, **__: 0.001)
+    monkeypatch.setattr(calibration.attribution.doubts, "transfer_p", lambda *_, **__: 0.001)
     doubted = calibrate(swimmer, draws=FEW_DRAWS, progress=False)
     assert doubted.effects == (EFFECT,)
     assert "or something outside the catalogue" in doubted.sentence
@@ -91,9 +91,9 @@ def test_an_effect_beside_a_wrong_number_is_in_doubt() -> None:
     refit = claimed(planted(model(), np.ones(len(model().runs))))
     swimmer = model()
     effect = parameter(swimmer, EFFECT)
-    sure = Candidate(effect, (), 8.0, 1.0, 1.0, 1.0, refit, None, 1.0, 0.1, "kept")
+    sure = Candidate(effect, (), 8.0, 1.0, 1.0, 1.0, "kept", refit, None, 1.0, 0.1)
     assert not sure.doubted
     pull = pulls(
-        fit(swimmer, start_values(swimmer), names(swimmer), everywhere(swimmer), title=""), swimmer.given
+        fit(swimmer, start_values(swimmer), names(swimmer), everywhere(swimmer), title=""), swimmer.nuisances
     )[0]
-    assert replace(sure, refit=replace(refit, wrong=((pull,),))).doubted
+    assert replace(sure, refit=replace(refit, wrong_numbers=((pull,),))).doubted

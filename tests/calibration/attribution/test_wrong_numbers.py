@@ -100,13 +100,13 @@ def test_a_stiffness_far_off_is_named_with_what_looks_like_it(share: float, sigm
     """40 % with the default tolerances; 20 % where E is stated to 3 % and the other numbers to be exact."""
     softer = replace(TRUTH, youngs_modulus=share * TRUTH.youngs_modulus)
     data = read_measurements(make_table(softer, seed=5, title=""))
-    result = calibrate(Swimmer(replace(START, sigmas=sigmas), data), progress=False)
+    result = calibrate(SwimmerModel(replace(START, sigmas=sigmas), data), progress=False)
     assert result.verdict == "number"
     assert result.wrong_numbers[0][0].parameter.name == "youngs_modulus"
-    given = result.delivered.parameters["youngs_modulus"] / START.youngs_modulus
+    given = result.fits.final_refit.parameters["youngs_modulus"] / START.youngs_modulus
     assert given == pytest.approx(share, rel=0.1)
-    corrected = corrected_robot(START, result.delivered.parameters)
-    assert corrected.youngs_modulus == result.delivered.parameters["youngs_modulus"]
+    corrected = corrected_robot(START, result.fits.final_refit.parameters)
+    assert corrected.youngs_modulus == result.fits.final_refit.parameters["youngs_modulus"]
 
 
 def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
@@ -147,9 +147,9 @@ def test_pulls_are_those_of_the_textbook() -> None:
             assert pull.change == pytest.approx(
                 pull.alone * sigma**2 / (sigma**2 + pull.alone_error**2), rel=1e-6, abs=1e-12
             )
-    free = fit(model, bound.parameters, names, used, free=(CAMERA,), title="")
-    bound_pull = {p.parameter.name: p for p in pulls(bound, model.given)}[CAMERA]
-    alone = {p.parameter.name: p for p in pulls(free, model.given)}[CAMERA]
+    bound_pull = {p.parameter.name: p for p in pulls(bound, model.nuisances)}[CAMERA]
+    free = fit(model, bound.parameters, names, used, wrong_numbers=((bound_pull,),), title="")
+    alone = {p.parameter.name: p for p in pulls(free, model.nuisances)}[CAMERA]
     assert alone.freed
     assert alone.change == pytest.approx(bound_pull.alone, abs=0.1 * bound_pull.alone_error)
 

@@ -12,7 +12,9 @@ from calibration.statistics.fit import fit
 from calibration.statistics.forward_model import Runs, start_values
 from calibration.statistics.noise import Noise
 from calibration.statistics.profile_intervals import profile_intervals
-from calibration.verdict.calibrate import Verdict, calibrate, verdict_record
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import Verdict
+from calibration.verdict.verdict_json import verdict_record
 
 
 def falls(diameter: np.ndarray, session: np.ndarray, truth: dict[str, float], seed: int, noise: float) -> Spheres:

@@ -44,7 +44,7 @@ def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -
 
 @shares_verdicts
 def test_a_current_is_handed_on_with_its_error() -> None:
-    delivered = calibrated_toy(3).delivered
+    delivered = calibrated_toy(3).fits.final_refit
     current = replace(delivered.fitted[0], name=CURRENT[1], logarithmic=False)
     handed_on = knowledge_of(
         START,

@@ -12,9 +12,10 @@ from calibration.statistics.forward_model import start_values
 from calibration.statistics.input_features import features
 from calibration.statistics.noise import FixedColumns, Noise, inverse_root, least_squares, repeat_covariance, sums
 from calibration.statistics.priors import changes, precisions
-from calibration.statistics.residual_tests import DRAWS, check_misfit
+from calibration.statistics.residual_tests import DRAWS, examine_residual
 from calibration.statistics.score_directions import Directions
-from calibration.swimmer.measured_table import read_measurements
+from calibration.statistics.splits import middle_session
+from calibration.statistics.study import Study
 from tests.calibration.toy_tables import calibrated, toy_swimmer, toy_table
 
 
@@ -52,7 +53,7 @@ def test_a_design_makes_the_same_products_for_many_residuals() -> None:
     session = np.array([0, 0, 1, 1, 1, 2, 2])
     columns, residuals = rng.normal(size=(7, 3, 4)), rng.normal(size=(5, 7, 3))
     roots = np.linalg.inv(np.linalg.cholesky([np.eye(3) + np.outer(v, v) for v in rng.normal(size=(5, 3))]))
-    products = Design(columns, session).sums(np.swapaxes(roots, -1, -2) @ roots, residuals)
+    products = FixedColumns(columns, session).sums(np.swapaxes(roots, -1, -2) @ roots, residuals)
     for i, (root, residual) in enumerate(zip(roots, residuals, strict=True)):
         expected = sums(root @ np.concatenate([columns, residual[..., None]], -1), session, 3)
         assert products.within[i] == pytest.approx(expected.within)
@@ -67,7 +68,7 @@ def test_scores_along_features_are_those_of_least_squares() -> None:
     names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     fitted = fit(model, start_values(model), names, used, title="")
     none = Directions(np.zeros((*model.runs.y.shape, 0)), np.zeros(0, int), np.zeros(0))
-    scores = check_misfit(fitted, model.runs, used, none, level=0.04, seed=0, draws=50).scores
+    scores = examine_residual(Study.fitted_to(model, used, draws=50), fitted, none).scores
     _, table = features(model.runs, used)
     J = fitted.jacobian[used]
     residual = (model.runs.y - fitted.prediction)[used] + J @ changes(fitted.fitted, fitted.parameters)

@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 
 from calibration.report.corrected_robot import corrected_robot, corrected_toml
-from calibration.swimmer.swimmer import Swimmer
-from calibration.verdict.calibrate import Verdict, verdict_record
+from calibration.swimmer.swimmer import SwimmerModel
+from calibration.verdict.verdict import Verdict
+from calibration.verdict.verdict_json import verdict_record
 from planner.paths.path import circle
 from planner.planning.plan import plan
 from planner.vehicle.calibration_table import read_knowledge
@@ -62,7 +63,7 @@ def test_it_predicts_runs_that_it_was_not_learnt_from(result: Verdict) -> None:
     assert result.verdict == "unexplained"
     assert result.corrections.learnt is not None
     assert result.error_predictive is not None
-    assert any("ln l/R" in term for term in result.predictive.terms)
+    assert any("ln l/R" in term for term in result.corrections.learnt.terms)
     excess = result.error_before**2 - result.noise_ceiling**2
     assert result.error_predictive**2 - result.noise_ceiling**2 < 0.4 * excess
     assert f"{100 * result.error_predictive:.1f} % on runs" in result.sentence
@@ -76,9 +77,9 @@ def test_what_no_effect_does_is_left_unexplained(result: Verdict, table: pd.Data
     assert result.effects == ()
     assert corrected_robot(START, result.final.parameters).effects == {}
     assert "no effect and no pair" in result.sentence
-    assert any("ln l" in name for name in result.generic.features)
-    residual = (toy_swimmer(table).runs.y - result.base.prediction)[result.used]
-    corrected = residual - result.generic.correction[result.used]
+    assert any("ln l" in name for name in result.corrections.regression.features)
+    residual = (toy_swimmer(table).runs.y - result.base.prediction)[result.conditions.split.fitted]
+    corrected = residual - result.corrections.regression.correction[result.conditions.split.fitted]
     assert (corrected**2).mean() < 0.7 * (residual**2).mean()
 
 
@@ -95,12 +96,12 @@ def test_the_corrected_robot_simulates_what_was_predicted(
     robot = load_robot(tmp_path / "corrected.toml")
     assert robot.correction == result.corrections.learnt.correction
     model = toy_swimmer(table)
-    corrected = Swimmer(replace(robot, tail_length=START.tail_length), model.runs, solver=model.solver)
-    start = {p.name: p.start for p in (*corrected.coefficients, *corrected.given, *corrected.effects)}
+    corrected = SwimmerModel(replace(robot, tail_length=START.tail_length), model.runs, solver=model.solver)
+    start = {p.name: p.start for p in (*corrected.coefficients, *corrected.nuisances, *corrected.effects)}
     start["tail_length_offset"] = robot.tail_length - START.tail_length
-    start |= {k: result.delivered.parameters[k] for k in ("camera_scale", "heading_zero", "tachometer")}
-    residual = (model.runs.y - corrected.predict([start])[0])[result.used]
-    uncorrected = (model.runs.y - result.base.prediction)[result.used]
+    start |= {k: result.fits.final_refit.parameters[k] for k in ("camera_scale", "heading_zero", "tachometer")}
+    residual = (model.runs.y - corrected.predict([start])[0])[result.conditions.split.fitted]
+    uncorrected = (model.runs.y - result.base.prediction)[result.conditions.split.fitted]
     assert (residual**2).mean() < 0.6 * (uncorrected**2).mean()
 
 

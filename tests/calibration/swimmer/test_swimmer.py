@@ -65,7 +65,7 @@ def test_an_odd_effect_of_the_robot_itself_tells_left_from_right(table: pd.DataF
     """Even where the runs are in one direction, so that it cannot be fitted."""
     left_runs = read_measurements(table[table["omega_rpm"] < 0].drop(columns=["elapsed_min", "temperature_C"]))
     plain, biased = (
-        Swimmer(replace(START, effects=effects), left_runs, solver=toy.SOLVER)
+        SwimmerModel(replace(START, effects=effects), left_runs, solver=toy.SOLVER)
         for effects in ({}, {"left_right_bias": 0.3})
     )
     assert "left_right_bias" not in {e.name for e in biased.effects}

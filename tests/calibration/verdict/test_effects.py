@@ -14,10 +14,10 @@ from calibration.report.corrected_robot import corrected_robot
 from calibration.report.report import write_report
 from calibration.statistics.fit import fit
 from calibration.statistics.forward_model import start_values
-from calibration.statistics.held_out import middle_session
-from calibration.statistics.residual_tests import DRAWS, check_misfit
+from calibration.statistics.residual_tests import DRAWS, examine_residual
 from calibration.statistics.score_directions import Directions
-from calibration.swimmer.measured_table import read_measurements
+from calibration.statistics.splits import middle_session
+from calibration.statistics.study import Study
 from tests.calibration import toy
 from tests.calibration.toy_tables import (
     START,
@@ -69,10 +69,10 @@ def test_planted_effects_are_mostly_found_sized_and_removed() -> None:
 @pytest.mark.usefixtures("toy_model")
 def test_an_effect_that_the_coefficients_absorb_is_not_testable() -> None:
     """A direction that C_t covers leaves nothing to score, however wrong the model is."""
-    data = read_measurements(toy_table(5, **{EFFECT: SIZE}))
-    used = ~middle_session(data)
+    model = toy_swimmer(toy_table(5, **{EFFECT: SIZE}))
+    study = Study.fitted_to(model, ~middle_session(model.runs), draws=20)
     base = calibrated_toy(5, **{EFFECT: SIZE}).base
-    misfit = check_misfit(base, data, used, Directions.plain(base.jacobian[..., :1]), level=0.05, seed=0, draws=20)
+    misfit = examine_residual(study, base, Directions.plain(base.jacobian[..., :1]))
     assert misfit.scores.survived[0] < 1e-5
     assert misfit.p["score"] == 1.0
     assert misfit.general_p < 0.1
@@ -122,8 +122,8 @@ def test_fits_arrive_along_a_valley() -> None:
     names, every = (*(p.name for p in model.coefficients), hidden), np.ones(len(table), bool)
     from_preset = fit(model, {**start_values(model), hidden: 5.0}, names, every)
     from_truth = fit(true_model, {**start_values(true_model), hidden: 5.0}, names, every)
-    assert from_preset.arrived
-    assert from_truth.arrived
+    assert from_preset.converged
+    assert from_truth.converged
     assert from_preset.deviance == pytest.approx(from_truth.deviance, abs=0.5)
 
 
@@ -215,9 +215,9 @@ def test_the_generic_correction_helps_where_no_effect_explains() -> None:
     table["omega_yr_rad_s"] *= 1 + 0.02 * (table["l_cm"] - 8.0) ** 2
     model = toy_swimmer(table)
     result = calibrated(table)
-    residual = (model.runs.y - result.base.prediction)[result.used]
-    corrected = residual - result.generic.correction[result.used]
-    assert any("ln l" in name for name in result.generic.features)
+    residual = (model.runs.y - result.base.prediction)[result.conditions.split.fitted]
+    corrected = residual - result.corrections.regression.correction[result.conditions.split.fitted]
+    assert any("ln l" in name for name in result.corrections.regression.features)
     assert (corrected**2).mean() < 0.7 * (residual**2).mean()
 
 
@@ -227,7 +227,7 @@ def test_an_effect_that_changes_nothing_says_so(tmp_path: Path) -> None:
     """The toy's tails cannot touch: no size of contact shows, and the report has no size for it."""
     model = toy_swimmer(toy_table(1, lengths_cm=(8.0,), end_over_end_drag=4.0))
     result = calibrated_toy(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
-    contact = next(c for c in result.candidates if c.effect.name == "tail_contact")
+    contact = next(c for c in result.evidence.candidates if c.effect.name == "tail_contact")
     assert contact.verdict == "it changes nothing in these runs"
     write_report(result, model.runs, tmp_path / "report.html", title="t")
     text = (tmp_path / "report.html").read_text()

@@ -7,8 +7,9 @@ import pytest
 
 from calibration.statistics.profile_intervals import least_determined
 from calibration.statistics.residual_tests import DRAWS
+from calibration.statistics.splits import middle_session
 from calibration.swimmer.measured_table import read_measurements
-from calibration.verdict.calibrate import verdict_record
+from calibration.verdict.verdict_json import verdict_record
 from tests.calibration.toy_tables import calibrated, calibrated_toy, shares_verdicts, toy_table
 
 
@@ -42,17 +43,17 @@ def test_the_locked_session_is_judged_and_used_in_the_end() -> None:
     """p is nothing for a bad model; the last fit has all runs."""
     ruined = toy_table(3)
     good = calibrated_toy(3)
-    assert good.locked_p > 0.01
-    ruined.loc[ruined["session"] == good.locked, "omega_yr_rad_s"] *= 1.5
+    assert good.errors.p_value > 0.01
+    ruined.loc[ruined["session"] == good.conditions.split.names, "omega_yr_rad_s"] *= 1.5
     result = calibrated(ruined)
-    assert result.locked_p < 0.01
-    assert result.delivered.parameters["C_yr"] != pytest.approx(result.final.parameters["C_yr"], rel=0.02)
+    assert result.errors.p_value < 0.01
+    assert result.fits.final_refit.parameters["C_yr"] != pytest.approx(result.final.parameters["C_yr"], rel=0.02)
 
 
 @pytest.mark.rates
 @pytest.mark.usefixtures("toy_model")
 def test_p_of_the_locked_session_is_even_for_a_good_model() -> None:
-    good = [calibrated(toy_table(seed), draws=DRAWS).locked_p for seed in range(17, 25)]
+    good = [calibrated(toy_table(seed), draws=DRAWS).errors.p_value for seed in range(17, 25)]
     assert 0.2 < np.mean(good) < 0.8
 
 
@@ -61,7 +62,7 @@ def test_p_of_the_locked_session_is_even_for_a_good_model() -> None:
 def test_profile_intervals_are_those_of_the_covariance_where_the_model_is_linear() -> None:
     """And lean to one side where it is not."""
     result = calibrated_toy(5, end_over_end_drag=5.0)
-    for name, (low, high) in result.final_intervals.items():
+    for name, (low, high) in result.fits.final_intervals.items():
         wald = result.final.interval(name)
         assert low < result.final.parameters[name] < high
         assert (low, high) == pytest.approx(wald, abs=0.35 * (wald[1] - wald[0]))

@@ -59,7 +59,7 @@ def test_intervals_of_coefficients_cover(name: str, nulls: list[Verdict]) -> Non
 
     Stated errors allow for the tolerances of the numbers as given. Here these numbers are exact.
     """
-    ends = [null.base_intervals[name] for null in nulls]
+    ends = [null.fits.base_intervals[name] for null in nulls]
     missed = sum(not low < getattr(TRUTH, name) < high for low, high in ends)
     assert missed <= binom.isf(0.01, len(nulls), 0.05)
     place = nulls[0].base.names.index(name)

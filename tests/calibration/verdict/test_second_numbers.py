@@ -56,19 +56,17 @@ def test_scores_are_taken_at_several_values_and_the_largest_counts() -> None:
     for column, value in zip(np.moveaxis(columns, -1, 0), grid, strict=True):
         expected = by_differences(model, {**base.parameters, TIME: value, SIZE: 1e-6}, [SIZE])[1][..., 0]
         assert column == pytest.approx(expected, rel=0.05, abs=1e-4)
-    misfit = check_misfit(base, model.runs, used, candidates, level=0.05, seed=0, draws=50)
-    alone = [
-        check_misfit(base, model.runs, used, Directions.plain(columns[..., [j]]), level=0.05, seed=0, draws=50)
-        for j in range(len(grid))
-    ]
+    study = Study.fitted_to(model, used, level=0.05, draws=50)
+    misfit = examine_residual(study, base, candidates)
+    alone = [examine_residual(study, base, Directions.plain(columns[..., [j]])) for j in range(len(grid))]
     z = np.array([abs(single.scores.z[0]) for single in alone])
     assert abs(misfit.scores.z[place]) == pytest.approx(z.max())
     assert misfit.second[place] == grid[int(np.argmax(z))]
     assert len(misfit.scores.z) == len(model.effects)
     all_values = Directions(columns, np.zeros(3, int), np.array(grid))
-    together = check_misfit(base, model.runs, used, all_values, level=0.05, seed=0, draws=200)
+    together = examine_residual(study, base, all_values, draws=200)
     first_value = Directions.plain(columns[..., [0]])
-    first = check_misfit(base, model.runs, used, first_value, level=0.05, seed=0, draws=200)
+    first = examine_residual(study, base, first_value, draws=200)
     assert together.critical_z >= first.critical_z  # the bootstrap takes the largest, too
 
 

@@ -90,10 +90,12 @@ def test_two_sessions_kept_whole_are_not_called_blocks() -> None:
     """The paper's protocol locks N = 2 and 5; where these are a session, none is divided."""
     table = toy_table(5)
     table["session"] = np.where(table["N"].isin((3, 4)), "inner", "outer")
-    data, locked = PROTOCOLS["paper"](read_measurements(table))
-    result = calibrate(Swimmer(START, data, solver=toy.SOLVER), locked=locked, draws=FEW_DRAWS, progress=False)
-    assert result.locked == "outer"
-    assert not any("sessions only" in limit for limit in result.limits)
+    data, held_out = PROTOCOLS["paper"](read_measurements(table))
+    result = calibrate(
+        SwimmerModel(START, data, solver=toy.SOLVER), held_out=held_out, draws=FEW_DRAWS, progress=False
+    )
+    assert result.conditions.split.names == "outer"
+    assert not any("sessions only" in limit for limit in result.conditions.caveats)
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -142,8 +144,8 @@ def test_a_slipped_decimal_point_is_named_and_set_aside() -> None:
     table = toy_table(12)
     table.loc[17, "omega_yr_rad_s"] *= 10
     result = calibrated(table)
-    assert [line.split(" is ")[0] for line in result.set_aside] == ["row 18: omega_yr"]
-    assert not result.used[17]
+    assert [line.split(" is ")[0] for line in result.conditions.excluded] == ["row 18: omega_yr"]
+    assert not result.conditions.split.fitted[17]
 
 
 @pytest.mark.long
@@ -159,7 +161,7 @@ def test_the_verdict_is_that_of_the_table_without_the_slipped_decimal_point() ->
 
 @shares_verdicts
 def test_noise_and_missing_effects_are_no_gross_errors() -> None:
-    assert calibrated_toy(5, end_over_end_drag=5.0).set_aside == ()
+    assert calibrated_toy(5, end_over_end_drag=5.0).conditions.excluded == ()
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -179,8 +181,8 @@ def test_runs_of_one_robot_give_a_weaker_conclusion_that_is_stated() -> None:
     noise = np.random.default_rng(0).normal(scale=0.02, size=len(table))
     table["omega_yr_rad_s"] *= np.exp(noise)
     result = calibrated(table)
-    assert any("N = 3" in line for line in result.limits)
-    assert verdict_record(result, table="t")["limits"] == list(result.limits)
+    assert any("N = 3" in line for line in result.conditions.caveats)
+    assert verdict_record(result, table="t")["limits"] == list(result.conditions.caveats)
 
 
 @pytest.mark.long
@@ -188,9 +190,11 @@ def test_runs_of_one_robot_give_a_weaker_conclusion_that_is_stated() -> None:
 def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five() -> None:
     data, held_out = PROTOCOLS["paper"](read_measurements(toy_table(16, end_over_end_drag=5.0)))
     assert data.outputs == ("omega_h", "omega_yr")
-    assert set(data.tails[locked]) == {2.0, 5.0}
-    result = calibrate(Swimmer(START, data, solver=toy.SOLVER), locked=locked, draws=FEW_DRAWS, progress=False)
-    assert result.locked == "N=2, N=5"
+    assert set(data.tails[held_out]) == {2.0, 5.0}
+    result = calibrate(
+        SwimmerModel(START, data, solver=toy.SOLVER), held_out=held_out, draws=FEW_DRAWS, progress=False
+    )
+    assert result.conditions.split.names == "N=2, N=5"
     assert "end_over_end_drag" in result.effects
     assert result.error_after < 0.5 * result.error_before
     with pytest.raises(InputError, match="N = 2, 3, 4 and 5"):
