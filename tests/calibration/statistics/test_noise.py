@@ -12,10 +12,10 @@ from calibration.statistics.forward_model import start_values
 from calibration.statistics.input_features import features
 from calibration.statistics.noise import FixedColumns, Noise, inverse_root, least_squares, repeat_covariance, sums
 from calibration.statistics.priors import changes, precisions
-from calibration.statistics.residual_tests import DRAWS, examine_residual
+from calibration.statistics.residual_tests import examine_residual
 from calibration.statistics.score_directions import Directions
 from calibration.statistics.splits import middle_session
-from calibration.statistics.study import Study
+from calibration.statistics.study import DRAWS, Study
 from tests.calibration.toy_tables import calibrated, toy_swimmer, toy_table
 
 

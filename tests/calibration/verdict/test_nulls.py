@@ -10,7 +10,7 @@ from scipy.stats import binom
 
 import sim.motion.batches
 from calibration.statistics.forward_model import start_values
-from calibration.statistics.residual_tests import DRAWS
+from calibration.statistics.study import DRAWS
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import COEFFICIENTS, DIRECT, SwimmerModel
 from calibration.verdict.verdict import Verdict
