@@ -53,7 +53,7 @@ SMALL_BEADS, SMALL_NOISE = np.array([3.0, 4.0, 5.0, 5.5]) / 1000, 0.01
 
 def test_a_model_that_is_no_robot_is_calibrated() -> None:
     assert calibrate(spheres(0.0, 0.0, 0, BEADS), progress=False).verdict == "none"
-    result = calibrate(spheres(1.0, 0.0, 1, BEADS), progress=False)
+    result = calibrate(spheres(1.0, 0.0, 2, BEADS), progress=False)
     assert result.effects == ("wall",)
     low, high = result.final.interval("wall")
     assert low < 1.0 < high
@@ -102,7 +102,7 @@ TRUTHS = pytest.mark.parametrize("truth", [{"wall": 1.0}, {"inertia": 5.0}], ids
 
 @TRUTHS
 def test_twins_are_called_ambiguous_and_the_next_runs_tell_them_apart(truth: dict[str, float]) -> None:
-    after = after_more_falls(truth, 0, diameters_wanted(twins(truth, 0)))
+    after = after_more_falls(truth, 1, diameters_wanted(twins(truth, 1)))
     assert after.effects == tuple(truth)
     assert after.next_runs == ()
 
