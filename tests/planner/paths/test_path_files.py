@@ -1,0 +1,128 @@
+"""Paths from files: tables of several kinds; SVG with transforms, curves, units and several shapes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.paths.fillets import CORNER, kinks
+from planner.paths.path import Path2D
+from planner.paths.path_files import METRES_PER_PIXEL, Drawing, read_path
+from sim.io.errors import InputError
+
+
+def drawn(folder: Path, body: str, *, root: str = "", shape: str | None = None) -> Drawing:
+    file = folder / "a.svg"
+    file.write_text(f"<svg xmlns='http://www.w3.org/2000/svg' {root}>{body}</svg>")
+    return read_path(file, shape=shape)
+
+
+def path_of(folder: Path, body: str) -> Path2D:
+    return drawn(folder, body).path
+
+
+def test_lines_and_basic_shapes(tmp_path: Path) -> None:
+    assert path_of(tmp_path, "<polyline points='0,0 3,0 3,-4'/>").length == pytest.approx(7)
+    triangle = path_of(tmp_path, "<polygon points='0,0 3,0 3,-4'/>")
+    assert triangle.closed
+    assert triangle.length == pytest.approx(12)
+    assert path_of(tmp_path, "<path d='M 0 0 h 3 v -4 Z'/>").points.tolist() == [[0, 0], [3, 0], [3, 4]]
+    assert path_of(tmp_path, "<path d='M 1 1 L 4 1 l 0 -4'/>").points.tolist() == [[1, -1], [4, -1], [4, 3]]
+    assert path_of(tmp_path, "<line x1='1' y1='1' x2='4' y2='-3'/>").length == pytest.approx(5)
+    box = path_of(tmp_path, "<rect x='1' y='1' width='3' height='2'/>")
+    assert box.closed
+    assert box.length == pytest.approx(10)
+
+
+def test_circles_and_ellipses_are_smooth(tmp_path: Path) -> None:
+    ring = path_of(tmp_path, "<circle cx='2' cy='1' r='3'/>")
+    assert ring.closed
+    assert np.linalg.norm(ring.points - [2, -1], axis=1) == pytest.approx(np.full(len(ring.points), 3.0))
+    assert ring.length == pytest.approx(6 * math.pi, rel=1e-4)
+    for body in (
+        "<ellipse rx='3' ry='1'/>",
+        "<path d='M 0 0 A 3 1 0 0 1 6 0'/>",
+        "<path d='M 0 0 C 1 2 3 2 4 0'/>",
+    ):
+        assert np.abs(kinks(path_of(tmp_path, body))).max() < CORNER, body
+
+
+def test_a_bezier_curve_is_followed(tmp_path: Path) -> None:
+    """Points of the curve by de Casteljau's definition."""
+    points = path_of(tmp_path, "<path d='M 0 0 C 1 -2 3 -2 4 0'/>").points
+    t = np.linspace(0, 1, 2001)[:, None]
+    corners = np.array([[0, 0], [1, 2], [3, 2], [4, 0]], float)
+    curve = sum(math.comb(3, k) * t**k * (1 - t) ** (3 - k) * corners[k] for k in range(4))
+    away = np.linalg.norm(points[:, None] - curve[None], axis=-1).min(1)
+    assert away.max() < 2e-3
+
+
+def test_transforms_of_shapes_and_groups_apply(tmp_path: Path) -> None:
+    body = "<g transform='translate(10,0) rotate(90)'><path d='M 0 0 L 2 0' transform='scale(3)'/></g>"
+    assert path_of(tmp_path, body).points == pytest.approx(np.array([[10, 0], [10, -6]]), abs=1e-9)
+
+
+def test_view_box_and_physical_units(tmp_path: Path) -> None:
+    """A hundred units drawn on 5 cm: each is half a millimetre."""
+    found = drawn(tmp_path, "<path d='M 0 0 L 100 0'/>", root="width='5cm' height='5cm' viewBox='0 0 100 100'")
+    assert found.unit == METRES_PER_PIXEL
+    assert found.path.length * found.unit == pytest.approx(0.05)
+    assert drawn(tmp_path, "<path d='M 0 0 L 100 0'/>").unit is None
+    assert drawn(
+        tmp_path, "<circle r='3cm'/>", root="width='10cm' height='10cm'"
+    ).path.length * METRES_PER_PIXEL == (pytest.approx(2 * math.pi * 0.03, rel=1e-4))
+
+
+def test_several_paths_are_named_and_one_can_be_chosen(tmp_path: Path) -> None:
+    body = (
+        "<defs><clipPath id='c'><path d='M 0 0 L 9 9'/></clipPath></defs>"
+        "<path id='outline' d='M 0 0 L 1 0 M 5 5 L 5 7'/><rect width='2' height='2'/><text>no path</text>"
+    )
+    with pytest.raises(InputError, match=r"3 paths \(outline/1, outline/2, rect1\); choose one with --shape"):
+        drawn(tmp_path, body)
+    assert drawn(tmp_path, body, shape="outline/2").path.length == pytest.approx(2)
+    assert drawn(tmp_path, body, shape="rect1").path.length == pytest.approx(8)
+    with pytest.raises(InputError, match="no shape 'circle1'; there are outline/1"):
+        drawn(tmp_path, body, shape="circle1")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("<svg", "not SVG"),
+        ("", "not SVG"),
+        ("<html/>", "not SVG"),
+        ("<svg/>", "no path"),
+        ("<svg><path d='M 0 0'/></svg>", "no path"),
+        ("<svg><path d='nonsense'/></svg>", "no path"),
+        ("<svg><path d='M 0 0 L 0 0'/></svg>", "same"),
+        ("<svg><text>hi</text></svg>", "no path"),
+    ],
+)
+def test_what_is_no_drawing_is_refused(text: str, expected: str, tmp_path: Path) -> None:
+    (tmp_path / "a.svg").write_text(text)
+    with pytest.raises(InputError, match=expected):
+        read_path(tmp_path / "a.svg")
+    (tmp_path / "b.svg").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="not SVG"):
+        read_path(tmp_path / "b.svg")
+
+
+def test_a_table_has_no_shapes(tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text("x,y\n0,0\n1,1\n")
+    assert read_path(tmp_path / "p.csv").unit is None
+    with pytest.raises(InputError, match="no SVG"):
+        read_path(tmp_path / "p.csv", shape="a")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["x,y\n0,0\n3,0\n3,4.5\n", "X;Y\n0;0\n3;0\n3;4,5\n", "0,0\n3,0\n3,4.5\n", "0 0\n3 0\n3 4.5\n",
+     "t;x;y\n1;0;0\n2;3;0\n3;3;4.5\n", "y\tx\n0\t0\n0\t3\n4.5\t3\n", "\ufeffx,y\n0,0\n3,0\n3,4.5\n"],
+)  # fmt: skip
+def test_tables_of_several_kinds_are_the_same_path(text: str, tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text(text, encoding="utf-8")
+    assert read_path(tmp_path / "path.csv").path.points.tolist() == [[0, 0], [3, 0], [3, 4.5]]

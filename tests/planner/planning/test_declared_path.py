@@ -1,0 +1,49 @@
+"""The declared path: tight, noisy and degenerate paths are refused with a remedy that works, or followed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from planner.paths.path import Path2D, circle, smoothed
+from planner.planning.plan import plan
+from sim.io.errors import InputError
+from sim.model.presets import PRESETS
+
+CONTROL = PRESETS["paper-control"]
+
+
+@pytest.mark.parametrize("radius", [0.4, 0.5, 0.57])
+def test_a_tight_circle_is_refused_with_a_scale_that_works(radius: float) -> None:
+    with pytest.raises(InputError) as caught:
+        plan(circle(radius), CONTROL)
+    factor = float(str(caught.value).rsplit(" ", 1)[1])
+    assert plan(circle(radius * factor), CONTROL).predicted_rms < 0.1
+
+
+def test_a_noisy_path_is_told_how_to_be_smoothed_and_that_works() -> None:
+    rng = np.random.default_rng(0)
+    line = np.stack([np.arange(600) * 0.01, np.zeros(600)], 1)
+    noisy = Path2D.of(line + 0.02 * rng.normal(size=line.shape))
+    with pytest.raises(InputError, match=r"it looks noisy: .* give --smooth") as caught:
+        plan(noisy, CONTROL)
+    smooth, _ = smoothed(noisy, float(str(caught.value).rsplit(" ", 1)[1]))
+    assert np.abs(plan(smooth, CONTROL).reference[:, 1]).max() < 0.06
+
+
+def test_a_line_and_back_ends_with_a_line() -> None:
+    with pytest.raises(InputError) as caught:
+        plan([[0, 0], [5, 0], [0, 0]], CONTROL)
+    assert "\n" not in str(caught.value)
+
+
+def test_many_points_with_little_noise_are_the_same_path() -> None:
+    """10⁵ points with noise of 1e-4 l: as many flips as the circle without it, within 2 %."""
+    rng = np.random.default_rng(0)
+    angle = np.linspace(0, 2 * np.pi, 100_000, endpoint=False)
+    clean = 2 * np.stack([np.cos(angle), np.sin(angle)], 1)
+    one, other = (
+        plan(Path2D.of(clean + s * rng.normal(size=clean.shape), closed=True), CONTROL) for s in (0, 1e-4)
+    )
+    assert len(other.dwells) == pytest.approx(len(one.dwells), rel=0.02)
+    assert other.errors.drawn_rms == pytest.approx(one.errors.drawn_rms, rel=0.05)

@@ -1,0 +1,64 @@
+"""The command `softflagella`: words, packages, version."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import softflagella as sf
+from sim.io.errors import run_command
+from softflagella.__main__ import PACKAGES, WORDS, command, main
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_one_command_has_those_of_all_packages(package: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([package, "--help"])
+    assert ended.value.code == 0
+    said = capsys.readouterr().out
+    assert f"usage: softflagella {package}" in said
+    for name in import_module(f"{package}.__main__").program.commands:
+        assert name in said
+
+
+def test_words_are_commands_of_packages_and_stand_first(capsys: pytest.CaptureFixture[str]) -> None:
+    assert {"plan", "sweep", "train", "calibrate", "replay", "query"} <= set(WORDS)
+    main([])
+    lines = capsys.readouterr().out.splitlines()
+    places = [next(i for i, line in enumerate(lines) if line.startswith(f"  {word} ")) for word in WORDS]
+    assert places == sorted(places)
+    assert max(places) < lines.index("further commands, by package (softflagella PACKAGE COMMAND …):")
+    for word, (package, name) in WORDS.items():
+        packaged = import_module(f"{package}.__main__").program.commands[name]
+        assert command(word) is packaged
+        with pytest.raises(SystemExit) as ended:
+            main([word, "--help"])
+        assert ended.value.code == 0
+        assert f"usage: softflagella {word} " in capsys.readouterr().out
+
+
+def test_a_word_runs_its_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(main, ["plan", "no-such-path.csv", "--robot", "paper-control", "--out", str(tmp_path)]) == 2
+    assert "no-such-path.csv" in capsys.readouterr().err
+    assert run_command(main, ["sweep", "--config", "none.toml", "--out", str(tmp_path / "out")]) == 2
+    assert "none.toml" in capsys.readouterr().err
+
+
+def test_the_command_runs_what_the_package_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(main, ["sim", "robot", "paper-control", "--out", str(tmp_path / "robot.toml")]) == 0
+    assert sf.load_robot(tmp_path / "robot.toml") == sf.load_robot("paper-control")
+    assert run_command(main, ["sim", "robot", "nobody", "--out", str(tmp_path / "other.toml")]) == 2
+    assert "no preset 'nobody'" in capsys.readouterr().err
+
+
+def test_version_and_unknown_words(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["--version"])
+    assert capsys.readouterr().out == f"softflagella {sf.__version__}\n"
+    main([])
+    assert "usage: softflagella" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as ended:
+        main(["swim"])
+    assert ended.value.code == 2
+    assert "no command 'swim'" in capsys.readouterr().err

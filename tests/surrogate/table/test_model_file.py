@@ -1,0 +1,129 @@
+"""Files of look-up tables: they come back as they were, and whatever is wrong with one is refused in one line."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from surrogate.table import tensor_file
+from surrogate.table.lookup import table_content
+from surrogate.table.model_file import FORMAT, SHIPPED, load, save
+from tests.surrogate.refusals import refusal
+from tests.surrogate.small import rows, table
+
+
+def test_a_model_comes_back_as_it_was(tmp_path: Path) -> None:
+    path = tmp_path / "model.safetensors"
+    save(table(), path)
+    again = load(path)
+    assert again.identity == table().identity
+    assert (again.domain, again.errors) == (table().domain, table().errors)
+    robots = rows(256, 13, wide=False).robots
+    answer, wanted = (t.query(robots, intervals=True, flag=True) for t in (again, table()))
+    for name, values in wanted.items():
+        assert answer[name] == pytest.approx(values, rel=1e-10, nan_ok=True), name
+
+
+def test_the_same_table_makes_the_same_bytes() -> None:
+    content = table_content(load())
+    assert tensor_file.packed(content, FORMAT) == tensor_file.packed(content, FORMAT) == SHIPPED.read_bytes()
+
+
+def test_flipped_bits_are_refused_wherever_they_are(tmp_path: Path) -> None:
+    whole, path = SHIPPED.read_bytes(), tmp_path / "changed.safetensors"
+    random = np.random.default_rng(5)
+    header = 8 + int.from_bytes(whole[:8], "little")
+    places = [*range(8), *random.integers(8, header, 120), *random.integers(header, len(whole), 60)]
+    for place in places:
+        broken = bytearray(whole)
+        broken[place] ^= 1 << int(random.integers(8))
+        path.write_bytes(broken)
+        refusal(path)
+    for size in [0, 1, 7, 8, 9, header, len(whole) - 1, *random.integers(len(whole), size=12)]:
+        path.write_bytes(whole[:size])
+        refusal(path)
+    path.write_bytes(whole + b"\0")
+    refusal(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"C_t,C_r\n1,2\n", "is not a model file"),
+        (b"\xff\xfe\x00\x01" * 9, "is not a model file"),
+        (b"", "is not a model file"),
+        (b"[" * 200_000, "is not a model file"),
+        (b"\x02\0\0\0\0\0\0\0{}", "is not a model file"),
+        (b"PK\x03\x04" + bytes(200), "older version; train it again"),
+    ],
+)
+def test_what_is_no_model_is_refused(content: bytes, expected: str, tmp_path: Path) -> None:
+    path = tmp_path / "m.safetensors"
+    path.write_bytes(content)
+    assert expected in refusal(path)
+
+
+def test_a_file_of_torch_and_one_of_another_format_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "model.pt"
+    torch.save({"format": 4, "content": {}}, path)
+    assert "older version; train it again" in refusal(path)
+    tensor_file.write(path, table_content(load()), 7)
+    assert "has format 7, this version reads 5; train it again" in refusal(path)
+
+
+def edited(change: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
+    content = copy.deepcopy(table_content(load()))
+    change(content)
+    return content
+
+
+EDITS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
+    (lambda c: c["wrench"][1]["state"]["weights.0"].fill_(np.nan), "some of its numbers are not finite"),
+    (lambda c: c["intervals"]["weights"]["v_z"].fill_(np.inf), "some of its numbers are not finite"),
+    (lambda c: c["intervals"]["factor"]["v_z"].fill_(np.nan), "some of its intervals are no numbers"),
+    (lambda c: c.update(wrench=[None] * 3, support=[None] * 3), "it has no networks"),
+    (lambda c: c.update(support=[None] * 3), "do not belong together"),
+    (lambda c: c["curves"].pop(), "no response to a flip"),
+    (lambda c: c["bases"].pop("lag"), "no response to a flip"),
+    (lambda c: c["ranges"].pop("omega_bar"), "no range of omega_bar"),
+    (lambda c: c["ranges"].update(C_t=[float("nan"), 1.0]), "no range of C_t"),
+    (lambda c: c.update(errors={}), "states no errors"),
+    (lambda c: c["wrench"][0]["shape"].update(width=10**12), "another shape"),
+    (lambda c: c["wrench"][0]["state"].pop("biases.1"), "no complete look-up table; train"),
+    (lambda c: c["support"][2].pop("limit"), "no complete look-up table; train"),
+    (lambda c: c.update(intervals="wide"), "no complete look-up table; train"),
+]
+
+
+@pytest.mark.parametrize(("change", "expected"), EDITS)
+def test_a_content_that_cannot_answer_is_refused_though_its_hash_is_right(
+    change: Callable[[dict[str, Any]], Any], expected: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "m.safetensors"
+    tensor_file.write(path, edited(change), FORMAT)
+    assert expected in refusal(path)
+
+
+@pytest.mark.parametrize("key", sorted(table_content(load())))
+def test_a_missing_key_is_named(key: str, tmp_path: Path) -> None:
+    path = tmp_path / "m.safetensors"
+    tensor_file.write(path, edited(lambda content: content.pop(key)), FORMAT)
+    assert f"it has no {key!r}" in refusal(path)
+
+
+def test_an_edited_domain_is_refused(tmp_path: Path) -> None:
+    """The header's text is edited as by hand; its length stays the same."""
+    path = tmp_path / "m.safetensors"
+    whole = SHIPPED.read_bytes()
+    low, high = load().ranges["omega_bar"]
+    old = f"{high!r}".encode()
+    assert whole.count(old) == 1
+    path.write_bytes(whole.replace(old, b"9" * len(old)))
+    assert "was changed after it was written" in refusal(path)
+    assert low < high

@@ -1,0 +1,32 @@
+"""The model card: what it says is what the table does."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from surrogate.table.errors import relative_errors
+from surrogate.training.model_card import model_card
+from surrogate.training.train import with_radius
+from tests.surrogate.small import rows, table
+
+
+def test_the_card_states_the_errors_of_the_held_out_robots() -> None:
+    held = rows(256, 13, wide=False)
+    card = model_card(table(), held)
+    answer = table().query(held.robots, flag=True)
+    error = 100 * np.abs(relative_errors(answer, with_radius(held.motion))["omega_yr_bar"])
+    stated = re.findall(r"\| yaw rate \| ([\d.e-]+) \| ([\d.e-]+)", card)
+    every = float(stated[-1][0])  # touching or not
+    assert np.isclose(every, np.median(error[~answer["outside"]]), rtol=0.06)
+    assert table().identity in card
+    assert "## Where not to trust it" in card
+
+
+def test_the_worst_robot_is_first() -> None:
+    held = rows(256, 13, wide=False)
+    lines = model_card(table(), held).split("## The worst robots")[1].splitlines()
+    sizes = [float(line.split("|")[1]) for line in lines if re.match(r"\| [\d.]", line)]
+    assert len(sizes) == 10
+    assert sizes == sorted(sizes, reverse=True)

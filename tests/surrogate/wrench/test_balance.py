@@ -1,0 +1,66 @@
+"""Compiled queries: networks, inputs and motions against the same by torch."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import torch
+
+import surrogate
+from sim.compiling import folder_of_package
+from surrogate.table.model_file import load
+from surrogate.table.wrench_table import network_index
+from surrogate.training.fit_wrench import wrench_samples
+from surrogate.training.simulated import draw_robots
+from surrogate.wrench.balance import inputs_rows, solve_rows
+from surrogate.wrench.heads import heads_and_tails, unbalanced
+from surrogate.wrench.tails import pack_tails, tail_inputs
+from tests.oracles.balance import linear_guess, solve
+from tests.surrogate.small import rows, table
+
+
+def test_loops_are_kept_by_all_files_of_the_package() -> None:
+    """Loops of one folder are made of formulas in another one."""
+    folder = folder_of_package(Path(surrogate.__file__).parent)
+    assert Path(solve_rows.stats.cache_path).is_relative_to(folder)
+
+
+def test_motions_are_those_of_torch() -> None:
+    robots = draw_robots(2000, 31, wide=False)
+    robots = {name: values[robots["N"] > 1] for name, values in robots.items()}
+    heads, tails = heads_and_tails(robots)
+    lookup = load().tails
+    motion, converged = lookup.solve(heads, tails)
+    assert converged.mean() > 0.999
+    kind = network_index(tails.number)
+    for k, network in enumerate(lookup.wrench[1:], 1):
+        rows = torch.nonzero(kind == k)[:, 0]
+        assert network is not None
+        wanted, known = solve(heads.at(rows), tails.at(rows), network)
+        both = known.numpy() & converged[rows.numpy()]
+        assert motion[rows.numpy()][both] == pytest.approx(wanted.numpy()[both], rel=1e-6)
+    inputs = inputs_rows(pack_tails(tails), motion)[converged]
+    by_torch = tail_inputs(tails, torch.from_numpy(motion)).numpy()[converged]
+    assert inputs == pytest.approx(by_torch, rel=1e-10, abs=1e-12)
+
+
+def test_forces_are_in_balance() -> None:
+    robots = rows(256, 13, wide=False).robots
+    heads, tails = heads_and_tails(robots)
+    found, converged = table().tails.solve(heads, tails)
+    assert converged.mean() > 0.97
+    network = table().tails.wrench[2]
+    assert network is not None
+    motion = torch.from_numpy(found)
+    left = unbalanced(heads, tails, motion[:, :4], network)
+    size = (heads.resistance.abs() @ motion.abs()[..., None])[..., 0]
+    assert float((left / size)[torch.from_numpy(converged)].abs().max()) < 1e-6
+
+
+def test_linear_theory_is_a_good_start() -> None:
+    some = rows(256, 13, wide=False)
+    found = wrench_samples(some.robots, some.motion)
+    guess = linear_guess(found.heads, found.tails)
+    assert float((guess[:, 3] / found.motion[:, 3] - 1).abs().median()) < 0.1
+    assert float((guess[:, 2] / found.motion[:, 2] - 1).abs().median()) < 0.3
