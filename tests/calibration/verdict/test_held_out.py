@@ -25,7 +25,7 @@ def test_the_locked_session_has_no_say() -> None:
     ruined.loc[ruined["session"] == name, "omega_yr_rad_s"] *= 1.5
     result_of_ruined = calibrated(ruined)
     assert result.final.parameters == result_of_ruined.final.parameters
-    assert result.misfit.p_value == result_of_ruined.misfit.p_value
+    assert result.evidence.misfit.p_value == result_of_ruined.evidence.misfit.p_value
     assert result_of_ruined.error_after > 1.5 * result.error_after
 
 
