@@ -49,7 +49,7 @@ test-rest: $(VENV)/.extras ## run what `make test` leaves out: rates over many t
 test-all: $(VENV)/.extras ## run every test
 	$(RUN) -m pytest $(TWO)
 $(VENV)/.extras: $(STAMP)
-	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[clusters,onnx]'
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[clusters]'
 	touch $@
 
 quick: $(STAMP) ## run the quick tests, under a minute

@@ -137,7 +137,6 @@ LIBRARIES = {
     "matplotlib",
     "numba",
     "numpy",
-    "onnx",
     "pandas",
     "pyarrow",
     "safetensors",
