@@ -21,9 +21,9 @@ from calibration.statistics.held_out import FinalRefit
 from calibration.swimmer.candidate_effects import CURRENT
 from calibration.swimmer.head_correction import HeadCorrection
 from calibration.swimmer.nuisance_numbers import LENGTH
-from calibration.swimmer.swimmer import robot_numbers
+from calibration.swimmer.swimmer import COEFFICIENTS, robot_numbers
 from calibration.verdict.experiment import LearntCorrection
-from planner.vehicle.calibration_table import COEFFICIENTS, NUMBERS, CalibrationKnowledge, knowledge_toml
+from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, knowledge_toml
 from sim.effects import catalogue
 from sim.inputs import robot_toml
 from sim.io.errors import InputError
@@ -53,8 +53,8 @@ def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
     return replace(robot, **own, effects={**robot.effects, **sizes})
 
 
-def knowledge_of(robot: Robot, delivered: FinalRefit) -> CalibrationKnowledge:
-    """Covariance of the corrected robot's coefficients, numbers and effects, and the current in the tank.
+def calibration_knowledge(robot: Robot, delivered: FinalRefit) -> CalibrationKnowledge:
+    """Collect the covariance of the corrected robot's parameters and effects, and the current in the tank.
 
     Args:
         robot: as it was given; the error of the tail length is one of ln l of this robot.
@@ -81,7 +81,7 @@ def knowledge_of(robot: Robot, delivered: FinalRefit) -> CalibrationKnowledge:
 def corrected_toml(robot: Robot, final: FinalRefit, learnt: LearntCorrection | None = None) -> str:
     """Write corrected.toml, with the correction that was `learnt` where nothing explains the runs."""
     corrected = corrected_robot(robot, final.parameters)
-    known = knowledge_of(robot, final)
+    known = calibration_knowledge(robot, final)
     if isinstance(learnt, HeadCorrection):
         known = _with_correction(known, learnt, corrected)
         corrected = replace(corrected, correction=learnt.correction)

@@ -29,7 +29,7 @@ _LABELS = {
     "v": "v, speed",
 }
 _SETTINGS = {"l_cm": "l [cm]", "omega_rpm": "ω [rpm]"}
-_DISAGREES = 0.01  # p of the locked runs below which the report says so
+_DISAGREES = 0.01  # p of the held-out runs below which the report says so
 _TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes", "score": "effects"}
 
 
@@ -90,13 +90,13 @@ def _add_batch(page: Page, batch: Batch) -> None:
 def _add_numbers(page: Page, result: Verdict) -> None:
     if not result.fits.pulls:
         return
-    page.section("Numbers as given")
+    page.section("Nuisance parameters")
     wrong = [" or ".join(p.parameter.title for p in alike) for alike in result.wrong_numbers]
     said = "; ".join(wrong) if wrong else "none is"
     page.text(
-        "What was given is known to a tolerance only. So these numbers are fitted, too, each with the tolerance "
-        "that was stated for it. The pull is how far the runs move a number, in standard deviations of what "
-        f"chance would do. Beyond {WRONG:g} the number is taken to be wrong: {said}.",
+        "What was given is known to a tolerance only. So these parameters are fitted, too, each with the "
+        "tolerance that was stated for it. The pull is how far the runs move a parameter, in standard deviations "
+        f"of what chance would do. Beyond {WRONG:g} the value as given is taken to be wrong: {said}.",
         tone="bad" if wrong else "good",
     )
     rows = []
@@ -115,14 +115,14 @@ def _add_numbers(page: Page, result: Verdict) -> None:
                 f"{p.z:+.1f}" if p.learnt else "",
             )
         )
-    page.table(("number", "given [SI]", "tolerance (σ)", "fitted", "what the runs alone say", "pull"), rows)
+    page.table(("parameter", "given [SI]", "tolerance (σ)", "fitted", "what the runs alone say", "pull"), rows)
 
 
 def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
     page.section("Data")
     page.text(
-        f"{len(data)} usable runs in {len(data.session_names)} session(s); locked away for the test: "
-        f"{result.conditions.split.names}. Set aside: "
+        f"{len(data)} usable runs in {len(data.session_names)} session(s); held out for the test: "
+        f"{result.conditions.split.names}. Excluded: "
         + ("; ".join(result.conditions.excluded) if result.conditions.excluded else "nothing")
         + "."
     )
@@ -157,7 +157,7 @@ def _add_fit(page: Page, result: Verdict) -> None:
     delivered = result.fits.final_refit.parameters
     page.text(
         f"The runs determine {combination} worst: {100 * error:.1f} %. corrected.toml has the model fitted once "
-        "more to all runs, with the locked ones: "
+        "more to all runs, with the held-out ones: "
         + ", ".join(f"{name} {delivered[name]:.4g}" for name in result.final.names if name not in given)
         + "."
     )
@@ -210,7 +210,7 @@ def _carried(claim: Candidate) -> str:
 
 
 def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
-    page.section("Error on the locked runs")
+    page.section("Error on the held-out runs")
     low, high = result.errors.after_interval
     corrected: list[tuple[str, float, dict[str, float]]] = []
     if result.error_predictive is not None:
@@ -243,7 +243,7 @@ def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
     agree = result.errors.p_value >= _DISAGREES
     page.text(
         f"95 % interval with effects: {100 * low:.2f} to {100 * high:.2f} %. "
-        f"Noise of one run from the repeats: {100 * result.noise_ceiling:.2f} %. The locked runs "
+        f"Noise of one run from the repeats: {100 * result.noise_ceiling:.2f} %. The held-out runs "
         f"{'agree' if agree else 'do not agree'} with the final model (p = {result.errors.p_value:.2g}). "
         f"Generic correction: {features} (it describes the residual and does not explain it).",
         tone="good" if agree else "bad",

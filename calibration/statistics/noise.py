@@ -24,6 +24,7 @@ from sim.arrays import Floats, Integers
 
 SESSION_SHARE = 1.0  # largest ρ
 _RIDGE = 1e-11
+_PASSES_OF_A_SCORE = 2  # iterations for the scatter of the sessions
 
 Labels = Integers
 
@@ -39,7 +40,7 @@ class Noise:
         return Whitener(self, session)
 
     def covariance(self, session: Labels) -> Floats:
-        """Σ of the runs of `session` (n,), (n k, n k)."""
+        """Compute Σ of the runs of `session` (n,), (n k, n k)."""
         together = session[:, None] == session
         return np.asarray(np.kron(np.eye(len(session)) + self.share * together, self.run))
 
@@ -70,7 +71,7 @@ class Sums:
     outputs: int
 
     def at(self, share: Floats) -> Floats:
-        """Columnᵀ Σ⁻¹ column, (..., m, m), for ρ (...)."""
+        """Compute columnᵀ Σ⁻¹ column, (..., m, m), for ρ (...)."""
         weight = 1 / (1 + share[..., None] * self.sizes)
         columns = self.between.shape[-1]
         flat = self.between.reshape(*self.between.shape[:-2], columns * columns)
@@ -78,7 +79,7 @@ class Sums:
         return np.asarray(self.within + between)
 
     def take(self, columns: Integers) -> Sums:
-        """The same for choices of columns (c, q), (..., c, q, q)."""
+        """Choose columns (c, q), (..., c, q, q)."""
         rows, cols = columns[:, :, None], columns[:, None, :]
         between = np.swapaxes(self.between[..., rows, cols], -4, -3)
         return Sums(self.within[..., rows, cols], between, self.sizes, self.outputs)
@@ -94,25 +95,25 @@ class Linear:
 
 
 def root_diagonal(whole: Floats) -> Floats:
-    """Roots of the diagonals of (..., p, p), 1 where there is nothing."""
+    """Return roots of the diagonals of (..., p, p), 1 where there is nothing."""
     diagonal = np.diagonal(whole, axis1=-2, axis2=-1)
     return np.where(diagonal > 1e-280, np.sqrt(np.maximum(diagonal, 1e-280)), 1.0)
 
 
 def inverse(scaled: Floats) -> Floats:
-    """Inverse of positive semidefinite matrices (..., p, p) with ones on the diagonal; large where there is
+    """Invert positive semidefinite matrices (..., p, p) with ones on the diagonal; large where there is
     none.
     """
     return np.asarray(np.linalg.inv(scaled + _RIDGE * np.eye(scaled.shape[-1])))
 
 
 def inverse_root(run: Floats) -> Floats:
-    """L⁻¹ of S = L Lᵀ, (..., k, k)."""
+    """Return L⁻¹ of S = L Lᵀ, (..., k, k)."""
     return np.asarray(np.linalg.inv(np.linalg.cholesky(run)))
 
 
 def sums(columns: Floats, session: Labels, outputs: int) -> Sums:
-    """Products of columns (..., n, k, m) that are white in S."""
+    """Multiply columns (..., n, k, m) that are white in S with each other."""
     *batch, n, k, m = columns.shape
     flat = columns.reshape(*batch, n * k, m)
     whole = np.swapaxes(flat, -1, -2) @ flat
@@ -123,7 +124,7 @@ def sums(columns: Floats, session: Labels, outputs: int) -> Sums:
 
 
 def _picks(session: Labels) -> tuple[Floats, Floats]:
-    """Rows (s, n) that take the mean of each session times the root of its size; the sizes (s,)."""
+    """Make rows (s, n) that take the mean of each session times the root of its size; the sizes (s,)."""
     kinds, place, count = np.unique(session, return_inverse=True, return_counts=True)
     return (np.arange(len(kinds))[:, None] == place.reshape(-1)) / np.sqrt(count)[:, None], count.astype(float)
 
@@ -144,11 +145,11 @@ class FixedColumns:
         self._between = between.reshape(k * k, -1)
 
     def average(self, table: Floats) -> Floats:
-        """Mean of each session times the root of its size, (s, ...), of (n, ...)."""
+        """Average each session, times the root of its size, (s, ...), of (n, ...)."""
         return np.asarray(np.tensordot(self.picks, table, 1))
 
     def sums(self, precision: Floats, residual: Floats) -> Sums:
-        """The same as `sums` of these columns and a residual behind them.
+        """Compute the same as `sums` of these columns and a residual behind them.
 
         Args:
             precision: S⁻¹, (b, k, k).
@@ -177,7 +178,7 @@ def least_squares(products: Sums, *, passes: int) -> Linear:
 
 
 def session_share(products: Sums, *, passes: int) -> Floats:
-    """ρ (...) from the residuals of a fit of the last of the columns, after `passes` iterations from 0.
+    """Estimate ρ (...) from the residuals of a fit of the last of the columns, after `passes` iterations from 0.
 
     The expected scatter of the sessions' means is Σ_s n_s |m_s|² = (k − h/s) Σ_s (1 + ρ n_s), where h of their k s
     degrees of freedom are used by the fit.
@@ -200,7 +201,7 @@ def session_share(products: Sums, *, passes: int) -> Floats:
 
 
 def solved(whole: Floats) -> tuple[Floats, Floats]:
-    """Coefficients (..., p) of the last of the columns, and their covariance (..., p, p)."""
+    """Solve for the coefficients (..., p) of the last of the columns; with their covariance (..., p, p)."""
     p = whole.shape[-1] - 1
     scale = root_diagonal(whole[..., :p, :p])
     scaled = whole[..., :p, :p] / scale[..., :, None] / scale[..., None, :]
@@ -208,8 +209,28 @@ def solved(whole: Floats) -> tuple[Floats, Floats]:
     return (covariance @ whole[..., :p, p, None])[..., 0], covariance
 
 
+def projected_scores(products: Sums, p: int) -> tuple[Floats, Floats, Floats]:
+    """Score each column after the first `p`, and before the last, without the part that the first `p` can absorb.
+
+    Each column has the scatter of sessions that remains with it in the fit.
+
+    Returns:
+        z of the last column along it, the share of it that survives the projection, and the length of the rest.
+    """
+    e = products.within.shape[-1] - p - 1
+    columns = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
+    part = products.take(columns)
+    whole = part.at(session_share(part, passes=_PASSES_OF_A_SCORE))  # (B, e, p + 2, p + 2)
+    weights = solved(whole[..., : p + 1, : p + 1])[0]  # of the first p columns in the one that is scored
+    score = whole[..., p, p + 1] - (weights * whole[..., :p, p + 1]).sum(-1)
+    square = whole[..., p, p] - (weights * whole[..., :p, p]).sum(-1)
+    length = np.sqrt(np.maximum(square, 1e-300))
+    survived = length / np.sqrt(np.maximum(whole[..., p, p], 1e-300))
+    return np.where(survived > 1e-6, score / length, 0.0), survived, length
+
+
 def repeat_covariance(y: Floats, condition: Labels) -> Floats:
-    """S (..., k, k) from the scatter of (..., n, k) about the mean of each condition, pooled."""
+    """Estimate S (..., k, k) from the scatter of (..., n, k) about the mean of each condition, pooled."""
     places = np.unique(condition, return_inverse=True)[1].reshape(-1)
     count = np.bincount(places)
     picks = (np.arange(len(count))[:, None] == places) / count[:, None]

@@ -38,12 +38,10 @@ from calibration.statistics.forward_model import Runs
 from calibration.statistics.input_features import features
 from calibration.statistics.noise import (
     FixedColumns,
-    Sums,
     inverse_root,
     least_squares,
+    projected_scores,
     repeat_covariance,
-    session_share,
-    solved,
 )
 from calibration.statistics.priors import changes, precisions
 from calibration.statistics.score_directions import Directions
@@ -53,7 +51,6 @@ from sim.arrays import Flags, Floats, Integers
 TESTABLE = 0.03  # an effect cannot be tested if less than this share of its signal survives the projection
 GENERAL = ("lack", "kernel", "shape")
 _PASSES = 3
-_PASSES_OF_AN_EFFECT = 2
 _AT_ONCE = 50  # draws
 
 
@@ -114,6 +111,7 @@ class _Tester:
         products = self.design.sums(np.swapaxes(root, -1, -2) @ root, residual)
         products.within[..., range(p), range(p)] += self.precision
         base = least_squares(products.take(np.r_[np.arange(p), p + e][None]), passes=_PASSES)
+        projected = projected_scores(products, p)
         share, step = base.share[:, 0], base.step[:, 0]
         white = residual - np.einsum("nkp,bp->bnk", self.J, step, optimize=True)
         white = self._shrunk(white @ np.swapaxes(root, -1, -2), share)
@@ -121,19 +119,7 @@ class _Tester:
         kernel = np.einsum("bnk,nm,bmk->b", white, self.K, white, optimize=True)
         shapes = self._shapes(base.covariance[:, 0], white, root, share)
         largest = np.abs(shapes).max((-1, -2)) if shapes.size else np.zeros(len(share))
-        return Scores(np.stack([lack, kernel, largest], -1), *self._effects(products, p, e), shapes, share)
-
-    def _effects(self, products: Sums, p: int, e: int) -> tuple[Floats, Floats, Floats]:
-        """Compute z, survived share and length of every effect, each with the scatter of sessions left by it."""
-        columns = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
-        part = products.take(columns)
-        whole = part.at(session_share(part, passes=_PASSES_OF_AN_EFFECT))  # (B, e, p + 2, p + 2)
-        weights = solved(whole[..., : p + 1, : p + 1])[0]  # of the coefficients in the effect's signal
-        score = whole[..., p, p + 1] - (weights * whole[..., :p, p + 1]).sum(-1)
-        square = whole[..., p, p] - (weights * whole[..., :p, p]).sum(-1)
-        length = np.sqrt(np.maximum(square, 1e-300))
-        survived = length / np.sqrt(np.maximum(whole[..., p, p], 1e-300))
-        return np.where(survived > 1e-6, score / length, 0.0), survived, length
+        return Scores(np.stack([lack, kernel, largest], -1), *projected, shapes, share)
 
     def _shapes(self, covariance: Floats, white: Floats, root: Floats, share: Floats) -> Floats:
         """Compute z of every output along every feature, (B, k, f).

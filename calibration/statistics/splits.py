@@ -7,7 +7,7 @@ be estimated. Its variance is taken to be `noise.SESSION_SHARE`, so a shift of a
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,7 +27,8 @@ class Split:
     held_out: Flags  # (n,) whole sessions or blocks
     outliers: Flags  # (n,) neither fitted nor tested
     names: str = ""  # of the held-out groups
-    reasons: tuple[str, ...] = field(default=())  # for each outlier
+    reasons: tuple[str, ...] = ()  # for each outlier
+    caveats: tuple[str, ...] = ()  # what the split weakens
 
     @property
     def fitted(self) -> Flags:
@@ -67,10 +68,27 @@ def middle_session(data: Runs) -> Flags:
     return np.asarray(group == len(names) // 2)
 
 
-def held_out_names(data: Runs, held_out: Flags) -> str:
-    """Name the groups of the `held_out` runs (n,)."""
-    group, names = groups(data) if divided(data, held_out) else (data.session, data.session_names)
-    return ", ".join(names[g] for g in np.unique(group[held_out]))
+def split_runs(data: Runs, held_out: Flags | None, outliers: tuple[Flags, tuple[str, ...]]) -> Split:
+    """Divide the runs, and say what is weaker if the held-out ones are not whole sessions.
+
+    Args:
+        held_out: (n,); the middle session if not given.
+        outliers: which they are (n,), and why.
+    """
+    held_out = middle_session(data) if held_out is None else held_out
+    count = len(data.session_names)
+    parted = divided(data, held_out)
+    group, names = groups(data) if parted else (data.session, data.session_names)
+    held_out_names = ", ".join(names[g] for g in np.unique(group[held_out]))
+    if count >= _FEWEST or not parted:
+        return Split(held_out, outliers[0], held_out_names, outliers[1])
+    caveat = (
+        f"{count} session{'s' * (count > 1)} only: the held-out runs are a quarter of the conditions, not a "
+        "session of their own, so the error on them does not contain the differences between sessions"
+    )
+    if count == 1:
+        caveat += ", and a shift that is equal in all runs is no evidence for an effect"
+    return Split(held_out, outliers[0], held_out_names, outliers[1], (caveat,))
 
 
 def leave_one_group_out(group: Labels, used: Flags) -> Iterator[tuple[Flags, Flags]]:
@@ -82,17 +100,3 @@ def leave_one_group_out(group: Labels, used: Flags) -> Iterator[tuple[Flags, Fla
 def divided(data: Runs, held_out: Flags) -> bool:
     """Tell whether some runs of a session are held out and others are not."""
     return bool(set(data.session[held_out]) & set(data.session[~held_out]))
-
-
-def split_caveats(data: Runs, held_out: Flags) -> tuple[str, ...]:
-    """Say what is weaker if the `held_out` runs (n,) are not whole sessions."""
-    count = len(data.session_names)
-    if count >= _FEWEST or not divided(data, held_out):
-        return ()
-    caveat = (
-        f"{count} session{'s' * (count > 1)} only: the held-out runs are a quarter of the conditions, not a "
-        "session of their own, so the error on them does not contain the differences between sessions"
-    )
-    if count == 1:
-        caveat += ", and a shift that is equal in all runs is no evidence for an effect"
-    return (caveat,)

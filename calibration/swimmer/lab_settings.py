@@ -24,7 +24,7 @@ Owned = Mapping[str, tuple[float, ...]]
 
 
 def owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
-    """Settings that a lab has, by the columns of a table.
+    """Read the settings that a lab has, by the columns of a table.
 
     Args:
         entries: "COLUMN=VALUE,VALUE,…" each.
@@ -62,8 +62,8 @@ def check_owned(own: Owned) -> None:
                 )
 
 
-def settings_of(runs: Measurements, own: Owned) -> Floats:
-    """N, l_cm and omega_rpm of every run that can be made next, (m, 3); both directions."""
+def possible_settings(runs: Measurements, own: Owned) -> Floats:
+    """List N, l_cm and omega_rpm of every run that can be made next, (m, 3); both directions."""
     cm, rpm = 100 * runs.length, np.abs(runs.omega).max() * 30 / math.pi
     default = {
         "N": np.arange(runs.tails.min(), runs.tails.max() + 2),

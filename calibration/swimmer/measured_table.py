@@ -7,7 +7,7 @@ Needed: N, l_cm, omega_rpm (tails relative to head, signed) and some of the outp
 Some conditions must be repeated, because the noise is estimated from repeats. `session` names the group of runs
 that were made together. Without it, all runs of one N are one session. Some effects need elapsed_min,
 temperature_C, tank_diameter_cm or heading_deg (direction of the path in the lab, where a run is a part of a
-circle). Rows that cannot be used are set aside with number and reason. So are columns of other names, unless the
+circle). Rows that cannot be used are excluded with number and reason. So are columns of other names, unless the
 name looks like a misspelt one.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians. A
@@ -45,7 +45,7 @@ OUTPUTS = {
 _ERRORS = (  # of `calibration.swimmer.camera_tracks`; not used, since repeats give the noise
     "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
 )  # fmt: skip
-_SIGMAS = {  # column -> number as given, factor
+_SIGMAS = {  # column -> nuisance parameter, factor
     "camera_scale_sigma_percent": (CAMERA, 0.01),
     "heading_zero_sigma_deg": (HEADING, math.pi / 180),
     "tachometer_sigma_percent": (TACHOMETER, 0.01),

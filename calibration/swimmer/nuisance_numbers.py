@@ -1,4 +1,4 @@
-"""The swimmer's numbers as given: which they are, how well they are known, and what depends on them.
+"""The swimmer's nuisance parameters: which they are, how well they are known, and what depends on them.
 
 Those of the robot come from robot.toml. Three belong to the way of measuring and come from the table: the camera's
 scale, the zero of the heading and the tachometer. Each is a parameter with a prior
@@ -51,13 +51,13 @@ _FACTOR = 5.0  # a number may be off by
 
 
 def robot_number(robot: Robot, name: str) -> float:
-    """A number of the robot; a is the head's radius if it is not given."""
+    """Return a number of the robot; a is the head's radius if it is not given."""
     value = getattr(robot, name)
     return float(robot.head_radius if value is None else value)
 
 
-def given_numbers(robot: Robot, table: Mapping[str, float], outputs: Sequence[str]) -> tuple[Parameter, ...]:
-    """Every number that is not exact.
+def nuisance_parameters(robot: Robot, table: Mapping[str, float], outputs: Sequence[str]) -> tuple[Parameter, ...]:
+    """List every number that is not exact.
 
     Args:
         robot: with its standard deviations.

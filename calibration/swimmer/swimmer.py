@@ -25,7 +25,7 @@ from calibration.swimmer.candidate_effects import (
     influences,
     reason_untestable,
 )
-from calibration.swimmer.lab_settings import Owned, check_owned, settings_of
+from calibration.swimmer.lab_settings import Owned, check_owned, possible_settings
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.nuisance_numbers import (
     CAMERA,
@@ -34,7 +34,7 @@ from calibration.swimmer.nuisance_numbers import (
     LENGTH,
     POWERS,
     TACHOMETER,
-    given_numbers,
+    nuisance_parameters,
     robot_number,
 )
 from calibration.swimmer.observation import Observation
@@ -46,10 +46,10 @@ from sim.model.robot import Robot
 from sim.motion.batches import sensitivity_columns, steady_columns
 from sim.motion.sensitivity import Sensitivities
 from sim.solve.refinement import FEW, MANY
+from surrogate.input_ranges import COEFFICIENTS
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
 
-COEFFICIENTS = ("C_t", "C_r", "C_yr")
 SANE = (0.1, 20.0)  # range of the coefficients; at its ends the model lacks something
 
 _STEP = 0.05  # finite-difference step in ln C, with the look-up table
@@ -98,7 +98,7 @@ class SwimmerModel:
 
     @cached_property
     def nuisances(self) -> tuple[Parameter, ...]:
-        return given_numbers(self.robot, self.runs.sigmas, self.runs.outputs)
+        return nuisance_parameters(self.robot, self.runs.sigmas, self.runs.outputs)
 
     @cached_property
     def effects(self) -> tuple[Parameter, ...]:
@@ -191,7 +191,7 @@ class SwimmerModel:
     def _slope_of_number(
         self, name: str, runs: list[_Run], columns: dict[str, Floats], found: Sensitivities, view: Observation
     ) -> Floats:
-        """Derivatives (m, k) along a number as given, on its own scale."""
+        """Compute the derivatives (m, k) along a nuisance parameter, on its own scale."""
         by = np.array([1 / run.robot.tail_length if name == LENGTH else 1.0 for run in runs])
         powers = POWERS[name]
         motion = {key: np.zeros(len(runs)) for key in found.derivatives}
@@ -253,7 +253,7 @@ class SwimmerModel:
 
     def possible(self) -> tuple[SwimmerModel, list[dict[str, Any]]]:
         """Runs that can be made next (`calibration.swimmer.lab_settings`)."""
-        runs, grid = self.runs, settings_of(self.runs, self.own)
+        runs, grid = self.runs, possible_settings(self.runs, self.own)
         count = len(grid)
         noted = np.tile(runs.noted.mean(0), (count, 1))
         settings = [{"N": int(n), "l_cm": length, "omega_rpm": speed} for n, length, speed in grid.tolist()]

@@ -23,12 +23,12 @@ import numpy as np
 from calibration.attribution.explain import Explained, explain
 from calibration.attribution.single_effects import coefficients_within_range
 from calibration.statistics.fit import Fit
-from calibration.statistics.forward_model import ForwardModel
+from calibration.statistics.forward_model import ForwardModel, start_values
 from calibration.statistics.held_out import error_interval, errors, held_out_p_value, refit_to_all
 from calibration.statistics.outliers import find_outliers
 from calibration.statistics.profile_intervals import profile_intervals
 from calibration.statistics.pulls import pulls
-from calibration.statistics.splits import Split, held_out_names, middle_session, split_caveats
+from calibration.statistics.splits import Split, split_runs
 from calibration.statistics.study import DRAWS, LEVEL, Study
 from calibration.verdict.experiment import Experiment, LearntCorrection
 from calibration.verdict.next_runs import next_runs
@@ -71,12 +71,9 @@ def calibrate(
         draws: of the bootstrap. It resolves no smaller p-value than 2/(draws + 1).
         progress: show progress bars.
     """
-    held_out = middle_session(model.runs) if held_out is None else held_out
-    plain = Study(model, Split(held_out, np.zeros_like(held_out)), level, seed, draws, progress)
-    uncalibrated = model.predict([plain.start], title=plain.title("as given"))[0]
+    uncalibrated = model.predict([start_values(model)], title="as given" if progress else "")[0]
     model.check(uncalibrated)
-    outliers, reasons = find_outliers(model.runs, uncalibrated)
-    split = Split(held_out, outliers, held_out_names(model.runs, held_out), reasons)
+    split = split_runs(model.runs, held_out, find_outliers(model.runs, uncalibrated))
     study = Study(model, split, level, seed, draws, progress)
     explained = explain(study, model.guess(study.start, study.used))
     evidence = Evidence(
@@ -90,7 +87,6 @@ def calibrate(
     verdict = reach_verdict(evidence, level, number_explains=explained.number is not None)
     learnt = correction(model, explained.base, split) if correction and verdict == "unexplained" else None
     corrections = Corrections(regress_residual(model.runs, explained.base.prediction, split.fitted), learnt)
-    caveats = (*split_caveats(model.runs, held_out), *_caveats_of_fits(model, explained.base, explained.final))
     return Verdict(
         verdict=verdict,
         evidence=evidence,
@@ -102,8 +98,8 @@ def calibrate(
             split=split,
             sessions=model.runs.session_names,
             hash=study.fixed,
-            excluded=(*model.runs.excluded, *reasons),
-            caveats=(*model.runs.caveats, *caveats),
+            excluded=(*model.runs.excluded, *split.reasons),
+            caveats=(*model.runs.caveats, *split.caveats, *_caveats(model, explained)),
         ),
     )
 
@@ -132,7 +128,7 @@ def _next_runs(model: Experiment, rivals: tuple[tuple[str, Fit], ...], seed: int
         return Next()
     runs, batch = next_runs(model, [fitted for _, fitted in rivals], seed=seed)
     outputs = model.runs.outputs
-    return Next(tuple(Explanation.of(title, fitted, outputs) for title, fitted in rivals), runs, batch)
+    return Next(tuple(Explanation.from_fit(title, fitted, outputs) for title, fitted in rivals), runs, batch)
 
 
 def _errors(study: Study, explained: Explained, uncalibrated: Floats, corrections: Corrections) -> HeldOutErrors:
@@ -157,8 +153,9 @@ def _errors(study: Study, explained: Explained, uncalibrated: Floats, correction
     )
 
 
-def _caveats_of_fits(model: ForwardModel, base: Fit, final: Fit) -> tuple[str, ...]:
+def _caveats(model: ForwardModel, explained: Explained) -> tuple[str, ...]:
     """Say why a fit may not be the best one."""
+    base, final = explained.base, explained.final
     caveats = [f"{name} is at the end of its range: these runs do not determine it" for name in final.at_bounds]
     if not coefficients_within_range(model, base.parameters):
         caveats.append(

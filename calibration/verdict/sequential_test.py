@@ -3,7 +3,7 @@
 Each explanation was fitted before the new runs were made, and gives them a density: Gaussian about its prediction,
 with covariance Σ + J Cov Jᵀ. Σ is the noise of runs and sessions, J Cov Jᵀ the error of the fit. The ratio of two
 densities, of all new runs together, is an e-value. If one of the two is true, the ratio of the other to it exceeds
-`discriminate.STOP` with a probability of at most 1/STOP, however often one looks (Ville 1939). So an explanation
+`next_runs.STOP` with a probability of at most 1/STOP, however often one looks (Ville 1939). So an explanation
 is given up if it is behind the best one by more than 2 ln STOP. Source: Grünwald, de Heide and Koolen (2024).
 """
 
@@ -36,12 +36,13 @@ class Explanation:
     outputs: tuple[str, ...]  # (k,) that were fitted
 
     @staticmethod
-    def of(title: str, fitted: Fit, outputs: tuple[str, ...]) -> Explanation:
+    def from_fit(title: str, fitted: Fit, outputs: tuple[str, ...]) -> Explanation:
+        """Keep of a fit what a decision needs."""
         parameters = {name: fitted.parameters[name] for name in fitted.names}
         return Explanation(title, parameters, fitted.covariance, fitted.noise, outputs)
 
     def record(self) -> dict[str, Any]:
-        """For verdict.json."""
+        """Write it for verdict.json."""
         return {
             "title": self.title,
             "parameters": self.parameters,
@@ -53,7 +54,7 @@ class Explanation:
 
     @staticmethod
     def read(record: dict[str, Any]) -> Explanation:
-        """From verdict.json."""
+        """Read it from verdict.json."""
         return Explanation(
             record["title"],
             record["parameters"],
@@ -76,7 +77,7 @@ class Standing:
 
 
 def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
-    """Explanations that the runs of a verdict.json could not tell apart, and the sessions of these runs.
+    """Read the explanations that the runs of a verdict.json could not tell apart, and the sessions of these runs.
 
     Raises:
         InputError: no such file, or its verdict has nothing to decide.
@@ -96,7 +97,7 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
 
 
 def new_runs(runs: Runs, before: set[str]) -> Flags:
-    """Runs (n,) of sessions that were not there before.
+    """Choose the runs (n,) of sessions that were not there before.
 
     Raises:
         InputError: there are none.
@@ -111,36 +112,41 @@ def new_runs(runs: Runs, before: set[str]) -> Flags:
 
 
 def standings(model: ForwardModel, explanations: Sequence[Explanation], new: Flags) -> list[Standing]:
-    """How explanations stand after the new runs in `new` (n,), best first.
+    """Judge explanations by the new runs in `new` (n,), best first.
+
+    It takes up where `calibration.verdict.verdict.reach_verdict` says "ambiguous".
 
     Raises:
         InputError: the table has other outputs than were fitted, or lacks what an effect needs.
     """
     data, known = model.runs, start_values(model)
     scores = []
-    for one in explanations:
-        if one.outputs != data.outputs:
+    for explanation in explanations:
+        if explanation.outputs != data.outputs:
             raise InputError(
                 f"this table has the outputs {', '.join(data.outputs)}; the verdict was made from "
-                f"{', '.join(one.outputs)}"
+                f"{', '.join(explanation.outputs)}"
             )
-        missing = [name for name in one.parameters if name not in known]
+        missing = [name for name in explanation.parameters if name not in known]
         if missing:
             raise InputError(
-                f"{one.title}: these runs cannot test {', '.join(missing)}; keep every column of the table before"
+                f"{explanation.title}: these runs cannot test {', '.join(missing)}; keep every column of the "
+                "table before"
             )
-        prediction, J = model.derivatives({**known, **one.parameters}, list(one.parameters))
+        parameters = {**known, **explanation.parameters}
+        prediction, J = model.derivatives(parameters, list(explanation.parameters))
         slopes = J[new].reshape(-1, J.shape[-1])
-        spread = one.noise.covariance(data.session[new]) + slopes @ one.covariance @ slopes.T
-        left = (data.y - prediction)[new].ravel()
-        scores.append(float(left @ np.linalg.solve(spread, left) + np.linalg.slogdet(spread)[1]))
-    found = [Standing(one.title, score - min(scores)) for one, score in zip(explanations, scores, strict=True)]
-    return sorted(found, key=lambda s: s.behind)
+        spread = explanation.noise.covariance(data.session[new]) + slopes @ explanation.covariance @ slopes.T
+        residual = (data.y - prediction)[new].ravel()
+        scores.append(float(residual @ np.linalg.solve(spread, residual) + np.linalg.slogdet(spread)[1]))
+    best = min(scores)
+    standing = [Standing(e.title, score - best) for e, score in zip(explanations, scores, strict=True)]
+    return sorted(standing, key=lambda s: s.behind)
 
 
-def sentence(found: Sequence[Standing]) -> str:
-    """What to do now."""
-    left = [s.title for s in found if not s.given_up]
-    if len(left) == 1:
-        return f"Decided: {left[0]}. The next step is to close the loop with all runs."
-    return f"Not decided between {' and '.join(left)}: make more runs."
+def sentence(standing: Sequence[Standing]) -> str:
+    """Say what to do now."""
+    titles = [s.title for s in standing if not s.given_up]
+    if len(titles) == 1:
+        return f"Decided: {titles[0]}. The next step is to close the loop with all runs."
+    return f"Not decided between {' and '.join(titles)}: make more runs."

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.report.corrected_robot import corrected_robot, corrected_toml, knowledge_of
+from calibration.report.corrected_robot import calibration_knowledge, corrected_robot, corrected_toml
 from calibration.swimmer.candidate_effects import CURRENT
 from calibration.swimmer.synthetic_table import make_table
 from planner.files.plan_json import load_plan
@@ -46,7 +46,7 @@ def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -
 def test_a_current_is_handed_on_with_its_error() -> None:
     delivered = calibrated_toy(3).fits.final_refit
     current = replace(delivered.fitted[0], name=CURRENT[1], logarithmic=False)
-    handed_on = knowledge_of(
+    handed_on = calibration_knowledge(
         START,
         replace(
             delivered,

@@ -8,28 +8,28 @@ from itertools import product
 import numpy as np
 import pytest
 
-from calibration.swimmer.lab_settings import owned, settings_of
+from calibration.swimmer.lab_settings import owned, possible_settings
 from sim.io.errors import InputError
 from tests.calibration.toy_tables import START, toy_swimmer, toy_table
 
 
 def test_without_a_word_it_is_the_range_of_the_table() -> None:
     runs = toy_swimmer(toy_table(3)).runs
-    grid = settings_of(runs, {})
+    grid = possible_settings(runs, {})
     assert set(grid[:, 0]) == {2, 3, 4, 5, 6}
     assert grid[:, 1].min() == pytest.approx(5)
     assert grid[:, 1].max() == pytest.approx(11)
     assert np.abs(grid[:, 2]).max() == pytest.approx(np.abs(runs.omega).max() * 30 / math.pi)
     assert len(np.unique(grid, axis=0)) == len(grid) == 5 * 6 * 6
     one_length = toy_swimmer(toy_table(3, lengths_cm=(8.0,))).runs
-    assert len(settings_of(one_length, {})) == 5 * 6
+    assert len(possible_settings(one_length, {})) == 5 * 6
 
 
 def test_a_lab_gets_only_what_it_has() -> None:
     lab = owned(["N=2,4", "l_cm=5,7", "omega_rpm=60"])
     runs = toy_swimmer(toy_table(3)).runs
     expected = set(product((2, 4), (5, 7), (60, -60)))
-    assert {tuple(row) for row in settings_of(runs, lab).tolist()} == expected
+    assert {tuple(row) for row in possible_settings(runs, lab).tolist()} == expected
 
 
 def test_settings_are_those_of_the_lab_to_the_last_digit() -> None:
