@@ -19,14 +19,15 @@ OUT ?= reports/dataset.html
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-# Tests run in two processes, each file in one of them.
-TWO := -n 2 --dist loadfile
+# Tests run in two processes, longest first; tests/conftest.py says what stays together. REST is what `make test` omits.
+TWO := -n 2 --dist loadgroup --no-loadscope-reorder
+REST := long or rates or cluster
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test quick lint docs dataset train plan calibrate report bench clean
+.PHONY: help setup demo test test-rest test-all quick lint docs dataset train plan calibrate report bench clean
 
 help: ## list the targets
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1\t\2/' | expand -t 20
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
 
 setup: $(STAMP) ## make .venv, install everything, pinned, and compile all loops
 $(STAMP): pyproject.toml constraints.txt
@@ -41,14 +42,18 @@ demo: reports/demo.html ## the whole pipeline on the paper's robot, ends with re
 reports/demo.html: $(STAMP) $(SOURCES) $(wildcard $(foreach p,dataset surrogate planner calibration softflagella,$(p)/*.py $(p)/*/*.py) surrogate/shipped/*) softflagella/demo.toml
 	$(RUN) -m softflagella demo --out $@
 
-test: $(VENV)/.extras ## run the tests, those of clusters included
+test: $(VENV)/.extras ## run the tests of every feature, about six minutes on two cores
+	$(RUN) -m pytest $(TWO) -m "not ($(REST))"
+test-rest: $(VENV)/.extras ## run what `make test` leaves out: rates over many tables, clusters, the longest tests
+	$(RUN) -m pytest $(TWO) -m "$(REST)"
+test-all: $(VENV)/.extras ## run every test
 	$(RUN) -m pytest $(TWO)
 $(VENV)/.extras: $(STAMP)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[clusters]'
 	touch $@
 
 quick: $(STAMP) ## run the quick tests, under a minute
-	$(RUN) -m pytest $(TWO) -m "not slow"
+	$(RUN) -m pytest $(TWO) -m "not (slow or page or $(REST))"
 
 lint: $(STAMP) ## style and types
 	$(VENV)/bin/ruff check .

@@ -1,7 +1,88 @@
-"""Shared by all tests: one thread, and robots from column values."""
+"""Shared by all tests: one thread, the marks by duration, the order, and the processor time that each test takes.
+
+tests/durations.json has the processor seconds of the longer tests, by name; `pytest --write-durations` brings it
+up to date for the tests that it runs. Tests over `SLOW` are marked. The longest run first, so that two processes
+end at about the same time. The quick tests of a file stay in one process; a slow one goes to whichever process is
+free, unless an `xdist_group` keeps it with those that share its fixtures.
+"""
 
 from __future__ import annotations
 
-import torch
+import json
+import os
+import resource
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+for library in ("OMP", "MKL", "OPENBLAS"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+import pytest  # noqa: E402
+import torch  # noqa: E402
 
 torch.set_num_threads(1)
+
+DURATIONS = Path(__file__).parent / "durations.json"
+NOTED, SLOW = 0.5, 1.0  # s of processor time
+_measured: dict[str, float] = defaultdict(float)
+_last = 0.0
+
+
+def noted_durations() -> dict[str, float]:
+    """Processor seconds of the longer tests, by name."""
+    return dict(json.loads(DURATIONS.read_text())) if DURATIONS.exists() else {}
+
+
+def processor_seconds() -> float:
+    """Processor time of this process and of those that it started and that have ended [s]."""
+    usages = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(usage.ru_utime + usage.ru_stime for usage in usages)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--write-durations", action="store_true", help="bring tests/durations.json up to date")
+
+
+@pytest.hookimpl(tryfirst=True)  # before tests are selected by their marks
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    durations = noted_durations()
+    groups: dict[pytest.Item, str] = {}
+    seconds: dict[str, float] = defaultdict(float)
+    for item in items:
+        if durations.get(item.name, 0.0) > SLOW:
+            item.add_marker(pytest.mark.slow)
+        named = item.get_closest_marker("xdist_group")
+        file = item.nodeid.partition("::")[0]
+        group = named.args[0] if named else item.nodeid if item.get_closest_marker("slow") else file
+        item.add_marker(pytest.mark.xdist_group(group))
+        groups[item] = group
+        seconds[group] += durations.get(item.name, 0.0)
+    items.sort(key=lambda item: -seconds[groups[item]])
+
+
+def pytest_runtest_logstart() -> None:
+    global _last
+    _last = processor_seconds()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    """Send the processor time of each phase of a test with its report."""
+    global _last
+    report = yield
+    now = processor_seconds()
+    report.test_name, report.processor_seconds, _last = item.name, now - _last, now
+    return report
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    if hasattr(report, "processor_seconds"):
+        _measured[report.test_name] += report.processor_seconds
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if session.config.getoption("--write-durations") and not hasattr(session.config, "workerinput"):
+        durations = {**noted_durations(), **{name: round(seconds, 1) for name, seconds in _measured.items()}}
+        kept = {name: durations[name] for name in sorted(durations) if durations[name] >= NOTED}
+        DURATIONS.write_text(json.dumps(kept, indent=0, ensure_ascii=False) + "\n")

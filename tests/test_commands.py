@@ -24,6 +24,7 @@ from surrogate.table.model_file import SHIPPED, load
 from tests.calibration.toy_tables import START, install_toy, toy_swimmer, toy_table
 from tests.calibration.track import RADIUS, track
 from tests.dataset.sweeps import SMALL
+from tests.processes import LIMIT
 
 COMMANDS = [
     (package, name) for package in PACKAGES for name in import_module(f"{package}.__main__").program.commands
@@ -115,11 +116,11 @@ def config(made: Path, out: Path) -> str:
 
 
 def train(made: Path, out: Path) -> str:
-    wide = (made / "sweep.toml").read_text().replace("rows = 6", "rows = 256")
+    wide = (made / "sweep.toml").read_text().replace("rows = 6", "rows = 128")
     (out / "sweep.toml").write_text(wide)
     done("dataset", "build", "--config", out / "sweep.toml", "--out", out / "data", "--jobs", 1)
     done("surrogate", "train", out / "data", "--out", out / "model.safetensors", "--epochs", 2)
-    assert load(out / "model.safetensors").provenance["rows"]["train"] > 150
+    assert load(out / "model.safetensors").provenance["rows"]["train"] > 75
     assert not (out / "model.safetensors.states").exists()
     return "held-out error on"
 
@@ -172,7 +173,8 @@ def follow(made: Path, out: Path) -> str:
     words = ["planner", "track", "circle:1.5", "--robot", made / "robot.toml"]
     answer = subprocess.run(
         [sys.executable, "-m", "softflagella", *map(str, words)],
-        input="0\n0.5 0 0 0\n", capture_output=True, text=True, check=True, cwd=Path(__file__).parents[1],
+        input="0\n0.5 0 0 0\n", capture_output=True, text=True, check=True, timeout=LIMIT,
+        cwd=Path(__file__).parents[1],
     )  # fmt: skip
     print(answer.stdout)
     direction, flip_at, error, alarm = answer.stdout.splitlines()[0].split()

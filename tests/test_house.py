@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.processes import LIMIT
+
 ROOT = Path(__file__).parents[1]
 # The rooms of each package, folders and single files; each imports only from those before it. Packages import only
 # from packages before them.
@@ -156,7 +158,9 @@ SIMULATOR = {"sim.linear", "sim.motion", "sim.reference", "sim.solve"}
 def test_importing_loads_only_what_is_used(module: str, may_load: set[str]) -> None:
     """Of the large libraries, of the other packages but `sim`, and of the simulator."""
     code = f"import sys, {module}; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT, timeout=LIMIT
+    )
     loaded = set(done.stdout.split())
     assert module in loaded
     own = {"sim", module.split(".")[0]}
@@ -165,7 +169,9 @@ def test_importing_loads_only_what_is_used(module: str, may_load: set[str]) -> N
 
 def test_importing_softflagella_loads_none_of_the_other_packages() -> None:
     code = "import sys, softflagella; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT, timeout=LIMIT
+    )
     own = {name for name in done.stdout.split() if name.split(".")[0] in ORDER}
     assert own == {"softflagella"}
 
@@ -183,7 +189,9 @@ table.query({name: [value] for name, value in robot.group_values().items()})
 plan(circle(2.0), robot, lookup=table)
 print(*sys.modules)
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT, timeout=LIMIT
+    )
     loaded = set(done.stdout.split())
     assert "surrogate.table.wrench_table" in loaded
     training = {f"surrogate.networks.{name}" for name in ("training_loop", "bfgs", "checkpoints")}

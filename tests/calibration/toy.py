@@ -25,30 +25,39 @@ from sim.solve.assembly import assemble
 def steady_columns(columns: Mapping[str, Any], **_: object) -> dict[str, np.ndarray]:
     """Stand-in for `sim.motion.batches.steady_columns`."""
     values = check_columns({k: np.asarray(v, float) for k, v in columns.items()})
-    found: dict[str, np.ndarray] = {}
+    outputs: dict[str, np.ndarray] = {}
     for tails in np.unique(values["N"]):
         rows = values["N"] == tails
         for name, value in _robots({k: v[rows] for k, v in values.items()}).items():
-            found.setdefault(name, np.empty(len(rows)))[rows] = value
-    return found
+            outputs.setdefault(name, np.empty(len(rows)))[rows] = value
+    return outputs
 
 
 def slopes(columns: Mapping[str, Any], parameters: tuple[str, ...], **_: object) -> Sensitivities:
-    """Stand-in for `sim.motion.batches.sensitivity_columns`, by differences."""
-    values = steady_columns(columns)
-    values = {k: np.radians(v) if k == "theta_deg" else v for k, v in values.items()}
-    found: dict[str, list[np.ndarray]] = {k: [] for k in values}
-    for name in parameters:
-        null = catalogue()[name].null if name in catalogue() else 0.0
-        at = np.asarray(columns.get(name, np.full(len(values["v_x"]), null)), float)
+    """Stand-in for `sim.motion.batches.sensitivity_columns`, by differences; all robots in one batch."""
+    base = {name: np.asarray(value, float) for name, value in columns.items()}
+    rows = len(base["N"])
+    for name in set(parameters) & set(catalogue()):
+        base.setdefault(name, np.full(rows, catalogue()[name].null))
+    stacked = {name: np.tile(value, (1 + len(parameters), 1)) for name, value in base.items()}
+    widths = []
+    for place, name in enumerate(parameters, 1):
+        at = base[name]
         width = 1e-5 * np.abs(at)
         if name in catalogue():  # towards the inside
-            step, most = 1e-5 * abs(catalogue()[name].typical - null), catalogue()[name].bounds[1]
-            width = step * np.where(at + step <= most, 1, -1)
-        ends = [steady_columns({**columns, name: at + sign * width}) for sign in (0, 1)]
-        for key in found:
-            found[key].append((ends[1][key] - ends[0][key]) / width)
-    return Sensitivities(parameters, values, {k: np.stack(v, 1) for k, v in found.items() if v})
+            effect = catalogue()[name]
+            step = 1e-5 * abs(effect.typical - effect.null)
+            width = step * np.where(at + step <= effect.bounds[1], 1, -1)
+        stacked[name][place] += width
+        widths.append(width)
+    moved = steady_columns({name: value.ravel() for name, value in stacked.items()})
+    outputs = {name: value.reshape(1 + len(parameters), rows) for name, value in moved.items()}
+    derivatives = {
+        name: np.stack([(v - value[0]) / width for v, width in zip(value[1:], widths, strict=True)], 1)
+        for name, value in outputs.items()
+        if parameters
+    }
+    return Sensitivities(parameters, {name: value[0] for name, value in outputs.items()}, derivatives)
 
 
 def _robots(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

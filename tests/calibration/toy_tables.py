@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
+from typing import TypeVar
 
 import pandas as pd
 import pytest
@@ -23,11 +26,20 @@ from tests.calibration import toy
 START = PRESETS["paper-measured"]
 TRUTH = replace(START, C_t=3.1, C_r=2.4, C_yr=4.4)
 
+Test = TypeVar("Test", bound=Callable[..., None])
+LENGTHS_CM = (5.0, 8.0, 11.0)
+FEW_DRAWS = 200  # of the bootstrap, where no rate is asserted
+
+
+def shares_verdicts(test: Test) -> Test:
+    """Mark a test that uses `calibrated_toy`: all such tests run in one process."""
+    return pytest.mark.slow(pytest.mark.xdist_group("verdicts")(test))
+
 
 def install_toy(patch: pytest.MonkeyPatch) -> None:
     """The toy in place of the simulator: for tables, and for every SwimmerModel that is not told otherwise."""
-    own = SwimmerModel.__init__.__defaults__
-    patch.setattr(SwimmerModel.__init__, "__defaults__", tuple(toy.SOLVER if d is DIRECT else d for d in own))
+    defaults = SwimmerModel.__init__.__defaults__
+    patch.setattr(SwimmerModel.__init__, "__defaults__", tuple(toy.SOLVER if d is DIRECT else d for d in defaults))
     patch.setattr(calibration.swimmer.synthetic_table, "stepped_columns", toy.steady_columns)
     patch.setattr(SwimmerModel, "guess", lambda model, start, used: start)
     for name in ("steady", "sensitivities", "settle"):  # what all of the simulator's batches call
@@ -38,7 +50,7 @@ def refuse_to_simulate(*_: object, **__: object) -> None:
     raise AssertionError("a test on the toy simulated")
 
 
-def toy_table(seed: int, *, lengths_cm: tuple[float, ...] = (5.0, 8.0, 11.0), **effects: float) -> pd.DataFrame:
+def toy_table(seed: int, *, lengths_cm: tuple[float, ...] = LENGTHS_CM, **effects: float) -> pd.DataFrame:
     return make_table(replace(TRUTH, effects=effects), seed=seed, lengths_cm=lengths_cm, title="")
 
 
@@ -46,5 +58,14 @@ def toy_swimmer(table: pd.DataFrame, robot: Robot = START, own: Owned | None = N
     return SwimmerModel(robot, read_measurements(table), solver=toy.SOLVER, own=own or {})
 
 
-def closed(table: pd.DataFrame, seed: int = 0) -> Verdict:
-    return calibrate(toy_swimmer(table), correction=learn_head_correction, seed=seed, progress=False)
+def calibrated(table: pd.DataFrame, *, seed: int = 0, draws: int = FEW_DRAWS) -> Verdict:
+    correction = learn_head_correction
+    return calibrate(toy_swimmer(table), correction=correction, seed=seed, draws=draws, progress=False)
+
+
+@cache
+def calibrated_toy(seed: int, *, lengths_cm: tuple[float, ...] = LENGTHS_CM, **effects: float) -> Verdict:
+    """The verdict of a toy table, found once a process; for tests with the mark `shares_verdicts`."""
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        return calibrated(toy_table(seed, lengths_cm=lengths_cm, **effects))

@@ -21,6 +21,7 @@ from dataset.rows.schema import arrow_table, schema
 from dataset.storage.data_set import SWEEP, read, read_manifest
 from sim.io.errors import InputError, run_command
 from tests.dataset.sweeps import ROOT, SMALL, write_rows
+from tests.processes import LIMIT
 
 pytestmark = pytest.mark.slow
 
@@ -88,7 +89,7 @@ def test_a_sweep_over_effects_and_both_directions(tmp_path: Path) -> None:
 
 
 def make(target: str, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(["make", target, *words], cwd=ROOT, text=True, capture_output=True)
+    return subprocess.run(["make", target, *words], cwd=ROOT, text=True, capture_output=True, timeout=LIMIT)
 
 
 def test_make_dataset_knows_its_sources(tmp_path: Path) -> None:

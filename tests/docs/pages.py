@@ -31,8 +31,8 @@ def name_of(page: Path) -> str:
 
 def blocks(page: Path) -> list[Block]:
     """The blocks of code on a page, in order."""
-    found = _BLOCK.finditer(page.read_text())
-    return [Block(match["language"], match["code"], match["reason"] or "") for match in found]
+    matches = _BLOCK.finditer(page.read_text())
+    return [Block(match["language"], match["code"], match["reason"] or "") for match in matches]
 
 
 def glossary() -> dict[str, str]:

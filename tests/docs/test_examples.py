@@ -17,22 +17,17 @@ from surrogate.export.small_copy_files import save_small_copy
 from surrogate.table.model_file import load
 from tests.docs.pages import DOCS, PAGES, ROOT, blocks, name_of
 from tests.planner.compiled import compile_c
+from tests.processes import LIMIT
 
 RUN = ("sh", "python")
-SLOW = {
-    "tutorial/calibration.md",
-    "tutorial/schedule.md",
-    "howto/effect.md",
-    "howto/cluster.md",
-    "howto/tracker.md",
-}
+LONG = {"tutorial/calibration.md", "tutorial/schedule.md", "howto/cluster.md", "howto/goal.md"}
 SHOWN = {*RUN, "toml", "text", "c", "js"}
 
 
 def marked() -> list[Any]:
-    """Pages with something to run; the slow ones are marked."""
+    """Return the pages with something to run."""
     pages = [p for p in PAGES if any(b.language in RUN and not b.reason for b in blocks(p))]
-    return [pytest.param(p, id=name_of(p), marks=[pytest.mark.slow] if name_of(p) in SLOW else []) for p in pages]
+    return [pytest.param(p, id=name_of(p), marks=[pytest.mark.long] if name_of(p) in LONG else []) for p in pages]
 
 
 def environment(folder: Path) -> dict[str, str]:
@@ -44,6 +39,8 @@ def environment(folder: Path) -> dict[str, str]:
     return {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)}
 
 
+@pytest.mark.page
+@pytest.mark.slow  # so that each page goes to whichever process is free
 @pytest.mark.parametrize("page", marked())
 def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     commands, work = tmp_path / "bin", tmp_path / "work"
@@ -58,7 +55,13 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytes
             exec(compile(block.code, name_of(page), "exec"), names)
         else:
             done = subprocess.run(
-                ["sh", "-e", "-c", block.code], env=shell, cwd=work, capture_output=True, text=True, check=False
+                ["sh", "-e", "-c", block.code],
+                env=shell,
+                cwd=work,
+                capture_output=True,
+                text=True,
+                check=False,
+                timeout=LIMIT,
             )
             assert done.returncode == 0, f"{block.code}\n{done.stdout}\n{done.stderr}"
 
@@ -67,9 +70,9 @@ def test_c_on_pages_compiles(tmp_path: Path) -> None:
     robot = sf.load_robot("paper-control")
     sf.write_plan(sf.plan(sf.circle(2.0), robot), tmp_path)
     save_small_copy(load(), tmp_path)
-    found = [block for page in PAGES for block in blocks(page) if block.language == "c"]
-    assert found
-    for block in found:
+    c_blocks = [block for page in PAGES for block in blocks(page) if block.language == "c"]
+    assert c_blocks
+    for block in c_blocks:
         (tmp_path / "page.c").write_text(block.code)
         compile_c(tmp_path / "page.c", tmp_path / "page.o", "-c")
 
@@ -79,9 +82,9 @@ def test_every_block_is_of_a_known_language() -> None:
     for page in PAGES:
         fences = [line for line in page.read_text().splitlines() if line.startswith("```") and line != "```"]
         directives = [line for line in fences if line.startswith("```{")]
-        found = blocks(page)
-        assert len(found) == len(fences) - len(directives), name_of(page)
-        assert {block.language for block in found} <= SHOWN, name_of(page)
+        page_blocks = blocks(page)
+        assert len(page_blocks) == len(fences) - len(directives), name_of(page)
+        assert {block.language for block in page_blocks} <= SHOWN, name_of(page)
 
 
 def test_the_robot_on_the_page_of_files_is_one(tmp_path: Path) -> None:

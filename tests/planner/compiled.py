@@ -14,6 +14,7 @@ from planner.files.tracker_header import tracker_header
 from planner.planning.plan import Plan
 from planner.tracking.kalman_filter import STATES
 from planner.tracking.tracker import Command
+from tests.processes import LIMIT
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2")
 _LIBRARY = """#include "tracker.h"
@@ -43,7 +44,7 @@ def compile_c(source: Path, out: Path, *flags: str) -> None:
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
         pytest.skip("no C compiler on this machine")
-    subprocess.run([compiler, *FLAGS, *flags, "-o", str(out), str(source), "-lm"], check=True)
+    subprocess.run([compiler, *FLAGS, *flags, "-o", str(out), str(source), "-lm"], check=True, timeout=LIMIT)
 
 
 class CompiledTracker:

@@ -13,6 +13,7 @@ import pytest
 
 import sim
 from sim.compiling import CACHE, Locator, code_digest, folder_of_package, prune
+from tests.processes import LIMIT
 
 SIM = Path(sim.__file__).parent
 MARKS = {"compiled", "formula"}
@@ -150,7 +151,7 @@ def test_machine_code_is_read_where_the_sources_have_moved(tmp_path: Path) -> No
         (tmp_path / place / "loops" / "one.py").write_text(text.format(place))
     said = [
         subprocess.run([sys.executable, "-c", code, str(tmp_path / place), str(SIM.parent)], capture_output=True,
-                       text=True, check=True).stdout.split()
+                       text=True, check=True, timeout=LIMIT).stdout.split()
         for place in ("here", "there")
     ]  # fmt: skip
     folder_of_package.cache_clear()

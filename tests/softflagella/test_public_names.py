@@ -10,6 +10,7 @@ from importlib import import_module
 import pytest
 
 import softflagella as sf
+from tests.processes import LIMIT
 
 NAMES = [name for name in sf.__all__ if not name.startswith("_")]
 
@@ -55,5 +56,5 @@ def test_a_name_that_is_not_there() -> None:
 def test_importing_the_package_loads_nothing_heavy() -> None:
     heavy = ("numpy", "torch", "numba", "pandas", "matplotlib", "scipy", "pyarrow", "sim")
     code = f"import sys, softflagella; print([name for name in {heavy!r} if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=LIMIT)
     assert done.stdout.strip() == "[]"

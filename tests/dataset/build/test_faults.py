@@ -11,8 +11,7 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,6 +20,7 @@ from dataset.build.build import build
 from dataset.storage.data_set import read, read_manifest
 from tests.dataset import sweeps
 from tests.dataset.sweeps import MARKS, ROOT, SMALL, design, invented, without_cost
+from tests.processes import LIMIT, printed, until
 
 pytestmark = pytest.mark.slow
 
@@ -58,12 +58,6 @@ def building(folder: Path, rows: int, rows_by: str, jobs: int = 2) -> str:
     )
 
 
-def until(true: Callable[[], bool], process: subprocess.Popen[str] | None = None) -> None:
-    while not true():
-        assert process is None or process.poll() is None, process.communicate()
-        time.sleep(0.05)
-
-
 def alive(process: int) -> bool:
     try:
         return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
@@ -75,25 +69,26 @@ def workers() -> list[int]:
     return [int(mark.name.rsplit("-", 1)[1]) for mark in MARKS.iterdir()]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_an_interrupt_ends_it_with_one_line_and_the_workers(number: int, tmp_path: Path) -> None:
     process = started(building(tmp_path / "out", 400, "endless"))
     until(lambda: len(workers()) == 2, process)
     process.send_signal(number)
-    _, line = process.communicate()
+    _, line = printed(process)
     assert process.returncode == 128 + number
     assert line.strip() == f"stopped: 0 of 400 rows are stored in {tmp_path}/out; go on with: the same words"
     until(lambda: not any(alive(worker) for worker in workers()))
     assert not (tmp_path / "out" / ".lock").exists()
 
 
+@pytest.mark.long
 def test_the_command_line_stops_and_goes_on(tmp_path: Path) -> None:
     (tmp_path / "sweep.toml").write_text(SMALL.replace("rows = 6", "rows = 64"))
     words = ["build", "--config", str(tmp_path / "sweep.toml"), "--out", str(tmp_path / "out"), "--jobs", "2"]
     process = started(f"import sys; sys.argv[1:] = {words}; program.exit()")
     until(lambda: bool(list(tmp_path.glob("out/pending/rows-*"))), process)
     os.kill(process.pid, signal.SIGINT)
-    _, error = process.communicate()
+    _, error = printed(process)
     assert process.returncode == 130
     line = error.strip().splitlines()[-1]
     assert line.startswith("stopped: ")
@@ -104,32 +99,33 @@ def test_the_command_line_stops_and_goes_on(tmp_path: Path) -> None:
     calm = [str(tmp_path / "calm") if word == str(tmp_path / "out") else word for word in words]
     for each in (["build", *command[2:]], calm):
         again = started(f"import sys; sys.argv[1:] = {each}; program.exit()")
-        assert "64 rows: 64 converged" in again.communicate()[0]
+        assert "64 rows: 64 converged" in printed(again)[0]
     assert without_cost(read(tmp_path / "out")).equals(without_cost(read(tmp_path / "calm")))
 
 
+@pytest.mark.long
 def test_workers_end_with_their_parent(tmp_path: Path) -> None:
     process = started(building(tmp_path / "out", 400, "endless"))
     until(lambda: len(workers()) == 2, process)
     process.kill()
-    process.communicate()
+    printed(process)
     until(lambda: not any(alive(worker) for worker in workers()))
     again = started(building(tmp_path / "out", 400, "endless"))
     until(lambda: len(workers()) == 4, again)  # the lock went with its owner
     again.kill()
-    again.communicate()
+    printed(again)
 
 
 def test_two_builds_at_once(tmp_path: Path) -> None:
     first = started(building(tmp_path / "out", 400, "endless"))
     until(lambda: len(workers()) == 2, first)
     second = started(building(tmp_path / "out", 400, "invented"))
-    _, line = second.communicate()
+    _, line = printed(second)
     assert second.returncode == 2
     assert f"is being written by process {first.pid} on" in line
     assert len(line.splitlines()) == 1
     first.kill()
-    first.communicate()
+    printed(first)
 
 
 def test_a_script_is_not_run_again_by_its_workers(tmp_path: Path) -> None:
@@ -141,7 +137,9 @@ def test_a_script_is_not_run_again_by_its_workers(tmp_path: Path) -> None:
         f"build(design(40), {str(tmp_path / 'out')!r}, jobs=2, title='', simulate=own)\n"
     )
     environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
-    done = subprocess.run([sys.executable, str(script)], env=environment, text=True, capture_output=True)
+    done = subprocess.run(
+        [sys.executable, str(script)], env=environment, text=True, capture_output=True, timeout=LIMIT
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "once\n", "")
     assert len(read(tmp_path / "out")) == 40
 
@@ -154,16 +152,17 @@ def test_a_worker_killed_at_each_step_of_its_write(tmp_path: Path) -> None:
     assert not [p for p in (tmp_path / "out").rglob(".*")]
 
 
+@pytest.mark.long
 def test_the_build_killed_at_each_of_its_operations(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "tests.dataset.build.dying", str(tmp_path)]
-    done = subprocess.run(words, cwd=ROOT, text=True, capture_output=True)
+    done = subprocess.run(words, cwd=ROOT, text=True, capture_output=True, timeout=LIMIT)
     assert done.returncode == 0, done.stderr + done.stdout
     assert int(done.stdout.split()[0]) > 30
 
 
 def refused(folder: Path, rows: int, *, limit: int | None = None) -> str:
     process = started(building(folder, rows, "invented"), limit=limit)
-    _, line = process.communicate()
+    _, line = printed(process)
     assert process.returncode == 2, line
     assert len(line.splitlines()) == 1
     assert line.startswith("error: cannot ")
@@ -183,27 +182,32 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(disk)]
-    if os.getuid() != 0 or not shutil.which("mount") or subprocess.run(mount, capture_output=True).returncode:
+    if (
+        os.getuid() != 0
+        or not shutil.which("mount")
+        or subprocess.run(mount, capture_output=True, timeout=LIMIT).returncode
+    ):
         pytest.skip("this user may not mount a small disk")
     yield disk
-    subprocess.run(["umount", "-l", str(disk)], check=True)
+    subprocess.run(["umount", "-l", str(disk)], check=True, timeout=LIMIT)
 
 
+@pytest.mark.long
 def test_a_full_disk(small_disk: Path, tmp_path: Path) -> None:
     build(design(200), small_disk / "out", jobs=1, title="", simulate=invented)
     before = read(small_disk / "out")
     assert "No space left on device" in refused(small_disk / "out", 8000)
     assert read(small_disk / "out").equals(before)
-    subprocess.run(["mount", "-o", "remount,size=32m", str(small_disk)], check=True)
+    subprocess.run(["mount", "-o", "remount,size=32m", str(small_disk)], check=True, timeout=LIMIT)
     goes_on_to_the_same_rows(small_disk / "out", 8000, tmp_path / "calm")
 
 
 def test_a_disk_that_becomes_read_only(small_disk: Path, tmp_path: Path) -> None:
     build(design(200), small_disk / "out", jobs=1, title="", simulate=invented)
-    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True, timeout=LIMIT)
     assert "Read-only file system" in refused(small_disk / "out", 400)
     assert len(read(small_disk / "out")) == 200
-    subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True)
+    subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True, timeout=LIMIT)
     goes_on_to_the_same_rows(small_disk / "out", 400, tmp_path / "calm")
 
 

@@ -24,21 +24,21 @@ def bits(columns: dict[str, np.ndarray], row: int) -> dict[str, object]:
     return {name: values[row].tobytes() for name, values in columns.items() if name != COST}
 
 
-@pytest.mark.slow
-def test_any_batch_and_any_order_give_the_same_bits() -> None:
+@pytest.mark.parametrize("rows", [4, pytest.param(24, marks=pytest.mark.long)])
+def test_any_batch_and_any_order_give_the_same_bits(rows: int) -> None:
     """Robots that fall back to time steps used to take their mesh from the fastest robot of their batch."""
-    points = load_design().with_rows(24).points()
+    points = load_design().with_rows(rows).points()
     quick = {"C_t": 0.55, "C_r": 0.54, "C_yr": 4.1, "l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2,
              "omega_bar": 117.0, "N": 6.0}  # fmt: skip
     points = {name: np.append(values, quick[name]) for name, values in points.items()}
-    points["history"] = np.arange(25) % 8 == 0
+    points["history"] = np.arange(rows + 1) % 8 == 0
     whole = simulate(points)
     assert whole["reason"][-1]  # it is stepped in time
-    order = np.random.default_rng(2).permutation(25)
+    order = np.random.default_rng(2).permutation(rows + 1)
     mixed = simulate({name: values[order] for name, values in points.items()})
     for place, row in enumerate(order.tolist()):
         assert bits(mixed, place) == bits(whole, row), row
-    for row in (0, 7, 24):
+    for row in (0, rows // 3, rows):
         alone = simulate({name: values[row : row + 1] for name, values in points.items()})
         assert bits(alone, 0) == bits(whole, row), row
 

@@ -23,6 +23,7 @@ from dataset.storage.lock import locked
 from dataset.storage.storage import RemoteStorage, open_storage
 from sim.io.errors import InputError
 from tests.dataset.sweeps import ROOT, InThisProcess, design, invented
+from tests.processes import LIMIT
 
 
 def files(address: str) -> dict[str, str]:
@@ -116,7 +117,7 @@ def bucket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
     s3fs.S3FileSystem().mkdir("sweeps")
     yield "s3://sweeps/one"
     server.kill()
-    server.wait()
+    server.wait(timeout=LIMIT)
 
 
 def break_off(there: RemoteStorage) -> None:
@@ -133,7 +134,12 @@ def test_s3_holds_the_same_files(bucket: str, calm: Path) -> None:
         f"build(design(200), {bucket!r}, jobs=2, title='', simulate=invented)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, env=dict(os.environ), text=True, capture_output=True
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env=dict(os.environ),
+        text=True,
+        capture_output=True,
+        timeout=LIMIT,
     )
     assert done.returncode == 0, done.stderr
     assert read(bucket).equals(read(calm))

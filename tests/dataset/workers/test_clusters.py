@@ -8,11 +8,9 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -23,9 +21,11 @@ from dataset.storage.data_set import read
 from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import MARKS, ROOT, design, invented
+from tests.processes import LIMIT, printed, until
 
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.xdist_group("clusters"),  # they share the processors and the marks
     pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning"),
 ]
 Head = tuple[str, Callable[[], None]]
@@ -49,11 +49,6 @@ def free_port() -> int:
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         return int(one.getsockname()[1])
-
-
-def until(true: Callable[[], Any]) -> None:
-    while not true():
-        time.sleep(0.05)
 
 
 class Dask:
@@ -81,14 +76,14 @@ class Dask:
         for process in (*self.workers, self.scheduler):
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)  # with what it has started
-            process.wait()
+            process.wait(timeout=LIMIT)
 
 
 @pytest.fixture
 def dask(tmp_path: Path) -> Iterator[Dask]:
     pytest.importorskip("distributed", reason="the extra dask is not installed")
     cluster = Dask(tmp_path)
-    until(lambda: (tmp_path / "dask.log").read_bytes().count(b"Registered to") == 2)
+    until(lambda: (tmp_path / "dask.log").read_bytes().count(b"Registered to") == 2, log=tmp_path / "dask.log")
     yield cluster
     cluster.stop()
 
@@ -103,6 +98,7 @@ def test_dask_makes_the_same_rows(dask: Dask, calm: Path, tmp_path: Path, monkey
     assert os.getpid() not in {int(mark.name.rsplit("-", 1)[1]) for mark in MARKS.iterdir()}
 
 
+@pytest.mark.cluster
 def test_dask_replaces_killed_workers(dask: Dask, calm: Path, tmp_path: Path) -> None:
     build(
         design(200), tmp_path / "out", backend="dask", address=dask.address, title="", simulate=sweeps.killing_once
@@ -111,6 +107,7 @@ def test_dask_replaces_killed_workers(dask: Dask, calm: Path, tmp_path: Path) ->
     assert {mark.name.split("-")[-2] for mark in MARKS.iterdir()} >= {"0", "1"}
 
 
+@pytest.mark.cluster
 def test_dask_sets_a_poisonous_chunk_aside(dask: Dask, tmp_path: Path) -> None:
     with pytest.raises(UnfinishedError, match=r"rows \d+ to \d+ \(its worker died 3 times"):
         build(
@@ -120,25 +117,28 @@ def test_dask_sets_a_poisonous_chunk_aside(dask: Dask, tmp_path: Path) -> None:
     assert len(list((tmp_path / "out" / "pending").iterdir())) == 7
 
 
+@pytest.mark.cluster
 def test_dask_goes_on_when_a_nanny_is_killed(dask: Dask, calm: Path, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "slow", "dask", dask.address)
     until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
     dask.workers[0].kill()
-    assert process.communicate()[1] == ""
+    assert printed(process)[1] == ""
     assert process.returncode == 0
     assert read(tmp_path / "out").equals(read(calm))
 
 
+@pytest.mark.cluster
 def test_dask_ends_when_its_scheduler_is_killed(dask: Dask, calm: Path, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "endless", "dask", dask.address, patience=2)
     until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
     dask.scheduler.kill()
-    line = process.communicate()[1]
+    line = printed(process)[1]
     assert process.returncode == 1
     assert re.search(r"^unfinished: no workers for 2 s: 0 of 200 rows are stored .* go on with", line)
     assert len(line.splitlines()) == 1
 
 
+@pytest.mark.cluster
 def test_without_dask_workers_it_ends_with_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="the extra dask is not installed")
     monkeypatch.setattr(engine, "PATIENCE", 1.0)
@@ -185,44 +185,46 @@ def ray(tmp_path: Path) -> Iterator[Head]:
             [sys.executable, "-c", code, *words, "--object-store-memory", "100000000"],
             env={**ENVIRONMENT, "RAY_USAGE_STATS_ENABLED": "0"}, stdout=file, stderr=file, start_new_session=True,
         )  # fmt: skip
-    until(lambda: b"Ray runtime started" in log.read_bytes() or head.poll() is not None)
+    until(lambda: b"Ray runtime started" in log.read_bytes() or head.poll() is not None, log=log)
     assert head.poll() is None, log.read_text()
 
     def kill() -> None:
         with suppress(ProcessLookupError):
             os.killpg(head.pid, signal.SIGKILL)
-        head.wait()
+        head.wait(timeout=LIMIT)
 
     yield f"127.0.0.1:{port}", kill
     kill()
 
 
+@pytest.mark.cluster
 def test_ray_ends_when_its_head_is_killed(ray: Head, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "endless", "ray", ray[0], patience=2)
     until(lambda: len(list(MARKS.iterdir())) >= 2 or process.poll() is not None)
     ray[1]()
-    line = process.communicate()[1].strip().splitlines()[-1]
+    line = printed(process)[1].strip().splitlines()[-1]
     assert re.search(r"^unfinished: no workers for 2 s: 0 of 200 rows are stored .* go on with", line)
     assert process.returncode == 1
 
 
 def test_ray_makes_the_same_rows(ray: Head, calm: Path, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "killing_once", "ray", ray[0])
-    _, words = process.communicate()
+    _, words = printed(process)
     assert process.returncode == 0, words
     assert read(tmp_path / "out").equals(read(calm))
     assert {mark.name.split("-")[-2] for mark in MARKS.iterdir()} >= {"0", "1"}
 
 
+@pytest.mark.cluster
 def test_ray_sets_a_poisonous_chunk_aside_and_stops_when_told(ray: Head, tmp_path: Path) -> None:
     process = build_apart(tmp_path / "out", "poisonous", "ray", ray[0])
-    line = process.communicate()[1].strip().splitlines()[-1]
+    line = printed(process)[1].strip().splitlines()[-1]
     assert re.search(r"rows \d+ to \d+ \(its worker died 3 times", line)
     assert process.returncode == 1
     stopped = build_apart(tmp_path / "stopped", "endless", "ray", ray[0])
     until(lambda: any("endless" in mark.name for mark in MARKS.iterdir()))
     stopped.send_signal(signal.SIGINT)
-    assert stopped.communicate()[1].strip().splitlines()[-1].startswith("stopped: 0 of 200 rows")
+    assert printed(stopped)[1].strip().splitlines()[-1].startswith("stopped: 0 of 200 rows")
     assert stopped.returncode == 130
 
 

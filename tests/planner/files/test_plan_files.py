@@ -16,6 +16,7 @@ from planner.planning.plan import plan
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.schedule import load_schedule
+from tests.processes import LIMIT
 
 CONTROL = PRESETS["paper-control"]
 
@@ -51,8 +52,14 @@ def test_the_header_compiles(tmp_path: Path) -> None:
         'printf("%ld %ld %f %f %ld",s,(long)SCHEDULE_TOTAL_MS,SCHEDULE_START_X,SCHEDULE_START_HEADING,'
         "(long)schedule_checkpoints[SCHEDULE_CHECKPOINTS-1].ms);return 0;}"
     )
-    subprocess.run([compiler, "-Wall", "-Werror", "-o", str(tmp_path / "a"), str(tmp_path / "main.c")], check=True)
-    words = subprocess.run([str(tmp_path / "a")], capture_output=True, text=True, check=True).stdout.split()
+    subprocess.run(
+        [compiler, "-Wall", "-Werror", "-o", str(tmp_path / "a"), str(tmp_path / "main.c")],
+        check=True,
+        timeout=LIMIT,
+    )
+    words = subprocess.run(
+        [str(tmp_path / "a")], capture_output=True, text=True, check=True, timeout=LIMIT
+    ).stdout.split()
     total = int(words[0])
     content = json.loads((header.parent / "plan.json").read_text())
     seconds = content["dwell_s"]

@@ -20,6 +20,7 @@ from planner.vehicle.calibration_table import (
 )
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
+from tests.processes import LIMIT
 
 CONTROL = PRESETS["paper-control"]
 
@@ -68,7 +69,7 @@ def test_planning_does_not_even_load_the_simulator() -> None:
         "plan(circle(2.0), PRESETS['paper-control']);"
         f"print([m for m in {simulator} if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=LIMIT)
     assert done.stdout.strip() == "[]"
 
 

@@ -25,7 +25,13 @@ def planned(car: Vehicle, path: Path2D) -> tuple[Switches, Reference, np.ndarray
     return switches, ref, trace(car, switches, 0.0)
 
 
-@pytest.mark.parametrize("path", [circle(2.0), Path2D.of([[0, 0], [25, 0]])], ids=["circle", "line"])
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(circle(2.0), id="circle"),
+        pytest.param(Path2D.of([[0, 0], [25, 0]]), id="line", marks=pytest.mark.long),
+    ],
+)
 @pytest.mark.parametrize("errors", [1.0, 4.0])
 def test_it_is_the_quantile_over_drawn_vehicles(path: Path2D, errors: float) -> None:
     car = vehicle(errors=errors)

@@ -18,6 +18,7 @@ from sim.effects.tail_contact import least_gap
 from sim.motion.steady import orbits, steady
 from sim.motion.switching import switch_response
 from sim.solve.assembly import assemble, numbers
+from tests.processes import LIMIT
 from tests.sim.robots import CONTROL_VALUES, control
 
 OUTPUTS = ("omega_t", "omega_yr", "v_x", "v_z")
@@ -70,7 +71,9 @@ body = bodies(Groups.from_columns(values))[0]
 assert "stickiness" in influences()
 print(body.resistance[3, 3], getattr(body.nonlocal_terms, "stickiness", None))
 """
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True, timeout=LIMIT
+    )
     base = assemble(control()).resistance[3, 3, 0]
     spin, number = done.stdout.split()
     assert float(spin) == pytest.approx(1.5 * float(base))
@@ -181,6 +184,7 @@ def test_end_over_end_drag_slows_the_turn_as_much_as_estimated() -> None:
     assert 0.5 < ratio < 0.75
 
 
+@pytest.mark.long
 def test_a_row_with_contact_is_valid_where_its_gap_is_kept() -> None:
     """0.99 of a diameter: overlap without contact, within its limit with it."""
     assert least_gap([0.0, 0.5, 1.0]).tolist() == [1.0, 0.98, 0.98]

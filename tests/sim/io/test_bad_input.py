@@ -14,6 +14,7 @@ from sim.io.files import whole_file
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
+from tests.processes import LIMIT
 from tests.sim.robots import CONTROL_VALUES
 
 GOOD = ",".join(f"{CONTROL_VALUES[k]:g}" for k in CONTROL_VALUES)
@@ -67,7 +68,7 @@ def test_the_command_itself_exits_with_2(tmp_path: Path) -> None:
         "--out",
         str(tmp_path / "o.csv"),
     ]
-    done = subprocess.run(words, capture_output=True, text=True, cwd=Path(__file__).parents[3])
+    done = subprocess.run(words, capture_output=True, text=True, cwd=Path(__file__).parents[3], timeout=LIMIT)
     assert done.returncode == 2
     assert "none.csv" in done.stderr
     assert len(done.stderr.splitlines()) == 1

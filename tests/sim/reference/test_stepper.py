@@ -78,7 +78,7 @@ def test_time_steps_are_of_second_order() -> None:
     assert math.log2(abs((coarse - middle) / (middle - fine))) > 1.8
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_robot_converges_at_second_order_in_edges() -> None:
     yaw = [yaw_after(400, edges=n) for n in (8, 16, 32)]
     assert math.log2(abs((yaw[0] - yaw[1]) / (yaw[1] - yaw[2]))) > 1.8

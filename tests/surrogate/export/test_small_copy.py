@@ -25,6 +25,7 @@ from surrogate.table.lookup import RESPONSE_OUTPUTS
 from surrogate.table.model_file import load
 from surrogate.training.simulated import draw_robots
 from tests.planner.compiled import compile_c
+from tests.processes import LIMIT
 from tests.surrogate.small import table
 
 OUTPUTS = (*STEADY_OUTPUTS, *RESPONSE_OUTPUTS)
@@ -184,7 +185,7 @@ def test_the_reader_in_javascript_gives_the_same(folder: Path) -> None:
     (folder / "robots.json").write_text(pd.concat([rows, strange]).to_json(orient="records", double_precision=15))
     (folder / "run.mjs").write_text(SCRIPT)
     shutil.copyfile(folder / "lookup.js", folder / "lookup.mjs")
-    subprocess.run([node, "run.mjs"], check=True, cwd=folder)
+    subprocess.run([node, "run.mjs"], check=True, cwd=folder, timeout=LIMIT)
     *told, far, still, short = json.loads((folder / "answers.json").read_text())
     steady = pd.DataFrame([part[0] for part in told])
     response = pd.DataFrame([part[1] or {} for part in told]).drop(columns="outside")
@@ -222,7 +223,7 @@ def test_where_the_response_does_not_fit_it_is_left_out(tmp_path: Path, monkeypa
     )
     (tmp_path / "only.c").write_text("\n".join(lines))
     compile_c(tmp_path / "only.c", tmp_path / "only")
-    subprocess.run([tmp_path / "only"], check=True)
+    subprocess.run([tmp_path / "only"], check=True, timeout=LIMIT)
     monkeypatch.setattr("surrogate.export.small_copy.MOST_BYTES", 30_000)
     with pytest.raises(InputError, match="too large for 30 kB"):
         make_small_copy(load())

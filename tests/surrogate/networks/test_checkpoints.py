@@ -19,6 +19,7 @@ from sim.io.errors import InputError
 from surrogate.networks.checkpoints import Checkpoint, TrainingContext, device_named, remove_states
 from surrogate.networks.ensemble import Ensemble
 from surrogate.networks.training_loop import Problem, Settings, Watch, _adam, fit
+from tests.processes import LIMIT
 from tests.surrogate.small import table
 
 SMALL = Settings(width=8, depth=2, members=2, epochs=6, batch=16, iterations=12)
@@ -71,7 +72,11 @@ class OneDevice(TorchDispatchMode):
 def run(folder: Path, states: int) -> subprocess.CompletedProcess[str]:
     root = Path(__file__).parents[3]
     return subprocess.run(
-        [sys.executable, "-c", KILLED, str(folder), str(states)], capture_output=True, text=True, cwd=root
+        [sys.executable, "-c", KILLED, str(folder), str(states)],
+        capture_output=True,
+        text=True,
+        cwd=root,
+        timeout=LIMIT,
     )
 
 
@@ -90,7 +95,7 @@ def trained(work: TrainingContext, settings: Settings = SMALL, wanted: torch.Ten
     return network
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_training_that_is_killed_twice_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     folder = tmp_path / "model.pt.states"
     for count, where in ((10, None), (120, "train: tails of N = 3 and more: goes on after epoch 10 of 40")):

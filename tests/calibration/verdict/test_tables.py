@@ -17,7 +17,7 @@ from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError, run_command
 from tests.calibration import toy
-from tests.calibration.toy_tables import START, closed, toy_table
+from tests.calibration.toy_tables import FEW_DRAWS, START, calibrated, calibrated_toy, shares_verdicts, toy_table
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -67,9 +67,8 @@ def test_bad_rows_are_named_and_set_aside(toy_model: None) -> None:
         read_measurements(table.rename(columns={"trial": "tri al"}))
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
-@pytest.mark.parametrize("names", [("one",), ("one", "two")])
+@pytest.mark.parametrize("names", [("one",), pytest.param(("one", "two"), marks=pytest.mark.long)])
 def test_few_sessions_give_a_weaker_conclusion(names: tuple[str, ...]) -> None:
     table = toy_table(5, end_over_end_drag=5.0)
     table["session"] = [names[i % len(names)] for i in range(len(table))]
@@ -80,7 +79,7 @@ def test_few_sessions_give_a_weaker_conclusion(names: tuple[str, ...]) -> None:
     for condition in np.unique(data.condition):
         for name in names:  # repeats of a session stay together
             assert len(set(locked[(data.condition == condition) & (within == name)])) <= 1
-    result = closed(table)
+    result = calibrated(table)
     assert result.effects == ("end_over_end_drag",)
     assert any(f"{len(names)} session" in limit for limit in result.conditions.caveats)
     assert "block" in result.conditions.split.names
@@ -92,7 +91,9 @@ def test_two_sessions_kept_whole_are_not_called_blocks() -> None:
     table = toy_table(5)
     table["session"] = np.where(table["N"].isin((3, 4)), "inner", "outer")
     data, held_out = PROTOCOLS["paper"](read_measurements(table))
-    result = calibrate(SwimmerModel(START, data, solver=toy.SOLVER), held_out=held_out, progress=False)
+    result = calibrate(
+        SwimmerModel(START, data, solver=toy.SOLVER), held_out=held_out, draws=FEW_DRAWS, progress=False
+    )
     assert result.conditions.split.names == "outer"
     assert not any("sessions only" in limit for limit in result.conditions.caveats)
 
@@ -102,7 +103,7 @@ def test_what_shifts_all_runs_of_a_single_session_is_no_evidence() -> None:
     shifted = toy_table(5).assign(session="one")
     shifted["R_yr_cm"] *= 1.03
     shifted["omega_h_rpm"] *= 0.98
-    result = closed(shifted)
+    result = calibrated(shifted)
     assert result.verdict == "none"
     assert result.base.noise.share == SESSION_SHARE
 
@@ -110,7 +111,7 @@ def test_what_shifts_all_runs_of_a_single_session_is_no_evidence() -> None:
 @pytest.mark.usefixtures("toy_model")
 def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
     table = pd.concat([t[t["N"] == 3] for t in (toy_table(5), toy_table(6))])
-    result = closed(table)
+    result = calibrated(table)
     assert result.verdict == "none"
     assert [("N = 3" in limit, "1 session only" in limit) for limit in result.conditions.caveats] == [
         (True, False),
@@ -118,38 +119,49 @@ def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
     ]
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 @pytest.mark.parametrize(
-    "kept", [("omega_h_rpm", "omega_yr_rad_s"), ("R_yr_cm", "theta_deg"), ("omega_t_rpm", "omega_yr_rad_s")]
+    "kept",
+    [
+        ("R_yr_cm", "theta_deg"),
+        pytest.param(("omega_h_rpm", "omega_yr_rad_s"), marks=pytest.mark.long),
+        pytest.param(("omega_t_rpm", "omega_yr_rad_s"), marks=pytest.mark.long),
+    ],
 )
 def test_any_two_outputs_are_enough(kept: tuple[str, str]) -> None:
     table = toy_table(5, end_over_end_drag=5.0)
     outputs = [
         c for c in ("omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm", "theta_deg") if c not in kept
     ]
-    result = closed(table.drop(columns=outputs))
+    result = calibrated(table.drop(columns=outputs))
     assert result.verdict in {"effect", "ambiguous"}
     assert "end_over_end_drag" in result.effects
 
 
 @pytest.mark.usefixtures("toy_model")
 def test_a_slipped_decimal_point_is_named_and_set_aside() -> None:
-    """The run, not its repeat; and the verdict is that of the table without it."""
+    """The run, not its repeat."""
     table = toy_table(12)
     table.loc[17, "omega_yr_rad_s"] *= 10
-    result = closed(table)
+    result = calibrated(table)
     assert [line.split(" is ")[0] for line in result.conditions.excluded] == ["row 18: omega_yr"]
     assert not result.conditions.split.fitted[17]
-    without = closed(table.drop(index=17))
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("toy_model")
+def test_the_verdict_is_that_of_the_table_without_the_slipped_decimal_point() -> None:
+    table = toy_table(12)
+    table.loc[17, "omega_yr_rad_s"] *= 10
+    result = calibrated(table)
+    without = calibrated(table.drop(index=17))
     assert result.verdict == without.verdict
     assert result.noise_ceiling == pytest.approx(without.noise_ceiling, rel=0.05)
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("toy_model")
+@shares_verdicts
 def test_noise_and_missing_effects_are_no_gross_errors() -> None:
-    assert closed(toy_table(13, end_over_end_drag=5.0)).conditions.excluded == ()
+    assert calibrated_toy(5, end_over_end_drag=5.0).conditions.excluded == ()
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -168,18 +180,20 @@ def test_runs_of_one_robot_give_a_weaker_conclusion_that_is_stated() -> None:
     table["session"] = np.repeat(["a", "b", "c", "d"], len(table) // 4)
     noise = np.random.default_rng(0).normal(scale=0.02, size=len(table))
     table["omega_yr_rad_s"] *= np.exp(noise)
-    result = closed(table)
+    result = calibrated(table)
     assert any("N = 3" in line for line in result.conditions.caveats)
     assert verdict_record(result, table="t")["limits"] == list(result.conditions.caveats)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.usefixtures("toy_model")
 def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five() -> None:
     data, held_out = PROTOCOLS["paper"](read_measurements(toy_table(16, end_over_end_drag=5.0)))
     assert data.outputs == ("omega_h", "omega_yr")
     assert set(data.tails[held_out]) == {2.0, 5.0}
-    result = calibrate(SwimmerModel(START, data, solver=toy.SOLVER), held_out=held_out, progress=False)
+    result = calibrate(
+        SwimmerModel(START, data, solver=toy.SOLVER), held_out=held_out, draws=FEW_DRAWS, progress=False
+    )
     assert result.conditions.split.names == "N=2, N=5"
     assert "end_over_end_drag" in result.effects
     assert result.error_after < 0.5 * result.error_before

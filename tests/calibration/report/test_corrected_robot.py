@@ -23,12 +23,12 @@ from sim.model.robot import Robot
 from sim.model.schedule import Schedule, load_schedule
 from sim.motion.replay import replay
 from surrogate.table.model_file import load_table
-from tests.calibration.toy_tables import START, closed, toy_table
+from tests.calibration.toy_tables import START, calibrated_toy, shares_verdicts
 
 
-@pytest.mark.usefixtures("toy_model")
+@shares_verdicts
 def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -> None:
-    result = closed(toy_table(5, end_over_end_drag=5.0))
+    result = calibrated_toy(5, end_over_end_drag=5.0)
     assert result.effects == ("end_over_end_drag",)
     path = tmp_path / "corrected.toml"
     path.write_text(corrected_toml(START, result.fits.final_refit))
@@ -42,28 +42,28 @@ def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -
     assert sigma["tail_length"] == pytest.approx(1e-3 / START.tail_length, rel=0.5)  # of ln l, by its prior
 
 
-@pytest.mark.usefixtures("toy_model")
+@shares_verdicts
 def test_a_current_is_handed_on_with_its_error() -> None:
-    delivered = closed(toy_table(5)).fits.final_refit
-    one = replace(delivered.fitted[0], name=CURRENT[1], logarithmic=False)
-    found = calibration_knowledge(
+    delivered = calibrated_toy(3).fits.final_refit
+    current = replace(delivered.fitted[0], name=CURRENT[1], logarithmic=False)
+    handed_on = calibration_knowledge(
         START,
         replace(
             delivered,
             parameters={**delivered.parameters, CURRENT[1]: 2e-4},
-            fitted=(*delivered.fitted, one),
+            fitted=(*delivered.fitted, current),
             covariance=np.block([
                 [delivered.covariance, np.zeros((len(delivered.fitted), 1))],
                 [np.zeros((1, len(delivered.fitted))), np.array([[1e-10]])],
             ]),
         ),
     )  # fmt: skip
-    assert found.current == (0.0, 2e-4)
-    assert found.current_error == (0.0, pytest.approx(1e-5))
-    assert CURRENT[1] not in found.names
+    assert handed_on.current == (0.0, 2e-4)
+    assert handed_on.current_error == (0.0, pytest.approx(1e-5))
+    assert CURRENT[1] not in handed_on.names
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_from_a_table_to_a_path_whose_stated_error_holds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -97,10 +97,10 @@ def _swum(schedule: Schedule, planned: Robot, truth: Robot):  # type: ignore[no-
     """The track of the true robot, in units of the planned one: seconds and metres are the same."""
     time, length = planned.time_scale / truth.time_scale, planned.tail_length / truth.tail_length
     x, y, heading = schedule.start
-    own = Schedule(
+    schedule_of_truth = Schedule(
         truth.group_values(), schedule.first_direction, schedule.dwells * time, (x * length, y * length, heading),
         truth.time_scale,
     )  # fmt: skip
-    track = replay([own])[0]
+    track = replay([schedule_of_truth])[0]
     track[["x_over_l", "y_over_l"]] /= length
     return track

@@ -15,8 +15,8 @@ from calibration.statistics.priors import changes, precisions
 from calibration.statistics.residual_tests import examine_residual
 from calibration.statistics.score_directions import Directions
 from calibration.statistics.splits import middle_session
-from calibration.statistics.study import Study
-from tests.calibration.toy_tables import closed, toy_swimmer, toy_table
+from calibration.statistics.study import DRAWS, Study
+from tests.calibration.toy_tables import calibrated, toy_swimmer, toy_table
 
 
 def test_whitener_is_the_inverse_root_of_the_block_covariance() -> None:
@@ -38,11 +38,11 @@ def test_products_of_columns_are_those_of_white_columns() -> None:
     table = rng.normal(size=(6, 3, 4))
     noise = Noise(np.eye(3), 0.4)
     flat = noise.whitener(session)(table)
-    found = sums(table, session, 3)
-    assert found.at(np.array(0.4)) == pytest.approx(flat.T @ flat)
-    picked = found.take(np.array([[0, 3], [2, 1]]))
+    products = sums(table, session, 3)
+    assert products.at(np.array(0.4)) == pytest.approx(flat.T @ flat)
+    picked = products.take(np.array([[0, 3], [2, 1]]))
     assert picked.at(np.array([0.4, 0.4]))[1] == pytest.approx((flat.T @ flat)[np.ix_([2, 1], [2, 1])])
-    fitted = least_squares(found, passes=0)
+    fitted = least_squares(products, passes=0)
     plain = table.reshape(18, 4)
     assert fitted.step == pytest.approx(np.linalg.lstsq(plain[:, :3], plain[:, 3], rcond=None)[0])
 
@@ -53,11 +53,11 @@ def test_a_design_makes_the_same_products_for_many_residuals() -> None:
     session = np.array([0, 0, 1, 1, 1, 2, 2])
     columns, residuals = rng.normal(size=(7, 3, 4)), rng.normal(size=(5, 7, 3))
     roots = np.linalg.inv(np.linalg.cholesky([np.eye(3) + np.outer(v, v) for v in rng.normal(size=(5, 3))]))
-    found = FixedColumns(columns, session).sums(np.swapaxes(roots, -1, -2) @ roots, residuals)
+    products = FixedColumns(columns, session).sums(np.swapaxes(roots, -1, -2) @ roots, residuals)
     for i, (root, residual) in enumerate(zip(roots, residuals, strict=True)):
-        own = sums(root @ np.concatenate([columns, residual[..., None]], -1), session, 3)
-        assert found.within[i] == pytest.approx(own.within)
-        assert found.between[i] == pytest.approx(own.between)
+        expected = sums(root @ np.concatenate([columns, residual[..., None]], -1), session, 3)
+        assert products.within[i] == pytest.approx(expected.within)
+        assert products.between[i] == pytest.approx(expected.between)
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -68,22 +68,22 @@ def test_scores_along_features_are_those_of_least_squares() -> None:
     names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     fitted = fit(model, start_values(model), names, used, title="")
     none = Directions(np.zeros((*model.runs.y.shape, 0)), np.zeros(0, int), np.zeros(0))
-    found = examine_residual(Study.fitted_to(model, used, draws=50), fitted, none).scores
+    scores = examine_residual(Study.fitted_to(model, used, draws=50), fitted, none).scores
     _, table = features(model.runs, used)
     J = fitted.jacobian[used]
     residual = (model.runs.y - fitted.prediction)[used] + J @ changes(fitted.fitted, fitted.parameters)
-    noise = Noise(repeat_covariance(residual, model.runs.condition[used]), float(found.share))
+    noise = Noise(repeat_covariance(residual, model.runs.condition[used]), float(scores.share))
     white = noise.whitener(model.runs.session[used])
     prior = np.diag(np.sqrt(precisions(fitted.fitted)))
     for output, feature in ((0, 0), (2, 3), (4, 1)):
-        along = np.zeros_like(residual)
-        along[:, output] = table[used][:, feature]
-        columns = np.concatenate([J, along[..., None]], -1)
+        feature_column = np.zeros_like(residual)
+        feature_column[:, output] = table[used][:, feature]
+        columns = np.concatenate([J, feature_column[..., None]], -1)
         rows = np.concatenate([white(columns), np.pad(prior, ((0, 0), (0, 1)))])
         values = np.concatenate([white(residual), np.zeros(len(prior))])
         step = np.linalg.lstsq(rows, values, rcond=None)[0]
         error = np.sqrt(np.linalg.inv(rows.T @ rows)[-1, -1])
-        assert found.shapes[output, feature] == pytest.approx(step[-1] / error, rel=1e-6)
+        assert scores.shapes[output, feature] == pytest.approx(step[-1] / error, rel=1e-6)
 
 
 def test_noise_is_recovered_from_repeats_and_sessions() -> None:
@@ -105,7 +105,7 @@ def test_noise_is_recovered_from_repeats_and_sessions() -> None:
     assert np.mean(shares) == pytest.approx(0.1, rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.rates
 @pytest.mark.usefixtures("toy_model")
 def test_p_values_of_nulls_are_spread_evenly() -> None:
     """The bootstrap accounts for the fit: p-values of pure noise are neither small nor large on the whole."""
@@ -113,7 +113,7 @@ def test_p_values_of_nulls_are_spread_evenly() -> None:
     model = toy_swimmer(table)
     data = model.runs
     used = ~middle_session(data)
-    base = closed(table).base
+    base = calibrated(table, draws=DRAWS).base
     rng = np.random.default_rng(0)
     p = []
     for seed in range(40):

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.report.corrected_robot import corrected_toml
+from calibration.report.corrected_robot import corrected_robot, corrected_toml
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.verdict import Verdict
 from calibration.verdict.verdict_json import verdict_record
@@ -23,7 +23,7 @@ from sim.model.correction import Correction
 from sim.model.presets import PRESETS
 from sim.motion.steady import steady
 from surrogate.table.model_file import load
-from tests.calibration.toy_tables import START, closed, install_toy, toy_swimmer, toy_table
+from tests.calibration.toy_tables import START, calibrated, install_toy, toy_swimmer, toy_table
 
 CONTROL = PRESETS["paper-control"]
 
@@ -33,16 +33,16 @@ def table() -> pd.DataFrame:
     """A yaw rate that bends with the tails' length, of no effect's form."""
     with pytest.MonkeyPatch.context() as patch:
         install_toy(patch)
-        found = toy_table(9, lengths_cm=(5.0, 6.5, 8.0, 9.5, 11.0))
-    found["omega_yr_rad_s"] *= np.exp(0.02 * (found["l_cm"] - 8.0) ** 2)
-    return found
+        bent = toy_table(9, lengths_cm=(5.0, 6.5, 8.0, 9.5, 11.0))
+    bent["omega_yr_rad_s"] *= np.exp(0.02 * (bent["l_cm"] - 8.0) ** 2)
+    return bent
 
 
 @pytest.fixture(scope="module")
 def result(table: pd.DataFrame) -> Verdict:
     with pytest.MonkeyPatch.context() as patch:
         install_toy(patch)
-        return closed(table)
+        return calibrated(table)
 
 
 def correction(**changes: object) -> Correction:
@@ -57,17 +57,34 @@ def correction(**changes: object) -> Correction:
     return replace(plain, **changes)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
+@pytest.mark.xdist_group("head correction")
 def test_it_predicts_runs_that_it_was_not_learnt_from(result: Verdict) -> None:
     assert result.verdict == "unexplained"
     assert result.corrections.learnt is not None
     assert result.error_predictive is not None
     assert any("ln l/R" in term for term in result.corrections.learnt.terms)
-    left = result.error_before**2 - result.noise_ceiling**2
-    assert result.error_predictive**2 - result.noise_ceiling**2 < 0.4 * left
+    excess = result.error_before**2 - result.noise_ceiling**2
+    assert result.error_predictive**2 - result.noise_ceiling**2 < 0.4 * excess
     assert f"{100 * result.error_predictive:.1f} % on runs" in result.sentence
     assert verdict_record(result, table="t")["error_predictive"] == result.error_predictive
 
 
+@pytest.mark.slow
+@pytest.mark.xdist_group("head correction")
+def test_what_no_effect_does_is_left_unexplained(result: Verdict, table: pd.DataFrame) -> None:
+    """No effect is claimed; a correction of the predictions, of no effect's form, helps by itself."""
+    assert result.effects == ()
+    assert corrected_robot(START, result.final.parameters).effects == {}
+    assert "no effect and no pair" in result.sentence
+    assert any("ln l" in name for name in result.corrections.regression.features)
+    residual = (toy_swimmer(table).runs.y - result.base.prediction)[result.conditions.split.fitted]
+    corrected = residual - result.corrections.regression.correction[result.conditions.split.fitted]
+    assert (corrected**2).mean() < 0.7 * (residual**2).mean()
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("head correction")
 def test_the_corrected_robot_simulates_what_was_predicted(
     result: Verdict, table: pd.DataFrame, tmp_path: Path
 ) -> None:
@@ -79,15 +96,17 @@ def test_the_corrected_robot_simulates_what_was_predicted(
     robot = load_robot(tmp_path / "corrected.toml")
     assert robot.correction == result.corrections.learnt.correction
     model = toy_swimmer(table)
-    own = SwimmerModel(replace(robot, tail_length=START.tail_length), model.runs, solver=model.solver)
-    start = {p.name: p.start for p in (*own.coefficients, *own.nuisances, *own.effects)}
+    corrected = SwimmerModel(replace(robot, tail_length=START.tail_length), model.runs, solver=model.solver)
+    start = {p.name: p.start for p in (*corrected.coefficients, *corrected.nuisances, *corrected.effects)}
     start["tail_length_offset"] = robot.tail_length - START.tail_length
     start |= {k: result.fits.final_refit.parameters[k] for k in ("camera_scale", "heading_zero", "tachometer")}
-    left = (model.runs.y - own.predict([start])[0])[result.conditions.split.fitted]
-    before = (model.runs.y - result.base.prediction)[result.conditions.split.fitted]
-    assert (left**2).mean() < 0.6 * (before**2).mean()
+    residual = (model.runs.y - corrected.predict([start])[0])[result.conditions.split.fitted]
+    uncorrected = (model.runs.y - result.base.prediction)[result.conditions.split.fitted]
+    assert (residual**2).mean() < 0.6 * (uncorrected**2).mean()
 
 
+@pytest.mark.slow
+@pytest.mark.xdist_group("head correction")
 def test_its_uncertainty_is_in_the_covariance(result: Verdict, tmp_path: Path) -> None:
     assert result.corrections.learnt is not None
     (tmp_path / "with.toml").write_text(corrected_toml(START, result.fits.final_refit, result.corrections.learnt))
@@ -101,9 +120,9 @@ def test_its_uncertainty_is_in_the_covariance(result: Verdict, tmp_path: Path) -
 def test_a_robot_with_a_correction_is_that_with_other_drag() -> None:
     robot = replace(CONTROL, correction=correction())
     longer = replace(robot, tail_length=1.1 * CONTROL.tail_length)
-    for one in (robot, longer):
-        plain, values = replace(one, correction=None).group_values(), one.group_values()
-        g = 0.2 + 0.1 * np.log(one.tail_length / CONTROL.tail_length) / 0.2
+    for corrected in (robot, longer):
+        plain, values = replace(corrected, correction=None).group_values(), corrected.group_values()
+        g = 0.2 + 0.1 * np.log(corrected.tail_length / CONTROL.tail_length) / 0.2
         assert values["C_yr"] == pytest.approx(plain["C_yr"] * np.exp(1.5 * np.tanh(g / 1.5)))
         assert values["surface_couple"] == pytest.approx(2 * np.tanh(0.025))
         assert {k: v for k, v in values.items() if k not in ("C_yr", "surface_couple")} == {
@@ -132,7 +151,7 @@ def test_outside_its_range_it_refuses() -> None:
 
 def test_the_planner_steers_with_it() -> None:
     robot = replace(CONTROL, correction=correction())
-    turned, plain = (table_vehicle(one, load()).yaw_rate for one in (robot, CONTROL))
+    turned, plain = (table_vehicle(swimmer, load()).yaw_rate for swimmer in (robot, CONTROL))
     exact = abs(steady(robot.groups()).omega_yr[0])
     assert turned == pytest.approx(exact, rel=0.01)
     assert turned > 1.1 * plain

@@ -24,7 +24,7 @@ from sim.io.errors import InputError
 from sim.model.robot import Robot
 from sim.model.uncertainty import Sigma
 from tests.calibration import toy
-from tests.calibration.toy_tables import START, TRUTH, toy_table
+from tests.calibration.toy_tables import START, TRUTH, calibrated, toy_table
 
 EXACT = {
     name: Sigma(0.0, False)
@@ -36,8 +36,7 @@ def table_of(robot: Robot, seed: int) -> pd.DataFrame:
     return make_table(robot, seed=seed, lengths_cm=(5.0, 8.0, 11.0), title="")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", [5, pytest.param(4, marks=pytest.mark.long)])
 def test_a_stiffness_that_was_given_too_high_is_no_inertia(seed: int) -> None:
     """Tail drag 25 % above the formula is Young's modulus 20 % below; with the simulator on both sides."""
     softer = replace(TRUTH, youngs_modulus=0.8 * TRUTH.youngs_modulus)
@@ -50,7 +49,7 @@ def test_a_stiffness_that_was_given_too_high_is_no_inertia(seed: int) -> None:
     assert stiffness.z < -1
 
 
-@pytest.mark.slow
+@pytest.mark.rates
 @pytest.mark.usefixtures("toy_model")
 def test_numbers_drawn_from_their_priors_are_no_effects() -> None:
     """One claim in twenty is stated; more than `most` would come from that once in a hundred times (binomial)."""
@@ -73,13 +72,12 @@ def test_numbers_drawn_from_their_priors_are_no_effects() -> None:
     assert count - covered <= most
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
     """A camera's scale off by six of its σ: said as such, freed, and ahead of every effect."""
     table = toy_table(4)
     table["R_yr_cm"] *= 1.06
-    result = calibrate(SwimmerModel(START, read_measurements(table)), progress=False)
+    result = calibrated(table)
     assert result.verdict == "number"
     assert result.effects == ()
     assert CAMERA in {p.parameter.name for p in result.wrong_numbers[0]}
@@ -90,19 +88,25 @@ def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
     assert result.error_after < 1.25 * result.noise_ceiling
 
 
-@pytest.mark.slow
-def test_a_stiffness_far_off_is_named_with_what_looks_like_it() -> None:
+@pytest.mark.parametrize(
+    ("share", "sigmas"),
+    [
+        pytest.param(0.6, {}, marks=pytest.mark.long),
+        (0.8, {"youngs_modulus": Sigma(0.03, True), **EXACT}),
+    ],
+    ids=["40 %", "20 %"],
+)
+def test_a_stiffness_far_off_is_named_with_what_looks_like_it(share: float, sigmas: dict[str, Sigma]) -> None:
     """40 % with the default tolerances; 20 % where E is stated to 3 % and the other numbers to be exact."""
-    for share, sigmas in ((0.6, {}), (0.8, {"youngs_modulus": Sigma(0.03, True), **EXACT})):
-        softer = replace(TRUTH, youngs_modulus=share * TRUTH.youngs_modulus)
-        data = read_measurements(make_table(softer, seed=5, title=""))
-        result = calibrate(SwimmerModel(replace(START, sigmas=sigmas), data), progress=False)
-        assert result.verdict == "number"
-        assert result.wrong_numbers[0][0].parameter.name == "youngs_modulus"
-        given = result.fits.final_refit.parameters["youngs_modulus"] / START.youngs_modulus
-        assert given == pytest.approx(share, rel=0.1)
-        corrected = corrected_robot(START, result.fits.final_refit.parameters)
-        assert corrected.youngs_modulus == result.fits.final_refit.parameters["youngs_modulus"]
+    softer = replace(TRUTH, youngs_modulus=share * TRUTH.youngs_modulus)
+    data = read_measurements(make_table(softer, seed=5, title=""))
+    result = calibrate(SwimmerModel(replace(START, sigmas=sigmas), data), progress=False)
+    assert result.verdict == "number"
+    assert result.wrong_numbers[0][0].parameter.name == "youngs_modulus"
+    given = result.fits.final_refit.parameters["youngs_modulus"] / START.youngs_modulus
+    assert given == pytest.approx(share, rel=0.1)
+    corrected = corrected_robot(START, result.fits.final_refit.parameters)
+    assert corrected.youngs_modulus == result.fits.final_refit.parameters["youngs_modulus"]
 
 
 def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
@@ -143,11 +147,11 @@ def test_pulls_are_those_of_the_textbook() -> None:
             assert pull.change == pytest.approx(
                 pull.alone * sigma**2 / (sigma**2 + pull.alone_error**2), rel=1e-6, abs=1e-12
             )
-    own = {p.parameter.name: p for p in pulls(bound, model.nuisances)}[CAMERA]
-    free = fit(model, bound.parameters, names, used, wrong_numbers=((own,),), title="")
+    bound_pull = {p.parameter.name: p for p in pulls(bound, model.nuisances)}[CAMERA]
+    free = fit(model, bound.parameters, names, used, wrong_numbers=((bound_pull,),), title="")
     alone = {p.parameter.name: p for p in pulls(free, model.nuisances)}[CAMERA]
     assert alone.freed
-    assert alone.change == pytest.approx(own.alone, abs=0.1 * own.alone_error)
+    assert alone.change == pytest.approx(bound_pull.alone, abs=0.1 * bound_pull.alone_error)
 
 
 def test_exact_numbers_are_not_fitted_and_the_table_states_its_own() -> None:

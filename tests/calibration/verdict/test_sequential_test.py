@@ -25,7 +25,7 @@ from calibration.verdict.sequential_test import (
 )
 from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError
-from tests.calibration.toy_tables import closed, install_toy, toy_swimmer, toy_table
+from tests.calibration.toy_tables import calibrated_toy, install_toy, shares_verdicts, toy_swimmer, toy_table
 
 
 @pytest.fixture(scope="module")
@@ -34,13 +34,13 @@ def undecided(tmp_path_factory: pytest.TempPathFactory) -> tuple[pd.DataFrame, P
     with pytest.MonkeyPatch.context() as patch:
         install_toy(patch)
         table = toy_table(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
-        verdict = closed(table)
+    verdict = calibrated_toy(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
     path = tmp_path_factory.mktemp("decide") / "verdict.json"
     path.write_text(json.dumps(verdict_record(verdict, table="t")))
     return table, path
 
 
-@pytest.mark.slow
+@shares_verdicts
 @pytest.mark.usefixtures("toy_model")
 def test_new_runs_of_other_lengths_decide_for_the_truth(undecided: tuple[pd.DataFrame, Path]) -> None:
     table, path = undecided
@@ -50,22 +50,22 @@ def test_new_runs_of_other_lengths_decide_for_the_truth(undecided: tuple[pd.Data
     model = toy_swimmer(pd.concat([table, more.sample(8, random_state=1)], ignore_index=True))
     new = new_runs(model.runs, before)
     assert new.sum() == 8
-    found = standings(model, explanations, new)
-    assert [s.given_up for s in found] == [False, True]
-    assert found[0] == Standing("head's end-over-end drag", 0.0)
-    assert sentence(found).startswith("Decided: head's end-over-end drag.")
+    standing = standings(model, explanations, new)
+    assert [s.given_up for s in standing] == [False, True]
+    assert standing[0] == Standing("head's end-over-end drag", 0.0)
+    assert sentence(standing).startswith("Decided: head's end-over-end drag.")
 
 
-@pytest.mark.slow
+@shares_verdicts
 @pytest.mark.usefixtures("toy_model")
 def test_eight_runs_like_the_old_ones_decide_nothing(undecided: tuple[pd.DataFrame, Path]) -> None:
     table, path = undecided
     explanations, before = read_explanations(path)
     more = toy_table(3, lengths_cm=(8.0,), end_over_end_drag=4.0).assign(session="new")
     model = toy_swimmer(pd.concat([table, more.sample(8, random_state=3)], ignore_index=True))
-    found = standings(model, explanations, new_runs(model.runs, before))
-    assert not any(s.given_up for s in found)
-    assert "make more runs" in sentence(found)
+    standing = standings(model, explanations, new_runs(model.runs, before))
+    assert not any(s.given_up for s in standing)
+    assert "make more runs" in sentence(standing)
     with pytest.raises(InputError, match="a session of their own"):
         new_runs(toy_swimmer(table).runs, before)
 
@@ -93,9 +93,9 @@ def test_the_true_explanation_is_seldom_given_up() -> None:
     lost, won = 0, 0
     for _ in range(draws):
         y = predictions["A"] + (root @ rng.normal(size=n * k)).reshape(n, k)
-        found = {s.title: s for s in standings(model(y), both, np.ones(n, bool))}
-        lost += found["A"].given_up
-        won += found["B"].given_up
+        standing = {s.title: s for s in standings(model(y), both, np.ones(n, bool))}
+        lost += standing["A"].given_up
+        won += standing["B"].given_up
     assert lost <= binom.isf(0.01, draws, 1 / STOP)
     assert won > 0.1 * draws
     with pytest.raises(InputError, match="has the outputs a, c; the verdict was made from a, b"):

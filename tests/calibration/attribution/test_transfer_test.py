@@ -18,7 +18,7 @@ from calibration.swimmer.swimmer import COEFFICIENTS, SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict_json import verdict_record
 from sim.arrays import Flags, Floats
-from tests.calibration.toy_tables import TRUTH, toy_swimmer, toy_table
+from tests.calibration.toy_tables import FEW_DRAWS, TRUTH, toy_swimmer, toy_table
 
 EFFECT = "end_over_end_drag"
 SIZE = 3.0
@@ -59,28 +59,27 @@ def test_short_tails_and_few_are_fitted() -> None:
 
 @pytest.mark.usefixtures("toy_model")
 def test_an_effect_carries_over_and_a_mimic_does_not() -> None:
-    own = model()
-    rest = ~fitted_again(own.runs, everywhere(own))
+    plain = model()
+    further_runs = ~fitted_again(plain.runs, everywhere(plain))
     for further, carries in ((1.0, True), (3.0, False)):
-        there = planted(own, np.where(rest, further, 1.0))
-        p = transfer_p(Study.fitted_to(there, everywhere(there), seed=1), claimed(there))
+        swimmer = planted(plain, np.where(further_runs, further, 1.0))
+        p = transfer_p(Study.fitted_to(swimmer, everywhere(swimmer), seed=1), claimed(swimmer))
         assert (p >= SURE) == carries
 
 
 @pytest.mark.usefixtures("toy_model")
 def test_runs_that_are_all_alike_say_nothing() -> None:
-    own = planted(model(), np.ones(len(model().runs)))
-    short = own.runs.length < 0.06
-    few = short & (own.runs.tails <= 4)
-    assert transfer_p(Study.fitted_to(own, few, seed=1), claimed(own)) == 1.0
+    swimmer = planted(model(), np.ones(len(model().runs)))
+    short = swimmer.runs.length < 0.06
+    few = short & (swimmer.runs.tails <= 4)
+    assert transfer_p(Study.fitted_to(swimmer, few, seed=1), claimed(swimmer)) == 1.0
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_a_claim_that_does_not_carry_over_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    there = planted(model(), np.full(len(model().runs), 2.0))
+    swimmer = planted(model(), np.full(len(model().runs), 2.0))
     monkeypatch.setattr(calibration.attribution.doubts, "transfer_p", lambda *_, **__: 0.001)
-    doubted = calibrate(there, progress=False)
+    doubted = calibrate(swimmer, draws=FEW_DRAWS, progress=False)
     assert doubted.effects == (EFFECT,)
     assert "or something outside the catalogue" in doubted.sentence
     assert verdict_record(doubted, table="")["transfer_p"] == [0.001]
@@ -90,9 +89,11 @@ def test_a_claim_that_does_not_carry_over_says_so(monkeypatch: pytest.MonkeyPatc
 def test_an_effect_beside_a_wrong_number_is_in_doubt() -> None:
     """It is a pair: something outside the catalogue finds two things that explain it more easily than one."""
     refit = claimed(planted(model(), np.ones(len(model().runs))))
-    own = model()
-    effect = parameter(own, EFFECT)
+    swimmer = model()
+    effect = parameter(swimmer, EFFECT)
     sure = Candidate(effect, (), 8.0, 1.0, 1.0, 1.0, "kept", refit, None, 1.0, 0.1)
     assert not sure.doubted
-    pull = pulls(fit(own, start_values(own), names(own), everywhere(own), title=""), own.nuisances)[0]
+    pull = pulls(
+        fit(swimmer, start_values(swimmer), names(swimmer), everywhere(swimmer), title=""), swimmer.nuisances
+    )[0]
     assert replace(sure, refit=replace(refit, wrong_numbers=((pull,),))).doubted

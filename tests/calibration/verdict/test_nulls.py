@@ -10,11 +10,12 @@ from scipy.stats import binom
 
 import sim.motion.batches
 from calibration.statistics.forward_model import start_values
+from calibration.statistics.study import DRAWS
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import COEFFICIENTS, DIRECT, SwimmerModel
 from calibration.verdict.verdict import Verdict
 from tests.calibration import toy
-from tests.calibration.toy_tables import START, TRUTH, closed, install_toy, toy_table
+from tests.calibration.toy_tables import START, TRUTH, calibrated, install_toy, toy_table
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -38,10 +39,11 @@ def nulls() -> list[Verdict]:
     """60 tables of 64 runs in which nothing is missing."""
     with pytest.MonkeyPatch.context() as patch:
         install_toy(patch)
-        return [closed(toy_table(seed, lengths_cm=(6.0, 9.0))) for seed in range(60)]
+        return [calibrated(toy_table(seed, lengths_cm=(6.0, 9.0)), draws=DRAWS) for seed in range(60)]
 
 
-@pytest.mark.slow
+@pytest.mark.rates
+@pytest.mark.xdist_group("nulls")
 def test_no_effect_is_claimed_where_there_is_none(nulls: list[Verdict]) -> None:
     """One claim in twenty is stated; more than `most` would come from that once in a hundred times (binomial)."""
     most = binom.isf(0.01, len(nulls), 0.05)
@@ -49,23 +51,24 @@ def test_no_effect_is_claimed_where_there_is_none(nulls: list[Verdict]) -> None:
     assert all(null.effects == () for null in nulls if null.verdict == "none")
 
 
-@pytest.mark.slow
+@pytest.mark.rates
+@pytest.mark.xdist_group("nulls")
 @pytest.mark.parametrize("name", COEFFICIENTS)
 def test_intervals_of_coefficients_cover(name: str, nulls: list[Verdict]) -> None:
     """As often as 95 % intervals may miss (binomial, once in a hundred times), and they are not too wide.
 
     Stated errors allow for the tolerances of the numbers as given. Here these numbers are exact.
     """
-    ends = [null.base_intervals[name] for null in nulls]
+    ends = [null.fits.base_intervals[name] for null in nulls]
     missed = sum(not low < getattr(TRUTH, name) < high for low, high in ends)
     assert missed <= binom.isf(0.01, len(nulls), 0.05)
     place = nulls[0].base.names.index(name)
     stated = np.sqrt(np.mean([null.base.covariance[place, place] for null in nulls]))
-    found = np.std([math.log(null.base.parameters[name]) for null in nulls])
-    assert 0.7 < stated / found < 3.0  # 2.4 for C_r
+    scatter = np.std([math.log(null.base.parameters[name]) for null in nulls])
+    assert 0.7 < stated / scatter < 3.0  # 2.4 for C_r
 
 
-@pytest.mark.slow
+@pytest.mark.rates
 @pytest.mark.usefixtures("toy_model")
 def test_twice_the_heavy_tails_do_not_make_an_effect() -> None:
     """Student noise with three degrees of freedom on the toy."""
@@ -75,5 +78,5 @@ def test_twice_the_heavy_tails_do_not_make_an_effect() -> None:
         table = toy_table(40 + seed)
         for column in ("omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm"):
             table[column] *= np.exp(0.02 * rng.standard_t(3, len(table)))
-        claimed += closed(table).verdict != "none"
+        claimed += calibrated(table, draws=DRAWS).verdict != "none"
     assert claimed <= 2

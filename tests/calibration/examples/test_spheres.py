@@ -13,6 +13,7 @@ from calibration.statistics.forward_model import Runs, start_values
 from calibration.statistics.noise import Noise
 from calibration.statistics.profile_intervals import profile_intervals
 from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import Verdict
 from calibration.verdict.verdict_json import verdict_record
 
 
@@ -46,45 +47,79 @@ def with_more_falls(
     return replace(both, runs=replace(both.runs, y=y))
 
 
-@pytest.mark.slow
-def test_the_engine_closes_a_model_that_is_no_robot() -> None:
-    beads = np.array([1.5, 2.5, 3.5, 5.0, 7.0, 9.0]) / 1000
-    assert calibrate(spheres(0.0, 0.0, 0, beads), progress=False).verdict == "none"
-    results = [calibrate(spheres(1.0, 0.0, seed, beads), progress=False) for seed in range(1, 9)]
+BEADS = np.array([1.5, 2.5, 3.5, 5.0, 7.0, 9.0]) / 1000
+SMALL_BEADS, SMALL_NOISE = np.array([3.0, 4.0, 5.0, 5.5]) / 1000, 0.01
+
+
+def test_a_model_that_is_no_robot_is_calibrated() -> None:
+    assert calibrate(spheres(0.0, 0.0, 0, BEADS), progress=False).verdict == "none"
+    result = calibrate(spheres(1.0, 0.0, 2, BEADS), progress=False)
+    assert result.effects == ("wall",)
+    low, high = result.final.interval("wall")
+    assert low < 1.0 < high
+
+
+@pytest.mark.rates
+def test_the_wall_is_mostly_found_and_sized() -> None:
+    results = [calibrate(spheres(1.0, 0.0, seed, BEADS), progress=False) for seed in range(1, 9)]
     assert sum(r.effects == ("wall",) for r in results) >= 7
     intervals = [r.final.interval("wall") for r in results if r.effects == ("wall",)]
     assert sum(low < 1.0 < high for low, high in intervals) >= len(intervals) - 2
     assert np.mean([r.error_after / r.noise_ceiling for r in results]) < 1.15
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("truth", [{"wall": 1.0}, {"inertia": 5.0}], ids=["wall", "inertia"])
+def twins(truth: dict[str, float], seed: int) -> Verdict:
+    """The verdict of small beads, which alone do not tell the wall from inertia."""
+    result = calibrate(small_beads(truth, seed), progress=False)
+    assert result.verdict == "ambiguous"
+    assert set(result.effects) == {"wall", "inertia"}
+    assert [len(c.beside) for c in result.explaining] == [0, 0]
+    assert "wall of the vessel" in result.sentence
+    assert "inertia of the fluid" in result.sentence
+    wanted = result.next_runs
+    assert [r.separation for r in wanted] == sorted((r.separation for r in wanted), reverse=True)
+    assert wanted[0].settings["d_mm"] > 5.5
+    assert all(0.5 < r.decides <= 1 for r in wanted)
+    assert verdict_record(result, table="t")["next_runs"] == [r.record() for r in wanted]
+    return result
+
+
+def small_beads(truth: dict[str, float], seed: int) -> Spheres:
+    return spheres(truth.get("wall", 0.0), truth.get("inertia", 0.0), seed, SMALL_BEADS, noise=SMALL_NOISE)
+
+
+def diameters_wanted(result: Verdict) -> np.ndarray:
+    return np.concatenate([np.full(r.repeats, r.settings["d_mm"] / 1000) for r in result.next_runs])
+
+
+def after_more_falls(truth: dict[str, float], seed: int, diameter: np.ndarray) -> Verdict:
+    model = with_more_falls(small_beads(truth, seed), diameter, truth, 100 + seed, SMALL_NOISE)
+    return calibrate(model, progress=False)
+
+
+TRUTHS = pytest.mark.parametrize("truth", [{"wall": 1.0}, {"inertia": 5.0}], ids=["wall", "inertia"])
+
+
+@TRUTHS
 def test_twins_are_called_ambiguous_and_the_next_runs_tell_them_apart(truth: dict[str, float]) -> None:
-    """Small beads alone do not tell the wall from inertia; the beads asked for do, more small ones do not."""
-    beads, noise = np.array([3.0, 4.0, 5.0, 5.5]) / 1000, 0.01
+    after = after_more_falls(truth, 1, diameters_wanted(twins(truth, 1)))
+    assert after.effects == tuple(truth)
+    assert after.next_runs == ()
+
+
+@pytest.mark.rates
+@TRUTHS
+def test_twins_are_mostly_told_apart_by_the_next_runs_and_not_by_others(truth: dict[str, float]) -> None:
+    """The beads asked for tell them apart, more small ones do not."""
     told_apart, still_twins, rejected = 0, 0, 0
     for seed in range(6):
-        model = spheres(truth.get("wall", 0.0), truth.get("inertia", 0.0), seed, beads, noise=noise)
-        result = calibrate(model, progress=False)
-        assert result.verdict == "ambiguous"
-        assert set(result.effects) == {"wall", "inertia"}
-        assert [len(c.beside) for c in result.explaining] == [0, 0]
-        assert "wall of the vessel" in result.sentence
-        assert "inertia of the fluid" in result.sentence
-        wanted = result.next_runs
-        assert [r.separation for r in wanted] == sorted((r.separation for r in wanted), reverse=True)
-        assert wanted[0].settings["d_mm"] > 5.5
-        assert all(0.5 < r.decides <= 1 for r in wanted)
-        assert verdict_record(result, table="t")["next_runs"] == [r.record() for r in wanted]
-        diameter = np.concatenate([np.full(r.repeats, r.settings["d_mm"] / 1000) for r in wanted])
-        after = calibrate(with_more_falls(model, diameter, truth, 100 + seed, noise), progress=False)
+        diameter = diameters_wanted(twins(truth, seed))
+        after = after_more_falls(truth, seed, diameter)
         told_apart += after.effects == tuple(truth)
         assert after.effects in {(), tuple(truth)} or after.verdict == "ambiguous"
         rejected += after.verdict == "unexplained"  # the true effect is lost in one of fifty tables by the level
         assert (after.next_runs == ()) == (after.verdict != "ambiguous")
-        more = calibrate(
-            with_more_falls(model, np.resize(beads, len(diameter)), truth, 100 + seed, noise), progress=False
-        )
+        more = after_more_falls(truth, seed, np.resize(SMALL_BEADS, len(diameter)))
         still_twins += more.verdict == "ambiguous"
     assert rejected <= 1
     assert told_apart >= 5

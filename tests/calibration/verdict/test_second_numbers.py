@@ -18,7 +18,7 @@ from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
-from tests.calibration.toy_tables import START, TRUTH, closed, toy_swimmer, toy_table
+from tests.calibration.toy_tables import START, TRUTH, calibrated, toy_swimmer, toy_table
 
 SIZE, TIME = "shear_thinning", "shear_thinning_time"
 HIDDEN = {SIZE: 0.45, TIME: 0.6}
@@ -48,48 +48,48 @@ def test_scores_are_taken_at_several_values_and_the_largest_counts() -> None:
     model = toy_swimmer(toy_table(5, **HIDDEN))
     used = np.ones(len(model.runs), bool)
     base = fit(model, start_values(model), ("C_t", "C_r", "C_yr"), used, title="")
-    along = directions(model, base.parameters, model.effects)
+    candidates = directions(model, base.parameters, model.effects)
     place = [e.name for e in model.effects].index(SIZE)
-    own = along.table[..., along.owner == place]
+    columns = candidates.table[..., candidates.owner == place]
     grid = influences()[SIZE].parameter.second.grid  # type: ignore[union-attr]
-    assert own.shape[-1] == len(grid)
-    for column, value in zip(np.moveaxis(own, -1, 0), grid, strict=True):
+    assert columns.shape[-1] == len(grid)
+    for column, value in zip(np.moveaxis(columns, -1, 0), grid, strict=True):
         expected = by_differences(model, {**base.parameters, TIME: value, SIZE: 1e-6}, [SIZE])[1][..., 0]
         assert column == pytest.approx(expected, rel=0.05, abs=1e-4)
     study = Study.fitted_to(model, used, level=0.05, draws=50)
-    found = examine_residual(study, base, along)
-    alone = [examine_residual(study, base, Directions.plain(own[..., [j]])) for j in range(len(grid))]
-    z = np.array([abs(one.scores.z[0]) for one in alone])
-    assert abs(found.scores.z[place]) == pytest.approx(z.max())
-    assert found.second[place] == grid[int(np.argmax(z))]
-    assert len(found.scores.z) == len(model.effects)
-    all_values = Directions(own, np.zeros(3, int), np.array(grid))
+    misfit = examine_residual(study, base, candidates)
+    alone = [examine_residual(study, base, Directions.plain(columns[..., [j]])) for j in range(len(grid))]
+    z = np.array([abs(single.scores.z[0]) for single in alone])
+    assert abs(misfit.scores.z[place]) == pytest.approx(z.max())
+    assert misfit.second[place] == grid[int(np.argmax(z))]
+    assert len(misfit.scores.z) == len(model.effects)
+    all_values = Directions(columns, np.zeros(3, int), np.array(grid))
     together = examine_residual(study, base, all_values, draws=200)
-    first = examine_residual(study, base, Directions.plain(own[..., [0]]), draws=200)
+    first_value = Directions.plain(columns[..., [0]])
+    first = examine_residual(study, base, first_value, draws=200)
     assert together.critical_z >= first.critical_z  # the bootstrap takes the largest, too
 
 
 def test_leaving_an_effect_out_leaves_all_its_columns_out() -> None:
     table = np.arange(4.0) * np.ones((2, 1, 4))
-    left = Directions(table, np.array([0, 1, 1, 2]), np.array([np.nan, 0.0, 1.0, np.nan])).without(1)
-    assert left.owner.tolist() == [0, 1]
-    assert left.table[0, 0].tolist() == [0.0, 3.0]
+    remaining = Directions(table, np.array([0, 1, 1, 2]), np.array([np.nan, 0.0, 1.0, np.nan])).without(1)
+    assert remaining.owner.tolist() == [0, 1]
+    assert remaining.table[0, 0].tolist() == [0.0, 3.0]
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [4, pytest.param(3, marks=pytest.mark.long)])
 def test_size_and_time_are_recovered_from_the_toy(seed: int) -> None:
     truth = replace(TRUTH, effects=HIDDEN)
     table = make_table(truth, seed=seed, lengths_cm=(5.0, 8.0, 11.0), motor_rpm=SPEEDS, title="")
-    result = closed(table)
+    result = calibrated(table)
     assert SIZE in result.effects
     refit = next(c.refit for c in result.explaining if c.effect.name == SIZE)
     recovered(refit)
     assert result.error_after < 1.15 * result.noise_ceiling
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_local_thinning_is_found_by_the_simulator() -> None:
     """Truth by time steps on a finer mesh."""
     truth = replace(TRUTH, effects=HIDDEN)

@@ -17,21 +17,21 @@ def measured(table: pd.DataFrame) -> dict[str, float]:
 
 @pytest.mark.parametrize("rate", [RATE, -RATE])
 def test_a_circle_gives_rate_radius_angle_and_speed(rate: float) -> None:
-    found = measured(track(0, rate=rate))
-    assert found["omega_yr_rad_s"] == pytest.approx(rate, rel=5e-3)
-    assert found["R_yr_cm"] == pytest.approx(RADIUS, rel=5e-3)
-    assert found["theta_deg"] == pytest.approx(SLIP, abs=0.5)
-    assert found["v_cm_s"] == pytest.approx(abs(rate) * RADIUS, rel=5e-3)
+    motion = measured(track(0, rate=rate))
+    assert motion["omega_yr_rad_s"] == pytest.approx(rate, rel=5e-3)
+    assert motion["R_yr_cm"] == pytest.approx(RADIUS, rel=5e-3)
+    assert motion["theta_deg"] == pytest.approx(SLIP, abs=0.5)
+    assert motion["v_cm_s"] == pytest.approx(abs(rate) * RADIUS, rel=5e-3)
 
 
 def test_a_current_drifts_the_circle_and_leaves_its_radius() -> None:
     still = track(2)
     moved = still.assign(x_cm=still["x_cm"] + 0.05 * still["time_s"], y_cm=still["y_cm"] - 0.02 * still["time_s"])
-    found = measured(moved)
-    assert found["drift_x_cm_s"] == pytest.approx(0.05, abs=4 * found["drift_error"])
-    assert found["drift_y_cm_s"] == pytest.approx(-0.02, abs=4 * found["drift_error"])
-    assert found["drift_error"] < 0.005
-    assert found["R_yr_cm"] == pytest.approx(measured(still)["R_yr_cm"], rel=1e-3)
+    motion = measured(moved)
+    assert motion["drift_x_cm_s"] == pytest.approx(0.05, abs=4 * motion["drift_error"])
+    assert motion["drift_y_cm_s"] == pytest.approx(-0.02, abs=4 * motion["drift_error"])
+    assert motion["drift_error"] < 0.005
+    assert motion["R_yr_cm"] == pytest.approx(measured(still)["R_yr_cm"], rel=1e-3)
     assert np.isnan(measured(track(2, seconds=30.0))["drift_x_cm_s"])  # two thirds of a turn
 
 
@@ -46,10 +46,10 @@ def test_errors_are_as_large_as_the_scatter_of_repeated_tracks() -> None:
 
 
 def test_a_run_that_hardly_turns_gives_a_speed_alone() -> None:
-    found = measured(track(1, rate=0.002, wobble=0.0))
-    assert np.isnan(found["R_yr_cm"])
-    assert np.isnan(found["omega_yr_rad_s"])
-    assert found["v_cm_s"] == pytest.approx(0.02, rel=0.1)
+    motion = measured(track(1, rate=0.002, wobble=0.0))
+    assert np.isnan(motion["R_yr_cm"])
+    assert np.isnan(motion["omega_yr_rad_s"])
+    assert motion["v_cm_s"] == pytest.approx(0.02, rel=0.1)
 
 
 def test_bad_samples_and_short_tracks_are_named() -> None:

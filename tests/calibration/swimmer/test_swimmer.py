@@ -26,14 +26,14 @@ def table() -> pd.DataFrame:
     """A table with everything that can be noted and measured; values by the toy."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("calibration.swimmer.synthetic_table.stepped_columns", toy.steady_columns)
-        found = make_table(START, seed=3, tails=(2, 3, 5), lengths_cm=(6.0, 9.0), title="")
+        measured = make_table(START, seed=3, tails=(2, 3, 5), lengths_cm=(6.0, 9.0), title="")
     rng = np.random.default_rng(0)
-    found["v_cm_s"] = 2.0 * np.exp(rng.normal(scale=0.03, size=len(found)))
-    found["elapsed_min"] = 3.0 * np.arange(len(found))
-    found["temperature_C"] = 20 + rng.normal(size=len(found))
-    found["tank_diameter_cm"] = rng.choice([40.0, 60.0], len(found))
-    found["heading_deg"] = rng.uniform(0, 360, len(found))
-    return found
+    measured["v_cm_s"] = 2.0 * np.exp(rng.normal(scale=0.03, size=len(measured)))
+    measured["elapsed_min"] = 3.0 * np.arange(len(measured))
+    measured["temperature_C"] = 20 + rng.normal(size=len(measured))
+    measured["tank_diameter_cm"] = rng.choice([40.0, 60.0], len(measured))
+    measured["heading_deg"] = rng.uniform(0, 360, len(measured))
+    return measured
 
 
 @pytest.mark.slow
@@ -63,9 +63,9 @@ def test_derivatives_are_those_of_the_prediction(table: pd.DataFrame) -> None:
 
 def test_an_odd_effect_of_the_robot_itself_tells_left_from_right(table: pd.DataFrame) -> None:
     """Even where the runs are in one direction, so that it cannot be fitted."""
-    left = read_measurements(table[table["omega_rpm"] < 0].drop(columns=["elapsed_min", "temperature_C"]))
+    left_runs = read_measurements(table[table["omega_rpm"] < 0].drop(columns=["elapsed_min", "temperature_C"]))
     plain, biased = (
-        SwimmerModel(replace(START, effects=effects), left, solver=toy.SOLVER)
+        SwimmerModel(replace(START, effects=effects), left_runs, solver=toy.SOLVER)
         for effects in ({}, {"left_right_bias": 0.3})
     )
     assert "left_right_bias" not in {e.name for e in biased.effects}
@@ -77,7 +77,7 @@ def test_an_odd_effect_of_the_robot_itself_tells_left_from_right(table: pd.DataF
     )
     right = SwimmerModel(biased.robot, mirrored, solver=toy.SOLVER)
     right_turns = right.predict([start_values(right)])[0]
-    yaw = left.outputs.index("omega_yr")
+    yaw = left_runs.outputs.index("omega_yr")
     assert np.abs(left_turns[1] - left_turns[0])[:, yaw].min() > 1e-4
     assert np.abs(left_turns[1] - right_turns)[:, yaw].min() > 1e-4
 

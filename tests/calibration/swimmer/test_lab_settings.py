@@ -21,20 +21,20 @@ def test_without_a_word_it_is_the_range_of_the_table() -> None:
     assert grid[:, 1].max() == pytest.approx(11)
     assert np.abs(grid[:, 2]).max() == pytest.approx(np.abs(runs.omega).max() * 30 / math.pi)
     assert len(np.unique(grid, axis=0)) == len(grid) == 5 * 6 * 6
-    one = toy_swimmer(toy_table(3, lengths_cm=(8.0,))).runs
-    assert len(possible_settings(one, {})) == 5 * 6
+    one_length = toy_swimmer(toy_table(3, lengths_cm=(8.0,))).runs
+    assert len(possible_settings(one_length, {})) == 5 * 6
 
 
 def test_a_lab_gets_only_what_it_has() -> None:
-    own = owned(["N=2,4", "l_cm=5,7", "omega_rpm=60"])
+    lab = owned(["N=2,4", "l_cm=5,7", "omega_rpm=60"])
     runs = toy_swimmer(toy_table(3)).runs
     expected = set(product((2, 4), (5, 7), (60, -60)))
-    assert {tuple(row) for row in possible_settings(runs, own).tolist()} == expected
+    assert {tuple(row) for row in possible_settings(runs, lab).tolist()} == expected
 
 
 def test_settings_are_those_of_the_lab_to_the_last_digit() -> None:
-    own = {"l_cm": (5.25, 7.0), "omega_rpm": (57.46,)}
-    model, settings = toy_swimmer(toy_table(3), START, own).possible()
+    lab = {"l_cm": (5.25, 7.0), "omega_rpm": (57.46,)}
+    model, settings = toy_swimmer(toy_table(3), START, lab).possible()
     assert {s["l_cm"] for s in settings} == {5.25, 7.0}
     assert {s["omega_rpm"] for s in settings} == {57.46, -57.46}
     assert model.runs.length == pytest.approx([s["l_cm"] / 100 for s in settings])

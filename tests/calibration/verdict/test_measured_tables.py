@@ -14,7 +14,7 @@ from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from tests.calibration.toy_tables import START
 
-MEASURED = Path(__file__).parents[3] / "shared" / "measured"
+MEASURED = Path(__file__).parents[4] / "shared" / "measured"
 
 
 @pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
@@ -41,11 +41,13 @@ def test_spheres_in_glycerine_need_the_wall() -> None:
     assert calibrate(read_spheres(source, "ZK2026"), progress=False).verdict == "unexplained"
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
 @pytest.mark.parametrize(
     ("name", "effect", "size"),
-    [("run04.csv", "natural_curvature", -0.295), ("run05.csv", "viscosity_with_time", 0.0444)],
+    [
+        ("run04.csv", "natural_curvature", -0.295),
+        pytest.param("run05.csv", "viscosity_with_time", 0.0444, marks=pytest.mark.long),
+    ],
 )
 def test_what_came_out_of_the_measured_tables(name: str, effect: str, size: float) -> None:
     """docs/measured-tables.md; the others take longer and are written down there."""
