@@ -10,8 +10,9 @@ from pathlib import Path
 
 from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
+from sim.io.commands import Command
 from sim.model.effect import Effect
-from softflagella.__main__ import PACKAGES
+from softflagella.__main__ import PACKAGES, WORDS, command
 
 
 def write_generated_pages(folder: Path) -> None:
@@ -35,7 +36,7 @@ def effects_page() -> str:
     )
     parts = [
         "# Effects",
-        f"Each of these {len(effects)} files in `sim/effects` adds a physical effect that the base model leaves out. "
+        f"Each of these {len(effects)} files in `sim/effects` adds an effect that the base model leaves out. "
         "An effect has a size ε. At its null value the model is exactly the base model.",
         "In a robot.toml, effects are lines `name = size` in the table `[effects]`; in a table of robots they are "
         "columns.",
@@ -89,14 +90,21 @@ def commands_page() -> str:
     os.environ["COLUMNS"] = "100"
     parts = [
         "# Commands",
-        "Invalid input ends with one line on stderr and exit status 2.",
+        "The most frequent commands have a short form. Invalid input ends with one line on stderr and exit status 2.",
     ]
+    for word, (package, name) in WORDS.items():
+        same = "" if package == "softflagella" else f"The same as `softflagella {package} {name}`."
+        parts += [f"## {word}", same, _help(command(word), f"softflagella {word}")]
     for package, what in PACKAGES.items():
         program = import_module(f"{package}.__main__").program
         parts += [f"## {package}", f"{what[0].upper()}{what[1:]}."]
-        for name, text in program.help_texts(f"softflagella {package}").items():
-            parts += [f"### {package} {name}", f"```text\n{text.rstrip()}\n```"]
-    return "\n\n".join(parts) + "\n"
+        for name, packaged in program.commands.items():
+            parts += [f"### {package} {name}", _help(packaged, f"softflagella {package} {name}")]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _help(described: Command, prog: str) -> str:
+    return f"```text\n{described.parser(prog).format_help().rstrip()}\n```"
 
 
 def number(value: float) -> str:

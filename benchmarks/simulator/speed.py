@@ -50,7 +50,7 @@ def timed(work: Callable[[], Result], *, repeats: int = 1) -> tuple[float, Resul
 
 
 def sweep(rows: int) -> dict[str, np.ndarray]:
-    return load_design("sweep.toml").with_rows(rows).points()
+    return load_design().with_rows(rows).points()
 
 
 def robots() -> None:
