@@ -90,7 +90,8 @@ def commands_page() -> str:
     os.environ["COLUMNS"] = "100"
     parts = [
         "# Commands",
-        "The most frequent commands have a short form. Invalid input ends with one line on stderr and exit status 2.",
+        "The most frequent commands have a short form. Invalid input ends with one line on stderr and exit "
+        "status 2.",
     ]
     for word, (package, name) in WORDS.items():
         same = "" if package == "softflagella" else f"The same as `softflagella {package} {name}`."
