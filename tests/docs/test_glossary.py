@@ -25,8 +25,7 @@ from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS
 from tests.docs.pages import DOCS, PAGES, ROOT, glossary, replaced_words
 
 TEXTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
-HISTORY = {DOCS / "log.md", DOCS / "reference" / "glossary.md", DOCS / "figures.md", DOCS / "operating.md"}
-HISTORY |= set((DOCS / "decisions").iterdir())
+HISTORY = {DOCS / "log.md", DOCS / "reference" / "glossary.md"}
 SOURCES = sorted(file for top in ("sim",) for file in (ROOT / top).rglob("*.py"))
 
 
