@@ -35,11 +35,13 @@ main = program.main
 def _calibrate(arguments: Namespace) -> None:
     from calibration.report.corrected_robot import check_given, corrected_toml
     from calibration.report.report import write_report
+    from calibration.swimmer.head_correction import learn_head_correction
     from calibration.swimmer.lab_settings import owned
     from calibration.swimmer.measured_table import read_measurements
     from calibration.swimmer.protocols import PROTOCOLS
-    from calibration.swimmer.swimmer import Swimmer
-    from calibration.verdict.calibrate import calibrate, verdict_record
+    from calibration.swimmer.swimmer import SwimmerModel
+    from calibration.verdict.calibrate import calibrate
+    from calibration.verdict.verdict_json import verdict_record
     from sim.inputs import load_robot
     from sim.io.files import write_text
 
@@ -47,26 +49,29 @@ def _calibrate(arguments: Namespace) -> None:
     robot = load_robot(arguments.robot)
     check_given(robot)
     data = read_measurements(arguments.table)
-    for line in data.set_aside:
+    for line in data.excluded:
         print(f"set aside: {line}", file=sys.stderr)
-    data, locked = PROTOCOLS[arguments.protocol](data)
-    model = Swimmer(robot, data, arguments.jobs, own=own)
-    result = calibrate(model, locked=locked, seed=arguments.seed)
+    data, held_out = PROTOCOLS[arguments.protocol](data)
+    model = SwimmerModel(robot, data, arguments.jobs, own=own)
+    result = calibrate(model, held_out=held_out, correction=learn_head_correction, seed=arguments.seed)
     folder = Path(arguments.out)
     record = verdict_record(result, table=Path(arguments.table).name)
     write_report(result, data, folder / "report.html", title=Path(arguments.table).name)
-    write_text(folder / "corrected.toml", corrected_toml(robot, result.delivered, result.predictive))
+    write_text(
+        folder / "corrected.toml", corrected_toml(robot, result.fits.final_refit, result.corrections.learnt)
+    )
     write_text(folder / "verdict.json", json.dumps(record, indent=1) + "\n")
     print(result.sentence)
+    held_out_runs = result.conditions.split.names
     print(
-        f"error on the locked runs ({result.locked}): as given {100 * result.error_uncalibrated:.2f} %, "
+        f"error on the held-out runs ({held_out_runs}): as given {100 * result.error_uncalibrated:.2f} %, "
         f"calibrated {100 * result.error_before:.2f} %, with effects {100 * result.error_after:.2f} %, "
         f"noise {100 * result.noise_ceiling:.2f} %"
     )
-    for limit in result.limits:
+    for limit in result.conditions.caveats:
         print(f"the conclusion is weaker: {limit}")
-    if result.set_aside:
-        print(f"set aside: {len(result.set_aside)}, first {result.set_aside[0]}")
+    if result.conditions.excluded:
+        print(f"set aside: {len(result.conditions.excluded)}, first {result.conditions.excluded[0]}")
     print(f"-> {folder / 'verdict.json'}, {folder / 'report.html'}, {folder / 'corrected.toml'}")
 
 
@@ -80,13 +85,13 @@ def _calibrate(arguments: Namespace) -> None:
 )
 def _decide(arguments: Namespace) -> None:
     from calibration.swimmer.measured_table import read_measurements
-    from calibration.swimmer.swimmer import Swimmer
+    from calibration.swimmer.swimmer import SwimmerModel
     from calibration.verdict.next_runs import GIVEN_UP
     from calibration.verdict.sequential_test import new_runs, read_explanations, sentence, standings
     from sim.inputs import load_robot
 
     explanations, before = read_explanations(arguments.verdict)
-    model = Swimmer(load_robot(arguments.robot), read_measurements(arguments.table), arguments.jobs)
+    model = SwimmerModel(load_robot(arguments.robot), read_measurements(arguments.table), arguments.jobs)
     new = new_runs(model.runs, before)
     found = standings(model, explanations, new)
     print(f"{new.sum()} new runs. An explanation that is behind by more than {GIVEN_UP:.1f} is given up.")

@@ -31,10 +31,13 @@ from tqdm import tqdm
 
 from calibration.report.corrected_robot import corrected_robot, corrected_toml
 from calibration.report.report import draw_residuals
+from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.measured_table import Measurements, read_measurements
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
-from calibration.verdict.calibrate import Verdict, calibrate, verdict_record
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import Verdict
+from calibration.verdict.verdict_json import verdict_record
 from dataset.report.figures import draw_responses, draw_trends, plain_logarithms
 from dataset.report.report import usable_rows
 from dataset.storage.data_set import read
@@ -149,7 +152,7 @@ def _steer(verdict: Verdict) -> dict[str, Steered]:
     truth = replace(start, **HIDDEN, effects=HIDDEN_EFFECT)  # type: ignore[arg-type]
     models = {
         "calibrated": corrected_robot(start, verdict.base.parameters),
-        "corrected": corrected_robot(start, verdict.delivered.parameters),
+        "corrected": corrected_robot(start, verdict.fits.final_refit.parameters),
         "truth known": truth,
     }
     found = steer(models, truth, polygon(4, 3.0))
@@ -168,10 +171,12 @@ def _close(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     place.mkdir(exist_ok=True)
     table.to_csv(place / "table.csv", index=False, float_format="%.6g")
     data = read_measurements(place / "table.csv")
-    verdict = calibrate(Swimmer(start, data))
+    verdict = calibrate(SwimmerModel(start, data), correction=learn_head_correction)
     record = verdict_record(verdict, table="table.csv")
     write_text(place / "verdict.json", json.dumps(record, indent=1) + "\n")
-    write_text(place / "corrected.toml", corrected_toml(start, verdict.delivered, verdict.predictive))
+    write_text(
+        place / "corrected.toml", corrected_toml(start, verdict.fits.final_refit, verdict.corrections.learnt)
+    )
     print(f"  {name}: {verdict.sentence}")
     return verdict, data
 
@@ -262,7 +267,7 @@ def _write_page(
         ]
         shown_errors = [e for e in errors if verdict.effects or "effect" not in e[0]]
         page.table(
-            ("error on the locked session", "relative rms"),
+            ("error on the held-out session", "relative rms"),
             [(label, f"{100 * value:.2f} %") for label, value in shown_errors],
         )
     page.section("Back on the path: the square again, on the robot with the hidden effect")

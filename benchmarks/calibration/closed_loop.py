@@ -17,9 +17,9 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.report.corrected_robot import corrected_robot
-from calibration.statistics.held_out import fitted_to_all
+from calibration.statistics.held_out import refit_to_all
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from planner.paths.path import polygon
@@ -46,13 +46,13 @@ def main(robots: str = "10") -> None:
         C_t, C_r, C_yr = np.array([2.5, 2.2, 3.5]) * np.exp(rng.uniform(-0.3, 0.3, 3))
         truth = replace(start, C_t=C_t, C_r=C_r, C_yr=C_yr, effects={name: size})
         table = make_table(truth, seed=seed, lengths_cm=LENGTHS, title="")
-        model = Swimmer(start, read_measurements(table))
+        model = SwimmerModel(start, read_measurements(table))
         verdict = calibrate(model, progress=False)
         swimmer = replace(truth, tails=2).with_motor(10.0)
-        before = fitted_to_all(model, verdict.base, np.ones(len(table), bool))
+        before = refit_to_all(model, verdict.base, np.ones(len(table), bool))
         models = {
             "before": corrected_robot(replace(swimmer, effects={}), before.parameters),
-            "after": corrected_robot(replace(swimmer, effects={}), verdict.delivered.parameters),
+            "after": corrected_robot(replace(swimmer, effects={}), verdict.fits.final_refit.parameters),
             "truth": swimmer,
         }
         rms = [one.error.rms for one in steer(models, swimmer, polygon(4, 3.0)).values()]

@@ -25,9 +25,10 @@ from scipy.stats import chi2, ncx2
 from benchmarks.calibration.planted import Linear, Signals, outside, scatter, stand_in
 from benchmarks.proportions import per_cent
 from calibration.statistics.forward_model import Parameter
-from calibration.statistics.held_out import middle_session
 from calibration.statistics.residual_tests import TESTABLE
-from calibration.verdict.calibrate import Verdict, calibrate
+from calibration.statistics.splits import middle_session
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import Verdict
 from sim.arrays import Floats
 from sim.motion.batches import available_jobs
 
@@ -56,7 +57,7 @@ def claims(verdict: Verdict, case: Case) -> dict[str, bool]:
     """Every question that can be asked of a verdict."""
     sets = [{e.name for e in c.claimed} for c in verdict.explaining]
     doubted = any(c.doubted for c in verdict.explaining)
-    beside = [{e.name for e in c.claimed} for c in verdict.instead]
+    beside = [{e.name for e in c.claimed} for c in verdict.evidence.rival_effects]
     found = {
         "an effect is claimed": bool(sets),
         "claimed without the words": bool(sets) and not doubted,
@@ -67,7 +68,7 @@ def claims(verdict: Verdict, case: Case) -> dict[str, bool]:
     }
     if STIFFNESS in verdict.base.names:
         low, high = verdict.base.interval(STIFFNESS)
-        true = case.model.given[0].start * math.exp(_shift(case.label))
+        true = case.model.nuisances[0].start * math.exp(_shift(case.label))
         found[_COVERED] = low <= true <= high
     return found
 
@@ -98,18 +99,18 @@ def fixed(signal: Floats, seed: int) -> Floats:
 
 def restated(model: Linear, sigmas: dict[str, float]) -> Linear:
     """The same with other standard deviations; numbers with none are exact."""
-    given = tuple(replace(p, sigma=sigmas[p.name]) for p in model.given if sigmas.get(p.name))
-    keep = [i for i, p in enumerate(model.given) if sigmas.get(p.name)]
-    return replace(model, given=given, G=model.G[..., keep])
+    given = tuple(replace(p, sigma=sigmas[p.name]) for p in model.nuisances if sigmas.get(p.name))
+    keep = [i for i, p in enumerate(model.nuisances) if sigmas.get(p.name)]
+    return replace(model, nuisances=given, G=model.G[..., keep])
 
 
 def cases(model: Linear) -> list[Case]:
     """All of them."""
-    own = {p.name: float(p.sigma or 0.0) for p in model.given}
+    own = {p.name: float(p.sigma or 0.0) for p in model.nuisances}
     exact = restated(model, {})
-    place = [p.name for p in model.given].index(STIFFNESS)
+    place = [p.name for p in model.nuisances].index(STIFFNESS)
     soft, softer, softest = (partial(fixed, model.G[..., place] * math.log(s)) for s in (0.9, 0.8, 0.6))
-    draw = partial(drawn, model.G, model.given)
+    draw = partial(drawn, model.G, model.nuisances)
     tight = {"numbers of the table only": {k: own[k] for k in ("camera_scale", "heading_zero", "tachometer")}}
     alone = restated(model, {**own, STIFFNESS: 0.03})
     all_of = restated(model, {**tight["numbers of the table only"], STIFFNESS: 0.03})

@@ -1,7 +1,7 @@
 """Missing physics named by information criteria, stepwise and sparse regression.
 
-Every way fits the coefficients, the numbers as given with their priors, and a set of effects to the runs that are
-not locked, by generalised least squares with the same noise. What differs is which set is taken:
+Every way fits the coefficients, the nuisance parameters with their priors, and a set of effects to the runs that
+are not held out, by generalised least squares with the same noise. What differs is which set is taken:
 
     best AIC, best BIC, EBIC    the least deviance + cost over no effect, every single one and every pair
     stepwise                    one more effect as long as BIC falls
@@ -32,11 +32,12 @@ from benchmarks.calibration.sparse_identification import identify
 from benchmarks.proportions import per_cent
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward_model import start_values
-from calibration.statistics.held_out import errors, middle_session
+from calibration.statistics.held_out import errors
 from calibration.statistics.noise import repeat_covariance
 from calibration.statistics.residual_tests import TESTABLE
+from calibration.statistics.splits import middle_session
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.residual_regression import correct
+from calibration.verdict.residual_regression import regress_residual
 from sim.arrays import Floats
 from sim.motion.batches import available_jobs
 
@@ -66,7 +67,7 @@ class _Sets:
     def __init__(self, model: Linear):
         self.model, self.locked = model, middle_session(model.runs)
         self.used = ~self.locked
-        self.common = tuple(p.name for p in (*model.coefficients, *model.given))
+        self.common = tuple(p.name for p in (*model.coefficients, *model.nuisances))
         run = repeat_covariance(model.runs.y, model.runs.condition)
         self.noise = float(np.sqrt(np.trace(run) / len(run)))
         self.values = int(self.used.sum()) * model.prediction.shape[1]
@@ -110,7 +111,7 @@ def ways(model: Linear) -> dict[str, Found]:
     identified = identify(model, sets.used, testable)
     found["identification"] = Found(_claims(identified), sets.error(sets.fit(identified).prediction))
     base = sets.fit(frozenset()).prediction
-    generic = base + correct(model.runs, base, sets.used).correction
+    generic = base + regress_residual(model.runs, base, sets.used).correction
     found["generic correction"] = Found((), sets.error(generic))
     own = calibrate(model, progress=False)
     named = tuple(frozenset(e.name for e in c.claimed) for c in (*own.explaining, *own.instead))
@@ -123,7 +124,7 @@ def _claims(effects: frozenset[str]) -> tuple[frozenset[str], ...]:
 
 
 def _survived(sets: _Sets) -> Floats:
-    """Share of every effect that coefficients leave, (e,); numbers as given are kept at their values."""
+    """Share of every effect that coefficients leave, (e,); nuisance parameters are kept at their values."""
     model = sets.model
     white = np.linalg.qr(model.J[sets.used].reshape(-1, model.J.shape[-1]))[0]
     D = model.D[sets.used].reshape(-1, model.D.shape[-1])

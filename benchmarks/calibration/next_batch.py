@@ -26,7 +26,8 @@ from benchmarks.calibration.planted import Linear, Signals, linearised, scatter,
 from benchmarks.proportions import per_cent
 from calibration.statistics.residual_tests import TESTABLE
 from calibration.swimmer.measured_table import read_measurements
-from calibration.verdict.calibrate import Verdict, calibrate
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import Verdict
 from sim.arrays import Floats, Integers
 from sim.motion.batches import available_jobs
 

@@ -22,8 +22,10 @@ from joblib import Parallel, delayed
 
 from benchmarks.calibration.planted import Case, Design, Linear, cases, nulls, scatter, stand_in
 from benchmarks.proportions import per_cent
-from calibration.statistics.forward_model import Model, start_values
-from calibration.verdict.calibrate import Verdict, calibrate
+from calibration.statistics.forward_model import start_values
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.experiment import Experiment
+from calibration.verdict.verdict import Verdict
 from sim.motion.batches import available_jobs
 
 PAGE = Path("docs/operating.md")
@@ -58,9 +60,8 @@ def judge(verdict: Verdict, case: Case) -> str:
         return "none" if verdict.verdict == "none" else f"claimed ({verdict.verdict})"
     truth = frozenset(case.sizes)
     if verdict.verdict == "number":
-        return (
-            "in the set" if truth in [frozenset(e.name for e in c.claimed) for c in verdict.instead] else "number"
-        )
+        rivals = [frozenset(e.name for e in c.claimed) for c in verdict.evidence.rival_effects]
+        return "in the set" if truth in rivals else "number"
     if not verdict.explaining:
         return "abstained" if verdict.verdict == "none" else "unexplained"
     sets = [frozenset(e.name for e in c.claimed) for c in verdict.explaining]
@@ -69,7 +70,7 @@ def judge(verdict: Verdict, case: Case) -> str:
     return "in the set" if truth in sets else "wrong"
 
 
-def outcome(model: Model, case: Case) -> Outcome:
+def outcome(model: Experiment, case: Case) -> Outcome:
     """Close the loop on a model that has its data."""
     verdict = calibrate(model, progress=False)
     judgement = judge(verdict, case)

@@ -3,7 +3,7 @@
 The stand-in is the simulator's prediction and its derivatives in coefficients and effects at one robot; a table
 costs a second with it. Noise 2.5 % on every output, session scatter 0.5 %; in the paper's design four sessions.
 λ is the size of an effect in standard deviations of its score, after what the coefficients absorb, and what
-numbers as given can absorb within their priors.
+nuisance parameters can absorb within their priors.
 
     nulls           nothing missing; Gaussian noise, and heavy tails (Student, 3 degrees of freedom)
     effects         each testable effect at λ = 2, 4, 8, 16; at λ = 8 with heavy tails, too
@@ -20,14 +20,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.fit import Fit
 from calibration.statistics.forward_model import Parameter, Parameters, Runs, start_values
-from calibration.statistics.held_out import middle_session
 from calibration.statistics.noise import Noise
 from calibration.statistics.priors import prior_rows
 from calibration.statistics.residual_tests import TESTABLE
+from calibration.statistics.splits import middle_session
 from calibration.swimmer.measured_table import Measurements, read_measurements
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Flags, Floats, Integers
 from sim.model.presets import PRESETS
 
@@ -38,11 +37,11 @@ LEVELS = (2.0, 4.0, 8.0, 16.0)
 
 @dataclass(frozen=True)
 class Linear:
-    """The swimmer near one robot: prediction + J (ln C − ln C0) + G x + D (ε − null), x: numbers as given."""
+    """The swimmer near one robot: prediction + J (ln C − ln C0) + G x + D (ε − null), x: nuisance parameters."""
 
     runs: Runs
     coefficients: tuple[Parameter, ...]
-    given: tuple[Parameter, ...]
+    nuisances: tuple[Parameter, ...]
     effects: tuple[Parameter, ...]
     prediction: Floats  # (n, k)
     J: Floats  # (n, k, 3)
@@ -62,15 +61,15 @@ class Linear:
         for p in sets:
             c = np.array([np.log(p[q.name] / q.start) for q in self.coefficients])
             e = np.array([p[q.name] - q.start for q in self.effects])
-            x = np.array([np.log(p[q.name] / q.start) if q.logarithmic else p[q.name] for q in self.given])
-            found.append(self.prediction + self.J @ c + self.D @ e + (self.G @ x if self.given else 0.0))
+            x = np.array([np.log(p[q.name] / q.start) if q.logarithmic else p[q.name] for q in self.nuisances])
+            found.append(self.prediction + self.J @ c + self.D @ e + (self.G @ x if self.nuisances else 0.0))
         return np.array(found)
 
     def derivatives(
         self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
     ) -> tuple[Floats, Floats]:
         """Prediction (n, k) and derivatives (n, k, p)."""
-        order = [p.name for p in (*self.coefficients, *self.given, *self.effects)]
+        order = [p.name for p in (*self.coefficients, *self.nuisances, *self.effects)]
         table = np.concatenate([self.J, self.G, self.D], -1)
         return self.predict([parameters])[0], table[..., [order.index(n) for n in names]]
 
@@ -81,9 +80,6 @@ class Linear:
         """Runs that can be made next, and their places."""
         model = self.next or self
         return model, [{"run": i} for i in range(len(model.runs))]
-
-    def predictive(self, base: Fit, used: Flags, rows: Flags, test: Flags) -> None:
-        """None: the stand-in cannot be corrected."""
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """The start as it is."""
@@ -144,12 +140,12 @@ def stand_in(which: Design = PAPER) -> Linear:
 
 def linearised(data: Measurements) -> Linear:
     """The same at the runs of a table."""
-    model = Swimmer(ROBOT, data)
-    names = [p.name for p in (*model.coefficients, *model.given, *model.effects)]
+    model = SwimmerModel(ROBOT, data)
+    names = [p.name for p in (*model.coefficients, *model.nuisances, *model.effects)]
     prediction, table = model.derivatives(start_values(model), names)
-    J, G, D = np.split(table, np.cumsum([len(model.coefficients), len(model.given)]), -1)
+    J, G, D = np.split(table, np.cumsum([len(model.coefficients), len(model.nuisances)]), -1)
     effects = tuple(replace(e, second=None) for e in model.effects)  # it is linear in the sizes alone
-    return Linear(model.runs, model.coefficients, model.given, effects, prediction, J, G, D, {})
+    return Linear(model.runs, model.coefficients, model.nuisances, effects, prediction, J, G, D, {})
 
 
 def scatter(runs: Runs, outputs: int, seed: int, *, heavy: bool = False) -> Floats:
@@ -169,7 +165,7 @@ class Signals:
         self.used = ~middle_session(model.runs)
         white = Noise(NOISE**2 * np.eye(k), (SESSION / NOISE) ** 2)
         self.white = white.whitener(model.runs.session[self.used])
-        fitted = (*model.coefficients, *model.given)
+        fitted = (*model.coefficients, *model.nuisances)
         rows = prior_rows(fitted, start_values(model))[0]
         J = np.concatenate([model.J, model.G], -1)
         self.priors = len(rows)

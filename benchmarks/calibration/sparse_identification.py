@@ -1,6 +1,6 @@
 """Naming what a model lacks in the manner of sparse identification: localise, select from a library, test.
 
-1. Half of the repeats of every condition fit the coefficients and the numbers as given, with their priors.
+1. Half of the repeats of every condition fit the coefficients and the nuisance parameters, with their priors.
 2. Localise: outputs whose residual follows the inputs, their squares and products (an F test for each output).
 3. Select: the library is the signals of all effects. The one that lowers the sum of squares on those outputs most
    is taken, as long as its F test passes, with at most three.
@@ -32,7 +32,7 @@ def identify(model: Linear, used: Flags, testable: list[str]) -> frozenset[str]:
     """Effects that are confirmed; none if nothing is."""
     first = _half(model, used)
     scale = np.sqrt(np.diag(repeat_covariance(model.runs.y[used], model.runs.condition[used])))
-    fitted = (*model.coefficients, *model.given)
+    fitted = (*model.coefficients, *model.nuisances)
     rows = prior_rows(fitted, start_values(model))[0]
     effects = [e.name for e in model.effects]
     library = {name: model.D[..., effects.index(name)] / scale for name in testable}

@@ -30,7 +30,7 @@ from benchmarks.proportions import per_cent
 from calibration.statistics.forward_model import Parameter, start_values, stepped
 from calibration.statistics.priors import prior_rows
 from calibration.statistics.residual_tests import TESTABLE
-from calibration.swimmer.swimmer import DIRECT, Swimmer
+from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from sim.arrays import Floats
 from sim.motion.batches import available_jobs, stepped_columns
@@ -58,7 +58,7 @@ class Closed:
     size: tuple[float, float] | None  # the effect's interval, over its truth
 
 
-def truth(sizes: dict[str, float], model: Swimmer) -> tuple[Floats, int]:
+def truth(sizes: dict[str, float], model: SwimmerModel) -> tuple[Floats, int]:
     """Outputs (n, k) by time stepping on a finer mesh; how many conditions did not settle."""
     unsettled = 0
 
@@ -77,7 +77,7 @@ def truth(sizes: dict[str, float], model: Swimmer) -> tuple[Floats, int]:
     return np.asarray(finer.predict([{**start_values(model), **sizes}])[0]), unsettled
 
 
-def sized(effect: Parameter, model: Swimmer, signals: Signals) -> float | None:
+def sized(effect: Parameter, model: SwimmerModel, signals: Signals) -> float | None:
     """The size at which λ is `LEVEL`; None if it is out of bounds."""
     start = start_values(model)
     size = 0.5 * effect.typical
@@ -91,9 +91,9 @@ def sized(effect: Parameter, model: Swimmer, signals: Signals) -> float | None:
     return None
 
 
-def strength(outputs: Floats, model: Swimmer, signals: Signals) -> float:
-    """λ: what the best coefficients and numbers as given leave of outputs (n, k) without noise, in σ."""
-    fitted = (*model.coefficients, *model.given)
+def strength(outputs: Floats, model: SwimmerModel, signals: Signals) -> float:
+    """λ: what the best coefficients and nuisance parameters leave of outputs (n, k) without noise, in σ."""
+    fitted = (*model.coefficients, *model.nuisances)
     names, used = [p.name for p in fitted], signals.used
     parameters, left = start_values(model), np.zeros(0)
     for _ in range(_PASSES):
@@ -109,7 +109,7 @@ def strength(outputs: Floats, model: Swimmer, signals: Signals) -> float:
 
 def closed(label: str, sizes: dict[str, float], seeds: list[int]) -> list[Closed]:
     """A truth, with several draws of the noise."""
-    model = Swimmer(ROBOT, design(DESIGN), jobs=1)
+    model = SwimmerModel(ROBOT, design(DESIGN), jobs=1)
     outputs, unsettled = truth(sizes, model)
     found = []
     for seed in seeds:
@@ -137,7 +137,7 @@ def planned(tables: int, first: int) -> list[tuple[str, dict[str, float], list[i
     linear = stand_in(DESIGN)
     signals = Signals(linear)
     survived = signals.survived(linear.D)
-    model = Swimmer(ROBOT, linear.runs)  # type: ignore[arg-type]
+    model = SwimmerModel(ROBOT, linear.runs)  # type: ignore[arg-type]
     testable = [e for e, s in zip(linear.effects, survived, strict=True) if s >= TESTABLE]
     sizes = {e.name: sized(e, model, signals) for e in testable}
     truths = [(name, {name: size}) for name, size in sizes.items() if size is not None]

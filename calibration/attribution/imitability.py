@@ -2,7 +2,7 @@
 
 What is outside is not known. It is drawn: the signal of an effect times exp(g), with g a smooth random function of
 the runs' inputs (Gaussian process, correlation length one standard deviation, standard deviation 0.5). So it
-acts on the same outputs, and depends on N, l and ω in another way. The numbers as given and the coefficients
+acts on the same outputs, and depends on N, l and ω in another way. The nuisance parameters and the coefficients
 absorb what they can. Of the rest, the claim absorbs a share a (the absorbable share). A departure that passes
 for a claim of strength Λ (standard deviations) leaves Λ √(1/a − 1). Less than `SEEN` is not noticed.
 
@@ -13,11 +13,14 @@ what was measured.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from calibration.statistics.fit import Fit
 from calibration.statistics.forward_model import Runs
 from calibration.statistics.priors import prior_rows
+from calibration.statistics.study import Study
 from sim.arrays import Flags, Floats
 
 DOUBT = 0.05
@@ -26,30 +29,31 @@ _DRAWS = 200
 _SPREAD = 0.5  # of ln of a signal
 
 
-def absorbable_shares(fitted: Fit, runs: Runs, used: Flags, names: tuple[str, ...], *, seed: int) -> Floats:
-    """a of draws from outside, made from each of the effects `names` of a fit in turn, (draws,)."""
+def absorbable_shares(study: Study, fitted: Fit, names: Sequence[str]) -> Floats:
+    """Draw signals from outside, made from each of the effects `names` of a fit in turn, and return their a."""
+    runs, used = study.runs, study.used
     white = fitted.noise.whitener(runs.session[used])
     rows = prior_rows(fitted.fitted, fitted.parameters)[0]
     J = np.concatenate([white(fitted.jacobian[used]), rows])
-    places = [fitted.names.index(name) for name in names]
-    others = [i for i in range(J.shape[1]) if i not in places]
-    absorbed, claimed = (np.linalg.qr(_scaled(J[:, columns]))[0] for columns in (others, [*others, *places]))
-    drawn = deformations(runs, used, _DRAWS, seed)
-    signals = np.concatenate([fitted.jacobian[used][..., [p]] * drawn[:, None] for p in places], -1)
+    claimed = [fitted.names.index(name) for name in names]
+    others = [i for i in range(J.shape[1]) if i not in claimed]
+    without, with_claim = (np.linalg.qr(_scaled(J[:, columns]))[0] for columns in (others, [*others, *claimed]))
+    factors = deformations(runs, used, _DRAWS, study.seed)
+    signals = np.concatenate([fitted.jacobian[used][..., [p]] * factors[:, None] for p in claimed], -1)
     signals = np.concatenate([white(signals), np.zeros((len(rows), signals.shape[-1]))])
-    rest = signals - absorbed @ (absorbed.T @ signals)
-    left = signals - claimed @ (claimed.T @ signals)
-    return np.asarray(1 - (left**2).sum(0) / np.maximum((rest**2).sum(0), 1e-300))
+    before = signals - without @ (without.T @ signals)
+    after = signals - with_claim @ (with_claim.T @ signals)
+    return np.asarray(1 - (after**2).sum(0) / np.maximum((before**2).sum(0), 1e-300))
 
 
 def imitability(shares: Floats, strength: float) -> float:
-    """Share of draws that a claim of this strength (standard deviations) would not notice."""
-    left = strength * np.sqrt(np.maximum(1 / np.maximum(shares, 1e-9) - 1, 0.0))
-    return float((left < SEEN).mean())
+    """Return the share of draws that a claim of this strength (standard deviations) would not notice."""
+    remainder = strength * np.sqrt(np.maximum(1 / np.maximum(shares, 1e-9) - 1, 0.0))
+    return float((remainder < SEEN).mean())
 
 
 def deformations(runs: Runs, used: Flags, count: int, seed: int) -> Floats:
-    """exp(g) at the runs in `used`, (n, count)."""
+    """Draw exp(g) at the runs in `used`, (n, count)."""
     spread = runs.inputs[used].std(0)
     inputs = runs.inputs[used] / np.where(spread > 0, spread, 1.0)
     kinds, place = np.unique(inputs.round(9), axis=0, return_inverse=True)

@@ -3,7 +3,7 @@
 Something outside the catalogue can look like an effect at some runs. It depends on N and l in another way, so that
 the size which fits short tails is wrong for long ones. The model with the claim is fitted again, by one linear
 step, to the runs with at most the median tail length and one of the `FEWEST` smallest numbers of tails. Then the
-other runs are judged as the locked ones are. Below `SURE` the verdict says "or something outside the catalogue
+other runs are judged as the held-out ones are. Below `SURE` the verdict says "or something outside the catalogue
 that looks like it".
 """
 
@@ -15,7 +15,8 @@ import numpy as np
 
 from calibration.statistics.fit import Fit
 from calibration.statistics.forward_model import Runs, stepped
-from calibration.statistics.held_out import locked_p_value, one_step
+from calibration.statistics.held_out import held_out_p_value, one_step
+from calibration.statistics.study import Study
 from sim.arrays import Flags
 
 SURE = 0.01
@@ -24,31 +25,28 @@ _INPUTS = ("N", "ln l")
 _ENOUGH = 2  # values a parameter
 
 
-def transfer_p(fitted: Fit, runs: Runs, used: Flags, *, seed: int) -> float:
-    """Probability that noise alone puts the other runs as far from the model; 1 where runs are too few or alike.
+def transfer_p(study: Study, fitted: Fit) -> float:
+    """Estimate the probability that noise alone puts the other runs as far from a model with the claim.
 
-    Args:
-        fitted: a model with the claim, fitted to the runs in `used` (n,).
-        runs: all runs.
-        seed: of the draws.
+    It is 1 where runs are too few or too much alike.
     """
-    near = fitted_again(runs, used)
-    rest = used & ~near
-    values = near.sum() * runs.y.shape[1]
-    if not rest.any() or values < _ENOUGH * len(fitted.names):
+    near = fitted_again(study.runs, study.used)
+    others = study.used & ~near
+    values = near.sum() * study.runs.y.shape[1]
+    if not others.any() or values < _ENOUGH * len(fitted.names):
         return 1.0
-    found = one_step(runs, fitted, near)
+    refit = one_step(study.runs, fitted, near)
     moved = replace(
         fitted,
-        parameters=stepped(fitted.fitted, fitted.parameters, found.step),
-        prediction=fitted.prediction + fitted.jacobian @ found.step,
-        covariance=fitted.inflation * found.covariance,
+        parameters=stepped(fitted.fitted, fitted.parameters, refit.step),
+        prediction=fitted.prediction + fitted.jacobian @ refit.step,
+        covariance=fitted.inflation * refit.covariance,
     )
-    return locked_p_value(moved, runs, rest, seed=seed)
+    return held_out_p_value(moved, study.runs, others, seed=study.seed)
 
 
 def fitted_again(runs: Runs, used: Flags) -> Flags:
-    """Runs (n,) with short tails and few of them; all of `used` where that is not an input."""
+    """Choose the runs (n,) with short tails and few of them; all of `used` where that is not an input."""
     near = used.copy()
     for name in _INPUTS:
         if name in runs.input_names:

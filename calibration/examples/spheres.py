@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.fit import Fit
 from calibration.statistics.forward_model import Parameter, Parameters, Runs, by_differences
-from calibration.verdict.calibrate import Verdict, calibrate
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import Verdict
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError, run_command
 
@@ -40,7 +40,7 @@ class Spheres:
     coefficients: tuple[Parameter, ...] = (
         Parameter("viscosity", "viscosity", 1.0, (0.01, 100.0), 1.0, logarithmic=True, unit="Pa s"),
     )
-    given: tuple[Parameter, ...] = ()
+    nuisances: tuple[Parameter, ...] = ()
     effects: tuple[Parameter, ...] = (
         Parameter("wall", "wall of the vessel", 0.0, (0.0, 2.0), 1.0, unit="Faxén's correction"),
         Parameter("inertia", "inertia of the fluid", 0.0, (0.0, 20.0), 1.0, unit="Oseen's correction"),
@@ -76,14 +76,11 @@ class Spheres:
         runs = replace(
             self.runs, y=np.zeros((count, 1)), condition=np.arange(count), session=np.zeros(count, int),
             session_names=("next",), inputs=np.log(diameter)[:, None], rows=np.arange(count),
-            set_aside=(), limits=(),
+            excluded=(), caveats=(),
         )  # fmt: skip
         return replace(self, runs=runs, diameter=diameter), [
             {"d_mm": round(1000 * d, 2)} for d in diameter.tolist()
         ]
-
-    def predictive(self, base: Fit, used: Flags, rows: Flags, test: Flags) -> None:
-        """None: nothing is to be steered."""
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
         """The start as it is: the fit is linear in ln μ."""
@@ -120,8 +117,8 @@ def read_spheres(source: str | Path, name: str) -> Spheres:
         inputs=np.log(diameter)[:, None],
         input_names=("ln d",),
         rows=np.flatnonzero(~bad) + 1,
-        set_aside=aside,
-        limits=(),
+        excluded=aside,
+        caveats=(),
     )
     return Spheres(runs, diameter)
 
@@ -138,7 +135,7 @@ def main(table: str, name: str = "KW2023") -> None:
     model = read_spheres(table, name)
     verdict = calibrate(model, progress=False)
     print(f"{name}: {verdict.sentence}")
-    for candidate in verdict.candidates:
+    for candidate in verdict.evidence.candidates:
         print(f"  {candidate.effect.title}: score {candidate.z:+.1f}, {candidate.verdict}")
     for label, effects in (
         ("Stokes", {}),
@@ -149,7 +146,8 @@ def main(table: str, name: str = "KW2023") -> None:
         print(f"  rms of the medians, {label}: {100 * median_error(model, verdict, effects):.1f} %")
     for run in verdict.next_runs:
         print(f"  next: {run.record()}")
-    print(f"  locked {verdict.locked}: {100 * verdict.error_before:.1f} % -> {100 * verdict.error_after:.1f} %")
+    before, after = 100 * verdict.error_before, 100 * verdict.error_after
+    print(f"  held out {verdict.conditions.split.names}: {before:.1f} % -> {after:.1f} %")
 
 
 if __name__ == "__main__":

@@ -16,12 +16,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.statistics.forward_model import Parameters, Predictive
-from calibration.statistics.held_out import Delivered
+from calibration.statistics.forward_model import Parameters
+from calibration.statistics.held_out import FinalRefit
 from calibration.swimmer.candidate_effects import CURRENT
-from calibration.swimmer.head_correction import Corrected
+from calibration.swimmer.head_correction import HeadCorrection
 from calibration.swimmer.nuisance_numbers import LENGTH
 from calibration.swimmer.swimmer import robot_numbers
+from calibration.verdict.experiment import LearntCorrection
 from planner.vehicle.calibration_table import COEFFICIENTS, NUMBERS, CalibrationKnowledge, knowledge_toml
 from sim.effects import catalogue
 from sim.inputs import robot_toml
@@ -52,7 +53,7 @@ def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
     return replace(robot, **own, effects={**robot.effects, **sizes})
 
 
-def knowledge_of(robot: Robot, delivered: Delivered) -> CalibrationKnowledge:
+def knowledge_of(robot: Robot, delivered: FinalRefit) -> CalibrationKnowledge:
     """Covariance of the corrected robot's coefficients, numbers and effects, and the current in the tank.
 
     Args:
@@ -77,18 +78,17 @@ def knowledge_of(robot: Robot, delivered: Delivered) -> CalibrationKnowledge:
     )
 
 
-def corrected_toml(robot: Robot, delivered: Delivered, predictive: Predictive | None = None) -> str:
-    """The text of corrected.toml; with the correction of `predictive` where nothing explains the runs."""
-    corrected = corrected_robot(robot, delivered.parameters)
-    known = knowledge_of(robot, delivered)
-    if predictive is not None:
-        learnt: Corrected = predictive.content
+def corrected_toml(robot: Robot, final: FinalRefit, learnt: LearntCorrection | None = None) -> str:
+    """Write corrected.toml, with the correction that was `learnt` where nothing explains the runs."""
+    corrected = corrected_robot(robot, final.parameters)
+    known = knowledge_of(robot, final)
+    if isinstance(learnt, HeadCorrection):
         known = _with_correction(known, learnt, corrected)
         corrected = replace(corrected, correction=learnt.correction)
     return robot_toml(corrected) + "\n" + knowledge_toml(known)
 
 
-def _with_correction(known: CalibrationKnowledge, learnt: Corrected, robot: Robot) -> CalibrationKnowledge:
+def _with_correction(known: CalibrationKnowledge, learnt: HeadCorrection, robot: Robot) -> CalibrationKnowledge:
     """With the uncertainty of the correction at this robot; as it is if the robot is outside the runs."""
     values = robot.group_values()
     try:

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from calibration.attribution.candidate import UNSEEN, Candidate
 from calibration.attribution.imitability import DOUBT
-from calibration.attribution.refits import UNSEEN, Candidate
 from calibration.attribution.transfer_test import SURE
 from calibration.statistics.priors import WRONG
 from calibration.statistics.profile_intervals import least_determined
 from calibration.swimmer.measured_table import Measurements
-from calibration.verdict.calibrate import Verdict
 from calibration.verdict.next_runs import STOP, Batch
+from calibration.verdict.verdict import Verdict
 from sim.arrays import Floats
 from sim.io.pages import Page
 from sim.io.provenance import code_version
@@ -38,7 +38,7 @@ def write_report(result: Verdict, data: Measurements, out: str | Path, *, title:
     page = Page(f"Calibration: {title}", result.sentence)
     page.figure(draw_summary(result, data), "residual of each output before and after, beside the noise")
     add_sections(page, result, data)
-    page.write(out, f"code {code_version()}; fixed before the data was looked at: {result.plan_hash}")
+    page.write(out, f"code {code_version()}; fixed before the data was looked at: {result.conditions.hash}")
 
 
 def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
@@ -69,8 +69,8 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
                 for r in result.next_runs
             ],
         )
-        if result.next_batch is not None:
-            _add_batch(page, result.next_batch)
+        if result.next.batch is not None:
+            _add_batch(page, result.next.batch)
 
 
 def _add_batch(page: Page, batch: Batch) -> None:
@@ -88,7 +88,7 @@ def _add_batch(page: Page, batch: Batch) -> None:
 
 
 def _add_numbers(page: Page, result: Verdict) -> None:
-    if not result.numbers:
+    if not result.fits.pulls:
         return
     page.section("Numbers as given")
     wrong = [" or ".join(p.parameter.title for p in alike) for alike in result.wrong_numbers]
@@ -100,7 +100,7 @@ def _add_numbers(page: Page, result: Verdict) -> None:
         tone="bad" if wrong else "good",
     )
     rows = []
-    for p in result.numbers:
+    for p in result.fits.pulls:
         one = p.parameter
         assert one.sigma is not None
         scale, unit = (100.0, "%") if one.logarithmic else (one.shown, one.unit)
@@ -122,7 +122,9 @@ def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
     page.section("Data")
     page.text(
         f"{len(data)} usable runs in {len(data.session_names)} session(s); locked away for the test: "
-        f"{result.locked}. Set aside: " + ("; ".join(result.set_aside) if result.set_aside else "nothing") + "."
+        f"{result.conditions.split.names}. Set aside: "
+        + ("; ".join(result.conditions.excluded) if result.conditions.excluded else "nothing")
+        + "."
     )
     scatter = np.sqrt(np.diag(result.base.noise.run))
     noise = ", ".join(f"{_LABELS[o]} {100 * s:.1f} %" for o, s in zip(data.outputs, scatter, strict=True))
@@ -131,17 +133,17 @@ def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
     if len(data.session_names) == 1:
         shift = f"With one session its shift cannot be measured; {share} is assumed."
     page.text(f"Scatter of one run, from the repeats: {noise}. {shift}")
-    for limit in result.limits:
+    for limit in result.conditions.caveats:
         page.text(f"The conclusion is weaker: {limit}.", tone="bad")
 
 
 def _add_fit(page: Page, result: Verdict) -> None:
     page.section("Fit")
-    given = {p.parameter.name for p in result.numbers}
+    given = {p.parameter.name for p in result.fits.pulls}
     rows = []
     for fitted, intervals, name in (
-        (result.base, result.base_intervals, "without effects"),
-        (result.final, result.final_intervals, "with the verdict's effects"),
+        (result.base, result.fits.base_intervals, "without effects"),
+        (result.final, result.fits.final_intervals, "with the verdict's effects"),
     ):
         for parameter in (one.name for one in fitted.fitted if one.name not in given):
             low, high = intervals[parameter]
@@ -152,7 +154,7 @@ def _add_fit(page: Page, result: Verdict) -> None:
             break
     page.table(("parameter", "value", "95 % interval, by profile deviance"), rows)
     combination, error = least_determined(result.final)
-    delivered = result.delivered.parameters
+    delivered = result.fits.final_refit.parameters
     page.text(
         f"The runs determine {combination} worst: {100 * error:.1f} %. corrected.toml has the model fitted once "
         "more to all runs, with the locked ones: "
@@ -163,13 +165,14 @@ def _add_fit(page: Page, result: Verdict) -> None:
 
 def _add_evidence(page: Page, result: Verdict) -> None:
     page.section("Evidence for each effect of the catalogue")
-    each = ", ".join(f"{_TESTS[name]} {p:.2g}" for name, p in result.misfit.p.items())
+    misfit = result.evidence.misfit
+    each = ", ".join(f"{_TESTS[name]} {p:.2g}" for name, p in misfit.p.items())
     page.text(
-        f"Is there more than noise? p = {result.misfit.p_value:.2g} by all tests together ({each}). Below: score "
-        "of each effect, without the part that the coefficients and the numbers as given can absorb; claims need "
-        f"more than {result.misfit.critical_z:.2f}. The smallest detectable size is found half of the time. The "
-        "column beside it is that size if every number as given were exact. A dash means that the effect changes "
-        "nothing in these runs."
+        f"Is there more than noise? p = {misfit.p_value:.2g} by all tests together ({each}). Below: score of each "
+        "effect, without the part that the coefficients and the nuisance parameters can absorb; claims need more "
+        f"than {misfit.critical_z:.2f}. The smallest detectable size is found half of the time. The column beside "
+        "it is that size if every nuisance parameter were exact. A dash means that the effect changes nothing in "
+        "these runs."
     )
     page.figure(draw_evidence(result), "score of each effect against what a claim needs")
     page.table(
@@ -183,7 +186,7 @@ def _add_evidence(page: Page, result: Verdict) -> None:
                 _size(c.detectable_exact),
                 c.verdict,
             )
-            for c in result.candidates
+            for c in result.evidence.candidates
         ],
     )
     for c in result.explaining:
@@ -192,10 +195,10 @@ def _add_evidence(page: Page, result: Verdict) -> None:
             f"{said}: {100 * c.imitable:.0f} % of the departures from outside the catalogue that were drawn for "
             f"comparison would have passed for it; above {100 * DOUBT:.0f} % the verdict says so. {_carried(c)}"
         )
-    if result.untestable:
+    if result.evidence.untestable:
         page.text(
             "Not tested, because data are missing: "
-            + "; ".join(f"{t} ({why})" for t, why in result.untestable.items())
+            + "; ".join(f"{t} ({why})" for t, why in result.evidence.untestable.items())
         )
 
 
@@ -208,39 +211,40 @@ def _carried(claim: Candidate) -> str:
 
 def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
     page.section("Error on the locked runs")
-    low, high = result.error_after_interval
+    low, high = result.errors.after_interval
     corrected: list[tuple[str, float, dict[str, float]]] = []
     if result.error_predictive is not None:
-        each_output = result.errors_by_output["predictive"]
+        each_output = result.errors.by_output["predictive"]
         corrected = [("correction in corrected.toml, simulated", result.error_predictive, each_output)]
     page.table(
         ("model", "relative rms", *(_LABELS[o] for o in data.outputs)),
         [
             (label, f"{100 * value:.2f} %", *(f"{100 * v:.1f} %" for v in each.values()))
             for label, value, each in (
-                ("as given", result.error_uncalibrated, result.errors_by_output["uncalibrated"]),
-                ("calibrated", result.error_before, result.errors_by_output["before"]),
-                ("calibrated, with effects", result.error_after, result.errors_by_output["after"]),
-                ("calibrated, generic correction", result.error_generic, result.errors_by_output["generic"]),
+                ("as given", result.error_uncalibrated, result.errors.by_output["uncalibrated"]),
+                ("calibrated", result.error_before, result.errors.by_output["before"]),
+                ("calibrated, with effects", result.error_after, result.errors.by_output["after"]),
+                ("calibrated, generic correction", result.error_generic, result.errors.by_output["generic"]),
                 *corrected,
             )
         ],
     )
-    if result.predictive is not None:
+    learnt = result.corrections.learnt
+    if learnt is not None:
         page.text(
             "So that the robot can be steered although nothing explains the residual, corrected.toml has a "
-            f"correction of the head's load in {', '.join(result.predictive.terms)}. It holds between these runs "
+            f"correction of the head's load in {', '.join(learnt.terms)}. It holds between these runs "
             f"only: N from {data.tails.min():.0f} to {data.tails.max():.0f}, l from "
             f"{100 * data.length.min():.3g} to {100 * data.length.max():.3g} cm, ω from {_rpm(data).min():.3g} "
             f"to {_rpm(data).max():.3g} rpm. A robot outside is refused. The response to a flip is simulated with "
             "the same load."
         )
-    features = ", ".join(result.generic.features) or "no feature"
-    agree = result.locked_p >= _DISAGREES
+    features = ", ".join(result.corrections.regression.features) or "no feature"
+    agree = result.errors.p_value >= _DISAGREES
     page.text(
         f"95 % interval with effects: {100 * low:.2f} to {100 * high:.2f} %. "
         f"Noise of one run from the repeats: {100 * result.noise_ceiling:.2f} %. The locked runs "
-        f"{'agree' if agree else 'do not agree'} with the final model (p = {result.locked_p:.2g}). "
+        f"{'agree' if agree else 'do not agree'} with the final model (p = {result.errors.p_value:.2g}). "
         f"Generic correction: {features} (it describes the residual and does not explain it).",
         tone="good" if agree else "bad",
     )
@@ -261,7 +265,7 @@ def draw_summary(result: Verdict, data: Measurements) -> Figure:
     axes = figure.add_subplot()
     place = np.arange(len(data.outputs))
     for i, (label, prediction, colour) in enumerate(bars):
-        rms = 100 * np.sqrt(((data.y - prediction)[result.used] ** 2).mean(0))
+        rms = 100 * np.sqrt(((data.y - prediction)[result.conditions.split.fitted] ** 2).mean(0))
         axes.bar(place + 0.32 * (i - 0.5), rms, width=0.3, color=colour, label=label)
     for i, height in enumerate(noise.tolist()):
         said = "noise of a run" if i == 0 else None
@@ -276,13 +280,13 @@ def draw_summary(result: Verdict, data: Measurements) -> Figure:
 
 def draw_map(result: Verdict, data: Measurements) -> Figure:
     """z of every output along every feature of the inputs, before and after."""
-    maps = [("calibrated", result.misfit)]
+    maps = [("calibrated", result.evidence.misfit)]
     if result.explaining and result.explaining[0].refit_misfit is not None:
         maps.append(("with the verdict's effects", result.explaining[0].refit_misfit))
-    names = [name.replace("omega", "ω") for name in result.misfit.features]
+    names = [name.replace("omega", "ω") for name in result.evidence.misfit.features]
     height = 0.32 * len(data.outputs) + 0.5
     figure = Figure(figsize=(11, len(maps) * height + 1.6))
-    limit = max(4.0, float(np.abs(result.misfit.scores.shapes).max(initial=0.0)))
+    limit = max(4.0, float(np.abs(result.evidence.misfit.scores.shapes).max(initial=0.0)))
     for place, (label, misfit) in enumerate(maps):
         axes = figure.add_subplot(len(maps), 1, place + 1)
         z = misfit.scores.shapes
@@ -307,17 +311,17 @@ def draw_map(result: Verdict, data: Measurements) -> Figure:
 def draw_evidence(result: Verdict) -> Figure:
     """Score of every effect as a bar, with the critical score; what explains the residual is filled in green."""
     named = {name for c in result.explaining for name in (c.effect.name, *(e.name for e in c.beside))}
-    ranked = sorted(result.candidates, key=lambda c: abs(c.z))
+    ranked = sorted(result.evidence.candidates, key=lambda c: abs(c.z))
     figure = Figure(figsize=(9, 0.8 + 0.24 * len(ranked)))
     axes = figure.add_subplot()
     for place, candidate in enumerate(ranked):
         tested = candidate.refit is not None
         colour = "#3d9a5f" if candidate.effect.name in named else "#e08a1e" if tested else "#b8c2cc"
         axes.barh(place, candidate.z, color=colour, height=0.7)
-    for edge in (-result.misfit.critical_z, result.misfit.critical_z):
+    for edge in (-result.evidence.misfit.critical_z, result.evidence.misfit.critical_z):
         axes.axvline(edge, color="#1c2733", lw=0.8, ls="--")
     axes.set_yticks(range(len(ranked)), [c.effect.title for c in ranked], fontsize=7)
-    axes.set_xscale("symlog", linthresh=2 * result.misfit.critical_z)
+    axes.set_xscale("symlog", linthresh=2 * result.evidence.misfit.critical_z)
     axes.tick_params(axis="x", labelsize=8)
     axes.set_xlabel(
         "score z (dashed: needed for a claim; green: explains; orange: refitted and rejected)", fontsize=8
@@ -332,7 +336,7 @@ def draw_residuals(result: Verdict, data: Measurements) -> Figure:
     figure = Figure(figsize=(11, 1.9 * len(outputs)))
     colours = {n: c for n, c in zip((2, 3, 4, 5), ("#2a7fba", "#e08a1e", "#3d9a5f", "#8a4fa3"), strict=True)}
     rng = np.random.default_rng(0)
-    used = result.used
+    used = result.conditions.split.fitted
     jitter = rng.uniform(-0.25, 0.25, used.sum())
     for i, name in enumerate(outputs):
         limit = 0.0

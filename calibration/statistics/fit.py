@@ -6,7 +6,7 @@ Steps of Levenberg (1944) with the model's own derivatives:
 
 D is 1 for ln C and a typical size for ε. λ is 0, unless the step is too long or does not improve the fit. A
 parameter at a bound stays there if the step would lead out. The covariance of the parameters is V = A⁻¹, times a
-factor because S is estimated (`_inflation`). Numbers as given have priors, which are rows of their own
+factor because S is estimated (`_inflation`). Nuisance parameters have priors, which are rows of their own
 (`calibration.statistics.priors`): they are in A, in the residual and in the deviance. Intervals are 95 %, by
 Student's t. The scatter ρ of a few sessions is uncertain, which limits the degrees of freedom (Satterthwaite
 1946):
@@ -18,18 +18,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
 
-from calibration.statistics.forward_model import Model, Parameter, Parameters, parameter, stepped
+from calibration.statistics.forward_model import ForwardModel, Parameter, Parameters, parameter, stepped
 from calibration.statistics.noise import Noise, Sums, inverse_root, least_squares, repeat_covariance, sums
-from calibration.statistics.priors import with_prior
+from calibration.statistics.priors import Pull, with_prior
 from sim.arrays import Flags, Floats, Integers
-
-if TYPE_CHECKING:
-    from calibration.statistics.priors import Pull
 
 _MOST_STEPS = 25
 _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
@@ -38,7 +35,7 @@ _LARGEST = 0.7  # change of ln C in one step
 _PASSES = 3  # iterations for the scatter of the sessions
 _DAMPING = (0.0, *(10.0**e for e in range(-3, 9)))  # λ
 _NEARER = 5  # starts that are tried
-_UNSETTLED = 1.0  # a fit has not arrived if one more step is expected to reduce rᵀ Σ⁻¹ r by more
+_UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce rᵀ Σ⁻¹ r by more
 
 
 @dataclass(frozen=True)
@@ -54,8 +51,8 @@ class Fit:
     jacobian: Floats  # (n, k, p)
     noise: Noise
     deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
-    arrived: bool  # the fit is at a minimum, or at one within the bounds
-    wrong: tuple[tuple[Pull, ...], ...] = ()  # numbers whose priors were taken away, each with those like it
+    converged: bool  # the fit is at a minimum, or at one within the bounds
+    wrong_numbers: tuple[tuple[Pull, ...], ...] = ()  # the first of each has lost its prior; see `fit`
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -81,25 +78,27 @@ class Fit:
 
 
 def fit(
-    model: Model,
+    model: ForwardModel,
     start: Parameters,
     names: tuple[str, ...],
     used: Flags,
     *,
-    free: tuple[str, ...] = (),
+    wrong_numbers: tuple[tuple[Pull, ...], ...] = (),
     title: str = "fit",
 ) -> Fit:
     """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay.
 
     Args:
-        free: numbers as given whose priors are taken away.
+        wrong_numbers: nuisance parameters that are wrong, each followed by those that may be wrong in its place;
+            the first of each is fitted without its prior.
     """
     data = model.runs
+    freed = {alike[0].parameter.name for alike in wrong_numbers}
     fitted = tuple(parameter(model, name) for name in names)
-    fitted = tuple(replace(one, sigma=None) if one.name in free else one for one in fitted)
+    fitted = tuple(replace(p, sigma=None) if p.name in freed else p for p in fitted)
     run = repeat_covariance(data.y[used], data.condition[used])
-    task = _Task(model, fitted, used, inverse_root(run), title)
-    point = _descend(task, task.first(dict(start)))
+    problem = _Problem(model, fitted, used, inverse_root(run), title)
+    point = _descend(problem, problem.first(dict(start)))
     linear = least_squares(point.products, passes=_PASSES)
     share = float(linear.share)
     whole = point.products.at(linear.share)
@@ -114,7 +113,8 @@ def fit(
         jacobian=point.derivative,
         noise=Noise(run, share),
         deviance=float(whole[-1, -1] + len(run) * np.log1p(share * point.products.sizes).sum()),
-        arrived=_step(fitted, point.parameters, whole, 0).promise < _UNSETTLED,
+        converged=_step(fitted, point.parameters, whole, 0).promise < _UNSETTLED,
+        wrong_numbers=wrong_numbers,
     )
 
 
@@ -133,10 +133,10 @@ class _Point:
 
 
 @dataclass(frozen=True)
-class _Task:
+class _Problem:
     """The model, the runs, and the parameters to fit."""
 
-    model: Model
+    model: ForwardModel
     fitted: tuple[Parameter, ...]
     used: Flags
     root: Floats
@@ -177,9 +177,9 @@ class _Step(NamedTuple):
     damping: int  # place of its λ in _DAMPING
 
 
-def _descend(task: _Task, point: _Point) -> _Point:
+def _descend(problem: _Problem, point: _Point) -> _Point:
     """The least rᵀ Σ⁻¹ r from `point`; steps to where the model cannot be solved quickly are too long."""
-    fitted = task.fitted
+    fitted = problem.fitted
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
     for count in range(1, _MOST_STEPS + 1):
         # The scatter of the sessions comes from the residuals of the fit, but only near the solution. Far from it
@@ -188,11 +188,11 @@ def _descend(task: _Task, point: _Point) -> _Point:
         step = _step(fitted, point.parameters, point.products.at(share), least)
         if step.promise < _SMALL and count > 1:
             break
-        tried = task.at(step.parameters, None if step.size > _SHORT else point.derivative, count + 1)
+        tried = problem.at(step.parameters, None if step.size > _SHORT else point.derivative, count + 1)
         if tried.solved and tried.products.at(share)[-1, -1] < point.products.at(share)[-1, -1] + _SMALL:
             point, least, kept = tried, max(least - 2, 0), step.size <= _SHORT
         elif kept:
-            point, kept = task.at(point.parameters, None, count + 1, quick=False), False
+            point, kept = problem.at(point.parameters, None, count + 1, quick=False), False
         else:
             least = max(step.damping + 1, 2)
             if least >= len(_DAMPING):

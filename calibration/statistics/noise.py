@@ -128,7 +128,7 @@ def _picks(session: Labels) -> tuple[Floats, Floats]:
     return (np.arange(len(kinds))[:, None] == place.reshape(-1)) / np.sqrt(count)[:, None], count.astype(float)
 
 
-class Design:
+class FixedColumns:
     """Columns (n, k, m) that stay the same for many residuals, each of which has its own S.
 
     Products of two columns are linear in S⁻¹, so they are made once for every pair of outputs.
@@ -203,8 +203,8 @@ def solved(whole: Floats) -> tuple[Floats, Floats]:
     """Coefficients (..., p) of the last of the columns, and their covariance (..., p, p)."""
     p = whole.shape[-1] - 1
     scale = root_diagonal(whole[..., :p, :p])
-    own = whole[..., :p, :p] / scale[..., :, None] / scale[..., None, :]
-    covariance = inverse(own) / scale[..., :, None] / scale[..., None, :]
+    scaled = whole[..., :p, :p] / scale[..., :, None] / scale[..., None, :]
+    covariance = inverse(scaled) / scale[..., :, None] / scale[..., None, :]
     return (covariance @ whole[..., :p, p, None])[..., 0], covariance
 
 

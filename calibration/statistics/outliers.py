@@ -1,7 +1,7 @@
-"""Gross errors: runs that are far from their own repeats, for example because of a misplaced decimal point.
+"""Outliers: runs that are far from their own repeats, for example because of a misplaced decimal point.
 
 If, in one output, the runs of a condition are more than `FAR` robust standard deviations apart, the run that is
-farthest from the model as given is set aside. A missing effect does not cause this: it changes all repeats alike.
+farthest from the model as given is excluded. A missing effect does not cause this: it changes all repeats alike.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ FAR = 12.0
 _MAD = 1.4826  # median absolute deviation to standard deviation
 
 
-def gross_errors(data: Runs, prediction: Floats) -> tuple[Flags, tuple[str, ...]]:
-    """Which runs (n,) to set aside, and why; `prediction` (n, k) of the model as given."""
+def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[str, ...]]:
+    """Find the runs (n,) to exclude, and say why; `prediction` (n, k) of the model as given."""
     bad = np.zeros(len(data), dtype=bool)
     residual = data.y - prediction
     residual -= np.median(residual, 0)

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.forward_model import Model, Parameters, moved, stepped
+from calibration.statistics.forward_model import ForwardModel, Parameters, moved, stepped
 from calibration.statistics.noise import inverse_root, sums
 from calibration.statistics.priors import with_prior
 from sim.arrays import Flags, Floats, Integers
@@ -22,7 +22,7 @@ _MOST = 5.0  # if it is larger, the others were not refitted along a bent valley
 
 
 def profile_intervals(
-    model: Model, fitted: Fit, used: Flags, *, title: str = ""
+    model: ForwardModel, fitted: Fit, used: Flags, *, title: str = ""
 ) -> dict[str, tuple[float, float]]:
     """95 % intervals of every fitted parameter, by their profile deviances; of numbers as given by the
     covariance.

@@ -14,13 +14,14 @@ Four statistics:
              one score at each of several values of it, and the largest counts
              (`calibration.statistics.score_directions`).
 
-Numbers as given have priors of covariance P (`calibration.statistics.priors`), so Σ is Σ + J P Jᵀ in all of them.
+Nuisance parameters have priors of covariance P (`calibration.statistics.priors`), so Σ is Σ + J P Jᵀ in all of
+them.
 
-Their null distribution comes from data drawn with the fitted noise (repeats and sessions) and with numbers drawn
-from their priors. Each draw goes through
-the same steps: S and ρ are estimated, and the coefficients are refitted (linearised). So the p-values take into
-account the fit, the estimated noise, and correlated candidates. Several statistics are judged together by the
-smallest of their p-values. Its null distribution comes from the same draws (Westfall and Young 1993).
+Their null distribution comes from data drawn with the fitted noise (repeats and sessions) and with nuisance
+parameters drawn from their priors. Each draw goes through the same steps: S and ρ are estimated, and the
+coefficients are refitted (linearised). So the p-values take into account the fit, the estimated noise, and
+correlated candidates. Several statistics are judged together by the smallest of their p-values. Its null
+distribution comes from the same draws (Westfall and Young 1993).
 
 Source: score tests after projection, Rao (1948); kernel score, e.g. Liu, Lin, Ghosh (2007).
 """
@@ -36,7 +37,7 @@ from calibration.statistics.fit import Fit
 from calibration.statistics.forward_model import Runs
 from calibration.statistics.input_features import features
 from calibration.statistics.noise import (
-    Design,
+    FixedColumns,
     Sums,
     inverse_root,
     least_squares,
@@ -46,9 +47,9 @@ from calibration.statistics.noise import (
 )
 from calibration.statistics.priors import changes, precisions
 from calibration.statistics.score_directions import Directions
+from calibration.statistics.study import Study
 from sim.arrays import Flags, Floats, Integers
 
-DRAWS = 1000
 TESTABLE = 0.03  # an effect cannot be tested if less than this share of its signal survives the projection
 GENERAL = ("lack", "kernel", "shape")
 _PASSES = 3
@@ -78,17 +79,17 @@ class Misfit:
     p_value: float  # any departure: general tests and scores together
     critical_z: float  # quantile of max |z_j| at the level
     features: tuple[str, ...]
-    exact_length: Floats  # (e,) `Scores.length` if the numbers as given were exact
+    exact_length: Floats  # (e,) `Scores.length` if the nuisance parameters were exact
     second: Floats  # (e,) value of each effect's second number at its largest score; NaN where there is none
 
 
 class _Tester:
-    """The design of the runs used, which is fixed, and the statistics of any residual."""
+    """The columns of the fitted runs, which stay the same, and the statistics of any residual."""
 
     def __init__(self, data: Runs, used: Flags, J: Floats, D: Floats, precision: Floats):
         self.session, self.condition = data.session[used], data.condition[used]
         self.J, self.D, self.precision = J, D, precision
-        self.design = Design(np.concatenate([J, D], -1), self.session)
+        self.design = FixedColumns(np.concatenate([J, D], -1), self.session)
         inputs = data.inputs[used]
         spread = inputs.std(0)
         inputs = (inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
@@ -104,8 +105,9 @@ class _Tester:
         self.FJ_means = np.einsum("sf,skp->sfkp", self.F_means, self.design.average(J))
 
     def scores(self, residual: Floats) -> Scores:
-        """Statistics of residuals (B, n, k) from the numbers as given, after a linear refit, each in its own
-        noise.
+        """Compute the statistics of residuals (B, n, k) from the parameters as given, after a linear refit.
+
+        Each residual is judged in its own noise.
         """
         p, e = self.J.shape[-1], self.D.shape[-1]
         root = inverse_root(repeat_covariance(residual, self.condition))  # (B, k, k)
@@ -113,18 +115,18 @@ class _Tester:
         products.within[..., range(p), range(p)] += self.precision
         base = least_squares(products.take(np.r_[np.arange(p), p + e][None]), passes=_PASSES)
         share, step = base.share[:, 0], base.step[:, 0]
-        left = residual - np.einsum("nkp,bp->bnk", self.J, step, optimize=True)
-        left = self._shrunk(left @ np.swapaxes(root, -1, -2), share)
-        lack = ((self.means @ left) ** 2).sum((-1, -2))
-        kernel = np.einsum("bnk,nm,bmk->b", left, self.K, left, optimize=True)
-        shapes = self._shapes(base.covariance[:, 0], left, root, share)
+        white = residual - np.einsum("nkp,bp->bnk", self.J, step, optimize=True)
+        white = self._shrunk(white @ np.swapaxes(root, -1, -2), share)
+        lack = ((self.means @ white) ** 2).sum((-1, -2))
+        kernel = np.einsum("bnk,nm,bmk->b", white, self.K, white, optimize=True)
+        shapes = self._shapes(base.covariance[:, 0], white, root, share)
         largest = np.abs(shapes).max((-1, -2)) if shapes.size else np.zeros(len(share))
         return Scores(np.stack([lack, kernel, largest], -1), *self._effects(products, p, e), shapes, share)
 
     def _effects(self, products: Sums, p: int, e: int) -> tuple[Floats, Floats, Floats]:
-        """z, survived share and length of every effect, each with the scatter of sessions that remains with it."""
-        own = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
-        part = products.take(own)
+        """Compute z, survived share and length of every effect, each with the scatter of sessions left by it."""
+        columns = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
+        part = products.take(columns)
         whole = part.at(session_share(part, passes=_PASSES_OF_AN_EFFECT))  # (B, e, p + 2, p + 2)
         weights = solved(whole[..., : p + 1, : p + 1])[0]  # of the coefficients in the effect's signal
         score = whole[..., p, p + 1] - (weights * whole[..., :p, p + 1]).sum(-1)
@@ -133,21 +135,22 @@ class _Tester:
         survived = length / np.sqrt(np.maximum(whole[..., p, p], 1e-300))
         return np.where(survived > 1e-6, score / length, 0.0), survived, length
 
-    def _shapes(self, covariance: Floats, left: Floats, root: Floats, share: Floats) -> Floats:
-        """z of every output along every feature, (B, k, f).
+    def _shapes(self, covariance: Floats, white: Floats, root: Floats, share: Floats) -> Floats:
+        """Compute z of every output along every feature, (B, k, f).
 
         Args:
-            left: residuals, white in Σ.
+            white: residuals, white in Σ.
         """
-        count, k = len(left), left.shape[-1]
-        score = np.einsum("nf,bnk,bka->baf", self.F, self._shrunk(left, share), root, optimize=True)
+        count, k = len(white), white.shape[-1]
+        score = np.einsum("nf,bnk,bka->baf", self.F, self._shrunk(white, share), root, optimize=True)
         less = 1 / (1 + share[:, None] * self.design.sizes) - 1  # Σ⁻¹ of the sessions' means
         followed = np.einsum("bs,sfkp->bfkp", less, self.FJ_means, optimize=True) + self.FJ
         absorbed = np.einsum("bik,bia,bfkp->bafp", root, root, followed, optimize=True)
-        whole = (root**2).sum(1)[:, :, None] * ((self.F**2).sum(0) + less @ self.F_means**2)[:, None]
-        rest = whole - np.einsum("bafp,bpq,bafq->baf", absorbed, covariance, absorbed, optimize=True)
-        seen = rest > TESTABLE**2 * whole
-        return np.asarray(np.where(seen, score / np.sqrt(np.where(seen, rest, 1.0)), 0.0)).reshape(count, k, -1)
+        square = (root**2).sum(1)[:, :, None] * ((self.F**2).sum(0) + less @ self.F_means**2)[:, None]
+        projected = square - np.einsum("bafp,bpq,bafq->baf", absorbed, covariance, absorbed, optimize=True)
+        seen = projected > TESTABLE**2 * square
+        z = np.where(seen, score / np.sqrt(np.where(seen, projected, 1.0)), 0.0)
+        return np.asarray(z).reshape(count, k, -1)
 
     def _shrunk(self, table: Floats, share: Floats) -> Floats:
         """Whiten runs (B, n, c) in Σ that are white in S."""
@@ -156,66 +159,55 @@ class _Tester:
         return np.asarray(table + picks.T @ (less[..., None] * (picks @ table)))
 
 
-def check_misfit(
-    fitted: Fit,
-    data: Runs,
-    used: Flags,
-    directions: Directions,
-    *,
-    level: float,
-    seed: int,
-    draws: int = DRAWS,
-    decide: float | None = None,
+def examine_residual(
+    study: Study, fitted: Fit, directions: Directions, *, draws: int | None = None, decide: float | None = None
 ) -> Misfit:
     """Test the residual of a fit.
 
     Args:
-        fitted: model fitted to the runs in `used`.
+        study: its level is α of the critical |z|.
+        fitted: model fitted to the runs that the study uses.
         directions: of e candidates, at their null; e may be 0. Of an effect with a second number, the value with
             the largest score counts, in the bootstrap, too.
-        level: α of the critical |z|.
-        seed: of the bootstrap.
+        draws: of the bootstrap, if not as many as the study says.
         decide: stop drawing as soon as it is clear whether the p-value is below this.
     """
+    data, used = study.runs, study.used
     precision = precisions(fitted.fitted)
     tester = _Tester(data, used, fitted.jacobian[used], directions.table[used], precision)
-    left = (data.y - fitted.prediction)[used]
-    residual = left + tester.J @ changes(fitted.fitted, fitted.parameters)
-    observed = tester.scores(residual[None])
-    exact = _Tester(data, used, tester.J[..., precision == 0], tester.D, precision[precision == 0]).scores(
-        left[None]
-    )
+    residual = (data.y - fitted.prediction)[used]
+    residual_as_given = residual + tester.J @ changes(fitted.fitted, fitted.parameters)
+    observed = tester.scores(residual_as_given[None])
+    free = precision == 0
+    exact = _Tester(data, used, tester.J[..., free], tester.D, precision[free]).scores(residual[None])
     testable = observed.survived[0] >= TESTABLE
-    rng = np.random.default_rng(seed)
-    root = np.linalg.cholesky(repeat_covariance(left, data.condition[used]))
+    rng = np.random.default_rng(study.seed)
+    root = np.linalg.cholesky(repeat_covariance(residual, data.condition[used]))
     scatter = float(np.sqrt(observed.share[0]))
     session = np.unique(tester.session, return_inverse=True)[1].reshape(-1)
-    prior = np.where(precision > 0, 1 / np.sqrt(np.where(precision > 0, precision, 1.0)), 0.0)
-    own = np.append(observed.general[0], _largest(observed.z, testable))
-    found = []
-    for start in range(0, draws, _AT_ONCE):
-        count = min(_AT_ONCE, draws - start)
-        drawn = rng.normal(size=(count, *residual.shape))
-        drawn += scatter * rng.normal(size=(count, session.max() + 1, residual.shape[-1]))[:, session]
-        numbers = rng.normal(size=(count, len(prior))) * prior
-        null = tester.scores(drawn @ root.T + np.einsum("nkp,bp->bnk", tester.J, numbers))
-        found.append(np.column_stack([null.general, _largest(null.z, testable)]))
-        if decide is not None and _decided(np.concatenate(found), own, decide):
+    sigma = np.where(precision > 0, 1 / np.sqrt(np.where(precision > 0, precision, 1.0)), 0.0)
+    statistics = np.append(observed.general[0], _largest(observed.z, testable))
+    batches: list[Floats] = []
+    while (drawn := sum(map(len, batches))) < (draws or study.draws):
+        count = min(_AT_ONCE, (draws or study.draws) - drawn)
+        noise = rng.normal(size=(count, *residual.shape))
+        noise += scatter * rng.normal(size=(count, session.max() + 1, residual.shape[-1]))[:, session]
+        nuisances = rng.normal(size=(count, len(sigma))) * sigma
+        null = tester.scores(noise @ root.T + np.einsum("nkp,bp->bnk", tester.J, nuisances))
+        batches.append(np.column_stack([null.general, _largest(null.z, testable)]))
+        if decide is not None and _decided(np.concatenate(batches), statistics, decide):
             break
-    null_table = np.concatenate(found)
-    columns = range(len(GENERAL) + 1)
-    one = Scores(*(getattr(observed, name)[0] for name in Scores.__dataclass_fields__))
-    best = _best(one.z, testable, directions)
-    one = replace(one, z=one.z[best], survived=one.survived[best], length=one.length[best])
+    null_table = np.concatenate(batches)
+    scores = Scores(*(getattr(observed, name)[0] for name in Scores.__dataclass_fields__))
+    best = _best(scores.z, testable, directions)
     return Misfit(
-        scores=one,
-        p={
-            name: _p_value(null_table[:, [i]], own[[i]])
-            for i, name in zip(columns, (*GENERAL, "score"), strict=True)
-        },
-        general_p=_p_value(null_table[:, :-1], own[:-1]),
-        p_value=_p_value(null_table, own) if testable.any() else _p_value(null_table[:, :-1], own[:-1]),
-        critical_z=float(np.quantile(null_table[:, -1], 1 - level)),
+        scores=replace(scores, z=scores.z[best], survived=scores.survived[best], length=scores.length[best]),
+        p={name: _p_value(null_table[:, [i]], statistics[[i]]) for i, name in enumerate((*GENERAL, "score"))},
+        general_p=_p_value(null_table[:, :-1], statistics[:-1]),
+        p_value=_p_value(null_table, statistics)
+        if testable.any()
+        else _p_value(null_table[:, :-1], statistics[:-1]),
+        critical_z=float(np.quantile(null_table[:, -1], 1 - study.level)),
         features=tester.names,
         exact_length=exact.length[0][best],
         second=directions.second[best],
@@ -223,16 +215,15 @@ def check_misfit(
 
 
 def _best(z: Floats, testable: Flags, directions: Directions) -> Integers:
-    """The column of each effect with the largest |z|, among those that are testable if any is, (e,)."""
+    """Choose the column of each effect with the largest |z|, among those that are testable if any is, (e,)."""
     size = np.abs(z) + np.where(testable, 1e6, 0.0)
-    owners = np.unique(directions.owner)
-    columns = [np.flatnonzero(directions.owner == owner) for owner in owners]
-    return np.array([own[np.argmax(size[own])] for own in columns], dtype=np.int64)
+    columns = [np.flatnonzero(directions.owner == owner) for owner in np.unique(directions.owner)]
+    return np.array([candidates[np.argmax(size[candidates])] for candidates in columns], dtype=np.int64)
 
 
-def _decided(null: Floats, own: Floats, level: float) -> bool:
-    """Whether so many draws tell a p-value from `level` (Besag and Clifford 1991)."""
-    p = _p_value(null, own)
+def _decided(null: Floats, observed: Floats, level: float) -> bool:
+    """Tell whether so many draws tell a p-value from `level` (Besag and Clifford 1991)."""
+    p = _p_value(null, observed)
     far = p < level / 4
     return far or (p > 8 * level and len(null) * p > 10)
 
@@ -242,7 +233,7 @@ def _largest(z: Floats, testable: Flags) -> Floats:
 
 
 def _p_value(null: Floats, observed: Floats) -> float:
-    """How often the least p-value of the statistics (D, q) is as small as that of `observed` (q,)."""
+    """Tell how often the least p-value of the statistics (D, q) is as small as that of `observed` (q,)."""
     table = np.vstack([observed, null])
     p = np.stack([rankdata(-column, method="max") for column in table.T], 1) / len(table)
     least = p.min(1)

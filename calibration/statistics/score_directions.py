@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.statistics.forward_model import Model, Parameter, Parameters
+from calibration.statistics.forward_model import ForwardModel, Parameter, Parameters
 from sim.arrays import Floats, Integers
 
 
@@ -39,24 +39,24 @@ class Directions:
 
 
 def directions(
-    model: Model, parameters: Parameters, effects: Sequence[Parameter], *, title: str = ""
+    model: ForwardModel, parameters: Parameters, effects: Sequence[Parameter], *, title: str = ""
 ) -> Directions:
-    """Directions of effects that are at their null in `parameters`, (n, k, m)."""
-    table = model.derivatives(parameters, [e.name for e in effects], title=title)[1]
+    """Compute the directions of effects that are at their null in `parameters`, (n, k, m)."""
+    at_null = model.derivatives(parameters, [e.name for e in effects], title=title)[1]
     columns, owner, second = [], [], []
     for place, effect in enumerate(effects):
         values: dict[float, Floats] = {}
         if effect.second is None:
-            values[np.nan] = table[..., place]
+            values[np.nan] = at_null[..., place]
         else:
             name = effect.second.name
             for value in effect.second.grid:
-                at = {**parameters, name: value}
-                here = value == parameters[name]
-                own = table[..., [place]] if here else model.derivatives(at, [effect.name])[1]
-                values[value] = own[..., 0]
+                if value == parameters[name]:
+                    values[value] = at_null[..., place]
+                else:
+                    values[value] = model.derivatives({**parameters, name: value}, [effect.name])[1][..., 0]
         columns += list(values.values())
         owner += [place] * len(values)
         second += list(values)
-    whole = np.stack(columns, -1) if columns else table
-    return Directions(whole, np.array(owner, dtype=np.int64), np.array(second, dtype=float))
+    table = np.stack(columns, -1) if columns else at_null
+    return Directions(table, np.array(owner, dtype=np.int64), np.array(second, dtype=float))

@@ -1,4 +1,4 @@
-"""The best predictive model of a swimmer whose runs no effect explains: a correction of the head's load.
+"""A correction of the head's load, for a swimmer whose runs no effect explains.
 
 `sim.model.correction` says what is corrected: coefficients and two effects (knobs). Each has the same few terms
 in N, l/R and the motor's rate. With J_i the derivatives of run i in the knobs, the residual is
@@ -15,20 +15,17 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calibration.statistics.forward_model import Predictive
+from calibration.statistics.fit import Fit
+from calibration.statistics.forward_selection import select_forward
 from calibration.statistics.noise import inverse_root
-from calibration.statistics.splits import groups
+from calibration.statistics.splits import Split, groups, leave_one_group_out
+from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Flags, Floats, Integers
 from sim.io.errors import InputError
 from sim.model.correction import Correction, inputs_of, monomials
-
-if TYPE_CHECKING:
-    from calibration.statistics.fit import Fit
-    from calibration.swimmer.swimmer import Swimmer
 
 Powers = tuple[tuple[int, ...], ...]
 
@@ -41,9 +38,11 @@ _SETTLED = 1e-3  # share of the remaining error
 
 
 @dataclass(frozen=True)
-class Corrected:
-    """What is handed on to corrected.toml."""
+class HeadCorrection:
+    """A learnt correction, how sure it is, and what it predicts."""
 
+    prediction: Floats  # (n, k) of the runs, learnt without the held-out ones
+    terms: tuple[str, ...]  # that it depends on, in words
     correction: Correction  # learnt from all runs
     covariance: Floats  # (q t, q t) of the weights, knob by knob
     slopes: Floats  # (n, k, q) of the runs' outputs in the knobs
@@ -51,23 +50,27 @@ class Corrected:
     beyond: float  # what is left on runs that were not learnt from, beyond noise; relative rms
 
     def knob_covariance(self, values: dict[str, float]) -> Floats:
-        """Covariance (q, q) of the knobs at a robot given by its groups: of the weights, and of what is left."""
+        """Compute the covariance (q, q) of the knobs at a robot: of the weights, and of what is left.
+
+        Args:
+            values: groups of the robot.
+        """
         x = np.array(inputs_of(values))
         knobs = tuple(self.correction.weights)
         phi = np.kron(np.eye(len(knobs)), self.correction.terms(x[None]))  # (q, q t)
         J = self.slopes[int(np.argmin((((self.inputs - x) / np.array(self.correction.scale)) ** 2).sum(1)))]
         prior = np.diag([_SIGMA[name] ** -2 for name in knobs])
-        left = np.zeros_like(prior)
+        remainder = np.zeros_like(prior)
         if self.beyond > 0:
-            left = np.linalg.inv(J.T @ J / self.beyond**2 + prior)
-        return np.asarray(phi @ self.covariance @ phi.T + left)
+            remainder = np.linalg.inv(J.T @ J / self.beyond**2 + prior)
+        return np.asarray(phi @ self.covariance @ phi.T + remainder)
 
 
 @dataclass(frozen=True)
-class _Task:
+class _Problem:
     """The calibrated model, and whitened residuals, derivatives and inputs of all runs."""
 
-    model: Swimmer
+    model: SwimmerModel
     base: Fit
     knobs: tuple[str, ...]
     root: Floats  # (k, k) whitens outputs
@@ -78,61 +81,63 @@ class _Task:
     group: Integers
 
     def white(self, prediction: Floats) -> Floats:
-        """Residual (n, k) of a prediction."""
+        """Whiten the residual (n, k) of a prediction."""
         return np.asarray((self.model.runs.y - prediction) @ self.root.T)
 
     def design(self, powers: Powers) -> Floats:
-        """Derivatives of the whitened outputs in the weights, (n, k, q t)."""
+        """Compute the derivatives of the whitened outputs in the weights, (n, k, q t)."""
         phi = monomials((self.inputs - self.centre) / self.scale, powers)
         A = np.einsum("ab,nbq,nt->naqt", self.root, self.slopes, phi, optimize=True)
         return np.asarray(A.reshape(*A.shape[:2], -1))
 
     def precision(self, count: int) -> Floats:
-        """1/σ² of `count` weights."""
+        """Return 1/σ² of `count` weights."""
         sigma = np.array([_SIGMA[name] for name in self.knobs])
         return np.asarray(np.repeat(sigma**-2, count // len(sigma)))
 
     def step(self, A: Floats, residual: Floats, rows: Flags, weights: Floats) -> tuple[Floats, Floats]:
-        """Change of the weights, and their covariance."""
-        own, precision = A[rows].reshape(-1, A.shape[-1]), self.precision(A.shape[-1])
-        covariance = np.linalg.inv(own.T @ own + np.diag(precision))
-        change = covariance @ (own.T @ residual[rows].ravel() - precision * weights)
+        """Compute the change of the weights, and their covariance."""
+        flat, precision = A[rows].reshape(-1, A.shape[-1]), self.precision(A.shape[-1])
+        covariance = np.linalg.inv(flat.T @ flat + np.diag(precision))
+        change = covariance @ (flat.T @ residual[rows].ravel() - precision * weights)
         return np.asarray(change), np.asarray(covariance)
 
-    def left_out(self, powers: Powers, used: Flags) -> float:
-        """Mean square left on groups of runs that the weights have not seen; without terms, of the residual."""
+    def left_out_error(self, powers: Powers, used: Flags) -> float:
+        """Compute the mean square on groups that the weights have not seen; without terms, of the residual."""
         residual = self.white(self.base.prediction)
         if not powers:
             return float((residual[used] ** 2).mean())
-        A, left = self.design(powers), []
-        for own in np.unique(self.group[used]):
-            learn, out = used & (self.group != own), used & (self.group == own)
-            w = self.step(A, residual, learn, np.zeros(A.shape[-1]))[0]
-            left.append(residual[out] - A[out] @ w)
-        return float((np.concatenate(left) ** 2).mean())
+        A, errors = self.design(powers), []
+        for learn, out in leave_one_group_out(self.group, used):
+            weights = self.step(A, residual, learn, np.zeros(A.shape[-1]))[0]
+            errors.append(residual[out] - A[out] @ weights)
+        return float((np.concatenate(errors) ** 2).mean())
 
     def correction(self, powers: Powers, weights: Floats, rows: Flags) -> Correction:
-        """The correction with these weights, whose range is that of the runs in `rows`; without errors."""
+        """Make the correction with these weights, whose range is that of the runs in `rows`; without errors."""
         table = weights.reshape(len(self.knobs), len(powers)).tolist()
         ends = (self.inputs[rows].min(0), self.inputs[rows].max(0))
         centre, scale, low, high = (tuple(v.tolist()) for v in (self.centre, self.scale, *ends))
         named = {k: tuple(row) for k, row in zip(self.knobs, table, strict=True)}
         return Correction(centre, scale, low, high, powers, named, 0.0, 0.0)
 
-    def learnt(
+    def learn(
         self, powers: Powers, weights: Floats, prediction: Floats, rows: Flags
     ) -> tuple[Floats, Floats, Floats]:
-        """Weights after a few corrections with the simulator, the prediction with them, and their covariance.
+        """Correct the weights a few times with the simulator.
 
         Args:
             weights, prediction: to begin with.
             rows: (n,) runs to learn from.
+
+        Returns:
+            The weights, the prediction with them, and their covariance.
         """
         A, every = self.design(powers), np.ones(len(self.inputs), bool)
         covariance = self.step(A, self.white(prediction), rows, weights)[1]
 
-        def cost(w: Floats, found: Floats) -> float:
-            return float((self.white(found)[rows] ** 2).sum() + (self.precision(len(w)) * w**2).sum())
+        def cost(w: Floats, predicted: Floats) -> float:
+            return float((self.white(predicted)[rows] ** 2).sum() + (self.precision(len(w)) * w**2).sum())
 
         best = cost(weights, prediction)
         for _ in range(_CORRECTIONS):
@@ -142,31 +147,30 @@ class _Task:
                 tried = weights + share * change
                 robot = replace(self.model.robot, correction=self.correction(powers, tried, every))
                 try:
-                    found = replace(self.model, robot=robot).predict([self.base.parameters])[0]
+                    predicted = replace(self.model, robot=robot).predict([self.base.parameters])[0]
                 except InputError:  # no motion with these weights
                     continue
-                if cost(tried, found) < best:
-                    weights, prediction, best = tried, found, cost(tried, found)
+                if cost(tried, predicted) < best:
+                    weights, prediction, best = tried, predicted, cost(tried, predicted)
                     break
             if before - best < _SETTLED * before:
                 break
         return weights, prediction, covariance
 
 
-def predictive(model: Swimmer, base: Fit, used: Flags, rows: Flags, test: Flags) -> Predictive | None:
+def learn_head_correction(model: SwimmerModel, base: Fit, split: Split) -> HeadCorrection | None:
     """Learn a correction of `base`, if there is one that predicts left-out sessions better.
 
-    Args:
-        used: (n,) runs to learn from and to choose the terms.
-        rows: (n,) runs from which the correction that is handed on is learnt in the end.
-        test: (n,) runs on which its error is stated.
+    The terms are chosen from the runs that are fitted. The error is that on the held-out runs. In the end the
+    correction is learnt from both.
     """
     here = {p.name for p in (*model.coefficients, *model.effects)}
     knobs = tuple(name for name in _SIGMA if name in here)
     robots, place = model.robots(base.parameters)
     inputs = np.array([inputs_of(robot.group_values()) for robot in robots])[place]
+    used = split.fitted
     spread = inputs[used].std(0)
-    task = _Task(
+    problem = _Problem(
         model=model,
         base=base,
         knobs=knobs,
@@ -177,49 +181,46 @@ def predictive(model: Swimmer, base: Fit, used: Flags, rows: Flags, test: Flags)
         scale=np.where(spread > 1e-6, spread, 1.0),
         group=groups(model.runs)[0],
     )
-    powers = _chosen(task, used)
+    powers = _choose_terms(problem, used)
     if not powers:
         return None
     none = np.zeros(len(knobs) * len(powers))
-    weights, prediction, _ = task.learnt(powers, none, base.prediction, used)
-    last, fitted, covariance = task.learnt(powers, weights, prediction, rows)
+    weights, prediction, _ = problem.learn(powers, none, base.prediction, used)
+    last, fitted, covariance = problem.learn(powers, weights, prediction, split.kept)
     error, without = (
-        float(np.sqrt(((model.runs.y - found)[test] ** 2).mean())) for found in (prediction, base.prediction)
+        float(np.sqrt(((model.runs.y - p)[split.test] ** 2).mean())) for p in (prediction, base.prediction)
     )
     noise = float(np.trace(base.noise.run) / len(base.noise.run))
-    content = Corrected(
-        correction=replace(task.correction(powers, last, rows), error=error, error_without=without),
-        covariance=covariance * max(1.0, float((task.white(fitted)[rows] ** 2).mean())),
-        slopes=task.slopes,
+    correction = problem.correction(powers, last, split.kept)
+    return HeadCorrection(
+        prediction=prediction,
+        terms=tuple(_name_term(term) for term in powers),
+        correction=replace(correction, error=error, error_without=without),
+        covariance=covariance * max(1.0, float((problem.white(fitted)[split.kept] ** 2).mean())),
+        slopes=problem.slopes,
         inputs=inputs,
         beyond=math.sqrt(max(error**2 - noise, 0.0)),
     )
-    return Predictive(prediction, tuple(_words(term) for term in powers), content)
 
 
-def _chosen(task: _Task, used: Flags) -> Powers:
-    """Powers of the terms, in the order in which they were added; none if they do not predict better."""
-    levels = [len(np.unique(column[used].round(6))) for column in task.inputs.T]
+def _choose_terms(problem: _Problem, used: Flags) -> Powers:
+    """Choose the powers of the terms, the constant first; none if they do not predict better."""
+    levels = [len(np.unique(column[used].round(6))) for column in problem.inputs.T]
     possible = [
         p for p in itertools.product(range(4), repeat=3)
         if (sum(p) <= 2 or max(p) == sum(p)) and all(q < m for q, m in zip(p, levels, strict=True))
     ]  # fmt: skip
-    chosen: Powers = ()
-    error = task.left_out(chosen, used)
-    while len(chosen) < _MOST:
-        rest = [tuple(dict.fromkeys((_CONSTANT, *chosen, p))) for p in possible if p not in chosen]
-        if not rest:
-            break
-        tried = [task.left_out(powers, used) for powers in rest]
-        best = int(np.argmin(tried))
-        if tried[best] > (1 - _GAIN) * error:
-            break
-        chosen, error = rest[best], tried[best]
-    return chosen
+    start: Powers = ()
+    return select_forward(
+        start,
+        lambda chosen: [tuple(dict.fromkeys((_CONSTANT, *chosen, p))) for p in possible if p not in chosen],
+        lambda powers: problem.left_out_error(powers, used),
+        most=_MOST,
+        gain=_GAIN,
+    )
 
 
-def _words(term: tuple[int, ...]) -> str:
-    """A term in words."""
+def _name_term(term: tuple[int, ...]) -> str:
     symbols = ("N", "ln l/R", "ln ω")
     parts = [s if p == 1 else f"({s})^{p}" for s, p in zip(symbols, term, strict=True) if p]
     return " × ".join(parts) or "constant"

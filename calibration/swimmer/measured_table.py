@@ -137,8 +137,8 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         inputs=np.stack(inputs, 1),
         input_names=("N", "ln l", "ln |omega|", "direction", *noted),
         rows=np.flatnonzero(keep) + 1,
-        set_aside=(*aside, *follows, *(f"column {name}: not known, left out" for name in unknown)),
-        limits=_limits(tails, length, omega),
+        excluded=(*aside, *follows, *(f"column {name}: not known, left out" for name in unknown)),
+        caveats=_caveats(tails, length, omega),
         tails=tails,
         length=length,
         omega=omega,
@@ -191,7 +191,7 @@ def _sigmas(good: pd.DataFrame) -> dict[str, float]:
     return found
 
 
-def _limits(tails: Floats, length: Floats, omega: Floats) -> tuple[str, ...]:
+def _caveats(tails: Floats, length: Floats, omega: Floats) -> tuple[str, ...]:
     """Inputs that are the same in all runs, in words."""
     found = []
     if np.ptp(tails) == 0:

@@ -11,11 +11,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from calibration.statistics.forward_model import Parameter, Parameters, Predictive, by_differences
+from calibration.statistics.forward_model import Parameter, Parameters, by_differences
 from calibration.statistics.noise import Noise, repeat_covariance
 from calibration.swimmer.candidate_effects import (
     CURRENT,
@@ -49,9 +49,6 @@ from sim.solve.refinement import FEW, MANY
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
 
-if TYPE_CHECKING:
-    from calibration.statistics.fit import Fit
-
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
 SANE = (0.1, 20.0)  # range of the coefficients; at its ends the model lacks something
 
@@ -81,7 +78,7 @@ DIRECT = Solver(steady_columns, sensitivity_columns)
 
 
 @dataclass(frozen=True)
-class Swimmer:
+class SwimmerModel:
     """Predicts the outputs of a table for a robot with given parameters."""
 
     robot: Robot
@@ -100,7 +97,7 @@ class Swimmer:
         return tuple(Parameter(n, n, float(getattr(self.robot, n)), SANE, 1.0, True) for n in COEFFICIENTS)
 
     @cached_property
-    def given(self) -> tuple[Parameter, ...]:
+    def nuisances(self) -> tuple[Parameter, ...]:
         return given_numbers(self.robot, self.runs.sigmas, self.runs.outputs)
 
     @cached_property
@@ -254,7 +251,7 @@ class Swimmer:
         """Refuse a table whose units cannot be those that its columns name."""
         check_outputs(self.runs, prediction)
 
-    def possible(self) -> tuple[Swimmer, list[dict[str, Any]]]:
+    def possible(self) -> tuple[SwimmerModel, list[dict[str, Any]]]:
         """Runs that can be made next (`calibration.swimmer.lab_settings`)."""
         runs, grid = self.runs, settings_of(self.runs, self.own)
         count = len(grid)
@@ -263,8 +260,8 @@ class Swimmer:
         own = replace(
             runs, y=np.zeros((count, len(runs.outputs))),
             condition=np.arange(count), session=np.zeros(count, int),
-            session_names=("next",), inputs=np.zeros((count, runs.inputs.shape[1])), set_aside=(),
-            rows=np.arange(count), limits=(), tails=grid[:, 0], length=grid[:, 1] / 100,
+            session_names=("next",), inputs=np.zeros((count, runs.inputs.shape[1])), excluded=(),
+            rows=np.arange(count), caveats=(), tails=grid[:, 0], length=grid[:, 1] / 100,
             omega=grid[:, 2] * math.pi / 30, noted=noted,
         )  # fmt: skip
         return replace(self, runs=own), settings
@@ -273,12 +270,6 @@ class Swimmer:
         """The robots that are simulated for the runs at `parameters`, and the place of each run among them."""
         runs, place = self._conditions(parameters)
         return [run.robot for run in runs], place
-
-    def predictive(self, base: Fit, used: Flags, rows: Flags, test: Flags) -> Predictive | None:
-        """A correction of the head's load (`calibration.swimmer.head_correction`)."""
-        from calibration.swimmer.head_correction import predictive
-
-        return predictive(self, base, used, rows, test)
 
     def _inside(self, lookup: NeuralTable, parameters: Parameters) -> Flags:
         """Which runs (n,) the look-up table covers at `parameters`."""

@@ -27,8 +27,8 @@ import numpy as np
 from scipy.special import ndtr
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.forward_model import Model
 from calibration.statistics.noise import Noise
+from calibration.verdict.experiment import Experiment
 from sim.arrays import Floats
 
 STOP = 25.0  # ratio of likelihoods at which an explanation is given up, 1/α of the sequence of batches
@@ -86,23 +86,23 @@ class Pair(NamedTuple):
 
 
 def next_runs(
-    model: Model, rivals: Sequence[Fit], *, count: int = 3, seed: int = 0
-) -> tuple[list[NextRun], Batch]:
-    """The best experiments to tell fits apart, best first, and the best batch of `BATCH` runs.
+    model: Experiment, rivals: Sequence[Fit], *, count: int = 3, seed: int = 0
+) -> tuple[tuple[NextRun, ...], Batch]:
+    """Find the best experiments to tell fits apart, best first, and the best batch of `BATCH` runs.
 
     Args:
         rivals: two fits or more, the best first; of many, the first four are told apart.
     """
     possible, settings = model.possible()
     fits = rivals[:_MOST_RIVALS]
-    sides = [possible.derivatives(one.parameters, one.names) for one in fits]
+    sides = [possible.derivatives(fitted.parameters, fitted.names) for fitted in fits]
     pairs = [
         Pair(true[0] - wrong[0], wrong[1], again.covariance)
         for (_, true), (again, wrong) in itertools.permutations(zip(fits, sides, strict=True), 2)
     ]
-    noise = Noise(np.mean([one.noise.run for one in fits], 0), float(np.mean([one.noise.share for one in fits])))
+    noise = Noise(np.mean([f.noise.run for f in fits], 0), float(np.mean([f.noise.share for f in fits])))
     alone = np.array([_together(pairs, noise, [place]).min() for place in range(len(settings))])
-    found = []
+    runs = []
     rng = np.random.default_rng(seed)
     for place in np.argsort(-alone)[:count].tolist():
         for repeats in (1, 2, 4, 8, _MOST_REPEATS):
@@ -110,25 +110,25 @@ def next_runs(
             decides = _decides(strength, rng)
             if decides >= _WANTED:
                 break
-        found.append(NextRun(settings[place], repeats, strength, decides))
+        runs.append(NextRun(settings[place], repeats, strength, decides))
     chosen, strength = _greedy(pairs, noise)
     batch = tuple(settings[place] for place in chosen)
-    return found, Batch(batch, strength, _decides(strength, rng), GIVEN_UP)
+    return tuple(runs), Batch(batch, strength, _decides(strength, rng), GIVEN_UP)
 
 
 def _decides(strength: float, rng: np.random.Generator) -> float:
-    """Share of draws in which the true one is chosen; χ² of the wrong one over it is λ + 2 √λ z."""
+    """Estimate the share of draws in which the true one is chosen; χ² of the wrong one over it is λ + 2 √λ z."""
     draws = strength + 2 * np.sqrt(strength) * rng.normal(size=_DRAWS)
     return float((draws > _DECIDES).mean())
 
 
 def _greedy(pairs: Sequence[Pair], noise: Noise) -> tuple[list[int], float]:
-    """Places of `BATCH` runs, and the smallest λ of them together."""
+    """Choose `BATCH` runs, one after the other; return their places and the smallest λ of them together."""
     chosen: list[int] = []
     strengths = np.zeros(len(pairs))
     for _ in range(BATCH):
         tried = [_together(pairs, noise, [*chosen, place]) for place in range(len(pairs[0].difference))]
-        wrong = [float(ndtr(-np.sqrt(one) / 2).sum()) for one in tried]
+        wrong = [float(ndtr(-np.sqrt(strength) / 2).sum()) for strength in tried]
         place = int(np.argmin(wrong))
         strengths = tried[place]
         chosen.append(place)
@@ -136,11 +136,11 @@ def _greedy(pairs: Sequence[Pair], noise: Noise) -> tuple[list[int], float]:
 
 
 def _together(pairs: Sequence[Pair], noise: Noise, places: list[int]) -> Floats:
-    """λ of several runs made together, for every pair."""
+    """Compute λ of several runs made together, for every pair."""
     spread = noise.covariance(np.zeros(len(places), dtype=np.int64))  # one session
-    found = []
+    strengths = []
     for pair in pairs:
         slopes = pair.J[places].reshape(-1, pair.J.shape[-1])
         d = pair.difference[places].ravel()
-        found.append(float(d @ np.linalg.solve(spread + slopes @ pair.covariance @ slopes.T, d)))
-    return np.array(found)
+        strengths.append(float(d @ np.linalg.solve(spread + slopes @ pair.covariance @ slopes.T, d)))
+    return np.array(strengths)

@@ -1,8 +1,8 @@
-"""Generic correction: a small regression of the residual on the runs' inputs, for use when no effect explains it.
+"""A small regression of the residual on the runs' inputs, for comparison.
 
 Features are the inputs, their squares and their products, standardised. They are added one at a time, as long as
 left-out sessions are predicted better. Each output has its own weights. There may be no feature at all. The
-correction describes the residual and does not explain it. It holds only between the runs that it was made from.
+regression describes the residual and does not explain it. It holds only between the runs that it was made from.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.statistics.forward_model import Runs
+from calibration.statistics.forward_selection import select_forward
 from calibration.statistics.input_features import features
 from calibration.statistics.noise import repeat_covariance
-from calibration.statistics.splits import groups
+from calibration.statistics.splits import groups, leave_one_group_out
 from sim.arrays import Flags, Floats, Integers
 
 _MOST = 6
@@ -22,34 +23,31 @@ _GAIN = 0.02  # share of the left-out error that a feature must save
 
 
 @dataclass(frozen=True)
-class Generic:
+class Regression:
     """A correction to the prediction."""
 
     features: tuple[str, ...]  # in the order in which they were added
     correction: Floats  # (n, k), for all runs
 
 
-def correct(runs: Runs, prediction: Floats, used: Flags) -> Generic:
+def regress_residual(runs: Runs, prediction: Floats, used: Flags) -> Regression:
     """Learn the residual of `prediction` (n, k) from the runs in `used` (n,)."""
     names, table = features(runs, used)
     scale = np.sqrt(np.diag(repeat_covariance(runs.y[used], runs.condition[used])))
     residual = (runs.y - prediction) / scale
     group = groups(runs)[0]
-    chosen: list[int] = []
-    error = _left_out(table[:, chosen], residual, group, used)
-    while len(chosen) < _MOST:
-        rest = [i for i in range(len(names)) if i not in chosen]
-        if not rest:
-            break
-        tried = [_left_out(table[:, [*chosen, i]], residual, group, used) for i in rest]
-        best = int(np.argmin(tried))
-        if tried[best] > (1 - _GAIN) * error:
-            break
-        chosen.append(rest[best])
-        error = tried[best]
-    weights = _weights(table[used][:, chosen], residual[used])
-    correction = _with_constant(table[:, chosen]) @ weights * scale if chosen else np.zeros_like(residual)
-    return Generic(tuple(names[i] for i in chosen), correction)
+    start: tuple[int, ...] = ()
+    chosen = select_forward(
+        start,
+        lambda chosen: [(*chosen, i) for i in range(len(names)) if i not in chosen],
+        lambda chosen: _left_out_error(table[:, list(chosen)], residual, group, used),
+        most=_MOST,
+        gain=_GAIN,
+    )
+    columns = table[:, list(chosen)]
+    weights = _weights(columns[used], residual[used])
+    correction = _with_constant(columns) @ weights * scale if chosen else np.zeros_like(residual)
+    return Regression(tuple(names[i] for i in chosen), correction)
 
 
 def _with_constant(table: Floats) -> Floats:
@@ -60,12 +58,12 @@ def _weights(table: Floats, residual: Floats) -> Floats:
     return np.asarray(np.linalg.lstsq(_with_constant(table), residual, rcond=None)[0])
 
 
-def _left_out(table: Floats, residual: Floats, group: Integers, used: Flags) -> float:
-    """Mean square left on groups of runs that the weights have not seen; without features, of the residual."""
+def _left_out_error(table: Floats, residual: Floats, group: Integers, used: Flags) -> float:
+    """Compute the mean square left on groups that the weights have not seen; without features, of the residual."""
     if not table.shape[1]:
         return float((residual[used] ** 2).mean())
-    left = []
-    for own in np.unique(group[used]):
-        learn, out = used & (group != own), used & (group == own)
-        left.append(residual[out] - _with_constant(table[out]) @ _weights(table[learn], residual[learn]))
-    return float((np.concatenate(left) ** 2).mean())
+    errors = [
+        residual[out] - _with_constant(table[out]) @ _weights(table[learn], residual[learn])
+        for learn, out in leave_one_group_out(group, used)
+    ]
+    return float((np.concatenate(errors) ** 2).mean())

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.forward_model import Model, Runs, start_values
+from calibration.statistics.forward_model import ForwardModel, Runs, start_values
 from calibration.statistics.noise import Noise
 from calibration.verdict.next_runs import GIVEN_UP
 from sim.arrays import Flags, Floats
@@ -110,7 +110,7 @@ def new_runs(runs: Runs, before: set[str]) -> Flags:
     return new
 
 
-def standings(model: Model, explanations: Sequence[Explanation], new: Flags) -> list[Standing]:
+def standings(model: ForwardModel, explanations: Sequence[Explanation], new: Flags) -> list[Standing]:
     """How explanations stand after the new runs in `new` (n,), best first.
 
     Raises:

@@ -7,9 +7,10 @@ from pathlib import Path
 import pandas as pd
 
 from calibration.report.corrected_robot import check_given
+from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.lab_settings import Owned
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate as close_loop
 from calibration.verdict.verdict import Verdict
 from sim.inputs import load_robot
@@ -39,7 +40,7 @@ def calibrate(
 
     Returns:
         The verdict, with `verdict` ("none", "effect", "ambiguous", "unexplained"), `sentence`, `effects`, fits
-        with intervals, and errors on the locked runs.
+        with intervals, and errors on the held-out runs.
 
     Raises:
         InputError: the table cannot be used; the message says why.
@@ -51,5 +52,5 @@ def calibrate(
     """
     given = robot if isinstance(robot, Robot) else load_robot(robot)
     check_given(given)
-    model = Swimmer(given, read_measurements(table), jobs, own=own or {})
-    return close_loop(model, seed=seed, progress=progress)
+    model = SwimmerModel(given, read_measurements(table), jobs, own=own or {})
+    return close_loop(model, correction=learn_head_correction, seed=seed, progress=progress)

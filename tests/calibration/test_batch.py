@@ -55,7 +55,7 @@ def test_a_batch_serves_all_pairs_of_rivals() -> None:
 def test_a_batch_is_stated_with_its_settings_and_where_to_stop() -> None:
     model = toy_swimmer(toy_table(2, end_over_end_drag=5.0), TRUTH)
     used = np.ones(len(model.runs), bool)
-    common = tuple(p.name for p in (*model.coefficients, *model.given))
+    common = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     fits = [
         fit(model, start_values(model), (*common, name), used, title="")
         for name in ("end_over_end_drag", "disc_drag")

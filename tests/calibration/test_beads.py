@@ -12,7 +12,8 @@ from calibration.statistics.fit import fit
 from calibration.statistics.forward_model import Runs, start_values
 from calibration.statistics.noise import Noise
 from calibration.statistics.profile_intervals import profile_intervals
-from calibration.verdict.calibrate import calibrate, verdict_record
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict_json import verdict_record
 
 
 def falls(diameter: np.ndarray, session: np.ndarray, truth: dict[str, float], seed: int, noise: float) -> Spheres:
@@ -21,7 +22,7 @@ def falls(diameter: np.ndarray, session: np.ndarray, truth: dict[str, float], se
         outputs=("v",), y=np.zeros((len(diameter), 1)), condition=np.unique(diameter, return_inverse=True)[1],
         session=session, session_names=tuple(f"round {i + 1}" for i in range(session.max() + 1)),
         inputs=np.log(diameter)[:, None], input_names=("ln d",), rows=np.arange(len(diameter)),
-        set_aside=(), limits=(),
+        excluded=(), caveats=(),
     )  # fmt: skip
     model = Spheres(runs, diameter)
     speed = model.predict([{"viscosity": 1.3, "wall": 0.0, "inertia": 0.0, **truth}])[0]

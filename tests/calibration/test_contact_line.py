@@ -8,7 +8,7 @@ import pytest
 from calibration.statistics.forward_model import by_differences, start_values
 from calibration.swimmer.candidate_effects import influences
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from tests.calibration.toy_tables import START, TRUTH
 
@@ -20,7 +20,7 @@ def test_derivatives_along_both_numbers() -> None:
     assert second is not None
     assert second.name == SPEED
     table = make_table(TRUTH, seed=2, tails=(2, 3), lengths_cm=(6.0, 9.0), title="")
-    model = Swimmer(START, read_measurements(table))
+    model = SwimmerModel(START, read_measurements(table))
     at = {**start_values(model), FRICTION: 0.3, SPEED: 6.0}
     ours, J = model.derivatives(at, [FRICTION, SPEED])
     theirs, differences = by_differences(model, at, [FRICTION, SPEED])

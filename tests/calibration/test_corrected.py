@@ -31,9 +31,9 @@ def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -
     result = closed(toy_table(5, end_over_end_drag=5.0))
     assert result.effects == ("end_over_end_drag",)
     path = tmp_path / "corrected.toml"
-    path.write_text(corrected_toml(START, result.delivered))
+    path.write_text(corrected_toml(START, result.fits.final_refit))
     robot, knowledge = load_robot(path), read_knowledge(path)
-    assert robot == corrected_robot(START, result.delivered.parameters)
+    assert robot == corrected_robot(START, result.fits.final_refit.parameters)
     sigma = dict(zip(knowledge.names, np.sqrt(np.diag(knowledge.covariance)), strict=True))
     assert {"C_t", "C_r", "C_yr", "youngs_modulus", "tail_length", "end_over_end_drag"} <= set(sigma)
     low, high = result.final.interval("end_over_end_drag")
@@ -44,7 +44,7 @@ def test_the_corrected_robot_carries_the_covariance_of_its_fit(tmp_path: Path) -
 
 @pytest.mark.usefixtures("toy_model")
 def test_a_current_is_handed_on_with_its_error() -> None:
-    delivered = closed(toy_table(5)).delivered
+    delivered = closed(toy_table(5)).fits.final_refit
     one = replace(delivered.fitted[0], name=CURRENT[1], logarithmic=False)
     found = knowledge_of(
         START,

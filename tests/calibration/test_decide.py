@@ -14,7 +14,6 @@ import pytest
 from scipy.stats import binom
 
 from calibration.statistics.noise import Noise
-from calibration.verdict.calibrate import verdict_record
 from calibration.verdict.next_runs import GIVEN_UP, STOP
 from calibration.verdict.sequential_test import (
     Explanation,
@@ -24,6 +23,7 @@ from calibration.verdict.sequential_test import (
     sentence,
     standings,
 )
+from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError
 from tests.calibration.toy_tables import closed, install_toy, toy_swimmer, toy_table
 
@@ -84,7 +84,7 @@ def test_the_true_explanation_is_seldom_given_up() -> None:
         known = tuple(SimpleNamespace(name=name, start=0.0) for name in predictions)
         runs = SimpleNamespace(y=y, session=np.zeros(n, int), outputs=outputs or ("a", "b"))
         return SimpleNamespace(
-            runs=runs, coefficients=known, given=(), effects=(),
+            runs=runs, coefficients=known, nuisances=(), effects=(),
             derivatives=lambda parameters, names: (predictions[names[0]], slopes),
         )  # fmt: skip
 

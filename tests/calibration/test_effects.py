@@ -14,10 +14,10 @@ from calibration.report.corrected_robot import corrected_robot
 from calibration.report.report import write_report
 from calibration.statistics.fit import fit
 from calibration.statistics.forward_model import start_values
-from calibration.statistics.held_out import middle_session
-from calibration.statistics.residual_tests import check_misfit
+from calibration.statistics.residual_tests import examine_residual
 from calibration.statistics.score_directions import Directions
-from calibration.swimmer.measured_table import read_measurements
+from calibration.statistics.splits import middle_session
+from calibration.statistics.study import Study
 from calibration.verdict.calibrate import calibrate
 from tests.calibration import toy
 from tests.calibration.toy_tables import START, TRUTH, closed, toy_swimmer, toy_table
@@ -48,10 +48,10 @@ def test_a_planted_effect_is_found_sized_and_removed() -> None:
 def test_an_effect_that_the_coefficients_absorb_is_not_testable() -> None:
     """A direction that C_t covers leaves nothing to score, however wrong the model is."""
     table = toy_table(5, end_over_end_drag=5.0)
-    data = read_measurements(table)
-    used = ~middle_session(data)
+    model = toy_swimmer(table)
+    study = Study.fitted_to(model, ~middle_session(model.runs), draws=20)
     base = closed(table).base
-    misfit = check_misfit(base, data, used, Directions.plain(base.jacobian[..., :1]), level=0.05, seed=0, draws=20)
+    misfit = examine_residual(study, base, Directions.plain(base.jacobian[..., :1]))
     assert misfit.scores.survived[0] < 1e-5
     assert misfit.p["score"] == 1.0
     assert misfit.general_p < 0.1
@@ -98,8 +98,8 @@ def test_fits_arrive_along_a_valley() -> None:
     names, every = (*(p.name for p in model.coefficients), hidden), np.ones(len(table), bool)
     here = fit(model, {**start_values(model), hidden: 5.0}, names, every)
     there = fit(true_model, {**start_values(true_model), hidden: 5.0}, names, every)
-    assert here.arrived
-    assert there.arrived
+    assert here.converged
+    assert there.converged
     assert here.deviance == pytest.approx(there.deviance, abs=0.5)
 
 
@@ -154,7 +154,7 @@ def test_a_drift_with_time_is_found_where_there_is_a_clock(seed: int) -> None:
     assert closed(table).verdict == "none"
     result = closed(in_thinning_fluid(table, rate))
     assert result.effects == ("viscosity_with_time",)
-    low, high = result.final_intervals["viscosity_with_time"]
+    low, high = result.fits.final_intervals["viscosity_with_time"]
     assert low < rate < high < 2 * rate
     assert low > 0.5 * rate
     assert result.error_after < result.error_before
@@ -169,7 +169,10 @@ def test_without_a_clock_a_drift_is_no_effect_of_the_robot() -> None:
     table["elapsed_min"] = 4.0 * np.arange(len(table))
     result = closed(in_thinning_fluid(table, 0.06).drop(columns="elapsed_min"))
     assert "viscosity_with_time" not in result.effects
-    assert result.untestable["viscosity drifting with time"] == "needs elapsed_min, differing between the runs"
+    assert (
+        result.evidence.untestable["viscosity drifting with time"]
+        == "needs elapsed_min, differing between the runs"
+    )
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -191,9 +194,9 @@ def test_the_generic_correction_helps_where_no_effect_explains() -> None:
     table["omega_yr_rad_s"] *= 1 + 0.02 * (table["l_cm"] - 8.0) ** 2
     model = toy_swimmer(table)
     result = calibrate(model, progress=False)
-    left = (model.runs.y - result.base.prediction)[result.used]
-    corrected = left - result.generic.correction[result.used]
-    assert any("ln l" in name for name in result.generic.features)
+    left = (model.runs.y - result.base.prediction)[result.conditions.split.fitted]
+    corrected = left - result.corrections.regression.correction[result.conditions.split.fitted]
+    assert any("ln l" in name for name in result.corrections.regression.features)
     assert (corrected**2).mean() < 0.7 * (left**2).mean()
 
 
@@ -203,7 +206,7 @@ def test_an_effect_that_changes_nothing_says_so(tmp_path: Path) -> None:
     """The toy's tails cannot touch: no size of contact shows, and the report has no size for it."""
     model = toy_swimmer(toy_table(1, lengths_cm=(8.0,), end_over_end_drag=4.0))
     result = calibrate(model, progress=False)
-    contact = next(c for c in result.candidates if c.effect.name == "tail_contact")
+    contact = next(c for c in result.evidence.candidates if c.effect.name == "tail_contact")
     assert contact.verdict == "it changes nothing in these runs"
     write_report(result, model.runs, tmp_path / "report.html", title="t")
     text = (tmp_path / "report.html").read_text()

@@ -13,12 +13,13 @@ from scipy.stats import binom
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import fit
 from calibration.statistics.forward_model import by_differences, start_values
-from calibration.statistics.priors import pulls
+from calibration.statistics.pulls import pulls
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, LENGTH, TACHOMETER
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
-from calibration.verdict.calibrate import calibrate, verdict_record
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError
 from sim.model.robot import Robot
 from sim.model.uncertainty import Sigma
@@ -40,11 +41,11 @@ def table_of(robot: Robot, seed: int) -> pd.DataFrame:
 def test_a_stiffness_that_was_given_too_high_is_no_inertia(seed: int) -> None:
     """Tail drag 25 % above the formula is Young's modulus 20 % below; with the simulator on both sides."""
     softer = replace(TRUTH, youngs_modulus=0.8 * TRUTH.youngs_modulus)
-    model = Swimmer(START, read_measurements(make_table(softer, seed=seed, title="")))
+    model = SwimmerModel(START, read_measurements(make_table(softer, seed=seed, title="")))
     result = calibrate(model, progress=False)
     assert "inertia" not in result.effects
     assert result.verdict != "number"
-    stiffness = next(p for p in result.numbers if p.parameter.name == "youngs_modulus")
+    stiffness = next(p for p in result.fits.pulls if p.parameter.name == "youngs_modulus")
     assert stiffness.alone == pytest.approx(math.log(0.8), abs=2 * stiffness.alone_error)
     assert stiffness.z < -1
 
@@ -63,7 +64,7 @@ def test_numbers_drawn_from_their_priors_are_no_effects() -> None:
         table["l_cm"] += rng.normal(scale=0.1)
         table["R_yr_cm"] *= math.exp(rng.normal(scale=0.01))
         table["theta_deg"] += rng.normal() * np.sign(table["omega_rpm"])
-        result = calibrate(Swimmer(START, read_measurements(table)), progress=False)
+        result = calibrate(SwimmerModel(START, read_measurements(table)), progress=False)
         claimed += bool(result.effects) or result.verdict == "unexplained"
         low, high = result.base.interval("youngs_modulus")
         covered += low < drawn["youngs_modulus"] < high
@@ -78,7 +79,7 @@ def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
     """A camera's scale off by six of its σ: said as such, freed, and ahead of every effect."""
     table = toy_table(4)
     table["R_yr_cm"] *= 1.06
-    result = calibrate(Swimmer(START, read_measurements(table)), progress=False)
+    result = calibrate(SwimmerModel(START, read_measurements(table)), progress=False)
     assert result.verdict == "number"
     assert result.effects == ()
     assert CAMERA in {p.parameter.name for p in result.wrong_numbers[0]}
@@ -95,13 +96,13 @@ def test_a_stiffness_far_off_is_named_with_what_looks_like_it() -> None:
     for share, sigmas in ((0.6, {}), (0.8, {"youngs_modulus": Sigma(0.03, True), **EXACT})):
         softer = replace(TRUTH, youngs_modulus=share * TRUTH.youngs_modulus)
         data = read_measurements(make_table(softer, seed=5, title=""))
-        result = calibrate(Swimmer(replace(START, sigmas=sigmas), data), progress=False)
+        result = calibrate(SwimmerModel(replace(START, sigmas=sigmas), data), progress=False)
         assert result.verdict == "number"
         assert result.wrong_numbers[0][0].parameter.name == "youngs_modulus"
-        given = result.delivered.parameters["youngs_modulus"] / START.youngs_modulus
+        given = result.fits.final_refit.parameters["youngs_modulus"] / START.youngs_modulus
         assert given == pytest.approx(share, rel=0.1)
-        corrected = corrected_robot(START, result.delivered.parameters)
-        assert corrected.youngs_modulus == result.delivered.parameters["youngs_modulus"]
+        corrected = corrected_robot(START, result.fits.final_refit.parameters)
+        assert corrected.youngs_modulus == result.fits.final_refit.parameters["youngs_modulus"]
 
 
 def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
@@ -110,7 +111,7 @@ def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
     table["v_cm_s"] = (
         table["R_yr_cm"] * table["omega_yr_rad_s"].abs() * np.random.default_rng(0).uniform(0.9, 1.1, len(table))
     )
-    model = Swimmer(START, read_measurements(table), solver=toy.SOLVER)
+    model = SwimmerModel(START, read_measurements(table), solver=toy.SOLVER)
     at = {
         **start_values(model),
         "tracked_point": 0.2,
@@ -119,7 +120,7 @@ def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
         LENGTH: 0.001,
         TACHOMETER: 1.01,
     }
-    names = [p.name for p in model.given]
+    names = [p.name for p in model.nuisances]
     assert len(names) == 10
     ours, J = model.derivatives(at, names)
     theirs, differences = by_differences(model, at, names)
@@ -130,11 +131,11 @@ def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
 
 def test_pulls_are_those_of_the_textbook() -> None:
     """One number, one measurement: x = y σ²/(σ² + s²), pull y/√(σ² + s²), alone y."""
-    model = Swimmer(START, read_measurements(toy_table(8)), solver=toy.SOLVER)
+    model = SwimmerModel(START, read_measurements(toy_table(8)), solver=toy.SOLVER)
     used = np.ones(len(model.runs), bool)
-    names = tuple(p.name for p in (*model.coefficients, *model.given))
+    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     bound = fit(model, start_values(model), names, used, title="")
-    for pull in pulls(bound, model.given):
+    for pull in pulls(bound, model.nuisances):
         if pull.learnt:
             sigma = pull.parameter.sigma
             assert sigma is not None
@@ -142,17 +143,17 @@ def test_pulls_are_those_of_the_textbook() -> None:
             assert pull.change == pytest.approx(
                 pull.alone * sigma**2 / (sigma**2 + pull.alone_error**2), rel=1e-6, abs=1e-12
             )
-    free = fit(model, bound.parameters, names, used, free=(CAMERA,), title="")
-    own = {p.parameter.name: p for p in pulls(bound, model.given)}[CAMERA]
-    alone = {p.parameter.name: p for p in pulls(free, model.given)}[CAMERA]
+    own = {p.parameter.name: p for p in pulls(bound, model.nuisances)}[CAMERA]
+    free = fit(model, bound.parameters, names, used, wrong_numbers=((own,),), title="")
+    alone = {p.parameter.name: p for p in pulls(free, model.nuisances)}[CAMERA]
     assert alone.freed
     assert alone.change == pytest.approx(own.alone, abs=0.1 * own.alone_error)
 
 
 def test_exact_numbers_are_not_fitted_and_the_table_states_its_own() -> None:
     table = toy_table(9).assign(camera_scale_sigma_percent=2.0, heading_zero_sigma_deg=0.0)
-    model = Swimmer(replace(START, sigmas=EXACT), read_measurements(table), solver=toy.SOLVER)
-    sigmas = {p.name: p.sigma for p in model.given}
+    model = SwimmerModel(replace(START, sigmas=EXACT), read_measurements(table), solver=toy.SOLVER)
+    sigmas = {p.name: p.sigma for p in model.nuisances}
     assert sigmas == {"youngs_modulus": pytest.approx(0.1), CAMERA: 0.02, TACHOMETER: 0.005}
     for bad in (-1.0, np.arange(len(table), dtype=float)):
         with pytest.raises(InputError, match="camera_scale_sigma_percent"):

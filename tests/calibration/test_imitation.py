@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from calibration.attribution.imitability import DOUBT, SEEN, absorbable_shares, deformations, imitability
-from calibration.attribution.refits import ebic
+from calibration.attribution.pairs import ebic
 from calibration.statistics.fit import fit
 from calibration.statistics.forward_model import start_values
+from calibration.statistics.study import Study
 from tests.calibration.toy_tables import TRUTH, toy_swimmer, toy_table
 
 HIDDEN = "end_over_end_drag"
@@ -18,10 +19,10 @@ HIDDEN = "end_over_end_drag"
 
 def test_a_strong_claim_is_hard_to_imitate_and_a_weak_one_is_not() -> None:
     model = toy_swimmer(toy_table(2, **{HIDDEN: 5.0}), TRUTH)
-    names = (*(p.name for p in (*model.coefficients, *model.given)), HIDDEN)
+    names = (*(p.name for p in (*model.coefficients, *model.nuisances)), HIDDEN)
     used = np.ones(len(model.runs), bool)
     refit = fit(model, {**start_values(model), HIDDEN: 5.0}, names, used, title="")
-    shares = absorbable_shares(refit, model.runs, used, (HIDDEN,), seed=1)
+    shares = absorbable_shares(Study.fitted_to(model, used, seed=1), refit, (HIDDEN,))
     assert ((shares > -1e-9) & (shares < 1)).all()
     strengths = [imitability(shares, strength) for strength in (SEEN / 2, 2 * SEEN, 20 * SEEN)]
     assert strengths == sorted(strengths, reverse=True)
@@ -49,5 +50,6 @@ def test_pairs_pay_for_their_number() -> None:
     names = tuple(p.name for p in model.coefficients)
     one = fit(model, start_values(model), names, used, title="")
     count = len(model.effects)
-    cost = ebic(one, 2, model, used) - ebic(one, 1, model, used)
+    study = Study.fitted_to(model, used)
+    cost = ebic(study, one, 2) - ebic(study, one, 1)
     assert cost == pytest.approx(2 * math.log((count - 1) / 2))

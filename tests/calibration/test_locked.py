@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibration.statistics.held_out import middle_session
 from calibration.statistics.profile_intervals import least_determined
+from calibration.statistics.splits import middle_session
 from calibration.swimmer.measured_table import read_measurements
-from calibration.verdict.calibrate import verdict_record
+from calibration.verdict.verdict_json import verdict_record
 from tests.calibration.toy_tables import closed, toy_table
 
 
@@ -40,14 +40,14 @@ def test_the_result_is_deterministic() -> None:
 def test_the_locked_session_is_judged_and_used_in_the_end() -> None:
     """p is even for a good model and nothing for a bad one; the last fit has all runs."""
     table = toy_table(17)
-    good = [closed(toy_table(seed)).locked_p for seed in range(17, 25)]
+    good = [closed(toy_table(seed)).errors.p_value for seed in range(17, 25)]
     assert 0.2 < np.mean(good) < 0.8
-    name = closed(table).locked
+    name = closed(table).conditions.split.names
     ruined = table.copy()
     ruined.loc[ruined["session"] == name, "omega_yr_rad_s"] *= 1.5
     result = closed(ruined)
-    assert result.locked_p < 0.01
-    assert result.delivered.parameters["C_yr"] != pytest.approx(result.final.parameters["C_yr"], rel=0.02)
+    assert result.errors.p_value < 0.01
+    assert result.fits.final_refit.parameters["C_yr"] != pytest.approx(result.final.parameters["C_yr"], rel=0.02)
 
 
 @pytest.mark.slow
@@ -55,7 +55,7 @@ def test_the_locked_session_is_judged_and_used_in_the_end() -> None:
 def test_profile_intervals_are_those_of_the_covariance_where_the_model_is_linear() -> None:
     """And lean to one side where it is not."""
     result = closed(toy_table(19, end_over_end_drag=5.0))
-    for name, (low, high) in result.final_intervals.items():
+    for name, (low, high) in result.fits.final_intervals.items():
         wald = result.final.interval(name)
         assert low < result.final.parameters[name] < high
         assert (low, high) == pytest.approx(wald, abs=0.35 * (wald[1] - wald[0]))

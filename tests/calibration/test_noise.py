@@ -9,13 +9,13 @@ import pytest
 
 from calibration.statistics.fit import fit
 from calibration.statistics.forward_model import start_values
-from calibration.statistics.held_out import middle_session
 from calibration.statistics.input_features import features
-from calibration.statistics.noise import Design, Noise, inverse_root, least_squares, repeat_covariance, sums
+from calibration.statistics.noise import FixedColumns, Noise, inverse_root, least_squares, repeat_covariance, sums
 from calibration.statistics.priors import changes, precisions
-from calibration.statistics.residual_tests import check_misfit
+from calibration.statistics.residual_tests import examine_residual
 from calibration.statistics.score_directions import Directions
-from calibration.swimmer.measured_table import read_measurements
+from calibration.statistics.splits import middle_session
+from calibration.statistics.study import Study
 from tests.calibration.toy_tables import closed, toy_swimmer, toy_table
 
 
@@ -53,7 +53,7 @@ def test_a_design_makes_the_same_products_for_many_residuals() -> None:
     session = np.array([0, 0, 1, 1, 1, 2, 2])
     columns, residuals = rng.normal(size=(7, 3, 4)), rng.normal(size=(5, 7, 3))
     roots = np.linalg.inv(np.linalg.cholesky([np.eye(3) + np.outer(v, v) for v in rng.normal(size=(5, 3))]))
-    found = Design(columns, session).sums(np.swapaxes(roots, -1, -2) @ roots, residuals)
+    found = FixedColumns(columns, session).sums(np.swapaxes(roots, -1, -2) @ roots, residuals)
     for i, (root, residual) in enumerate(zip(roots, residuals, strict=True)):
         own = sums(root @ np.concatenate([columns, residual[..., None]], -1), session, 3)
         assert found.within[i] == pytest.approx(own.within)
@@ -65,10 +65,10 @@ def test_scores_along_features_are_those_of_least_squares() -> None:
     """One output along one feature: its coefficient over its error, with coefficients and numbers beside it."""
     model = toy_swimmer(toy_table(8))
     used = ~middle_session(model.runs)
-    names = tuple(p.name for p in (*model.coefficients, *model.given))
+    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
     fitted = fit(model, start_values(model), names, used, title="")
     none = Directions(np.zeros((*model.runs.y.shape, 0)), np.zeros(0, int), np.zeros(0))
-    found = check_misfit(fitted, model.runs, used, none, level=0.04, seed=0, draws=50).scores
+    found = examine_residual(Study.fitted_to(model, used, draws=50), fitted, none).scores
     _, table = features(model.runs, used)
     J = fitted.jacobian[used]
     residual = (model.runs.y - fitted.prediction)[used] + J @ changes(fitted.fitted, fitted.parameters)
@@ -110,19 +110,17 @@ def test_noise_is_recovered_from_repeats_and_sessions() -> None:
 def test_p_values_of_nulls_are_spread_evenly() -> None:
     """The bootstrap accounts for the fit: p-values of pure noise are neither small nor large on the whole."""
     table = toy_table(11)
-    data = read_measurements(table)
+    model = toy_swimmer(table)
+    data = model.runs
     used = ~middle_session(data)
     base = closed(table).base
     rng = np.random.default_rng(0)
     p = []
     for seed in range(40):
         noise = rng.multivariate_normal(np.zeros(len(data.outputs)), base.noise.run, size=len(data))
-        drawn = replace(data, y=base.prediction + noise)
-        p.append(
-            check_misfit(
-                base, drawn, used, Directions.plain(np.zeros((*data.y.shape, 0))), level=0.05, seed=seed, draws=100
-            )
-        )
+        drawn = replace(model, runs=replace(data, y=base.prediction + noise))
+        study = Study.fitted_to(drawn, used, level=0.05, seed=seed, draws=100)
+        p.append(examine_residual(study, base, Directions.plain(np.zeros((*data.y.shape, 0)))))
     kernel = np.array([m.general_p for m in p])
     assert 0.3 < kernel.mean() < 0.7
     assert (kernel < 0.1).mean() < 0.25

@@ -11,17 +11,17 @@ from scipy.stats import binom
 import sim.motion.batches
 from calibration.statistics.forward_model import start_values
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.swimmer import COEFFICIENTS, DIRECT, Swimmer
-from calibration.verdict.calibrate import Verdict
+from calibration.swimmer.swimmer import COEFFICIENTS, DIRECT, SwimmerModel
+from calibration.verdict.verdict import Verdict
 from tests.calibration import toy
 from tests.calibration.toy_tables import START, TRUTH, closed, install_toy, toy_table
 
 
 @pytest.mark.usefixtures("toy_model")
 def test_tests_on_the_toy_do_not_simulate() -> None:
-    """A Swimmer takes the toy by itself, as the command line makes it; the simulator refuses."""
+    """A SwimmerModel takes the toy by itself, as the command line makes it; the simulator refuses."""
     data = read_measurements(toy_table(1))
-    plain, real = Swimmer(START, data), Swimmer(START, data, solver=DIRECT)
+    plain, real = SwimmerModel(START, data), SwimmerModel(START, data, solver=DIRECT)
     start = start_values(plain)
     assert plain.solver is toy.SOLVER
     assert np.isfinite(plain.predict([start])).all()

@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 
 from calibration.report.corrected_robot import corrected_toml
-from calibration.swimmer.swimmer import Swimmer
-from calibration.verdict.calibrate import Verdict, verdict_record
+from calibration.swimmer.swimmer import SwimmerModel
+from calibration.verdict.verdict import Verdict
+from calibration.verdict.verdict_json import verdict_record
 from planner.paths.path import circle
 from planner.planning.plan import plan
 from planner.vehicle.calibration_table import read_knowledge
@@ -58,9 +59,9 @@ def correction(**changes: object) -> Correction:
 
 def test_it_predicts_runs_that_it_was_not_learnt_from(result: Verdict) -> None:
     assert result.verdict == "unexplained"
-    assert result.predictive is not None
+    assert result.corrections.learnt is not None
     assert result.error_predictive is not None
-    assert any("ln l/R" in term for term in result.predictive.terms)
+    assert any("ln l/R" in term for term in result.corrections.learnt.terms)
     left = result.error_before**2 - result.noise_ceiling**2
     assert result.error_predictive**2 - result.noise_ceiling**2 < 0.4 * left
     assert f"{100 * result.error_predictive:.1f} % on runs" in result.sentence
@@ -71,24 +72,26 @@ def test_the_corrected_robot_simulates_what_was_predicted(
     result: Verdict, table: pd.DataFrame, tmp_path: Path
 ) -> None:
     """The file's robot, with the table's settings, moves as the correction that was learnt from all runs says."""
-    assert result.predictive is not None
-    (tmp_path / "corrected.toml").write_text(corrected_toml(START, result.delivered, result.predictive))
+    assert result.corrections.learnt is not None
+    (tmp_path / "corrected.toml").write_text(
+        corrected_toml(START, result.fits.final_refit, result.corrections.learnt)
+    )
     robot = load_robot(tmp_path / "corrected.toml")
-    assert robot.correction == result.predictive.content.correction
+    assert robot.correction == result.corrections.learnt.correction
     model = toy_swimmer(table)
-    own = Swimmer(replace(robot, tail_length=START.tail_length), model.runs, solver=model.solver)
-    start = {p.name: p.start for p in (*own.coefficients, *own.given, *own.effects)}
+    own = SwimmerModel(replace(robot, tail_length=START.tail_length), model.runs, solver=model.solver)
+    start = {p.name: p.start for p in (*own.coefficients, *own.nuisances, *own.effects)}
     start["tail_length_offset"] = robot.tail_length - START.tail_length
-    start |= {k: result.delivered.parameters[k] for k in ("camera_scale", "heading_zero", "tachometer")}
-    left = (model.runs.y - own.predict([start])[0])[result.used]
-    before = (model.runs.y - result.base.prediction)[result.used]
+    start |= {k: result.fits.final_refit.parameters[k] for k in ("camera_scale", "heading_zero", "tachometer")}
+    left = (model.runs.y - own.predict([start])[0])[result.conditions.split.fitted]
+    before = (model.runs.y - result.base.prediction)[result.conditions.split.fitted]
     assert (left**2).mean() < 0.6 * (before**2).mean()
 
 
 def test_its_uncertainty_is_in_the_covariance(result: Verdict, tmp_path: Path) -> None:
-    assert result.predictive is not None
-    (tmp_path / "with.toml").write_text(corrected_toml(START, result.delivered, result.predictive))
-    (tmp_path / "without.toml").write_text(corrected_toml(START, result.delivered))
+    assert result.corrections.learnt is not None
+    (tmp_path / "with.toml").write_text(corrected_toml(START, result.fits.final_refit, result.corrections.learnt))
+    (tmp_path / "without.toml").write_text(corrected_toml(START, result.fits.final_refit))
     known, plain = (read_knowledge(tmp_path / f"{name}.toml") for name in ("with", "without"))
     assert {"surface_couple", "anisotropic_head_drag"} <= set(known.names)
     place = known.names.index("C_yr")

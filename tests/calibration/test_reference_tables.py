@@ -10,7 +10,7 @@ import pytest
 
 from calibration.report.report import write_report
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
 from sim.inputs import load_robot
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 
 def closed(name: str) -> Verdict:
     data = read_measurements(HERE / f"{name}.csv")
-    return calibrate(Swimmer(load_robot(HERE / "robot.toml"), data), progress=False)
+    return calibrate(SwimmerModel(load_robot(HERE / "robot.toml"), data), progress=False)
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -43,7 +43,7 @@ def test_one_effect_is_named_and_sized() -> None:
     result = closed("effect")
     assert result.verdict == "effect"
     assert result.effects == ("end_over_end_drag",)
-    low, high = result.final_intervals["end_over_end_drag"]
+    low, high = result.fits.final_intervals["end_over_end_drag"]
     assert low < 5.0 < high
     assert result.error_after < 1.25 * result.noise_ceiling < result.error_before
 
@@ -59,7 +59,7 @@ def test_rivals_are_all_named_with_the_runs_that_would_tell_them_apart(tmp_path:
     """The verdict, the first rival's size, and the page that a lab reads; the robot is as given."""
     data = read_measurements(HERE / "ambiguous.csv")
     known = replace(load_robot(HERE / "robot.toml"), sigmas=dict.fromkeys(DEFAULTS, Sigma(0.0, False)))
-    result = calibrate(Swimmer(known, data), progress=False)
+    result = calibrate(SwimmerModel(known, data), progress=False)
     assert result.verdict == "ambiguous"
     assert "tail_spin_drag" in result.effects
     assert len(result.effects) > 1
@@ -78,5 +78,5 @@ def test_where_tolerances_are_wide_a_wrong_number_comes_ahead_of_those_rivals() 
     result = closed("ambiguous")
     assert result.verdict == "number"
     assert result.effects == ()
-    assert "tail_spin_drag" in {e.name for c in result.instead for e in c.claimed}
+    assert "tail_spin_drag" in {e.name for c in result.evidence.rival_effects for e in c.claimed}
     assert "If the number is right, " in result.sentence

@@ -10,7 +10,7 @@ import pytest
 
 from calibration.statistics.forward_model import by_differences, start_values
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from sim.io.errors import InputError
@@ -44,7 +44,7 @@ def test_derivatives_are_those_of_the_prediction(table: pd.DataFrame) -> None:
     noise = np.random.default_rng(1).normal(scale=0.01, size=(len(rows), 6))
     columns = ["omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm", "theta_deg", "v_cm_s"]
     rows[columns] *= np.exp(noise)
-    model = Swimmer(START, read_measurements(rows))
+    model = SwimmerModel(START, read_measurements(rows))
     assert model.untestable == {}
     names = [p.name for p in (*model.coefficients, *model.effects)]
     at = {**start_values(model), "motor_slip": 0.03, "tracked_point": 0.2, "current_along_x": 0.002}
@@ -65,7 +65,7 @@ def test_an_odd_effect_of_the_robot_itself_tells_left_from_right(table: pd.DataF
     """Even where the runs are in one direction, so that it cannot be fitted."""
     left = read_measurements(table[table["omega_rpm"] < 0].drop(columns=["elapsed_min", "temperature_C"]))
     plain, biased = (
-        Swimmer(replace(START, effects=effects), left, solver=toy.SOLVER)
+        SwimmerModel(replace(START, effects=effects), left, solver=toy.SOLVER)
         for effects in ({}, {"left_right_bias": 0.3})
     )
     assert "left_right_bias" not in {e.name for e in biased.effects}
@@ -75,7 +75,7 @@ def test_an_odd_effect_of_the_robot_itself_tells_left_from_right(table: pd.DataF
             **{c: lambda t, c=c: -t[c] for c in ("omega_rpm", "omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s")}
         )
     )
-    right = Swimmer(biased.robot, mirrored, solver=toy.SOLVER)
+    right = SwimmerModel(biased.robot, mirrored, solver=toy.SOLVER)
     right_turns = right.predict([start_values(right)])[0]
     yaw = left.outputs.index("omega_yr")
     assert np.abs(left_turns[1] - left_turns[0])[:, yaw].min() > 1e-4
@@ -83,14 +83,14 @@ def test_an_odd_effect_of_the_robot_itself_tells_left_from_right(table: pd.DataF
 
 
 def test_a_current_shows_in_the_speed_along_its_heading(table: pd.DataFrame) -> None:
-    model = Swimmer(START, read_measurements(table), solver=toy.SOLVER)
+    model = SwimmerModel(START, read_measurements(table), solver=toy.SOLVER)
     at = start_values(model)
     still, moving = model.predict([at, {**at, "current_along_x": 0.001}])
     speed = model.runs.outputs.index("v")
     gained = np.exp(moving[:, speed]) - np.exp(still[:, speed])
     assert gained == pytest.approx(0.001 * np.cos(np.radians(table["heading_deg"])))
     assert np.delete(moving - still, speed, 1) == pytest.approx(0)
-    without = Swimmer(START, read_measurements(table.drop(columns="heading_deg")), solver=toy.SOLVER)
+    without = SwimmerModel(START, read_measurements(table.drop(columns="heading_deg")), solver=toy.SOLVER)
     assert "current in the tank along x" in without.untestable
 
 
@@ -109,11 +109,11 @@ def test_a_current_shows_in_the_speed_along_its_heading(table: pd.DataFrame) -> 
 def test_wrong_units_are_refused(table: pd.DataFrame, column: str, factor: float, expected: str) -> None:
     rows = table.assign(**{column: table[column] * factor}).drop(columns="v_cm_s")
     with pytest.raises(InputError, match=expected):
-        calibrate(Swimmer(START, read_measurements(rows), solver=toy.SOLVER), progress=False)
+        calibrate(SwimmerModel(START, read_measurements(rows), solver=toy.SOLVER), progress=False)
 
 
 def test_right_units_are_taken(table: pd.DataFrame) -> None:
-    model = Swimmer(START, read_measurements(table.drop(columns="v_cm_s")), solver=toy.SOLVER)
+    model = SwimmerModel(START, read_measurements(table.drop(columns="v_cm_s")), solver=toy.SOLVER)
     model.check(model.predict([start_values(model)])[0])
 
 
@@ -122,9 +122,9 @@ def test_the_first_guess_is_found_from_any_start(table: pd.DataFrame) -> None:
     truth = replace(START, C_t=3.4, C_r=1.5, C_yr=4.5)
     data = read_measurements(table.drop(columns="v_cm_s"))
     rng = np.random.default_rng(4)
-    exact = Swimmer(truth, data).predict([start_values(Swimmer(truth, data))], lookup=load())[0]
+    exact = SwimmerModel(truth, data).predict([start_values(SwimmerModel(truth, data))], lookup=load())[0]
     runs = replace(data, y=exact + rng.normal(scale=0.003, size=exact.shape))
     for start in (START, replace(START, C_t=1.2, C_r=3.0, C_yr=2.0), replace(START, C_t=5.0, C_r=1.2, C_yr=6.0)):
-        model = Swimmer(start, runs)
+        model = SwimmerModel(start, runs)
         guess = model.guess(start_values(model), np.ones(len(runs), bool))
         assert [guess[n] for n in ("C_t", "C_r", "C_yr")] == pytest.approx([3.4, 1.5, 4.5], rel=0.05)

@@ -8,12 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.statistics.held_out import middle_session
 from calibration.statistics.noise import SESSION_SHARE
+from calibration.statistics.splits import middle_session
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.protocols import PROTOCOLS
-from calibration.swimmer.swimmer import Swimmer
-from calibration.verdict.calibrate import calibrate, verdict_record
+from calibration.swimmer.swimmer import SwimmerModel
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError, run_command
 from tests.calibration import toy
 from tests.calibration.toy_tables import START, closed, toy_table
@@ -60,8 +61,8 @@ def test_bad_rows_are_named_and_set_aside(toy_model: None) -> None:
     table.loc[2, "omega_h_rpm"] *= -1
     data = read_measurements(table)
     assert len(data) == len(table) - 3
-    assert [line.split(":")[0] for line in data.set_aside] == ["row 1", "row 2", "row 3"]
-    assert read_measurements(table.assign(colour="red")).set_aside[-1] == "column colour: not known, left out"
+    assert [line.split(":")[0] for line in data.excluded] == ["row 1", "row 2", "row 3"]
+    assert read_measurements(table.assign(colour="red")).excluded[-1] == "column colour: not known, left out"
     with pytest.raises(InputError, match="unknown"):
         read_measurements(table.rename(columns={"trial": "tri al"}))
 
@@ -81,8 +82,8 @@ def test_few_sessions_give_a_weaker_conclusion(names: tuple[str, ...]) -> None:
             assert len(set(locked[(data.condition == condition) & (within == name)])) <= 1
     result = closed(table)
     assert result.effects == ("end_over_end_drag",)
-    assert any(f"{len(names)} session" in limit for limit in result.limits)
-    assert "block" in result.locked
+    assert any(f"{len(names)} session" in limit for limit in result.conditions.caveats)
+    assert "block" in result.conditions.split.names
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -90,10 +91,10 @@ def test_two_sessions_kept_whole_are_not_called_blocks() -> None:
     """The paper's protocol locks N = 2 and 5; where these are a session, none is divided."""
     table = toy_table(5)
     table["session"] = np.where(table["N"].isin((3, 4)), "inner", "outer")
-    data, locked = PROTOCOLS["paper"](read_measurements(table))
-    result = calibrate(Swimmer(START, data, solver=toy.SOLVER), locked=locked, progress=False)
-    assert result.locked == "outer"
-    assert not any("sessions only" in limit for limit in result.limits)
+    data, held_out = PROTOCOLS["paper"](read_measurements(table))
+    result = calibrate(SwimmerModel(START, data, solver=toy.SOLVER), held_out=held_out, progress=False)
+    assert result.conditions.split.names == "outer"
+    assert not any("sessions only" in limit for limit in result.conditions.caveats)
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -111,7 +112,7 @@ def test_robots_of_one_kind_are_closed_with_both_limits() -> None:
     table = pd.concat([t[t["N"] == 3] for t in (toy_table(5), toy_table(6))])
     result = closed(table)
     assert result.verdict == "none"
-    assert [("N = 3" in limit, "1 session only" in limit) for limit in result.limits] == [
+    assert [("N = 3" in limit, "1 session only" in limit) for limit in result.conditions.caveats] == [
         (True, False),
         (False, True),
     ]
@@ -138,8 +139,8 @@ def test_a_slipped_decimal_point_is_named_and_set_aside() -> None:
     table = toy_table(12)
     table.loc[17, "omega_yr_rad_s"] *= 10
     result = closed(table)
-    assert [line.split(" is ")[0] for line in result.set_aside] == ["row 18: omega_yr"]
-    assert not result.used[17]
+    assert [line.split(" is ")[0] for line in result.conditions.excluded] == ["row 18: omega_yr"]
+    assert not result.conditions.split.fitted[17]
     without = closed(table.drop(index=17))
     assert result.verdict == without.verdict
     assert result.noise_ceiling == pytest.approx(without.noise_ceiling, rel=0.05)
@@ -148,7 +149,7 @@ def test_a_slipped_decimal_point_is_named_and_set_aside() -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_noise_and_missing_effects_are_no_gross_errors() -> None:
-    assert closed(toy_table(13, end_over_end_drag=5.0)).set_aside == ()
+    assert closed(toy_table(13, end_over_end_drag=5.0)).conditions.excluded == ()
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -157,7 +158,7 @@ def test_an_output_that_follows_from_others_is_counted_once() -> None:
     table["v_cm_s"] = table["R_yr_cm"] * table["omega_yr_rad_s"].abs()
     data = read_measurements(table)
     assert "v" not in data.outputs
-    assert any("v_cm_s: follows from" in line for line in data.set_aside)
+    assert any("v_cm_s: follows from" in line for line in data.excluded)
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -168,18 +169,18 @@ def test_runs_of_one_robot_give_a_weaker_conclusion_that_is_stated() -> None:
     noise = np.random.default_rng(0).normal(scale=0.02, size=len(table))
     table["omega_yr_rad_s"] *= np.exp(noise)
     result = closed(table)
-    assert any("N = 3" in line for line in result.limits)
-    assert verdict_record(result, table="t")["limits"] == list(result.limits)
+    assert any("N = 3" in line for line in result.conditions.caveats)
+    assert verdict_record(result, table="t")["limits"] == list(result.conditions.caveats)
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_the_papers_protocol_fits_three_and_four_tails_and_predicts_two_and_five() -> None:
-    data, locked = PROTOCOLS["paper"](read_measurements(toy_table(16, end_over_end_drag=5.0)))
+    data, held_out = PROTOCOLS["paper"](read_measurements(toy_table(16, end_over_end_drag=5.0)))
     assert data.outputs == ("omega_h", "omega_yr")
-    assert set(data.tails[locked]) == {2.0, 5.0}
-    result = calibrate(Swimmer(START, data, solver=toy.SOLVER), locked=locked, progress=False)
-    assert result.locked == "N=2, N=5"
+    assert set(data.tails[held_out]) == {2.0, 5.0}
+    result = calibrate(SwimmerModel(START, data, solver=toy.SOLVER), held_out=held_out, progress=False)
+    assert result.conditions.split.names == "N=2, N=5"
     assert "end_over_end_drag" in result.effects
     assert result.error_after < 0.5 * result.error_before
     with pytest.raises(InputError, match="N = 2, 3, 4 and 5"):

@@ -10,11 +10,12 @@ import pytest
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward_model import by_differences, start_values
-from calibration.statistics.residual_tests import check_misfit
+from calibration.statistics.residual_tests import examine_residual
 from calibration.statistics.score_directions import Directions, directions
+from calibration.statistics.study import Study
 from calibration.swimmer.candidate_effects import influences
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.swimmer import Swimmer
+from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from tests.calibration.toy_tables import START, TRUTH, closed, toy_swimmer, toy_table
@@ -55,18 +56,16 @@ def test_scores_are_taken_at_several_values_and_the_largest_counts() -> None:
     for column, value in zip(np.moveaxis(own, -1, 0), grid, strict=True):
         expected = by_differences(model, {**base.parameters, TIME: value, SIZE: 1e-6}, [SIZE])[1][..., 0]
         assert column == pytest.approx(expected, rel=0.05, abs=1e-4)
-    found = check_misfit(base, model.runs, used, along, level=0.05, seed=0, draws=50)
-    alone = [
-        check_misfit(base, model.runs, used, Directions.plain(own[..., [j]]), level=0.05, seed=0, draws=50)
-        for j in range(len(grid))
-    ]
+    study = Study.fitted_to(model, used, level=0.05, draws=50)
+    found = examine_residual(study, base, along)
+    alone = [examine_residual(study, base, Directions.plain(own[..., [j]])) for j in range(len(grid))]
     z = np.array([abs(one.scores.z[0]) for one in alone])
     assert abs(found.scores.z[place]) == pytest.approx(z.max())
     assert found.second[place] == grid[int(np.argmax(z))]
     assert len(found.scores.z) == len(model.effects)
-    together = check_misfit(base, model.runs, used, Directions(own, np.zeros(3, int), np.array(grid)), level=0.05,
-                            seed=0, draws=200)  # fmt: skip
-    first = check_misfit(base, model.runs, used, Directions.plain(own[..., [0]]), level=0.05, seed=0, draws=200)
+    all_values = Directions(own, np.zeros(3, int), np.array(grid))
+    together = examine_residual(study, base, all_values, draws=200)
+    first = examine_residual(study, base, Directions.plain(own[..., [0]]), draws=200)
     assert together.critical_z >= first.critical_z  # the bootstrap takes the largest, too
 
 
@@ -95,7 +94,7 @@ def test_local_thinning_is_found_by_the_simulator() -> None:
     """Truth by time steps on a finer mesh."""
     truth = replace(TRUTH, effects=HIDDEN)
     table = make_table(truth, seed=4, tails=(2, 3, 4), lengths_cm=(5.0, 8.0), motor_rpm=SPEEDS, title="")
-    result = calibrate(Swimmer(START, read_measurements(table)), progress=False)
+    result = calibrate(SwimmerModel(START, read_measurements(table)), progress=False)
     assert SIZE in result.effects
     assert result.error_after < 1.2 * result.noise_ceiling
     refit = next(c.refit for c in result.explaining if c.effect.name == SIZE)

@@ -7,15 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import calibration.attribution.refits
-from calibration.attribution.refits import Candidate
+import calibration.attribution.doubts
+from calibration.attribution.candidate import Candidate
 from calibration.attribution.transfer_test import SURE, fitted_again, transfer_p
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward_model import parameter, start_values
-from calibration.statistics.priors import pulls
-from calibration.swimmer.swimmer import COEFFICIENTS, Swimmer
+from calibration.statistics.pulls import pulls
+from calibration.statistics.study import Study
+from calibration.swimmer.swimmer import COEFFICIENTS, SwimmerModel
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.verdict import verdict_record
+from calibration.verdict.verdict_json import verdict_record
 from sim.arrays import Flags, Floats
 from tests.calibration.toy_tables import TRUTH, toy_swimmer, toy_table
 
@@ -23,15 +24,15 @@ EFFECT = "end_over_end_drag"
 SIZE = 3.0
 
 
-def model() -> Swimmer:
+def model() -> SwimmerModel:
     return toy_swimmer(toy_table(8))
 
 
-def everywhere(swimmer: Swimmer) -> Flags:
+def everywhere(swimmer: SwimmerModel) -> Flags:
     return np.ones(len(swimmer.runs), dtype=bool)
 
 
-def planted(swimmer: Swimmer, share: Floats) -> Swimmer:
+def planted(swimmer: SwimmerModel, share: Floats) -> SwimmerModel:
     """The effect on each run by this share (n,)."""
     truth = {**start_values(swimmer), **{name: getattr(TRUTH, name) for name in COEFFICIENTS}}
     clean, present = swimmer.predict([truth, {**truth, EFFECT: SIZE}])
@@ -39,11 +40,11 @@ def planted(swimmer: Swimmer, share: Floats) -> Swimmer:
     return replace(swimmer, runs=replace(swimmer.runs, y=y))
 
 
-def names(swimmer: Swimmer) -> tuple[str, ...]:
-    return tuple(p.name for p in (*swimmer.coefficients, *swimmer.given))
+def names(swimmer: SwimmerModel) -> tuple[str, ...]:
+    return tuple(p.name for p in (*swimmer.coefficients, *swimmer.nuisances))
 
 
-def claimed(swimmer: Swimmer) -> Fit:
+def claimed(swimmer: SwimmerModel) -> Fit:
     start = {**start_values(swimmer), EFFECT: SIZE}
     return fit(swimmer, start, (*COEFFICIENTS, EFFECT), everywhere(swimmer), title="")
 
@@ -62,7 +63,7 @@ def test_an_effect_carries_over_and_a_mimic_does_not() -> None:
     rest = ~fitted_again(own.runs, everywhere(own))
     for further, carries in ((1.0, True), (3.0, False)):
         there = planted(own, np.where(rest, further, 1.0))
-        p = transfer_p(claimed(there), there.runs, everywhere(there), seed=1)
+        p = transfer_p(Study.fitted_to(there, everywhere(there), seed=1), claimed(there))
         assert (p >= SURE) == carries
 
 
@@ -71,14 +72,14 @@ def test_runs_that_are_all_alike_say_nothing() -> None:
     own = planted(model(), np.ones(len(model().runs)))
     short = own.runs.length < 0.06
     few = short & (own.runs.tails <= 4)
-    assert transfer_p(claimed(own), own.runs, few, seed=1) == 1.0
+    assert transfer_p(Study.fitted_to(own, few, seed=1), claimed(own)) == 1.0
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("toy_model")
 def test_a_claim_that_does_not_carry_over_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     there = planted(model(), np.full(len(model().runs), 2.0))
-    monkeypatch.setattr(calibration.attribution.refits, "transfer_p", lambda *_, **__: 0.001)
+    monkeypatch.setattr(calibration.attribution.doubts, "transfer_p", lambda *_, **__: 0.001)
     doubted = calibrate(there, progress=False)
     assert doubted.effects == (EFFECT,)
     assert "or something outside the catalogue" in doubted.sentence
@@ -91,7 +92,7 @@ def test_an_effect_beside_a_wrong_number_is_in_doubt() -> None:
     refit = claimed(planted(model(), np.ones(len(model().runs))))
     own = model()
     effect = parameter(own, EFFECT)
-    sure = Candidate(effect, (), 8.0, 1.0, 1.0, 1.0, refit, None, 1.0, 0.1, "kept")
+    sure = Candidate(effect, (), 8.0, 1.0, 1.0, 1.0, "kept", refit, None, 1.0, 0.1)
     assert not sure.doubted
-    pull = pulls(fit(own, start_values(own), names(own), everywhere(own), title=""), own.given)[0]
-    assert replace(sure, refit=replace(refit, wrong=((pull,),))).doubted
+    pull = pulls(fit(own, start_values(own), names(own), everywhere(own), title=""), own.nuisances)[0]
+    assert replace(sure, refit=replace(refit, wrong_numbers=((pull,),))).doubted

@@ -9,11 +9,13 @@ import pytest
 
 import calibration.swimmer.synthetic_table
 import sim.motion.batches
+from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.lab_settings import Owned
 from calibration.swimmer.measured_table import read_measurements
-from calibration.swimmer.swimmer import DIRECT, Swimmer
+from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
-from calibration.verdict.calibrate import Verdict, calibrate
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import Verdict
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from tests.calibration import toy
@@ -23,11 +25,11 @@ TRUTH = replace(START, C_t=3.1, C_r=2.4, C_yr=4.4)
 
 
 def install_toy(patch: pytest.MonkeyPatch) -> None:
-    """The toy in place of the simulator: for tables, and for every Swimmer that is not told otherwise."""
-    own = Swimmer.__init__.__defaults__
-    patch.setattr(Swimmer.__init__, "__defaults__", tuple(toy.SOLVER if d is DIRECT else d for d in own))
+    """The toy in place of the simulator: for tables, and for every SwimmerModel that is not told otherwise."""
+    own = SwimmerModel.__init__.__defaults__
+    patch.setattr(SwimmerModel.__init__, "__defaults__", tuple(toy.SOLVER if d is DIRECT else d for d in own))
     patch.setattr(calibration.swimmer.synthetic_table, "stepped_columns", toy.steady_columns)
-    patch.setattr(Swimmer, "guess", lambda model, start, used: start)
+    patch.setattr(SwimmerModel, "guess", lambda model, start, used: start)
     for name in ("steady", "sensitivities", "settle"):  # what all of the simulator's batches call
         patch.setattr(sim.motion.batches, name, refuse_to_simulate)
 
@@ -40,9 +42,9 @@ def toy_table(seed: int, *, lengths_cm: tuple[float, ...] = (5.0, 8.0, 11.0), **
     return make_table(replace(TRUTH, effects=effects), seed=seed, lengths_cm=lengths_cm, title="")
 
 
-def toy_swimmer(table: pd.DataFrame, robot: Robot = START, own: Owned | None = None) -> Swimmer:
-    return Swimmer(robot, read_measurements(table), solver=toy.SOLVER, own=own or {})
+def toy_swimmer(table: pd.DataFrame, robot: Robot = START, own: Owned | None = None) -> SwimmerModel:
+    return SwimmerModel(robot, read_measurements(table), solver=toy.SOLVER, own=own or {})
 
 
 def closed(table: pd.DataFrame, seed: int = 0) -> Verdict:
-    return calibrate(toy_swimmer(table), seed=seed, progress=False)
+    return calibrate(toy_swimmer(table), correction=learn_head_correction, seed=seed, progress=False)

@@ -12,21 +12,17 @@ the Stokeslets of `sim.mechanics.flow`, spread over √e a, which is slender-bod
 
 A table has the columns lambda_over_R, thrust_over_etaOmR2, torque_over_etaOmR3 and drag_over_etaUR, and one row
 for each helix. Rodenborn et al. (2013) measured such helices.
-
-Usage: python -m calibration.examples.helices TABLE.csv
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
 
 from sim.arrays import Floats
 from sim.compiling import compiled
-from sim.io.errors import InputError, run_command
+from sim.io.errors import InputError
 from sim.io.tables import read_table
 from sim.mechanics.stokeslets import stokeslets
 
@@ -106,25 +102,3 @@ def read_helices(source: str | Path) -> tuple[Floats, Floats]:
         if column not in table:
             raise InputError(f"the table has no column {column!r}")
     return table["lambda_over_R"].to_numpy(dtype=float), table[list(COLUMNS)].to_numpy(dtype=float)
-
-
-def main(table: str) -> None:
-    pitch, measured = read_helices(table)
-    print("  model minus measurement [%]    thrust: each λ/R, rms      torque: rms      drag: rms")
-    for label, found in (
-        ("resistive, Gray and Hancock", resistive(pitch)),
-        ("resistive, Lighthill", resistive(pitch, lighthill=True)),
-        ("with the flow of every piece", with_flow(pitch)),
-    ):
-        off = 100 * (found / measured - 1)
-        rms = np.sqrt((off**2).mean(0))
-        each = " ".join(f"{o:+6.1f}" for o in off[:, 0])
-        print(f"  {label:30s} {each}  {rms[0]:6.1f}  {rms[1]:12.1f}  {rms[2]:12.1f}")
-    print("  λ/R: " + " ".join(f"{p:.2f}" for p in pitch))
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python -m calibration.examples.helices")
-    parser.add_argument("table", help="CSV of helices: " + ", ".join(("lambda_over_R", *COLUMNS)))
-    arguments = parser.parse_args()
-    sys.exit(run_command(lambda _: main(arguments.table)))

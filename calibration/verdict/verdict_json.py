@@ -1,0 +1,92 @@
+"""verdict.json: the record of a verdict."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from calibration.statistics.priors import Pull
+from calibration.verdict.verdict import Verdict
+from sim.io.provenance import provenance
+
+
+def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
+    """Write a verdict as verdict.json has it; its keys are a format, and older than the names here."""
+    final, misfit, learnt = result.final, result.evidence.misfit, result.corrections.learnt
+    parameters = {
+        name: {
+            "value": final.parameters[name],
+            "interval": list(result.fits.final_intervals[name]),
+            "value_all_runs": result.fits.final_refit.parameters[name],
+        }
+        for name in final.names
+    }
+    return {
+        "verdict": result.verdict,
+        "effects": list(result.effects),
+        "sentence": result.sentence,
+        "parameters": parameters,
+        "in_form_only": list(result.in_form_only),
+        "imitability": [c.imitable for c in result.explaining],
+        "transfer_p": [c.transfer for c in result.explaining],
+        "imitable": any(c.doubted for c in result.explaining),
+        "effects_instead": [[e.name for e in c.claimed] for c in result.evidence.rival_effects],
+        "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
+        "numbers_as_given": [_number_record(p) for p in result.fits.pulls],
+        "error_uncalibrated": result.error_uncalibrated,
+        "error_before": result.error_before,
+        "error_after": result.error_after,
+        "error_generic": result.error_generic,
+        "error_predictive": result.error_predictive,
+        "error_after_interval": list(result.errors.after_interval),
+        "noise_ceiling": result.noise_ceiling,
+        "errors_by_output": result.errors.by_output,
+        "p_value": misfit.p_value,
+        "p_general": misfit.general_p,
+        "p_of_each_test": misfit.p,
+        "critical_z": misfit.critical_z,
+        "candidates": [
+            {
+                "effect": c.effect.name,
+                "z": c.z,
+                "survived_share": c.survived,
+                "smallest_detectable": c.detectable,
+                "smallest_detectable_if_numbers_were_exact": c.detectable_exact,
+                "size": c.refit.parameters[c.effect.name] if c.refit else None,
+                "deviance": c.refit.deviance if c.refit else None,
+                "session_gain": [c.gain, c.gain_error],
+                "verdict": c.verdict,
+            }
+            for c in result.evidence.candidates
+        ],
+        "untestable": result.evidence.untestable,
+        "generic_features": list(result.corrections.regression.features),
+        "correction_terms": list(learnt.terms) if learnt else [],
+        "explanations": [e.record() for e in result.next.explanations],
+        "sessions": list(result.conditions.sessions),
+        "next_runs": [run.record() for run in result.next.runs],
+        "next_batch": result.next.batch.record() if result.next.batch else None,
+        "locked_test": result.conditions.split.names,
+        "locked_p_value": result.errors.p_value,
+        "fixed_before": result.conditions.hash,
+        "rows_set_aside": list(result.conditions.excluded),
+        "limits": list(result.conditions.caveats),
+        "table": table,
+        "provenance": provenance({"table": table}),
+    }
+
+
+def _number_record(pull: Pull) -> dict[str, Any]:
+    nuisance = pull.parameter
+    return {
+        "name": nuisance.name,
+        "title": nuisance.title,
+        "given": nuisance.start,
+        "sigma": nuisance.sigma,
+        "scale": "logarithm" if nuisance.logarithmic else "as it is",
+        "change": pull.change,
+        "change_error": pull.error,
+        "change_by_the_runs_alone": pull.alone,
+        "change_by_the_runs_alone_error": pull.alone_error,
+        "pull": pull.z,
+        "words": pull.words,
+    }
