@@ -97,7 +97,7 @@ def run_demo(out: str | Path) -> None:
     shutil.rmtree(data, ignore_errors=True)  # an earlier demo's rows, perhaps of another version
     _command("dataset", "build", "--config", str(Path(__file__).with_name("demo.toml")), "--out", str(data))
     _command("surrogate", "train", str(data), "--out", str(model), "--epochs", "60")
-    print("4/4 close the loop on two measured tables")
+    print("4/4 calibrate with two synthetic tables")
     loops = {name: _close(folder, name) for name in ("hidden effect", "nothing hidden")}
     steered = _steer(loops["hidden effect"][0])
     seconds = time.perf_counter() - began
@@ -255,7 +255,7 @@ def _write_page(
         ],
     )
     for name, (verdict, data) in loops.items():
-        page.section(f"Closing the loop: a table with {name}")
+        page.section(f"Calibration: a table with {name}")
         page.text(verdict.sentence, tone="good" if verdict.verdict in ("effect", "none") else "bad")
         if verdict.verdict == "effect":
             page.figure(draw_residuals(verdict, data), "residuals before and after the effect is added")
