@@ -130,7 +130,7 @@ def gaps() -> dict[str, float]:
             if robot is touching and not np.isnan(size):
                 sizes[name] = size
         print(f"{name:28}{words}   {plausible[0]:.3g} to {plausible[1]:.3g}", flush=True)
-    print("* outside what is plausible; -: at no size within its bounds. Nuisance parameters, fit: ln of the factor")
+    print("* outside the plausible range; -: no size within bounds. Nuisance parameters, fit: ln of the factor")
     return sizes
 
 

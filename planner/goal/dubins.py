@@ -1,9 +1,9 @@
 """Shortest tracks of bounded curvature between poses: Dubins' words.
 
 A car that only drives forward, with least turn radius R, gets from one pose to another on the shortest way by one
-of six words of three segments: LSL, RSR, LSR, RSL, RLR, LRL (L: left arc, R: right arc, S: straight). Source: Dubins
-(1957); formulas as in Shkel and Lumelsky, "Classification of the Dubins set" (2001). Poses are x, y, course. All
-functions take arrays of poses.
+of six words of three segments: LSL, RSR, LSR, RSL, RLR, LRL (L: left arc, R: right arc, S: straight). Source:
+Dubins (1957); formulas as in Shkel and Lumelsky, "Classification of the Dubins set" (2001). Poses are x, y,
+course. All functions take arrays of poses.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _ROUNDING = 1e-9
 
 
 class DubinsPaths(NamedTuple):
-    """M tracks: a start pose (M, 3), the turns (M, 3) of its segments (+1 left, 0, −1) and their lengths (M, 3)."""
+    """M tracks: a start pose (M, 3), the turns (M, 3) of the segments (+1 left, 0, −1), their lengths (M, 3)."""
 
     start: Floats
     turns: Integers

@@ -186,7 +186,7 @@ def _judged(
 
 
 def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[torch.Tensor, dict[str, torch.Tensor], Floats]:
-    """Hints and relative errors of rows inside the domain, and which those are."""
+    """Return the features of the widths and the relative errors of rows inside the domain, and which those are."""
     found = lookup.motions(rows.robots, flag=True)
     inside = np.array([not reason for reason in found.reason])
     if inside.sum() < _FEWEST_INSIDE:  # a table of few rows has a domain that holds hardly any others: all count
