@@ -1,4 +1,4 @@
-"""Paths that people draw: CSV and SVG, with transforms, curves, units, and several shapes."""
+"""Paths from files: tables of several kinds; SVG with transforms, curves, units and several shapes."""
 
 from __future__ import annotations
 
@@ -116,3 +116,13 @@ def test_a_table_has_no_shapes(tmp_path: Path) -> None:
     assert read_path(tmp_path / "p.csv").unit is None
     with pytest.raises(InputError, match="no SVG"):
         read_path(tmp_path / "p.csv", shape="a")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["x,y\n0,0\n3,0\n3,4.5\n", "X;Y\n0;0\n3;0\n3;4,5\n", "0,0\n3,0\n3,4.5\n", "0 0\n3 0\n3 4.5\n",
+     "t;x;y\n1;0;0\n2;3;0\n3;3;4.5\n", "y\tx\n0\t0\n0\t3\n4.5\t3\n", "\ufeffx,y\n0,0\n3,0\n3,4.5\n"],
+)  # fmt: skip
+def test_tables_of_several_kinds_are_the_same_path(text: str, tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text(text, encoding="utf-8")
+    assert read_path(tmp_path / "path.csv").path.points.tolist() == [[0, 0], [3, 0], [3, 4.5]]

@@ -16,7 +16,7 @@ from planner.goal.route import NoWayError
 from planner.goal.to_goal import GoalPlan, to_goal
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.rollout import Switches, poses_at_flips
-from sim.io.errors import InputError, run_command
+from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
 from surrogate.one_robot.tabulate import tabulate
@@ -24,6 +24,8 @@ from tests.oracles.quickest import brute_force
 from tests.oracles.random_tasks import goal_behind_circles, random_goal, replayed_clearance
 
 CONTROL = PRESETS["paper-control"]
+
+
 BOX = [[-2, -4], [9, -4], [9, 4], [-2, 4]]
 
 
@@ -133,30 +135,3 @@ def test_refusals() -> None:
         to_goal((0, 0, 0), (3, 0, 0), CONTROL, tolerance=0.001)
     with pytest.raises(InputError, match="radius above 0"):
         Circle(0, 0, -1)
-
-
-def test_the_command_says_that_there_is_no_way(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from planner.__main__ import main
-
-    words = ["goal", "--robot", "paper-control", "--goal", "5", "0", "0", "--keep-out", "circle:5,0,1"]
-    assert run_command(main, [*words, "--out", str(tmp_path / "out")]) == 3
-    error = capsys.readouterr().err
-    assert error.startswith("error: there is no way: at the goal")
-    assert len(error.splitlines()) == 1
-    assert not (tmp_path / "out").exists()
-
-
-def test_files_and_units(tmp_path: Path) -> None:
-    from planner.__main__ import main
-
-    tail = 100 * CONTROL.tail_length
-    (tmp_path / "outline.csv").write_text("".join(f"{x * tail},{y * tail}\n" for x, y in BOX))
-    words = ["goal", "--robot", "paper-control", "--unit", "cm", "--goal", str(3 * tail), str(tail), "-90"]
-    words += ["--walls", str(tmp_path / "outline.csv"), "--keep-out", f"circle:0,{3 * tail},{tail}"]
-    assert run_command(main, [*words, "--out", str(tmp_path / "out")]) == 0
-    content = json.loads((tmp_path / "out" / "goal.json").read_text())
-    assert content["goal"] == pytest.approx([3, 1, -math.pi / 2])
-    assert np.array(content["walls"]) == pytest.approx(np.array(BOX))
-    assert content["keep_out"][0]["circle"] == pytest.approx([0, 3, 1])
-    assert content["margin_over_l"] > 0
-    assert {"plan.json", "schedule.h", "goal.svg"} <= {path.name for path in (tmp_path / "out").iterdir()}

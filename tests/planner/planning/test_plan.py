@@ -1,0 +1,166 @@
+"""Plans: the paper's cases, objectives, tolerance, refusals, currents, and no simulation."""
+
+from __future__ import annotations
+
+import math
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from typing import Any, get_type_hints
+
+import numpy as np
+import pytest
+
+from planner.paths.path import Path2D, circle, polygon
+from planner.planning.plan import _MOVED, plan
+from planner.planning.request import PlanRequest, RequestOptions
+from planner.vehicle.calibration_table import (
+    CalibrationKnowledge,
+)
+from sim.io.errors import InputError
+from sim.model.presets import PRESETS
+
+CONTROL = PRESETS["paper-control"]
+
+
+def refused(path: Any, expected: str, **options: Any) -> None:
+    with pytest.raises(InputError, match=expected) as caught:
+        plan(path, options.pop("robot", CONTROL), **options)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["circle", "square", "triangle"])
+def test_paper_cases_are_planned_within_their_bound(name: str) -> None:
+    path = {"circle": circle(1.5), "square": polygon(4, 3.0), "triangle": polygon(3, 4.0)}[name]
+    robot = PRESETS["paper-triangle"] if name == "triangle" else CONTROL
+    result = plan(path, robot)
+    assert result.predicted_rms < 1.3 * result.straight.rms
+    assert result.errors.drawn_rms < {"circle": 0.012, "square": 0.020, "triangle": 0.042}[name]
+    assert result.errors.guaranteed is not None
+    assert result.predicted_max <= min(result.errors.guaranteed, result.stated_error)
+    assert result.errors.closure is not None
+    assert result.errors.closure < 0.05
+    assert result.dwells.min() >= result.minimum_dwell * (1 - 1e-9)
+    again = plan(path, robot)
+    assert np.array_equal(again.dwells, result.dwells)
+
+
+def test_planning_never_calls_the_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
+    import sim.motion.orbits
+    import sim.motion.run
+    import sim.motion.steady
+    import sim.motion.switching
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("the planner simulated")
+
+    for module, name in ((sim.motion.steady, "steady"), (sim.motion.switching, "switch_response"),
+                         (sim.motion.orbits, "refined_orbit"), (sim.motion.run, "advance")):  # fmt: skip
+        monkeypatch.setattr(module, name, refuse)
+    assert len(plan(polygon(4, 3.0), CONTROL).dwells) > 50
+
+
+def test_planning_does_not_even_load_the_simulator() -> None:
+    simulator = ("sim.solve.newton", "sim.motion.steady", "sim.motion.replay", "sim.motion.run", "sim.solve.orbit")
+    code = (
+        "import sys; from softflagella import plan, circle; from sim.model.presets import PRESETS;"
+        "plan(circle(2.0), PRESETS['paper-control']);"
+        f"print([m for m in {simulator} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_other_points_of_the_axis() -> None:
+    """The tip needs a longer rod, the pivot none; each is planned for itself."""
+    for point in ("head_tip", "pivot"):
+        result = plan(circle(2.5), CONTROL, point=point)  # type: ignore[arg-type]
+        assert result.errors.guaranteed is not None
+        assert result.predicted_max <= result.errors.guaranteed
+        assert result.tracked.offset != 0
+
+
+def test_old_attributes_of_a_plan_warn_and_work() -> None:
+    result = plan(circle(2.0), CONTROL)
+    for name, path in _MOVED.items():
+        with pytest.warns(DeprecationWarning, match=f"Plan.{name} is now Plan.{re.escape(path)}"):
+            value = getattr(result, name)
+        new: Any = result
+        for part in path.removesuffix("()").split("."):
+            new = getattr(new, part)
+        assert np.array_equal(value, new()) if path.endswith("()") else value == new or value is new
+    with pytest.raises(AttributeError, match="'Plan' object has no attribute 'dwell'"):
+        result.dwell  # type: ignore[attr-defined]  # noqa: B018
+
+
+def test_the_options_of_plan_are_the_fields_of_a_request() -> None:
+    assert get_type_hints(RequestOptions) == get_type_hints(PlanRequest)
+
+
+def test_a_tolerance_shortens_the_dwell_and_says_when_it_cannot() -> None:
+    free = plan(circle(2.0), CONTROL, objective="flips")
+    tight = plan(circle(2.0), CONTROL, objective="flips", tolerance=0.75 * free.stated_error)
+    assert tight.minimum_dwell < free.minimum_dwell
+    assert tight.stated_error <= 0.75 * free.stated_error
+    assert len(tight.dwells) > len(free.dwells)
+    with pytest.raises(InputError, match="smallest stated error is"):
+        plan(circle(2.0), CONTROL, tolerance=1e-3)
+
+
+def test_objectives_trade_error_for_time_and_flips() -> None:
+    found = {name: plan(circle(2.0), CONTROL, objective=name) for name in ("error", "time", "flips")}  # type: ignore[arg-type]
+    assert found["error"].predicted_rms < found["time"].predicted_rms
+    assert found["time"].duration < found["error"].duration
+    assert len(found["flips"].dwells) <= len(found["time"].dwells) < len(found["error"].dwells)
+
+
+def test_a_shortest_dwell_in_seconds() -> None:
+    result = plan(circle(2.0), CONTROL, minimum_seconds=4.0)
+    assert result.seconds[:-1].min() >= 4.0 * (1 - 1e-9)
+
+
+def test_refusals() -> None:
+    from dataclasses import replace
+
+    refused([], "empty")
+    refused([[0, 0]], "same|two points")
+    refused([[0, 0], [0, 0]], "same")
+    refused([[0, 0], [float("nan"), 1]], "finite")
+    refused([[0, 0, 0], [1, 1, 1]], r"\(n, 2\)")
+    refused([["a", "b"]], "no number")
+    refused(circle(0.5), "too tight .* scale the path by")
+    refused(polygon(4, 0.8), "too tight .* scale the path by")
+    refused(polygon(4, 0.1), "too small, the robot's circle has a radius")
+    refused([[0, 0], [8e4, 0]], "if you gave m and mean mm")
+    refused(polygon(4, 3.0), "corner of 90 degrees", corner="error")
+    for weight in (-1.0, float("nan")):
+        refused(polygon(4, 3.0), "give a number of l²", time_weight=weight)
+    refused(polygon(4, 3.0), "needs corner = nearest or minimax", corner="fillet", time_weight=0.1)
+    refused(circle(2.0), "below 0.2 time units", minimum_dwell=0.1)
+    refused(circle(2.0), "objective", objective="speed")
+    refused(circle(2.0), "outside the look-up table.* omega_bar = 500", robot=CONTROL.with_motor(500.0))
+    refused(circle(2.0), "outside the look-up table.* a_over_R = 0.1", robot=replace(CONTROL, disc_offset=0.0016))
+    refused(circle(2.0), "tail_sag .*surrogate robot", robot=replace(CONTROL, effects={"tail_sag": 0.1}))
+
+
+def test_another_robot_carries_a_plan_out_in_the_same_seconds_and_metres() -> None:
+    result = plan(circle(2.0), CONTROL)
+    other = replace(CONTROL, viscosity=1.1 * CONTROL.viscosity, tail_length=1.02 * CONTROL.tail_length)
+    one, own = result.schedule(other), result.schedule()
+    assert one.dwells * one.time_scale == pytest.approx(own.dwells * own.time_scale)
+    assert np.array(one.start[:2]) * other.tail_length == pytest.approx(
+        np.array(own.start[:2]) * CONTROL.tail_length
+    )
+
+
+def test_a_current_is_steered_against() -> None:
+    """Across a line: the robot looks upstream, and its track stays on the line."""
+    unit = CONTROL.tail_length / CONTROL.time_scale
+    flow = CalibrationKnowledge(current=(0.0, 0.004 * unit))
+    result = plan(Path2D.of([[0, 0], [12, 0]]), CONTROL, knowledge=flow)
+    assert result.predicted_rms < 1.4 * result.straight.rms
+    middle = result.poses[len(result.poses) // 2 :, 2].mean()
+    assert middle == pytest.approx(-math.asin(0.004 / result.straight.net_speed), abs=0.01)
+    with pytest.raises(InputError, match="as fast as the robot"):
+        plan(circle(3.0), CONTROL, knowledge=CalibrationKnowledge(current=(0.0, 0.5 * unit)))

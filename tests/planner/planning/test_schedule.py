@@ -1,0 +1,74 @@
+"""The schedule: the guaranteed error as a property of random paths; errors do not grow with length."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.paths.distance import distance_to
+from planner.paths.path import Path2D, circle
+from planner.paths.tractrix import Drift, reference
+from planner.planning.schedule import follow
+from planner.planning.stated_error import guaranteed, look_ahead
+from planner.vehicle.rollout import poses_at_flips, trace
+from sim.mechanics import planar
+from tests.planner.vehicles import plain_guidance, vehicle
+
+
+def random_smooth_path(seed: int, length: float, sharpest: float) -> Path2D:
+    """A path of given length with curvature within ±sharpest, varying over lengths of about one."""
+    rng = np.random.default_rng(seed)
+    s = np.arange(0, length, 0.02)
+    waves = rng.normal(size=(6, 1)) * np.sin(rng.uniform(0.3, 2.0, (6, 1)) * s + rng.uniform(0, 6.3, (6, 1)))
+    curvature = sharpest * np.tanh(waves.sum(0) / 2)
+    heading = np.cumsum(curvature) * 0.02
+    return Path2D.of(np.cumsum(0.02 * np.stack([np.cos(heading), np.sin(heading)], 1), 0), closed=False)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_bound_holds_on_random_paths(seed: int) -> None:
+    """Predicted track within the guaranteed error, for paths of many lengths and curvatures."""
+    rng = np.random.default_rng(1000 + seed)
+    car = vehicle(lag=rng.uniform(0, 1))
+    path = random_smooth_path(seed, rng.uniform(5, 40), rng.uniform(0.05, 0.9))
+    ref = reference(path, car.pivot_distance, 0.01)
+    curvature = float(np.abs(ref.curvature).max())
+    if curvature * car.pivot_radius > 0.9:
+        pytest.skip("this path is tighter than the robot can turn")
+    dwell = rng.uniform(0.3, 2.0)
+    ahead = look_ahead(car, curvature)
+    switches = follow(ref, car, plain_guidance(car, dwell, ahead))
+    track = trace(car, switches, 0.0, samples=12)
+    error = distance_to(ref.p, track[:-12])
+    assert error.max() <= guaranteed(car, car.pivot_distance, car.yaw_rate * dwell, ahead)
+    assert switches.dwells.min() >= dwell * (1 - 1e-9)
+
+
+def test_error_does_not_grow_with_length() -> None:
+    car = vehicle()
+    worst = []
+    for length in (20.0, 200.0):
+        ref = reference(Path2D.of([[0, 0], [length, 0]]), car.pivot_distance, 0.01)
+        switches = follow(ref, car, plain_guidance(car, 1.0, look_ahead(car, 0.0)))
+        track = trace(car, switches, 0.0)
+        worst.append(np.abs(track[:, 1]).max())
+    assert worst[1] < 1.2 * worst[0]
+
+
+@pytest.mark.parametrize("bias", [0.0, 0.2])
+def test_the_schedule_predicts_what_the_vehicle_does(bias: float) -> None:
+    """Poses found switch by switch in plain numbers, against the chain of pose changes, current included."""
+    car = replace(vehicle(bias=bias), current=np.array([0.001, -0.0005]))
+    ref = reference(circle(2.0), car.pivot_distance + 0.3, 0.02, Drift(0.0, (0.05, -0.03)))
+    switches = follow(ref, car, plain_guidance(car, 0.4, look_ahead(car, 0.3)), 0.3)
+    pose = switches.poses[0]
+    before = None
+    for i, dwell in enumerate(switches.dwells[:40]):
+        pose = planar.compose(pose, car.motion(switches.first_direction * (-1) ** i, before, dwell))
+        pose = pose + np.append(car.current * dwell, 0.0)
+        assert switches.poses[i + 1] == pytest.approx(pose, abs=1e-9)
+        before = dwell
+    assert poses_at_flips(car, switches) == pytest.approx(switches.poses, abs=1e-8)
+    assert trace(car, switches, 0.0)[::8] == pytest.approx(switches.poses[:, :2], abs=1e-8)
