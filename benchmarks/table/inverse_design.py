@@ -1,32 +1,23 @@
 """Inverse design with the look-up table, checked by the simulator.
 
 Targets are motions that the simulator found for random robots of the domain with two tails and more. The table is
-asked which robots move so, and each robot that it gives is simulated. For the design problem the lengths of tails
-and head, the number of tails and the motor's speed are free.
+asked which robots move so, and each robot that it gives is simulated.
 
 Usage: python -m benchmarks inverse_design [TARGETS]
 
-Takes 2 minutes.
+Takes one minute.
 """
 
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 
 import numpy as np
 import torch
 
-from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.model.groups import Groups
-from sim.model.presets import PRESETS
-from sim.model.response import DWELLS
-from sim.model.robot import Robot
 from sim.motion.batches import steady_columns
-from sim.motion.response import responses
 from surrogate.input_ranges import BOUNDS, COEFFICIENTS, ROBOT
-from surrogate.table.inverse import design, inverse
+from surrogate.table.inverse import inverse
 from surrogate.table.lookup import OUTSIDE, NeuralTable
 from surrogate.table.model_file import load
 from surrogate.training.simulated import SimulatedRobots, as_reached, draw_robots
@@ -40,9 +31,6 @@ KINDS = {  # free inputs, and the outputs that are given
 _SEED, _DRAWN = 77, 256
 _MET = 1e-3  # a target is met where no output misses it by more, relative
 _SOLVED = 1e-6  # misfit of a solution of the table's equations
-_AT = 13  # of DWELLS: T̄ of the design, 1.0
-RADIUS, RPM = 0.9, (20.0, 200.0)  # of the design: largest R_yr/l, motor
-LENGTHS = np.linspace(0.07, 0.15, 9)  # m, of the tails
 
 
 def targets(lookup: NeuralTable, count: int) -> SimulatedRobots:
@@ -85,59 +73,9 @@ def backwards(lookup: NeuralTable, rows: SimulatedRobots, title: str) -> None:
           f"{100 * np.median(away[known]):.2g} %, {100 * np.quantile(away[known], 0.95):.2g} %")  # fmt: skip
 
 
-def designed(lookup: NeuralTable, robot: Robot) -> dict[str, float]:
-    """Of one tail length and N: head length and motor speed for the highest net speed; outputs of the table."""
-    groups = robot.group_values()
-    low, high = (robot.time_scale * rpm * 2 * np.pi / 60 for rpm in RPM)
-    bounds = {
-        "omega_bar": (max(low, BOUNDS["omega_bar"][0]), min(high, BOUNDS["omega_bar"][1])),
-        "L_over_R": BOUNDS["L_over_R"],
-    }
-    limits = {"R_yr_over_l": (0.0, RADIUS), "tail_gap": (1.0, np.inf)}
-    return design(lookup, groups | {"dwell_bar": DWELLS[_AT]}, bounds, best="net_speed_bar", limits=limits)
-
-
-def fastest(lookup: NeuralTable) -> None:
-    """For every N the fastest allowed robot, beside the simulator."""
-    base = PRESETS["paper-control"]
-    print(f"\ndesign: highest net speed at dwells of {DWELLS[_AT]:.2f}, R_yr at most {RADIUS:g} l, tails apart")
-    print(f"{'N':>3}{'l cm':>7}{'L cm':>7}{'rpm':>7}{'mm/s':>8}{'simulated':>11}{'R/l':>8}{'simulated':>11}"
-          f"{'gap':>7}{'simulated':>11}")  # fmt: skip
-    began = time.process_time()
-    for tails in range(2, 9):
-        best: tuple[float, Robot, dict[str, float]] | None = None
-        for length in LENGTHS:
-            robot = replace(base, tails=tails, tail_length=float(length))
-            try:
-                found = designed(lookup, robot)
-            except InputError:
-                continue
-            speed = 1e3 * found["net_speed_bar"] * robot.tail_length / robot.time_scale
-            if best is None or speed > best[0]:
-                best = speed, robot, found
-        if best is None:
-            print(f"{tails:3d}   no robot keeps the limits")
-            continue
-        speed, robot, found = best
-        columns = {n: np.array([found[n]]) for n in ROBOT if n in found}
-        motion = steady_columns(columns, title="")
-        net = _first(responses(Groups.from_columns(columns)).net_speed[:, _AT])
-        unit = 1e3 * robot.tail_length / robot.time_scale
-        head, rpm = found["L_over_R"] * robot.head_radius, found["omega_bar"] / robot.time_scale * 30 / np.pi
-        print(f"{tails:3d}{100 * robot.tail_length:7.1f}{100 * head:7.1f}{rpm:7.0f}{speed:8.3f}{unit * net:11.3f}"
-              f"{found['R_yr_over_l']:8.4f}{_first(motion['R_yr_over_l']):11.4f}{found['tail_gap']:7.2f}"
-              f"{_first(motion['tail_gap']):11.2f}", flush=True)  # fmt: skip
-    print(f"{time.process_time() - began:.0f} s for {7 * len(LENGTHS)} tail lengths and numbers of tails")
-
-
-def _first(values: Floats) -> float:
-    return float(values[0])
-
-
 def main(count: str = "100") -> None:
     torch.set_num_threads(1)
     lookup = load()
     rows = targets(lookup, int(count))
     for title in KINDS:
         backwards(lookup, rows, title)
-    fastest(lookup)

@@ -1,8 +1,7 @@
-"""The table backwards: which robots have a wanted motion, and which of the allowed robots is best.
+"""The table backwards: which robots have a wanted motion.
 
-`inverse` solves for the free inputs by damped least squares (Levenberg and Marquardt) from many starts at once,
-with the derivatives of the table. Several solutions are all returned. `design` maximises one output under limits
-on others, by Sobol points that close in on the best allowed one.
+The free inputs are solved for by damped least squares (Levenberg and Marquardt) from many starts at once, with the
+derivatives of the table. Several solutions are all returned.
 
 Free inputs are varied as logarithms within their bounds. Left out: N, which is not continuous.
 """
@@ -25,7 +24,6 @@ Bounds = Mapping[str, tuple[float, float]]
 _STARTS, _STEPS = 16, 40
 _SOLVED = 1e-6  # misfit, relative, of a solution
 _SAME = 1e-3  # difference of ln(input) up to which two solutions are one
-_SHRINK, _ROUNDS, _CANDIDATES = 0.5, 6, 1024
 
 
 @dataclass(frozen=True)
@@ -131,45 +129,3 @@ def _different(row: Integers, p: Floats, misfit: Floats, outside: Floats, names:
         kept += [int(i) for i in chosen]
     inputs = {name: np.exp(p[kept, i]) for i, name in enumerate(names)}
     return Solutions(row[kept], inputs, misfit[kept], outside[kept])
-
-
-def design(
-    lookup: NeuralTable, robot: Mapping[str, float], bounds: Bounds, *, best: str, limits: Bounds
-) -> dict[str, float]:
-    """The allowed robot with the highest output.
-
-    Args:
-        lookup: the table.
-        robot: the inputs that are given; with `dwell_bar` the net speed can be asked for.
-        bounds: free inputs and their ranges.
-        best: the output to make as large as possible.
-        limits: smallest and largest allowed value of outputs.
-
-    Returns:
-        Inputs and outputs of the best robot found.
-
-    Raises:
-        InputError: no robot within the bounds keeps the limits.
-    """
-    names = list(bounds)
-    low, high = (np.log([bounds[name][i] for name in names]) for i in (0, 1))
-    centre, width = (low + high) / 2, high - low
-    sampler = qmc.Sobol(len(names), rng=np.random.default_rng(0))
-    winner: dict[str, float] = {}
-    for _ in range(_ROUNDS):
-        p = np.clip(centre + width * (sampler.random(_CANDIDATES) - 0.5), low, high)
-        columns = {name: np.full(len(p), value) for name, value in robot.items()}
-        columns |= {name: np.exp(p[:, i]) for i, name in enumerate(names)}
-        found = lookup.query(columns, flag=True)
-        allowed = ~found[OUTSIDE]
-        for name, (least, most) in limits.items():
-            allowed &= (found[name] >= least) & (found[name] <= most)
-        score = np.where(allowed, found[best], -np.inf)
-        top = int(score.argmax())
-        if allowed.any() and score[top] > winner.get(best, -np.inf):
-            winner = {name: float(values[top]) for name, values in {**columns, **found}.items() if name != OUTSIDE}
-            centre = p[top]
-        width = width * _SHRINK
-    if not winner:
-        raise InputError("no robot within the bounds keeps the limits; widen one of them")
-    return winner

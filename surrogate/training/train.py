@@ -59,8 +59,7 @@ def train(
     """A look-up table from a finished data set, or from several.
 
     Args:
-        folder: data set written by `softflagella sweep` or `softflagella surrogate refine`, or several. A row
-            that is in two of them counts once.
+        folder: data set written by `softflagella sweep`, or several. A row that is in two of them counts once.
         settings: networks of the tails and their optimiser.
         curve_settings: the same for the response to a flip.
         flips: robots whose flips are simulated if the data set has no curves.
@@ -89,7 +88,7 @@ def train(
     if not len(flipped):
         some = sets[0].at(np.flatnonzero(sets[0].robots["N"] > 1)[:flips])
         flipped = simulate_robots(some.robots, curves=True, title=title and f"{title}: flips simulated")
-    kept = {"data_hash": "config_hash", "data_code_version": "code_version", "data_chosen": "chosen"}
+    kept = {"data_hash": "config_hash", "data_code_version": "code_version"}
     source = {name: "+".join(str(m.get(key, "")) for m in manifests) for name, key in kept.items()}
     learned, widths, held_out = sets
     return learn(learned, widths, held_out, flipped, settings, curve_settings, source=source, work=work)
@@ -172,8 +171,10 @@ def _judged(
     lookup: NeuralTable, widths: SimulatedRobots, held_out: SimulatedRobots, flips: SimulatedRobots
 ) -> NeuralTable:
     """The table with its intervals and held-out errors; the errors are those of robots with two tails and more."""
-    (first_hints, first, _), (hints, errors, inside) = (_errors(lookup, rows) for rows in (widths, held_out))
-    intervals = Intervals.learned(first_hints, first, hints, errors)
+    (first_features, first, _), (width_features, errors, inside) = (
+        _errors(lookup, rows) for rows in (widths, held_out)
+    )
+    intervals = Intervals.learned(first_features, first, width_features, errors)
     apart = held_out.motion["tail_gap"][inside] >= 1
     several = held_out.robots["N"][inside] > 1
     several = several if several.any() else ~several
@@ -194,7 +195,7 @@ def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[torch.Tensor, d
     truth = with_radius(rows.motion)
     errors = relative_errors(steady_outputs(found, lookup.tails), truth)
     return (
-        lookup.hints(found)[torch.as_tensor(inside)],
+        lookup.width_features(found)[torch.as_tensor(inside)],
         {name: torch.tensor(error[inside]) for name, error in errors.items()},
         inside,
     )

@@ -34,3 +34,10 @@ def table() -> NeuralTable:
     """A table that learned them; its errors are some per cent."""
     held = rows(256, 13, wide=False)
     return learn(rows(), held.at(np.arange(len(held)) % 2 == 0), held, flips(), TAILS, CURVES)
+
+
+def robots_inside(count: int = 6) -> dict[str, np.ndarray]:
+    """Robots inside the small table's domain."""
+    robots = rows(256, 13, wide=False).robots
+    inside = np.flatnonzero(~table().query(robots, flag=True)["outside"])[:count]
+    return {name: values[inside] for name, values in robots.items()}

@@ -28,16 +28,16 @@ import os, signal, sys
 from pathlib import Path
 import numpy as np
 import torch
-import surrogate.networks.checkpoints as work
+import surrogate.networks.checkpoints as checkpoints
+from surrogate.networks import compiled
+from surrogate.table import support
 from surrogate.wrench import balance
-from surrogate.networks import compiled as perceptron
-from surrogate.interface import support
 from surrogate.training.train import learn
 from tests.surrogate.small import CURVES, TAILS, flips, rows
 
 torch.set_num_threads(1)  # as in the tests
-work.EVERY = work._SHARE = 0.0
-left, write = int(sys.argv[2]), work.Checkpoint.write
+checkpoints.EVERY = checkpoints._SHARE = 0.0
+left, write = int(sys.argv[2]), checkpoints.Checkpoint.write
 
 def counted(self, state, *, now=False):
     global left
@@ -46,12 +46,13 @@ def counted(self, state, *, now=False):
     if not left:
         os.kill(os.getpid(), signal.SIGKILL)
 
-work.Checkpoint.write = counted
+checkpoints.Checkpoint.write = counted
 held = rows(256, 13, wide=False)
 halves = held.at(np.arange(len(held)) % 2 == 0)
-found = learn(rows(), halves, held, flips(), TAILS, CURVES, work=work.Work("train", folder=Path(sys.argv[1])))
+context = checkpoints.TrainingContext("train", folder=Path(sys.argv[1]))
+found = learn(rows(), halves, held, flips(), TAILS, CURVES, work=context)
 print(found.identity)
-loops = (perceptron.evaluate_rows, balance.solve_rows, balance.inputs_rows, support._remoteness)
+loops = (compiled.evaluate_rows, balance.solve_rows, balance.inputs_rows, support._remoteness)
 print(sum(loop.stats.cache_hits.total() for loop in loops), sum(loop.stats.cache_misses.total() for loop in loops))
 """
 
@@ -68,7 +69,7 @@ class OneDevice(TorchDispatchMode):
 
 
 def run(folder: Path, states: int) -> subprocess.CompletedProcess[str]:
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     return subprocess.run(
         [sys.executable, "-c", KILLED, str(folder), str(states)], capture_output=True, text=True, cwd=root
     )

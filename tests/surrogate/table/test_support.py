@@ -1,0 +1,47 @@
+"""The domain of a table: joint support, refusals and flags."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from sim.io.errors import InputError
+from surrogate.table.support import Support
+from tests.surrogate.small import table
+
+
+def test_the_support_is_joint() -> None:
+    """Two inputs that always move together: one high and one low is outside, though each alone is in range."""
+    generator = torch.Generator().manual_seed(1)
+    x = torch.randn(4000, 1, generator=generator).double()
+    noise = 0.05 * torch.randn(4000, 2, generator=generator).double()
+    support = Support.of(torch.cat([x, x], 1) + noise)
+    points = torch.tensor([[0.0, 0.0], [1.5, 1.5], [-1.0, -1.05], [1.0, -1.0], [6.0, 6.0]]).double()
+    assert (support.remoteness(points.numpy()) <= 1).tolist() == [True, True, True, False, False]
+
+
+def one_robot(**changes: float) -> dict[str, np.ndarray]:
+    robot = {"C_t": 3.0, "C_r": 2.8, "C_yr": 2.0, "l_over_R": 6.875, "L_over_R": 3.75, "l_over_r0": 34.375,
+             "omega_bar": 10.0, "N": 3.0, "a_over_R": 1.0}  # fmt: skip
+    return {name: np.array([value]) for name, value in (robot | changes).items()}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"omega_bar": 2000.0}, "row 1 is outside the look-up table.*omega_bar = 2000, learned were"),
+        ({"l_over_r0": 500.0}, "l_over_r0 = 500"),
+        ({"N": 2.0}, "none with as many tails"),
+        ({"C_yr": 900.0, "C_t": 0.01}, "outside the look-up table"),
+    ],
+)
+def test_robots_outside_are_refused_or_flagged(changes: dict[str, float], message: str) -> None:
+    robot = one_robot(**changes)
+    with pytest.raises(InputError, match=message):
+        table().query(robot)
+    assert table().query(robot, flag=True)["outside"].tolist() == [True]
+
+
+def test_a_robot_inside_is_answered() -> None:
+    assert table().query(one_robot(), flag=True)["outside"].tolist() == [False]

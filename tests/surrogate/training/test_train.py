@@ -1,0 +1,57 @@
+"""Training from data sets: repeatable, each row once, a fixed split."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import surrogate.training.train as training
+from dataset.build.build import build
+from sim.io.errors import InputError
+from surrogate.training.simulated import draw_robots, simulate_robots
+from tests.dataset.sweeps import design, invented
+from tests.surrogate.small import CURVES, TAILS, flips
+
+
+def test_training_is_repeatable_and_reads_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    some = simulate_robots(draw_robots(256, 11, wide=False) | {"N": np.full(256, 3.0)})
+    monkeypatch.setattr(training, "read_robots", lambda folder: (some, np.arange(len(some))))
+    monkeypatch.setattr(
+        training, "read_manifest", lambda folder: {"config_hash": "h", "code_version": "c", "config": {}}
+    )
+    monkeypatch.setattr(training, "simulate_robots", lambda robots, **kind: flips())
+    first, again = (training.train("folder", TAILS, CURVES, title="") for _ in range(2))
+    assert first.identity == again.identity
+    counts = first.provenance["rows"]
+    assert counts["train"] + counts["widths"] + counts["held_out"] == len(some)
+    few = some.at(np.arange(40))
+    monkeypatch.setattr(training, "read_robots", lambda folder: (few, np.arange(40)))
+    with pytest.raises(InputError, match="training needs 64"):
+        training.train("folder", TAILS, CURVES, title="")
+
+
+def test_the_split_is_fixed_and_disjoint() -> None:
+    parts = training.split(np.arange(10_000))
+    assert np.array_equal(parts[:500], training.split(np.arange(500)))
+    assert np.bincount(parts) / 10_000 == pytest.approx([0.8, 0.1, 0.1], abs=0.02)
+
+
+def test_a_row_that_is_in_two_data_sets_counts_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = {}
+
+    def learn(learned: object, widths: object, held_out: object, *_: object, **__: object) -> None:
+        seen["sizes"] = [len(part) for part in (learned, widths, held_out)]  # type: ignore[arg-type]
+
+    monkeypatch.setattr(training, "learn", learn)
+    first, longer, another = (str(tmp_path / name) for name in ("first", "longer", "another"))
+    for folder, sweep in ((first, design(100)), (longer, design(160)), (another, design(100, seed=6))):
+        build(sweep, folder, jobs=1, title="", simulate=invented)
+    sizes = {}
+    for folders in (first, longer, another, (first, longer), (longer, first, longer), (longer, another)):
+        training.train(folders, title="")
+        sizes[folders] = seen["sizes"]
+    assert sum(sizes[first]) < sum(sizes[longer])
+    assert sizes[first, longer] == sizes[longer, first, longer] == sizes[longer]
+    assert sizes[longer, another] == [a + b for a, b in zip(sizes[longer], sizes[another], strict=True)]
