@@ -1,12 +1,12 @@
-"""make demo: the whole pipeline on the paper's robots, ending with one page.
+"""Run the whole pipeline on the paper's robots, ending with one page (`softflagella demo`).
 
-Every step is a command that a user would type; it is printed and run. Steps that do not wait for each other
-(replays, small simulations) run side by side, one process a core.
+Every step is a command that a user would type; it is printed and run. Independent steps (replays, simulations)
+run side by side, one process for each core.
 
-1. Look at the robot: shape of its tails, circles for both motor directions (simulated).
-2. A small sweep, and a look-up table trained on it, beside the shipped one.
-3. Circle, square (N = 2) and triangle (N = 4): planned from the look-up table alone, replayed in the simulator.
-4. Two measured tables, made on a finer mesh: one with an effect that the fitter is not told of, one without.
+1. Simulate the robot: the shape of its tails, circles for both motor directions.
+2. Plan circle, square (N = 2) and triangle (N = 4) from the look-up table alone, and replay them in the simulator.
+3. Simulate a small sweep, and train a look-up table on it.
+4. Calibrate with two synthetic tables from a finer mesh: one has an effect that the model lacks, one has none.
 """
 
 from __future__ import annotations
@@ -74,14 +74,15 @@ CASES = (
     Case("square", "paper-control", "square:3"),
     Case("triangle", "paper-triangle", "triangle:4"),
 )
-# The robot behind the two tables; the fitter starts from the paper's coefficients.
+# The robot behind the two tables; calibration starts from the paper's coefficients.
 HIDDEN = {"C_t": 3.1, "C_r": 2.4, "C_yr": 4.4}
 HIDDEN_EFFECT = {"end_over_end_drag": 5.0}
+SWEEP_TOML = Path(__file__).with_name("demo.toml")
 _LENGTHS_CM = (6.0, 7.5, 9.0)
 
 
 def run_demo(out: str | Path) -> None:
-    """Run everything; intermediate files go to a folder beside the page."""
+    """Run the pipeline; intermediate files go to a folder beside the page."""
     began = time.perf_counter()
     page_path = Path(out)
     folder = page_path.parent / "demo"
@@ -95,10 +96,10 @@ def run_demo(out: str | Path) -> None:
     print("3/4 a small sweep and a look-up table trained on it")
     data, model = folder / "sweep", folder / "model.safetensors"
     shutil.rmtree(data, ignore_errors=True)  # an earlier demo's rows, perhaps of another version
-    _command("dataset", "build", "--config", str(Path(__file__).with_name("demo.toml")), "--out", str(data))
-    _command("surrogate", "train", str(data), "--out", str(model), "--epochs", "60")
-    print("4/4 calibrate with two synthetic tables")
-    loops = {name: _close(folder, name) for name in ("hidden effect", "nothing hidden")}
+    _command("sweep", "--config", str(SWEEP_TOML), "--out", str(data))
+    _command("train", str(data), "--out", str(model), "--epochs", "60")
+    print("4/4 calibrate with two measured tables")
+    loops = {name: _calibrate(folder, name) for name in ("hidden effect", "nothing hidden")}
     steered = _steer(loops["hidden effect"][0])
     seconds = time.perf_counter() - began
     _write_page(page_path, robot, motions, read(data), load(model), errors, loops, steered, seconds)
@@ -106,13 +107,15 @@ def run_demo(out: str | Path) -> None:
 
 
 def _command(*words: str, quiet: bool = False) -> None:
+    """Print and run a command of softflagella."""
     if not quiet:
-        print("  python -m", " ".join(words), flush=True)
+        print("  softflagella", " ".join(words), flush=True)
     output = subprocess.DEVNULL if quiet else None
-    subprocess.run([sys.executable, "-m", *words], check=True, stdout=output, stderr=output)
+    subprocess.run([sys.executable, "-m", "softflagella", *words], check=True, stdout=output, stderr=output)
 
 
 def _look(folder: Path) -> tuple[Robot, list[Steady]]:
+    """Write the robot's file and simulate its motion for both motor directions."""
     robot = PRESETS["paper-control"]
     write_text(folder / "robot.toml", robot_toml(robot))
     groups = robot.groups()
@@ -120,14 +123,15 @@ def _look(folder: Path) -> tuple[Robot, list[Steady]]:
 
 
 def _plan_and_replay(folder: Path) -> dict[str, tuple[dict[str, Any], TrackingError]]:
+    """Plan and replay all paths; return each plan with its tracking error."""
     for case in CASES:
-        _command("planner", "plan", case.path, "--robot", case.robot, "--out", str(folder / case.name))
+        _command("plan", case.path, "--robot", case.robot, "--out", str(folder / case.name))
     threads = {name: "1" for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS")}
     os.environ.update(threads)
 
     def replay_one(case: Case) -> None:
-        place = folder / case.name
-        _command("sim", "replay", str(place / "plan.json"), "--out", str(place / "track.csv"), quiet=True)
+        plan, track = folder / case.name / "plan.json", folder / case.name / "track.csv"
+        _command("replay", str(plan), "--out", str(track), quiet=True)
 
     for case in CASES:
         print(f"  softflagella replay {folder / case.name / 'plan.json'} --out …/track.csv")
@@ -147,7 +151,7 @@ def _plan_and_replay(folder: Path) -> dict[str, tuple[dict[str, Any], TrackingEr
 
 
 def _steer(verdict: Verdict) -> dict[str, Steered]:
-    """A square planned with the calibrated, the corrected and the true model, run on the truth."""
+    """Plan a square with the calibrated, the corrected and the true model, and run the plans on the true robot."""
     start = replace(PRESETS["paper-measured"], tails=2).with_motor(10.0)
     truth = replace(start, **HIDDEN, effects=HIDDEN_EFFECT)  # type: ignore[arg-type]
     models = {
@@ -155,27 +159,27 @@ def _steer(verdict: Verdict) -> dict[str, Steered]:
         "corrected": corrected_robot(start, verdict.fits.final_refit.parameters),
         "truth known": truth,
     }
-    found = steer(models, truth, polygon(4, 3.0))
-    for label, one in found.items():
-        print(f"  square planned with the model {label}: {one.error.rms:.4f} l rms on the true robot")
-    return found
+    steered = steer(models, truth, polygon(4, 3.0))
+    for label, run in steered.items():
+        print(f"  square planned with the model {label}: {run.error.rms:.4f} l rms on the true robot")
+    return steered
 
 
-def _close(folder: Path, name: str) -> tuple[Verdict, Measurements]:
+def _calibrate(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     start = PRESETS["paper-measured"]
     effects = HIDDEN_EFFECT if name == "hidden effect" else {}
     truth = replace(start, **HIDDEN, effects=effects)  # type: ignore[arg-type]
     seed = 3 if effects else 4
     table = make_table(truth, seed=seed, lengths_cm=_LENGTHS_CM, title=f"table, {name}")
-    place = folder / name.replace(" ", "-")
-    place.mkdir(exist_ok=True)
-    table.to_csv(place / "table.csv", index=False, float_format="%.6g")
-    data = read_measurements(place / "table.csv")
+    case = folder / name.replace(" ", "-")
+    case.mkdir(exist_ok=True)
+    table.to_csv(case / "table.csv", index=False, float_format="%.6g")
+    data = read_measurements(case / "table.csv")
     verdict = calibrate(SwimmerModel(start, data), correction=learn_head_correction)
     record = verdict_record(verdict, table="table.csv")
-    write_text(place / "verdict.json", json.dumps(record, indent=1) + "\n")
+    write_text(case / "verdict.json", json.dumps(record, indent=1) + "\n")
     write_text(
-        place / "corrected.toml", corrected_toml(start, verdict.fits.final_refit, verdict.corrections.learnt)
+        case / "corrected.toml", corrected_toml(start, verdict.fits.final_refit, verdict.corrections.learnt)
     )
     print(f"  {name}: {verdict.sentence}")
     return verdict, data
@@ -209,9 +213,9 @@ def _write_page(
     )
     page.section("Three paths, planned without simulating")
     page.text(
-        "The planner asks the look-up table only. The schedule is then replayed, open loop, in the simulator. "
-        "Errors are from the declared path: the one nearest to the path as given that the robot can follow. The "
-        "robot cannot turn on the spot."
+        "The planner uses the look-up table only. The schedule is then replayed, open loop, in the simulator. "
+        "Errors are distances from the declared path: the feasible path nearest to the given one. The robot "
+        "cannot turn on the spot."
     )
     plans = _draw_plans(tracks)
     plans.savefig(out.parent / "demo" / "plans.png", dpi=90, bbox_inches="tight")
@@ -240,12 +244,12 @@ def _write_page(
     page.figure(
         draw_trends(good, "omega_yr_bar", ("omega_bar", "C_yr", "l_over_R", "C_t")), "yaw rate over inputs"
     )
-    page.text("After a flip the tails turn over, and the robot lags its new circle:")
+    page.text("After a flip the tails turn over, and the robot lags behind its new circle:")
     page.figure(draw_responses(good), "lags and net speed over the dwell")
     page.section("Look-up table against simulator")
     page.figure(_draw_parity(rows), "shipped look-up table against simulated rows")
     shipped = load()
-    page.text("Relative rms error on rows that training did not see (slip angle in degrees):")
+    page.text("Relative rms error on held-out rows (slip angle in degrees):")
     shown = ("omega_t_bar", "omega_yr_bar", "R_yr_over_l", "theta_deg", "v_z")
     page.table(
         ("look-up table", *shown),
@@ -255,7 +259,7 @@ def _write_page(
         ],
     )
     for name, (verdict, data) in loops.items():
-        page.section(f"Calibration: a table with {name}")
+        page.section(f"Calibration with a table: {name}")
         page.text(verdict.sentence, tone="good" if verdict.verdict in ("effect", "none") else "bad")
         if verdict.verdict == "effect":
             page.figure(draw_residuals(verdict, data), "residuals before and after the effect is added")
@@ -270,8 +274,8 @@ def _write_page(
             ("error on the held-out session", "relative rms"),
             [(label, f"{100 * value:.2f} %") for label, value in shown_errors],
         )
-    page.section("Back on the path: the square again, on the robot with the hidden effect")
-    rms = [one.error.rms for one in steered.values()]
+    page.section("Planning again: the square, on the robot with the hidden effect")
+    rms = [run.error.rms for run in steered.values()]
     page.text(
         "Planned without simulating, with three models, run open loop on the true robot: "
         f"{rms[0]:.3f} l rms with the calibrated model, {rms[1]:.3f} l with the corrected one, {rms[2]:.3f} l "
@@ -289,8 +293,8 @@ def _draw_robot(robot: Robot, motions: Sequence[Steady]) -> Figure:
     figure = Figure(figsize=(11, 4.2))
     shape = figure.add_subplot(1, 2, 1, projection="3d")
     radius, length = robot.head_radius / robot.tail_length, robot.head_length / robot.tail_length
-    angle, along = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(0, length, 2))
-    shape.plot_surface(along, radius * np.cos(angle), radius * np.sin(angle), color="#c9d3dc", alpha=0.6)
+    angle, z = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(0, length, 2))
+    shape.plot_surface(z, radius * np.cos(angle), radius * np.sin(angle), color="#c9d3dc", alpha=0.6)
     _, tails = tails_over_a_revolution(robot, 1)
     for x, y, z in tails[0].transpose(0, 2, 1):
         shape.plot(z, x, y, color="#c8452f", lw=3)
@@ -323,8 +327,8 @@ def _draw_robot(robot: Robot, motions: Sequence[Steady]) -> Figure:
 
 def _draw_plans(errors: dict[str, tuple[dict[str, Any], TrackingError]]) -> Figure:
     figure = Figure(figsize=(13, 4.6))
-    for place, (name, (plan, error)) in enumerate(errors.items()):
-        axes = figure.add_subplot(1, len(errors), place + 1)
+    for panel, (name, (plan, error)) in enumerate(errors.items()):
+        axes = figure.add_subplot(1, len(errors), panel + 1)
         draw_overlay(axes, plan, error, f"{name}, N = {int(plan['robot']['groups']['N'])}")
     figure.axes[0].legend(fontsize=7, frameon=False, loc="center")
     figure.tight_layout()
@@ -335,15 +339,15 @@ def _draw_parity(rows: pd.DataFrame) -> Figure:
     names = (("omega_yr_bar", "yaw rate"), ("v_z", "surge"), ("R_yr_over_l", "turn radius / l"),
              ("theta_deg", "slip angle [deg]"))  # fmt: skip
     good = usable_rows(rows)
-    found = load().query({n: good[n].to_numpy(float) for n in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)}, flag=True)
+    predicted = load().query({n: good[n].to_numpy(float) for n in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)}, flag=True)
     truth = {name: good[name].to_numpy(float) for name in ("v_x", *(name for name, _ in names))}
     figure = Figure(figsize=(12, 3.4))
-    for place, (name, label) in enumerate(names):
-        axes = figure.add_subplot(1, 4, place + 1)
-        axes.plot(truth[name], found[name], ".", ms=4, color="#2a7fba", alpha=0.7)
+    for panel, (name, label) in enumerate(names):
+        axes = figure.add_subplot(1, 4, panel + 1)
+        axes.plot(truth[name], predicted[name], ".", ms=4, color="#2a7fba", alpha=0.7)
         ends = [np.nanmin(truth[name]), np.nanmax(truth[name])]
         axes.plot(ends, ends, color="#1c2733", lw=0.7)
-        error = np.nanmedian(np.abs(found[name] - truth[name]) / error_scale(name, truth))
+        error = np.nanmedian(np.abs(predicted[name] - truth[name]) / error_scale(name, truth))
         text = f"{error:.1g} deg" if name == "theta_deg" else f"{100 * error:.1g} %"
         axes.set_title(f"{label}: median error {text}", fontsize=9)
         axes.set_xlabel("simulated", fontsize=8)

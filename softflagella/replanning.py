@@ -1,7 +1,7 @@
-"""What a corrected model gains on the path: plan with different models, run every schedule on the true robot.
+"""Measure what a corrected model gains: plan with different models, and run every schedule on the true robot.
 
 Each model is tabulated (`surrogate.one_robot.tabulate`) and plans the same path. Then the schedule is run on the
-simulated true robot, without feedback. With a wrong yaw rate the robot leaves the path a little more with every
+simulated true robot, without feedback. With a wrong yaw rate the robot drifts from the path with every
 dwell. So errors of a few percent in the model can lead to errors as large as the path.
 """
 
@@ -26,7 +26,7 @@ from surrogate.one_robot.tabulate import tabulate
 
 @dataclass(frozen=True)
 class Steered:
-    """One model's plan and how the truth followed it; lengths in l."""
+    """One model's plan and how the true robot followed it; lengths in l."""
 
     plan: dict[str, Any]  # plan.json
     error: TrackingError
@@ -39,32 +39,32 @@ def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, 
     Args:
         models: by label; the same robot with other coefficients, numbers and effects.
     """
-    found = {}
+    runs = {}
     for label, model in models.items():
         planned = plan(path, model, lookup=tabulate(model))
         content = plan_record(planned)
         track = replay([planned.schedule(truth)])[0]
         track[["x_over_l", "y_over_l"]] *= truth.tail_length / model.tail_length
-        found[label] = Steered(content, tracking_error(content, track), track[["x_over_l", "y_over_l"]].to_numpy())
-    return found
+        runs[label] = Steered(content, tracking_error(content, track), track[["x_over_l", "y_over_l"]].to_numpy())
+    return runs
 
 
 def gap_closed(before: float, after: float, best: float) -> float:
-    """Share of the avoidable error that the correction removes."""
+    """Return the share of the avoidable error that the correction removes."""
     return (before - after) / (before - best)
 
 
-def draw_steered(found: Mapping[str, Steered]) -> Figure:
-    """The tracks side by side, each with the path that its plan declares."""
-    figure = Figure(figsize=(3.7 * len(found), 3.9))
-    for i, (label, one) in enumerate(found.items()):
-        axes = figure.add_subplot(1, len(found), i + 1)
-        reference, raw = np.array(one.plan["reference"]), np.array(one.plan["raw_path"])
+def draw_steered(runs: Mapping[str, Steered]) -> Figure:
+    """Draw the tracks side by side, each with the path that its plan declares."""
+    figure = Figure(figsize=(3.7 * len(runs), 3.9))
+    for i, (label, run) in enumerate(runs.items()):
+        axes = figure.add_subplot(1, len(runs), i + 1)
+        reference, raw = np.array(run.plan["reference"]), np.array(run.plan["raw_path"])
         axes.plot(*raw.T, color="#b8c2cc", lw=1)
         axes.plot(*reference.T, color="#1c2733", lw=1)
-        axes.plot(*one.track.T, color="#c8452f", lw=1.3)
+        axes.plot(*run.track.T, color="#c8452f", lw=1.3)
         axes.set_aspect("equal")
-        axes.set_title(f"{label}: {one.error.rms:.3f} l rms", fontsize=9)
+        axes.set_title(f"{label}: {run.error.rms:.3f} l rms", fontsize=9)
         axes.tick_params(labelsize=7)
         axes.set_xlabel("x / l", fontsize=8)
     figure.tight_layout()

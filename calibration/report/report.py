@@ -90,7 +90,7 @@ def _add_batch(page: Page, batch: Batch) -> None:
 def _add_numbers(page: Page, result: Verdict) -> None:
     if not result.fits.pulls:
         return
-    page.section("Nuisance parameters")
+    page.section("Numbers as given")
     wrong = [" or ".join(p.parameter.title for p in alike) for alike in result.wrong_numbers]
     said = "; ".join(wrong) if wrong else "none is"
     page.text(
@@ -121,8 +121,8 @@ def _add_numbers(page: Page, result: Verdict) -> None:
 def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
     page.section("Data")
     page.text(
-        f"{len(data)} usable runs in {len(data.session_names)} session(s); held out for the test: "
-        f"{result.conditions.split.names}. Excluded: "
+        f"{len(data)} usable runs in {len(data.session_names)} session(s); locked away for the test: "
+        f"{result.conditions.split.names}. Set aside: "
         + ("; ".join(result.conditions.excluded) if result.conditions.excluded else "nothing")
         + "."
     )
@@ -210,7 +210,7 @@ def _carried(claim: Candidate) -> str:
 
 
 def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
-    page.section("Error on the held-out runs")
+    page.section("Error on the locked runs")
     low, high = result.errors.after_interval
     corrected: list[tuple[str, float, dict[str, float]]] = []
     if result.error_predictive is not None:
@@ -243,7 +243,7 @@ def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
     agree = result.errors.p_value >= _DISAGREES
     page.text(
         f"95 % interval with effects: {100 * low:.2f} to {100 * high:.2f} %. "
-        f"Noise of one run from the repeats: {100 * result.noise_ceiling:.2f} %. The held-out runs "
+        f"Noise of one run from the repeats: {100 * result.noise_ceiling:.2f} %. The locked runs "
         f"{'agree' if agree else 'do not agree'} with the final model (p = {result.errors.p_value:.2g}). "
         f"Generic correction: {features} (it describes the residual and does not explain it).",
         tone="good" if agree else "bad",

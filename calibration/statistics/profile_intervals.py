@@ -24,7 +24,9 @@ _MOST = 5.0  # if it is larger, the others were not refitted along a bent valley
 def profile_intervals(
     model: ForwardModel, fitted: Fit, used: Flags, *, title: str = ""
 ) -> dict[str, tuple[float, float]]:
-    """Compute 95 % intervals: by profile deviances, those of nuisance parameters by the covariance."""
+    """95 % intervals of every fitted parameter, by their profile deviances; of numbers as given by the
+    covariance.
+    """
     data, count = model.runs, len(fitted.names)
     root = inverse_root(fitted.noise.run)
     sets, ends = [], []

@@ -61,7 +61,7 @@ def measure_tracks(
         runs: run, N, l_cm, omega_rpm and other notes; one row for each run.
 
     Returns:
-        The runs with omega_yr_rad_s, R_yr_cm, theta_deg, v_cm_s and their errors; the excluded rows, and why.
+        The runs with omega_yr_rad_s, R_yr_cm, theta_deg, v_cm_s and their errors; what was set aside, and why.
 
     Raises:
         InputError: a column is missing.

@@ -7,7 +7,7 @@ Needed: N, l_cm, omega_rpm (tails relative to head, signed) and some of the outp
 Some conditions must be repeated, because the noise is estimated from repeats. `session` names the group of runs
 that were made together. Without it, all runs of one N are one session. Some effects need elapsed_min,
 temperature_C, tank_diameter_cm or heading_deg (direction of the path in the lab, where a run is a part of a
-circle). Unusable rows are excluded with number and reason. So are columns of other names, unless the
+circle). Rows that cannot be used are set aside with number and reason. So are columns of other names, unless the
 name looks like a misspelt one.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians. A

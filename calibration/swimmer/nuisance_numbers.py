@@ -1,4 +1,4 @@
-"""The nuisance parameters of the swimmer: their priors, and what depends on them.
+"""The swimmer's numbers as given: which they are, how well they are known, and what depends on them.
 
 Those of the robot come from robot.toml. Three belong to the way of measuring and come from the table: the camera's
 scale, the zero of the heading and the tachometer. Each is a parameter with a prior

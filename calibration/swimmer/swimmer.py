@@ -191,7 +191,7 @@ class SwimmerModel:
     def _slope_of_number(
         self, name: str, runs: list[_Run], columns: dict[str, Floats], found: Sensitivities, view: Observation
     ) -> Floats:
-        """Return the derivatives (m, k) along a nuisance parameter, on its own scale."""
+        """Derivatives (m, k) along a number as given, on its own scale."""
         by = np.array([1 / run.robot.tail_length if name == LENGTH else 1.0 for run in runs])
         powers = POWERS[name]
         motion = {key: np.zeros(len(runs)) for key in found.derivatives}

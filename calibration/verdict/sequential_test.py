@@ -92,7 +92,7 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
     try:
         return [Explanation.read(one) for one in record["explanations"]], set(record["sessions"])
     except (KeyError, TypeError, ValueError):
-        raise InputError(f"{path} is no verdict.json of this version: calibrate the table again") from None
+        raise InputError(f"{path} is no verdict.json of this version: close the table again") from None
 
 
 def new_runs(runs: Runs, before: set[str]) -> Flags:
@@ -142,5 +142,5 @@ def sentence(found: Sequence[Standing]) -> str:
     """What to do now."""
     left = [s.title for s in found if not s.given_up]
     if len(left) == 1:
-        return f"Decided: {left[0]}. The next step is to calibrate with all runs."
+        return f"Decided: {left[0]}. The next step is to close the loop with all runs."
     return f"Not decided between {' and '.join(left)}: make more runs."

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dataset.rows.schema import COST, OUTPUTS
-from sim.arrays import Floats
+from sim.arrays import Flags, Floats
 from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.effects.tail_contact import least_gap
 from sim.inputs import check_columns
@@ -73,13 +73,18 @@ def _row(values: dict[str, Floats], history: bool, sensitivities: bool) -> Colum
     for name, curve in curves.items():
         for i, axis in enumerate(LAG_PARTS):
             columns[f"{name}_{axis}"] = curve[..., i].reshape(1, -1)
-    for column in OUTPUTS:
-        if not column.kept:
-            columns[column.name] = np.array(columns[column.name])
-            columns[column.name][failed] = np.nan
+    clear_failed(columns, failed)
     if sensitivities:
         slopes = derivatives(groups, SLOPE_INPUTS).derivatives
         columns |= {f"d_{name}": slope for name, slope in slopes.items()}
     columns["N"] = values["N"].astype(int)
     columns[COST] = np.array([time.thread_time() - began])
     return columns
+
+
+def clear_failed(columns: Columns, failed: Flags) -> None:
+    """Set the outputs of failed rows to NaN, in place; a column may say that its value is kept."""
+    for column in OUTPUTS:
+        if not column.kept:
+            columns[column.name] = np.array(columns[column.name])
+            columns[column.name][failed] = np.nan

@@ -20,7 +20,7 @@ _SHAPES = {"circle": "circle:X,Y,RADIUS", "box": "box:LEFT,LOW,RIGHT,HIGH"}
 
 
 def read_region(words: str, unit: str, robot: Robot) -> Region:
-    """A region in tail lengths.
+    """Read a region, in tail lengths.
 
     Args:
         words: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG with a closed outline.
@@ -44,12 +44,12 @@ def read_region(words: str, unit: str, robot: Robot) -> Region:
             return Polygon.of([[left, low], [right, low], [right, high], [left, high]])
         raise InputError(f"{words!r}; write {_SHAPES[shape]}")
     drawing = read_path(words, closed=True)
-    own = scale if drawing.unit is None else drawing.unit / robot.tail_length
-    return Polygon.of(drawing.path.scaled(own))
+    unit_length = scale if drawing.unit is None else drawing.unit / robot.tail_length
+    return Polygon.of(drawing.path.scaled(unit_length))
 
 
 def write_goal_plan(goal_plan: GoalPlan, folder: str | Path) -> list[Path]:
-    """The files of the plan, goal.json with goal and regions, and a picture of all; returns their paths."""
+    """Write the files of the plan, goal.json and a picture; return their paths."""
     from planner.files.pictures import draw_goal_plan, write_svg
 
     paths = write_plan(goal_plan.plan, folder)
@@ -60,7 +60,7 @@ def write_goal_plan(goal_plan: GoalPlan, folder: str | Path) -> list[Path]:
 
 
 def goal_record(goal_plan: GoalPlan) -> dict[str, Any]:
-    """What was asked for and what is predicted, as JSON-like content. Lengths in l, angles in rad."""
+    """Return what was asked for and what is predicted, as JSON-like content. Lengths in l, angles in rad."""
     finite = goal_plan.clearance if goal_plan.clearance < float("inf") else None
     walls = goal_plan.free_space.walls
     return {

@@ -27,7 +27,7 @@ def write_svg(figure: Figure, path: Path) -> None:
 
 
 def draw_plan(result: Plan) -> Figure:
-    """One panel: the plan over its path, with the stated error."""
+    """Draw the plan over its path, with the stated error."""
     figure = Figure(figsize=(6, 6))
     axes = figure.add_subplot()
     draw_tracks(axes, result.drawn.polyline(), result.reference, result.stated_error)
@@ -44,7 +44,7 @@ def draw_plan(result: Plan) -> Figure:
 
 
 def draw_goal_plan(goal_plan: GoalPlan) -> Figure:
-    """One panel: a plan from pose to pose, with what the robot must keep out of."""
+    """Draw a plan from pose to pose, with what the robot must keep out of."""
     figure = draw_plan(goal_plan.plan)
     axes = figure.axes[0]
     for region in goal_plan.free_space.regions:
@@ -57,8 +57,8 @@ def draw_goal_plan(goal_plan: GoalPlan) -> Figure:
         axes.plot(*np.concatenate([corners, corners[:1]]).T, color=KEEP_OUT, lw=3)
     body = Footprint.of(goal_plan.plan.robot, 0.0)
     for x, y, heading in (goal_plan.plan.start, goal_plan.goal):
-        along = np.array([body.places.min() - body.radius, body.places.max() + body.radius])
-        axes.plot(x + along * math.cos(heading), y + along * math.sin(heading), color=DECLARED, lw=3, alpha=0.3)
+        axis = np.array([body.places.min() - body.radius, body.places.max() + body.radius])
+        axes.plot(x + axis * math.cos(heading), y + axis * math.sin(heading), color=DECLARED, lw=3, alpha=0.3)
         axes.plot(x, y, "o", color=DECLARED, ms=5)
     for x, y in goal_plan.via:
         axes.plot(x, y, "+", color=REPLAYED, ms=10)
@@ -74,7 +74,7 @@ def draw_goal_plan(goal_plan: GoalPlan) -> Figure:
 
 
 def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float) -> None:
-    """Raw and declared path with a band of the stated error."""
+    """Draw the raw and the declared path with a band of the stated error."""
     edges = _band(declared, stated)
     axes.fill(*edges.T, color="#2a7fba", alpha=0.10, lw=0, label=f"stated error {stated:.2f} l")
     axes.plot(*raw.T, color=RAW, lw=1.0, label="path as given")

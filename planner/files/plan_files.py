@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from planner.files.plan_json import plan_record
-from planner.files.tracker_header import tracker_header
+from planner.files.tracker_header import safe_name, tracker_header
 from planner.planning.plan import Plan
 from sim.io.errors import InputError
 from sim.io.files import whole_file, write_text
@@ -58,7 +58,7 @@ def write_plan(result: Plan, folder: str | Path) -> list[Path]:
 
 
 def dwell_table(result: Plan) -> pd.DataFrame:
-    """One row for each dwell: its start, its direction and length, and the predicted pose."""
+    """Tabulate the dwells: start, direction, length and predicted pose."""
     count = len(result.dwells)
     start = np.concatenate([[0.0], np.cumsum(result.dwells)[:-1]])
     return pd.DataFrame(
@@ -75,7 +75,7 @@ def dwell_table(result: Plan) -> pd.DataFrame:
 
 
 def milliseconds(seconds: np.ndarray) -> list[int]:
-    """Dwells in whole ms, rounding errors carried over; long ones are split by zeros.
+    """Round dwells to whole ms, carry rounding errors over, and split long dwells by zeros.
 
     Raises:
         InputError: a dwell rounds to 0 ms.
@@ -96,15 +96,14 @@ def milliseconds(seconds: np.ndarray) -> list[int]:
 
 
 def controller_header(result: Plan) -> str:
-    """schedule.h as text."""
+    """Write schedule.h as text."""
     entries = milliseconds(result.seconds)
     lines = [", ".join(map(str, entries[i : i + 12])) for i in range(0, len(entries), 12)]
     body = ",\n    ".join(lines)
-    name = "".join(c for c in result.robot.name if c.isalnum() or c in " -_.")
     x, y, heading = result.start
     checkpoints = _checkpoints(result)
     places = ",\n    ".join(checkpoints)
-    return f"""/* Motor schedule for robot "{name}": turn in FIRST_DIRECTION for the first entry,
+    return f"""/* Motor schedule for robot "{safe_name(result)}": turn in FIRST_DIRECTION for the first entry,
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
  * lengthens the dwell before it. Stop after the last entry. Look-up table {result.tracked.model}.
  * Put the head's centre at START_X, START_Y with heading START_HEADING, at rest. Checkpoints say where it should
@@ -132,7 +131,7 @@ static const schedule_checkpoint schedule_checkpoints[SCHEDULE_CHECKPOINTS] = {{
 
 
 def _checkpoints(result: Plan) -> list[str]:
-    """Time in ms and predicted pose of some flips and of the end, as C."""
+    """Write time in ms and predicted pose of some flips and of the end, as C."""
     ends = np.concatenate([[0.0], np.cumsum(result.seconds)])
     places = np.unique(np.linspace(0, len(ends) - 1, min(len(ends), _CHECKPOINTS)).astype(int))
     return [

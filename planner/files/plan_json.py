@@ -19,7 +19,7 @@ _TABLES = {"reference": 2, "raw_path": 2, "predicted_poses": 3}
 
 
 def plan_record(result: Plan) -> dict[str, Any]:
-    """The plan as JSON-like content; `sim.model.schedule.load_schedule` reads its schedule."""
+    """Return the plan as JSON-like content; `sim.model.schedule.load_schedule` reads its schedule."""
     robot, schedule = result.robot, result.schedule()
     declared, errors = result.declared, result.errors
     x, y, heading = schedule.start
@@ -62,7 +62,7 @@ def plan_record(result: Plan) -> dict[str, Any]:
 
 
 def load_plan(path: str | Path) -> dict[str, Any]:
-    """The content of a plan.json, checked.
+    """Read and check the content of a plan.json.
 
     Raises:
         InputError: the file is no plan.json of this version, or it has a value that cannot be.

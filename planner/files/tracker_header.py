@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from planner.paths.path import arc_length
 from planner.planning import line_of_sight
 from planner.planning.plan import Plan
 from planner.tracking import kalman_filter, tracker
@@ -29,34 +30,38 @@ _FLOAT_EXACT = 3e-6  # rad; in single precision a smaller angle is lost in the r
 
 
 def tracker_header(result: Plan) -> str:
-    """tracker.h as text."""
+    """Write tracker.h as text."""
     code = "\n".join((_CODE / name).read_text() for name in _PARTS)
     return f"{_intro(result)}\n{_numbers(result)}\n{_tables(result)}\n{code}#endif\n"
 
 
 def rounded(result: Plan) -> Plan:
-    """The plan with path and lags as tracker.h has them."""
+    """Round path and lags of a plan as tracker.h has them."""
     unit = _lag_unit(result)
     lag, rest = (
         np.round(table / unit) * unit for table in (result.tracked.vehicle.lag, result.tracked.vehicle.rest)
     )
     rows = np.array([[float(_nine(value)) for value in row] for row in _path(result)])
     q, heading = rows[:, :2], rows[:, 2]
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q, axis=0), axis=1))])
-    guide = replace(result.declared.reference, q=q, heading=heading, arc=arc)
+    guide = replace(result.declared.reference, q=q, heading=heading, arc=arc_length(q))
     tracked = result.tracked._replace(vehicle=replace(result.tracked.vehicle, lag=lag, rest=rest))
     return replace(result, tracked=tracked, declared=replace(result.declared, reference=guide))
 
 
 def table_bytes(result: Plan) -> int:
-    """Size of the tables in single precision."""
+    """Return the size of the tables in single precision, in bytes."""
     vehicle = result.tracked.vehicle
     return 2 * (vehicle.lag.size + vehicle.rest.size) + 4 * 3 * len(result.declared.reference.q)
 
 
+def safe_name(result: Plan) -> str:
+    """Return the robot's name without characters that could end a comment in C."""
+    return "".join(c for c in result.robot.name if c.isalnum() or c in " -_.")
+
+
 def _intro(result: Plan) -> str:
-    name = "".join(c for c in result.robot.name if c.isalnum() or c in " -_.")
-    return f"""/* Tracker for robot "{name}", look-up table {result.tracked.model}: keeps the robot on its plan
+    name, model = safe_name(result), result.tracked.model
+    return f"""/* Tracker for robot "{name}", look-up table {model}: keeps the robot on its plan
  * with poses from a camera, and learns the robot. It is planner.Tracker in C99, with the same formulas in the same
  * order. It needs <math.h> and <stdint.h>, and no heap. Tables: {table_bytes(result)} bytes in single precision.
  *
@@ -86,7 +91,7 @@ typedef double tracker_real;
 
 
 def _numbers(result: Plan) -> str:
-    """What the code needs as macros: counts and times as they are, the rest as tracker_real."""
+    """Write the numbers of the code as macros: counts and times as they are, the rest as tracker_real."""
     counts = {
         "FIRST_DIRECTION": result.first_direction, "STATES": kalman_filter.STATES,
         "POINTS": len(result.declared.reference.q),
@@ -150,7 +155,7 @@ def _lag_unit(result: Plan) -> Floats:
 
 
 def _path(result: Plan) -> Floats:
-    """Place of the pivot and heading, (m, 3)."""
+    """Return the reference of the pivot as rows of place and heading, (m, 3)."""
     return np.column_stack([result.declared.reference.q, result.declared.reference.heading])
 
 
@@ -163,7 +168,7 @@ def _row(values: Iterable[float]) -> str:
 
 
 def _nested(table: Sequence[Any], write: Callable[[float], str] = repr) -> str:
-    """Nested rows as C, one line for each innermost row."""
+    """Write nested rows as C, one line for each innermost row."""
     if not isinstance(table[0], list):
         return "{" + ", ".join(map(write, table)) + "}"
     return "{\n" + ",\n".join(_nested(row, write) for row in table) + "}"

@@ -1,9 +1,9 @@
 """Shortest tracks of bounded curvature between poses: Dubins' words.
 
 A car that only drives forward, with least turn radius R, gets from one pose to another on the shortest way by one
-of six words of three segments: LSL, RSR, LSR, RSL, RLR, LRL (L: left arc, R: right arc, S: straight). Source:
-Dubins (1957); formulas as in Shkel and Lumelsky, "Classification of the Dubins set" (2001). Poses are x, y,
-course. All functions take arrays of poses.
+of six words of three pieces: LSL, RSR, LSR, RSL, RLR, LRL (L: left arc, R: right arc, S: straight). Source: Dubins
+(1957); formulas as in Shkel and Lumelsky, "Classification of the Dubins set" (2001). Poses are x, y, course. All
+functions take arrays of poses.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _ROUNDING = 1e-9
 
 
 class DubinsPaths(NamedTuple):
-    """M tracks: a start pose (M, 3), the turns (M, 3) of the segments (+1 left, 0, −1), their lengths (M, 3)."""
+    """M paths: a start pose (M, 3), the turns (M, 3) of its pieces (+1 left, 0, −1) and their lengths (M, 3)."""
 
     start: Floats
     turns: Integers
@@ -34,28 +34,28 @@ class DubinsPaths(NamedTuple):
         return DubinsPaths(self.start[rows], self.turns[rows], self.pieces[rows])
 
     def poses(self, way: Floats, radius: float) -> Floats:
-        """Poses (M, K, 3) after ways (M, K) along the tracks; beyond the end, that of the end."""
+        """Compute poses (M, K, 3) after ways (M, K) along the tracks; beyond the end, that of the end."""
         pose = np.repeat(self.start[:, None], way.shape[1], 1)
-        left = way
+        remaining = way
         for i in range(3):
             piece = self.pieces[:, i, None]
-            now = np.clip(left, 0.0, piece)
-            left = left - piece
-            pose = _moved(pose, self.turns[:, i, None] / radius, now)
+            part = np.clip(remaining, 0.0, piece)
+            remaining = remaining - piece
+            pose = _moved(pose, self.turns[:, i, None] / radius, part)
         return pose
 
 
 def words(start: Floats, goal: Floats, radius: float) -> Floats:
-    """Lengths (..., 6, 3) of the segments of all words of TURNS; infinite where a word does not exist."""
+    """Compute the lengths (..., 6, 3) of the pieces of all words; infinite where a word does not exist."""
     move = (goal[..., :2] - start[..., :2]) / radius
     d, direction = np.hypot(move[..., 0], move[..., 1]), np.arctan2(move[..., 1], move[..., 0])
     a, b = start[..., 2] - direction, goal[..., 2] - direction
     sa, sb, ca, cb, cab = np.sin(a), np.sin(b), np.cos(a), np.cos(b), np.cos(a - b)
-    found = np.full((*d.shape, 6, 3), np.inf)
+    lengths = np.full((*d.shape, 6, 3), np.inf)
 
     def put(word: int, exists: Floats, t: Floats, p: Floats, q: Floats) -> None:
         for i, part in enumerate((_turn(t), p, _turn(q))):
-            found[..., word, i] = np.where(exists, part, np.inf)
+            lengths[..., word, i] = np.where(exists, part, np.inf)
 
     for word, side in ((0, 1.0), (1, -1.0)):
         square = 2 + d**2 - 2 * cab + side * 2 * d * (sa - sb)
@@ -73,18 +73,18 @@ def words(start: Floats, goal: Floats, radius: float) -> Floats:
         t = side * a - np.arctan2(ca - cb, d - side * (sa - sb)) + p / 2
         q = side * (a - b) - t + p
         put(word, np.abs(cosine) <= 1, t, p, q)
-    return found * radius
+    return lengths * radius
 
 
 def shortest_paths(start: Floats, goal: Floats, radius: float) -> DubinsPaths:
-    """The shortest tracks between M pairs of poses (M, 3)."""
+    """Find the shortest paths between M pairs of poses (M, 3)."""
     pieces = words(start, goal, radius)
     best = pieces.sum(-1).argmin(-1)
     return DubinsPaths(start, TURNS[best], pieces[np.arange(len(best)), best])
 
 
 def _turn(angle: Floats) -> Floats:
-    """Angle within [0, 2π); a whole turn that comes from rounding is none."""
+    """Reduce an angle to [0, 2π); a whole turn that comes from rounding is none."""
     angle = angle % _CIRCLE
     return np.asarray(np.where(angle > _CIRCLE - _ROUNDING, 0.0, angle))
 

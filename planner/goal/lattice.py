@@ -33,23 +33,23 @@ _MOST_POSES = 400_000
 
 @dataclass(frozen=True)
 class RouteLimits:
-    """What a track must keep to: its least radius, and the room for a body whose origin is on the track."""
+    """What a track must keep to: its least radius, and free space for a body whose origin is on the track."""
 
     radius: float
     body: Footprint
-    room: FreeSpace
+    space: FreeSpace
     drift: Drift
 
-    def clearance(self, poses: Floats, room: FreeSpace | Map | None = None) -> Floats:
+    def clearance(self, poses: Floats, space: FreeSpace | Map | None = None) -> Floats:
         """Compute the distance (...) of the body from what is not free, at poses (..., 3): place and course."""
         heading = poses[..., 2] - slips(poses[..., 2], self.drift)
         placed = np.concatenate([poses[..., :2], heading[..., None]], -1)
-        return self.body.clearance(placed, self.room if room is None else room)
+        return self.body.clearance(placed, self.space if space is None else space)
 
     def free(
-        self, tracks: DubinsPaths, margin: float, room: FreeSpace | Map | None = None, step: float = _STEP
+        self, tracks: DubinsPaths, margin: float, space: FreeSpace | Map | None = None, step: float = _STEP
     ) -> Flags:
-        """Whether the body keeps a margin all along each of M tracks."""
+        """Tell whether the body keeps a margin all along each of M tracks."""
         result = np.zeros(len(tracks.start), dtype=bool)
         length = tracks.length
         order = np.argsort(length)
@@ -61,7 +61,7 @@ class RouteLimits:
             count = max(2, math.ceil(float(length[rows[-1]]) / step) + 1)
             way = np.linspace(0, 1, count) * length[rows, None]
             poses = tracks.take(rows).poses(way, self.radius)
-            result[rows] = (self.clearance(poses, room) >= margin).all(1)
+            result[rows] = (self.clearance(poses, space) >= margin).all(1)
         return result
 
 
@@ -74,7 +74,7 @@ class Lattice:
         self.spacing = spacing = max(spacing, math.sqrt(area * courses / _MOST_POSES))
         nx, ny = (np.floor((high - low) / spacing).astype(int) + 1).tolist()
         pad = math.ceil(limits.body.reach / spacing) + _RANGE + 3
-        self.map = Map(limits.room, low - pad * spacing, high + pad * spacing, spacing / _CELLS)
+        self.map = Map(limits.space, low - pad * spacing, high + pad * spacing, spacing / _CELLS)
         self._shape, self._pad = (nx, ny), pad
         x, y = low[0] + spacing * np.arange(nx), low[1] + spacing * np.arange(ny)
         self.course = 2 * math.pi * np.arange(courses) / courses
@@ -84,18 +84,18 @@ class Lattice:
         self._edges = self._join()
 
     def _join(self) -> tuple[Integers, Integers, Floats, Floats]:
-        """Edges: from, to, length, clearance."""
+        """Join poses by edges: from, to, length, clearance."""
         (nx, ny), n = self._shape, self.courses
         index = np.arange(nx * ny).reshape(nx, ny) * n
         steps = np.arange(-_RANGE, _RANGE + 1)
         i, j, k = (part.ravel() for part in np.meshgrid(steps, steps, np.arange(n), indexing="ij"))
         goals = np.stack([i * self.spacing, j * self.spacing, self.course[k]], 1)
-        start, end, length, room = [], [], [], []
-        for own in range(n):
+        start, end, length, clearances = [], [], [], []
+        for start_course in range(n):
             tracks = shortest_paths(
-                np.repeat([[0.0, 0.0, self.course[own]]], len(goals), 0), goals, self.limits.radius
+                np.repeat([[0.0, 0.0, self.course[start_course]]], len(goals), 0), goals, self.limits.radius
             )
-            turn = np.abs((self.course[k] - self.course[own] + math.pi) % (2 * math.pi) - math.pi)
+            turn = np.abs((self.course[k] - self.course[start_course] + math.pi) % (2 * math.pi) - math.pi)
             least = np.maximum(np.hypot(goals[:, 0], goals[:, 1]), self.limits.radius * turn)
             rows = np.flatnonzero((tracks.length <= _DETOUR * least) & (tracks.length > 0))
             for row in rows.tolist():
@@ -104,16 +104,16 @@ class Lattice:
                 b = slice(max(0, di), nx + min(0, di)), slice(max(0, dj), ny + min(0, dj))
                 if not index[a].size:
                     continue
-                left = self._clearance(tracks.take(np.array([row])))[a].ravel()
-                good = np.flatnonzero(left > 0)
-                start.append(index[a].ravel()[good] + own)
+                clearance = self._clearance(tracks.take(np.array([row])))[a].ravel()
+                good = np.flatnonzero(clearance > 0)
+                start.append(index[a].ravel()[good] + start_course)
                 end.append(index[b].ravel()[good] + int(k[row]))
                 length.append(np.full(len(good), tracks.length[row]))
-                room.append(left[good])
-        return np.concatenate(start), np.concatenate(end), np.concatenate(length), np.concatenate(room)
+                clearances.append(clearance[good])
+        return np.concatenate(start), np.concatenate(end), np.concatenate(length), np.concatenate(clearances)
 
     def _clearance(self, track: DubinsPaths) -> Floats:
-        """Clearance (nx, ny) along the track of one joint, by its place in the lattice; a lower bound."""
+        """Bound the clearance (nx, ny) along the track of one joint from below, by its place in the lattice."""
         count = max(2, math.ceil(float(track.length[0]) / _STEP) + 1)
         poses = track.poses(np.linspace(0, track.length, count).T, self.limits.radius)[0]
         heading = poses[:, 2] - slips(poses[:, 2], self.limits.drift)
@@ -126,14 +126,14 @@ class Lattice:
         return np.asarray(room, dtype=float) - self.limits.body.radius - self.map.slack
 
     def _split(self) -> NDArray[np.float32]:
-        """The map's table, (cells, cells, ., .), by the place between two poses of the lattice."""
+        """Split the map's table by the place between two poses of the lattice, (cells, cells, ., .)."""
         table = self.map.table.astype(np.float32)
         rows, columns = len(table) // _CELLS, len(table.T) // _CELLS
         parts = table[: rows * _CELLS, : columns * _CELLS].reshape(rows, _CELLS, columns, _CELLS)
         return np.ascontiguousarray(parts.transpose(1, 3, 0, 2))
 
     def ways(self, starts: Floats, costs: Floats, goals: Floats, margin: float) -> tuple[Floats, list[Floats]]:
-        """Shortest ways from any of the starts (S, 3), with costs to begin with, to each of the goals (G, 3).
+        """Find the shortest ways from any of the starts (S, 3), with initial costs, to each of the goals (G, 3).
 
         The body keeps `margin` on all of them.
 
@@ -145,41 +145,41 @@ class Lattice:
         source = count + s + g
         open_ = self._edges[3] >= margin
         edges = [(self._edges[0][open_], self._edges[1][open_], self._edges[2][open_])]
-        for own, pose in enumerate(starts):
-            if np.isfinite(costs[own]):
+        for index, pose in enumerate(starts):
+            if np.isfinite(costs[index]):
                 near, length = self._links(pose, margin, True)
-                edges.append((np.full(len(near), count + own), near, length))
-                edges.append((np.array([source]), np.array([count + own]), np.array([costs[own] + 1e-9])))
-        for own, pose in enumerate(goals):
+                edges.append((np.full(len(near), count + index), near, length))
+                edges.append((np.array([source]), np.array([count + index]), np.array([costs[index] + 1e-9])))
+        for index, pose in enumerate(goals):
             near, length = self._links(pose, margin, False)
-            edges.append((near, np.full(len(near), count + s + own), length))
+            edges.append((near, np.full(len(near), count + s + index), length))
         start, end, length = (np.concatenate([part[i] for part in edges]) for i in range(3))
         graph = csr_array((length, (start, end)), shape=(source + 1, source + 1))
         distance, before = dijkstra(graph, indices=np.array([source]), return_predecessors=True)
         poses = np.concatenate([self.poses, starts, goals])
-        found = []
-        for own in range(g):
-            chain, at = [], count + s + own
+        ways = []
+        for index in range(g):
+            chain, at = [], count + s + index
             while at >= 0 and at != source:
                 chain.append(at)
                 at = int(before[0, at])
-            found.append(poses[chain[::-1]])
-        return distance[0, count + s : source], found
+            ways.append(poses[chain[::-1]])
+        return distance[0, count + s : source], ways
 
     def _links(self, pose: Floats, margin: float, onward: bool) -> tuple[Integers, Floats]:
-        """Poses of the lattice that a pose can be joined to, or that can be joined to it; lengths."""
+        """Find poses of the lattice that a pose can be joined to, or that can be joined to it; and the lengths."""
         radius = self.limits.radius
         reach = max(_LINK * radius, 2 * self.spacing)
         near = np.flatnonzero(np.hypot(*(self.poses[:, :2] - pose[:2]).T) <= reach)
-        one, other = np.repeat(pose[None], len(near), 0), self.poses[near]
-        tracks = shortest_paths(one, other, radius) if onward else shortest_paths(other, one, radius)
+        here, there = np.repeat(pose[None], len(near), 0), self.poses[near]
+        tracks = shortest_paths(here, there, radius) if onward else shortest_paths(there, here, radius)
         rows = np.flatnonzero(tracks.length <= _LONGEST_LINK * radius + self.spacing)
         rows = rows[self.limits.free(tracks.take(rows), margin, self.map)]
         return near[rows], tracks.length[rows]
 
 
 def _distinct(offsets: Integers) -> tuple[list[list[int]], list[list[int]]]:
-    """Whole steps and rests of offsets (n, 2) in cells, each pair once."""
+    """Split offsets (n, 2) in cells into whole steps and remainders, each pair once."""
     once = np.unique(offsets[:, 0] * 2**32 + offsets[:, 1])
     pairs = np.stack([once >> 32, once & (2**32 - 1)], 1)
     return (pairs // _CELLS).tolist(), (pairs % _CELLS).tolist()

@@ -1,4 +1,4 @@
-"""Where the robot must not go: circles, polygons, and the tank's walls. And how much room is left.
+"""Where the robot must not go: circles, polygons and the tank's walls; and the clearance of its body.
 
 The body of the robot is a row of discs along its axis: head and straight tails. Its clearance is the smallest
 distance of any disc from any region, negative inside. Lengths in l.
@@ -42,7 +42,7 @@ class Circle:
             )
 
     def distance(self, points: Floats) -> Floats:
-        """Distance (M,) of points (M, 2), negative inside."""
+        """Compute the distance (M,) of points (M, 2), negative inside."""
         return np.asarray(np.hypot(points[:, 0] - self.x, points[:, 1] - self.y) - self.radius)
 
     @property
@@ -60,7 +60,7 @@ class Polygon:
 
     @staticmethod
     def of(points: Path2D | ArrayLike) -> Polygon:
-        """A polygon from points (n, 2); three or more that are not on a line.
+        """Make a polygon from points (n, 2): three or more that are not on one line.
 
         Raises:
             InputError: the points enclose nothing.
@@ -73,21 +73,21 @@ class Polygon:
         return Polygon(path.points)
 
     def distance(self, points: Floats) -> Floats:
-        """Distance (M,) of points (M, 2) from the edges, negative inside."""
+        """Compute the distance (M,) of points (M, 2) from the edges, negative inside."""
         block = max(1, _BLOCK // len(self.corners))
         parts = [self._distance(points[i : i + block]) for i in range(0, len(points), block)]
         return np.concatenate(parts) if parts else np.zeros(0)
 
     def _distance(self, points: Floats) -> Floats:
         start, end = self.corners, np.roll(self.corners, -1, 0)
-        along = end - start
+        edge = end - start
         dx, dy = points[:, 0, None] - start[:, 0], points[:, 1, None] - start[:, 1]
-        share = np.clip((dx * along[:, 0] + dy * along[:, 1]) / (along**2).sum(1), 0, 1)
-        square = (dx - share * along[:, 0]) ** 2 + (dy - share * along[:, 1]) ** 2
+        share = np.clip((dx * edge[:, 0] + dy * edge[:, 1]) / (edge**2).sum(1), 0, 1)
+        square = (dx - share * edge[:, 0]) ** 2 + (dy - share * edge[:, 1]) ** 2
         y = points[:, 1, None]
         crosses = (start[:, 1] <= y) != (end[:, 1] <= y)
-        rise = np.where(along[:, 1] == 0, 1.0, along[:, 1])
-        inside = (crosses & (dx < dy * along[:, 0] / rise)).sum(1) % 2 == 1
+        rise = np.where(edge[:, 1] == 0, 1.0, edge[:, 1])
+        inside = (crosses & (dx < dy * edge[:, 0] / rise)).sum(1) % 2 == 1
         return np.where(inside, -1.0, 1.0) * np.sqrt(square.min(1))
 
     @property
@@ -111,16 +111,16 @@ class FreeSpace:
         return not self.regions and self.walls is None
 
     def distance(self, points: Floats) -> Floats:
-        """Distance (M,) of points (M, 2) from the nearest region or wall, negative where it is not free."""
-        found = np.full(len(points), np.inf)
+        """Compute the distance (M,) of points (M, 2) from the nearest region or wall, negative inside."""
+        distances = np.full(len(points), np.inf)
         for region in self.regions:
-            found = np.minimum(found, region.distance(points))
+            distances = np.minimum(distances, region.distance(points))
         if self.walls is not None:
-            found = np.minimum(found, -self.walls.distance(points))
-        return found
+            distances = np.minimum(distances, -self.walls.distance(points))
+        return distances
 
     def boxes(self) -> list[Floats]:
-        """The corners (2, 2) of what bounds the regions and walls."""
+        """List the corners (2, 2) of the boxes around the regions and walls."""
         return [region.box for region in (*self.regions, *([self.walls] if self.walls else []))]
 
 
@@ -133,7 +133,7 @@ class Footprint:
 
     @staticmethod
     def of(robot: Robot, origin: float) -> Footprint:
-        """Head and straight tails; `origin` is the distance from the head's centre forward to the point."""
+        """Cover head and straight tails; `origin` is the distance from the head's centre forward to the point."""
         length = robot.tail_length
         half, width = robot.head_length / 2 / length, robot.head_radius / length
         width = max(width, ((robot.disc_offset or robot.head_radius) + robot.tail_radius) / length)
@@ -149,31 +149,31 @@ class Footprint:
         return float(np.abs(self.places).max()) + self.radius
 
     def centres(self, poses: Floats) -> Floats:
-        """Centres (..., K, 2) of the discs of a body at poses (..., 3): origin and heading."""
+        """Compute the centres (..., K, 2) of the discs at poses (..., 3): origin and heading."""
         axis = np.stack([np.cos(poses[..., 2]), np.sin(poses[..., 2])], -1)
         return np.asarray(poses[..., None, :2] + self.places[:, None] * axis[..., None, :])
 
-    def clearance(self, poses: Floats, room: FreeSpace | Map) -> Floats:
-        """Distance (...) between the body at poses (..., 3) and what is not free."""
+    def clearance(self, poses: Floats, space: FreeSpace | Map) -> Floats:
+        """Compute the distance (...) between the body at poses (..., 3) and what is not free."""
         centres = self.centres(poses)
-        found = room.distance(centres.reshape(-1, 2)).reshape(centres.shape[:-1])
-        return np.asarray(found.min(-1) - self.radius)
+        distances = space.distance(centres.reshape(-1, 2)).reshape(centres.shape[:-1])
+        return np.asarray(distances.min(-1) - self.radius)
 
 
 class Map:
-    """Distances of a room on a grid, never larger than the true ones: quick for many points."""
+    """Distances from regions and walls on a grid, never larger than the true ones: fast for many points."""
 
-    def __init__(self, room: FreeSpace, low: Floats, high: Floats, step: float):
+    def __init__(self, space: FreeSpace, low: Floats, high: Floats, step: float):
         size = high - low
         self._low, self.step = low, step
         count = np.ceil(size / step).astype(int) + 1
         x, y = (low[i] + step * np.arange(count[i]) for i in (0, 1))
         points = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
-        self.table = room.distance(points.reshape(-1, 2)).reshape(points.shape[:2])
+        self.table = space.distance(points.reshape(-1, 2)).reshape(points.shape[:2])
         self.slack = step / math.sqrt(2)  # distances change by at most the way to the nearest grid point
 
     def distance(self, points: Floats) -> Floats:
-        """A lower bound (M,) of the distance of points (M, 2); outside the map nothing is free."""
+        """Bound the distance of points (M, 2) from below, (M,); outside the map nothing is free."""
         place = np.rint((points - self._low) / self.step).astype(int)
         last: Integers = np.array([len(self.table) - 1, len(self.table.T) - 1])
         inside = ((place >= 0) & (place <= last)).all(1)

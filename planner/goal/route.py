@@ -78,9 +78,9 @@ def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lat
     for number, stop in enumerate(stops):
         _check(stop, number, len(stops), limits, margin)
     direct = _direct(stops, limits, margin)
-    if limits.room.empty and direct is not None:
+    if limits.space.empty and direct is not None:
         return direct
-    shortest = _direct(stops, replace(limits, room=FreeSpace()), margin)
+    shortest = _direct(stops, replace(limits, space=FreeSpace()), margin)
     if direct is not None and shortest is not None and direct.length < _ENOUGH * shortest.length:
         return direct
     for spacing, courses in LEVELS:
@@ -170,7 +170,7 @@ def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | 
             chain.append((track, length, (came, at, word)))
             at = came
         found = _chain([track for track, _, _ in chain[::-1]], limits.radius)
-        free = np.ones(len(chain), dtype=bool) if limits.room.empty else limits.free(found.tracks, margin)[::-1]
+        free = np.ones(len(chain), dtype=bool) if limits.space.empty else limits.free(found.tracks, margin)[::-1]
         if free.all():
             return found
         for (_, length, place), good in zip(chain, free.tolist(), strict=True):
@@ -185,12 +185,12 @@ def _chain(parts: list[DubinsPaths], radius: float) -> Route:
 
 def _lattice(stops: list[Floats], limits: RouteLimits, spacing: float, courses: int) -> Lattice:
     """A lattice that reaches around all obstacles, or to the walls."""
-    boxes = [*limits.room.boxes(), *(stop[:, :2] for stop in stops)]
+    boxes = [*limits.space.boxes(), *(stop[:, :2] for stop in stops)]
     reach = _AROUND * limits.radius + limits.body.reach
     low = np.min([box.min(0) for box in boxes], 0) - reach
     high = np.max([box.max(0) for box in boxes], 0) + reach
-    if limits.room.walls is not None:
-        low, high = limits.room.walls.box
+    if limits.space.walls is not None:
+        low, high = limits.space.walls.box
     return Lattice(limits, low, high, spacing, courses)
 
 

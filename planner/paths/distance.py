@@ -14,64 +14,64 @@ _MOST_POINTS = 400_000  # of the refined polyline
 
 
 def distance_to(polyline: Floats, points: Floats) -> Floats:
-    """Distance (M,) of points (M, 2) from a polyline (m, 2), exact to rounding."""
+    """Compute the distance (M,) of points (M, 2) from a polyline (m, 2), exact to rounding."""
     return nearest(polyline, points)[0]
 
 
 def nearest(polyline: Floats, points: Floats) -> tuple[Floats, Integers, Floats]:
-    """Distance, segment and share along it (M,) of the place on a polyline (m, 2) that is nearest to each point.
+    """Find the place on a polyline (m, 2) that is nearest to each point: distance, segment and share of it (M,).
 
-    The tree holds the polyline's points, and points between them at most s apart. The nearest place is one of the
-    former, or it is within s/2 of one of the latter, along its segment: so that point's distance is at most
-    √(d² + s²/4). All segments with points that near are tried.
+    The tree holds the polyline's points, and points between them at most s apart. The nearest place is one
+    of the former, or it is within s/2 of one of the latter, along its segment: so that point's distance
+    is at most √(d² + s²/4). All segments with points that near are tried.
     """
-    start, along = polyline[:-1], np.diff(polyline, axis=0)
-    length = np.hypot(along[:, 0], along[:, 1])
+    start, direction = polyline[:-1], np.diff(polyline, axis=0)
+    length = np.hypot(direction[:, 0], direction[:, 1])
     step = max(float(np.median(length)), float(length.sum()) / _MOST_POINTS, 1e-300)
     pieces = np.maximum(1, np.ceil(length / step)).astype(int)
     owner = np.repeat(np.arange(len(start)), pieces)
     part = np.arange(len(owner)) - (np.cumsum(pieces) - pieces)[owner]
-    places = start[owner] + (part / pieces[owner])[:, None] * along[owner]
+    places = start[owner] + (part / pieces[owner])[:, None] * direction[owner]
     owner = np.append(owner, len(start) - 1)
-    other = np.maximum(owner - np.append(part == 0, False), 0)  # the segment that ends here
+    previous = np.maximum(owner - np.append(part == 0, False), 0)  # the segment that ends here
     tree = cKDTree(np.concatenate([places, polyline[-1:]]))
     half = float((length / pieces).max()) / 2
     count = min(_FINE, len(owner))
-    raw = tree.query(points, k=count)
-    gap, found = (np.reshape(part, (len(points), count)) for part in raw)
-    candidates = np.concatenate([owner[found], other[found]], 1)
-    distance, segment, place = _closest(start, along, points, candidates)
+    neighbours = tree.query(points, k=count)
+    gap, points_near = (np.reshape(part, (len(points), count)) for part in neighbours)
+    candidates = np.concatenate([owner[points_near], previous[points_near]], 1)
+    distance, segment, place = _closest(start, direction, points, candidates)
     unsure = np.flatnonzero((gap[:, -1] ** 2 < distance**2 + half**2) & (count < len(owner)))
     for i in unsure.tolist():
         reach = math.hypot(float(distance[i]), half) * (1 + 1e-9)
         near = tree.query_ball_point(points[i], reach)
-        both = np.unique(np.concatenate([owner[near], other[near]]))
-        one = _closest(start, along, points[i : i + 1], both[None])
-        distance[i], segment[i], place[i] = (float(part[0]) for part in one)
+        both = np.unique(np.concatenate([owner[near], previous[near]]))
+        closest = _closest(start, direction, points[i : i + 1], both[None])
+        distance[i], segment[i], place[i] = (float(part[0]) for part in closest)
     return distance, segment, place
 
 
 def _closest(
-    start: Floats, along: Floats, points: Floats, candidates: Integers
+    start: Floats, direction: Floats, points: Floats, candidates: Integers
 ) -> tuple[Floats, Integers, Floats]:
-    """The nearest of the candidate segments (M, k) of each point."""
-    direction = along[candidates]
+    """Choose the nearest of the candidate segments (M, k) of each point."""
+    chosen = direction[candidates]
     away = points[:, None] - start[candidates]
-    square = np.maximum((direction**2).sum(-1), 1e-300)
-    share = np.clip((away * direction).sum(-1) / square, 0, 1)
-    gap = np.hypot(*np.moveaxis(away - share[..., None] * direction, -1, 0))
+    square = np.maximum((chosen**2).sum(-1), 1e-300)
+    share = np.clip((away * chosen).sum(-1) / square, 0, 1)
+    gap = np.hypot(*np.moveaxis(away - share[..., None] * chosen, -1, 0))
     best = gap.argmin(1)
     rows = np.arange(len(points))
     return gap[rows, best], candidates[rows, best], share[rows, best]
 
 
-def two_sided(one: Floats, other: Floats) -> tuple[float, float]:
-    """Largest distance of any point of polyline `one` from `other`, and the other way round, at fine steps."""
-    return float(distance_to(other, _filled(one)).max()), float(distance_to(one, _filled(other)).max())
+def two_sided(first: Floats, second: Floats) -> tuple[float, float]:
+    """Compute the largest distance of any point of the first polyline from the second, and the reverse."""
+    return float(distance_to(second, _filled(first)).max()), float(distance_to(first, _filled(second)).max())
 
 
 def _filled(polyline: Floats) -> Floats:
-    """The polyline with points added, so that none of its steps is long beside its whole length."""
+    """Add points to a polyline, so that all steps are short compared with its length."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(polyline, axis=0).T))])
     count = max(2, min(4000, math.ceil(length[-1] / max(float(np.diff(length).min()), length[-1] / 4000))))
     at = np.union1d(np.linspace(0, length[-1], count), length)

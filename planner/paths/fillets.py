@@ -13,7 +13,7 @@ CORNER = math.radians(15.0)  # larger kinks are corners; smaller ones belong to 
 
 
 def kinks(path: Path2D) -> Floats:
-    """Signed turning angle [rad] at every point; zero at the ends of an open path."""
+    """Compute the signed turning angle [rad] at every point; zero at the ends of an open path."""
     edges = np.diff(path.polyline(), axis=0)
     direction = np.arctan2(edges[:, 1], edges[:, 0])
     if path.closed:
@@ -24,7 +24,7 @@ def kinks(path: Path2D) -> Floats:
 
 
 def largest_fillet(path: Path2D) -> float:
-    """The largest radius that fits all corners; infinite without corners."""
+    """Compute the largest radius that fits all corners; infinite without corners."""
     angle = np.abs(kinks(path))
     reach = np.where(angle > CORNER, np.tan(angle / 2), 0.0)
     edges = np.linalg.norm(np.diff(path.polyline(), axis=0), axis=1)
@@ -34,7 +34,7 @@ def largest_fillet(path: Path2D) -> float:
 
 
 def fillet(path: Path2D, radius: float) -> Path2D:
-    """Corners replaced by arcs of `radius`, tangent to the edges; at most `largest_fillet`."""
+    """Replace corners by arcs of `radius`, tangent to the edges; at most `largest_fillet`."""
     angle = kinks(path)
     corner = np.abs(angle) > CORNER
     if radius == 0 or not corner.any():

@@ -55,7 +55,7 @@ def nearest_path(
     minimax: bool = False,
     time_weight: float = 0.0,
 ) -> Path2D:
-    """The path of the tracked point that is nearest to `raw` among those that the robot can follow.
+    """Find the path of the tracked point that is nearest to `raw` among those that the robot can follow.
 
     Args:
         raw: the path as drawn.
@@ -86,13 +86,13 @@ def nearest_path(
     turned = np.append(np.repeat(np.diff(poses[:, 2]), _PIECES), 0.0)
     chord = np.append(np.repeat(np.hypot(*np.diff(poses[:, :2], axis=0).T), _PIECES), 0.0)
     off = -turned * chord * (at % 1) * (1 - at % 1) / 2
-    found = np.stack([x - off * np.sin(heading), y + off * np.cos(heading)], 1)
-    found += pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
-    return Path2D.of(found[:-1] if raw.closed else found, closed=raw.closed)
+    points = np.stack([x - off * np.sin(heading), y + off * np.cos(heading)], 1)
+    points += pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
+    return Path2D.of(points[:-1] if raw.closed else points, closed=raw.closed)
 
 
 def _start(target: Floats, pivot_distance: float, *, closed: bool) -> tuple[Floats, float | None]:
-    """Poses (m, 3) along the target, headings smoothed over a pivot distance; and the turn of a closed lap."""
+    """Begin with poses (m, 3) along the target, headings smoothed over a pivot distance; and the turn of a lap."""
     moves = np.diff(target, axis=0, append=target[:1]) if closed else np.diff(target, axis=0)
     length = np.hypot(moves[:, 0], moves[:, 1])
     going = length > 1e-9 * length.max()
@@ -111,7 +111,7 @@ def _start(target: Floats, pivot_distance: float, *, closed: bool) -> tuple[Floa
 
 
 def _sides(target: Floats, *, closed: bool) -> Floats:
-    """Unit vectors along the path, times the share that such distances count, and across it, (m, 2, 2)."""
+    """Compute unit vectors along the path, times the weight of such distances, and across it, (m, 2, 2)."""
     if closed:
         moves = np.roll(target, -1, axis=0) - np.roll(target, 1, axis=0)
     else:
@@ -122,7 +122,7 @@ def _sides(target: Floats, *, closed: bool) -> Floats:
 
 
 def _whole_lap(poses: Floats, turn: float) -> Floats:
-    """A lap with its first pose at the end again."""
+    """Repeat the first pose of a lap at its end."""
     return np.concatenate([poses, poses[:1] + np.array([0.0, 0.0, turn])])
 
 
@@ -141,7 +141,7 @@ class _Task(NamedTuple):
 
 
 def _minimax(poses: Floats, task: _Task) -> Floats:
-    """Poses whose largest distance from the target is small."""
+    """Find poses whose largest distance from the target is small."""
     best, shares = poses, task.shares
     for _ in range(_ROUNDS):
         away = _distances(poses, task)
@@ -154,13 +154,13 @@ def _minimax(poses: Floats, task: _Task) -> Floats:
 
 
 def _distances(poses: Floats, task: _Task) -> Floats:
-    """Of the tracked point from the target, (m,)."""
+    """Compute the distances (m,) of the tracked point from the target."""
     ahead = task.distance * np.stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])], 1)
     return np.asarray(np.hypot(*(poses[:, :2] + ahead - task.target).T))
 
 
 def _descend(poses: Floats, task: _Task, weight: float) -> Floats:
-    """Gauss-Newton with Levenberg's damping, for one weight of the constraints."""
+    """Minimise by Gauss-Newton with Levenberg's damping, for one weight of the constraints."""
     damping = 1e-3
     place = _places(len(poses), closed=task.turn is not None)
     residual, single, pair = _system(poses, task, weight)
@@ -193,7 +193,7 @@ def _descend(poses: Floats, task: _Task, weight: float) -> Floats:
 
 
 def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Floats], Floats, Floats]:
-    """Residuals of poses (m, 2) and of steps (k, 5); derivatives (m, 2, 3) and (k, 5, 6).
+    """Compute residuals of poses (m, 2) and of steps (k, 5), and derivatives (m, 2, 3) and (k, 5, 6).
 
     There are k = m − 1 steps on an open path, and m on a closed one.
     """
@@ -201,7 +201,7 @@ def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Fl
     root = np.sqrt(shares)
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     sides = root[:, None, None] * sides
-    own = np.einsum("kri,ki->kr", sides, poses[:, :2] + distance * np.stack([c, s], 1) - target)
+    pose_residual = np.einsum("kri,ki->kr", sides, poses[:, :2] + distance * np.stack([c, s], 1) - target)
     single = np.concatenate([sides, (sides @ (distance * np.stack([-s, c], 1))[..., None])], -1)
     if lap is not None:
         poses = _whole_lap(poses, lap)
@@ -216,7 +216,7 @@ def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Fl
     steps, pair = np.zeros((len(move), 5)), np.zeros((len(move), 5, 6))
 
     def put(row: int, along: Floats, across: Floats, turning: Floats) -> None:
-        """Derivatives of a residual by forward part, sideways part and turn of the step."""
+        """Store a residual's derivatives by forward part, sideways part and turn of the step."""
         dx, dy = along * c - across * s, along * s + across * c
         swing = (along * aside - across * forward) / 2
         pair[:, row, 0], pair[:, row, 1], pair[:, row, 2] = -dx, -dy, swing - turning
@@ -240,11 +240,11 @@ def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Fl
     length = np.maximum(forward, _SHORTEST_STEP * spacing)
     steps[:, 4] = np.sqrt(time_weight / spacing * length)
     put(4, np.asarray(steps[:, 4] / (2 * length) * (length == forward), dtype=np.float64), none, none)
-    return (own, steps), single, pair
+    return (pose_residual, steps), single, pair
 
 
 def _places(count: int, *, closed: bool) -> Integers:
-    """Where each pose stands in the system (m,): neighbours are near one another."""
+    """Order the poses in the system (m,) so that neighbours are near one another."""
     order = np.arange(count)
     if closed:
         order[::2], order[1::2] = np.arange((count + 1) // 2), np.arange(count - 1, (count - 1) // 2, -1)
@@ -256,20 +256,20 @@ def _places(count: int, *, closed: bool) -> Integers:
 def _normal(
     residual: tuple[Floats, Floats], single: Floats, pair: Floats, place: Integers
 ) -> tuple[Floats, Floats]:
-    """The banded normal matrix, upper form (band, 3 m), and the right side (3 m,), in the order of `place`."""
-    own, steps = residual
-    count, here = len(own), np.arange(len(steps))
-    there = (here + 1) % count
-    right = np.einsum("kri,kr->ki", single, own)
-    both = np.einsum("kri,kr->ki", pair, steps)
-    right[here] += both[:, :3]
-    right[there] += both[:, 3:]
+    """Assemble the normal matrix, upper form (band, 3 m), and the right side (3 m,), sorted by `place`."""
+    pose_residual, step_residual = residual
+    count, first = len(pose_residual), np.arange(len(step_residual))
+    second = (first + 1) % count
+    right = np.einsum("kri,kr->ki", single, pose_residual)
+    from_steps = np.einsum("kri,kr->ki", pair, step_residual)
+    right[first] += from_steps[:, :3]
+    right[second] += from_steps[:, 3:]
     diagonal = np.einsum("kri,krj->kij", single, single)
     blocks = np.einsum("kri,krj->kij", pair, pair)
-    diagonal[here] += blocks[:, :3, :3]
-    diagonal[there] += blocks[:, 3:, 3:]
-    low, high = np.minimum(place[here], place[there]), np.maximum(place[here], place[there])
-    across = np.where((place[here] < place[there])[:, None, None], blocks[:, :3, 3:], blocks[:, 3:, :3])
+    diagonal[first] += blocks[:, :3, :3]
+    diagonal[second] += blocks[:, 3:, 3:]
+    low, high = np.minimum(place[first], place[second]), np.maximum(place[first], place[second])
+    across = np.where((place[first] < place[second])[:, None, None], blocks[:, :3, 3:], blocks[:, 3:, :3])
     width = 3 * int((high - low).max()) + 2
     band = np.zeros((width + 1, count, 3))
     for i in range(3):

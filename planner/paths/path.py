@@ -34,7 +34,7 @@ class Path2D:
 
     @staticmethod
     def of(points: ArrayLike, *, closed: bool | None = None) -> Path2D:
-        """A path from points (n, 2). By default it is closed if it ends where it begins.
+        """Make a path from points (n, 2). By default it is closed if it ends where it begins.
 
         Raises:
             InputError: the points are none, no finite pairs, or all the same.
@@ -64,10 +64,11 @@ class Path2D:
         return Path2D(table, meets if closed is None else closed)
 
     def scaled(self, factor: float) -> Path2D:
+        """Multiply the coordinates."""
         return Path2D(self.points * factor, self.closed)
 
     def polyline(self) -> Floats:
-        """The points; of a closed path with the first one repeated at the end."""
+        """Return the points; those of a closed path with the first one repeated at the end."""
         return np.concatenate([self.points, self.points[:1]]) if self.closed else self.points
 
     @property
@@ -76,7 +77,7 @@ class Path2D:
 
 
 def circle(radius: float) -> Path2D:
-    """A circle about the origin, counter-clockwise from (radius, 0).
+    """Make a circle about the origin, counter-clockwise from (radius, 0).
 
     Example:
         >>> from softflagella import circle
@@ -88,7 +89,7 @@ def circle(radius: float) -> Path2D:
 
 
 def polygon(corners: int, side: float) -> Path2D:
-    """A regular polygon about the origin, counter-clockwise; it starts in the middle of its lower side.
+    """Make a regular polygon about the origin, counter-clockwise; it starts in the middle of its lower side.
 
     Args:
         corners: their number, 3 or more.
@@ -106,19 +107,24 @@ def polygon(corners: int, side: float) -> Path2D:
     return Path2D.of(np.concatenate([[middle], ring]), closed=True)
 
 
+def arc_length(polyline: Floats) -> Floats:
+    """Compute the length (m,) of a polyline (m, 2) from its start to each of its points."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(polyline, axis=0), axis=1))])
+
+
 def resample(polyline: Floats, spacing: float) -> Floats:
-    """Points at equal arc length, at most `spacing` apart; the ends are kept."""
-    lengths = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(polyline, axis=0), axis=1))])
+    """Place points at equal arc length, at most `spacing` apart; the ends are kept."""
+    lengths = arc_length(polyline)
     count = max(2, math.ceil(lengths[-1] / spacing) + 1)
     at = np.linspace(0, lengths[-1], count)
     return np.stack([np.interp(at, lengths, polyline[:, i]) for i in (0, 1)], 1)
 
 
 def smoothed(path: Path2D, length: float) -> tuple[Path2D, float]:
-    """The path smoothed over a length, and how far that moves it.
+    """Smooth a path over a length, and return how far that moves it.
 
     Each point becomes a Gaussian mean over its neighbours, with a standard deviation of half the length along the
-    path. So noise of a camera is taken out, and corners are rounded. The ends of an open path stay.
+    path. This removes the noise of a camera and rounds corners. The ends of an open path stay.
 
     Raises:
         InputError: the length is no number above 0, or as long as the path.

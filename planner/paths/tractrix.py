@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.paths.path import Path2D, resample
+from planner.paths.path import Path2D, arc_length, resample
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
@@ -62,7 +62,7 @@ class Reference:
 
 
 def reference(path: Path2D, pivot_distance: float, spacing: float, drift: Drift = STILL) -> Reference:
-    """Tractrix of a path.
+    """Compute the tractrix of a path.
 
     Args:
         path: the path of the tracked point.
@@ -89,18 +89,17 @@ def reference(path: Path2D, pivot_distance: float, spacing: float, drift: Drift 
             heading = _drag(tangent, length, pivot_distance, start, drift)
             start = heading[-1] - _turning(tangent) if path.closed else start
     q = p - pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
-    arc = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(q, axis=0), axis=1))])
-    return Reference(p, q, heading, arc, path.closed)
+    return Reference(p, q, heading, arc_length(q), path.closed)
 
 
 def _turning(tangent: Floats) -> float:
-    """Total turn of a closed path: a multiple of 2π."""
+    """Compute the total turn of a closed path: a multiple of 2π."""
     closing = (tangent[0] - tangent[-1] + math.pi) % (2 * math.pi) - math.pi
     return float(tangent[-1] - tangent[0] + closing)
 
 
 def _slip(direction: float, drift: Drift) -> float:
-    """Angle from the heading to a straight path in `direction`."""
+    """Compute the angle from the heading to a straight path in `direction`."""
     if drift.none:
         return 0.0
     slip = 0.0
@@ -110,7 +109,7 @@ def _slip(direction: float, drift: Drift) -> float:
 
 
 def slips(direction: Floats, drift: Drift) -> Floats:
-    """Angles (...) from the heading to straight paths in these directions (...)."""
+    """Compute the angles (...) from the heading to straight paths in these directions (...)."""
     slip = np.zeros_like(direction)
     if drift.none:
         return slip
@@ -122,7 +121,7 @@ def slips(direction: Floats, drift: Drift) -> Floats:
 
 
 def _ratio(heading: float, drift: Drift) -> float:
-    """Sideways part of the motion by its forward part, (u + c·n)/(V + c·e)."""
+    """Compute the ratio of sideways to forward motion, (u + c·n)/(V + c·e)."""
     cx, cy = drift.current
     ahead = 1 + cx * math.cos(heading) + cy * math.sin(heading)
     aside = drift.sideways - cx * math.sin(heading) + cy * math.cos(heading)
@@ -133,7 +132,7 @@ def _ratio(heading: float, drift: Drift) -> float:
 
 
 def _drag(tangent: Floats, length: Floats, pivot_distance: float, start: float, drift: Drift) -> Floats:
-    """Heading along straight steps: without drift exact, tan(δ/2) decays as exp(−s/a)."""
+    """Compute the heading along straight steps; exact without drift, where tan(δ/2) decays as exp(−s/a)."""
     heading = np.empty(len(tangent) + 1)
     heading[0] = now = float(start)
     decay = np.exp(-length / pivot_distance)

@@ -1,4 +1,4 @@
-"""The size of a path beside the robot. What makes no sense is refused, with the unit that would."""
+"""Check the size of a path against the robot; reject absurd sizes and suggest the unit that was probably meant."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SENSIBLE = (3.0, 300.0)  # length in l
 
 
 def describe(path: Path2D, robot: Robot) -> str:
-    """Length and extent of a path in l, as text in l and cm."""
+    """Describe length and extent of a path, in l and cm."""
     width, height = extent(path)
     cm = 100 * robot.tail_length
     return (
@@ -27,12 +27,12 @@ def describe(path: Path2D, robot: Robot) -> str:
 
 
 def in_tails(unit: str, robot: Robot) -> float:
-    """A unit of length in tail lengths; l is the tail length itself."""
+    """Convert a unit of length to tail lengths; l is the tail length itself."""
     return 1.0 if unit == "l" else UNITS[unit] / robot.tail_length
 
 
 def extent(path: Path2D) -> tuple[float, float]:
-    """Width and height."""
+    """Return width and height of a path."""
     width, height = (path.points.max(0) - path.points.min(0)).tolist()
     return width, height
 
@@ -54,13 +54,13 @@ def check_size(path: Path2D, robot: Robot, turn_radius: float) -> None:
 
 
 def _hint(path: Path2D, robot: Robot) -> str:
-    """The units with which the numbers of the path would make sense."""
-    own = {unit: in_tails(unit, robot) for unit in ("l", *UNITS)}
+    """Suggest the units with which the numbers of the path would make sense."""
+    scales = {unit: in_tails(unit, robot) for unit in ("l", *UNITS)}
     # The path may have been given in any of these units: undo it, then try the others.
-    found = []
-    for given, scale in own.items():
-        for meant, other in own.items():
-            length = path.length / scale * other
+    hints = []
+    for given, scale in scales.items():
+        for meant, meant_scale in scales.items():
+            length = path.length / scale * meant_scale
             if given != meant and _SENSIBLE[0] <= length <= _SENSIBLE[1]:
-                found.append(f"if you gave {given} and mean {meant}, it is {length:.3g} l: --unit {meant}")
-    return "; " + "; or ".join(found[:2]) if found else "; scale it"
+                hints.append(f"if you gave {given} and mean {meant}, it is {length:.3g} l: --unit {meant}")
+    return "; " + "; or ".join(hints[:2]) if hints else "; scale it"

@@ -1,4 +1,4 @@
-"""What a calibration found besides the corrected robot: how sure its coefficients are, and a current in the tank.
+"""What a calibration knows besides the corrected robot: the covariance of its coefficients, and a current.
 
 In a robot.toml it is the table
 
@@ -57,7 +57,7 @@ class CalibrationKnowledge:
 
 
 def read_knowledge(path: str | Path) -> CalibrationKnowledge:
-    """The table [calibration] of a robot.toml; nothing is known where there is no such file or table.
+    """Read the table [calibration] of a robot.toml; nothing is known where there is no such file or table.
 
     Raises:
         InputError: the table is not as described above.
@@ -65,17 +65,17 @@ def read_knowledge(path: str | Path) -> CalibrationKnowledge:
     if not Path(path).is_file():
         return CalibrationKnowledge()
     try:
-        found: dict[str, Any] = tomllib.loads(Path(path).read_text()).get("calibration", {})
-        names = tuple(str(name) for name in found.get("names", ()))
-        covariance = np.array(found.get("covariance", []), dtype=float).reshape(len(names), len(names))
-        current, error = (_pair(found.get(key, (0.0, 0.0))) for key in ("current_m_s", "current_error_m_s"))
+        table: dict[str, Any] = tomllib.loads(Path(path).read_text()).get("calibration", {})
+        names = tuple(str(name) for name in table.get("names", ()))
+        covariance = np.array(table.get("covariance", []), dtype=float).reshape(len(names), len(names))
+        current, error = (_pair(table.get(key, (0.0, 0.0))) for key in ("current_m_s", "current_error_m_s"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, TypeError, ValueError, AttributeError) as broken:
         raise InputError(f"{path}: [calibration] cannot be read: {broken}") from None
     return CalibrationKnowledge(names, covariance, current, error)
 
 
 def knowledge_toml(knowledge: CalibrationKnowledge) -> str:
-    """The table [calibration] that `read_knowledge` reads back."""
+    """Write the table [calibration] that `read_knowledge` reads back."""
     rows = ",\n".join(f"    {[float(f'{value:.12g}') for value in row]}" for row in knowledge.covariance.tolist())
     lines = ["[calibration]", f"names = {json.dumps(knowledge.names)}", f"covariance = [\n{rows},\n]"]
     if any((*knowledge.current, *knowledge.current_error)):

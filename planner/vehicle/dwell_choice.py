@@ -1,4 +1,4 @@
-"""The shortest dwell is chosen from what the user asks: time, error, or few flips.
+"""Choose the minimum dwell for the user's objective: time, error or number of flips.
 
 A longer dwell loses less speed to the turn-over of the tails, and swings further. So one number decides between
 speed and error. All figures here are of straight motion; the plan's own errors are checked
@@ -18,7 +18,7 @@ from sim.io.errors import InputError
 from sim.mechanics import planar
 
 Objective = Literal["error", "time", "flips"]
-QUICK = 0.3  # below this, two dwells before matter as well
+QUICK = 0.3  # below this, the last two dwells matter, not only the last one
 LONGEST = 4.0
 KEPT = {"error": 0.90, "flips": 0.95}  # share of the best net speed that is kept
 _WIDEST = 0.6  # rad that the heading swings to a side
@@ -26,7 +26,7 @@ _COUNT = 100
 
 
 def dwells_for(vehicle: Vehicle, objective: Objective, least: float | None) -> list[float]:
-    """Dwells in the order of preference: the first one for itself, the others where a tolerance asks for less.
+    """List dwells in order of preference: the best one, then shorter ones for a tolerance that asks for less.
 
     Args:
         vehicle: both directions.
@@ -53,20 +53,20 @@ def dwells_for(vehicle: Vehicle, objective: Objective, least: float | None) -> l
 
 
 def longest_dwell(vehicle: Vehicle, least: float) -> float:
-    """The longest dwell that is considered; not below `least`."""
+    """Return the longest dwell that is considered; not below `least`."""
     return max(least, min(LONGEST, 2 * _WIDEST / float(np.abs(vehicle.twist[:, 2]).max())))
 
 
 def net_speeds(vehicle: Vehicle, dwells: Floats) -> Floats:
-    """Net speed (T,) of straight motion with shortest dwells (T,), as in `zigzag`; without the current."""
+    """Compute net speeds (T,) of straight motion with shortest dwells (T,), as in `zigzag`; no current."""
     rates = np.abs(vehicle.twist[:, 2])
-    one, other = dwells * rates.max() / rates[0], dwells * rates.max() / rates[1]
-    pair = planar.compose(vehicle.motion(1, other, one), vehicle.motion(-1, one, other))
-    return np.asarray(np.hypot(pair[:, 0], pair[:, 1]) / (one + other))
+    positive, negative = dwells * rates.max() / rates[0], dwells * rates.max() / rates[1]
+    move = planar.compose(vehicle.motion(1, negative, positive), vehicle.motion(-1, positive, negative))
+    return np.asarray(np.hypot(move[:, 0], move[:, 1]) / (positive + negative))
 
 
 def check_least(least: float | None) -> float:
-    """The shortest dwell that is allowed.
+    """Return the shortest dwell that is allowed.
 
     Raises:
         InputError: below what the curves of the response cover.

@@ -34,7 +34,7 @@ def default_table() -> LookupTable:
 
 
 def table_vehicle(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowledge | None = None) -> Vehicle:
-    """The vehicle that the look-up table predicts for a robot.
+    """Ask a look-up table for the vehicle of a robot.
 
     Args:
         robot: the robot.
@@ -46,14 +46,14 @@ def table_vehicle(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowl
     """
     knowledge = knowledge or CalibrationKnowledge()
     columns = _both_directions(robot.group_values())
-    found = lookup.query(columns)
-    twist = _twists(found)
+    motion = lookup.query(columns)
+    twist = _twists(motion)
     curves = lookup.response(columns)
     if curves.failed.any():
         raise InputError("the response of this robot to a flip could not be found; turn its motor slower")
-    slow = twist[:, 0].mean()
-    if slow <= 0:
-        raise InputError(f"robot {robot.name!r} does not move forward (v_z = {slow:.3g}); turn its motor slower")
+    speed = twist[:, 0].mean()
+    if speed <= 0:
+        raise InputError(f"robot {robot.name!r} does not move forward (v_z = {speed:.3g}); turn its motor slower")
     if (twist[:, 2] * [1.0, -1.0] <= 0).any():
         raise InputError(f"robot {robot.name!r} turns to the same side in both directions of its motor; it cannot "
                          "follow a path")  # fmt: skip
@@ -67,25 +67,25 @@ def table_vehicle(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowl
         spread=resampled(curves.spread),
         modes=(*_table_modes(twist, lookup), *_coefficient_modes(robot, lookup, twist, knowledge)),
         current=np.asarray(knowledge.current) * unit,
-        tail_gap=float(np.min(found["tail_gap"])),
+        tail_gap=float(np.min(motion["tail_gap"])),
         least_gap=float(least_gap(robot.effects.get(CONTACT.name, 0.0))),
     )
 
 
 def _both_directions(values: dict[str, float]) -> dict[str, Floats]:
-    """The robot twice: with its motor forward, and reversed."""
+    """Return the robot's groups twice: with its motor forward, and reversed."""
     columns: dict[str, Floats] = {name: np.array([value, value]) for name, value in values.items()}
     columns["omega_bar"] = columns["omega_bar"] * [1.0, -1.0]
     return columns
 
 
-def _twists(found: Mapping[str, Floats]) -> Floats:
-    """Twists (2, 3) of both directions, from what a table answers."""
-    return np.stack([found[name] for name in _STEADY], -1)
+def _twists(motion: Mapping[str, Floats]) -> Floats:
+    """Return the twists (2, 3) of both directions from a table's answer."""
+    return np.stack([motion[name] for name in _STEADY], -1)
 
 
 def _table_modes(twist: Floats, lookup: LookupTable) -> list[Mode]:
-    """The held-out errors of the table.
+    """Turn the held-out errors of the table into modes.
 
     The two directions of a mirror-symmetric robot have the same errors. Those of other robots also have a part of
     opposite signs.
@@ -101,9 +101,9 @@ def _table_modes(twist: Floats, lookup: LookupTable) -> list[Mode]:
             size[:, i] = twist[:, i] * error[name] if i else error[name] * speed
             modes.append(Mode(f"table: {name}", side * size, np.zeros((2, 3))))
         for i, (name, scale) in enumerate((("lag_z", speed), ("lag_x", speed), ("lag_psi_rad", yaw))):
-            one = np.zeros(3)
-            one[i] = error[name] * scale
-            lag = np.stack([one, one * planar.MIRROR])
+            forward_lag = np.zeros(3)
+            forward_lag[i] = error[name] * scale
+            lag = np.stack([forward_lag, forward_lag * planar.MIRROR])
             modes.append(Mode(f"table: {name}", np.zeros((2, 3)), side * lag))
     return modes
 
@@ -111,7 +111,7 @@ def _table_modes(twist: Floats, lookup: LookupTable) -> list[Mode]:
 def _coefficient_modes(
     robot: Robot, lookup: LookupTable, twist: Floats, knowledge: CalibrationKnowledge
 ) -> list[Mode]:
-    """What the covariances of the robot's parameters and of the current do to its motion."""
+    """Turn the covariances of the robot's parameters and of the current into modes."""
     modes: list[Mode] = []
     if knowledge.names:
         slopes = np.array([
@@ -127,25 +127,25 @@ def _coefficient_modes(
     unit = robot.time_scale / robot.tail_length
     for i, sigma in enumerate(knowledge.current_error):
         if sigma > 0:
-            along = np.zeros(2)
-            along[i] = sigma * unit
-            modes.append(Mode(f"current {'xy'[i]}", np.zeros((2, 3)), np.zeros((2, 3)), along))
+            current = np.zeros(2)
+            current[i] = sigma * unit
+            modes.append(Mode(f"current {'xy'[i]}", np.zeros((2, 3)), np.zeros((2, 3)), current))
     return modes
 
 
 def _slope_of_number(robot: Robot, lookup: LookupTable, twist: Floats, name: str) -> Floats:
-    """Derivative (2, 3) of the twists in ln of a number of the robot.
+    """Compute the derivative (2, 3) of the twists by the logarithm of a number of the robot.
 
     It changes groups, and the units of time and length. The schedule keeps its seconds, the path its metres.
     """
     given = robot.head_radius if getattr(robot, name) is None else getattr(robot, name)
-    moved: list[dict[str, Any]] = [{name: given * math.exp(sign * _STEP)} for sign in (1.0, -1.0)]
-    ends = [replace(robot, **one) for one in moved]
-    one, other = (end.group_values() for end in ends)
+    changed: list[dict[str, Any]] = [{name: given * math.exp(sign * _STEP)} for sign in (1.0, -1.0)]
+    ends = [replace(robot, **change) for change in changed]
+    above, below = (end.group_values() for end in ends)
     changes = {
-        group: math.log(one[group] / other[group]) / (2 * _STEP)
-        for group in one
-        if group not in catalogue() and one[group] != other[group]
+        group: math.log(above[group] / below[group]) / (2 * _STEP)
+        for group in above
+        if group not in catalogue() and above[group] != below[group]
     }
     faster = -math.log(ends[0].time_scale / ends[1].time_scale) / (2 * _STEP)
     longer = math.log(ends[0].tail_length / ends[1].tail_length) / (2 * _STEP)
@@ -156,7 +156,7 @@ def _slope_of_number(robot: Robot, lookup: LookupTable, twist: Floats, name: str
 
 
 def _slope(robot: Robot, lookup: LookupTable, twist: Floats, name: str) -> Floats:
-    """Derivative (2, 3) of the twists in ln of a coefficient or another group, or in the size of an effect."""
+    """Compute the derivative (2, 3) of the twists by the logarithm of a group, or by the size of an effect."""
     values = robot.group_values()
     stored = getattr(lookup, "slopes", {})
     if name in stored:
@@ -170,9 +170,9 @@ def _slope(robot: Robot, lookup: LookupTable, twist: Floats, name: str) -> Float
             ends.append((_twists(lookup.query(_both_directions({**values, name: value}))), sign * step))
         except InputError:  # at the edge of the table
             ends.append((twist, 0.0))
-    (one, at), (two, to) = ends
-    if at == to:
+    (above, step_up), (below, step_down) = ends
+    if step_up == step_down:
         raise InputError(
             f"the table does not say what {name} changes; make the robot's own table with {OWN_TABLE}"
         )
-    return np.asarray((one - two) / (at - to))
+    return np.asarray((above - below) / (step_up - step_down))

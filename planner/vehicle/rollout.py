@@ -25,13 +25,13 @@ class Switches:
 
 
 def poses_at_flips(vehicle: Vehicle, switches: Switches) -> Floats:
-    """Poses (M + 1, 3) of the head's centre at the flips, if `vehicle` carries out the schedule."""
+    """Predict the poses (M + 1, 3) of the head's centre at the flips, if `vehicle` carries out the schedule."""
     changes = pose_changes(vehicle, switches.first_direction, switches.dwells, switches.dwells[:, None])[:, 0]
     return _chain(switches.poses[0], changes, vehicle.current * switches.dwells[:, None])
 
 
 def trace(vehicle: Vehicle, switches: Switches, offset: float, *, samples: int = 8) -> Floats:
-    """Predicted track of the tracked point, (M samples + 1, 2), at equal times within each dwell."""
+    """Predict the track of the tracked point, (M samples + 1, 2), at equal times within each dwell."""
     share = np.arange(1, samples + 1) / samples
     times = switches.dwells[:, None] * share
     changes = pose_changes(vehicle, switches.first_direction, switches.dwells, times)
@@ -43,7 +43,7 @@ def trace(vehicle: Vehicle, switches: Switches, offset: float, *, samples: int =
 
 
 def pose_changes(vehicle: Vehicle, first_direction: int, dwells: Floats, times: Floats) -> Floats:
-    """Pose changes (M, K, 3) of each dwell after times (M, K), from rest."""
+    """Predict the pose changes (M, K, 3) of each dwell after times (M, K), from rest."""
     before = np.concatenate([dwells[:1], dwells[:-1]])[:, None] + np.zeros_like(times)
     changes = np.empty((*times.shape, 3))
     for first, sense in ((0, first_direction), (1, -first_direction)):
@@ -53,7 +53,7 @@ def pose_changes(vehicle: Vehicle, first_direction: int, dwells: Floats, times: 
 
 
 def _chain(start: Floats, changes: Floats, drift: Floats) -> Floats:
-    """Poses (M + 1, 3) from a start, pose changes (M, 3) and moves in the lab (M, 2)."""
+    """Compose poses (M + 1, 3) from a start, pose changes (M, 3) and moves in the lab (M, 2)."""
     heading = start[2] + np.concatenate([[0.0], np.cumsum(changes[:, 2])])
     moves = planar.turn(changes[:, :2], heading[:-1]) + drift
     position = start[:2] + np.concatenate([[[0.0, 0.0]], np.cumsum(moves, 0)])

@@ -46,7 +46,7 @@ class Vehicle:
     least_gap: float = 1.0  # below it the model does not hold, because tails touch
 
     def lag_after(self, sense: int, before: ArrayLike | None, time: ArrayLike) -> Floats:
-        """Lag (..., 3) after `time` (...), where the dwell before had length `before` (...); None: from rest."""
+        """Interpolate the lag (..., 3) after `time` (...) and a dwell `before` (...); None: from rest."""
         side = 0 if sense > 0 else 1
         time = np.asarray(time, dtype=float)
         place = np.minimum(np.maximum(time, 0.0) / STEP, len(TIMES) - 1)
@@ -64,12 +64,12 @@ class Vehicle:
         return np.asarray((1 - part) * near + part * far)
 
     def motion(self, sense: int, before: ArrayLike | None, time: ArrayLike) -> Floats:
-        """Pose change E_σ(time | before), (..., 3), without the current."""
+        """Compute the pose change E_σ(time | before), (..., 3), without the current."""
         twist = self.twist[0 if sense > 0 else 1]
         return planar.compose(self.lag_after(sense, before, time), planar.arc(twist, time))
 
     def lag_noise(self, sense: int, time: ArrayLike) -> Floats:
-        """One standard deviation (..., 3) of the lag after `time`, over the phase of the disc at the flip."""
+        """Return the standard deviation (..., 3) of the lag after `time`, over the disc's phase at the flip."""
         table = self.spread[0 if sense > 0 else 1]
         time = np.asarray(time, dtype=float)
         parts = [np.interp(time, TIMES, table[:, i]) for i in range(3)]
@@ -106,7 +106,7 @@ class Vehicle:
 
 @dataclass(frozen=True)
 class Mode:
-    """One independent cause of error: what it adds to a vehicle at one standard deviation."""
+    """An independent cause of error: what one standard deviation of it adds to a vehicle."""
 
     name: str
     twist: Floats  # (2, 3)
@@ -115,16 +115,16 @@ class Mode:
 
 
 def resampled(curve: Floats) -> Floats:
-    """Curves (..., D, 3) over DWELLS at TIMES, (..., T, 3): a cubic spline in ln T; constant after SETTLED.
+    """Resample curves (..., D, 3) over DWELLS at TIMES, (..., T, 3), by a cubic spline in ln T.
 
-    Below the shortest dwell it is a straight line to zero.
+    Below the shortest dwell the curve is a straight line to zero; after SETTLED it is constant.
     """
     spline = CubicSpline(np.log(DWELLS), curve, axis=-2)(np.log(np.maximum(TIMES, DWELLS[0])))
     return np.asarray(spline * np.minimum(TIMES / DWELLS[0], 1.0)[:, None])
 
 
 def lag_table(lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
-    """Lags (K, T, 3) after dwells of BEFORE_KNOTS, from curves of `sim.model.response`."""
+    """Compute lags (K, T, 3) after dwells of BEFORE_KNOTS, from curves of `sim.model.response`."""
     knots = np.log(np.append(before, FORGOTTEN))
     known = np.concatenate([memory, np.zeros_like(memory[:1])])
     fine = CubicSpline(knots, known, bc_type=("not-a-knot", "clamped"))(np.log(BEFORE_KNOTS))

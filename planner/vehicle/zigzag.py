@@ -1,8 +1,7 @@
-"""How a vehicle moves along a straight line when the motor flips at even times.
+"""Straight motion: the motor flips so that each pair of dwells turns the robot as far to the left as to the right.
 
-Two dwells, one in each direction, turn the robot by as much to the left as to the right. The shorter one of the
-two lasts T. The robot then moves along a line, and its heading swings about a middle. Robots whose two directions
-differ move at an angle to that middle: they drift sideways. Lengths in l, times in μ0 l⁴/EI.
+The shorter of the two dwells lasts T. The robot moves along a line, and its heading swings about a mean. Robots
+whose two directions differ move at an angle to that mean: they drift sideways. Lengths in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ class Zigzag:
     largest: float
 
     def hysteresis(self, ahead: float) -> float:
-        """2 h: what the heading swings past the line of sight, with look-ahead `ahead`."""
+        """Compute 2 h, the swing of the heading past the line of sight, with look-ahead `ahead`."""
         return max(self.swing + 2 * math.atan(self.sway / ahead), 0.2 * self.swing)
 
     @property
@@ -42,7 +41,7 @@ class Zigzag:
 
 
 def zigzag(vehicle: Vehicle, dwell: float, offset: float = 0.0) -> Zigzag:
-    """The zigzag of a vehicle with shortest dwell `dwell`; the current is left out."""
+    """Compute the zigzag of a vehicle with shortest dwell `dwell`, without the current."""
     still = replace(vehicle, current=np.zeros(2))
     fast = 0 if abs(vehicle.twist[0, 2]) >= abs(vehicle.twist[1, 2]) else 1
     ratio = abs(vehicle.twist[fast, 2] / vehicle.twist[1 - fast, 2])
@@ -50,11 +49,11 @@ def zigzag(vehicle: Vehicle, dwell: float, offset: float = 0.0) -> Zigzag:
         pair = [0.0, 0.0]
         pair[fast], pair[1 - fast] = dwell, dwell * ratio
         switches, poses = _repeated(still, pair)
-        left = float(poses[-1, 2] - poses[-3, 2])
-        if abs(left) < 1e-10:
+        turn = float(poses[-1, 2] - poses[-3, 2])
+        if abs(turn) < 1e-10:
             break
         sign = 1 if fast == 1 else -1  # the slower direction turns to this side
-        ratio = max(ratio - sign * left / (abs(vehicle.twist[1 - fast, 2]) * dwell), 1e-3)
+        ratio = max(ratio - sign * turn / (abs(vehicle.twist[1 - fast, 2]) * dwell), 1e-3)
     middle = float(poses[-1, 2] + poses[-2, 2]) / 2
     move = poses[-1, :2] - poses[-3, :2]
     duration = sum(pair)
@@ -73,14 +72,15 @@ def zigzag(vehicle: Vehicle, dwell: float, offset: float = 0.0) -> Zigzag:
     )
 
 
-def _sway(vehicle: Vehicle, poses: Floats, along: Floats) -> float:
-    """Half of the distance between the pivot's places at flips to the right and at flips to the left."""
+def _sway(vehicle: Vehicle, poses: Floats, direction: Floats) -> float:
+    """Compute half of the distance between the pivot at flips to the right and at flips to the left."""
     axis = np.stack([np.cos(poses[-3:, 2]), np.sin(poses[-3:, 2])], 1)
     pivot = poses[-3:, :2] - vehicle.pivot_distance * axis
-    across = pivot @ np.array([-along[1], along[0]])
+    across = pivot @ np.array([-direction[1], direction[0]])
     return float(across[1] - (across[0] + across[2]) / 2) / 2
 
 
 def _repeated(vehicle: Vehicle, pair: list[float]) -> tuple[Switches, Floats]:
+    """Repeat a pair of dwells, and predict the poses at the flips."""
     switches = Switches(1, np.tile(pair, _PAIRS), np.zeros((1, 3)))
     return switches, poses_at_flips(vehicle, switches)

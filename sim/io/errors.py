@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 
 class InputError(ValueError):
-    """The input cannot be used. The message is one line: what was given, what is allowed, what to change.
+    """The input is unusable. The message is one line: what was given, what is allowed, what to change.
 
     Example:
         >>> from softflagella import InputError, load_robot

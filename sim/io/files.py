@@ -1,4 +1,4 @@
-"""Files that the pipeline makes: written completely or not at all.
+"""Write files completely or not at all.
 
 A file is written under another name in the same folder. When it is complete, it is renamed. So an error or an
 interruption leaves either the old file or the new one.

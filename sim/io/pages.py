@@ -42,17 +42,17 @@ class Page:
         self._open = True
 
     def text(self, words: str, *, tone: str = "") -> None:
-        """A paragraph; tone "good" or "bad" colours it."""
+        """Add a paragraph; tone "good" or "bad" colours it."""
         self._parts.append(f'<p class="{tone}">{html.escape(words)}</p>')
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-        """A table; the first column is left-aligned."""
+        """Add a table; the first column is left-aligned."""
         head = "".join(f"<th>{html.escape(h)}</th>" for h in header)
         body = "".join("<tr>" + "".join(f"<td>{html.escape(str(c))}</td>" for c in row) + "</tr>" for row in rows)
         self._parts.append(f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>')
 
     def figure(self, figure: Figure, description: str) -> None:
-        """A picture, with a description for people who cannot see it."""
+        """Add a picture, with a description for people who cannot see it."""
         store = io.BytesIO()
         figure.savefig(store, format="png", dpi=110, bbox_inches="tight")
         data = base64.b64encode(store.getvalue()).decode()

@@ -1,4 +1,4 @@
-"""Where a result comes from: version of the code, libraries, configuration and its hash.
+"""Record where a result comes from: version of the code, libraries, configuration and its hash.
 
 Provenance is a plain dictionary. Each kind of file stores it in its own way: as Parquet metadata, as a JSON entry,
 or at the foot of a page.
@@ -17,13 +17,13 @@ _LIBRARIES = ("numpy", "scipy", "torch", "pandas", "pyarrow")
 
 
 def fingerprint(content: object) -> str:
-    """A short hash of JSON-like content, independent of key order."""
+    """Return a short hash of JSON-like content, independent of key order."""
     text = json.dumps(content, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _version() -> str:
-    """Version of the installed package; "0" where it is not installed."""
+    """Return the version of the installed package; "0" where it is not installed."""
     try:
         return metadata.version("softflagella")
     except metadata.PackageNotFoundError:
@@ -35,7 +35,7 @@ __version__ = _version()
 
 @cache
 def code_version() -> str:
-    """Version of the package and a hash of the simulator's source, e.g. "0.1.0+1a2b3c4d"."""
+    """Return the version of the package and a hash of the simulator's source, e.g. "0.1.0+1a2b3c4d"."""
     digest = hashlib.sha256()
     for file in sorted(Path(__file__).parents[1].rglob("*.py")):
         digest.update(file.read_bytes())
@@ -43,7 +43,7 @@ def code_version() -> str:
 
 
 def provenance(config: object) -> dict[str, object]:
-    """Version of the code, libraries, configuration and its hash."""
+    """Return version of the code, libraries, configuration and its hash."""
     return {
         "code_version": code_version(),
         "config": config,

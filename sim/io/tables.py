@@ -1,4 +1,4 @@
-"""Tables that people bring: CSV files with a header, or Parquet."""
+"""Read tables: CSV files with a header, or Parquet."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sim.io.errors import InputError
 
 
 def read_table(path: str | Path, *, comment: str | None = None) -> pd.DataFrame:
-    """A table: Parquet if the name ends so, otherwise CSV with a header.
+    """Read a table: Parquet if the name ends so, otherwise CSV with a header.
 
     Raises:
         InputError: the file is empty, or it is not a table.
@@ -22,7 +22,7 @@ def read_table(path: str | Path, *, comment: str | None = None) -> pd.DataFrame:
     except (pd.errors.EmptyDataError, pd.errors.ParserError, UnicodeDecodeError, ArrowException) as broken:
         reason = str(broken).splitlines()[0]
         kind = "Parquet" if parquet else "CSV"
-        raise InputError(f"{path} is no {kind} table ({reason}); give a header and one row a line") from None
+        raise InputError(f"{path} is no {kind} table ({reason}); give a header and one row per line") from None
     except IsADirectoryError:
         raise InputError(f"{path} is a folder; give a CSV or Parquet file") from None
     if table.empty:

@@ -1,4 +1,4 @@
-"""Simulate robots: `softflagella.steady`, `response`, `switch_response`, `sensitivities` and `replay`.
+"""Simulate robots: `softflagella.steady`, `response`, `sensitivities` and `replay`.
 
 Robots are a `Robot`, or a table with one row for each robot: a mapping or a pandas table with the columns `C_t`,
 `C_r`, `C_yr`, `l_over_R`, `L_over_R`, `l_over_r0`, `omega_bar`, `N`, and optionally `a_over_R` and sizes of
@@ -31,8 +31,8 @@ from sim.motion.switching import switch_response as respond
 Robots = Robot | Mapping[str, Any] | pd.DataFrame
 
 
-def columns_of(robots: Robots) -> dict[str, Floats]:
-    """Robots as checked columns, each (M,)."""
+def robot_columns(robots: Robots) -> dict[str, Floats]:
+    """Convert robots to checked columns, each (M,)."""
     if isinstance(robots, Robot):
         robots = {name: [value] for name, value in robots.group_values().items()}
     columns = {str(name): np.atleast_1d(np.asarray(values)) for name, values in robots.items()}
@@ -47,7 +47,7 @@ def columns_of(robots: Robots) -> dict[str, Floats]:
 
 
 def steady(robots: Robots, *, jobs: int | None = None) -> pd.DataFrame:
-    """Mean motion at constant motor speed, as reached from rest.
+    """Simulate the mean motion at constant motor speed, as reached from rest.
 
     Args:
         robots: a `Robot`, or a table with M rows (single values stand for all rows).
@@ -73,11 +73,11 @@ def steady(robots: Robots, *, jobs: int | None = None) -> pd.DataFrame:
         >>> sf.steady(faster)["omega_yr_bar"].round(2).tolist()
         [0.05, 0.08, 0.16]
     """
-    return pd.DataFrame(steady_columns(columns_of(robots), jobs=jobs, title=""))
+    return pd.DataFrame(steady_columns(robot_columns(robots), jobs=jobs, title=""))
 
 
 def switch_response(robots: Robots, dwell: ArrayLike) -> pd.DataFrame:
-    """Response to flips of the motor every `dwell`, from the steady motion.
+    """Simulate flips of the motor every `dwell`, from the steady motion (deprecated: use `response`).
 
     Args:
         robots: a `Robot`, or a table with M rows.
@@ -89,26 +89,21 @@ def switch_response(robots: Robots, dwell: ArrayLike) -> pd.DataFrame:
 
     Raises:
         InputError: a robot is not possible, or a dwell is not above 0.
-
-    Example:
-        >>> import softflagella as sf
-        >>> sf.switch_response(sf.load_robot("paper-control"), 2.0)["net_speed_bar"].round(3).tolist()
-        [0.017]
     """
-    columns = columns_of(robots)
+    columns = robot_columns(robots)
     dwells = np.broadcast_to(np.asarray(dwell, dtype=float), columns["N"].shape)
     names = (DWELL, "net_speed_bar", "lag_psi_rad", "lag_x", "lag_z")
     table = pd.DataFrame({name: np.full(len(dwells), np.nan) for name in names})
     for rows in split(columns["N"], len(dwells)):
-        found = respond(Groups.from_columns({k: v[rows] for k, v in columns.items()}), dwells[rows])
-        values = (found.dwell, found.net_speed, found.lag_psi, found.lag_x, found.lag_z)
+        flips = respond(Groups.from_columns({k: v[rows] for k, v in columns.items()}), dwells[rows])
+        values = (flips.dwell, flips.net_speed, flips.lag_psi, flips.lag_x, flips.lag_z)
         for name, column in zip(names, values, strict=True):
             table.loc[rows, name] = column
     return table
 
 
 def response(robot: Robot) -> pd.DataFrame:
-    """The whole response of a robot to a flip of its motor: one row for each direction, dwell before and dwell.
+    """Simulate the response to a flip of the motor: one row for each direction, preceding dwell and dwell.
 
     Args:
         robot: any robot, effects included.
@@ -132,21 +127,21 @@ def response(robot: Robot) -> pd.DataFrame:
     tables = []
     for direction in (1, -1):
         groups = robot.groups()
-        found = responses(replace(groups, omega_bar=direction * groups.omega_bar))
-        if found.failed.any():
+        flip = responses(replace(groups, omega_bar=direction * groups.omega_bar))
+        if flip.failed.any():
             raise InputError(f"{robot.name}: the response to a flip breaks down; try a slower motor")
-        curves = {np.inf: found.lag[0], 0.0: found.rest[0]}
-        curves |= {float(T): found.lag[0] + memory for T, memory in zip(BEFORE, found.memory[0], strict=True)}
+        curves = {np.inf: flip.lag[0], 0.0: flip.rest[0]}
+        curves |= {float(T): flip.lag[0] + memory for T, memory in zip(BEFORE, flip.memory[0], strict=True)}
         for before, lag in curves.items():
             table = pd.DataFrame({"direction": direction, "before_bar": before, DWELL: DWELLS})
             table[["lag_z", "lag_x", "lag_psi_rad"]] = lag
-            table["net_speed_bar"] = found.net_speed[0] if before == np.inf else np.nan
+            table["net_speed_bar"] = flip.net_speed[0] if before == np.inf else np.nan
             tables.append(table)
     return pd.concat(tables, ignore_index=True)
 
 
 def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None = None) -> pd.DataFrame:
-    """Derivatives of the steady motion in inputs and effect sizes, by the implicit function theorem.
+    """Differentiate the steady motion in inputs and effect sizes, by the implicit function theorem.
 
     Args:
         robots: a `Robot`, or a table with M rows.
@@ -167,11 +162,11 @@ def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None
         >>> slopes["omega_yr_bar", "C_yr"].round(4).tolist()  # in proportion to C_yr = 2
         [0.0245]
     """
-    found = sensitivity_columns(columns_of(robots), parameters, jobs=jobs, title="")
+    result = sensitivity_columns(robot_columns(robots), parameters, jobs=jobs, title="")
     columns = {
         (output, parameter): slopes[:, k]
-        for output, slopes in found.derivatives.items()
-        for k, parameter in enumerate(found.parameters)
+        for output, slopes in result.derivatives.items()
+        for k, parameter in enumerate(result.parameters)
     }
     return pd.DataFrame(columns)
 
@@ -193,8 +188,8 @@ def replay(schedule: Schedule | Plan, robot: Robot | None = None) -> pd.DataFram
     Example:
         >>> import softflagella as sf
         >>> robot = sf.load_robot("paper-control")
-        >>> one = sf.Schedule(robot.group_values(), 1, np.array([1.0, 1.0]), (0.0, 0.0, 0.0), robot.time_scale)
-        >>> track = sf.replay(one)
+        >>> flips = sf.Schedule(robot.group_values(), 1, np.array([1.0, 1.0]), (0.0, 0.0, 0.0), robot.time_scale)
+        >>> track = sf.replay(flips)
         >>> round(float(track["time_bar"].iloc[-1]), 6), track["direction"].unique().tolist()
         (2.0, [1, -1])
     """

@@ -15,7 +15,7 @@ from dataset.storage.data_set import read
 def sweep(
     config: str | Path, out: str | Path, *, rows: int | None = None, jobs: int | None = None
 ) -> dict[str, Any]:
-    """Simulate a sweep into a folder of Parquet files. An interrupted sweep goes on where it stopped.
+    """Simulate a sweep into a folder of Parquet files. An interrupted sweep continues.
 
     Args:
         config: a sweep.toml.
@@ -37,7 +37,7 @@ def sweep(
 
 
 def read_sweep(folder: str | Path) -> pd.DataFrame:
-    """All rows of a finished sweep, in the order of its design; units are in the Parquet schema.
+    """Read all rows of a finished sweep, in the order of its design; units are in the Parquet schema.
 
     Args:
         folder: written by `sweep`.

@@ -17,6 +17,8 @@ from dataset.rows.schema import COST, arrow_table, schema
 from dataset.storage.data_set import ROWS, manifest_content, write_manifest
 from dataset.storage.shards import shard_name, write_shard
 from dataset.storage.storage import open_storage
+from dataset.workers.backend import Lost
+from dataset.workers.tasks import Join, Outcome, Task, run_task
 from sim.model.response import BEFORE, DWELLS
 
 SMALL = """
@@ -36,6 +38,26 @@ Rows = Callable[[dict[str, np.ndarray]], dict[str, Any]]
 ROOT = Path(__file__).parents[2]
 # Where workers of tests leave marks; set before any worker starts.
 MARKS = Path(os.environ.setdefault("SOFTFLAGELLA_TEST_MARKS", mkdtemp()))
+
+
+class InThisProcess:
+    """A backend in this process."""
+
+    def __init__(self) -> None:
+        self._ended: list[tuple[int, Outcome | Lost]] = []
+
+    def slots(self) -> int:
+        return 1
+
+    def submit(self, number: int, task: Task | Join) -> None:
+        self._ended.append((number, run_task(task)))
+
+    def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
+        ended, self._ended = self._ended, []
+        return ended
+
+    def stop(self) -> None:
+        self._ended = []
 
 
 def design(rows: int, seed: int = 5) -> SweepDesign:

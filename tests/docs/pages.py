@@ -30,7 +30,7 @@ def name_of(page: Path) -> str:
 
 
 def blocks(page: Path) -> list[Block]:
-    """Return the blocks of code on a page, in order."""
+    """The blocks of code on a page, in order."""
     matches = _BLOCK.finditer(page.read_text())
     return [Block(match["language"], match["code"], match["reason"] or "") for match in matches]
 

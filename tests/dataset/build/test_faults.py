@@ -155,7 +155,7 @@ def test_a_worker_killed_at_each_step_of_its_write(tmp_path: Path) -> None:
 
 
 def test_the_build_killed_at_each_of_its_operations(tmp_path: Path) -> None:
-    words = [sys.executable, "-m", "tests.dataset.dying", str(tmp_path)]
+    words = [sys.executable, "-m", "tests.dataset.build.dying", str(tmp_path)]
     done = subprocess.run(words, cwd=ROOT, text=True, capture_output=True)
     assert done.returncode == 0, done.stderr + done.stdout
     assert int(done.stdout.split()[0]) > 30

@@ -22,8 +22,7 @@ from dataset.storage.data_set import batches, read, read_manifest
 from dataset.storage.lock import locked
 from dataset.storage.storage import RemoteStorage, open_storage
 from sim.io.errors import InputError
-from tests.dataset.dying import Here
-from tests.dataset.sweeps import ROOT, design, invented
+from tests.dataset.sweeps import ROOT, InThisProcess, design, invented
 
 
 def files(address: str) -> dict[str, str]:
@@ -41,7 +40,7 @@ def calm(tmp_path: Path) -> Path:
 @pytest.fixture
 def memory(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> str:
     """A folder in the memory of this process, and workers in it."""
-    monkeypatch.setattr(dataset.build.build, "open_backend", lambda *_, **__: Here())
+    monkeypatch.setattr(dataset.build.build, "open_backend", lambda *_, **__: InThisProcess())
     return f"memory://{re.sub(r'[^a-z_]', '', request.node.name)}"
 
 

@@ -3,7 +3,7 @@
 For every operation: a copy of a finished data set of FEWER rows is extended to MORE, the process is killed there,
 and the build is run again. Prints how many operations there were. Rows are made in the process itself.
 
-Usage: python -m tests.dataset.dying FOLDER
+Usage: python -m tests.dataset.build.dying FOLDER
 """
 
 from __future__ import annotations
@@ -21,33 +21,11 @@ import dataset.build.sweep_folder
 import dataset.storage.shards
 from dataset.rows.version import rows_version
 from dataset.storage.data_set import read
-from dataset.workers.backend import Lost
-from dataset.workers.tasks import Join, Outcome, Task, run_task
 from sim.io.errors import InputError
-from tests.dataset.sweeps import design, invented
+from tests.dataset.sweeps import InThisProcess, design, invented
 
 FEWER, MORE = 100, 300
 _STEPS = ("replace", "fsync", "unlink", "rmdir", "open")
-
-
-class Here:
-    """A backend in this process."""
-
-    def __init__(self) -> None:
-        self._ended: list[tuple[int, Outcome | Lost]] = []
-
-    def slots(self) -> int:
-        return 1
-
-    def submit(self, number: int, task: Task | Join) -> None:
-        self._ended.append((number, run_task(task)))
-
-    def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
-        ended, self._ended = self._ended, []
-        return ended
-
-    def stop(self) -> None:
-        self._ended = []
 
 
 def build(folder: Path, rows: int) -> None:
@@ -93,7 +71,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def main(place: Path) -> None:
-    dataset.build.build.open_backend = lambda *_, **__: Here()  # type: ignore[assignment]
+    dataset.build.build.open_backend = lambda *_, **__: InThisProcess()  # type: ignore[assignment]
     dataset.build.sweep_folder.SEGMENT, dataset.storage.shards.SEGMENT, dataset.storage.shards.ROW_GROUP = (
         128,
         128,
