@@ -41,10 +41,10 @@ demo: reports/demo.html ## the whole pipeline on the paper's robot, ends with re
 reports/demo.html: $(STAMP) $(SOURCES) $(wildcard $(foreach p,dataset surrogate planner calibration softflagella,$(p)/*.py $(p)/*/*.py) surrogate/shipped/*) softflagella/demo.toml
 	$(RUN) -m softflagella demo --out $@
 
-test: $(VENV)/.extras ## run the tests, those of clusters and of ONNX files included
+test: $(VENV)/.extras ## run the tests, those of clusters included
 	$(RUN) -m pytest $(TWO)
 $(VENV)/.extras: $(STAMP)
-	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[clusters,onnx]'
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[clusters]'
 	touch $@
 
 quick: $(STAMP) ## run the quick tests, under a minute

@@ -157,25 +157,22 @@ def _robot(arguments: Namespace) -> None:
     "export",
     "write a look-up table for other programs",
     argument("model", nargs="?", help="look-up table (default: the one that comes with the package)"),
-    argument("--onnx", metavar="OUT.onnx", help="the whole query as one ONNX graph, in double precision"),
+    argument("--onnx", metavar="OUT.onnx", help="no longer written; use --small"),
     argument(
         "--small", metavar="FOLDER", help="at most 150 kB, for a web page or a microcontroller, with readers"
     ),
 )
 def _export(arguments: Namespace) -> None:
-    from surrogate.export.onnx_query import save_onnx
     from surrogate.export.small_copy_files import save_small_copy
     from surrogate.table.model_file import load
 
-    if not (arguments.onnx or arguments.small):
-        raise InputError("nothing to write; give --onnx OUT.onnx or --small FOLDER")
-    table = load(arguments.model)
     if arguments.onnx:
-        save_onnx(table, arguments.onnx)
-        print(f"model {table.identity}, {Path(arguments.onnx).stat().st_size / 1000:.0f} kB -> {arguments.onnx}")
-    if arguments.small:
-        print(save_small_copy(table, arguments.small))
-        print(f"model {table.identity} -> {arguments.small}")
+        raise InputError("ONNX files are no longer written; give --small FOLDER for readers in C and JavaScript")
+    if not arguments.small:
+        raise InputError("nothing to write; give --small FOLDER")
+    table = load(arguments.model)
+    print(save_small_copy(table, arguments.small))
+    print(f"model {table.identity} -> {arguments.small}")
 
 
 @program.command("compile", "compile the loops of queries now rather than on first use")

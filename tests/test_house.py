@@ -135,7 +135,6 @@ LIBRARIES = {
     "matplotlib",
     "numba",
     "numpy",
-    "onnx",
     "pandas",
     "pyarrow",
     "safetensors",

@@ -22,7 +22,6 @@ from sim.io.files import whole_file, write_text
 from sim.model.groups import DWELL
 from sim.model.response import DWELLS
 from sim.motion.steady_motion import STEADY_OUTPUTS
-from surrogate.export.onnx_query import UNITS
 from surrogate.export.small_copy import (
     EXACT,
     NETWORKS,
@@ -38,8 +37,11 @@ from surrogate.table.lookup import RESPONSE_OUTPUTS, NeuralTable
 READERS = Path(__file__).parents[1] / "readers"
 FORMAT = 1
 _UNITS = {
-    **UNITS, DWELL: "mu0 l^4/EI", "net_speed_bar": "EI/(mu0 l^3)",
-    "lag_psi_rad": "rad", "lag_x": "l", "lag_z": "l",
+    "C_t": "1", "C_r": "1", "C_yr": "1", "l_over_R": "1", "L_over_R": "1", "l_over_r0": "1",
+    "omega_bar": "EI/(mu0 l^4), signed", "N": "1, a whole number", "a_over_R": "1", DWELL: "mu0 l^4/EI",
+    "omega_t_bar": "EI/(mu0 l^4)", "omega_h_bar": "EI/(mu0 l^4)", "omega_yr_bar": "EI/(mu0 l^4)",
+    "v_x": "EI/(mu0 l^3)", "v_z": "EI/(mu0 l^3)", "R_yr_over_l": "l", "theta_deg": "degree", "tail_gap": "2 r0",
+    "net_speed_bar": "EI/(mu0 l^3)", "lag_psi_rad": "rad", "lag_x": "l", "lag_z": "l",
 }  # fmt: skip
 
 

@@ -235,3 +235,10 @@ def test_the_command_prints_the_loss(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "kB; loss against the whole table" in said
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"lookup.safetensors", "lookup_weights.h", "lookup.h", "lookup.js", "vectors.csv"}
+
+
+def test_the_command_says_what_it_writes(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(main, ["export"]) == 2
+    assert "nothing to write; give --small FOLDER" in capsys.readouterr().err
+    assert run_command(main, ["export", "--onnx", "query.onnx"]) == 2
+    assert "ONNX files are no longer written; give --small FOLDER" in capsys.readouterr().err
