@@ -55,7 +55,7 @@ def main(robots: str = "10") -> None:
             "after": corrected_robot(replace(swimmer, effects={}), verdict.fits.final_refit.parameters),
             "truth": swimmer,
         }
-        rms = [one.error.rms for one in steer(models, swimmer, polygon(4, 3.0)).values()]
+        rms = [comparison.error.rms for comparison in steer(models, swimmer, polygon(4, 3.0)).values()]
         shares.append(gap_closed(*rms))
         named = " + ".join(verdict.effects) or "-"
         figures = "".join(f"{value:8.3f}" for value in rms)

@@ -19,10 +19,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from joblib import Parallel, delayed
 from scipy.stats import chi2, ncx2
 
-from benchmarks.calibration.planted import Linear, Signals, outside, scatter, stand_in
+from benchmarks.calibration.planted import Linear, Signals, measured, outside, stand_in
+from benchmarks.markdown import heading, row
+from benchmarks.parallel import in_parallel
 from benchmarks.proportions import per_cent
 from calibration.statistics.forward_model import Parameter
 from calibration.statistics.residual_tests import TESTABLE
@@ -30,7 +31,6 @@ from calibration.statistics.splits import middle_session
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
 from sim.arrays import Floats
-from sim.motion.batches import available_jobs
 
 STIFFNESS = "youngs_modulus"
 _COVERED = "interval covers E"
@@ -58,7 +58,7 @@ def claims(verdict: Verdict, case: Case) -> dict[str, bool]:
     sets = [{e.name for e in c.claimed} for c in verdict.explaining]
     doubted = any(c.doubted for c in verdict.explaining)
     beside = [{e.name for e in c.claimed} for c in verdict.evidence.rival_effects]
-    found = {
+    answers = {
         "an effect is claimed": bool(sets),
         "claimed without the words": bool(sets) and not doubted,
         "a number is wrong": verdict.verdict == "number",
@@ -69,8 +69,8 @@ def claims(verdict: Verdict, case: Case) -> dict[str, bool]:
     if STIFFNESS in verdict.base.names:
         low, high = verdict.base.interval(STIFFNESS)
         true = case.model.nuisances[0].start * math.exp(_shift(case.label))
-        found[_COVERED] = low <= true <= high
-    return found
+        answers[_COVERED] = low <= true <= high
+    return answers
 
 
 def _shift(label: str) -> float:
@@ -78,12 +78,11 @@ def _shift(label: str) -> float:
     return math.log(1 - off)
 
 
-def one(case: Case, seed: int) -> tuple[dict[str, bool], float]:
-    """A table, closed; and the time of a processor that it took [s]."""
-    model, began = case.model, time.process_time()
-    y = model.prediction + case.signal(seed) + scatter(model.runs, model.prediction.shape[1], seed)
-    found = claims(calibrate(replace(model, runs=replace(model.runs, y=y)), progress=False), case)
-    return found, time.process_time() - began
+def closed(case: Case, seed: int) -> tuple[dict[str, bool], float]:
+    """Calibrate one table; return the answers and the processor time [s]."""
+    began = time.process_time()
+    answers = claims(calibrate(measured(case.model, case.signal(seed), seed), progress=False), case)
+    return answers, time.process_time() - began
 
 
 def drawn(G: Floats, given: tuple[Parameter, ...], seed: int) -> Floats:
@@ -106,16 +105,16 @@ def restated(model: Linear, sigmas: dict[str, float]) -> Linear:
 
 def cases(model: Linear) -> list[Case]:
     """All of them."""
-    own = {p.name: float(p.sigma or 0.0) for p in model.nuisances}
+    sigmas = {p.name: float(p.sigma or 0.0) for p in model.nuisances}
     exact = restated(model, {})
     place = [p.name for p in model.nuisances].index(STIFFNESS)
     soft, softer, softest = (partial(fixed, model.G[..., place] * math.log(s)) for s in (0.9, 0.8, 0.6))
     draw = partial(drawn, model.G, model.nuisances)
-    tight = {"numbers of the table only": {k: own[k] for k in ("camera_scale", "heading_zero", "tachometer")}}
-    alone = restated(model, {**own, STIFFNESS: 0.03})
+    tight = {"numbers of the table only": {k: sigmas[k] for k in ("camera_scale", "heading_zero", "tachometer")}}
+    alone = restated(model, {**sigmas, STIFFNESS: 0.03})
     all_of = restated(model, {**tight["numbers of the table only"], STIFFNESS: 0.03})
     both = ("an effect is claimed", "a number is wrong")
-    found = [
+    listed = [
         Case("numbers drawn from their priors", model, draw, both, weight=5.0),
         Case("the same, numbers exact", exact, draw, both[:1]),
         Case("E off by 10 %", model, soft, both[:1]),
@@ -134,14 +133,14 @@ def cases(model: Linear) -> list[Case]:
             if survived[j] >= TESTABLE and effect.start + size <= effect.bounds[1]:
                 signal = partial(fixed, model.D[..., j] * size)
                 label = f"one effect, λ = {level:g}"
-                found.append(Case(label, model, signal, _OF_AN_EFFECT, effect.name, weight=0.05))
+                listed.append(Case(label, model, signal, _OF_AN_EFFECT, effect.name, weight=0.05))
     for label, signal_of in outside(model).items():
         for level in (8.0, 16.0):
             signal = partial(fixed, signal_of * (level / signals.beyond_catalogue(signal_of)))
             asked = ("an effect is claimed", "claimed without the words")
             kind = "mimics" if label.startswith("mimic") else "others"
-            found.append(Case(f"outside, three {kind}, size {level:g}", model, signal, asked, weight=0.5))
-    return found
+            listed.append(Case(f"outside, three {kind}, size {level:g}", model, signal, asked, weight=0.5))
+    return listed
 
 
 def ceiling(model: Linear, size: float) -> float:
@@ -166,12 +165,12 @@ def planned(model: Linear, count: int, first: int) -> Work:
 
 def report(work: Work, results: list[tuple[dict[str, bool], float]]) -> None:
     """Print the table."""
-    print("| case | tables | asked | share (95 %) |\n|---|---|---|---|")
+    print(heading("case", "tables", "asked", "share (95 %)"))
     for label in dict.fromkeys(c.label for c, _ in work):
         of = [(c, r) for (c, _), (r, _) in zip(work, results, strict=True) if c.label == label]
         for question in of[0][0].asked:
             hits = sum(r[question] for _, r in of)
-            print(f"| {label} | {len(of)} | {question} | {per_cent(hits, len(of))} |")
+            print(row(label, len(of), question, per_cent(hits, len(of))))
     seconds = [s for _, s in results]
     print(f"\nProcessor time of a table: median {np.median(seconds):.1f} s, largest {max(seconds):.1f} s")
 
@@ -179,6 +178,6 @@ def report(work: Work, results: list[tuple[dict[str, bool], float]]) -> None:
 def main(count: str = "100", first: str = "0") -> None:
     model = stand_in()
     work = planned(model, int(count), int(first))
-    report(work, Parallel(n_jobs=available_jobs(), verbose=1)(delayed(one)(c, seed) for c, seed in work))
+    report(work, in_parallel(closed, work))
     for size in (8.0, 16.0):
         print(f"size {size:g}: a χ² test of all values notices {100 * ceiling(model, size):.0f} %")

@@ -21,14 +21,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from benchmarks.calibration.false_claims import Case, cases
-from benchmarks.calibration.planted import Linear, scatter, stand_in
+from benchmarks.calibration.planted import Linear, measured, stand_in
 from benchmarks.calibration.sparse_identification import identify
+from benchmarks.markdown import heading, row
+from benchmarks.parallel import in_parallel
 from benchmarks.proportions import per_cent
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.forward_model import start_values
@@ -39,7 +40,6 @@ from calibration.statistics.splits import middle_session
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.residual_regression import regress_residual
 from sim.arrays import Floats
-from sim.motion.batches import available_jobs
 
 KINDS = {
     "numbers drawn from their priors": "nothing is missing",
@@ -97,26 +97,28 @@ def ways(model: Linear) -> dict[str, Found]:
     sets = _Sets(model)
     testable = [n for n, s in zip(sets.names, _survived(sets), strict=True) if s >= TESTABLE]
     every = [frozenset(c) for count in (0, 1, 2) for c in itertools.combinations(testable, count)]
-    found = {}
+    results = {}
     for way in ("best AIC", "best BIC", "EBIC"):
         best = min(every, key=lambda effects: sets.cost(effects, way))
-        found[way] = Found(_claims(best), sets.error(sets.fit(best).prediction))
+        results[way] = Found(_claims(best), sets.error(sets.fit(best).prediction))
     taken: frozenset[str] = frozenset()
     while len(taken) < _MOST:
         best = min((taken | {n} for n in testable if n not in taken), key=lambda e: sets.cost(e, "stepwise"))
         if sets.cost(best, "stepwise") >= sets.cost(taken, "stepwise"):
             break
         taken = best
-    found["stepwise"] = Found(_claims(taken), sets.error(sets.fit(taken).prediction))
+    results["stepwise"] = Found(_claims(taken), sets.error(sets.fit(taken).prediction))
     identified = identify(model, sets.used, testable)
-    found["identification"] = Found(_claims(identified), sets.error(sets.fit(identified).prediction))
+    results["identification"] = Found(_claims(identified), sets.error(sets.fit(identified).prediction))
     base = sets.fit(frozenset()).prediction
     generic = base + regress_residual(model.runs, base, sets.used).correction
-    found["generic correction"] = Found((), sets.error(generic))
-    own = calibrate(model, progress=False)
-    named = tuple(frozenset(e.name for e in c.claimed) for c in (*own.explaining, *own.instead))
-    found["this procedure"] = Found(named, own.error_after / own.noise_ceiling)
-    return found
+    results["generic correction"] = Found((), sets.error(generic))
+    verdict = calibrate(model, progress=False)
+    named = tuple(
+        frozenset(e.name for e in c.claimed) for c in (*verdict.explaining, *verdict.evidence.rival_effects)
+    )
+    results["this procedure"] = Found(named, verdict.error_after / verdict.noise_ceiling)
+    return results
 
 
 def _claims(effects: frozenset[str]) -> tuple[frozenset[str], ...]:
@@ -128,24 +130,21 @@ def _survived(sets: _Sets) -> Floats:
     model = sets.model
     white = np.linalg.qr(model.J[sets.used].reshape(-1, model.J.shape[-1]))[0]
     D = model.D[sets.used].reshape(-1, model.D.shape[-1])
-    rest = D - white @ (white.T @ D)
-    return np.asarray(np.linalg.norm(rest, axis=0) / np.maximum(np.linalg.norm(D, axis=0), 1e-300))
+    unabsorbed = D - white @ (white.T @ D)
+    return np.asarray(np.linalg.norm(unabsorbed, axis=0) / np.maximum(np.linalg.norm(D, axis=0), 1e-300))
 
 
-def one(case: Case, seed: int) -> dict[str, Found]:
-    """A table, by every way."""
-    model = case.model
-    y = model.prediction + case.signal(seed) + scatter(model.runs, model.prediction.shape[1], seed)
-    return ways(replace(model, runs=replace(model.runs, y=y)))
+def compared(case: Case, seed: int) -> dict[str, Found]:
+    """Apply every method to one table."""
+    return ways(measured(case.model, case.signal(seed), seed))
 
 
 def main(count: str = "30", first: str = "0") -> None:
     todo = [c for c in cases(stand_in()) if c.label in KINDS]
     share = {kind: sum(KINDS[c.label] == kind for c in todo) for kind in KINDS.values()}
     work = [(c, s) for c in todo for s in range(max(int(count) // share[KINDS[c.label]], 1))]
-    parallel = Parallel(n_jobs=available_jobs(), verbose=1)
-    results = list(parallel(delayed(one)(c, int(first) + 37 * i) for i, (c, _) in enumerate(work)))
-    print("| tables | way | named right | wrong claim | error / noise |\n|---|---|---|---|---|")
+    results = in_parallel(compared, [(c, int(first) + 37 * i) for i, (c, _) in enumerate(work)])
+    print(heading("tables", "way", "named right", "wrong claim", "error / noise"))
     for kind in share:
         of = [(c, r) for (c, _), r in zip(work, results, strict=True) if KINDS[c.label] == kind]
         for way in of[0][1]:
@@ -155,4 +154,4 @@ def main(count: str = "30", first: str = "0") -> None:
             wrong = sum(bool(c) and t not in c for t, c in zip(truths, claims, strict=True))
             error = float(np.median([r[way].error for _, r in of]))
             named = per_cent(right, len(of)) if any(truths) else ""
-            print(f"| {kind}, {len(of)} | {way} | {named} | {per_cent(wrong, len(of))} | {error:.2f} |")
+            print(row(f"{kind}, {len(of)}", way, named, per_cent(wrong, len(of)), f"{error:.2f}"))

@@ -20,16 +20,16 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
 
 from benchmarks.calibration.planted import Linear, Signals, linearised, scatter, with_values
+from benchmarks.markdown import heading, row
+from benchmarks.parallel import in_parallel
 from benchmarks.proportions import per_cent
 from calibration.statistics.residual_tests import TESTABLE
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
 from sim.arrays import Floats, Integers
-from sim.motion.batches import available_jobs
 
 TAILS, LENGTH, RPM, DAYS = (2, 3, 4), 9.0, (110.0, 150.0), 3
 GRID_TAILS = (2, 3, 4, 5)
@@ -44,31 +44,31 @@ def table() -> Linear:
     made = [(n, LENGTH, s * w, f"day {d}") for d in range(DAYS) for n in TAILS for w in RPM for s in (1, -1)]
     possible = [(n, a, s * w, "next") for n in GRID_TAILS for a in GRID_LENGTHS for w in GRID_RPM for s in (1, -1)]
     rows = pd.DataFrame([*made, *possible], columns=["N", "l_cm", "omega_rpm", "session"])
-    whole = linearised(read_measurements(with_values(rows, np.random.default_rng(0))))
+    model = linearised(read_measurements(with_values(rows, np.random.default_rng(0))))
     new = np.arange(len(made), len(rows))
-    return replace(whole, next=whole.subset(new))
+    return replace(model, next=model.subset(new))
 
 
-def made(whole: Linear) -> Integers:
+def made(model: Linear) -> Integers:
     """Places of the runs that were made."""
-    assert whole.next is not None
-    return np.arange(len(whole.runs) - len(whole.next.runs))
+    assert model.next is not None
+    return np.arange(len(model.runs) - len(model.next.runs))
 
 
-def factorial(whole: Linear) -> Integers:
+def factorial(model: Linear) -> Integers:
     """Places of 16 runs."""
     ends = [GRID_TAILS[::3], GRID_LENGTHS[::5], GRID_RPM[::2], (1, -1)]
     grid: list[tuple[float, ...]] = list(itertools.product(GRID_TAILS, GRID_LENGTHS, GRID_RPM, (1, -1)))
-    return np.array([grid.index(setting) for setting in itertools.product(*ends)]) + len(made(whole))
+    return np.array([grid.index(setting) for setting in itertools.product(*ends)]) + len(made(model))
 
 
-def close(whole: Linear, signal: Floats, seed: int, more: Integers | None = None) -> Verdict:
+def close(all_runs: Linear, signal: Floats, seed: int, more: Integers | None = None) -> Verdict:
     """The verdict on the runs that were made, and on `more`; a run that comes twice is measured twice."""
-    parts = [made(whole)] if more is None else [made(whole), more]
-    k = whole.prediction.shape[1]
-    noise = np.concatenate([scatter(whole.subset(p).runs, k, seed + i * 10**6) for i, p in enumerate(parts)])
+    parts = [made(all_runs)] if more is None else [made(all_runs), more]
+    k = all_runs.prediction.shape[1]
+    noise = np.concatenate([scatter(all_runs.subset(p).runs, k, seed + i * 10**6) for i, p in enumerate(parts)])
     rows = np.concatenate(parts)
-    model = whole.subset(rows)
+    model = all_runs.subset(rows)
     y = model.prediction + signal[rows] + noise
     return calibrate(replace(model, runs=replace(model.runs, y=y)), progress=False)
 
@@ -82,46 +82,45 @@ def outcome(verdict: Verdict, truth: str) -> str:
     return verdict.verdict
 
 
-def one(whole: Linear, effect: int, size: float, seed: int) -> dict[str, str] | None:
+def compared(model: Linear, effect: int, size: float, seed: int) -> dict[str, str] | None:
     """What the new runs say; None if the table is not ambiguous."""
-    truth, signal, own = whole.effects[effect].name, whole.D[..., effect] * size, made(whole)
-    first = close(whole, signal, seed)
+    truth, signal, first_runs = model.effects[effect].name, model.D[..., effect] * size, made(model)
+    first = close(model, signal, seed)
     if first.verdict != "ambiguous" or outcome(first, truth) == "wrong" or first.next_batch is None:
         return None
-    batch = np.array([s["run"] for s in first.next_batch.settings]) + len(own)
-    found = {"truth": truth, "set": " or ".join("+".join(e.name for e in c.claimed) for c in first.explaining)}
-    for name, more in (("8 proposed runs", batch), ("factorial of 16", factorial(whole))):
-        found[name] = outcome(close(whole, signal, seed, more), truth)
-    return found
+    batch = np.array([s["run"] for s in first.next_batch.settings]) + len(first_runs)
+    results = {"truth": truth, "set": " or ".join("+".join(e.name for e in c.claimed) for c in first.explaining)}
+    for name, more in (("8 proposed runs", batch), ("factorial of 16", factorial(model))):
+        results[name] = outcome(close(model, signal, seed, more), truth)
+    return results
 
 
 def main(count: str = "20", first: str = "0") -> None:
-    whole = table()
-    signals = Signals(whole.subset(made(whole)))
+    model = table()
+    signals = Signals(model.subset(made(model)))
     lengths = np.linalg.norm(signals.effects, axis=0)
-    survived = signals.survived(whole.subset(made(whole)).D)
+    survived = signals.survived(model.subset(made(model)).D)
     todo = [
         (j, LEVEL / float(lengths[j]))
-        for j, e in enumerate(whole.effects)
+        for j, e in enumerate(model.effects)
         if survived[j] >= TESTABLE and e.start + LEVEL / lengths[j] <= e.bounds[1]
     ]
-    found: list[dict[str, str]] = []
+    results: list[dict[str, str]] = []
     tried, seed = 0, int(first)
-    parallel = Parallel(n_jobs=available_jobs())
-    while len(found) < int(count) and tried < 50 * int(count):
+    while len(results) < int(count) and tried < 50 * int(count):
         work = [(*todo[(tried + k) % len(todo)], seed + tried + k) for k in range(_AT_ONCE)]
-        done = parallel(delayed(one)(whole, *w) for w in work)
-        found += [d for d in done if d]
+        done = in_parallel(compared, [(model, *case) for case in work], quiet=True)
+        results += [d for d in done if d]
         tried += _AT_ONCE
-        print(f"{len(found)} of {tried} tables are ambiguous", file=sys.stderr)
-    found = found[: int(count)]
-    print("| truth, and what the table says | tables | 8 proposed runs | factorial of 16 |\n|---|---|---|---|")
-    for pair in dict.fromkeys((d["truth"], d["set"]) for d in found):
-        of = [d for d in found if (d["truth"], d["set"]) == pair]
+        print(f"{len(results)} of {tried} tables are ambiguous", file=sys.stderr)
+    results = results[: int(count)]
+    print(heading("truth, and what the table says", "tables", "8 proposed runs", "factorial of 16"))
+    for pair in dict.fromkeys((d["truth"], d["set"]) for d in results):
+        of = [d for d in results if (d["truth"], d["set"]) == pair]
         said = [", ".join(f"{k} {v}" for k, v in Counter(d[w] for d in of).items())
                 for w in ("8 proposed runs", "factorial of 16")]  # fmt: skip
-        print(f"| {pair[0]}: {pair[1]} | {len(of)} | {said[0]} | {said[1]} |")
+        print(row(f"{pair[0]}: {pair[1]}", len(of), *said))
     for way in ("8 proposed runs", "factorial of 16"):
-        counts = Counter(d[way] for d in found)
+        counts = Counter(d[way] for d in results)
         decided = counts["right"] + counts["wrong"]
-        print(f"{way}: decided {per_cent(decided, len(found))}, wrong {per_cent(counts['wrong'], len(found))}")
+        print(f"{way}: decided {per_cent(decided, len(results))}, wrong {per_cent(counts['wrong'], len(results))}")

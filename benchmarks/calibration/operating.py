@@ -18,15 +18,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, delayed
 
-from benchmarks.calibration.planted import Case, Design, Linear, cases, nulls, scatter, stand_in
+from benchmarks.calibration.planted import Case, Design, Linear, cases, measured, nulls, stand_in
+from benchmarks.markdown import heading, row
+from benchmarks.parallel import in_parallel
 from benchmarks.proportions import per_cent
 from calibration.statistics.forward_model import start_values
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.experiment import Experiment
 from calibration.verdict.verdict import Verdict
-from sim.motion.batches import available_jobs
 
 PAGE = Path("docs/operating.md")
 OTHER_NULLS = 100
@@ -89,25 +89,24 @@ def outcome(model: Experiment, case: Case) -> Outcome:
 
 def run_linear(model: Linear, case: Case, seed: int) -> Outcome:
     """One case through the stand-in."""
-    y = model.prediction + case.signal + scatter(model.runs, model.prediction.shape[1], seed, heavy=case.heavy)
-    return outcome(replace(model, runs=replace(model.runs, y=y)), case)
+    return outcome(measured(model, case.signal, seed, heavy=case.heavy), case)
 
 
-def eights_of(model: Linear) -> list[Case]:
+def each_at_eight(model: Linear) -> list[Case]:
     """Each effect once at λ = 8."""
     return [c for c in cases(model, 1) if c.label.endswith("λ = 8") and c.sizes]
 
 
 def summary(results: list[Outcome], group: Callable[[str], str]) -> str:
     """A table of judgements by group."""
-    lines = ["| case | tables | judgements | right (95 %) | wrong (95 %) |", "|---|---|---|---|---|"]
+    lines = [heading("case", "tables", "judgements", "right (95 %)", "wrong (95 %)")]
     for label in dict.fromkeys(group(r.label) for r in results):
         counts = Counter(r.judgement for r in results if group(r.label) == label)
         right = sum(counts[k] for k in ("exact", "in the set", "none"))
         wrong = counts["wrong"] + counts["number"] + sum(v for k, v in counts.items() if k.startswith("claimed"))
         said = ", ".join(f"{k} {v}" for k, v in counts.most_common())
         total = counts.total()
-        lines.append(f"| {label} | {total} | {said} | {per_cent(right, total)} | {per_cent(wrong, total)} |")
+        lines.append(row(label, total, said, per_cent(right, total), per_cent(wrong, total)))
     return "\n".join(lines)
 
 
@@ -120,14 +119,13 @@ def by_level(label: str) -> str:
 def covers(results: list[Outcome], label: str) -> str:
     """How often intervals cover the truth."""
     all_of = [c for r in results if by_level(r.label) == label for c in r.covered]
-    return f"| {label} | {len(all_of)} | {per_cent(sum(all_of), len(all_of))} |" if all_of else ""
+    return row(label, len(all_of), per_cent(sum(all_of), len(all_of))) if all_of else ""
 
 
 def main(count: str = "500", repeats: str = "6", first: str = "0") -> None:
     model, start = stand_in(), int(first)
     todo = nulls(model, int(count)) + cases(model, int(repeats))
-    parallel = Parallel(n_jobs=available_jobs(), verbose=1)
-    results: list[Outcome] = parallel(delayed(run_linear)(model, c, seed) for seed, c in enumerate(todo, start))
+    results = in_parallel(run_linear, [(model, c, seed) for seed, c in enumerate(todo, start)])
     eights = [r for r in results if r.label.endswith("λ = 8") and by_level(r.label) != r.label]
     pairs = [r for r in results if r.label.startswith("pairs")]
     levels = [by_level(c.label) for c in todo]
@@ -135,23 +133,23 @@ def main(count: str = "500", repeats: str = "6", first: str = "0") -> None:
     named = [r.held_out for r in results if r.judgement == "exact"]
 
     others = [(label, stand_in(which)) for label, which in DESIGNS.items()]
-    elsewhere = [
-        (label, m, c) for label, m in others for c in (*nulls(m, OTHER_NULLS)[:OTHER_NULLS], *eights_of(m))
+    other_work = [
+        (label, m, c) for label, m in others for c in (*nulls(m, OTHER_NULLS)[:OTHER_NULLS], *each_at_eight(m))
     ]
-    found = parallel(
-        delayed(run_linear)(m, c, seed) for seed, (_, m, c) in enumerate(elsewhere, start + len(todo))
+    other_results = in_parallel(
+        run_linear, [(m, c, seed) for seed, (_, m, c) in enumerate(other_work, start + len(todo))]
     )
     designs = [
         replace(o, label=f"{label}: {by_level(o.label)}")
-        for (label, _, _), o in zip(elsewhere, found, strict=True)
+        for (label, _, _), o in zip(other_work, other_results, strict=True)
     ]
 
     parts = [
         "## By kind, linear model\n\n" + summary(results, by_level),
         "## By effect, λ = 8, linear model\n\n" + summary(eights, lambda s: s),
-        "## Intervals\n\nHow often a 95 % interval contains what was planted. Counted are effects that were named "
-        "alone, and the three coefficients where nothing was planted.\n\n"
-        "| case | intervals | contain it (95 %) |\n|---|---|---|\n" + "\n".join(line for line in coverage if line),
+        "## Intervals\n\nHow often a 95 % interval contains the planted value: of effects that were named alone, "
+        "and of the three coefficients where nothing was planted.\n\n"
+        + "\n".join([heading("case", "intervals", "contain it (95 %)"), *filter(None, coverage)]),
         f"Held-out error over the noise of a run, where the effect was named: median {np.median(named):.3f}, "
         f"95 % of {len(named)} tables below {np.quantile(named, 0.95):.3f}.",
         f"## Other designs, linear model\n\n{OTHER_NULLS} tables with nothing planted, and each effect once at "

@@ -52,18 +52,18 @@ class Linear:
 
     def subset(self, rows: Integers) -> Linear:
         """The runs at places `rows`, which may come more than once."""
-        own = {k: getattr(self, k)[rows] for k in ("prediction", "J", "G", "D")}
-        return replace(self, runs=self.runs.subset(rows), **own)
+        parts = {k: getattr(self, k)[rows] for k in ("prediction", "J", "G", "D")}
+        return replace(self, runs=self.runs.subset(rows), **parts)
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
         """Predictions (P, n, k)."""
-        found = []
+        predictions = []
         for p in sets:
             c = np.array([np.log(p[q.name] / q.start) for q in self.coefficients])
             e = np.array([p[q.name] - q.start for q in self.effects])
             x = np.array([np.log(p[q.name] / q.start) if q.logarithmic else p[q.name] for q in self.nuisances])
-            found.append(self.prediction + self.J @ c + self.D @ e + (self.G @ x if self.nuisances else 0.0))
-        return np.array(found)
+            predictions.append(self.prediction + self.J @ c + self.D @ e + (self.G @ x if self.nuisances else 0.0))
+        return np.array(predictions)
 
     def derivatives(
         self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
@@ -152,9 +152,15 @@ def scatter(runs: Runs, outputs: int, seed: int, *, heavy: bool = False) -> Floa
     """Noise of runs and sessions, (n, k)."""
     rng = np.random.default_rng(seed)
     shape = (len(runs), outputs)
-    own = rng.standard_t(3, size=shape) / np.sqrt(3) if heavy else rng.normal(size=shape)
+    noise = rng.standard_t(3, size=shape) / np.sqrt(3) if heavy else rng.normal(size=shape)
     shift = rng.normal(scale=SESSION, size=(len(runs.session_names), outputs))[runs.session]
-    return NOISE * own + shift
+    return NOISE * noise + shift
+
+
+def measured(model: Linear, signal: Floats, seed: int, *, heavy: bool = False) -> Linear:
+    """Return the model with data: its prediction, a signal (n, k), and the noise of a seed."""
+    noise = scatter(model.runs, model.prediction.shape[1], seed, heavy=heavy)
+    return replace(model, runs=replace(model.runs, y=model.prediction + signal + noise))
 
 
 class Signals:
@@ -182,17 +188,17 @@ class Signals:
 
     def survived(self, table: Floats) -> Floats:
         """Share that they leave, (q,)."""
-        whole = np.linalg.norm(self.white(table[self.used]), axis=0)
-        return np.asarray(np.linalg.norm(self.rest(table), axis=0) / np.maximum(whole, 1e-300))
+        length = np.linalg.norm(self.white(table[self.used]), axis=0)
+        return np.asarray(np.linalg.norm(self.rest(table), axis=0) / np.maximum(length, 1e-300))
 
     def beyond_catalogue(self, signal: Floats) -> float:
         """Length of what the best pair of the catalogue leaves of a signal (n, k), too."""
-        left = self.rest(signal[..., None])[:, 0]
+        unabsorbed = self.rest(signal[..., None])[:, 0]
         unit = self.effects / np.maximum(np.linalg.norm(self.effects, axis=0), 1e-300)
-        along, between = unit.T @ left, unit.T @ unit
-        both = along[:, None] ** 2 + along**2 - 2 * along[:, None] * along * between
+        projections, between = unit.T @ unabsorbed, unit.T @ unit
+        both = projections[:, None] ** 2 + projections**2 - 2 * projections[:, None] * projections * between
         taken = np.triu(both / np.maximum(1 - between**2, 1e-6), 1)
-        return float(np.sqrt(max(left @ left - taken.max(), 0.0)))
+        return float(np.sqrt(max(unabsorbed @ unabsorbed - taken.max(), 0.0)))
 
 
 def outside(model: Linear) -> dict[str, Floats]:
@@ -223,7 +229,7 @@ def cases(model: Linear, repeats: int) -> list[Case]:
     """Everything but the nulls."""
     signals = Signals(model)
     lengths, survived = np.linalg.norm(signals.effects, axis=0), signals.survived(model.D)
-    found: list[Case] = []
+    listed: list[Case] = []
     strong: list[Case] = []
     for j, effect in enumerate(model.effects):
         for level in LEVELS:
@@ -233,15 +239,15 @@ def cases(model: Linear, repeats: int) -> list[Case]:
                 continue
             size *= 1 if effect.start + size <= high else -1
             case = Case(f"{effect.name}, λ = {level:g}", {effect.name: size}, model.D[..., j] * size)
-            found += [case] * repeats
+            listed += [case] * repeats
             if level == 8.0:
-                found += [replace(case, label="effects, λ = 8, heavy tails", heavy=True)] * max(repeats // 3, 1)
+                listed += [replace(case, label="effects, λ = 8, heavy tails", heavy=True)] * max(repeats // 3, 1)
             if level == 16.0:
                 strong.append(case)
     for a, b in zip(strong, strong[1:] + strong[:1], strict=True):
         both = Case("pairs, λ = 16 each", {**a.sizes, **b.sizes}, a.signal + b.signal)
-        found += [both] * max(repeats // 3, 1)
-    return found
+        listed += [both] * max(repeats // 3, 1)
+    return listed
 
 
 def nulls(model: Linear, count: int) -> list[Case]:

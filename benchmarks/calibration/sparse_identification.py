@@ -39,7 +39,7 @@ def identify(model: Linear, used: Flags, testable: list[str]) -> frozenset[str]:
     base = np.concatenate([model.J, model.G], -1) / scale[:, None]
     residual = (model.runs.y - model.prediction) / scale
 
-    where = _localised(model, first, _rest(base, rows, residual, first))
+    where = _localised(model, first, _unabsorbed(base, rows, residual, first))
     if not where.any():
         return frozenset()
 
@@ -48,24 +48,24 @@ def identify(model: Linear, used: Flags, testable: list[str]) -> frozenset[str]:
         columns = [base, *(library[name][..., None] for name in names)]
         table = np.concatenate(columns, -1)[half][:, where].reshape(-1, base.shape[-1] + len(names))
         values = residual[half][:, where].ravel()
-        own = np.concatenate([table, np.pad(rows, ((0, 0), (0, len(names))))])
-        left = np.concatenate([values, np.zeros(len(rows))])
-        left = left - own @ np.linalg.lstsq(own, left, rcond=None)[0]
-        return float(left @ left), len(values) - len(model.coefficients) - len(names)
+        columns_and_priors = np.concatenate([table, np.pad(rows, ((0, 0), (0, len(names))))])
+        residuals = np.concatenate([values, np.zeros(len(rows))])
+        residuals = residuals - columns_and_priors @ np.linalg.lstsq(columns_and_priors, residuals, rcond=None)[0]
+        return float(residuals @ residuals), len(values) - len(model.coefficients) - len(names)
 
     chosen: tuple[str, ...] = ()
     while len(chosen) < _MOST:
-        rest = [name for name in testable if name not in chosen]
-        best = min(rest, key=lambda name: squares((*chosen, name), first)[0])
-        if _p(squares(chosen, first), squares((*chosen, best), first)) > _LEVEL / len(rest):
+        candidates = [name for name in testable if name not in chosen]
+        best = min(candidates, key=lambda name: squares((*chosen, name), first)[0])
+        if _p(squares(chosen, first), squares((*chosen, best), first)) > _LEVEL / len(candidates):
             break
         chosen = (*chosen, best)
     second = used & ~first
-    whole = squares(chosen, second)
+    complete = squares(chosen, second)
     return frozenset(
         name
         for name in chosen
-        if _p(squares(tuple(n for n in chosen if n != name), second), whole) < _LEVEL / len(chosen)
+        if _p(squares(tuple(n for n in chosen if n != name), second), complete) < _LEVEL / len(chosen)
     )
 
 
@@ -77,23 +77,23 @@ def _half(model: Linear, used: Flags) -> Flags:
     return first
 
 
-def _rest(base: Floats, rows: Floats, residual: Floats, half: Flags) -> Floats:
+def _unabsorbed(base: Floats, rows: Floats, residual: Floats, half: Flags) -> Floats:
     """What coefficients and numbers leave of a half, (n', k)."""
     table = np.concatenate([base[half].reshape(-1, base.shape[-1]), rows])
     values = np.concatenate([residual[half].ravel(), np.zeros(len(rows))])
-    left = values - table @ np.linalg.lstsq(table, values, rcond=None)[0]
-    return np.asarray(left[: half.sum() * residual.shape[1]].reshape(-1, residual.shape[1]))
+    unabsorbed = values - table @ np.linalg.lstsq(table, values, rcond=None)[0]
+    return np.asarray(unabsorbed[: half.sum() * residual.shape[1]].reshape(-1, residual.shape[1]))
 
 
-def _localised(model: Linear, half: Flags, left: Floats) -> Flags:
+def _localised(model: Linear, half: Flags, residual: Floats) -> Flags:
     """(k,) outputs whose residual follows the inputs."""
     _, table = features(model.runs, half)
     table = np.column_stack([np.ones(half.sum()), table[half]])
-    fits = left - table @ np.linalg.lstsq(table, left, rcond=None)[0]
-    before, after = (left**2).sum(0), (fits**2).sum(0)
-    n, p = len(left), table.shape[1]
+    unexplained = residual - table @ np.linalg.lstsq(table, residual, rcond=None)[0]
+    before, after = (residual**2).sum(0), (unexplained**2).sum(0)
+    n, p = len(residual), table.shape[1]
     ratio = (before - after) / p / (after / (n - p))
-    return np.asarray(f_distribution.sf(ratio, p, n - p) < _LEVEL / left.shape[1])
+    return np.asarray(f_distribution.sf(ratio, p, n - p) < _LEVEL / residual.shape[1])
 
 
 def _p(smaller: tuple[float, int], larger: tuple[float, int]) -> float:

@@ -22,10 +22,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from benchmarks.calibration.operating import judge
 from benchmarks.calibration.planted import ROBOT, Case, Design, Signals, design, scatter, stand_in
+from benchmarks.markdown import heading, row
+from benchmarks.parallel import in_parallel
 from benchmarks.proportions import per_cent
 from calibration.statistics.forward_model import Parameter, start_values, stepped
 from calibration.statistics.priors import prior_rows
@@ -33,7 +34,7 @@ from calibration.statistics.residual_tests import TESTABLE
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from sim.arrays import Floats
-from sim.motion.batches import available_jobs, stepped_columns
+from sim.motion.batches import stepped_columns
 
 DESIGN = Design(lengths_cm=(5.0, 6.2, 7.4, 8.6, 9.8, 11.0))
 LEVEL = 8.0
@@ -64,14 +65,14 @@ def truth(sizes: dict[str, float], model: SwimmerModel) -> tuple[Floats, int]:
 
     def steady(columns: Mapping[str, Floats], **options: Any) -> dict[str, Any]:
         nonlocal unsettled
-        found = stepped_columns(columns, finer=2, **options)
-        bad = ~(found["converged"] & np.isfinite(found["omega_t_bar"]))
+        answer = stepped_columns(columns, finer=2, **options)
+        bad = ~(answer["converged"] & np.isfinite(answer["omega_t_bar"]))
         unsettled = int(bad.sum())
         if bad.any():
             direct = DIRECT.steady({k: v[bad] for k, v in columns.items()}, **options)
-            for name, values in found.items():
+            for name, values in answer.items():
                 values[bad] = direct[name]
-        return found
+        return answer
 
     finer = replace(model, solver=DIRECT._replace(steady=steady))
     return np.asarray(finer.predict([{**start_values(model), **sizes}])[0]), unsettled
@@ -83,11 +84,11 @@ def sized(effect: Parameter, model: SwimmerModel, signals: Signals) -> float | N
     size = 0.5 * effect.typical
     for _ in range(_PASSES):
         at = float(np.clip(effect.start + size, *effect.bounds))
-        found = strength(model.predict([{**start, effect.name: at}])[0], model, signals)
-        if abs(found / LEVEL - 1) < 0.03:
+        level = strength(model.predict([{**start, effect.name: at}])[0], model, signals)
+        if abs(level / LEVEL - 1) < 0.03:
             return at
         size = at - effect.start
-        size *= min(max(LEVEL / max(found, 1e-3), 0.1), 10.0)
+        size *= min(max(LEVEL / max(level, 1e-3), 0.1), 10.0)
     return None
 
 
@@ -95,23 +96,23 @@ def strength(outputs: Floats, model: SwimmerModel, signals: Signals) -> float:
     """λ: what the best coefficients and nuisance parameters leave of outputs (n, k) without noise, in σ."""
     fitted = (*model.coefficients, *model.nuisances)
     names, used = [p.name for p in fitted], signals.used
-    parameters, left = start_values(model), np.zeros(0)
+    parameters, unabsorbed = start_values(model), np.zeros(0)
     for _ in range(_PASSES):
         prediction, J = model.derivatives(parameters, names)
         rows, pull = prior_rows(fitted, parameters)
         columns = np.concatenate([signals.white(J[used]), rows])
         values = np.concatenate([signals.white((outputs - prediction)[used]), pull])
         step = np.linalg.lstsq(columns, values, rcond=None)[0]
-        left = values - columns @ step
+        unabsorbed = values - columns @ step
         parameters = stepped(fitted, parameters, step)
-    return float(np.linalg.norm(left))
+    return float(np.linalg.norm(unabsorbed))
 
 
 def closed(label: str, sizes: dict[str, float], seeds: list[int]) -> list[Closed]:
     """A truth, with several draws of the noise."""
     model = SwimmerModel(ROBOT, design(DESIGN), jobs=1)
     outputs, unsettled = truth(sizes, model)
-    found = []
+    tables = []
     for seed in seeds:
         y = outputs + scatter(model.runs, outputs.shape[1], seed)
         began = time.process_time()
@@ -128,8 +129,8 @@ def closed(label: str, sizes: dict[str, float], seeds: list[int]) -> list[Closed
         errors = verdict.error_after / noise, verdict.error_before / noise
         said = " or ".join("+".join(e.name for e in c.claimed) for c in verdict.explaining)
         said = said or verdict.verdict
-        found.append(Closed(label, said, judge(verdict, case), *errors, seconds, unsettled, size))
-    return found
+        tables.append(Closed(label, said, judge(verdict, case), *errors, seconds, unsettled, size))
+    return tables
 
 
 def planned(tables: int, first: int) -> list[tuple[str, dict[str, float], list[int]]]:
@@ -142,45 +143,41 @@ def planned(tables: int, first: int) -> list[tuple[str, dict[str, float], list[i
     sizes = {e.name: sized(e, model, signals) for e in testable}
     truths = [(name, {name: size}) for name, size in sizes.items() if size is not None]
     repeats = -(-tables // len(truths))
-    found = []
-    for i, (name, own) in enumerate(truths):
-        found.append((f"{name}, λ = 8", own, [first + repeats * i + k for k in range(repeats)]))
+    work = []
+    for i, (name, sizes_of_truth) in enumerate(truths):
+        work.append((f"{name}, λ = 8", sizes_of_truth, [first + repeats * i + k for k in range(repeats)]))
     seed = first + repeats * len(truths)
-    found.append(("null", {}, list(range(seed, seed + NULLS))))
+    work.append(("null", {}, list(range(seed, seed + NULLS))))
     seed += NULLS
     for n in EXPONENTS:
         for log_time in TIMES:
-            own = {THINNING: 1 - n, TIME: log_time}
-            found.append((f"thinning, n = {n:g}, time {log_time:g}", own, [seed]))
+            sizes_of_truth = {THINNING: 1 - n, TIME: log_time}
+            work.append((f"thinning, n = {n:g}, time {log_time:g}", sizes_of_truth, [seed]))
             seed += 1
-    return found
+    return work
 
 
 def _summary(label: str, results: list[Closed]) -> str:
     right = sum(r.judgement in ("exact", "in the set", "none") for r in results)
     wrong = sum(r.judgement in ("wrong", "number") or r.judgement.startswith("claimed") for r in results)
     ratio, before = (np.median([getattr(r, k) for r in results]) for k in ("held_out", "calibrated"))
-    return (
-        f"| {label} | {len(results)} | {per_cent(right, len(results))} | {per_cent(wrong, len(results))} | "
-        f"{before:.2f} | {ratio:.2f} | {max(r.held_out for r in results):.2f} |"
+    shares = (per_cent(count, len(results)) for count in (right, wrong))
+    return row(
+        label, len(results), *shares, f"{before:.2f}", f"{ratio:.2f}", f"{max(r.held_out for r in results):.2f}"
     )
 
 
 def report(results: list[Closed]) -> None:
     """Print the tables."""
-    print(
-        "| truth | verdicts | calibrated error / noise | with effects | size over truth |\n|---|---|---|---|---|"
-    )
+    print(heading("truth", "verdicts", "calibrated error / noise", "with effects", "size over truth"))
     for label in dict.fromkeys(r.label for r in results):
         of = [r for r in results if r.label == label]
         said = ", ".join(dict.fromkeys(f"{r.said} ({r.judgement})" for r in of))
         sizes = "; ".join(f"{r.size[0]:.2f} to {r.size[1]:.2f}" for r in of if r.size)
-        print(
-            f"| {label} | {said} | {np.median([r.calibrated for r in of]):.2f} | "
-            f"{np.median([r.held_out for r in of]):.2f} | {sizes} |"
-        )
-    print("\n| truth | tables | right (95 %) | wrong (95 %) | calibrated | median error / noise | largest |")
-    print("|---|---|---|---|---|---|---|")
+        errors = (f"{np.median([getattr(r, kind) for r in of]):.2f}" for kind in ("calibrated", "held_out"))
+        print(row(label, said, *errors, sizes))
+    columns = ("truth", "tables", "right (95 %)", "wrong (95 %)", "calibrated", "median error / noise", "largest")
+    print(f"\n{heading(*columns)}")
     for label, start in (("one effect, λ = 8", ""), ("nothing", "null"), ("local thinning", "thinning")):
         of = [r for r in results if r.label.startswith(start)]
         if not start:
@@ -196,5 +193,5 @@ def report(results: list[Closed]) -> None:
 
 def main(tables: str = "100", first: str = "0") -> None:
     work = planned(int(tables), int(first))
-    done = Parallel(n_jobs=available_jobs(), verbose=1)(delayed(closed)(*w) for w in work)
+    done = in_parallel(closed, work)
     report([r for group in done for r in group])

@@ -18,7 +18,6 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -26,6 +25,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from benchmarks.timing import processor_time
 from dataset.build.build import build
 from dataset.rows.design import load_design
 from dataset.storage import shards
@@ -99,14 +99,14 @@ def overhead(rows: int) -> float:
     take beside the rows.
     """
     bare, printed = processor_seconds(_BARE, str(rows))
-    own = float(printed)
+    rows_alone = float(printed)
     print(f"{rows} rows of sweep.toml, processor seconds: all, the rows themselves, all the rest")
-    print(f"  bare simulation in one process {bare:8.1f} {own:8.1f} {bare - own:8.1f}")
+    print(f"  bare simulation in one process {bare:8.1f} {rows_alone:8.1f} {bare - rows_alone:8.1f}")
     for jobs in (1, 2):
         with TemporaryDirectory() as folder:
             engine, _ = processor_seconds(_ENGINE, str(rows), f"{folder}/out", str(jobs))
             cost = float(read_manifest(f"{folder}/out")["cost_s"])
-        more = (engine - cost) - (bare - own)
+        more = (engine - cost) - (bare - rows_alone)
         print(f"  engine, workers: {jobs}             {engine:8.1f} {cost:8.1f} {engine - cost:8.1f}   "
               f"{100 * more / cost:+.1f} % of the rows")  # fmt: skip
     return cost / rows
@@ -117,9 +117,9 @@ def encodings() -> None:
     with TemporaryDirectory() as folder:
         build(load_design().with_rows(512), f"{folder}/out", title="")
         rows = pa.Table.from_batches(list(batches(f"{folder}/out")))
-        whole = Path(folder, "out/rows").iterdir().__next__().stat().st_size
+        size = Path(folder, "out/rows").iterdir().__next__().stat().st_size
     words = {"use_dictionary": ["reason"]}
-    print(f"\nBytes a row, {len(rows)} simulated rows ({whole / len(rows):.0f} with the footer)")
+    print(f"\nBytes a row, {len(rows)} simulated rows ({size / len(rows):.0f} with the footer)")
     choices: dict[str, dict[str, Any]] = {
         "as it comes (snappy)": {},
         "zstd": {"compression": "zstd"},
@@ -149,13 +149,13 @@ def reading(rows: int) -> None:
         print(f"\n{rows} synthetic rows with all curves: {len(files)} files, {size / rows:.0f} bytes a row; "
               "processor seconds")  # fmt: skip
         print(f"  made, stored and joined                  {spent:6.1f}")
-        print(f"  of that, joined                          {_timed(lambda: _joined(out, form)):6.1f}")
-        print(f"  manifest opened and checked              {_timed(lambda: read_manifest(out)):6.2f}")
+        print(f"  of that, joined                          {processor_time(lambda: _joined(out, form)):6.1f}")
+        print(f"  manifest opened and checked              {processor_time(lambda: read_manifest(out)):6.2f}")
         two = ["omega_bar", "omega_yr_bar"]
-        print(f"  two columns scanned, all checked         {_timed(lambda: _scanned(out, two)):6.2f}")
-        print(f"  all columns scanned in batches           {_timed(lambda: _scanned(out, None)):6.2f}")
-        print(f"  all columns but curves read into pandas  {_timed(lambda: read(out, plain)):6.2f}")
-        print(f"  unchanged build                          {_timed(lambda: _again(rows, out)):6.2f}")
+        print(f"  two columns scanned, all checked         {processor_time(lambda: _scanned(out, two)):6.2f}")
+        print(f"  all columns scanned in batches           {processor_time(lambda: _scanned(out, None)):6.2f}")
+        print(f"  all columns but curves read into pandas  {processor_time(lambda: read(out, plain)):6.2f}")
+        print(f"  unchanged build                          {processor_time(lambda: _again(rows, out)):6.2f}")
 
 
 def _again(rows: int, out: str) -> None:
@@ -169,10 +169,10 @@ def _scanned(out: str, columns: list[str] | None) -> None:
 
 def _joined(out: str, form: pa.Schema) -> None:
     """Join the files again, elsewhere."""
-    there, key = open_storage(out), read_manifest(out)["config_hash"]
-    some = shards.shards_in(there, "rows")
-    name = shards.shard_name("../again", some[0].start, some[-1].stop)
-    shards.join(there, some, name, form.remove_metadata(), key)
+    storage, key = open_storage(out), read_manifest(out)["config_hash"]
+    parts = shards.shards_in(storage, "rows")
+    name = shards.shard_name("../again", parts[0].start, parts[-1].stop)
+    shards.join(storage, parts, name, form.remove_metadata(), key)
 
 
 def projection(cost: float) -> None:
@@ -181,12 +181,6 @@ def projection(cost: float) -> None:
     for rows in (10**6, 10**8):
         hours = [f"{cost * rows / cores / 3600:.3g} h on {cores}" for cores in (2, 64, 1024)]
         print(f"  {rows:.0e} rows: {-(-rows // SEGMENT)} files; {', '.join(hours)} cores")
-
-
-def _timed(work: Callable[[], object]) -> float:
-    began = time.process_time()
-    work()
-    return time.process_time() - began
 
 
 def main(*words: str) -> None:

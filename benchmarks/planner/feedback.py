@@ -16,9 +16,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed
 from matplotlib.figure import Figure
 
+from benchmarks.parallel import in_parallel
 from benchmarks.planner.simulated_swim import Blind, Camera, Swum, swim
 from benchmarks.proportions import wilson
 from planner.files.pictures import DECLARED, REPLAYED
@@ -64,11 +64,11 @@ def both(case: Case, planned: Plan) -> tuple[Swum, Swum]:
     return blind, swim(Tracker(planned), planned, case.robot, Camera(), later=case.later)
 
 
-def draw(planned: Plan, found: list[tuple[Swum, Swum]]) -> Figure:
+def draw(planned: Plan, swims: list[tuple[Swum, Swum]]) -> Figure:
     """Tracks of the hardest case; distances from the path over the way in all cases."""
     figure = Figure(figsize=(10, 6.6), layout="constrained")
     upper, lower = np.asarray(figure.subfigures(2, 1, height_ratios=(1.15, 1)), dtype=object)
-    ways = zip(found[-1], (REPLAYED, FEEDBACK), ("open loop", "with the tracker"), strict=True)
+    ways = zip(swims[-1], (REPLAYED, FEEDBACK), ("open loop", "with the tracker"), strict=True)
     for i, (swum, colour, name) in enumerate(ways):
         axes = upper.add_subplot(1, 2, 1 + i)
         axes.plot(*planned.reference.T, color=DECLARED, lw=1.2)
@@ -81,7 +81,7 @@ def draw(planned: Plan, found: list[tuple[Swum, Swum]]) -> Figure:
         axes.set_ylabel("y / l")
     for i, case in enumerate(CASES):
         axes = lower.add_subplot(1, len(CASES), 1 + i)
-        for swum, colour in zip(found[i], (REPLAYED, FEEDBACK), strict=True):
+        for swum, colour in zip(swims[i], (REPLAYED, FEEDBACK), strict=True):
             axes.semilogy(LENGTH * swum.time / swum.time[-1], smooth(swum), color=colour, lw=1.0)
         axes.set_ylim(3e-3, 10)
         axes.set_title(case.name, fontsize=9)
@@ -109,8 +109,8 @@ def alarms(planned: Plan, seed: int) -> tuple[int, int]:
     return swum.fed // WINDOW, len(swum.alarms)
 
 
-def lines(found: list[tuple[Swum, Swum]]) -> Iterator[str]:
-    for case, pair in zip(CASES, found, strict=True):
+def lines(swims: list[tuple[Swum, Swum]]) -> Iterator[str]:
+    for case, pair in zip(CASES, swims, strict=True):
         for name, swum in zip(("open loop", "tracker"), pair, strict=True):
             quarters = "".join(f"{swum.rms(q / 4, (q + 1) / 4):8.4f}" for q in range(4))
             rang = f"{swum.alarms[0] / swum.time[-1]:.2f}" if swum.alarms else "-"
@@ -119,16 +119,16 @@ def lines(found: list[tuple[Swum, Swum]]) -> Iterator[str]:
 
 def main(out: str = "docs/tracking.png", robots: str = "40") -> None:
     planned = plan(eight(LENGTH), ROBOT)
-    found = Parallel(n_jobs=-1)(delayed(both)(case, planned) for case in CASES)
+    swims = in_parallel(both, [(case, planned) for case in CASES], quiet=True)
     minutes = planned.duration * ROBOT.time_scale / 60
     print(f"{LENGTH:g} l, {len(planned.dwells)} dwells planned, {minutes:.0f} min")
     print(f"stated: open loop {planned.stated_error:.3f} l, with feedback {planned.feedback_error:.3f} l")
     print(f"{'robot':39}{'rms':>8}{'most':>8}{'rms, quarters of the way':>32}{'alarm':>8}")
-    print("\n".join(lines(found)))
-    draw(planned, found).savefig(out, dpi=130)
+    print("\n".join(lines(swims)))
+    draw(planned, swims).savefig(out, dpi=130)
     print(f"-> {out}")
     short = plan(circle(2.0), ROBOT)
-    counts = np.array(Parallel(n_jobs=-1)(delayed(alarms)(short, seed) for seed in range(int(robots)))).sum(0)
+    counts = np.array(in_parallel(alarms, [(short, seed) for seed in range(int(robots))], quiet=True)).sum(0)
     low, high = wilson(int(counts[1]), int(counts[0]))
     print(
         f"false alarms: {counts[1]} in {counts[0]} windows of {WINDOW} poses, {counts[1] / counts[0]:.2%} "

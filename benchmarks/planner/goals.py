@@ -26,7 +26,7 @@ def main(cases: str = "100", first: str = "0") -> None:
         ratios.append(goal_plan.plan.duration / least)
         print(f"{seed:5d}{goal[0]:7.2f}{goal[1]:7.2f}{goal[2]:9.2f}{goal_plan.plan.duration:9.1f}{least:9.1f}"
               f"{ratios[-1]:8.3f}{max(goal_plan.end_error):10.1e}{spent:7.2f}", flush=True)  # fmt: skip
-    found = np.array(ratios)
-    print(f"\n{len(found)} goals: time by the optimum's {np.median(found):.3f} at the median, "
-          f"{np.quantile(found, 0.95):.3f} at 95 %, {found.max():.3f} at most; within 5 %: "
-          f"{100 * np.mean(found <= 1.05):.0f} %")  # fmt: skip
+    ratio = np.array(ratios)
+    print(f"\n{len(ratio)} goals: time by the optimum's {np.median(ratio):.3f} at the median, "
+          f"{np.quantile(ratio, 0.95):.3f} at 95 %, {ratio.max():.3f} at most; within 5 %: "
+          f"{100 * np.mean(ratio <= 1.05):.0f} %")  # fmt: skip

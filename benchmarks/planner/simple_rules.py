@@ -52,9 +52,9 @@ def paper_polygon(result: Plan, corners: int, side: float) -> Rule:
     for number, length in enumerate((side / 2, *[side] * (corners - 1), side / 2)):
         count = max(2, 2 * round((length / ahead + owed) / 2))
         owed += length / ahead - count
-        own = [dwell] * count
-        own[0] += turn / rate if number else 0.0
-        dwells += own
+        leg = [dwell] * count
+        leg[0] += turn / rate if number else 0.0
+        dwells += leg
     low = side / 2 / math.tan(math.pi / corners)
     return 1, dwells, (0.0, -low, -rate * dwell / 2)
 
@@ -105,10 +105,10 @@ def _errors(result: Plan, rule: Rule) -> tuple[float, float, float]:
 def _rules(result: Plan, name: str) -> dict[str, Rule]:
     size = {"circle": 1.5, "square": 3.0, "triangle": 4.0}[name]
     corners = {"square": 4, "triangle": 3}
-    own = paper_polygon(result, corners[name], size) if name in corners else paper_circle(result, size)
+    paper = paper_polygon(result, corners[name], size) if name in corners else paper_circle(result, size)
     dwells: Floats = result.dwells
     return {
-        "the paper's rule": own,
+        "the paper's rule": paper,
         "sum-up rounding": sum_up_rounding(result),
         "this planner": (result.first_direction, dwells.tolist(), result.start),
     }

@@ -155,13 +155,13 @@ def swim(
             swimmer.become(later)
             change = np.inf
         elif until == look:
-            found = camera.sees(pose)
-            if found is not None:
-                waiting.append((now + delay, found, now))
+            seen_pose = camera.sees(pose)
+            if seen_pose is not None:
+                waiting.append((now + delay, seen_pose, now))
             look += every
         else:
-            _, found, seen = waiting.pop(0)
-            command = pilot.update(now, found, seen)
+            _, seen_pose, seen = waiting.pop(0)
+            command = pilot.update(now, seen_pose, seen)
             fed += 1
         if command.alarm and not rang:
             alarms.append(now)

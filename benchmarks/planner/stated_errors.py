@@ -19,8 +19,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import torch
-from joblib import Parallel, delayed
 
+from benchmarks.markdown import heading, row
+from benchmarks.parallel import in_parallel
 from benchmarks.proportions import wilson
 from planner.files.plan_json import plan_record
 from planner.files.tracking_error import tracking_error
@@ -106,7 +107,7 @@ def swum(seed: int) -> Swum | str:
         path = random_path(rng, plan(circle(4.0), robot, lookup=table).tracked.vehicle.turn_radius)
         result = plan(path, robot, lookup=table, knowledge=knowledge)
         moved = {name: getattr(robot, name) * np.exp(SIGMA * rng.normal()) for name in COEFFICIENTS}
-        tracks = [replay([result.schedule(one)])[0] for one in (replace(robot, **moved), robot)]
+        tracks = [replay([result.schedule(swimmer)])[0] for swimmer in (replace(robot, **moved), robot)]
     except InputError as refused:
         return f"{seed}: {refused}"
     wrong, exact = (tracking_error(plan_record(result), track) for track in tracks)
@@ -124,31 +125,31 @@ def _mean_path(result: Plan, track: pd.DataFrame) -> float:
 
 def line(name: str, some: list[Swum]) -> str:
     """Figures of a class of robots."""
-    held = sum(one.wrong <= one.stated for one in some)
+    held = sum(result.wrong <= result.stated for result in some)
     low, high = wilson(held, len(some))
 
     def two(value: Callable[[Swum], float]) -> str:
-        values = [value(one) for one in some]
+        values = [value(result) for result in some]
         return f"{np.median(values):.3f} / {np.quantile(values, 0.95):.3f}"
 
-    return (
-        f"| {name} | {len(some)} | {100 * held / len(some):.0f} % ({100 * low:.0f} to {100 * high:.0f}) "
-        f"| {np.median([one.stated / one.wrong for one in some]):.2f} | {two(lambda s: s.stated)} "
-        f"| {two(lambda s: s.wrong)} | {two(lambda s: s.mean_rms)} | {two(lambda s: s.rms)} "
-        f"| {np.median([one.rms / one.floor for one in some]):.2f} |"
-    )
+    return row(
+        name, len(some), f"{100 * held / len(some):.0f} % ({100 * low:.0f} to {100 * high:.0f})",
+        f"{np.median([result.stated / result.wrong for result in some]):.2f}", two(lambda s: s.stated),
+        two(lambda s: s.wrong), two(lambda s: s.mean_rms), two(lambda s: s.rms),
+        f"{np.median([result.rms / result.floor for result in some]):.2f}",
+    )  # fmt: skip
 
 
-def draw(found: list[Swum], path: str) -> None:
+def draw(swims: list[Swum], path: str) -> None:
     """Largest error of the robot that differs against the stated error."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(5.6, 5.2), layout="constrained")
     axes = figure.add_subplot()
     for name, colour, kind in (("slow turners", "#2a7fba", False), ("fast turners", "#d9a441", True)):
-        some = [one for one in found if (one.yaw >= QUICK) == kind]
+        some = [result for result in swims if (result.yaw >= QUICK) == kind]
         axes.loglog([s.stated for s in some], [s.wrong for s in some], ".", ms=7, color=colour, label=name)
-    ends = [0.8 * min(one.wrong for one in found), 1.25 * max(one.stated for one in found)]
+    ends = [0.8 * min(result.wrong for result in swims), 1.25 * max(result.stated for result in swims)]
     axes.plot(ends, ends, color="black", lw=1)
     axes.set_xlabel("stated error / l")
     axes.set_ylabel("largest error of the robot that differs / l")
@@ -160,13 +161,12 @@ def draw(found: list[Swum], path: str) -> None:
 def main(count: str = "40", first: str = "0", picture: str = "") -> None:
     seeds = range(int(first), int(first) + int(count))
     compile_once()
-    results = Parallel(n_jobs=-1, verbose=1)(delayed(swum)(seed) for seed in seeds)
-    found = [one for one in results if isinstance(one, Swum)]
-    for refused in (one for one in results if isinstance(one, str)):
+    results = in_parallel(swum, [(seed,) for seed in seeds])
+    swims = [result for result in results if isinstance(result, Swum)]
+    for refused in (result for result in results if isinstance(result, str)):
         print(refused)
-    print("| robots | plans | held | stated / largest | stated: median / 95 % | largest | mean path, rms | rms "
-          "| rms / zigzag |")  # fmt: skip
-    print("|---|---|---|---|---|---|---|---|---|")
+    print(heading("robots", "plans", "held", "stated / largest", "stated: median / 95 %", "largest",
+                  "mean path, rms", "rms", "rms / zigzag"))  # fmt: skip
     classes: tuple[tuple[str, Callable[[Swum], bool]], ...] = (
         ("all", lambda s: True),
         ("slow turners, N = 2", lambda s: s.yaw < QUICK and s.robot.tails == 2),
@@ -176,9 +176,9 @@ def main(count: str = "40", first: str = "0", picture: str = "") -> None:
         ("turns differ", lambda s: bool(s.robot.effects)),
     )
     for name, belongs in classes:
-        if some := [one for one in found if belongs(one)]:
+        if some := [result for result in swims if belongs(result)]:
             print(line(name, some))
-    for one in sorted((s for s in found if s.wrong > s.stated), key=lambda s: s.seed):
-        print(f"not held: seed {one.seed}, {one.wrong:.3f} l, stated {one.stated:.3f} l")
+    for result in sorted((s for s in swims if s.wrong > s.stated), key=lambda s: s.seed):
+        print(f"not held: seed {result.seed}, {result.wrong:.3f} l, stated {result.stated:.3f} l")
     if picture:
-        draw(found, picture)
+        draw(swims, picture)

@@ -32,12 +32,12 @@ def filament() -> None:
 def robots() -> None:
     inputs = np.array([p[0] for p in STEADY_POINTS]).T
     truth = np.array([p[1] for p in STEADY_POINTS]).T
-    found = steady_columns(dict(zip(STEADY_INPUTS, inputs, strict=True)))
+    columns = steady_columns(dict(zip(STEADY_INPUTS, inputs, strict=True)))
     print(f"\nWhole robot: largest error over {len(STEADY_POINTS)} points of an independent solver")
     for name, values in zip(_OUTPUTS, truth, strict=False):
-        print(f"  {name:14} {100 * np.abs(found[name] / values - 1).max():7.3f} %")
-    print(f"  theta          {np.abs(found['theta_deg'] - truth[6]).max():7.3f} degrees")
-    print(f"  largest error that a row states of itself {100 * found['error'].max():.3f} %")
+        print(f"  {name:14} {100 * np.abs(columns[name] / values - 1).max():7.3f} %")
+    print(f"  theta          {np.abs(columns['theta_deg'] - truth[6]).max():7.3f} degrees")
+    print(f"  largest error that a row states of itself {100 * columns['error'].max():.3f} %")
     motion = steady(PRESETS["paper-control"].groups())
     control = motion.columns()
     print("\nThe paper's control example (N = 2, C = (3.0, 2.8, 2.0), motor at 10)")

@@ -57,9 +57,9 @@ class PlainSwimmer:
         u = np.linalg.solve(matrix * gain + head, on_disc - motor)
         w = u * gain + np.array([0.0, 0.0, 0.0, self.body.omega])
         carried = np.einsum("aknj,a->knj", self._directions(x, e_x, e_y, e_z), w)
-        own = np.linalg.solve(resistance[1:], elastic[..., None])[..., 0]
+        relative = np.linalg.solve(resistance[1:], elastic[..., None])[..., 0]
         sway = u[0] + u[2] * self.body.head_length / 2
-        return np.concatenate([(own - carried).ravel(), [w[3], u[2], sway, u[1]]])
+        return np.concatenate([(relative - carried).ravel(), [w[3], u[2], sway, u[1]]])
 
     @staticmethod
     def _directions(x: Floats, e_x: Floats, e_y: Floats, e_z: Floats) -> Floats:
@@ -107,11 +107,11 @@ def settle_plainly(groups: Groups, *, edges: int = 16, tolerance: float = 1e-5) 
     """
     swimmer = PlainSwimmer(groups, edges)
     time = max(3.0, 2.0 + 2 * np.pi / (0.4 * abs(float(groups.omega_bar))))
-    found = solve_ivp(
+    answer = solve_ivp(
         swimmer.rates, (0.0, time), swimmer.start(), method="BDF", rtol=tolerance, atol=1e-8, dense_output=True
     )
     dense = np.linspace(0, time, 4000)
-    solution: Any = found.sol
+    solution: Any = answer.sol
     sums = solution(dense)[-4:]
     phase = sums[0] * np.sign(sums[0, -1])
     start = np.interp(phase[-1] - 2 * np.pi, phase, dense)

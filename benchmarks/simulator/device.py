@@ -59,10 +59,10 @@ def main() -> None:
     print(f"A robot's time step [µs], {EDGES} edges, N = 2; compiled loops, one robot: {alone:.0f}")
     print("  robots " + "".join(f"{d:>12}" for d in devices))
     for count in BATCHES:
-        found = [robot_step(count, device) for device in devices]
-        print(f"  {count:6d} " + "".join(f"{1e6 * t:12.1f}" for t, _ in found))
-        if len(found) == 2:
-            away = (found[1][1].pose.cpu() - found[0][1].pose).abs().max()
+        steps = [robot_step(count, device) for device in devices]
+        print(f"  {count:6d} " + "".join(f"{1e6 * t:12.1f}" for t, _ in steps))
+        if len(steps) == 2:
+            away = (steps[1][1].pose.cpu() - steps[0][1].pose).abs().max()
             print(f"         the two differ by {float(away):.0e}")
     if len(devices) == 1:
         print("No CUDA device here: only the processor was timed.")

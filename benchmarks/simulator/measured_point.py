@@ -65,12 +65,12 @@ def head_shares(robots: Sequence[Robot]) -> np.ndarray:
 
 def motions(robots: Sequence[Robot]) -> np.ndarray:
     """ω_h/ω and the yaw rate [rad/s] of orbits, (2, B)."""
-    found = []
+    rows = []
     for robot in robots:
         motion = orbits(robot.groups())
         share = motion.omega_h[0] / (motion.omega_h[0] - motion.omega_t[0])
-        found.append((share, motion.omega_yr[0] / robot.time_scale))
-    return np.array(found).T
+        rows.append((share, motion.omega_yr[0] / robot.time_scale))
+    return np.array(rows).T
 
 
 def closing_size(change: Change, robot: Robot, null: float, bounds: tuple[float, float]) -> tuple[float, float]:
@@ -99,17 +99,17 @@ def closing_size(change: Change, robot: Robot, null: float, bounds: tuple[float,
 
 def candidates() -> dict[str, tuple[Change, float, tuple[float, float], tuple[float, float]]]:
     """name -> change, null, bounds, and the sizes that are plausible."""
-    found = {}
+    known = {}
     for name, effect in catalogue().items():
         plausible = PLAUSIBLE.get(name) or effect.plausible or effect.bounds
-        found[name] = (effect_change(name), effect.null, effect.bounds, plausible)
+        known[name] = (effect_change(name), effect.null, effect.bounds, plausible)
     for name in NUMBERS:
         width = 2 * MEASURED.sigma(name).of(getattr(MEASURED, name) or MEASURED.head_radius)
         width /= getattr(MEASURED, name) or MEASURED.head_radius
-        found[f"{name} as given"] = (number_change(name), 0.0, (-0.7, 0.7), (-width, width))
+        known[f"{name} as given"] = (number_change(name), 0.0, (-0.7, 0.7), (-width, width))
     for name in COEFFICIENTS:
-        found[f"{name} of the fit"] = (number_change(name), 0.0, (-1.0, 1.0), (-0.05, 0.05))
-    return found
+        known[f"{name} of the fit"] = (number_change(name), 0.0, (-1.0, 1.0), (-0.05, 0.05))
+    return known
 
 
 def gaps() -> dict[str, float]:
@@ -145,13 +145,13 @@ def deciding_runs(sizes: dict[str, float]) -> None:
     print(
         f"\n{'explanation':28}{'size':>7}   deciding run             omega_h/omega    yaw [rad/s]   sd to the next"
     )
-    for name, own in predicted.items():
-        others = [other for key, other in predicted.items() if key != name]
-        apart = [np.hypot(*(np.log(np.abs(own) / np.abs(other)) / NOISE)) for other in others]
+    for name, motion in predicted.items():
+        rivals = [rival for key, rival in predicted.items() if key != name]
+        apart = [np.hypot(*(np.log(np.abs(motion) / np.abs(rival)) / NOISE)) for rival in rivals]
         least = np.min(np.nan_to_num(apart), 0)
         run = int(np.argmax(least))
         tails, length, rpm = RUNS[run]
-        words = f"N = {tails}, {100 * length:2.0f} cm, {rpm:6.2f} rpm{own[0, run]:12.3f}{own[1, run]:15.3f}"
+        words = f"N = {tails}, {100 * length:2.0f} cm, {rpm:6.2f} rpm{motion[0, run]:12.3f}{motion[1, run]:15.3f}"
         print(f"{name:28}{sizes[name]:7.3g}   {words}{least[run]:12.1f}")
 
 

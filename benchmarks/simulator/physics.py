@@ -49,8 +49,8 @@ def draw_tails(axes: Any, robot: Robot, title: str) -> None:
 
 def robots(tails: int) -> Groups:
     """The paper's control robot with N tails at every speed."""
-    one = replace(ROBOT, tails=tails).group_values()
-    columns = {name: np.full(len(SPEEDS), value) for name, value in one.items()}
+    values = replace(ROBOT, tails=tails).group_values()
+    columns = {name: np.full(len(SPEEDS), value) for name, value in values.items()}
     return Groups.from_columns({**columns, "omega_bar": SPEEDS})
 
 
@@ -61,14 +61,14 @@ def curves(tails: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], np
     R = 1 / float(groups.l_over_R[0])
     drag = 6 * math.pi * float(groups.C_t[0]) * R  # steady: what drags the head is the net thrust on it
     spin_drag = 8 * math.pi * float(groups.C_r[0]) * R**3
-    found = {"thrust": drag * motion.v_z, "torque": spin_drag * np.abs(motion.omega_h), "yaw": motion.omega_yr}
+    simulated = {"thrust": drag * motion.v_z, "torque": spin_drag * np.abs(motion.omega_h), "yaw": motion.omega_yr}
     theory = [linear_motion(groups.select(torch.tensor([i]))) for i in range(len(SPEEDS))]
     linear = {
         "thrust": np.array([drag * t.v_z for t in theory]),
         "torque": np.array([t.torque for t in theory]),
         "yaw": np.array([t.omega_yr for t in theory]),
     }
-    return found, linear, motion.tail_gap >= 1
+    return simulated, linear, motion.tail_gap >= 1
 
 
 def main(out: str = "docs/physics.png") -> None:
@@ -83,10 +83,10 @@ def main(out: str = "docs/physics.png") -> None:
         "yaw": ("yaw rate $\\bar\\omega_{yr}$", figure.add_subplot(grid[1, 4:])),
     }
     for tails, colour in COLOURS.items():
-        found, linear, apart = curves(tails)
+        simulated, linear, apart = curves(tails)
         for name, (_, axes) in panels.items():
-            axes.plot(SPEEDS, np.where(apart, found[name], np.nan), color=colour, lw=2.0, label=f"N = {tails}")
-            axes.plot(SPEEDS, found[name], color=colour, lw=0.7)
+            axes.plot(SPEEDS, np.where(apart, simulated[name], np.nan), color=colour, lw=2.0, label=f"N = {tails}")
+            axes.plot(SPEEDS, simulated[name], color=colour, lw=0.7)
             axes.plot(SPEEDS, linear[name], color=colour, lw=0.9, ls="--")
     for label, axes in panels.values():
         axes.set_xscale("log")

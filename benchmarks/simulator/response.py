@@ -8,11 +8,11 @@ Takes 2 minutes.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 import numpy as np
 
+from benchmarks.timing import processor_time
 from dataset.rows.design import load_design
 from sim.inputs import check_columns
 from sim.model.groups import Groups
@@ -55,23 +55,21 @@ def costs(parts: list[Groups], robots: int) -> None:
         work()  # load the machine code
     print(f"\n{robots} robots of the sweep, processor time a robot")
     for name, work in ways.items():
-        began = time.process_time()
-        work()
-        print(f"  {name:45s} {1e3 * (time.process_time() - began) / robots:7.2f} ms")
+        print(f"  {name:45s} {1e3 * processor_time(work) / robots:7.2f} ms")
 
 
 def errors(parts: list[Groups]) -> None:
     """Largest differences from fine time steps over the dwells, for some robots of each N."""
-    found: dict[str, list[float]] = {"lag": [], "memory": [], "rest": []}
+    differences: dict[str, list[float]] = {"lag": [], "memory": [], "rest": []}
     for part in parts:
         curves = responses(part)
         for i, body in enumerate(bodies(part)[: _CHECKED // len(parts)]):
             lag, memory, rest, _ = stepped_response(
                 body, part.N, DWELLS[_FEW], BEFORE[[0, 3]], resolution=_REFERENCE
             )
-            found["lag"].append(float(np.abs(curves.lag[i, _FEW] - lag).max()))
-            found["memory"].append(float(np.abs(curves.memory[i][[0, 3]][:, _FEW] - memory).max()))
-            found["rest"].append(float(np.abs(curves.rest[i, _FEW] - rest).max()))
-    print(f"Largest difference from fine time steps over the dwells, {len(found['lag'])} robots [l, rad]")
-    for name, values in found.items():
+            differences["lag"].append(float(np.abs(curves.lag[i, _FEW] - lag).max()))
+            differences["memory"].append(float(np.abs(curves.memory[i][[0, 3]][:, _FEW] - memory).max()))
+            differences["rest"].append(float(np.abs(curves.rest[i, _FEW] - rest).max()))
+    print(f"Largest difference from fine time steps over the dwells, {len(differences['lag'])} robots [l, rad]")
+    for name, values in differences.items():
         print(f"  {name:8s} median {np.median(values):.1e}, largest {np.max(values):.1e}")

@@ -41,18 +41,18 @@ def main(rows: str = "4096") -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         began = time.perf_counter()
-        found = steady_columns(points, title="robustness")
+        columns = steady_columns(points, title="robustness")
         spent = time.perf_counter() - began
     names = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "error")
-    good = found["converged"]
-    finite = np.all([np.isfinite(found[name]) for name in names], 0)
-    silent = int((~good & (found["note"] == "")).sum())
+    good = columns["converged"]
+    finite = np.all([np.isfinite(columns[name]) for name in names], 0)
+    silent = int((~good & (columns["note"] == "")).sum())
     print(f"\n{rows} robots over the wide domain, {spent:.0f} s")
-    print(f"  {int(good.sum())} converged, {int((good & (found['method'] == 'direct')).sum())} of them directly")
+    print(f"  {int(good.sum())} converged, {int((good & (columns['method'] == 'direct')).sum())} of them directly")
     print(f"  NaN or infinity in converged rows: {int((good & ~finite).sum())}; others without a reason: {silent}")
-    median, high, largest = 100 * np.quantile(found["error"][good], [0.5, 0.99, 1.0])
+    median, high, largest = 100 * np.quantile(columns["error"][good], [0.5, 0.99, 1.0])
     print(f"  error that rows state: median {median:.3f} %, 99th percentile {high:.2f} %, largest {largest:.1f} %")
-    reasons = Counter(_kind(note) for note in found["note"] if note)
+    reasons = Counter(_kind(note) for note in columns["note"] if note)
     for reason, count in reasons.most_common():
         print(f"  {count:5} {reason}")
     lonely = ~good & (points["N"] == 1)

@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from benchmarks.simulator.speed import sweep, timed
+from benchmarks.simulator.speed import sweep
+from benchmarks.timing import timed
 from sim.model.body import Body
 from sim.model.presets import PRESETS
 from sim.motion.batches import available_jobs, steady_columns
@@ -102,9 +103,9 @@ def main() -> None:
         table(f"A Newton correction of the orbit, tails (phases {phases})", TAILS, orbits, 1e-6, "µs")
     rows = BATCHES[-2]
     part = {k: v[:rows] for k, v in points.items()}
-    one = timed(lambda: steady_columns(part, jobs=1, title=""))[0]
+    alone = timed(lambda: steady_columns(part, jobs=1, title=""))[0]
     many = timed(lambda: steady_columns(part, title=""))[0]
-    print(f"\nThreads: {available_jobs()} solve {rows} robots {one / many:.2f} times as fast as one")
+    print(f"\nThreads: {available_jobs()} solve {rows} robots {alone / many:.2f} times as fast as one")
     print("Memory in work for one robot, whatever the size of the batch:")
     print(
         "  "

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.markdown import heading, row
 from sim.arrays import Floats
 from sim.linear.spectral import differentiation
 from sim.mechanics.balance import tail_spin
@@ -38,7 +39,7 @@ def sliding(robot: Robot) -> Floats:
     x_dot = np.einsum("ml,klc->kmc", differentiation(phases), x) * np.tile(spin, tails)[:, None]
     angle = 2 * np.pi / tails
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
-    found = []
+    speeds = []
     for m in range(phases):
         after = (m + phases // tails) % phases  # the next tail now is this one there
         apart = x[:, None, m] - (x[:, after] @ turn.T)[None]
@@ -46,16 +47,16 @@ def sliding(robot: Robot) -> Floats:
         for i, j in np.argwhere(distance < NEAR * 2 * body.tail_radius):
             normal = apart[i, j] / distance[i, j]
             speed = x_dot[i, m] - turn @ x_dot[j, after]
-            found.append(np.linalg.norm(speed - normal * (speed @ normal)))
-    return np.array(found) / (abs(spin.mean()) * body.offset)
+            speeds.append(np.linalg.norm(speed - normal * (speed @ normal)))
+    return np.array(speeds) / (abs(spin.mean()) * body.offset)
 
 
 def main() -> None:
     robots = [MEASURED]
     for tails, length, rpm in OTHERS:
         robots.append(replace(MEASURED, tails=tails, tail_length=length, motor_speed=rpm * np.pi / 30))
-    print("| N | l [cm] | motor [rpm] | sliding speed over ω_t a: median, largest |\n|---|---|---|---|")
-    for one in robots:
-        found, rpm = sliding(one), one.motor_speed * 30 / np.pi
-        said = f"{100 * np.median(found):.1f} %, {100 * found.max():.1f} %" if len(found) else "none touch"
-        print(f"| {one.tails} | {100 * one.tail_length:.0f} | {rpm:.0f} | {said} |")
+    print(heading("N", "l [cm]", "motor [rpm]", "sliding speed over ω_t a: median, largest"))
+    for robot in robots:
+        speeds, rpm = sliding(robot), robot.motor_speed * 30 / np.pi
+        said = f"{100 * np.median(speeds):.1f} %, {100 * speeds.max():.1f} %" if len(speeds) else "none touch"
+        print(row(robot.tails, f"{100 * robot.tail_length:.0f}", f"{rpm:.0f}", said))

@@ -11,14 +11,11 @@ Takes 3 minutes.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from typing import TypeVar
-
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.simulator.bdf_solver import settle_plainly
+from benchmarks.timing import timed
 from dataset.rows.design import load_design
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
@@ -36,17 +33,6 @@ SECONDS = 4.0
 ELEMENTS, EDGES = 20, 5
 LARGEST_STEP = 5e-5  # s, PyElastica: twice as long blows up
 STEP = 0.06  # time units, ours
-Result = TypeVar("Result")
-
-
-def timed(work: Callable[[], Result], *, repeats: int = 1) -> tuple[float, Result]:
-    """Shortest of a few runs [s], and the result."""
-    best = np.inf
-    for _ in range(repeats):
-        began = time.perf_counter()
-        result = work()
-        best = min(best, time.perf_counter() - began)
-    return best, result
 
 
 def sweep(rows: int) -> dict[str, np.ndarray]:
@@ -61,8 +47,8 @@ def robots() -> None:
     for i in range(ROBOTS):
         groups = Groups.from_columns({name: values[i : i + 1] for name, values in points.items()})
         quick, motion = timed(lambda groups=groups: steady(groups), repeats=5)  # type: ignore[misc]
-        slow, found = timed(lambda groups=groups: settle_plainly(groups))  # type: ignore[misc]
-        apart = abs(found[1] / motion.omega_yr[0] - 1)
+        slow, reference = timed(lambda groups=groups: settle_plainly(groups))  # type: ignore[misc]
+        apart = abs(reference[1] / motion.omega_yr[0] - 1)
         ratios.append(slow / quick)
         speed = float(groups.omega_bar)
         line = f"  {groups.N}  {speed:11.1f}   {slow:13.1f}   {1e3 * quick:11.2f}   {ratios[-1]:5.0f}"
@@ -111,10 +97,10 @@ def throughput() -> None:
     points = sweep(POINTS)
     print(f"\n{POINTS} steady operating points over the sweep's domain")
     for jobs in sorted({1, available_jobs()}):
-        spent, found = timed(lambda jobs=jobs: steady_columns(points, jobs=jobs, title=""))  # type: ignore[misc]
-        direct_rows = int((found["method"] == "direct").sum())
+        spent, columns = timed(lambda jobs=jobs: steady_columns(points, jobs=jobs, title=""))  # type: ignore[misc]
+        direct_rows = int((columns["method"] == "direct").sum())
         print(f"  {jobs} threads: {POINTS / spent:6.0f} a second ({direct_rows} solved directly)")
-    error = 100 * found["error"]
+    error = 100 * columns["error"]
     print(f"  error that rows state of themselves: median {np.median(error):.3f} %, largest {error.max():.2f} %")
 
 

@@ -44,41 +44,43 @@ def main(*words: str) -> None:
     parser.add_argument("work", type=Path)
     parser.add_argument("--rows", type=int, default=4096)
     parser.add_argument("--picture")
-    given = parser.parse_args(words)
+    options = parser.parse_args(words)
     torch.set_num_threads(1)
-    learned, tested = (_several(kept(given.work, name)) for name in ("tails", "widths"))
+    learned, tested = (_several(kept(options.work, name)) for name in ("tails", "widths"))
     tested = tested.at((tested.gap >= 1) & (tested.motion[:, 2] < 0.6 * tested.motion[:, 4]))
     tested = tested.at(torch.arange(min(_TESTED, len(tested.motion))))
-    some = learned.at(torch.arange(given.rows))
-    found = [_network("as shipped, smaller", some, tested)]
+    samples = learned.at(torch.arange(options.rows))
+    results = [_network("as shipped, smaller", samples, tested)]
     power, training_loop._POWER = training_loop._POWER, 1.0
-    found.append(_network("least squares", some, tested))
+    results.append(_network("least squares", samples, tested))
     training_loop._POWER = power
     polish: Callable[..., None] = training_loop._polish
     training_loop._polish = _lbfgs  # type: ignore[assignment]
-    found.append(_network("L-BFGS for BFGS", some, tested, replace(SMALL, iterations=_LONGER * SMALL.iterations)))
+    results.append(
+        _network("L-BFGS for BFGS", samples, tested, replace(SMALL, iterations=_LONGER * SMALL.iterations))
+    )
     training_loop._polish = polish
-    found.append(_network("Adam alone", some, tested, replace(SMALL, iterations=0)))
+    results.append(_network("Adam alone", samples, tested, replace(SMALL, iterations=0)))
     smooth, fit_wrench.SMOOTHNESS = fit_wrench.SMOOTHNESS, (1.5,) * 7  # type: ignore[attr-defined]
-    found.append(_network("inputs scaled alike", some, tested))
+    results.append(_network("inputs scaled alike", samples, tested))
     fit_wrench.SMOOTHNESS = smooth  # type: ignore[attr-defined]
-    found.append(_network("single precision", some, tested, single=True))
-    found.append(_network("half the rows", some.at(torch.arange(given.rows // 2)), tested))
-    found.append(_kernel("Gaussian process", some.at(torch.arange(min(_CENTRES, given.rows))), tested))
-    found.append(_nearest("nearest row", some, tested))
-    print(f"{given.rows} rows, {len(tested.motion)} fresh robots; errors in %")
+    results.append(_network("single precision", samples, tested, single=True))
+    results.append(_network("half the rows", samples.at(torch.arange(options.rows // 2)), tested))
+    results.append(_kernel("Gaussian process", samples.at(torch.arange(min(_CENTRES, options.rows))), tested))
+    results.append(_nearest("nearest row", samples, tested))
+    print(f"{options.rows} rows, {len(tested.motion)} fresh robots; errors in %")
     print(f"{'':26}{'train s':>8}{'query µs':>9}{'numbers':>9}{'ω_yr median':>12}{'95 %':>8}{'v_z':>8}{'95 %':>8}")
-    for name, train, query, size, errors in found:
+    for name, train, query, size, errors in results:
         figures = f"{errors[0]:12.4f}{errors[1]:8.3f}{errors[2]:8.4f}{errors[3]:8.3f}"
         print(f"{name:26}{train:8.0f}{query:9.1f}{size:9.0f}{figures}")
-    if given.picture:
-        _draw(found, given.picture)
+    if options.picture:
+        _draw(results, options.picture)
 
 
 def _several(rows: SimulatedRobots) -> WrenchSamples:
     rows = rows.at(rows.robots["N"] > 2)
-    found = wrench_samples(rows.robots, rows.motion)
-    return found.at(torch.as_tensor(np.flatnonzero(learnable(found))))
+    samples = wrench_samples(rows.robots, rows.motion)
+    return samples.at(torch.as_tensor(np.flatnonzero(learnable(samples))))
 
 
 def _judge(
@@ -157,22 +159,22 @@ def _nearest(name: str, rows: WrenchSamples, tested: WrenchSamples) -> Result:
 def _numbers(rows: WrenchSamples) -> Tensor:
     """y (M, 6) of rows with y_4 = y_5 = 0."""
     wrench = (rows.heads.resistance @ rows.motion[..., None])[..., 0]
-    left = wrench - straight_wrench(rows.tails, rows.motion)
+    remainder = wrench - straight_wrench(rows.tails, rows.motion)
     units = wrench_slopes(rows.tails, rows.motion)[:, :, :4].diagonal(dim1=1, dim2=2)
-    return torch.cat([left / units, torch.zeros(len(left), 2, dtype=torch.float64)], 1)
+    return torch.cat([remainder / units, torch.zeros(len(remainder), 2, dtype=torch.float64)], 1)
 
 
-def _draw(found: list[Result], path: str) -> None:
+def _draw(results: list[Result], path: str) -> None:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.5, 3.8), layout="constrained")
     axes = figure.add_subplot()
-    for place, (_, _, _, _, errors) in enumerate(reversed(found)):
+    for place, (_, _, _, _, errors) in enumerate(reversed(results)):
         axes.plot(errors[:2], [place, place], "-", color="#9fb8cc", lw=5, solid_capstyle="round")
         axes.plot(errors[0], place, "o", color="#2a7fba", ms=7)
     axes.set_xscale("log")
     plain_logarithms(axes.xaxis)
-    axes.set_yticks(range(len(found)), [name for name, *_ in reversed(found)])
+    axes.set_yticks(range(len(results)), [name for name, *_ in reversed(results)])
     axes.set_xlabel("error of the yaw rate [%]: median (dot) to 95 %")
     axes.grid(axis="x", alpha=0.3)
     figure.savefig(path, dpi=110)

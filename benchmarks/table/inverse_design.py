@@ -47,18 +47,22 @@ def backwards(lookup: NeuralTable, rows: SimulatedRobots, title: str) -> None:
     truth = with_radius(rows.motion)
     robots = {name: values for name, values in rows.robots.items() if name in ROBOT}
     began = time.process_time()
-    found = inverse(lookup, robots, {n: truth[n] for n in given}, {n: BOUNDS[n] for n in free})
+    solutions = inverse(lookup, robots, {n: truth[n] for n in given}, {n: BOUNDS[n] for n in free})
     spent = time.process_time() - began
-    solved = np.flatnonzero((found.misfit < _SOLVED) & ~found.outside.astype(bool))
-    target = found.target[solved]
-    own = {n: values[target] for n, values in robots.items()} | {n: v[solved] for n, v in found.inputs.items()}
-    simulated = steady_columns(own, title="")
+    solved = np.flatnonzero((solutions.misfit < _SOLVED) & ~solutions.outside.astype(bool))
+    target = solutions.target[solved]
+    robots_found = {n: values[target] for n, values in robots.items()} | {
+        n: v[solved] for n, v in solutions.inputs.items()
+    }
+    simulated = steady_columns(robots_found, title="")
     missed = np.max([np.abs(simulated[n] / truth[n][target] - 1) for n in given], axis=0)
     missed[~np.asarray(simulated["converged"], dtype=bool)] = np.inf
     best = np.full(len(rows), np.inf)
     np.minimum.at(best, target, missed)
     away = np.full(len(rows), np.inf)
-    np.minimum.at(away, target, np.max([np.abs(own[n] / rows.robots[n][target] - 1) for n in free], axis=0))
+    np.minimum.at(
+        away, target, np.max([np.abs(robots_found[n] / rows.robots[n][target] - 1) for n in free], axis=0)
+    )
     known = np.isfinite(best)
     figures = [*np.quantile(missed[np.isfinite(missed)], (0.5, 0.95)), missed[np.isfinite(missed)].max()]
     print(f"{title}: {len(rows)} targets, {1e3 * spent / len(rows):.0f} ms each")

@@ -50,24 +50,26 @@ class Found(NamedTuple):
 def usable(rows: SimulatedRobots) -> tuple[SimulatedRobots, WrenchSamples]:
     """Robots with two tails and more which a table may learn, as simulated and as rows of tails."""
     rows = rows.at(rows.robots["N"] > 1)
-    found = wrench_samples(rows.robots, rows.motion)
-    good = np.flatnonzero(learnable(found))
-    return rows.at(good), found.at(torch.as_tensor(good))
+    samples = wrench_samples(rows.robots, rows.motion)
+    good = np.flatnonzero(learnable(samples))
+    return rows.at(good), samples.at(torch.as_tensor(good))
 
 
-def errors_of(table: WrenchTable, tested: SimulatedRobots, rows: WrenchSamples) -> dict[str, tuple[float, float]]:
+def test_errors(
+    table: WrenchTable, tested: SimulatedRobots, rows: WrenchSamples
+) -> dict[str, tuple[float, float]]:
     """Median and 95 % of the relative errors, in %, by output."""
     motion = torch.from_numpy(table.solve(rows.heads, rows.tails)[0])
     values = table.outputs(rows.heads, motion, table.tail_gap(rows.tails, motion))
     names = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "tail_gap")
     answer = {name: value.numpy() for name, value in zip(names, values, strict=True)}
-    found = relative_errors(answer, with_radius(tested.motion))
-    found["v_z"] = answer["v_z"] / tested.motion["v_z"] - 1  # of itself
-    sizes = {name: 100 * np.abs(np.nan_to_num(found[name], nan=1.0)) for name in _NAMES}
+    deviations = relative_errors(answer, with_radius(tested.motion))
+    deviations["v_z"] = answer["v_z"] / tested.motion["v_z"] - 1  # of itself
+    sizes = {name: 100 * np.abs(np.nan_to_num(deviations[name], nan=1.0)) for name in _NAMES}
     return {name: (float(np.median(size)), float(np.quantile(size, 0.95))) for name, size in sizes.items()}
 
 
-def draw(found: list[Found], path: str) -> None:
+def draw(curves: list[Found], path: str) -> None:
     """Error of the yaw rate and of the surge against rows, both logarithmic."""
     from matplotlib.figure import Figure
 
@@ -76,10 +78,10 @@ def draw(found: list[Found], path: str) -> None:
     for place, (output, words) in enumerate(shown):
         axes = figure.add_subplot(1, 2, place + 1)
         for name, colour in zip(SETTINGS, ("#d9a441", "#2a7fba"), strict=True):
-            own = [one for one in found if one.name == name]
-            rows = [one.rows for one in own]
+            curve = [point for point in curves if point.name == name]
+            rows = [point.rows for point in curve]
             for i, (style, level) in enumerate((("o-", "median"), ("s--", "95 %"))):
-                axes.plot(rows, [one.errors[output][i] for one in own], style, color=colour, ms=4,
+                axes.plot(rows, [point.errors[output][i] for point in curve], style, color=colour, ms=4,
                           label=f"{name}: {level}")  # fmt: skip
         axes.set_xscale("log")
         axes.set_yscale("log")
@@ -97,9 +99,9 @@ def main(*words: str) -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("data", help="a finished data set")
     parser.add_argument("--picture", help="draw the errors into this file")
-    given = parser.parse_args(words)
+    options = parser.parse_args(words)
     torch.set_num_threads(1)
-    every, numbers = read_robots(given.data)
+    every, numbers = read_robots(options.data)
     part = split(numbers)
     tested, _ = usable(every.at(part == 2))
     slow = np.abs(tested.motion["omega_yr_bar"]) < BRANCHES * np.abs(tested.motion["omega_t_bar"])
@@ -109,17 +111,17 @@ def main(*words: str) -> None:
     print(
         f"{'':26}{'rows':>7}{'s':>6}{'yaw rate':>17}{'turn radius':>17}{'spin of tails':>17}{'v_z of itself':>17}"
     )
-    found = []
+    curves = []
     for name, settings in SETTINGS.items():
         for share in PARTS:
-            some = rows.at(torch.arange(round(share * len(learned))))
+            samples = rows.at(torch.arange(round(share * len(learned))))
             began = time.process_time()
-            table = fit_wrench(some, settings, TrainingContext())
+            table = fit_wrench(samples, settings, TrainingContext())
             spent = time.process_time() - began
-            one = Found(name, len(some.motion), spent, errors_of(table, tested, held_out))
-            found.append(one)
-            shown = [one.errors[n] for n in ("omega_yr_bar", "R_yr_over_l", "omega_t_bar", "v_z")]
+            point = Found(name, len(samples.motion), spent, test_errors(table, tested, held_out))
+            curves.append(point)
+            shown = [point.errors[n] for n in ("omega_yr_bar", "R_yr_over_l", "omega_t_bar", "v_z")]
             figures = "".join(f"{f'{median:.4f} / {high:.3f}':>17}" for median, high in shown)
-            print(f"{name:26}{one.rows:7d}{one.seconds:6.0f}{figures}", flush=True)
-    if given.picture:
-        draw(found, given.picture)
+            print(f"{name:26}{point.rows:7d}{point.seconds:6.0f}{figures}", flush=True)
+    if options.picture:
+        draw(curves, options.picture)

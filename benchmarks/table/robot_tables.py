@@ -52,11 +52,11 @@ _VIEW = np.stack([np.ones(3), planar.MIRROR])  # a motion in each direction, see
 
 def robots() -> dict[str, Robot]:
     """The control robot, plain and with each effect (beside the one that it needs)."""
-    base, found = PRESETS["paper-control"], {"none": PRESETS["paper-control"]}
+    base, named = PRESETS["paper-control"], {"none": PRESETS["paper-control"]}
     for name, effect in catalogue().items():
         partner = {effect.beside: catalogue()[effect.beside].typical} if effect.beside else {}
-        found[name] = replace(base, effects={**partner, name: effect.typical})
-    return found
+        named[name] = replace(base, effects={**partner, name: effect.typical})
+    return named
 
 
 def both(robot: Robot) -> Groups:
@@ -95,14 +95,14 @@ def stepped(robot: Robot, twist: Floats) -> Floats:
 def _lags(body: Body, reverse: Body, tails: int, dwell: float, mesh: Resolution) -> Floats:
     """Lags (2, 3) of equal dwells in each direction, mean over phases of the disc."""
     runs = [
-        Run(own, tails, mesh, steady_state(own, tails, mesh), reverse=other, most_work=np.inf)
-        for own, other in ((body, reverse), (reverse, body))
+        Run(forth, tails, mesh, steady_state(forth, tails, mesh), reverse=back, most_work=np.inf)
+        for forth, back in ((body, reverse), (reverse, body))
     ]
-    found = [
+    steady_parts = [
         steady_twist(run, tails, sense, adapts=_ADAPTS, window=_WINDOW)
         for run, sense in zip(runs, _SENSES, strict=True)
     ]
-    twists, (turn, _) = zip(*found, strict=True)
+    twists, (turn, _) = zip(*steady_parts, strict=True)
     count = 2 * int(np.ceil((1 + MEMORY / dwell) / 2)) + 1
     changes = np.zeros((2, 3))
     for phase in range(_PHASES):
@@ -132,10 +132,12 @@ def main(*effects: str) -> None:
         table = tabulate(robot)
         spent = time.process_time() - began
         mine, twist = tabulated(table, robot)
-        own, reference = pairs(mine), pairs(stepped(robot, twist))
-        away = np.hypot(*np.moveaxis(own - reference, -1, 0)[:2]) / np.hypot(*np.moveaxis(reference, -1, 0)[:2])
-        turned = np.abs(own - reference)[..., 2] / np.abs(twist[:, 2]).mean() / DWELLS[list(AT)]
+        predicted, reference = pairs(mine), pairs(stepped(robot, twist))
+        away = np.hypot(*np.moveaxis(predicted - reference, -1, 0)[:2]) / np.hypot(
+            *np.moveaxis(reference, -1, 0)[:2]
+        )
+        turned = np.abs(predicted - reference)[..., 2] / np.abs(twist[:, 2]).mean() / DWELLS[list(AT)]
         error = 100 * np.maximum(away, turned)
-        figures = "".join(" ".join(f"{one:6.3f}" for one in row) + " " for row in error)
+        figures = "".join(" ".join(f"{value:6.3f}" for value in row) + " " for row in error)
         stated = 100 * table.errors["omega_yr_bar"]["rms"]
         print(f"{name:24}{spent:6.1f}{stated:8.3f}{'':4}{figures}", flush=True)

@@ -69,12 +69,12 @@ def kept(work: Path, name: str) -> SimulatedRobots:
         return SimulatedRobots(*parts)
     began = time.process_time()
     make: Callable[..., SimulatedRobots] = simulate_robots if name == "tails" or name in FLIPS else as_reached
-    found = make(robots(name), title=name, **({"curves": True} if name in FLIPS else {}))
-    print(f"{name}: {len(found)} rows, {time.process_time() - began:.0f} s")
+    rows = make(robots(name), title=name, **({"curves": True} if name in FLIPS else {}))
+    print(f"{name}: {len(rows)} rows, {time.process_time() - began:.0f} s")
     work.mkdir(parents=True, exist_ok=True)
-    named = {f"{i}/{k}": values for i, part in enumerate(vars(found).values()) for k, values in part.items()}
+    named = {f"{i}/{k}": values for i, part in enumerate(vars(rows).values()) for k, values in part.items()}
     np.savez(path, allow_pickle=False, **named)
-    return found
+    return rows
 
 
 def swept(folder: str) -> tuple[SimulatedRobots, SimulatedRobots, SimulatedRobots]:
@@ -106,12 +106,12 @@ def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> 
         print(words)
         for name, figures in summary({n: e[kind] for n, e in errors.items()}, apart[inside][kind]).items():
             print(f"  {name:16}" + "".join(f"  {k} {100 * v:.4f}" for k, v in figures.items()))
-    own = {name: values[inside] for name, values in answer.items()}
-    print("coverage:", coverage(own, {name: values[inside] for name, values in truth.items()}))
+    answered = {name: values[inside] for name, values in answer.items()}
+    print("coverage:", coverage(answered, {name: values[inside] for name, values in truth.items()}))
     flips = flips.at(flips.robots["N"] > 1)
-    found = lookup.response(flips.robots, flag=True)
+    response = lookup.response(flips.robots, flag=True)
     known = ~lookup.query(flips.robots, flag=True)["outside"]
-    report = curve_errors(found, {**flips.motion, **flips.curves})
+    report = curve_errors(response, {**flips.motion, **flips.curves})
     print(f"response to a flip, {np.count_nonzero(known)} robots:")
     valid = flips.motion["tail_gap"] >= 1
     for name, figures in summary({n: e[known] for n, e in report.items()}, valid[known]).items():

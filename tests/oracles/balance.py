@@ -31,45 +31,45 @@ def solve(heads: Heads, tails: Tails, numbers: Numbers, start: Tensor | None = N
     """
     u = linear_guess(heads, tails) if start is None else start.clone()
     waiting = torch.arange(len(u))
-    own, inverse = (heads, tails), torch.zeros(len(u), 4, 4, dtype=u.dtype)
-    left = torch.zeros_like(u)
+    waiting_robots, inverse = (heads, tails), torch.zeros(len(u), 4, 4, dtype=u.dtype)
+    residual = torch.zeros_like(u)
     for count in range(STEPS):
         now = u[waiting]
         if count % _RENEWED == 0:
-            left, inverse = _left_and_inverse(*own, now, numbers)
-        step = _shortened(*own, now, (inverse @ left[..., None])[..., 0])
+            residual, inverse = _residual_and_inverse(*waiting_robots, now, numbers)
+        step = _shortened(*waiting_robots, now, (inverse @ residual[..., None])[..., 0])
         u[waiting] = now - step
         more = ~(_relative(step, u[waiting]) < CORRECTION)
         waiting = waiting[more]
         if not len(waiting):
             break
-        own = own[0].at(more), own[1].at(more)
-        step, inverse, before = step[more], inverse[more], left[more]
-        left = unbalanced(*own, u[waiting], numbers)
-        inverse = _updated(inverse, -step, left - before)
+        waiting_robots = waiting_robots[0].at(more), waiting_robots[1].at(more)
+        step, inverse, before = step[more], inverse[more], residual[more]
+        residual = unbalanced(*waiting_robots, u[waiting], numbers)
+        inverse = _updated(inverse, -step, residual - before)
     converged = torch.ones(len(u), dtype=torch.bool)
     converged[waiting] = False
     motion = full_motion(heads, u)
     return motion, converged & torch.isfinite(u).all(1) & (motion[:, 4] > 0)
 
 
-def _left_and_inverse(heads: Heads, tails: Tails, u: Tensor, numbers: Numbers) -> tuple[Tensor, Tensor]:
-    """What is unbalanced (M, 4), and the inverse of its derivative (M, 4, 4), by differences."""
+def _residual_and_inverse(heads: Heads, tails: Tails, u: Tensor, numbers: Numbers) -> tuple[Tensor, Tensor]:
+    """Return the residual (M, 4) and the inverse of its derivative (M, 4, 4), by differences."""
     width = _DIFFERENCE * (u.abs() + _LEAST_SHARE * u.abs().amax(1, keepdim=True))
     moved = torch.cat([u, *[u + width * unit for unit in torch.eye(4, dtype=u.dtype)]])
     heads = Heads(*[part.repeat(5, *[1] * (part.dim() - 1)) for part in heads])
     tails = Tails(*[part.repeat(5, *[1] * (part.dim() - 1)) for part in tails])
-    left = unbalanced(heads, tails, moved, numbers).reshape(5, -1, 4)
-    slope = ((left[1:] - left[0]) / width.T[:, :, None]).permute(1, 2, 0)
-    return left[0], torch.linalg.inv_ex(slope)[0]
+    residual = unbalanced(heads, tails, moved, numbers).reshape(5, -1, 4)
+    slope = ((residual[1:] - residual[0]) / width.T[:, :, None]).permute(1, 2, 0)
+    return residual[0], torch.linalg.inv_ex(slope)[0]
 
 
 def _updated(inverse: Tensor, step: Tensor, change: Tensor) -> Tensor:
     """The inverse after a step that changed the balance so (Broyden's good update)."""
     predicted = (inverse @ change[..., None])[..., 0]
-    along = (step[:, None, :] @ inverse)[:, 0]
-    size = (along * change).sum(1)[:, None, None]
-    update = (step - predicted)[:, :, None] * along[:, None, :] / size
+    direction = (step[:, None, :] @ inverse)[:, 0]
+    size = (direction * change).sum(1)[:, None, None]
+    update = (step - predicted)[:, :, None] * direction[:, None, :] / size
     return inverse + torch.nan_to_num(update, nan=0.0, posinf=0.0, neginf=0.0)
 
 

@@ -45,22 +45,22 @@ def brute_force(vehicle: Vehicle, goal: tuple[float, float, float]) -> float:
 
 def _schedules(vehicle: Vehicle, turns: Floats, pieces: Floats, dwell: float) -> list[tuple[int, Floats]]:
     """Dwells that carry out a word: arcs in one go, straight pieces by zigzags of an odd or an even number."""
-    found: list[tuple[int, list[float]]] = [(1, []), (-1, [])]
+    schedules: list[tuple[int, list[float]]] = [(1, []), (-1, [])]
     speed = float(vehicle.twist[0, 0])
     for turn, piece in zip(turns.tolist(), pieces.tolist(), strict=True):
         if piece < 1e-9:
             continue
         longer = []
-        for first, dwells in found:
+        for first, dwells in schedules:
             sense = first * (-1) ** len(dwells)
             if turn:
-                own = [] if sense == turn else [QUICK]
-                longer.append((first, [*dwells, *own, piece / speed]))
+                lead = [] if sense == turn else [QUICK]
+                longer.append((first, [*dwells, *lead, piece / speed]))
             else:
                 count = max(1, round(piece / speed / dwell))
                 longer += [(first, [*dwells, *(n * [piece / speed / n])]) for n in (count, count + 1)]
-        found = longer
-    return [(first, np.maximum(dwells, QUICK)) for first, dwells in found]
+        schedules = longer
+    return [(first, np.maximum(dwells, QUICK)) for first, dwells in schedules]
 
 
 def _optimum(vehicle: Vehicle, first: int, dwells: Floats, target: Floats) -> float:
@@ -85,5 +85,5 @@ def _optimum(vehicle: Vehicle, first: int, dwells: Floats, target: Floats) -> fl
     bounds: Any = [(QUICK, np.inf)] * len(dwells)
     met: Any = {"type": "eq", "fun": end, "jac": slopes}
     options: Any = {"maxiter": 150, "ftol": 1e-6}
-    found = minimize(cost, dwells, jac=even, bounds=bounds, constraints=met, method="SLSQP", options=options)
-    return float(found.x.sum()) if np.abs(end(found.x)).max() < 1e-4 else np.inf
+    result = minimize(cost, dwells, jac=even, bounds=bounds, constraints=met, method="SLSQP", options=options)
+    return float(result.x.sum()) if np.abs(end(result.x)).max() < 1e-4 else np.inf
