@@ -25,7 +25,7 @@ from torch import Tensor
 COVERAGE = 0.90
 _TINY = 1e-9  # of the scale of an output
 _RIDGE = 1e-3
-_HALVED = (0, 3, 5)  # features whose halves make the octants: drag number, deflection, forward motion
+_HALVED = (0, 3, 5)  # hints whose halves make the octants: drag number, deflection, forward motion
 _ONE_TAIL = -1  # the hint that is 1 for one tail
 PARTS = 2 ** len(_HALVED) + 1
 _FEWEST = 40  # robots in a part, for a q of its own
@@ -43,37 +43,32 @@ class Intervals:
     middle: Tensor  # (3,), the halves meet here
     factor: Mapping[str, Tensor]  # output -> q of each part, (PARTS,)
 
-    def half_widths(self, name: str, width_features: Tensor, sizes: Tensor) -> Tensor:
+    def half_widths(self, name: str, hints: Tensor, sizes: Tensor) -> Tensor:
         """Half of the width of the interval of one output, (M,).
 
         Args:
-            width_features: (M, F), see `surrogate.table.lookup`.
+            hints: (M, F), see `surrogate.table.lookup`.
             sizes: (M,), what errors of this output are relative to.
         """
-        return self.factor[name][self.part_of(width_features)] * self._local(name, width_features) * sizes
+        return self.factor[name][self.part_of(hints)] * self._local(name, hints) * sizes
 
-    def part_of(self, width_features: Tensor) -> Tensor:
+    def part_of(self, hints: Tensor) -> Tensor:
         """Which part each robot belongs to, (M,): 0 to 7 for octants, 8 for one tail."""
-        high = (width_features[:, list(_HALVED)] > self.middle).long()
+        high = (hints[:, list(_HALVED)] > self.middle).long()
         octant = (high * 2 ** torch.arange(len(_HALVED))).sum(1)
-        return torch.where(width_features[:, _ONE_TAIL] > 0.5, PARTS - 1, octant)
+        return torch.where(hints[:, _ONE_TAIL] > 0.5, PARTS - 1, octant)
 
-    def _local(self, name: str, width_features: Tensor) -> Tensor:
+    def _local(self, name: str, hints: Tensor) -> Tensor:
         low, high = self.bounds[name]
-        return torch.exp(
-            (_design((width_features - self.shift) / self.scale) @ self.weights[name]).clamp(low, high)
-        )
+        return torch.exp((_design((hints - self.shift) / self.scale) @ self.weights[name]).clamp(low, high))
 
     @staticmethod
     def learned(
-        width_features: Tensor,
-        errors: Mapping[str, Tensor],
-        more_width_features: Tensor,
-        more_errors: Mapping[str, Tensor],
+        hints: Tensor, errors: Mapping[str, Tensor], more_hints: Tensor, more_errors: Mapping[str, Tensor]
     ) -> Intervals:
         """From relative errors by output, (M,), of robots for s and of more robots, (M',), for q."""
-        shift, scale = width_features.mean(0), torch.clamp(width_features.std(0), min=1e-6)
-        design = _design((width_features - shift) / scale)
+        shift, scale = hints.mean(0), torch.clamp(hints.std(0), min=1e-6)
+        design = _design((hints - shift) / scale)
         weights, bounds, factor = {}, {}, {}
         for name, error in errors.items():
             known = torch.isfinite(error)
@@ -86,13 +81,13 @@ class Intervals:
             weights[name] = torch.linalg.solve(matrix, rows.T @ logs)
             low, high = (rows @ weights[name]).quantile(torch.tensor([_FIRMEST, _SOFTEST], dtype=rows.dtype))
             bounds[name] = (float(low), float(high))
-        several = width_features[width_features[:, _ONE_TAIL] < 0.5]
-        middle = (several if len(several) else width_features)[:, list(_HALVED)].median(0).values
+        several = hints[hints[:, _ONE_TAIL] < 0.5]
+        middle = (several if len(several) else hints)[:, list(_HALVED)].median(0).values
         plain = Intervals(shift, scale, weights, bounds, middle, {})
-        part = plain.part_of(more_width_features)
+        part = plain.part_of(more_hints)
         for name, error in more_errors.items():
             known = torch.isfinite(error)
-            scores = error[known].abs() / plain._local(name, more_width_features[known])
+            scores = error[known].abs() / plain._local(name, more_hints[known])
             each = [scores[part[known] == k] for k in range(PARTS)]
             factor[name] = torch.tensor(
                 [_conformal_quantile(own if len(own) >= _FEWEST else scores) for own in each], dtype=torch.float64

@@ -165,7 +165,7 @@ class NeuralTable:
             raise InputError(self._refusal(values, row, reason))
         return Motions(heads, tails, torch.from_numpy(motion), inputs, reasons)
 
-    def width_features(self, found: Motions) -> Tensor:
+    def hints(self, found: Motions) -> Tensor:
         """What the width of an interval may depend on, (M, 11)."""
         heads, tails, motion = found.heads, found.tails, found.motion
         inputs = torch.from_numpy(found.inputs)
@@ -191,10 +191,10 @@ class NeuralTable:
     def _intervals(self, found: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
         if self.intervals is None:
             raise InputError("this look-up table has no intervals; train it again")
-        width_features, added = self.width_features(found), {}
+        hints, added = self.hints(found), {}
         for name in [name for name in result if name in self.intervals.factor]:
             size = torch.tensor(np.broadcast_to(error_scale(name, result), result[name].shape))
-            half = self.intervals.half_widths(name, width_features, size).numpy()
+            half = self.intervals.half_widths(name, hints, size).numpy()
             half = np.where(np.isfinite(result[name]), half, 0.0)
             added[f"{name}_low"], added[f"{name}_high"] = result[name] - half, result[name] + half
         return added

@@ -171,10 +171,8 @@ def _judged(
     lookup: NeuralTable, widths: SimulatedRobots, held_out: SimulatedRobots, flips: SimulatedRobots
 ) -> NeuralTable:
     """The table with its intervals and held-out errors; the errors are those of robots with two tails and more."""
-    (first_features, first, _), (width_features, errors, inside) = (
-        _errors(lookup, rows) for rows in (widths, held_out)
-    )
-    intervals = Intervals.learned(first_features, first, width_features, errors)
+    (first_hints, first, _), (hints, errors, inside) = (_errors(lookup, rows) for rows in (widths, held_out))
+    intervals = Intervals.learned(first_hints, first, hints, errors)
     apart = held_out.motion["tail_gap"][inside] >= 1
     several = held_out.robots["N"][inside] > 1
     several = several if several.any() else ~several
@@ -187,7 +185,7 @@ def _judged(
 
 
 def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[torch.Tensor, dict[str, torch.Tensor], Floats]:
-    """Return the features of the widths and the relative errors of rows inside the domain, and which those are."""
+    """Hints and relative errors of rows inside the domain, and which those are."""
     found = lookup.motions(rows.robots, flag=True)
     inside = np.array([not reason for reason in found.reason])
     if inside.sum() < _FEWEST_INSIDE:  # a table of few rows has a domain that holds hardly any others: all count
@@ -195,7 +193,7 @@ def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[torch.Tensor, d
     truth = with_radius(rows.motion)
     errors = relative_errors(steady_outputs(found, lookup.tails), truth)
     return (
-        lookup.width_features(found)[torch.as_tensor(inside)],
+        lookup.hints(found)[torch.as_tensor(inside)],
         {name: torch.tensor(error[inside]) for name, error in errors.items()},
         inside,
     )

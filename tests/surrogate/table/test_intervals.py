@@ -14,13 +14,13 @@ from tests.surrogate.small import rows, table
 
 def sampled(count: int, generator: torch.Generator, size: Callable[[Tensor], Tensor]) -> tuple[Tensor, Tensor]:
     """Hints with values from 0 to 1, a fifth of them with one tail, and errors of that size."""
-    width_features = torch.rand(count, 8, generator=generator).double()
-    width_features[:, -1] = (width_features[:, -1] < 0.2).double()
-    return width_features, size(width_features) * torch.randn(count, generator=generator).double()
+    hints = torch.rand(count, 8, generator=generator).double()
+    hints[:, -1] = (hints[:, -1] < 0.2).double()
+    return hints, size(hints) * torch.randn(count, generator=generator).double()
 
 
 def covered(size: Callable[[Tensor], Tensor]) -> tuple[Intervals, Tensor, Tensor]:
-    """Intervals learned from such errors, fresh features, and which of their errors are inside."""
+    """Intervals learned from such errors, fresh hints, and which of their errors are inside."""
     generator = torch.Generator().manual_seed(2)
     (x, error), (more, other), (test, last) = (sampled(n, generator, size) for n in (3000, 3000, 20000))
     found = Intervals.learned(x, {"v": error}, more, {"v": other})
