@@ -42,7 +42,13 @@ html_show_sphinx = False
 
 
 def short_aliases(
-    app: Sphinx, what: str, name: str, found: object, options: object, arguments: str | None, returned: str | None
+    app: Sphinx,
+    what: str,
+    name: str,
+    documented: object,
+    options: object,
+    arguments: str | None,
+    returned: str | None,
 ) -> tuple[str | None, str | None]:
     """Write type aliases by their names; Sphinx writes TypeAliasForwardRef("Floats") inside other types."""
     alias = r"TypeAliasForwardRef\('(\w+)'\)"
@@ -51,5 +57,5 @@ def short_aliases(
 
 
 def setup(app: Sphinx) -> None:
-    """Called by Sphinx."""
+    """Register the handlers; Sphinx calls this."""
     app.connect("autodoc-process-signature", short_aliases)

@@ -1,4 +1,4 @@
-"""Pages that are written from the code: the table of effects, the columns of files, the commands."""
+"""Generate pages from the code: the table of effects, the columns of a data set, the commands."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def write_generated_pages(folder: Path) -> None:
 
 
 def effects_page() -> str:
-    """Every effect with equation, source, unit and bounds, from its declaration."""
+    """Describe every effect as it is declared: equation, source, unit, bounds."""
     effects = catalogue()
     summary = table(
         ("effect", "what it is", "null", "bounds", "unit of ε"),
@@ -36,9 +36,9 @@ def effects_page() -> str:
     )
     parts = [
         "# Effects",
-        f"The base model leaves things out. Each of these {len(effects)} files in `sim/effects` adds one of them. "
-        "An effect has one size ε. At its null value the model is exactly the base model.",
-        "In a robot.toml, effects are lines `name = size` in the table `[effects]`. In a table of robots they are "
+        f"Each of these {len(effects)} files in `sim/effects` adds an effect that the base model leaves out. "
+        "An effect has a size ε. At its null value the model is exactly the base model.",
+        "In a robot.toml, effects are lines `name = size` in the table `[effects]`; in a table of robots they are "
         "columns.",
         summary,
     ]
@@ -76,21 +76,21 @@ def _about(effect: Effect) -> str:
 
 
 def columns_page() -> str:
-    """Columns of a data set, from its schema."""
-    parts = ["# Columns of a data set", "Unit and meaning are stored in the Parquet files, too."]
+    """List the columns of a data set as its schema declares them."""
+    parts = ["# Columns of a data set", "The Parquet files store the unit and the meaning of each column, too."]
     for title, columns in (("Inputs", INPUTS), ("Outputs", OUTPUTS), ("Flags", FLAGS)):
         rows = [(f"`{c.name}`", str(c.type), c.unit, c.meaning) for c in columns]
         parts += [f"## {title}", table(("column", "type", "unit", "meaning"), rows)]
-    parts.append("A sweep over effects has a column for each, see [Effects](effects.md).")
+    parts.append("A sweep over effects has one column for each effect, see [Effects](effects.md).")
     return "\n\n".join(parts) + "\n"
 
 
 def commands_page() -> str:
-    """Write what `--help` prints for every command."""
+    """List every command with its help text."""
     os.environ["COLUMNS"] = "100"
     parts = [
         "# Commands",
-        "The most important commands have a word of their own. Bad input ends with one line on stderr and exit "
+        "The most frequent commands have a short form. Invalid input ends with one line on stderr and exit "
         "status 2.",
     ]
     for word, (package, name) in WORDS.items():
@@ -109,16 +109,16 @@ def _help(described: Command, prog: str) -> str:
 
 
 def number(value: float) -> str:
-    """A number with a typographic minus."""
+    """Write a number with a typographic minus."""
     return f"{value:g}".replace("-", "−")
 
 
 def bounds(ends: tuple[float, float]) -> str:
-    """An interval in words."""
+    """Write an interval in words."""
     return f"{number(ends[0])} to {number(ends[1])}"
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A Markdown table."""
+    """Write a Markdown table."""
     lines = [header, ["---"] * len(header), *rows]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)

@@ -71,7 +71,7 @@ def judge(verdict: Verdict, case: Case) -> str:
 
 
 def outcome(model: Experiment, case: Case) -> Outcome:
-    """Close the loop on a model that has its data."""
+    """Calibrate a model that has its data."""
     verdict = calibrate(model, progress=False)
     judgement = judge(verdict, case)
     start = start_values(model)

@@ -1,4 +1,4 @@
-"""Thrust, torque and drag of rigid helices, by resistive force theory and with the flow of every piece.
+"""Thrust, torque and drag of rigid helices, by resistive force theory and with the flow of every segment.
 
 A table has one row for each helix (`tests.oracles.helices`); Rodenborn et al. (2013) measured such helices.
 
@@ -21,7 +21,7 @@ def main(table: str) -> None:
     for label, model in (
         ("resistive, Gray and Hancock", resistive(pitch)),
         ("resistive, Lighthill", resistive(pitch, lighthill=True)),
-        ("with the flow of every piece", with_flow(pitch)),
+        ("with the flow of every segment", with_flow(pitch)),
     ):
         off = 100 * (model / measured - 1)
         rms = np.sqrt((off**2).mean(0))

@@ -1,7 +1,7 @@
-"""Which missing physics or wrong number could explain the paper's one measured point.
+"""Which missing physics or wrong nuisance parameter could explain the paper's one measured point.
 
 The model with the paper's own fit has ω_h/ω = 0.403 at N = 4, l = 11 cm, 143.66 rpm. The tank had 0.441. Each
-effect and each number as given is changed alone, without and with contact between the tails, to the smallest
+effect and each nuisance parameter is changed alone, without and with contact between the tails, to the smallest
 change that gives the measured value. What can is then compared over the runs that the paper could have made: the
 run that tells an explanation from all others is the one where the nearest other one is the farthest away.
 
@@ -49,7 +49,7 @@ def effect_change(name: str) -> Change:
 
 
 def number_change(name: str) -> Change:
-    """Multiplies a number as given by e^size."""
+    """Multiply a nuisance parameter by e^size."""
 
     def changed(robot: Robot, size: float) -> Robot:
         value = getattr(robot, name) or robot.head_radius  # clamps at a = R where nothing else is said
@@ -130,7 +130,7 @@ def gaps() -> dict[str, float]:
             if robot is touching and not np.isnan(size):
                 sizes[name] = size
         print(f"{name:28}{words}   {plausible[0]:.3g} to {plausible[1]:.3g}", flush=True)
-    print("* outside what is plausible; -: at no size within its bounds. Numbers as given, fit: ln of the factor")
+    print("* outside the plausible range; -: no size within bounds. Nuisance parameters, fit: ln of the factor")
     return sizes
 
 

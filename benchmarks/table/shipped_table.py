@@ -2,11 +2,11 @@
 
 Usage: softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
        python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
-       python -m benchmarks shipped_table WORK --test MODEL   errors and coverage on the locked robots
+       python -m benchmarks shipped_table WORK --test MODEL   errors and coverage on the held-out robots
 
 The tails are learned from robots with heads far wider than those of the sweep, a single tail from robots of the
 sweep as well. The response to a flip is learned from the sweep, and from some of these wide robots. All robots are
-drawn from Sobol sequences with the seeds below. The locked robots led to no choice of any kind.
+drawn from Sobol sequences with the seeds below. The held-out robots led to no choice of any kind.
 
 Takes a day with its simulations.
 """
@@ -98,7 +98,7 @@ def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> 
     inside = ~answer["outside"]
     truth = with_radius(rows.motion)
     apart = rows.motion["tail_gap"] >= 1
-    print(f"\n{len(rows)} locked robots, {1e6 * seconds / len(rows):.0f} µs each with intervals; outside: "
+    print(f"\n{len(rows)} held-out robots, {1e6 * seconds / len(rows):.0f} µs each with intervals; outside: "
           f"{np.count_nonzero(~inside)}")  # fmt: skip
     errors = {name: error[inside] for name, error in relative_errors(answer, truth).items()}
     errors["v_z of itself"] = (answer["v_z"] / truth["v_z"] - 1)[inside]
@@ -159,7 +159,7 @@ def main(*words: str) -> None:
     parser.add_argument("--out")
     parser.add_argument("--sweep", help="data set built from surrogate/shipped/domain.toml")
     parser.add_argument("--test")
-    parser.add_argument("--picture", help="with --test: draw the errors of the locked robots")
+    parser.add_argument("--picture", help="with --test: draw the errors of the held-out robots")
     given = parser.parse_args(words)
     if given.out:
         if not given.sweep:

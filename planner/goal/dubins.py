@@ -1,9 +1,9 @@
 """Shortest tracks of bounded curvature between poses: Dubins' words.
 
 A car that only drives forward, with least turn radius R, gets from one pose to another on the shortest way by one
-of six words of three pieces: LSL, RSR, LSR, RSL, RLR, LRL (L: left arc, R: right arc, S: straight). Source: Dubins
-(1957); formulas as in Shkel and Lumelsky, "Classification of the Dubins set" (2001). Poses are x, y, course. All
-functions take arrays of poses.
+of six words of three segments: LSL, RSR, LSR, RSL, RLR, LRL (L: left arc, R: right arc, S: straight). Source:
+Dubins (1957); formulas as in Shkel and Lumelsky, "Classification of the Dubins set" (2001). Poses are x, y,
+course. All functions take arrays of poses.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _ROUNDING = 1e-9
 
 
 class DubinsPaths(NamedTuple):
-    """M paths: a start pose (M, 3), the turns (M, 3) of its pieces (+1 left, 0, −1) and their lengths (M, 3)."""
+    """M paths: a start pose (M, 3), the turns (M, 3) of its segments (+1 left, 0, −1) and their lengths (M, 3)."""
 
     start: Floats
     turns: Integers
@@ -46,7 +46,7 @@ class DubinsPaths(NamedTuple):
 
 
 def words(start: Floats, goal: Floats, radius: float) -> Floats:
-    """Compute the lengths (..., 6, 3) of the pieces of all words; infinite where a word does not exist."""
+    """Compute the lengths (..., 6, 3) of the segments of all words; infinite where a word does not exist."""
     move = (goal[..., :2] - start[..., :2]) / radius
     d, direction = np.hypot(move[..., 0], move[..., 1]), np.arctan2(move[..., 1], move[..., 0])
     a, b = start[..., 2] - direction, goal[..., 2] - direction

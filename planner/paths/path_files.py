@@ -172,7 +172,7 @@ def _points(subpath: Any) -> tuple[Floats, bool]:
 
 
 def _enough(curve: Any) -> int:
-    """Number of pieces of a curve such that none turns by more than _TURN."""
+    """Return the number of segments of a curve such that none turns by more than _TURN."""
     probes = np.array([[p.x, p.y] for p in (curve.point(t) for t in np.linspace(0, 1, _PROBES + 1).tolist())])
     moves = np.diff(probes, axis=0)
     moves = moves[np.hypot(moves[:, 0], moves[:, 1]) > 0]

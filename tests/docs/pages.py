@@ -1,4 +1,4 @@
-"""Pages of the documentation, and what stands in them."""
+"""Read the pages of the documentation: blocks of code, the glossary."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Block(NamedTuple):
 
 
 def name_of(page: Path) -> str:
-    """A page's path in the folder of the documentation."""
+    """Return the path of a page in the folder of the documentation."""
     return page.relative_to(DOCS).as_posix()
 
 
@@ -36,7 +36,7 @@ def blocks(page: Path) -> list[Block]:
 
 
 def glossary() -> dict[str, str]:
-    """Unit by name in code; the unit is empty in tables without one."""
+    """Return units by name in code; a unit is empty in tables without units."""
     units: dict[str, str] = {}
     header: list[str] = []
     for line in (DOCS / "reference" / "glossary.md").read_text().splitlines():
@@ -53,14 +53,14 @@ def glossary() -> dict[str, str]:
 
 
 def replaced_words() -> list[str]:
-    """The words that the glossary replaces by terms."""
+    """Return the words that the glossary replaces by terms."""
     _, _, section = (DOCS / "reference" / "glossary.md").read_text().partition("## Replaced words")
     rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("|")]
     return [word.strip() for cell in rows[2:] for word in cell.split(",")]
 
 
 def generator() -> ModuleType:
-    """docs/generate.py as a module."""
+    """Import docs/generate.py as a module."""
     spec = importlib.util.spec_from_file_location("generate", DOCS / "generate.py")
     assert spec
     assert spec.loader
