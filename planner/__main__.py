@@ -1,10 +1,4 @@
-"""Command line of the planner.
-
-python -m planner plan PATH.{csv,svg} --robot robot.toml --out DIR     plan.json, plan.csv, schedule.h, plan.svg
-python -m planner goal --goal X Y DEGREES --robot robot.toml --out DIR  from a pose to a pose, around obstacles
-python -m planner track PATH --robot robot.toml                        poses on a pipe in, orders out
-python -m planner check PLAN.json TRACK.csv [--out OVERLAY.png]        tracking error of a replayed track
-"""
+"""Command line of the planner: plan a path, go to a goal, track a robot, check a track."""
 
 from __future__ import annotations
 
@@ -13,8 +7,7 @@ import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 from planner.paths.units import UNITS, in_tails
 from sim.io.commands import MODEL, ROBOT, Program, argument, out
@@ -23,6 +16,7 @@ from sim.io.errors import InputError
 if TYPE_CHECKING:
     from planner.paths.path import Path2D
     from planner.planning.plan import Plan
+    from planner.planning.request import PlanRequest
     from sim.model.robot import Robot
 
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
@@ -67,32 +61,18 @@ _PLANNING = (
 )
 def _plan(arguments: Namespace) -> None:
     from planner.files.plan_files import write_plan
+    from planner.files.trade_off import write_trade_off
 
-    task = _task(arguments)
-    result = _planned(task)
+    result, request = _planned(arguments)
     paths = write_plan(result, arguments.out)
     _say(result)
     print(
-        f"from the path as drawn {result.drawn_rms:.4f} l rms, {result.drawn_max:.3f} l at most; every drawn "
-        f"point is within {result.missed:.3f} l of the declared path"
+        f"from the path as drawn {result.errors.drawn_rms:.4f} l rms, {result.errors.drawn_max:.3f} l at most; "
+        f"every drawn point is within {result.declared.missed:.3f} l of the declared path"
     )
     if arguments.trade_off:
-        paths.append(_trade_off(task, result, arguments.out))
+        paths.append(write_trade_off(result, request, arguments.out))
     print(f"-> {', '.join(map(str, paths))}")
-
-
-def _trade_off(task: _Task, result: Plan, folder: str) -> Path:
-    """trade_off.svg in the folder of the plan."""
-    from planner.files.trade_off import draw_trade_off, trade_off
-    from planner.planning.plan import plan
-    from sim.io.files import whole_file
-
-    options = {**task.options, "tolerance": None}
-    found = trade_off(result, lambda dwell: plan(task.path, task.robot, **{**options, "dwell": dwell}))
-    target = Path(folder) / "trade_off.svg"
-    with whole_file(target) as part:
-        draw_trade_off(found).savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})
-    return target
 
 
 def _say(result: Plan) -> None:
@@ -200,50 +180,39 @@ def _track(arguments: Namespace) -> None:
     if not 0 <= arguments.latency < math.inf:
         raise InputError(f"--latency {arguments.latency}; give a number of seconds, 0 or more")
     with redirect_stdout(sys.stderr):
-        result = _planned(_task(arguments))
+        result, _ = _planned(arguments)
     scale = result.robot.time_scale
     tracker = Tracker(result, noise=(arguments.noise, arguments.noise_rad), latency=arguments.latency / scale)
     for answer in answers(tracker, sys.stdin, scale):
         print(answer, flush=True)
 
 
-class _Task(NamedTuple):
-    """What is to be planned: path and robot, and the options of `planner.planning.plan`."""
-
-    path: Path2D
-    robot: Robot
-    options: dict[str, Any]
-
-
-def _planned(task: _Task) -> Plan:
-    """The plan of a task."""
-    from planner.planning.plan import plan
-
-    with _progress() as progress:
-        return plan(task.path, task.robot, **task.options, progress=progress)
-
-
-def _task(arguments: Namespace) -> _Task:
-    """The task that the command asks for."""
+def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
+    """Make the plan that the command asks for, and return it with the request."""
     from planner.paths.units import describe
+    from planner.planning.plan import make_plan
+    from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import read_knowledge
+    from planner.vehicle.tracked_point import tracked_vehicle
     from sim.inputs import load_robot
     from surrogate.table.model_file import load_table
 
     robot = load_robot(arguments.robot)
     path = _path(arguments, robot)
     print(f"path: {describe(path, robot)}")
-    return _Task(path, robot, {
-        "lookup": load_table(arguments.model),
-        "point": arguments.point,
-        "corner": arguments.corner,
-        "time_weight": arguments.time_weight,
-        "objective": arguments.objective,
-        "minimum_dwell": arguments.min_dwell,
-        "minimum_seconds": arguments.min_dwell_s,
-        "tolerance": arguments.tolerance,
-        "knowledge": read_knowledge(arguments.robot),
-    })  # fmt: skip
+    request = PlanRequest(
+        point=arguments.point,
+        corner=arguments.corner,
+        time_weight=arguments.time_weight,
+        objective=arguments.objective,
+        minimum_dwell=arguments.min_dwell,
+        minimum_seconds=arguments.min_dwell_s,
+        tolerance=arguments.tolerance,
+    )
+    table, knowledge = load_table(arguments.model), read_knowledge(arguments.robot)
+    tracked = tracked_vehicle(robot, table, request.point, knowledge)
+    with _progress() as progress:
+        return make_plan(path, tracked, request, progress), request
 
 
 @contextmanager
@@ -291,7 +260,7 @@ def _path(arguments: Namespace, robot: Robot) -> Path2D:
     "check",
     "tracking error of a replayed track",
     argument("plan", help="plan.json"),
-    argument("track", help="CSV written by python -m sim replay"),
+    argument("track", help="CSV written by softflagella sim replay"),
     out("overlay picture, PNG", default=None),
 )
 def _check(arguments: Namespace) -> None:

@@ -22,7 +22,7 @@ def main(cases: str = "100", first: str = "0") -> None:
     heads = f"{'x':>7}{'y':>7}{'heading':>9}{'plan':>9}{'optimum':>9}{'/':>8}{'end':>10}{'s':>7}"
     for seed, goal_plan, spent in planned(goal_alone, seeds, heads):
         goal = goal_plan.goal
-        least = brute_force(goal_plan.plan.vehicle, goal)
+        least = brute_force(goal_plan.plan.tracked.vehicle, goal)
         ratios.append(goal_plan.plan.duration / least)
         print(f"{seed:5d}{goal[0]:7.2f}{goal[1]:7.2f}{goal[2]:9.2f}{goal_plan.plan.duration:9.1f}{least:9.1f}"
               f"{ratios[-1]:8.3f}{max(goal_plan.end_error):10.1e}{spent:7.2f}", flush=True)  # fmt: skip

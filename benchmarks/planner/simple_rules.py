@@ -62,9 +62,9 @@ def paper_polygon(result: Plan, corners: int, side: float) -> Rule:
 def sum_up_rounding(result: Plan) -> Rule:
     """The turning of the planner's reference, rounded on a grid of steps T; without the predicted pose."""
     rate, _, dwell = _steady(result)
-    guide, surge = result.guide, float(result.vehicle.twist[0, 0])
-    wanted = np.clip(guide.curvature * result.vehicle.pivot_radius, -1, 1)
-    speed = result.net_speed + (surge - result.net_speed) * np.abs(wanted)
+    guide, surge = result.declared.reference, float(result.tracked.vehicle.twist[0, 0])
+    wanted = np.clip(guide.curvature * result.tracked.vehicle.pivot_radius, -1, 1)
+    speed = result.straight.net_speed + (surge - result.straight.net_speed) * np.abs(wanted)
     time = np.concatenate([[0.0], np.cumsum(np.diff(guide.arc) / speed)])
     turned = np.concatenate([[0.0], np.cumsum(wanted * np.diff(time))])
     grid = np.arange(dwell, time[-1], dwell)
@@ -80,13 +80,13 @@ def sum_up_rounding(result: Plan) -> Rule:
             first, sense = first or now, now
     x, y = guide.q[0]
     heading = float(guide.heading[0]) - first * rate * dwell / 2
-    a = result.pivot_distance
+    a = result.tracked.rod
     return first, dwells, (float(x + a * math.cos(heading)), float(y + a * math.sin(heading)), heading)
 
 
 def _steady(result: Plan) -> tuple[float, float, float]:
     """Yaw rate, speed along the axis, and dwell."""
-    return result.vehicle.yaw_rate, float(result.vehicle.twist[0, 0]), result.minimum_dwell
+    return result.tracked.vehicle.yaw_rate, float(result.tracked.vehicle.twist[0, 0]), result.minimum_dwell
 
 
 def _sinc(angle: float) -> float:

@@ -166,5 +166,5 @@ def swim(
         if command.alarm and not rang:
             alarms.append(now)
         rang = command.alarm
-    track = planar.compose(np.concatenate(poses), np.array([plan.offset, 0.0, 0.0]))[:, :2]
+    track = planar.compose(np.concatenate(poses), np.array([plan.tracked.offset, 0.0, 0.0]))[:, :2]
     return Swum(np.concatenate(times), track, distance_to(plan.reference, track), fed, tuple(alarms))

@@ -104,7 +104,7 @@ def swum(seed: int) -> Swum | str:
     knowledge = CalibrationKnowledge(COEFFICIENTS, SIGMA**2 * np.eye(3))
     try:
         table = tabulate(robot) if robot.effects else load()
-        path = random_path(rng, plan(circle(4.0), robot, lookup=table).vehicle.turn_radius)
+        path = random_path(rng, plan(circle(4.0), robot, lookup=table).tracked.vehicle.turn_radius)
         result = plan(path, robot, lookup=table, knowledge=knowledge)
         moved = {name: getattr(robot, name) * np.exp(SIGMA * rng.normal()) for name in COEFFICIENTS}
         tracks = [replay([result.schedule(swimmer)])[0] for swimmer in (replace(robot, **moved), robot)]
@@ -112,8 +112,8 @@ def swum(seed: int) -> Swum | str:
         return f"{seed}: {refused}"
     wrong, exact = (tracking_error(plan_record(result), track) for track in tracks)
     return Swum(
-        seed, robot, len(result.dwells), float(np.abs(result.vehicle.twist[:, 2]).mean()), result.stated_error,
-        wrong.largest, exact.largest, exact.rms, _mean_path(result, tracks[1]), result.zigzag_rms,
+        seed, robot, len(result.dwells), result.tracked.vehicle.yaw_rate, result.stated_error,
+        wrong.largest, exact.largest, exact.rms, _mean_path(result, tracks[1]), result.straight.rms,
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from planner.goal.to_goal import GoalPlan
 from planner.paths.path_files import read_path
 from planner.paths.units import in_tails
 from sim.io.errors import InputError
-from sim.io.files import whole_file, write_text
+from sim.io.files import write_text
 from sim.model.robot import Robot
 
 FORMAT = 1
@@ -50,13 +50,12 @@ def read_region(words: str, unit: str, robot: Robot) -> Region:
 
 def write_goal_plan(goal_plan: GoalPlan, folder: str | Path) -> list[Path]:
     """The files of the plan, goal.json with goal and regions, and a picture of all; returns their paths."""
-    from planner.files.pictures import draw_goal_plan
+    from planner.files.pictures import draw_goal_plan, write_svg
 
     paths = write_plan(goal_plan.plan, folder)
     out = Path(folder)
     write_text(out / "goal.json", json.dumps(goal_record(goal_plan)) + "\n")
-    with whole_file(out / "goal.svg") as part:
-        draw_goal_plan(goal_plan).savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})
+    write_svg(draw_goal_plan(goal_plan), out / "goal.svg")
     return [*paths, out / "goal.json", out / "goal.svg"]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,16 +14,23 @@ from planner.goal.obstacles import Circle, Footprint
 from planner.goal.to_goal import GoalPlan
 from planner.planning.plan import Plan
 from sim.arrays import Floats
+from sim.io.files import whole_file
 
 KEEP_OUT = "#d8b365"
 RAW, DECLARED, PREDICTED, REPLAYED = "#b0b0b0", "#1a1a1a", "#2a7fba", "#c8452f"
+
+
+def write_svg(figure: Figure, path: Path) -> None:
+    """Write a figure as SVG, whole or not at all."""
+    with whole_file(path) as part:
+        figure.savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})
 
 
 def draw_plan(result: Plan) -> Figure:
     """One panel: the plan over its path, with the stated error."""
     figure = Figure(figsize=(6, 6))
     axes = figure.add_subplot()
-    draw_tracks(axes, result.raw, result.reference, result.stated_error)
+    draw_tracks(axes, result.drawn.polyline(), result.reference, result.stated_error)
     axes.plot(*result.track.T, color=PREDICTED, lw=0.8, label="predicted")
     axes.plot(*result.track[0], "o", color=DECLARED, ms=5)
     minutes = result.seconds.sum() / 60

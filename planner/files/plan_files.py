@@ -42,6 +42,8 @@ def write_plan(result: Plan, folder: str | Path) -> list[Path]:
         ...     [path.name for path in write_plan(plan(circle(2.0), load_robot("paper-control")), folder)]
         ['plan.json', 'plan.csv', 'schedule.h', 'tracker.h', 'plan.svg']
     """
+    from planner.files.pictures import draw_plan, write_svg  # loads matplotlib
+
     out = Path(folder)
     header = controller_header(result)
     record = {**plan_record(result), "code_version": code_version()}
@@ -51,7 +53,7 @@ def write_plan(result: Plan, folder: str | Path) -> list[Path]:
         dwell_table(result).to_csv(part, index=False, float_format="%.8g")
     write_text(paths[2], header)
     write_text(paths[3], tracker_header(result))
-    _picture(result, paths[4])
+    write_svg(draw_plan(result), paths[4])
     return paths
 
 
@@ -104,7 +106,7 @@ def controller_header(result: Plan) -> str:
     places = ",\n    ".join(checkpoints)
     return f"""/* Motor schedule for robot "{name}": turn in FIRST_DIRECTION for the first entry,
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
- * lengthens the dwell before it. Stop after the last entry. Look-up table {result.model}.
+ * lengthens the dwell before it. Stop after the last entry. Look-up table {result.tracked.model}.
  * Put the head's centre at START_X, START_Y with heading START_HEADING, at rest. Checkpoints say where it should
  * be later. x and y in tail lengths, heading in rad from the x axis to the left. */
 #ifndef SCHEDULE_H
@@ -137,11 +139,3 @@ def _checkpoints(result: Plan) -> list[str]:
         f"{{{round(1000 * ends[i])}UL, {', '.join(f'{value:.5f}f' for value in result.poses[i])}}}"
         for i in places.tolist()
     ]
-
-
-def _picture(result: Plan, path: Path) -> None:
-    from planner.files.pictures import draw_plan
-
-    with whole_file(path) as part:
-        figure = draw_plan(result)
-        figure.savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from planner.planning.plan import FEEDBACK_EVERY, Plan
+from planner.planning.errors import FEEDBACK_EVERY
+from planner.planning.plan import Plan
 from sim.io.errors import InputError
 from sim.model.plan_file import FORMAT, read_plan_file
 
@@ -20,6 +21,7 @@ _TABLES = {"reference": 2, "raw_path": 2, "predicted_poses": 3}
 def plan_record(result: Plan) -> dict[str, Any]:
     """The plan as JSON-like content; `sim.model.schedule.load_schedule` reads its schedule."""
     robot, schedule = result.robot, result.schedule()
+    declared, errors = result.declared, result.errors
     x, y, heading = schedule.start
     return {
         "format": FORMAT,
@@ -30,31 +32,31 @@ def plan_record(result: Plan) -> dict[str, Any]:
             "motor_speed_rad_s": robot.motor_speed,
             "time_scale_s": robot.time_scale,
         },
-        "point": result.point,
-        "offset_over_l": result.offset,
+        "point": result.tracked.point,
+        "offset_over_l": result.tracked.offset,
         "first_direction": result.first_direction,
         "start": {"x_over_l": x, "y_over_l": y, "heading_rad": heading},
         "dwell_bar": result.dwells.tolist(),
         "dwell_s": result.seconds.tolist(),
         "predicted_poses": result.poses.tolist(),
         "reference": result.reference.tolist(),
-        "raw_path": result.raw.tolist(),
-        "closed": result.closed,
+        "raw_path": result.drawn.polyline().tolist(),
+        "closed": result.drawn.closed,
         "objective": result.objective,
         "minimum_dwell_bar": result.minimum_dwell,
-        "off_drawn_over_l": result.off_drawn,
-        "missed_over_l": result.missed,
-        "zigzag_rms_over_l": result.zigzag_rms,
-        _GUARANTEE: result.guaranteed,
-        "stated_error_over_l": result.stated_error,
-        "feedback_error_over_l": result.feedback_error,
+        "off_drawn_over_l": declared.off_drawn,
+        "missed_over_l": declared.missed,
+        "zigzag_rms_over_l": result.straight.rms,
+        _GUARANTEE: errors.guaranteed,
+        "stated_error_over_l": errors.stated,
+        "feedback_error_over_l": errors.feedback,
         "feedback_every": FEEDBACK_EVERY,
-        "predicted_rms_over_l": result.predicted_rms,
-        "predicted_max_over_l": result.predicted_max,
-        "drawn_rms_over_l": result.drawn_rms,
-        "drawn_max_over_l": result.drawn_max,
-        "closure_over_l": result.closure,
-        "model": result.model,
+        "predicted_rms_over_l": errors.predicted_rms,
+        "predicted_max_over_l": errors.predicted_max,
+        "drawn_rms_over_l": errors.drawn_rms,
+        "drawn_max_over_l": errors.drawn_max,
+        "closure_over_l": errors.closure,
+        "model": result.tracked.model,
         "warnings": list(result.warnings),
     }
 

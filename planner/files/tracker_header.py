@@ -37,23 +37,26 @@ def tracker_header(result: Plan) -> str:
 def rounded(result: Plan) -> Plan:
     """The plan with path and lags as tracker.h has them."""
     unit = _lag_unit(result)
-    lag, rest = (np.round(table / unit) * unit for table in (result.vehicle.lag, result.vehicle.rest))
+    lag, rest = (
+        np.round(table / unit) * unit for table in (result.tracked.vehicle.lag, result.tracked.vehicle.rest)
+    )
     rows = np.array([[float(_nine(value)) for value in row] for row in _path(result)])
     q, heading = rows[:, :2], rows[:, 2]
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(q, axis=0), axis=1))])
-    guide = replace(result.guide, q=q, heading=heading, arc=arc)
-    return replace(result, vehicle=replace(result.vehicle, lag=lag, rest=rest), guide=guide)
+    guide = replace(result.declared.reference, q=q, heading=heading, arc=arc)
+    tracked = result.tracked._replace(vehicle=replace(result.tracked.vehicle, lag=lag, rest=rest))
+    return replace(result, tracked=tracked, declared=replace(result.declared, reference=guide))
 
 
 def table_bytes(result: Plan) -> int:
     """Size of the tables in single precision."""
-    vehicle = result.vehicle
-    return 2 * (vehicle.lag.size + vehicle.rest.size) + 4 * 3 * len(result.guide.q)
+    vehicle = result.tracked.vehicle
+    return 2 * (vehicle.lag.size + vehicle.rest.size) + 4 * 3 * len(result.declared.reference.q)
 
 
 def _intro(result: Plan) -> str:
     name = "".join(c for c in result.robot.name if c.isalnum() or c in " -_.")
-    return f"""/* Tracker for robot "{name}", look-up table {result.model}: keeps the robot on its plan
+    return f"""/* Tracker for robot "{name}", look-up table {result.tracked.model}: keeps the robot on its plan
  * with poses from a camera, and learns the robot. It is planner.Tracker in C99, with the same formulas in the same
  * order. It needs <math.h> and <stdint.h>, and no heap. Tables: {table_bytes(result)} bytes in single precision.
  *
@@ -85,8 +88,9 @@ typedef double tracker_real;
 def _numbers(result: Plan) -> str:
     """What the code needs as macros: counts and times as they are, the rest as tracker_real."""
     counts = {
-        "FIRST_DIRECTION": result.first_direction, "STATES": kalman_filter.STATES, "POINTS": len(result.guide.q),
-        "TIMES": result.vehicle.rest.shape[1], "KNOTS": len(BEFORE_KNOTS),
+        "FIRST_DIRECTION": result.first_direction, "STATES": kalman_filter.STATES,
+        "POINTS": len(result.declared.reference.q),
+        "TIMES": result.tracked.vehicle.rest.shape[1], "KNOTS": len(BEFORE_KNOTS),
         "HALVINGS": line_of_sight.HALVINGS, "MOST_LOOKS": line_of_sight.MOST_LOOKS,
         "KEPT": tracker.KEPT, "LOST": tracker.LOST, "WINDOW": tracker.WINDOW,
     }  # fmt: skip
@@ -95,13 +99,13 @@ def _numbers(result: Plan) -> str:
         "TAIL_LENGTH_M": result.robot.tail_length,
         "STEP": STEP,
         "SHORTEST": result.minimum_dwell,
-        "AHEAD": result.ahead,
-        "ROD": result.pivot_distance,
-        "OFFSET": result.offset,
-        "SWING": result.swing,
+        "AHEAD": result.guidance.ahead,
+        "ROD": result.tracked.rod,
+        "OFFSET": result.tracked.offset,
+        "SWING": result.guidance.swing,
         "SWING_ERROR": result.predicted_max,
-        "PIVOT_RADIUS": result.vehicle.pivot_radius,
-        "NET_SPEED": result.net_speed,
+        "PIVOT_RADIUS": result.tracked.vehicle.pivot_radius,
+        "NET_SPEED": result.straight.net_speed,
         "LARGEST_STEP": line_of_sight.LARGEST_STEP,
         "TURNS": line_of_sight.TURNS,
         "MOST_BIAS": line_of_sight.MOST_BIAS,
@@ -118,7 +122,7 @@ def _numbers(result: Plan) -> str:
 
 
 def _tables(result: Plan) -> str:
-    vehicle, unit = result.vehicle, _lag_unit(result)
+    vehicle, unit = result.tracked.vehicle, _lag_unit(result)
     most = kalman_filter.most(result)
     lag, rest = (np.round(table / unit).astype(int) for table in (vehicle.lag, vehicle.rest))
     real, short = "static const tracker_real tracker_", "static const int16_t tracker_"
@@ -140,14 +144,14 @@ def _tables(result: Plan) -> str:
 
 
 def _lag_unit(result: Plan) -> Floats:
-    vehicle = result.vehicle
+    vehicle = result.tracked.vehicle
     largest = np.maximum(np.abs(vehicle.lag).max((0, 1, 2)), np.abs(vehicle.rest).max((0, 1)))
     return np.asarray(np.maximum(largest, 1e-12) / _LARGEST)
 
 
 def _path(result: Plan) -> Floats:
     """Place of the pivot and heading, (m, 3)."""
-    return np.column_stack([result.guide.q, result.guide.heading])
+    return np.column_stack([result.declared.reference.q, result.declared.reference.heading])
 
 
 def _nine(value: float) -> str:

@@ -1,19 +1,21 @@
-"""What the dwell decides: error against time and number of flips, for one robot and path.
+"""The trade-off that the dwell decides: error against time and number of flips, for one robot and path.
 
-One plan is made for each of some dwells. A longer dwell loses less speed at the flips and flips less often, and it
-swings further.
+A longer dwell loses less speed at the flips and flips less often, but swings further. One plan is made for each of
+some dwells.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from planner.files.pictures import DECLARED, PREDICTED, RAW, REPLAYED
-from planner.planning.plan import Plan
+from planner.files.pictures import DECLARED, PREDICTED, RAW, REPLAYED, write_svg
+from planner.planning.plan import Plan, make_plan
+from planner.planning.request import PlanRequest
 from planner.vehicle.dwell_choice import QUICK, longest_dwell
 from sim.io.errors import InputError
 
@@ -28,45 +30,62 @@ class TradeOff:
     chosen: Plan
 
 
-def trade_off(chosen: Plan, make: Callable[[float], Plan], *, count: int = _COUNT) -> TradeOff:
+def trade_off(chosen: Plan, request: PlanRequest) -> TradeOff:
     """Plan with dwells from the shortest whose response is known well to the longest that makes sense.
 
     Args:
         chosen: the plan that the user gets.
-        make: the plan with a given shortest dwell; it raises `InputError` where there is none.
-        count: number of plans.
+        request: what it was made for.
     """
-    plans = []
-    for dwell in np.geomspace(QUICK, longest_dwell(chosen.vehicle, QUICK), count).tolist():
+    tracked, plans = chosen.tracked, []
+    for dwell in np.geomspace(QUICK, longest_dwell(tracked.vehicle, QUICK), _COUNT).tolist():
         try:
-            plans.append(make(dwell))
+            plans.append(make_plan(chosen.drawn, tracked, replace(request, dwell=dwell, tolerance=None)))
         except InputError:  # such dwells do not get the robot around the path
             continue
     return TradeOff(tuple(plans), chosen)
 
 
-def draw_trade_off(found: TradeOff) -> Figure:
-    """Errors above time, and errors above the number of flips."""
+def write_trade_off(chosen: Plan, request: PlanRequest, folder: str | Path) -> Path:
+    """Draw trade_off.svg in the folder of a plan, and return its path."""
+    target = Path(folder) / "trade_off.svg"
+    write_svg(draw_trade_off(trade_off(chosen, request)), target)
+    return target
+
+
+def draw_trade_off(comparison: TradeOff) -> Figure:
+    """Draw errors over time, and errors over the number of flips."""
     figure = Figure(figsize=(9, 4), layout="constrained")
-    one, other = figure.subplots(1, 2, sharey=True)
+    by_time, by_flips = figure.subplots(1, 2, sharey=True)
     values: tuple[tuple[str, Callable[[Plan], float]], ...] = (
         ("time / min", lambda plan: float(plan.seconds.sum()) / 60),
         ("flips", lambda plan: float(len(plan.dwells))),
     )
-    for axes, (name, value) in zip((one, other), values, strict=True):
-        x = [value(plan) for plan in found.plans]
-        axes.plot(x, [plan.stated_error for plan in found.plans], "o-", color=PREDICTED, ms=3, label="stated")
+    for axes, (name, value) in zip((by_time, by_flips), values, strict=True):
+        x = [value(plan) for plan in comparison.plans]
+        axes.plot(x, [plan.stated_error for plan in comparison.plans], "o-", color=PREDICTED, ms=3, label="stated")
         axes.plot(
-            x, [plan.predicted_max for plan in found.plans], "o-", color=DECLARED, ms=3, label="predicted, max"
+            x,
+            [plan.predicted_max for plan in comparison.plans],
+            "o-",
+            color=DECLARED,
+            ms=3,
+            label="predicted, max",
         )
-        axes.plot(x, [plan.predicted_rms for plan in found.plans], "o-", color=RAW, ms=3, label="predicted, rms")
-        axes.plot(value(found.chosen), found.chosen.stated_error, "s", color=REPLAYED, ms=7, label="this plan")
-        for plan, at in zip(found.plans, x, strict=True):
+        axes.plot(
+            x, [plan.predicted_rms for plan in comparison.plans], "o-", color=RAW, ms=3, label="predicted, rms"
+        )
+        axes.plot(
+            value(comparison.chosen), comparison.chosen.stated_error, "s", color=REPLAYED, ms=7, label="this plan"
+        )
+        for plan, at in zip(comparison.plans, x, strict=True):
             axes.annotate(f"{plan.minimum_dwell:.2g}", (at, plan.stated_error), textcoords="offset points",
                           xytext=(0, 6), ha="center", fontsize=7, color=PREDICTED)  # fmt: skip
         axes.set_xlabel(name)
-    one.set_ylabel("error / l")
-    one.set_ylim(bottom=0)
-    one.legend(fontsize=8, frameon=False)
-    figure.suptitle(f"{found.chosen.robot.name}: error against time and flips; numbers are dwells", fontsize=10)
+    by_time.set_ylabel("error / l")
+    by_time.set_ylim(bottom=0)
+    by_time.legend(fontsize=8, frameon=False)
+    figure.suptitle(
+        f"{comparison.chosen.robot.name}: error against time and flips; numbers are dwells", fontsize=10
+    )
     return figure

@@ -1,14 +1,13 @@
-"""The last dwells of a schedule are changed, so that the motion ends at a given pose.
+"""The last dwells of a schedule are changed so that the motion ends at a given pose.
 
 Of all last dwells that end there, those are sought that take the least time and keep the pivot near its track.
-Three numbers must be met, so a few dwells are enough. Some may be left out. Time, distances from the track and the
-distance from the goal enter as least squares.
+Three numbers must be met, so a few dwells are enough, and some may be left out. The cost is a sum of squares:
+time, distances from the track beyond those of the schedule, and the distance from the goal.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -20,41 +19,38 @@ from sim.arrays import Floats
 from sim.mechanics import planar
 
 _LAST = 30  # dwells that are changed
-_DROPPED = 4  # at most so many are left out
+_DROPPED = 4  # at most this many are left out
 _REACHED = 1e-4  # l and rad
 _STEP = 1e-4  # time units, for derivatives
 _EVALUATIONS = 40
-_GOAL = 1e7  # time units for the square of a distance [l or rad] from the goal
-_FAR = 3e4  # the same for a distance [l] from the track, beyond what is allowed
+_GOAL = 1e7  # time units that a squared distance [l² or rad²] from the goal costs
+_FAR = 3e4  # the same for a distance [l] from the track, beyond the largest one of the schedule
 
 
-def ending_at(
-    goal: tuple[float, float, float], vehicle: Vehicle, dwell: float, track: Floats
-) -> Callable[[Switches], Switches]:
-    """A function that makes a schedule end at a pose.
+def end_at_goal(
+    switches: Switches, goal: tuple[float, float, float], vehicle: Vehicle, dwell: float, track: Floats
+) -> Switches:
+    """Change the last dwells of a schedule so that it ends at a pose.
 
     Args:
+        switches: the schedule.
         goal: x, y [l] and heading [rad] of the head's centre.
         vehicle: who carries it out.
         dwell: the shortest dwell.
         track: (m, 2), that of the pivot.
     """
-
-    def ended(switches: Switches) -> Switches:
-        best, least = switches, math.inf
-        for dropped in range(min(_DROPPED, len(switches.dwells) - 1) + 1):
-            count = len(switches.dwells) - dropped
-            tried = Switches(switches.first_direction, switches.dwells[:count], switches.poses[: count + 1])
-            found, cost = _Ending(tried, goal, vehicle, dwell, track).solved()
-            if cost < least:
-                best, least = found, cost
-        return best
-
-    return ended
+    best, lowest = switches, math.inf
+    for dropped in range(min(_DROPPED, len(switches.dwells) - 1) + 1):
+        count = len(switches.dwells) - dropped
+        shorter = Switches(switches.first_direction, switches.dwells[:count], switches.poses[: count + 1])
+        candidate, cost = _Ending(shorter, goal, vehicle, dwell, track).solved()
+        if cost < lowest:
+            best, lowest = candidate, cost
+    return best
 
 
 class _Ending:
-    """A schedule whose last dwells are changed."""
+    """The least-squares problem of the last dwells of a schedule."""
 
     def __init__(self, switches: Switches, goal: tuple[float, float, float], vehicle: Vehicle, dwell: float,
                  track: Floats):  # fmt: skip
@@ -66,23 +62,24 @@ class _Ending:
         self._known: dict[bytes, tuple[Floats, Floats]] = {}
 
     def solved(self) -> tuple[Switches, float]:
-        """The changed schedule, and its cost."""
-        own = np.maximum(self._switches.dwells[self._kept :], self._least * (1 + 1e-6))
-        found = least_squares(
+        """Return the changed schedule and its cost."""
+        first = self._switches.first_direction
+        kept, last = self._switches.dwells[: self._kept], self._switches.dwells[self._kept :]
+        solution = least_squares(
             self._residuals,
-            own,
+            np.maximum(last, self._least * (1 + 1e-6)),
             self._slopes,
             bounds=(self._least, np.inf),
             x_scale=self._least,
             max_nfev=_EVALUATIONS,
             ftol=1e-5,
         ).x
-        missed = float(np.abs(self._at(found)[0][:3]).max()) / math.sqrt(_GOAL)
-        dwells = np.concatenate([self._switches.dwells[: self._kept], found])
-        changed = Switches(self._switches.first_direction, dwells, self._switches.poses)
-        poses = poses_at_flips(self._vehicle, changed)
-        cost = float((self._at(found)[0] ** 2).sum() + self._switches.dwells[: self._kept].sum())
-        return Switches(self._switches.first_direction, dwells, poses), cost + 1e6 * max(missed - _REACHED, 0.0)
+        residuals = self._at(solution)[0]
+        missed = float(np.abs(residuals[:3]).max()) / math.sqrt(_GOAL)
+        cost = float((residuals**2).sum() + kept.sum()) + 1e6 * max(missed - _REACHED, 0.0)
+        dwells = np.concatenate([kept, solution])
+        poses = poses_at_flips(self._vehicle, Switches(first, dwells, self._switches.poses))
+        return Switches(first, dwells, poses), cost
 
     def _residuals(self, last: Floats) -> Floats:
         return self._at(last)[0]
@@ -91,32 +88,32 @@ class _Ending:
         return self._at(last)[1]
 
     def _at(self, last: Floats) -> tuple[Floats, Floats]:
-        """Residuals (3 + 2 K,), the squares of which are times, and their derivatives."""
+        """Compute the residuals (3 + 2 K,), whose squares are times, and their derivatives."""
         key = last.tobytes()
         if key not in self._known:
-            tried = np.concatenate([last[None], last + _STEP * np.eye(len(last))])
-            poses = flips_after(self._vehicle, self._switches, self._kept, tried)
+            steps = np.concatenate([last[None], last + _STEP * np.eye(len(last))])
+            poses = flips_after(self._vehicle, self._switches, self._kept, steps)
             beyond = np.maximum(self._distances(poses) - self._near, 0.0)
-            parts = (math.sqrt(_GOAL) * (poses[:, -1] - self._goal), np.sqrt(tried), math.sqrt(_FAR) * beyond)
+            parts = (math.sqrt(_GOAL) * (poses[:, -1] - self._goal), np.sqrt(steps), math.sqrt(_FAR) * beyond)
             values = np.concatenate(parts, 1)
             self._known = {key: (values[0], (values[1:] - values[0]).T / _STEP)}
         return self._known[key]
 
     def _distances(self, poses: Floats) -> Floats:
-        """Distances (B, K) of the pivot from its track, at poses (B, K, 3) of the head's centre."""
+        """Compute distances (B, K) of the pivot from its track, at poses (B, K, 3) of the head's centre."""
         pivot = planar.compose(poses, np.array([-self._vehicle.pivot_distance, 0.0, 0.0]))[..., :2]
         return distance_to(self._track, pivot.reshape(-1, 2)).reshape(pivot.shape[:-1])
 
 
 def flips_after(vehicle: Vehicle, switches: Switches, kept: int, last: Floats) -> Floats:
-    """Poses (B, K, 3) at the flips, where other dwells (B, K) follow the first `kept` ones of a schedule."""
+    """Predict the poses (B, K, 3) at the flips where dwells (B, K) follow the first `kept` ones of a schedule."""
     pose = np.repeat(switches.poses[None, kept], len(last), 0)
     before = None if kept == 0 else np.full(len(last), switches.dwells[kept - 1])
     sense = switches.first_direction * (-1) ** kept
-    found = np.empty((*last.shape, 3))
+    poses = np.empty((*last.shape, 3))
     for k, dwell in enumerate(last.T):
         pose = planar.compose(pose, vehicle.motion(sense, before, dwell))
         pose[:, :2] += vehicle.current * dwell[:, None]
-        found[:, k] = pose
+        poses[:, k] = pose
         sense, before = -sense, dwell
-    return found
+    return poses

@@ -1,12 +1,12 @@
 """to_goal(start, goal, robot): the motor's switching times from one pose to another, around obstacles.
 
-The pivot moves like a car that only drives forward and has a least turn radius. So its shortest way between two
-poses is one of Dubins' words, or a chain of them around obstacles (`planner.goal.route`). The way is followed by a
-plan like any other. The last dwells are changed a little, so that the robot ends at the goal with the heading that
-was asked for.
+The pivot moves like a car that only drives forward and has a least turn radius. Its shortest track between two
+poses is one of Dubins' words, or a chain of them around obstacles (`planner.goal.route`). The schedule follows
+that track like any other path. Its last dwells are then changed so that the robot ends at the goal with the
+heading that was asked for (`planner.goal.final_dwells`).
 
-The margin around obstacles is the error that the plan states. That error is known when the plan is made. So the
-way is sought again with a larger margin until the two agree. If there is no way, shorter dwells are tried, which
+The margin around obstacles is the error that the plan states, which is known only when the plan is made. So the
+track is sought again with a larger margin until the two agree. If there is none, shorter dwells are tried, which
 need less room.
 """
 
@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.goal.final_dwells import ending_at
+from planner.goal.final_dwells import end_at_goal
 from planner.goal.lattice import RouteLimits
 from planner.goal.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.goal.route import COURSES, Lattices, NoWayError, Route, route
@@ -27,11 +28,16 @@ from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift, Reference, slips
 from planner.paths.units import LONGEST
 from planner.planning.declared_path import Declared
-from planner.planning.plan import Plan, TrackedVehicle, least_dwell, scheduled, tracked_vehicle, zigzag_drift
-from planner.planning.schedule import Start
+from planner.planning.errors import plan_errors
+from planner.planning.plan import Plan, choose_guidance, zigzag_drift
+from planner.planning.request import PlanRequest
+from planner.planning.schedule import Start, follow
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import Objective, check_least, dwells_for
-from planner.vehicle.rollout import pose_changes
+from planner.vehicle.from_table import OWN_TABLE
+from planner.vehicle.rollout import Switches, pose_changes
+from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
+from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError
@@ -41,7 +47,7 @@ from surrogate.interface import LookupTable
 
 Pose = tuple[float, float, float]
 _SPACING = 0.02  # l
-_SHORTER = 0.4  # of the dwell that was chosen: dwells near the end may be that short
+_SHORTER = 0.4  # share of the chosen dwell that dwells near the end must keep
 _MARGINS = 6  # tried for each dwell
 _MORE = 1.05  # times the stated error is the next margin
 _DWELLS = 5  # shortest dwells that are tried
@@ -56,8 +62,8 @@ class GoalPlan:
 
     Example:
         >>> from softflagella import load_robot, to_goal
-        >>> goal_plan = to_goal((0, 0, 0), (3, 1, 1), load_robot("paper-control"))
-        >>> goal_plan.end_error[0] < 0.01
+        >>> trip = to_goal((0, 0, 0), (3, 1, 1), load_robot("paper-control"))
+        >>> trip.end_error[0] < 0.01
         True
     """
 
@@ -72,9 +78,15 @@ class GoalPlan:
 
     @property
     def end_error(self) -> tuple[float, float]:
-        """Distance from the goal and difference of the heading, as predicted."""
+        """Predicted distance from the goal, and difference of the heading."""
         turn = (self.end[2] - self.goal[2] + math.pi) % (2 * math.pi) - math.pi
         return math.dist(self.end[:2], self.goal[:2]), abs(turn)
+
+    @property
+    def room(self) -> FreeSpace:
+        """Return `free_space`, of which this is the old name, for one release."""
+        warn("GoalPlan.room is now GoalPlan.free_space", DeprecationWarning, stacklevel=2)
+        return self.free_space
 
 
 def to_goal(
@@ -109,8 +121,7 @@ def to_goal(
         minimum_seconds: the same in seconds; the larger one counts.
         tolerance: largest acceptable stated error [l].
         feedback: the robot's pose will be measured every 20 flips (`planner.tracking.tracker`), so the margin
-        around
-            obstacles is the stated error with feedback.
+            around obstacles is the stated error with feedback.
         knowledge: what a calibration found besides the robot: covariance, current.
         seed: of the random robots from which the stated error is computed.
 
@@ -120,150 +131,164 @@ def to_goal(
 
     Example:
         >>> from softflagella import load_robot, to_goal
-        >>> goal_plan = to_goal((0, 0, 0), (4, 1, 0), load_robot("paper-control"))
-        >>> goal_plan.end_error[0] < 0.01
+        >>> trip = to_goal((0, 0, 0), (4, 1, 0), load_robot("paper-control"))
+        >>> trip.end_error[0] < 0.01
         True
     """
+    request = PlanRequest(
+        objective=objective,
+        minimum_dwell=minimum_dwell,
+        minimum_seconds=minimum_seconds,
+        tolerance=tolerance,
+        seed=seed,
+    )
     first, last = _pose(start, "start"), _pose(goal, "goal")
     places = tuple(_place(place) for place in via)
-    regions = tuple(one if isinstance(one, Circle | Polygon) else Polygon.of(one) for one in keep_out)
+    regions = tuple(shape if isinstance(shape, Circle | Polygon) else Polygon.of(shape) for shape in keep_out)
     outline = walls if isinstance(walls, Polygon) or walls is None else Polygon.of(walls)
-    room = FreeSpace(regions, outline)
     tracked = tracked_vehicle(robot, lookup, "head_centre", knowledge)
-    vehicle = tracked.vehicle
-    least = least_dwell(minimum_dwell, minimum_seconds, robot)
-    dwells = dwells_for(vehicle, objective, least)
-    tried = [dwells[i] for i in np.unique(np.linspace(0, len(dwells) - 1, _DWELLS).astype(int))]
-    trip = _Trip(tracked, first, last, places, room, objective, check_least(least), feedback, seed)
+    task = _Task(tracked, first, last, places, FreeSpace(regions, outline), request, feedback)
+    dwells = dwells_for(tracked.vehicle, objective, request.least_dwell(robot))
     refusal: InputError | None = None
-    for dwell in tried:
+    for dwell in (dwells[i] for i in np.unique(np.linspace(0, len(dwells) - 1, _DWELLS).astype(int))):
         try:
-            found = trip.with_dwell(dwell)
-        except NoWayError as none:
-            refusal = refusal or none
+            trip = task.plan_with(dwell)
+        except NoWayError as no_way:
+            refusal = refusal or no_way
             continue
-        if tolerance is None or found.plan.stated_error <= tolerance:
-            return found
+        if tolerance is None or trip.plan.stated_error <= tolerance:
+            return trip
         refusal = InputError(
             f"tolerance {tolerance:g} l cannot be kept: with dwells of {dwell:.2g} time units the stated error is "
-            f"{found.plan.stated_error:.3g} l; allow more"
+            f"{trip.plan.stated_error:.3g} l; allow more"
         )
     assert refusal is not None
     raise refusal
 
 
 def _pose(values: Sequence[float], name: str) -> Pose:
-    found = _finite(values, 3, f"{name}: give x, y and heading")
-    return found[0], found[1], found[2]
+    """Check a pose that the user gave."""
+    x, y, heading = _finite(values, 3, f"{name}: give x, y and heading")
+    return x, y, heading
 
 
 def _place(values: Sequence[float]) -> tuple[float, float]:
-    found = _finite(values, 2, "place on the way: give x and y")
-    return found[0], found[1]
+    """Check a place that the user gave."""
+    x, y = _finite(values, 2, "place on the way: give x and y")
+    return x, y
 
 
 def _finite(values: Sequence[float], count: int, wanted: str) -> list[float]:
+    """Check that there are `count` finite numbers; the message says what is wanted."""
     try:
-        found = [float(value) for value in values]
+        numbers = [float(value) for value in values]
     except (TypeError, ValueError):
-        found = []
-    if len(found) != count or not all(abs(value) < _FARTHEST for value in found):
+        numbers = []
+    if len(numbers) != count or not all(abs(number) < _FARTHEST for number in numbers):
         raise InputError(f"{wanted}, as finite numbers; not {values}")
-    return found
+    return numbers
 
 
-class _Trip:
-    """What is asked for, with the lattices that were made for it."""
+class _Task:
+    """A request for a way to a goal, with the lattices that were made for it."""
 
     def __init__(self, tracked: TrackedVehicle, start: Pose, goal: Pose, via: tuple[tuple[float, float], ...],
-                 room: FreeSpace, objective: Objective, least: float, feedback: bool, seed: int):  # fmt: skip
-        self.tracked, self.start, self.goal, self.via, self.room = tracked, start, goal, via, room
-        self.objective, self.least, self.feedback, self.seed = objective, least, feedback, seed
+                 free_space: FreeSpace, request: PlanRequest, feedback: bool):  # fmt: skip
+        self.tracked, self.start, self.goal, self.via = tracked, start, goal, via
+        self.free_space, self.request, self.feedback = free_space, request, feedback
+        self.least_dwell = check_least(request.least_dwell(tracked.robot))
         self.body = Footprint.of(tracked.robot, -tracked.vehicle.pivot_distance)
         self._lattices: dict[Drift, Lattices] = {}
 
-    def with_dwell(self, dwell: float) -> GoalPlan:
-        """The goal_plan with one shortest dwell; the margin is raised to what its plan states."""
-        straight = zigzag(self.tracked.vehicle, dwell)
-        drift = zigzag_drift(self.tracked.vehicle, straight, dwell)
-        limits = RouteLimits(self.tracked.vehicle.pivot_radius, self.body, self.room, drift)
-        margin = 0.0 if self.room.empty else 1.5 * straight.largest
+    def plan_with(self, dwell: float) -> GoalPlan:
+        """Plan with one shortest dwell; raise the margin until it is at least the stated error.
+
+        Raises:
+            NoWayError: there is no way with this dwell.
+        """
+        vehicle = self.tracked.vehicle
+        straight = zigzag(vehicle, dwell)
+        drift = zigzag_drift(vehicle, straight, dwell)
+        limits = RouteLimits(vehicle.pivot_radius, self.body, self.free_space, drift)
+        margin = 0.0 if self.free_space.empty else 1.5 * straight.largest
         for _ in range(_MARGINS):
-            way = route(self._stops(drift), limits, margin, self._lattices.setdefault(drift, {}))
-            found = self._follow(way, limits, straight, dwell, margin)
-            needed = found.plan.feedback_error if self.feedback else found.plan.stated_error
-            if self.room.empty or (needed <= margin and found.clearance > 0):
-                return found
+            track = route(self._stops(drift), limits, margin, self._lattices.setdefault(drift, {}))
+            trip = self._follow(track, drift, straight, dwell, margin)
+            needed = trip.plan.feedback_error if self.feedback else trip.plan.stated_error
+            if self.free_space.empty or (needed <= margin and trip.clearance > 0):
+                return trip
             margin = max(_MORE * needed, margin * 1.02)
         raise NoWayError(
             f"there is no way that leaves the plan's stated error around the robot: it is {needed:.3g} l; plan "
-            "with feedback, make a table of this robot (python -m surrogate robot), or move goal or obstacles"
+            f"with feedback, make a table of this robot ({OWN_TABLE}), or move goal or obstacles"
         )
 
     def _stops(self, drift: Drift) -> list[Floats]:
-        """Poses of the pivot: place and course."""
-        ends = [self._pivot(pose, drift)[None] for pose in (self.start, self.goal)]
+        """Return the pivot's poses to choose from at the start, at each place on the way, and at the goal."""
+        start, goal = (self._pivot(pose, drift)[None] for pose in (self.start, self.goal))
         courses = 2 * math.pi * np.arange(COURSES) / COURSES
-        middle = [np.stack([0 * courses + x, 0 * courses + y, courses], 1) for x, y in self.via]
-        return [ends[0], *middle, ends[1]]
+        places = [np.stack([0 * courses + x, 0 * courses + y, courses], 1) for x, y in self.via]
+        return [start, *places, goal]
 
     def _pivot(self, pose: Pose, drift: Drift) -> Floats:
+        """Return place and course of the pivot: its direction of motion while the robot has this heading."""
         x, y, heading = pose
         a = self.tracked.vehicle.pivot_distance
-        # The course is the direction in which the pivot moves while the robot has this heading.
         course = heading + float(_slip_at(np.array(heading), drift))
         return np.array([x - a * math.cos(heading), y - a * math.sin(heading), course])
 
-    def _follow(self, way: Route, limits: RouteLimits, straight: Zigzag, dwell: float, margin: float) -> GoalPlan:
+    def _follow(self, track: Route, drift: Drift, straight: Zigzag, dwell: float, margin: float) -> GoalPlan:
+        """Plan the schedule that follows a track of the pivot and ends at the goal."""
         tracked, vehicle = self.tracked, self.tracked.vehicle
-        if way.length > LONGEST:
-            raise InputError(f"the way is {way.length:.3g} l long; at most {LONGEST:g} l can be planned")
-        poses = way.poses(_SPACING)
+        declared, sense = self._declared(track, drift)
+        reference = declared.reference
+        guidance = choose_guidance(vehicle, declared, straight, dwell)
+        switches = follow(reference, vehicle, guidance, tracked.offset, start=Start(self.start, sense))
+        least = min(dwell, max(self.least_dwell, _SHORTER * dwell))
+        switches = end_at_goal(switches, self.goal, vehicle, least, reference.q)
+        guidance = guidance._replace(dwell=min(dwell, float(switches.dwells.min())))
+        drawn = Path2D(reference.p, False)
+        # The guaranteed bound is for paths that turn less than the robot can; these arcs turn as much as it can.
+        errors = plan_errors(tracked, drawn, declared, switches, guaranteed=None, seed=self.request.seed)
+        plan = Plan(tracked, self.request.objective, drawn, declared, straight, guidance, switches, errors)
+        x, y, heading = switches.poses[-1].tolist()
+        clearance = math.inf
+        if not self.free_space.empty:
+            body = Footprint.of(tracked.robot, 0.0)
+            clearance = float(body.clearance(_predicted_poses(vehicle, switches), self.free_space).min())
+        end = (x, y, heading)
+        return GoalPlan(plan, self.goal, end, self.via, self.free_space, track.length, margin, clearance)
+
+    def _declared(self, track: Route, drift: Drift) -> tuple[Declared, int]:
+        """Turn a track of the pivot into a declared path, and say to which side it turns first."""
+        if track.length > LONGEST:
+            raise InputError(f"the way is {track.length:.3g} l long; at most {LONGEST:g} l can be planned")
+        poses = track.poses(_SPACING)
         if len(poses) < 2:
             raise InputError("start and goal are the same; nothing to do")
-        heading = poses[:, 2] - slips(poses[:, 2], limits.drift)
+        heading = poses[:, 2] - slips(poses[:, 2], drift)
         heading += self.start[2] - heading[0]
         q = poses[:, :2]
-        p = q + tracked.rod * np.stack([np.cos(heading), np.sin(heading)], 1)
+        p = q + self.tracked.rod * np.stack([np.cos(heading), np.sin(heading)], 1)
         arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(q, axis=0).T))])
-        guide = Reference(p, q, heading, arc, False)
-        declared = Declared(guide, 0.0, 0.0, 0.0, ())
-        turning = np.flatnonzero(np.abs(np.diff(heading)) > 1e-9)
-        sense = 1 if not len(turning) or np.diff(heading)[turning[0]] > 0 else -1
-        plan = scheduled(
-            tracked,
-            Path2D(p, False),
-            declared,
-            straight,
-            self.objective,
-            dwell,
-            seed=self.seed,
-            start=lambda _: Start(self.start, 0, sense),
-            finish=ending_at(self.goal, vehicle, min(dwell, max(self.least, _SHORTER * dwell)), q),
-        )
-        # The bound is for paths that turn less than the robot can; these arcs turn as much as it can.
-        plan = replace(plan, guaranteed=None, minimum_dwell=min(dwell, float(plan.dwells.min())))
-        x, y, angle = plan.poses[-1].tolist()
-        clearance = math.inf
-        if not self.room.empty:
-            body = Footprint.of(tracked.robot, 0.0)
-            clearance = float(body.clearance(_swum(plan), self.room).min())
-        return GoalPlan(plan, self.goal, (x, y, angle), self.via, self.room, way.length, margin, clearance)
+        turns = np.diff(heading)
+        turning = np.flatnonzero(np.abs(turns) > 1e-9)
+        sense = 1 if not len(turning) or turns[turning[0]] > 0 else -1
+        return Declared(Reference(p, q, heading, arc, False), 0.0, 0.0, 0.0, ()), sense
 
 
 def _slip_at(heading: Floats, drift: Drift) -> Floats:
-    """Angle from a heading to the direction of motion."""
+    """Compute the angle from a heading to the direction of motion."""
     course = heading
     for _ in range(30):
         course = heading + slips(course, drift)
     return np.asarray(course - heading)
 
 
-def _swum(plan: Plan) -> Floats:
-    """Predicted poses of the head's centre, several a dwell."""
-    dwells = plan.dwells
-    times = dwells[:, None] * np.arange(0, 9) / 8
-    changes = pose_changes(plan.vehicle, plan.first_direction, dwells, times)
-    poses = planar.compose(plan.poses[:-1, None], changes)
-    poses[..., :2] += plan.vehicle.current * times[..., None]
+def _predicted_poses(vehicle: Vehicle, switches: Switches) -> Floats:
+    """Predict poses (K, 3) of the head's centre, several a dwell."""
+    times = switches.dwells[:, None] * np.arange(0, 9) / 8
+    changes = pose_changes(vehicle, switches.first_direction, switches.dwells, times)
+    poses = planar.compose(switches.poses[:-1, None], changes)
+    poses[..., :2] += vehicle.current * times[..., None]
     return np.asarray(poses.reshape(-1, 3))

@@ -1,17 +1,17 @@
 """The declared path: what the robot can follow of the path as drawn.
 
-A path that the pivot can follow with some room is declared as it is. Otherwise the nearest path that it can follow
-is declared (`planner.paths.nearest_feasible`), by root mean square or by the largest distance. Or corners are
-rounded by arcs (`planner.paths.fillets`), or the path is refused. How far the declared path is from the drawn one
-is told from both
-sides: a missed corner is a point of the drawn path that is far from the declared one.
+A path that the pivot can follow with some room is declared as it is. Otherwise the nearest path that it can
+follow is declared (`planner.paths.nearest_feasible`), by root mean square or by the largest distance; or corners
+are rounded by arcs (`planner.paths.fillets`); or the path is refused. The distance between the declared and the
+drawn path is reported from both sides: a missed corner is a point of the drawn path that is far from the
+declared one.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
 
@@ -21,28 +21,27 @@ from planner.paths.nearest_feasible import nearest_path
 from planner.paths.path import Path2D, smoothed
 from planner.paths.tractrix import Drift, Reference, reference
 from planner.paths.units import LONGEST, extent
+from planner.planning.request import Corner
 from planner.vehicle.vehicle import Vehicle
 from sim.io.errors import InputError
 
-Corner = Literal["nearest", "minimax", "fillet", "error"]
 AS_DRAWN = 0.85  # share of the pivot's largest curvature up to which a path is followed as it was drawn
 ROOMS = (0.92, 0.85, 0.7, 0.55)  # shares of it that the nearest path may use
 TIGHTEST = 0.95  # a reference that needs more than this share is refused
-LOST = 0.3  # declared paths further off than this share of the drawn one's extent, or than the radius of the
-# robot's circle, are refused
-WARN = 0.1
+LOST = 0.3  # share of the drawn path's extent; a declared path that is further off is refused
+WARN = 0.1  # share of the extent; a declared path that is further off gets a warning
 _FILLET_ROOM = 0.7
 _SPACING = 0.02  # of points on the reference, in l
 _MOST_POINTS = 150_000
-_SCALES = (1.5, 2.0, 2.5, 3.5, 5.0, 7.5, 12.0, 20.0)  # tried for a message
-_NOISY = 1.5  # times as long as when it is smoothed
+_SCALES = (1.5, 2.0, 2.5, 3.5, 5.0, 7.5, 12.0, 20.0)  # that a message may suggest
+_NOISY = 1.5  # ratio of a path's length to that of the smoothed path
 
 
 class Feasibility(NamedTuple):
-    """What decides which paths can be followed, and which is chosen."""
+    """What decides whether a path can be followed, and which one is declared if it cannot."""
 
     vehicle: Vehicle  # its pivot radius limits the curvature
-    distance: float  # from the pivot to the tracked point
+    rod: float  # from the pivot to the tracked point
     drift: Drift  # what carries the robot off its heading
     corner: Corner  # what to do with places that are too tight
     time_weight: float = 0.0  # as in `planner.paths.nearest_feasible` [l²]
@@ -59,76 +58,77 @@ class Declared:
     warnings: tuple[str, ...]
 
 
-def declare(raw: Path2D, own: Feasibility) -> Declared:
-    """Choose what the robot will follow of the path as drawn.
+def declare(raw: Path2D, feasibility: Feasibility) -> Declared:
+    """Choose the path that the robot will follow.
 
     Raises:
-        InputError: the path is too tight; names the place, the radii and a scale that works. Or corner or time
-            weight are no such thing.
+        InputError: the path is too tight (the message names the place, the radii and a scale that works), or
+            corner or time weight are not allowed.
     """
-    if own.corner not in get_args(Corner):
-        raise InputError(f"corner {own.corner!r}; allowed are {', '.join(get_args(Corner))}")
-    if not (math.isfinite(own.time_weight) and own.time_weight >= 0):
-        raise InputError(f"time weight {own.time_weight:g}; give a number of l², 0 or more")
-    if own.time_weight and own.corner not in ("nearest", "minimax"):
-        raise InputError(f"a time weight needs corner = nearest or minimax, not {own.corner}")
-    found = _try(raw, own)
-    if found is None:
-        raise InputError(_too_tight(raw, own))
-    limit = TIGHTEST / own.vehicle.pivot_radius
-    largest = max(extent(raw))
-    curvature = float(np.abs(found.curvature).max())
+    if feasibility.corner not in get_args(Corner):
+        raise InputError(f"corner {feasibility.corner!r}; allowed are {', '.join(get_args(Corner))}")
+    if not (math.isfinite(feasibility.time_weight) and feasibility.time_weight >= 0):
+        raise InputError(f"time weight {feasibility.time_weight:g}; give a number of l², 0 or more")
+    if feasibility.time_weight and feasibility.corner not in ("nearest", "minimax"):
+        raise InputError(f"a time weight needs corner = nearest or minimax, not {feasibility.corner}")
+    followed = _try(raw, feasibility)
+    if followed is None:
+        raise InputError(_too_tight(raw, feasibility))
+    curvature = float(np.abs(followed.curvature).max())
+    off_drawn, missed = two_sided(followed.p, raw.polyline())
+    distance = max(off_drawn, missed)
+    too_sharp = curvature > TIGHTEST / feasibility.vehicle.pivot_radius
+    if too_sharp or distance > _lost(raw, feasibility.vehicle):
+        raise InputError(_too_tight(raw, feasibility))
     warnings = []
-    if curvature > limit:
-        raise InputError(_too_tight(raw, own))
-    off, missed = two_sided(found.p, raw.polyline())
-    if max(off, missed) > _lost(raw, own.vehicle):
-        raise InputError(_too_tight(raw, own))
-    if max(off, missed) > WARN * largest:
+    if distance > WARN * max(extent(raw)):
         warnings.append(
-            f"the shape is lost in part: the declared path is up to {max(off, missed):.2g} l from the drawn one, "
-            f"which is {largest:.3g} l across; draw it larger"
+            f"the shape is lost in part: the declared path is up to {distance:.2g} l from the drawn one, "
+            f"which is {max(extent(raw)):.3g} l across; draw it larger"
         )
-    return Declared(found, curvature, off, missed, tuple(warnings))
+    return Declared(followed, curvature, off_drawn, missed, tuple(warnings))
 
 
-def _try(raw: Path2D, own: Feasibility) -> Reference | None:
-    """A reference that can be followed, or none."""
-    vehicle, distance, drift, corner, time_weight = own
+def _try(raw: Path2D, feasibility: Feasibility) -> Reference | None:
+    """Find a reference that can be followed; None if there is none."""
+    vehicle, rod, drift, corner, time_weight = feasibility
     limit = TIGHTEST / vehicle.pivot_radius
-    drawn = reference(raw, distance, _spacing(raw), drift)
+    drawn = reference(raw, rod, _spacing(raw), drift)
     sharpest = np.abs(drawn.curvature).max()
     if sharpest * vehicle.pivot_radius <= AS_DRAWN and not time_weight:
         return drawn
     if corner == "error":
         _refuse_corner(raw)
         return drawn if sharpest <= limit else None
-    if _smoothing(raw, vehicle.turn_radius / 4):
+    if _smoothing_advice(raw, vehicle.turn_radius / 4):
         return None
     if corner == "fillet":
-        path = _rounded(raw, own)
-        found = reference(path, distance, _spacing(path), drift)
-        return found if np.abs(found.curvature).max() <= limit else None
+        path = _rounded(raw, feasibility)
+        rounded = reference(path, rod, _spacing(path), drift)
+        return rounded if np.abs(rounded.curvature).max() <= limit else None
     for room in ROOMS:
         path = nearest_path(
-            raw, max(distance, 0.0), vehicle.pivot_radius / room, drift=drift, minimax=corner == "minimax",
+            raw, max(rod, 0.0), vehicle.pivot_radius / room, drift=drift, minimax=corner == "minimax",
             time_weight=time_weight,
         )  # fmt: skip
-        found = reference(path, distance, _spacing(path), drift)
-        if np.abs(found.curvature).max() <= limit:
-            return found
+        nearest = reference(path, rod, _spacing(path), drift)
+        if np.abs(nearest.curvature).max() <= limit:
+            return nearest
     return None
 
 
 def _lost(raw: Path2D, vehicle: Vehicle) -> float:
+    """Return the distance at which a declared path has lost the shape."""
     return min(LOST * max(extent(raw)), vehicle.turn_radius)
 
 
 def _spacing(path: Path2D) -> float:
+    """Choose the spacing of the reference's points."""
     return max(_SPACING, path.length / _MOST_POINTS)
 
 
 def _refuse_corner(raw: Path2D) -> None:
+    """Refuse a path with a sharp corner, and name the corner."""
     angle = np.abs(kinks(raw))
     sharpest = int(angle.argmax())
     if angle[sharpest] > CORNER:
@@ -139,14 +139,14 @@ def _refuse_corner(raw: Path2D) -> None:
         )
 
 
-def _rounded(raw: Path2D, own: Feasibility) -> Path2D:
-    """Corners rounded by the smallest radius that leaves the pivot some room."""
-    limit = _FILLET_ROOM / own.vehicle.pivot_radius
-    low, high = 0.0, min(largest_fillet(raw), math.hypot(own.distance, 1 / limit))
+def _rounded(raw: Path2D, feasibility: Feasibility) -> Path2D:
+    """Round corners by the smallest radius that leaves the pivot some room."""
+    limit = _FILLET_ROOM / feasibility.vehicle.pivot_radius
+    low, high = 0.0, min(largest_fillet(raw), math.hypot(feasibility.rod, 1 / limit))
 
     def tightest(radius: float) -> float:
         path = fillet(raw, radius)
-        return float(np.abs(reference(path, own.distance, _spacing(path), own.drift).curvature).max())
+        return float(np.abs(reference(path, feasibility.rod, _spacing(path), feasibility.drift).curvature).max())
 
     if tightest(high) > limit:
         return fillet(raw, high)
@@ -156,14 +156,15 @@ def _rounded(raw: Path2D, own: Feasibility) -> Path2D:
     return fillet(raw, high)
 
 
-def _too_tight(raw: Path2D, own: Feasibility) -> str:
-    vehicle = own.vehicle
-    drawn = reference(raw, own.distance, _spacing(raw), own.drift)
+def _too_tight(raw: Path2D, feasibility: Feasibility) -> str:
+    """Say where a path is too tight, and what to change."""
+    vehicle = feasibility.vehicle
+    drawn = reference(raw, feasibility.rod, _spacing(raw), feasibility.drift)
     curvature = np.abs(drawn.curvature)
     worst = int(curvature.argmax())
     x, y = drawn.p[worst]
-    remedy = _smoothing(raw, vehicle.turn_radius / 4)
-    scale = None if remedy else _working_scale(raw, own)
+    remedy = _smoothing_advice(raw, vehicle.turn_radius / 4)
+    scale = None if remedy else _working_scale(raw, feasibility)
     remedy = remedy or (f"scale the path by {scale:.3g}" if scale else "smooth the path, with --smooth LENGTH")
     return (
         f"path too tight at ({x:.3g}, {y:.3g}) l: the pivot would turn with radius {1 / curvature[worst]:.3g} l, "
@@ -172,15 +173,15 @@ def _too_tight(raw: Path2D, own: Feasibility) -> str:
     )
 
 
-def _working_scale(raw: Path2D, own: Feasibility) -> float | None:
-    """The first of some scales at which the path is accepted, tried; or none."""
+def _working_scale(raw: Path2D, feasibility: Feasibility) -> float | None:
+    """Find the first of _SCALES at which the path is accepted; None if there is none."""
 
     def works(factor: float) -> bool:
         larger = raw.scaled(factor)
-        found = _try(larger, own)
-        if found is None or np.abs(found.curvature).max() > TIGHTEST / own.vehicle.pivot_radius:
+        followed = _try(larger, feasibility)
+        if followed is None or np.abs(followed.curvature).max() > TIGHTEST / feasibility.vehicle.pivot_radius:
             return False
-        return max(two_sided(found.p, larger.polyline())) <= _lost(larger, own.vehicle)
+        return max(two_sided(followed.p, larger.polyline())) <= _lost(larger, feasibility.vehicle)
 
     for factor in _SCALES:
         if raw.length * factor < LONGEST and works(factor):
@@ -188,8 +189,8 @@ def _working_scale(raw: Path2D, own: Feasibility) -> float | None:
     return None
 
 
-def _smoothing(raw: Path2D, radius: float) -> str:
-    """What to do with a path that is long beside its smoothed self: it is noisy, and no scale helps."""
+def _smoothing_advice(raw: Path2D, radius: float) -> str:
+    """Advise to smooth a path that is much longer than after smoothing: it is noisy, and no scale helps."""
     length = float(f"{2 * radius:.2g}")
     if not length < raw.length / 2:
         return ""

@@ -1,42 +1,43 @@
 """plan(path, robot): from a path to a frozen plan, without simulating.
 
-1. The look-up table gives the vehicle, both directions and the memory of the last dwell
-(`planner.vehicle.from_table`).
-2. The shortest dwell is chosen from the objective (`planner.vehicle.dwell_choice`).
-3. The path that the robot can follow and that is nearest to the one drawn is declared
-(`planner.planning.declared_path`). Its
-   tractrix is the pivot's reference (`planner.paths.tractrix`).
-4. Hysteresis about the line of sight gives the dwells (`planner.planning.schedule`).
-5. The errors of this schedule are computed and stated (`planner.planning.stated_error`). If there is a tolerance
-and they
-   are above it, a shorter dwell is tried.
+1. The look-up table gives the vehicle: both directions, and the memory of the last dwell
+   (`planner.vehicle.from_table`).
+2. The objective chooses the shortest dwell (`planner.vehicle.dwell_choice`).
+3. The path that the robot can follow and that is nearest to the drawn one is declared
+   (`planner.planning.declared_path`). Its tractrix is the pivot's reference (`planner.paths.tractrix`).
+4. Line-of-sight guidance with hysteresis gives the dwells (`planner.planning.schedule`).
+5. The errors of this schedule are computed (`planner.planning.errors`). If the stated error is above the
+   tolerance, shorter dwells are tried.
 
-Errors are distances of the tracked point from the declared path. The distance of the declared path from the path
-as drawn is reported from both sides.
+Errors are distances of the tracked point from the declared path. The distance between the declared and the drawn
+path is reported from both sides.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal, NamedTuple
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, Unpack
+from warnings import warn
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.paths.distance import distance_to
 from planner.paths.path import Path2D
-from planner.paths.tractrix import Drift, Reference
+from planner.paths.tractrix import Drift
 from planner.paths.units import check_size
-from planner.planning.declared_path import Corner, Declared, Feasibility, declare
-from planner.planning.schedule import Start, follow
-from planner.planning.stated_error import guaranteed, look_ahead, predicted_error, rms_in_time, stated_error
+from planner.planning.declared_path import Declared, Feasibility, declare
+from planner.planning.errors import PlanErrors, plan_errors
+from planner.planning.line_of_sight import Guidance
+from planner.planning.request import PlanRequest, RequestOptions
+from planner.planning.schedule import follow
+from planner.planning.stated_error import guaranteed, look_ahead
 from planner.vehicle.calibration_table import CalibrationKnowledge
-from planner.vehicle.dwell_choice import QUICK, Objective, check_least, dwells_for
-from planner.vehicle.from_table import default_table, table_vehicle
-from planner.vehicle.rollout import Switches, trace
+from planner.vehicle.dwell_choice import Objective, check_least, dwells_for
+from planner.vehicle.from_table import OWN_TABLE
+from planner.vehicle.rollout import Switches
+from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
@@ -45,8 +46,27 @@ from sim.model.robot import Robot
 from sim.model.schedule import Schedule
 from surrogate.interface import LookupTable
 
-Point = Literal["head_centre", "head_tip", "pivot"]
-FEEDBACK_EVERY = 20  # flips
+# Attributes of a plan by their old names, for one release.
+_MOVED = {
+    "point": "tracked.point",
+    "offset": "tracked.offset",
+    "vehicle": "tracked.vehicle",
+    "model": "tracked.model",
+    "pivot_distance": "tracked.rod",
+    "raw": "drawn.polyline()",
+    "closed": "drawn.closed",
+    "guide": "declared.reference",
+    "off_drawn": "declared.off_drawn",
+    "missed": "declared.missed",
+    "zigzag_rms": "straight.rms",
+    "net_speed": "straight.net_speed",
+    "ahead": "guidance.ahead",
+    "swing": "guidance.swing",
+    "drawn_rms": "errors.drawn_rms",
+    "drawn_max": "errors.drawn_max",
+    "guaranteed": "errors.guaranteed",
+    "closure": "errors.closure",
+}
 
 
 @dataclass(frozen=True)
@@ -60,37 +80,44 @@ class Plan:
         (True, True)
     """
 
-    robot: Robot
-    point: Point
-    offset: float  # from the head's centre forward to the tracked point
-    first_direction: int
-    dwells: Floats  # (M,)
-    poses: Floats  # (M + 1, 3): predicted head's centre at the flips
-    track: Floats  # (K, 2): predicted tracked point, several samples a dwell
-    reference: Floats  # (m, 2): declared path
-    raw: Floats  # (k, 2): path as drawn
-    closed: bool
-    objective: Objective
-    minimum_dwell: float
-    off_drawn: float  # largest distance of a declared point from the drawn path
-    missed: float  # largest distance of a drawn point from the declared path
-    zigzag_rms: float  # of straight motion with this dwell: no schedule does better
-    predicted_rms: float
-    predicted_max: float
-    drawn_rms: float  # predicted, from the drawn path
-    drawn_max: float
-    stated_error: float  # holds for 95 % of the robots that the model's uncertainty allows, open loop
-    feedback_error: float  # the same where the pose is measured, and the rest planned again, every 20 flips
-    guaranteed: float | None  # bound for a robot without errors, however long the path; None: not known
-    closure: float | None
-    model: str  # hash of the look-up table
-    warnings: tuple[str, ...]
-    vehicle: Vehicle
-    guide: Reference  # declared path, with the pivot and heading that belong to it
-    pivot_distance: float
-    ahead: float  # look-ahead Δ
-    net_speed: float  # on a straight line
-    swing: float  # 2 h, of the hysteresis on a straight line
+    tracked: TrackedVehicle  # who follows
+    objective: Objective  # what decided the shortest dwell
+    drawn: Path2D  # the path that was asked for
+    declared: Declared  # the path that is followed, with the pivot's reference
+    straight: Zigzag  # straight motion with the shortest dwell: no schedule has a smaller rms error
+    guidance: Guidance  # when the motor flips
+    switches: Switches  # the schedule
+    errors: PlanErrors  # how far from the paths it leads
+
+    @property
+    def robot(self) -> Robot:
+        """The robot that the plan is for."""
+        return self.tracked.robot
+
+    @property
+    def first_direction(self) -> int:
+        """Direction of the motor in the first dwell, +1 or −1."""
+        return self.switches.first_direction
+
+    @property
+    def dwells(self) -> Floats:
+        """Dwell times (M,)."""
+        return self.switches.dwells
+
+    @property
+    def seconds(self) -> Floats:
+        """Dwell times (M,) [s]."""
+        return self.dwells * self.robot.time_scale
+
+    @property
+    def duration(self) -> float:
+        """Time of the whole schedule."""
+        return float(self.dwells.sum())
+
+    @property
+    def minimum_dwell(self) -> float:
+        """The shortest dwell that the schedule may have."""
+        return self.guidance.dwell
 
     @property
     def start(self) -> tuple[float, float, float]:
@@ -98,27 +125,67 @@ class Plan:
         x, y, heading = self.poses[0].tolist()
         return x, y, heading
 
+    @property
+    def poses(self) -> Floats:
+        """Predicted poses (M + 1, 3) of the head's centre at the flips and at the end."""
+        return self.switches.poses
+
+    @property
+    def track(self) -> Floats:
+        """Predicted track (K, 2) of the tracked point, several samples a dwell."""
+        return self.errors.track
+
+    @property
+    def reference(self) -> Floats:
+        """The declared path (m, 2)."""
+        return self.declared.reference.p
+
+    @property
+    def predicted_rms(self) -> float:
+        """Root mean square over time of the predicted distance from the declared path."""
+        return self.errors.predicted_rms
+
+    @property
+    def predicted_max(self) -> float:
+        """Largest predicted distance from the declared path."""
+        return self.errors.predicted_max
+
+    @property
+    def stated_error(self) -> float:
+        """Distance that 95 % of the robots that the model's uncertainty allows keep to, open loop."""
+        return self.errors.stated
+
+    @property
+    def feedback_error(self) -> float:
+        """The stated error where the pose is measured, and the rest planned again, every 20 flips."""
+        return self.errors.feedback
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know, in words."""
+        return (*self.declared.warnings, *self.tracked.warnings)
+
     def schedule(self, robot: Robot | None = None) -> Schedule:
-        """The schedule for `sim.motion.replay`.
+        """Return the schedule for `sim.motion.replay`.
 
         Args:
             robot: the robot that carries it out; default: the one that the plan was made for. Seconds and metres
                 stay as planned, so numbers change where its units of time and length are others.
         """
-        own = robot or self.robot
-        time, length = self.robot.time_scale / own.time_scale, self.robot.tail_length / own.tail_length
+        swims = robot or self.robot
+        time, length = self.robot.time_scale / swims.time_scale, self.robot.tail_length / swims.tail_length
         x, y, heading = self.start
         start = (x * length, y * length, heading)
-        return Schedule(own.group_values(), self.first_direction, self.dwells * time, start, own.time_scale)
+        return Schedule(swims.group_values(), self.first_direction, self.dwells * time, start, swims.time_scale)
 
-    @property
-    def duration(self) -> float:
-        return float(self.dwells.sum())
+    if not TYPE_CHECKING:
 
-    @property
-    def seconds(self) -> Floats:
-        """Dwell times [s]."""
-        return self.dwells * self.robot.time_scale
+        def __getattr__(self, name: str) -> Any:
+            if name not in _MOVED:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            warn(f"Plan.{name} is now Plan.{_MOVED[name]}", DeprecationWarning, stacklevel=2)
+            value = attrgetter(_MOVED[name].removesuffix("()"))(self)
+            return value() if _MOVED[name].endswith("()") else value
 
 
 def plan(
@@ -126,17 +193,9 @@ def plan(
     robot: Robot,
     *,
     lookup: LookupTable | None = None,
-    point: Point = "head_centre",
-    corner: Corner = "nearest",
-    time_weight: float = 0.0,
-    objective: Objective = "error",
-    minimum_dwell: float | None = None,
-    minimum_seconds: float | None = None,
-    dwell: float | None = None,
-    tolerance: float | None = None,
     knowledge: CalibrationKnowledge | None = None,
-    seed: int = 0,
     progress: Callable[[float], object] | None = None,
+    **options: Unpack[RequestOptions],
 ) -> Plan:
     """Plan the motor's switching times for a path.
 
@@ -144,20 +203,23 @@ def plan(
         path: (n, 2) points or a Path2D, lengths in tail lengths l.
         robot: the robot; its motor speed is used in both directions.
         lookup: trained table, or the table of this one robot; default the shipped one.
-        point: which point must follow the path.
-        corner: places that are too tight: declare the path that can be followed and is nearest by root mean square
-            ("nearest") or by its largest distance ("minimax"), round corners ("fillet"), or refuse ("error").
-        time_weight: for "nearest" and "minimax": the mean squared distance [l²] from the drawn path that is worth
-            as much as the time in which the whole path is followed; 0: distance alone counts.
-        objective: what decides the dwell: small "error", short "time", or few "flips"; see
-        `planner.vehicle.dwell_choice`.
-        minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
-        minimum_seconds: the same in seconds; the larger one counts.
-        dwell: this shortest dwell, and not the one that the objective would choose.
-        tolerance: largest acceptable stated error [l]. The dwell is shortened until it is kept.
         knowledge: what a calibration found besides the robot: covariance, current.
-        seed: of the random robots from which the stated error is computed.
         progress: called now and then with the share of the path that is done.
+        options: any of
+
+            - point: which point must follow the path: "head_centre" (default), "head_tip" or "pivot".
+            - corner: what to do with places that are too tight: declare the nearest path that can be followed, by
+              root mean square ("nearest", the default) or by its largest distance ("minimax"), round corners
+              ("fillet"), or refuse ("error").
+            - time_weight: for "nearest" and "minimax": the mean squared distance [l²] from the drawn path that is
+              worth as much as the time in which the whole path is followed; 0 (default): distance alone counts.
+            - objective: what decides the dwell: small "error" (default), short "time", or few "flips"; see
+              `planner.vehicle.dwell_choice`.
+            - minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
+            - minimum_seconds: the same in seconds; the larger one counts.
+            - dwell: this shortest dwell, and not the one that the objective would choose.
+            - tolerance: largest acceptable stated error [l]; the dwell is shortened until it is kept.
+            - seed: of the random robots from which the stated error is computed.
 
     Raises:
         InputError: the path is bad or too tight, the dwell too short, the tolerance too small, or the robot
@@ -169,197 +231,87 @@ def plan(
         >>> len(result.dwells) > 100, result.predicted_rms < 0.03
         (True, True)
     """
-    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0):
-        raise InputError(f"tolerance {tolerance:g} l; give a number above 0")
-    tracked = tracked_vehicle(robot, lookup, point, knowledge)
+    request = PlanRequest(**options)
+    tracked = tracked_vehicle(robot, lookup, request.point, knowledge)
+    return make_plan(path if isinstance(path, Path2D) else Path2D.of(path), tracked, request, progress)
+
+
+def make_plan(
+    drawn: Path2D,
+    tracked: TrackedVehicle,
+    request: PlanRequest,
+    progress: Callable[[float], object] | None = None,
+) -> Plan:
+    """Plan for a path, a vehicle and a request; see `plan`."""
     vehicle = tracked.vehicle
-    raw = path if isinstance(path, Path2D) else Path2D.of(path)
-    check_size(raw, robot, vehicle.turn_radius)
-    least = least_dwell(minimum_dwell, minimum_seconds, robot)
-    dwells = dwells_for(vehicle, objective, least) if dwell is None else [check_least(dwell)]
+    check_size(drawn, tracked.robot, vehicle.turn_radius)
+    least = request.least_dwell(tracked.robot)
+    if request.dwell is None:
+        dwells = dwells_for(vehicle, request.objective, least)
+    else:
+        dwells = [check_least(request.dwell)]
 
     @cache
-    def declared(drift: Drift) -> Declared:
-        return declare(raw, Feasibility(vehicle, tracked.rod, drift, corner, time_weight))
+    def declared_path(drift: Drift) -> Declared:
+        feasibility = Feasibility(vehicle, tracked.rod, drift, request.corner, request.time_weight)
+        return declare(drawn, feasibility)
 
-    def made(dwell: float) -> Plan:
+    def with_dwell(dwell: float) -> Plan:
         straight = zigzag(vehicle, dwell, tracked.offset)
-        found = declared(zigzag_drift(vehicle, straight, dwell))
-        return scheduled(tracked, raw, found, straight, objective, dwell, seed=seed, progress=progress)
+        declared = declared_path(zigzag_drift(vehicle, straight, dwell))
+        guidance = choose_guidance(vehicle, declared, straight, dwell)
+        switches = follow(declared.reference, vehicle, guidance, tracked.offset, progress=progress)
+        bound = guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
+        errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed)
+        return Plan(tracked, request.objective, drawn, declared, straight, guidance, switches, errors)
 
-    best = made(dwells[0])
-    if tolerance is None or best.stated_error <= tolerance:
-        return best
-    low, high = 0, len(dwells)  # the first dwell is too long; halve between it and the shortest
-    kept: Plan | None = None
+    first = with_dwell(dwells[0])
+    if request.tolerance is None or first.stated_error <= request.tolerance:
+        return first
+    return _shortened(first, dwells, with_dwell, request.tolerance)
+
+
+def _shortened(first: Plan, dwells: list[float], with_dwell: Callable[[float], Plan], tolerance: float) -> Plan:
+    """Halve between the first dwell, which is too long, and the shortest one, until the tolerance is kept.
+
+    Raises:
+        InputError: no dwell that was tried keeps the tolerance.
+    """
+    best, kept = first, None
+    low, high = 0, len(dwells)
     while high - low > 1:
         middle = (low + high) // 2
-        tried = made(dwells[middle])
-        if tried.stated_error < best.stated_error:
-            best = tried
-        if tried.stated_error <= tolerance:
-            kept, high = tried, middle
+        candidate = with_dwell(dwells[middle])
+        if candidate.stated_error < best.stated_error:
+            best = candidate
+        if candidate.stated_error <= tolerance:
+            kept, high = candidate, middle
         else:
             low = middle
     if kept is None:
         raise InputError(
             f"tolerance {tolerance:g} l cannot be kept: the smallest stated error is {best.stated_error:.3g} l, "
             f"with dwells from {best.minimum_dwell:.2g} time units; allow more, or make a table of this robot "
-            "with python -m surrogate robot"
+            f"with {OWN_TABLE}"
         )
     return kept
 
 
-class TrackedVehicle(NamedTuple):
-    """Who follows a path: the robot, its vehicle, and the point of its axis that must be on the path."""
-
-    robot: Robot
-    vehicle: Vehicle
-    point: Point
-    offset: float  # from the head's centre forward to the point
-    model: str  # hash of the look-up table
-
-    @property
-    def rod(self) -> float:
-        """Distance from the pivot to the point."""
-        return self.vehicle.pivot_distance + self.offset
-
-
-def tracked_vehicle(
-    robot: Robot, lookup: LookupTable | None, point: Point, knowledge: CalibrationKnowledge | None
-) -> TrackedVehicle:
-    """Ask a table for the vehicle of a robot, and add the tracked point; default: the shipped table."""
-    lookup = default_table() if lookup is None else lookup
-    vehicle = table_vehicle(robot, lookup, knowledge)
-    return TrackedVehicle(robot, vehicle, point, _offset(point, robot, vehicle), lookup.identity)
-
-
 def zigzag_drift(vehicle: Vehicle, straight: Zigzag, dwell: float) -> Drift:
-    """What carries the robot off its heading, with one shortest dwell.
+    """Return what carries the robot off its heading, with one shortest dwell, as shares of its net speed.
 
     Raises:
         InputError: with such dwells the robot does not get ahead.
     """
     if straight.speed <= 0:
         raise InputError(f"with dwells of {dwell:.2g} time units the robot does not get ahead; allow longer ones")
-    return Drift(_clean(straight.drift / straight.speed), _shares(vehicle.current, straight.speed))
+    sideways = straight.drift / straight.speed
+    x, y = (vehicle.current / straight.speed).tolist()
+    # A mirror-symmetric robot has no drift: what is left is rounding.
+    return Drift(0.0 if abs(sideways) < 1e-9 else sideways, (x, y))
 
 
-def scheduled(
-    tracked: TrackedVehicle,
-    raw: Path2D,
-    declared: Declared,
-    straight: Zigzag,
-    objective: Objective,
-    dwell: float,
-    *,
-    seed: int = 0,
-    progress: Callable[[float], object] | None = None,
-    start: Callable[[float], Start] | None = None,
-    finish: Callable[[Switches], Switches] | None = None,
-) -> Plan:
-    """The plan that follows a declared path with one shortest dwell.
-
-    Args:
-        tracked: who follows.
-        raw: the path as drawn.
-        declared: the path that is followed, with the pivot's poses.
-        straight: the zigzag with this dwell.
-        objective: what decided the dwell.
-        dwell: the shortest one.
-        seed: of the random robots.
-        progress: called now and then with the share of the path that is done.
-        start: where the schedule begins, from the swing of the zigzag; default: as the path begins.
-        finish: changes the schedule before its errors are computed.
-    """
-    robot, vehicle, point, offset, model = tracked
-    guide, distance = declared.reference, tracked.rod
+def choose_guidance(vehicle: Vehicle, declared: Declared, straight: Zigzag, dwell: float) -> Guidance:
+    """Choose look-ahead and hysteresis for a declared path and a shortest dwell."""
     ahead = look_ahead(vehicle, declared.curvature, straight)
-    swing = straight.hysteresis(ahead)
-    switches = follow(
-        guide,
-        vehicle,
-        pivot_distance=distance,
-        ahead=ahead,
-        dwell=dwell,
-        swing=swing,
-        offset=offset,
-        start=None if start is None else start(swing),
-        progress=progress,
-    )
-    if finish is not None:
-        switches = finish(switches)
-    track = trace(vehicle, switches, offset)
-    error = predicted_error(guide.p, track, closed=raw.closed)
-    drawn = distance_to(raw.polyline(), track)
-    return Plan(
-        robot=robot,
-        point=point,
-        offset=offset,
-        first_direction=switches.first_direction,
-        dwells=switches.dwells,
-        poses=switches.poses,
-        track=track,
-        reference=guide.p,
-        raw=raw.polyline(),
-        closed=raw.closed,
-        objective=objective,
-        minimum_dwell=dwell,
-        off_drawn=declared.off_drawn,
-        missed=declared.missed,
-        zigzag_rms=straight.rms,
-        predicted_rms=rms_in_time(error.distance, switches.dwells),
-        predicted_max=error.largest,
-        drawn_rms=rms_in_time(drawn, switches.dwells),
-        drawn_max=float(drawn.max()),
-        stated_error=stated_error(vehicle, switches, track, error, seed=seed),
-        feedback_error=stated_error(vehicle, switches, track, error, every=FEEDBACK_EVERY, seed=seed),
-        guaranteed=guaranteed(vehicle, distance, straight.swing, ahead),
-        closure=float(np.linalg.norm(track[-1] - guide.p[0])) if raw.closed else None,
-        model=model,
-        warnings=(*declared.warnings, *_warnings(vehicle)),
-        vehicle=vehicle,
-        guide=guide,
-        pivot_distance=distance,
-        ahead=ahead,
-        net_speed=straight.net_speed,
-        swing=swing,
-    )
-
-
-def _warnings(vehicle: Vehicle) -> tuple[str, ...]:
-    if vehicle.tail_gap < vehicle.least_gap:
-        without = "the model has no contact" if vehicle.least_gap == 1.0 else "contact does not hold them apart"
-        return (f"tails touch (predicted gap {vehicle.tail_gap:.2f} diameters): {without}",)
-    return ()
-
-
-def least_dwell(dwell: float | None, seconds: float | None, robot: Robot) -> float | None:
-    """The shortest dwell that the motor allows, in time units."""
-    if seconds is None:
-        return dwell
-    if not (math.isfinite(seconds) and seconds > 0):
-        raise InputError(f"minimum dwell {seconds:g} s; give a number above 0")
-    own = seconds / robot.time_scale
-    return max(own, dwell) if dwell is not None else max(own, QUICK)
-
-
-def _clean(value: float) -> float:
-    """Rounding errors of a mirror-symmetric robot are no drift."""
-    return 0.0 if abs(value) < 1e-9 else value
-
-
-def _shares(current: Floats, speed: float) -> tuple[float, float]:
-    x, y = (current / speed).tolist()
-    return x, y
-
-
-def _offset(point: Point, robot: Robot, vehicle: Vehicle) -> float:
-    """Distance from the head's centre forward to the tracked point [l]."""
-    if point == "head_centre":
-        return 0.0
-    if point == "head_tip":
-        return robot.head_length / 2 / robot.tail_length
-    if point == "pivot":
-        return -vehicle.pivot_distance
-    raise InputError(f"point {point!r}; allowed are head_centre, head_tip, pivot")
+    return Guidance(dwell, ahead, straight.hysteresis(ahead))

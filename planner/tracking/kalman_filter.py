@@ -49,15 +49,15 @@ class Estimate:
 
     Args:
         plan: gives the robot and where it starts.
-        follower: of the same plan; it is told what is learned.
+        law: guidance of the same plan; its vehicle follows what is learned.
         noise: standard deviations of a pose: of x and y [l], of the heading [rad].
     """
 
-    def __init__(self, plan: Plan, follower: LineOfSight, noise: tuple[float, float]):
-        self._twist: ROWS = plan.vehicle.twist.tolist()
-        self._current: list[float] = plan.vehicle.current.tolist()
-        self._speed = plan.net_speed
-        self._follower = follower
+    def __init__(self, plan: Plan, law: LineOfSight, noise: tuple[float, float]):
+        self._twist: ROWS = plan.tracked.vehicle.twist.tolist()
+        self._current: list[float] = plan.tracked.vehicle.current.tolist()
+        self._speed = plan.straight.net_speed
+        self._law = law
         self._noise = (noise[0] ** 2, noise[0] ** 2, noise[1] ** 2)
         self._most = most(plan)
         self.state: list[float] = [*plan.start, *[0.0] * (STATES - 3)]
@@ -70,7 +70,7 @@ class Estimate:
     def apply(self) -> None:
         """Let the follower move like the learned robot."""
         state = self.state
-        self._follower.set_robot(
+        self._law.update_vehicle(
             [self._learned(0), self._learned(1)],
             state[7],
             [self._current[0] + state[8], self._current[1] + state[9]],
@@ -153,7 +153,7 @@ class Estimate:
         """What a time in a dwell that began with `heading` adds to the pose."""
         state, sense = self.state, dwell.sense
         side = 0 if sense > 0 else 1
-        z, x, turned = self._follower.lag_after(side, dwell.before, time)
+        z, x, turned = self._law.lag_after(side, dwell.before, time)
         turned += sense * state[7]
         forward, left, rate = self._learned(side)
         along, across, angle = arc_terms(rate, time)
@@ -188,7 +188,7 @@ class _Change(NamedTuple):
 
 def prior(plan: Plan) -> ROWS:
     """Covariance (10, 10) before the first pose: how well the robot was put, and what the plan says."""
-    vehicle = plan.vehicle
+    vehicle = plan.tracked.vehicle
     P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in DOUBT), 1e-6, 1e-12, 1e-12])
     speed = np.hypot(vehicle.twist[0, 0], vehicle.twist[0, 1])
     for mode in vehicle.modes:
@@ -207,7 +207,7 @@ def prior(plan: Plan) -> ROWS:
 
 def most(plan: Plan) -> tuple[float, ...]:
     """Largest values (7,) of the learned numbers."""
-    return *MOST, MOST_CURRENT * plan.net_speed, MOST_CURRENT * plan.net_speed
+    return *MOST, MOST_CURRENT * plan.straight.net_speed, MOST_CURRENT * plan.straight.net_speed
 
 
 def _identity() -> ROWS:

@@ -77,10 +77,9 @@ class Tracker:
         self, plan: Plan, *, noise: tuple[float, float] = (0.01, 0.01), latency: float = 0.0, begin: float = 0.0
     ):
         self.shortest = plan.minimum_dwell
-        self._follower = LineOfSight(
-            plan.guide, plan.vehicle, plan.ahead, plan.pivot_distance, plan.offset, plan.minimum_dwell, plan.swing
-        )
-        self._estimate = Estimate(plan, self._follower, noise)
+        tracked = plan.tracked
+        self._law = LineOfSight(plan.declared.reference, tracked.vehicle, plan.guidance, tracked.offset)
+        self._estimate = Estimate(plan, self._law, noise)
         self._latency = latency
         self._swing_error = plan.predicted_max
         self._now = begin
@@ -145,7 +144,7 @@ class Tracker:
         done = self._dwell._replace(length=self._flip_at - self._dwell.start)
         self._estimate.advance(done)
         self._estimate.apply()
-        self._follower.learn(self._estimate.pose, done.sense)
+        self._law.integrate(self._estimate.pose, done.sense)
         self._past.append(done)
         self._dwell = Dwell(self._flip_at, -done.sense, done.length, 0.0)
         self._plan_flip()
@@ -154,14 +153,12 @@ class Tracker:
     def _plan_flip(self) -> None:
         """Time of the next flip, and whether the path ends there."""
         self._estimate.apply()
-        place = self._follower.place
+        place = self._law.place
         try:
-            length, self._ends = self._follower.next_dwell(
-                self._estimate.pose, self._dwell.sense, self._dwell.before
-            )
+            length, self._ends = self._law.next_dwell(self._estimate.pose, self._dwell.sense, self._dwell.before)
         except InputError:  # far off the path: swim on
             length, self._ends = self.shortest, False
-        self._follower.place = place
+        self._law.place = place
         start = self._dwell.start
         self._flip_at = max(start + length, self._now, start + (0.0 if self._ends else self.shortest))
 

@@ -23,6 +23,7 @@ from surrogate.interface import LookupTable
 _STEADY = ("v_z", "v_x", "omega_yr_bar")
 _ODD = 0.2  # share of a table's error that has opposite signs in the two directions
 _STEP = 0.02  # of a coefficient, for derivatives
+OWN_TABLE = "softflagella surrogate robot"  # makes the table of one robot
 
 
 def default_table() -> LookupTable:
@@ -171,6 +172,7 @@ def _slope(robot: Robot, lookup: LookupTable, twist: Floats, name: str) -> Float
             ends.append((twist, 0.0))
     (one, at), (two, to) = ends
     if at == to:
-        raise InputError(f"the table does not say what {name} changes; make the robot's own table, with "
-                         "python -m surrogate robot")  # fmt: skip
+        raise InputError(
+            f"the table does not say what {name} changes; make the robot's own table with {OWN_TABLE}"
+        )
     return np.asarray((one - two) / (at - to))

@@ -74,7 +74,7 @@ def swim(tracker: Tracks, plan: Plan, truth: Vehicle, camera: Camera, *, changes
         dwells.append(known - start)
         pose, before, start = at(known), known - start, known
         command = tracker.update(known)
-    followed = planar.compose(np.array(track), np.array([plan.offset, 0.0, 0.0]))
+    followed = planar.compose(np.array(track), np.array([plan.tracked.offset, 0.0, 0.0]))
     return distance_to(plan.reference, followed[:, :2]), dwells
 
 

@@ -76,7 +76,7 @@ class Both:
     ids=["good", "none at all", "late, gaps, wrong", "often and bad"],
 )
 def test_the_same_orders_as_in_python(compiled: CompiledTracker, camera: Camera) -> None:
-    car = planned().vehicle
+    car = planned().tracked.vehicle
     truth = replace(car, twist=car.twist * np.array([[0.97, 0.97, 1.04], [0.97, 0.97, 0.98]]))
     both = Both(Tracker(planned()), compiled)
     swim(both, planned(), truth, camera)
@@ -103,7 +103,7 @@ def test_the_same_orders_from_nonsense(compiled: CompiledTracker, seed: int) -> 
 @pytest.mark.parametrize("precise", [True, False], ids=["double", "single"])
 def test_in_c_the_robot_stays_on_its_path_as_well(tmp_path: Path, precise: bool) -> None:
     single = CompiledTracker(planned(), tmp_path, single=not precise)
-    car = planned().vehicle
+    car = planned().tracked.vehicle
     truth = replace(car, twist=car.twist * np.array([[0.97, 0.97, 1.04], [0.97, 0.97, 0.98]]))
     distance, dwells = swim(single, planned(), truth, Camera(delay=1.0, gaps=0.2))
     double, _ = swim(Tracker(planned()), planned(), truth, Camera(delay=1.0, gaps=0.2))
@@ -115,7 +115,9 @@ def test_memory_is_what_the_documentation_says(tmp_path: Path, compiled: Compile
     single = CompiledTracker(planned(), tmp_path, single=True)
     assert single.memory <= 900
     assert compiled.memory <= 1600
-    assert table_bytes(planned()) == 2 * (2 * 33 * 101 * 3 + 2 * 101 * 3) + 12 * len(planned().guide.q)
+    assert table_bytes(planned()) == 2 * (2 * 33 * 101 * 3 + 2 * 101 * 3) + 12 * len(
+        planned().declared.reference.q
+    )
 
 
 def test_the_example_in_the_header_compiles(tmp_path: Path) -> None:

@@ -26,9 +26,9 @@ def planned() -> Plan:
 
 @pytest.fixture
 def estimate(planned: Plan) -> Estimate:
-    follower = LineOfSight(planned.guide, planned.vehicle, planned.ahead, planned.pivot_distance, planned.offset,
-                        planned.minimum_dwell, planned.swing)  # fmt: skip
-    found = Estimate(planned, follower, (0.01, 0.01))
+    tracked = planned.tracked
+    law = LineOfSight(planned.declared.reference, tracked.vehicle, planned.guidance, tracked.offset)
+    found = Estimate(planned, law, (0.01, 0.01))
     found.state = list(STATE)
     return found
 
@@ -65,7 +65,7 @@ def test_counting_back_and_going_forward_end_at_the_same_pose(estimate: Estimate
     found = estimate.seen_from(0.2, NOW, PAST)
     assert found is not None
     state = np.array(STATE)
-    car = planned.vehicle
+    car = planned.tracked.vehicle
     twist = car.twist * np.array([[1.04, 0.95, 1.03], [1.04, 0.95, 0.98]])
 
     def change(dwell: Dwell, time: float) -> np.ndarray:

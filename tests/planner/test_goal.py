@@ -30,7 +30,9 @@ BOX = [[-2, -4], [9, -4], [9, 4], [-2, 4]]
 def end_of(goal_plan: GoalPlan) -> np.ndarray:
     """The end of the schedule from the start that was asked for, computed anew."""
     plan = goal_plan.plan
-    return poses_at_flips(plan.vehicle, Switches(plan.first_direction, plan.dwells, np.array([plan.start])))[-1]
+    return poses_at_flips(
+        plan.tracked.vehicle, Switches(plan.first_direction, plan.dwells, np.array([plan.start]))
+    )[-1]
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -51,13 +53,13 @@ def test_the_motion_begins_and_ends_as_asked(seed: int) -> None:
 def test_time_is_within_5_percent_of_brute_force(seed: int) -> None:
     goal = random_goal(np.random.default_rng(seed))
     goal_plan = to_goal((0, 0, 0), goal, CONTROL)
-    assert goal_plan.plan.duration < 1.05 * brute_force(goal_plan.plan.vehicle, goal)
+    assert goal_plan.plan.duration < 1.05 * brute_force(goal_plan.plan.tracked.vehicle, goal)
 
 
 def test_a_plan_to_a_goal_gives_no_guarantee_and_is_read_again(tmp_path: Path) -> None:
     """The guaranteed bound is for paths with wider turns."""
     plan = to_goal((0, 0, 0), (2, 1.5, 2.0), CONTROL).plan
-    assert plan.guaranteed is None
+    assert plan.errors.guaranteed is None
     (tmp_path / "plan.json").write_text(json.dumps(plan_record(plan)))
     assert load_plan(tmp_path / "plan.json")["guaranteed_error_over_l"] is None
 
@@ -76,7 +78,7 @@ def test_a_robot_that_turns_unequally_in_a_current_arrives() -> None:
     robot = replace(CONTROL, effects={"left_right_bias": 0.2})
     drifting = CalibrationKnowledge(current=(2e-5, -1e-5))
     goal_plan = to_goal((0, 0, 0.3), (3, 2, -1), robot, lookup=tabulate(robot), knowledge=drifting)
-    assert np.abs(goal_plan.plan.vehicle.current).max() > 0
+    assert np.abs(goal_plan.plan.tracked.vehicle.current).max() > 0
     assert end_of(goal_plan)[:2] == pytest.approx([3, 2], abs=1e-3)
 
 
@@ -89,7 +91,7 @@ def test_a_shortest_dwell_in_seconds_holds_to_the_end() -> None:
 def test_it_passes_places_on_the_way() -> None:
     goal_plan = to_goal((0, 0, 0), (0, 3, math.pi), CONTROL, via=[(2, 1), (2, 3)], objective="error")
     for place in goal_plan.via:
-        assert np.hypot(*(goal_plan.plan.guide.q - place).T).min() < 0.02
+        assert np.hypot(*(goal_plan.plan.declared.reference.q - place).T).min() < 0.02
 
 
 def test_the_margin_is_the_stated_error() -> None:

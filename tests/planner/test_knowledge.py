@@ -114,9 +114,9 @@ def test_a_current_is_steered_against() -> None:
     unit = CONTROL.tail_length / CONTROL.time_scale
     flow = CalibrationKnowledge(current=(0.0, 0.004 * unit))
     result = plan(Path2D.of([[0, 0], [12, 0]]), CONTROL, knowledge=flow)
-    assert result.predicted_rms < 1.4 * result.zigzag_rms
+    assert result.predicted_rms < 1.4 * result.straight.rms
     middle = result.poses[len(result.poses) // 2 :, 2].mean()
-    assert middle == pytest.approx(-math.asin(0.004 / result.net_speed), abs=0.01)
+    assert middle == pytest.approx(-math.asin(0.004 / result.straight.net_speed), abs=0.01)
     with pytest.raises(InputError, match="as fast as the robot"):
         plan(circle(3.0), CONTROL, knowledge=CalibrationKnowledge(current=(0.0, 0.5 * unit)))
 
@@ -128,7 +128,7 @@ def test_smoothing_takes_camera_noise_out_and_says_what_it_moves() -> None:
     found, moved = smoothed(noisy, 0.5)
     assert np.abs(np.hypot(*found.points.T) - 2.0).max() < 0.03
     assert 0.01 < moved < 0.15
-    assert plan(found, CONTROL).missed < 0.05
+    assert plan(found, CONTROL).declared.missed < 0.05
     with pytest.raises(InputError, match="smoothing over"):
         smoothed(noisy, -1.0)
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ from planner.paths.distance import distance_to
 from planner.paths.fillets import fillet
 from planner.paths.path import Path2D, circle, polygon
 from planner.paths.tractrix import reference
-from planner.planning.plan import plan
+from planner.planning.plan import _MOVED, plan
+from planner.planning.request import PlanRequest, RequestOptions
 from planner.planning.schedule import follow
 from planner.planning.stated_error import guaranteed, look_ahead
 from planner.vehicle.from_table import table_vehicle
@@ -29,7 +31,7 @@ from sim.mechanics import planar
 from sim.model.presets import PRESETS
 from sim.model.schedule import load_schedule
 from surrogate.table.model_file import load
-from tests.planner.vehicles import vehicle
+from tests.planner.vehicles import plain_guidance, vehicle
 
 CONTROL = PRESETS["paper-control"]
 
@@ -75,7 +77,7 @@ def test_the_bound_holds_on_random_paths(seed: int) -> None:
         pytest.skip("this path is tighter than the robot can turn")
     dwell = rng.uniform(0.3, 2.0)
     ahead = look_ahead(car, curvature)
-    switches = follow(ref, car, pivot_distance=car.pivot_distance, ahead=ahead, dwell=dwell, offset=0.0)
+    switches = follow(ref, car, plain_guidance(car, dwell, ahead))
     track = trace(car, switches, 0.0, samples=12)
     error = distance_to(ref.p, track[:-12])
     assert error.max() <= guaranteed(car, car.pivot_distance, car.yaw_rate * dwell, ahead)
@@ -87,9 +89,7 @@ def test_error_does_not_grow_with_length() -> None:
     worst = []
     for length in (20.0, 200.0):
         ref = reference(Path2D.of([[0, 0], [length, 0]]), car.pivot_distance, 0.01)
-        switches = follow(
-            ref, car, pivot_distance=car.pivot_distance, ahead=look_ahead(car, 0.0), dwell=1.0, offset=0.0
-        )
+        switches = follow(ref, car, plain_guidance(car, 1.0, look_ahead(car, 0.0)))
         track = trace(car, switches, 0.0)
         worst.append(np.abs(track[:, 1]).max())
     assert worst[1] < 1.2 * worst[0]
@@ -126,12 +126,12 @@ def test_paper_cases_are_planned_within_their_bound(name: str) -> None:
     path = {"circle": circle(1.5), "square": polygon(4, 3.0), "triangle": polygon(3, 4.0)}[name]
     robot = PRESETS["paper-triangle"] if name == "triangle" else CONTROL
     result = plan(path, robot)
-    assert result.predicted_rms < 1.3 * result.zigzag_rms
-    assert result.drawn_rms < {"circle": 0.012, "square": 0.020, "triangle": 0.042}[name]
-    assert result.guaranteed is not None
-    assert result.predicted_max <= min(result.guaranteed, result.stated_error)
-    assert result.closure is not None
-    assert result.closure < 0.05
+    assert result.predicted_rms < 1.3 * result.straight.rms
+    assert result.errors.drawn_rms < {"circle": 0.012, "square": 0.020, "triangle": 0.042}[name]
+    assert result.errors.guaranteed is not None
+    assert result.predicted_max <= min(result.errors.guaranteed, result.stated_error)
+    assert result.errors.closure is not None
+    assert result.errors.closure < 0.05
     assert result.dwells.min() >= result.minimum_dwell * (1 - 1e-9)
     again = plan(path, robot)
     assert np.array_equal(again.dwells, result.dwells)
@@ -163,13 +163,30 @@ def test_planning_does_not_even_load_the_simulator() -> None:
     assert done.stdout.strip() == "[]"
 
 
+def test_old_attributes_of_a_plan_warn_and_work() -> None:
+    result = plan(circle(2.0), CONTROL)
+    for name, path in _MOVED.items():
+        with pytest.warns(DeprecationWarning, match=f"Plan.{name} is now Plan.{re.escape(path)}"):
+            value = getattr(result, name)
+        new: Any = result
+        for part in path.removesuffix("()").split("."):
+            new = getattr(new, part)
+        assert np.array_equal(value, new()) if path.endswith("()") else value == new or value is new
+    with pytest.raises(AttributeError, match="'Plan' object has no attribute 'dwell'"):
+        result.dwell  # type: ignore[attr-defined]  # noqa: B018
+
+
+def test_the_options_of_plan_are_the_fields_of_a_request() -> None:
+    assert get_type_hints(RequestOptions) == get_type_hints(PlanRequest)
+
+
 def test_other_points_of_the_axis() -> None:
     """The tip needs a longer rod, the pivot none; each is planned for itself."""
     for point in ("head_tip", "pivot"):
         result = plan(circle(2.5), CONTROL, point=point)  # type: ignore[arg-type]
-        assert result.guaranteed is not None
-        assert result.predicted_max <= result.guaranteed
-        assert result.offset != 0
+        assert result.errors.guaranteed is not None
+        assert result.predicted_max <= result.errors.guaranteed
+        assert result.tracked.offset != 0
 
 
 def test_a_tolerance_shortens_the_dwell_and_says_when_it_cannot() -> None:
@@ -264,7 +281,7 @@ def test_files_of_a_plan(tmp_path: Path) -> None:
     assert [p.name for p in written] == ["plan.json", "plan.csv", "schedule.h", "tracker.h", "plan.svg"]
     content = json.loads(written[0].read_text())
     assert content["stated_error_over_l"] == pytest.approx(result.stated_error)
-    assert content["model"] == result.model
+    assert content["model"] == result.tracked.model
     schedule = load_schedule(written[0])
     assert np.array_equal(schedule.dwells, result.dwells)
     assert schedule.first_direction == result.first_direction

@@ -15,13 +15,13 @@ from planner.planning.schedule import follow
 from planner.planning.stated_error import look_ahead, predicted_error, rms_in_time, stated_error
 from planner.vehicle.rollout import Switches, trace
 from planner.vehicle.vehicle import TIMES, Vehicle
-from tests.planner.vehicles import vehicle
+from tests.planner.vehicles import plain_guidance, vehicle
 
 
 def planned(car: Vehicle, path: Path2D) -> tuple[Switches, Reference, np.ndarray]:
     ref = reference(path, car.pivot_distance, 0.02)
     ahead = look_ahead(car, float(np.abs(ref.curvature).max()))
-    switches = follow(ref, car, pivot_distance=car.pivot_distance, ahead=ahead, dwell=0.8, offset=0.0)
+    switches = follow(ref, car, plain_guidance(car, 0.8, ahead))
     return switches, ref, trace(car, switches, 0.0)
 
 

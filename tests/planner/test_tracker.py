@@ -26,7 +26,7 @@ def planned() -> Plan:
 
 
 def changed(*, left: float = 1.0, right: float = 1.0, speed: float = 1.0, current: float = 0.0) -> Vehicle:
-    car = planned().vehicle
+    car = planned().tracked.vehicle
     twist = car.twist * np.array([[speed, speed, left], [speed, speed, right]])
     return replace(car, twist=twist, current=np.array([current, 0.0]))
 

@@ -16,7 +16,7 @@ from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, lag_table
 from planner.vehicle.zigzag import zigzag
 from sim.mechanics import planar
 from sim.model.response import BEFORE, DWELLS, memory_after
-from tests.planner.vehicles import vehicle
+from tests.planner.vehicles import plain_guidance, vehicle
 
 
 def test_lags_are_those_of_the_curves() -> None:
@@ -46,10 +46,8 @@ def test_nothing_has_happened_at_a_flip_and_nothing_changes_after_settling() -> 
 def test_the_schedule_predicts_what_the_vehicle_does(bias: float) -> None:
     """Poses found switch by switch in plain numbers, against the chain of pose changes, current included."""
     car = replace(vehicle(bias=bias), current=np.array([0.001, -0.0005]))
-    ref = reference(circle(2.0), car.pivot_distance, 0.02, Drift(0.0, (0.05, -0.03)))
-    switches = follow(
-        ref, car, pivot_distance=car.pivot_distance, ahead=look_ahead(car, 0.3), dwell=0.4, offset=0.3
-    )
+    ref = reference(circle(2.0), car.pivot_distance + 0.3, 0.02, Drift(0.0, (0.05, -0.03)))
+    switches = follow(ref, car, plain_guidance(car, 0.4, look_ahead(car, 0.3)), 0.3)
     pose = switches.poses[0]
     before = None
     for i, dwell in enumerate(switches.dwells[:40]):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from planner.planning.line_of_sight import Guidance
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
 from sim.arrays import Floats
 from sim.mechanics import planar
@@ -38,6 +39,11 @@ def vehicle(*, yaw: float = 0.0489, sway: float = 0.0424, surge: float = 0.0179,
         modes=_modes(twist, errors),
         tail_gap=2.4,
     )
+
+
+def plain_guidance(car: Vehicle, dwell: float, ahead: float) -> Guidance:
+    """Guidance with the swing Ω T of a robot without lags."""
+    return Guidance(dwell, ahead, float(np.abs(car.twist[:, 2]).max()) * dwell)
 
 
 def _modes(twist: Floats, errors: float) -> tuple[Mode, ...]:

@@ -1,0 +1,56 @@
+"""What a user asks of a plan, besides path and robot. Lengths in l, times in μ0 l⁴/EI."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypedDict
+
+from planner.vehicle.dwell_choice import QUICK, Objective
+from planner.vehicle.tracked_point import Point
+from sim.io.errors import InputError
+from sim.model.robot import Robot
+
+Corner = Literal["nearest", "minimax", "fillet", "error"]
+
+
+@dataclass(frozen=True)
+class PlanRequest:
+    """Point, corners, dwells and tolerance, as `planner.planning.plan.plan` explains them."""
+
+    point: Point = "head_centre"
+    corner: Corner = "nearest"
+    time_weight: float = 0.0
+    objective: Objective = "error"
+    minimum_dwell: float | None = None
+    minimum_seconds: float | None = None
+    dwell: float | None = None
+    tolerance: float | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.tolerance is not None and not (math.isfinite(self.tolerance) and self.tolerance > 0):
+            raise InputError(f"tolerance {self.tolerance:g} l; give a number above 0")
+
+    def least_dwell(self, robot: Robot) -> float | None:
+        """Return the shortest dwell that the motor allows, in time units; None: the user gave none."""
+        seconds, dwell = self.minimum_seconds, self.minimum_dwell
+        if seconds is None:
+            return dwell
+        if not (math.isfinite(seconds) and seconds > 0):
+            raise InputError(f"minimum dwell {seconds:g} s; give a number above 0")
+        return max(seconds / robot.time_scale, QUICK if dwell is None else dwell)
+
+
+class RequestOptions(TypedDict, total=False):
+    """The fields of `PlanRequest` as keyword arguments."""
+
+    point: Point
+    corner: Corner
+    time_weight: float
+    objective: Objective
+    minimum_dwell: float | None
+    minimum_seconds: float | None
+    dwell: float | None
+    tolerance: float | None
+    seed: int

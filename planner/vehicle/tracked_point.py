@@ -1,0 +1,62 @@
+"""The vehicle of a robot with the point of its axis that is to follow a path. Lengths in l, times in μ0 l⁴/EI."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+from planner.vehicle.calibration_table import CalibrationKnowledge
+from planner.vehicle.from_table import default_table, table_vehicle
+from planner.vehicle.vehicle import Vehicle
+from sim.io.errors import InputError
+from sim.model.robot import Robot
+from surrogate.interface import LookupTable
+
+Point = Literal["head_centre", "head_tip", "pivot"]
+
+
+class TrackedVehicle(NamedTuple):
+    """A robot, its vehicle, and the tracked point: the point of its axis that follows the path."""
+
+    robot: Robot
+    vehicle: Vehicle
+    point: Point
+    offset: float  # from the head's centre forward to the tracked point
+    model: str  # hash of the look-up table
+
+    @property
+    def rod(self) -> float:
+        """Distance from the pivot to the tracked point."""
+        return self.vehicle.pivot_distance + self.offset
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings about what the model leaves out for this robot."""
+        vehicle = self.vehicle
+        if vehicle.tail_gap >= vehicle.least_gap:
+            return ()
+        without = "the model has no contact" if vehicle.least_gap == 1.0 else "contact does not hold them apart"
+        return (f"tails touch (predicted gap {vehicle.tail_gap:.2f} diameters): {without}",)
+
+
+def tracked_vehicle(
+    robot: Robot, lookup: LookupTable | None, point: Point, knowledge: CalibrationKnowledge | None
+) -> TrackedVehicle:
+    """Ask a table for the vehicle of a robot, and add the tracked point. Without a table, ask the shipped one.
+
+    Raises:
+        InputError: the point is unknown, or the robot is outside the table's domain.
+    """
+    lookup = default_table() if lookup is None else lookup
+    vehicle = table_vehicle(robot, lookup, knowledge)
+    return TrackedVehicle(robot, vehicle, point, _offset(point, robot, vehicle), lookup.identity)
+
+
+def _offset(point: Point, robot: Robot, vehicle: Vehicle) -> float:
+    """Compute the distance from the head's centre forward to the tracked point [l]."""
+    if point == "head_centre":
+        return 0.0
+    if point == "head_tip":
+        return robot.head_length / 2 / robot.tail_length
+    if point == "pivot":
+        return -vehicle.pivot_distance
+    raise InputError(f"point {point!r}; allowed are head_centre, head_tip, pivot")
