@@ -5,9 +5,8 @@ RUN := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
 SOURCES := $(wildcard sim/*.py sim/*/*.py)
 
-CONFIG ?= sweep.toml
+CONFIG ?=
 DATA ?= data/sweep
-REFINED ?=
 MODEL ?= models/model.safetensors
 ROBOT ?= paper-control
 PLANPATH ?= square:3
@@ -39,7 +38,7 @@ $(STAMP): pyproject.toml constraints.txt
 	touch $@
 
 demo: reports/demo.html ## the whole pipeline on the paper's robot, ends with reports/demo.html
-reports/demo.html: $(STAMP) $(SOURCES) $(wildcard $(foreach p,dataset surrogate planner calibration softflagella,$(p)/*.py $(p)/*/*.py) surrogate/shipped/*) demo.toml
+reports/demo.html: $(STAMP) $(SOURCES) $(wildcard $(foreach p,dataset surrogate planner calibration softflagella,$(p)/*.py $(p)/*/*.py) surrogate/shipped/*) softflagella/demo.toml
 	$(RUN) -m softflagella demo --out $@
 
 test: $(VENV)/.extras ## run the tests, those of clusters and of ONNX files included
@@ -63,16 +62,16 @@ $(VENV)/.docs: $(STAMP)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
 	touch $@
 
-# The build itself knows its sources and what is missing, so it always runs. It leaves the manifest of a finished
-# data set alone, so that `make train` does not run again.
+# Without CONFIG: the sweep that comes with the package. The build itself knows its sources and what is missing, so it
+# always runs. It leaves the manifest of a finished data set alone, so that `make train` does not run again.
 dataset: $(STAMP) ## simulate CONFIG into DATA (goes on where it stopped; ROWS=… for more or fewer rows)
-	$(RUN) -m dataset build --config "$(CONFIG)" --out "$(DATA)" $(if $(ROWS),--rows $(ROWS))
+	$(RUN) -m dataset build $(if $(CONFIG),--config "$(CONFIG)") --out "$(DATA)" $(if $(ROWS),--rows $(ROWS))
 $(DATA)/manifest.json:
 	$(MAKE) dataset
 
-train: $(MODEL) ## train the look-up table MODEL on DATA (and on REFINED=…, chosen rows; DEVICE=cuda or auto)
-$(MODEL): $(DATA)/manifest.json $(REFINED:%=%/manifest.json)
-	$(RUN) -m surrogate train $(DATA) $(REFINED) --out $(MODEL) --device $(DEVICE)
+train: $(MODEL) ## train the look-up table MODEL on DATA (DEVICE=cuda or auto)
+$(MODEL): $(DATA)/manifest.json
+	$(RUN) -m surrogate train $(DATA) --out $(MODEL) --device $(DEVICE)
 
 plan: $(STAMP) ## plan PLANPATH for ROBOT into reports/plan
 	$(RUN) -m planner plan $(PLANPATH) --robot $(ROBOT) --out reports/plan

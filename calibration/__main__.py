@@ -1,12 +1,4 @@
-"""Command line of the calibration.
-
-python -m calibration calibrate TABLE.csv --robot robot.toml --out DIR   verdict.json, report.html, corrected.toml
-python -m calibration decide TABLE.csv verdict.json --robot robot.toml   what new runs say, of several explanations
-python -m calibration simulate --robot robot.toml --out TABLE.csv        a table to try it on
-python -m calibration tracks TRACKS.csv RUNS.csv --out TABLE.csv         camera tracks to a table of runs
-
-`close` is another name of `calibrate`.
-"""
+"""Command line of the calibration: `calibrate`, `decide`, `simulate`, `tracks`."""
 
 from __future__ import annotations
 

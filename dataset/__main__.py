@@ -1,10 +1,4 @@
-"""Command line of data sets.
-
-python -m dataset build --config sweep.toml --out DIR [--rows N] [--jobs J] [--backend loky|dask|ray]
-                        [--scheduler ADDRESS]        simulate; goes on where it stopped
-python -m dataset report DIR --out PAGE.html         the sweep at a glance
-python -m dataset verify DIR [--rows N] [--mend]     check the files, simulate some rows again; repair
-"""
+"""Command line of data sets: `softflagella sweep`, `report`, `verify`, `config`."""
 
 from __future__ import annotations
 
@@ -12,20 +6,20 @@ import os
 import shlex
 from argparse import Namespace
 
-from dataset.build.exits import ended
-from dataset.workers.open_backend import BACKENDS
+from dataset.workers import BACKENDS
 from sim.io.commands import JOBS, Program, argument, out
 
 program = Program("dataset", "Simulate sweeps of robots into data sets.")
 main = program.main
 _DATA = argument("data", help="folder or URL of a data set")
 _SCHEDULER = "DASK_SCHEDULER_ADDRESS"
+_FORCE = argument("--force", action="store_true", help="take over a URL whose writer was killed")
 
 
 @program.command(
     "build",
     "simulate a sweep into Parquet",
-    argument("--config", required=True, help="sweep.toml"),
+    argument("--config", help="sweep.toml (default: the one that comes with the package)"),
     out("folder, or a URL that fsspec knows (s3://…),"),
     argument("--rows", type=int, help="number of rows (default: the configuration's); more than before adds rows"),
     JOBS,
@@ -38,15 +32,17 @@ _SCHEDULER = "DASK_SCHEDULER_ADDRESS"
         "--scheduler",
         help="address of a dask scheduler (default: DASK_SCHEDULER_ADDRESS) or ray head (default: RAY_ADDRESS)",
     ),
+    _FORCE,
 )
 def _build(arguments: Namespace) -> None:
     from dataset.build.build import build
-    from dataset.rows.design import load_design
+    from dataset.build.signals import run_long_command
+    from dataset.rows.design import SWEEP_TOML, load_design
 
-    design = load_design(arguments.config).with_rows(arguments.rows)
+    design = load_design(arguments.config or SWEEP_TOML).with_rows(arguments.rows)
     known = arguments.scheduler or os.environ.get(_SCHEDULER)
     backend = arguments.backend or ("dask" if known else "loky")
-    manifest = ended(
+    manifest = run_long_command(
         lambda: build(
             design,
             arguments.out,
@@ -54,6 +50,7 @@ def _build(arguments: Namespace) -> None:
             backend=backend,
             address=arguments.scheduler,
             resume=_command(arguments),
+            force=arguments.force,
         )
     )
     print(
@@ -63,7 +60,8 @@ def _build(arguments: Namespace) -> None:
 
 
 def _command(arguments: Namespace) -> str:
-    words = ["python", "-m", "dataset", "build"]
+    """Write the command that continues a build."""
+    words = ["softflagella", "sweep"]
     for name in ("config", "out", "rows", "jobs", "backend", "scheduler"):
         if getattr(arguments, name) is not None:
             words += [f"--{name}", str(getattr(arguments, name))]
@@ -83,17 +81,27 @@ def _report(arguments: Namespace) -> None:
     "check a data set against schema and simulator",
     _DATA,
     argument("--rows", type=int, default=8, help="rows to simulate again (default: 8)"),
-    argument("--mend", action="store_true", help="repair first: remove what is damaged, simulate what is missing"),
+    argument("--mend", action="store_true", help="repair first: remove damaged files, simulate missing rows"),
     JOBS,
+    _FORCE,
 )
 def _verify(arguments: Namespace) -> None:
-    if arguments.mend:
-        from dataset.build.build import mend
-
-        print(ended(lambda: mend(arguments.data, jobs=arguments.jobs)))
+    from dataset.build.build import mend
+    from dataset.build.signals import run_long_command
     from dataset.build.verify import verify
 
+    if arguments.mend:
+        print(run_long_command(lambda: mend(arguments.data, jobs=arguments.jobs, force=arguments.force)))
     print(verify(arguments.data, rows=arguments.rows))
+
+
+@program.command("config", "write a copy of the default sweep.toml, to edit", out("sweep.toml"))
+def _config(arguments: Namespace) -> None:
+    from dataset.rows.design import SWEEP_TOML
+    from sim.io.files import write_text
+
+    write_text(arguments.out, SWEEP_TOML.read_text())
+    print(f"-> {arguments.out}")
 
 
 if __name__ == "__main__":

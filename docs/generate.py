@@ -10,8 +10,9 @@ from pathlib import Path
 
 from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
+from sim.io.commands import Command
 from sim.model.effect import Effect
-from softflagella.__main__ import PACKAGES
+from softflagella.__main__ import PACKAGES, WORDS, command
 
 
 def write_generated_pages(folder: Path) -> None:
@@ -85,19 +86,26 @@ def columns_page() -> str:
 
 
 def commands_page() -> str:
-    """What `--help` prints for every command."""
+    """Write what `--help` prints for every command."""
     os.environ["COLUMNS"] = "100"
     parts = [
         "# Commands",
-        "`softflagella PACKAGE COMMAND` and `python -m PACKAGE COMMAND` are the same. Bad input ends with one "
-        "line on stderr and exit status 2.",
+        "The most important commands have a word of their own. Bad input ends with one line on stderr and exit "
+        "status 2.",
     ]
+    for word, (package, name) in WORDS.items():
+        same = "" if package == "softflagella" else f"The same as `softflagella {package} {name}`."
+        parts += [f"## {word}", same, _help(command(word), f"softflagella {word}")]
     for package, what in PACKAGES.items():
         program = import_module(f"{package}.__main__").program
         parts += [f"## {package}", f"{what[0].upper()}{what[1:]}."]
-        for name, text in program.help_texts(f"softflagella {package}").items():
-            parts += [f"### {package} {name}", f"```text\n{text.rstrip()}\n```"]
-    return "\n\n".join(parts) + "\n"
+        for name, packaged in program.commands.items():
+            parts += [f"### {package} {name}", _help(packaged, f"softflagella {package} {name}")]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _help(described: Command, prog: str) -> str:
+    return f"```text\n{described.parser(prog).format_help().rstrip()}\n```"
 
 
 def number(value: float) -> str:

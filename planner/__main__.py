@@ -260,7 +260,7 @@ def _path(arguments: Namespace, robot: Robot) -> Path2D:
     "check",
     "tracking error of a replayed track",
     argument("plan", help="plan.json"),
-    argument("track", help="CSV written by softflagella sim replay"),
+    argument("track", help="CSV written by softflagella replay"),
     out("overlay picture, PNG", default=None),
 )
 def _check(arguments: Namespace) -> None:

@@ -1,11 +1,4 @@
-"""Command line of the simulator.
-
-python -m sim steady POINTS.csv --out OUT.csv      mean motion of each row at constant motor speed
-python -m sim replay PLAN.json --out TRACK.csv     track of a switching schedule
-python -m sim robot PRESET --out robot.toml        write a preset robot, to start from
-python -m sim check                                the paper's measured point, measured and simulated
-python -m sim compile                              compile the simulator's loops now rather than on first use
-"""
+"""Command line of the simulator: `steady`, `replay`, `robot`, `check`, `compile`."""
 
 from __future__ import annotations
 

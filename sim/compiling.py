@@ -10,7 +10,7 @@ not depend on the folder that the sources are in.
 Sums may be reordered and multiplications fused, so last digits can differ between machines. NaN and infinity keep
 their meaning.
 
-The first use of a loop compiles it. A progress bar on stderr says so. `python -m sim compile` compiles all loops.
+The first use of a loop compiles it, with a progress bar on stderr. `softflagella sim compile` compiles all loops.
 
 A loop that this process compiles can give other last digits than the same loop read from disk: of a loop that
 several others call, the first copy in the process is used by all of them, and the copies were not optimised with

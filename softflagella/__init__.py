@@ -7,98 +7,49 @@
     result = sf.plan(sf.polygon(4, side=3.0), robot)   # plan a square without simulating
     track = sf.replay(result)                          # simulate the plan
 
-Every name below is loaded when it is first used, so importing the package is quick. Lengths are in tail lengths l,
-times in μ0 l⁴/EI, forces in EI/l², angles in radians, unless a name says its unit.
+The public names are listed in `__init__.pyi`. Each is loaded when it is first used, so importing the package is
+quick. Lengths are in tail lengths l, times in μ0 l⁴/EI, forces in EI/l², angles in radians, unless a name says its
+unit.
 """
 
 from __future__ import annotations
 
+import ast
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 from warnings import warn
 
-if TYPE_CHECKING:
-    from calibration.swimmer.synthetic_table import make_table
-    from calibration.verdict.verdict import Verdict
-    from planner.files.plan_files import write_plan
-    from planner.goal.obstacles import Circle
-    from planner.goal.to_goal import GoalPlan, to_goal
-    from planner.paths.path import Path2D, circle, polygon
-    from planner.paths.path_files import read_path
-    from planner.planning.plan import Plan, plan
-    from planner.tracking.tracker import Tracker
-    from sim.effects import catalogue as effects
-    from sim.inputs import load_robot, save_robot
-    from sim.io.errors import InputError
-    from sim.io.provenance import __version__
-    from sim.model.effect import Effect
-    from sim.model.robot import Robot
-    from sim.model.schedule import Schedule, load_schedule
-    from softflagella.api.calibrate import calibrate
-    from softflagella.api.simulate import replay, response, sensitivities, steady, switch_response
-    from softflagella.api.sweep import read_sweep, sweep
-    from surrogate.interface import LookupTable
-    from surrogate.one_robot.tabulate import tabulate
-    from surrogate.table.model_file import load_table
-    from surrogate.training.train import train
 
-_HOMES = {
-    "Circle": "planner.goal.obstacles",
-    "Effect": "sim.model.effect",
-    "GoalPlan": "planner.goal.to_goal",
-    "InputError": "sim.io.errors",
-    "LookupTable": "surrogate.interface",
-    "Path2D": "planner.paths.path",
-    "Plan": "planner.planning.plan",
-    "Robot": "sim.model.robot",
-    "Schedule": "sim.model.schedule",
-    "Verdict": "calibration.verdict.verdict",
-    "__version__": "sim.io.provenance",
-    "calibrate": "softflagella.api.calibrate",
-    "circle": "planner.paths.path",
-    "effects": "sim.effects:catalogue",
-    "load_robot": "sim.inputs",
-    "load_schedule": "sim.model.schedule",
-    "load_table": "surrogate.table.model_file",
-    "make_table": "calibration.swimmer.synthetic_table",
-    "plan": "planner.planning.plan",
-    "polygon": "planner.paths.path",
-    "read_path": "planner.paths.path_files",
-    "read_sweep": "softflagella.api.sweep",
-    "replay": "softflagella.api.simulate",
-    "response": "softflagella.api.simulate",
-    "save_robot": "sim.inputs",
-    "sensitivities": "softflagella.api.simulate",
-    "steady": "softflagella.api.simulate",
-    "sweep": "softflagella.api.sweep",
-    "switch_response": "softflagella.api.simulate",
-    "tabulate": "surrogate.one_robot.tabulate",
-    "Tracker": "planner.tracking.tracker",
-    "to_goal": "planner.goal.to_goal",
-    "train": "surrogate.training.train",
-    "write_plan": "planner.files.plan_files",
+def _listed() -> dict[str, tuple[str, str]]:
+    """Read the public names from the stub file: name -> (module, name in it)."""
+    homes: dict[str, tuple[str, str]] = {}
+    for node in ast.parse(Path(__file__).with_suffix(".pyi").read_text()).body:
+        if isinstance(node, ast.ImportFrom) and node.module:
+            homes |= {alias.name: (node.module, alias.name) for alias in node.names}
+        elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):  # another name: effects = …
+            homes[node.targets[0].id] = homes.pop(ast.unparse(node.value))
+    return homes
+
+
+_HOMES = _listed()
+_RENAMED = {  # old name -> (module, name in it, what to use instead), for one release
+    "Voyage": ("planner.goal.to_goal", "GoalPlan", "GoalPlan"),
+    "switch_response": ("softflagella.api.simulate", "switch_response", "response"),
 }
 
-__all__ = [
-    "Circle", "Effect", "GoalPlan", "InputError", "LookupTable", "Path2D", "Plan", "Robot", "Schedule", "Tracker",
-    "Verdict", "__version__", "calibrate", "circle", "effects", "load_robot", "load_schedule", "load_table",
-    "make_table", "plan", "polygon", "read_path", "read_sweep", "replay", "response", "save_robot",
-    "sensitivities", "steady", "sweep", "switch_response", "tabulate", "to_goal", "train",
-    "write_plan",
-]  # fmt: skip
-
-
-_RENAMED = {"Voyage": "GoalPlan"}  # old name -> new name, for one release
+__all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
     if name in _RENAMED:
-        warn(f"{name} is now {_RENAMED[name]}", DeprecationWarning, stacklevel=2)
-        name = _RENAMED[name]
+        module, attribute, instead = _RENAMED[name]
+        warn(f"softflagella.{name} is deprecated; use softflagella.{instead}", DeprecationWarning, stacklevel=2)
+        return getattr(import_module(module), attribute)
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module, _, attribute = _HOMES[name].partition(":")
-    value = getattr(import_module(module), attribute or name)
+    module, attribute = _HOMES[name]
+    value = getattr(import_module(module), attribute)
     globals()[name] = value
     return value
 

@@ -1,9 +1,4 @@
-"""One command over all packages.
-
-softflagella sim steady POINTS.csv --out OUT.csv     the same as python -m sim steady …
-softflagella demo                                    the whole pipeline, ends with one page to look at
-softflagella --version
-"""
+"""One command over all packages: `softflagella plan PATH`, or `softflagella planner plan PATH`."""
 
 from __future__ import annotations
 
@@ -11,9 +6,18 @@ import sys
 from argparse import Namespace
 from importlib import import_module
 
-from sim.io.commands import Program, out
+from sim.io.commands import Command, Program, out
 from sim.io.errors import run_command
 
+WORDS = {  # the most important commands -> package and command
+    "plan": ("planner", "plan"),
+    "sweep": ("dataset", "build"),
+    "train": ("surrogate", "train"),
+    "calibrate": ("calibration", "calibrate"),
+    "replay": ("sim", "replay"),
+    "query": ("surrogate", "query"),
+    "demo": ("softflagella", "demo"),
+}
 PACKAGES = {
     "sim": "simulate robots: steady motion, replays of schedules, presets",
     "dataset": "simulate sweeps into data sets, report and verify them",
@@ -31,15 +35,24 @@ def _demo(arguments: Namespace) -> None:
     run_demo(arguments.out)
 
 
+def command(word: str) -> Command:
+    """Return the command that a word stands for."""
+    package, name = WORDS[word]
+    commands: dict[str, Command] = import_module(f"{package}.__main__").program.commands
+    return commands[name]
+
+
 def _overview() -> str:
-    lines = ["usage: softflagella PACKAGE COMMAND …", "", "packages:"]
+    lines = ["usage: softflagella COMMAND …", "", "commands:"]
+    lines += [f"  {word:12} {command(word).help}" for word in WORDS]
+    lines += ["", "further commands, by package (softflagella PACKAGE COMMAND …):"]
     lines += [f"  {name:12} {what}" for name, what in PACKAGES.items()]
-    lines += ["", "and:", "  demo         run the whole pipeline on the paper's robots", ""]
-    return "\n".join([*lines, "softflagella PACKAGE --help lists its commands; --version prints the version."])
+    lines += ["", "--help after a command or a package tells more; --version prints the version."]
+    return "\n".join(lines)
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Hand the command over to its package."""
+    """Run the command that the words name."""
     words = sys.argv[1:] if argv is None else argv
     if not words or words[0] in ("-h", "--help", "help"):
         print(_overview())
@@ -47,18 +60,19 @@ def main(argv: list[str] | None = None) -> None:
         from sim.io.provenance import __version__
 
         print(f"softflagella {__version__}")
+    elif words[0] in WORDS:
+        arguments = command(words[0]).parser(f"softflagella {words[0]}").parse_args(words[1:])
+        arguments.run(arguments)
     elif words[0] in PACKAGES:
-        own: Program = import_module(f"{words[0]}.__main__").program
-        own.main(words[1:], prog=f"softflagella {words[0]}")
-    elif words[0] == "demo":
-        program.main(words, prog="softflagella")
+        packaged: Program = import_module(f"{words[0]}.__main__").program
+        packaged.main(words[1:])
     else:
-        print(f"error: no package {words[0]!r}; there are {', '.join((*PACKAGES, 'demo'))}", file=sys.stderr)
+        print(f"error: no command {words[0]!r}; there are {', '.join((*WORDS, *PACKAGES))}", file=sys.stderr)
         raise SystemExit(2)
 
 
 def run() -> None:
-    """Entry point of the command `softflagella`."""
+    """Run as the command `softflagella`."""
     sys.exit(run_command(main))
 
 

@@ -92,7 +92,7 @@ def run_demo(out: str | Path) -> None:
     print("3/4 a small sweep and a look-up table trained on it")
     data, model = folder / "sweep", folder / "model.safetensors"
     shutil.rmtree(data, ignore_errors=True)  # an earlier demo's rows, perhaps of another version
-    _command("dataset", "build", "--config", "demo.toml", "--out", str(data))
+    _command("dataset", "build", "--config", str(Path(__file__).with_name("demo.toml")), "--out", str(data))
     _command("surrogate", "train", str(data), "--out", str(model), "--epochs", "60")
     print("4/4 close the loop on two measured tables")
     loops = {name: _close(folder, name) for name in ("hidden effect", "nothing hidden")}
@@ -127,7 +127,7 @@ def _plan_and_replay(folder: Path) -> dict[str, tuple[dict[str, Any], TrackingEr
         _command("sim", "replay", str(place / "plan.json"), "--out", str(place / "track.csv"), quiet=True)
 
     for case in CASES:
-        print(f"  python -m sim replay {folder / case.name / 'plan.json'} --out …/track.csv")
+        print(f"  softflagella replay {folder / case.name / 'plan.json'} --out …/track.csv")
     with (
         ThreadPoolExecutor(min(available_jobs(), len(CASES))) as pool,
         tqdm(total=len(CASES), desc="replay", unit="plan") as bar,

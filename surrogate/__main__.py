@@ -1,24 +1,12 @@
-"""Command line of the look-up table.
-
-python -m surrogate train DIR … --out MODEL            learn a data set, or several; goes on after a kill
-python -m surrogate refine DIR --model MODEL --out DIR2 --rows N
-                                                       simulate more rows, where the table is unsure
-python -m surrogate query POINTS.csv --out OUT.csv     predict rows, with intervals, without simulating
-python -m surrogate inverse TARGETS.csv --out OUT.csv  which robots have these motions
-python -m surrogate errors [--model MODEL]             the stored held-out errors
-python -m surrogate robot ROBOT.toml --out T.json      the table of one robot with its effects, for the planner
-python -m surrogate export [MODEL] --onnx OUT.onnx     the whole query as one ONNX graph
-python -m surrogate export [MODEL] --small FOLDER      weights and readers for a web page or a microcontroller
-"""
+"""Command line of the look-up table: `train`, `query`, `inverse`, `errors`, `robot`, `export`, `compile`."""
 
 from __future__ import annotations
 
-import shlex
 import sys
 from argparse import Namespace
 from pathlib import Path
 
-from sim.io.commands import JOBS, MODEL, Program, argument, out
+from sim.io.commands import MODEL, Program, argument, out
 from sim.io.errors import InputError
 
 program = Program("surrogate", "Train look-up tables and query them.")
@@ -28,7 +16,7 @@ main = program.main
 @program.command(
     "train",
     "learn a data set",
-    argument("data", nargs="+", help="folders made by python -m dataset build or python -m surrogate refine"),
+    argument("data", nargs="+", help="folders made by softflagella sweep"),
     out("model file"),
     argument("--epochs", type=int, help="this many epochs, and as many iterations after them"),
     argument(
@@ -71,36 +59,9 @@ def _train(arguments: Namespace) -> None:
 
 
 @program.command(
-    "refine",
-    "simulate more rows of a data set, where a table is unsure",
-    argument("data", help="folder made by python -m dataset build"),
-    argument("--model", required=True, help="look-up table that was trained on it"),
-    out("folder or URL of the chosen rows; train takes both folders"),
-    argument("--rows", type=int, default=2048, help="number of chosen rows (default: 2048); more later adds rows"),
-    JOBS,
-)
-def _refine(arguments: Namespace) -> None:
-    from dataset.build.exits import ended
-    from surrogate.table.model_file import load
-    from surrogate.training.refine import refine
-
-    table = load(arguments.model)
-    words = ["refine", arguments.data, "--model", arguments.model, "--out", arguments.out]
-    words += ["--rows", str(arguments.rows)] + (["--jobs", str(arguments.jobs)] if arguments.jobs else [])
-    resume = shlex.join(["python", "-m", "surrogate", *words])
-    manifest = ended(
-        lambda: refine(arguments.data, table, arguments.out, arguments.rows, jobs=arguments.jobs, resume=resume)
-    )
-    print(
-        f"{manifest['rows']} chosen rows: {manifest['converged']} converged, {manifest['failed']} failed "
-        f"-> {arguments.out}"
-    )
-
-
-@program.command(
     "query",
     "predict rows, with intervals, without simulating",
-    argument("points", help="CSV like that of python -m sim steady; dwell_bar optional"),
+    argument("points", help="CSV like that of softflagella sim steady; dwell_bar optional"),
     out("CSV"),
     MODEL,
     argument(

@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 
 from calibration.statistics.forward_model import start_values
+from dataset.rows.design import load_design
 from planner.files.plan_json import load_plan
 from sim.inputs import load_robot
 from sim.io.errors import run_command
@@ -24,7 +25,9 @@ from tests.calibration.toy_tables import START, install_toy, toy_swimmer, toy_ta
 from tests.calibration.track import RADIUS, track
 from tests.dataset.sweeps import SMALL
 
-COMMANDS = [(package, name) for package in PACKAGES for name in import_module(f"{package}.__main__").program.names]
+COMMANDS = [
+    (package, name) for package in PACKAGES for name in import_module(f"{package}.__main__").program.commands
+]
 
 
 def done(*words: object) -> None:
@@ -105,6 +108,12 @@ def verify(made: Path, out: Path) -> str:
     return "6 rows as configured, flags consistent; 1 rows simulated again"
 
 
+def config(made: Path, out: Path) -> str:
+    done("dataset", "config", "--out", out / "sweep.toml")
+    assert load_design(out / "sweep.toml") == load_design()
+    return f"-> {out / 'sweep.toml'}"
+
+
 def train(made: Path, out: Path) -> str:
     wide = (made / "sweep.toml").read_text().replace("rows = 6", "rows = 256")
     (out / "sweep.toml").write_text(wide)
@@ -113,16 +122,6 @@ def train(made: Path, out: Path) -> str:
     assert load(out / "model.safetensors").provenance["rows"]["train"] > 150
     assert not (out / "model.safetensors.states").exists()
     return "held-out error on"
-
-
-def refine(made: Path, out: Path) -> str:
-    done(
-        "surrogate", "refine", made / "sweep", "--model", SHIPPED, "--out", out / "more", "--rows", 3, "--jobs", 1
-    )
-    done("dataset", "verify", out / "more", "--rows", 1)
-    done("dataset", "report", out / "more", "--out", out / "page.html")
-    assert "chosen where a look-up table was unsure" in (out / "page.html").read_text()
-    return "3 chosen rows: 3 converged"
 
 
 def query(made: Path, out: Path) -> str:
@@ -252,8 +251,9 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "steady"): steady, ("sim", "replay"): replay, ("sim", "robot"): robot, ("sim", "check"): check_paper,
     ("sim", "compile"): compiled, ("surrogate", "compile"): compiled_queries,
     ("dataset", "build"): build, ("dataset", "report"): report,
-    ("dataset", "verify"): verify, ("surrogate", "train"): train, ("surrogate", "query"): query,
-    ("surrogate", "inverse"): inverse, ("surrogate", "refine"): refine, ("planner", "track"): follow,
+    ("dataset", "verify"): verify, ("dataset", "config"): config,
+    ("surrogate", "train"): train, ("surrogate", "query"): query,
+    ("surrogate", "inverse"): inverse, ("planner", "track"): follow,
     ("surrogate", "errors"): errors, ("surrogate", "export"): export,
     ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
     ("planner", "goal"): goal,

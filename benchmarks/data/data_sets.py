@@ -28,10 +28,10 @@ import pyarrow.parquet as pq
 from benchmarks.timing import processor_time
 from dataset.build.build import build
 from dataset.rows.design import load_design
-from dataset.storage import shards as pieces
+from dataset.storage import shards
 from dataset.storage.data_set import batches, read, read_manifest
 from dataset.storage.shards import SEGMENT
-from dataset.storage.storage import place
+from dataset.storage.storage import open_storage
 from tests.dataset import sweeps
 
 ROWS = 2048
@@ -41,7 +41,7 @@ from dataset.rows.design import load_design
 from dataset.rows.simulate import simulate
 from sim.motion.batches import one_thread
 with one_thread():
-    design = load_design("sweep.toml").with_rows(int(sys.argv[1]))
+    design = load_design().with_rows(int(sys.argv[1]))
     rows = simulate({**design.points(), "history": design.history()})
 print(rows["cost_s"].sum())
 """
@@ -49,7 +49,7 @@ _ENGINE = """
 import sys
 from dataset.rows.design import load_design
 from dataset.build.build import build
-build(load_design("sweep.toml").with_rows(int(sys.argv[1])), sys.argv[2], jobs=int(sys.argv[3]), title="")
+build(load_design().with_rows(int(sys.argv[1])), sys.argv[2], jobs=int(sys.argv[3]), title="")
 """
 _SYNTHETIC = """
 import sys
@@ -115,7 +115,7 @@ def overhead(rows: int) -> float:
 def encodings() -> None:
     """Prints bytes a row of simulated and synthetic rows, by encoding."""
     with TemporaryDirectory() as folder:
-        build(load_design("sweep.toml").with_rows(512), f"{folder}/out", title="")
+        build(load_design().with_rows(512), f"{folder}/out", title="")
         rows = pa.Table.from_batches(list(batches(f"{folder}/out")))
         size = Path(folder, "out/rows").iterdir().__next__().stat().st_size
     words = {"use_dictionary": ["reason"]}
@@ -124,9 +124,9 @@ def encodings() -> None:
         "as it comes (snappy)": {},
         "zstd": {"compression": "zstd"},
         "zstd, no dictionary": {"compression": "zstd", **words},
-        "zstd, numbers split": {"compression": "zstd", **pieces.encodings(rows.schema)},
+        "zstd, numbers split": {"compression": "zstd", **shards.encodings(rows.schema)},
         "zstd 9, numbers split": {
-            "compression": "zstd", "compression_level": 9, **pieces.encodings(rows.schema),
+            "compression": "zstd", "compression_level": 9, **shards.encodings(rows.schema),
         },
     }  # fmt: skip
     for name, options in choices.items():
@@ -169,10 +169,10 @@ def _scanned(out: str, columns: list[str] | None) -> None:
 
 def _joined(out: str, form: pa.Schema) -> None:
     """Join the files again, elsewhere."""
-    storage, key = place(out), read_manifest(out)["config_hash"]
-    some = pieces.pieces(storage, "rows")
-    name = pieces.piece_name("../again", some[0].start, some[-1].stop)
-    pieces.join(storage, some, name, form.remove_metadata(), key)
+    storage, key = open_storage(out), read_manifest(out)["config_hash"]
+    parts = shards.shards_in(storage, "rows")
+    name = shards.shard_name("../again", parts[0].start, parts[-1].stop)
+    shards.join(storage, parts, name, form.remove_metadata(), key)
 
 
 def projection(cost: float) -> None:

@@ -33,7 +33,7 @@ _CHECKED = 12  # robots whose curves are compared
 
 def main(count: str = "128") -> None:
     robots = int(count)
-    columns = check_columns(load_design("sweep.toml").with_rows(robots).points())
+    columns = check_columns(load_design().with_rows(robots).points())
     parts = [Groups.from_columns({n: c[rows] for n, c in columns.items()}) for rows in split(columns["N"], robots)]
     with one_thread():
         costs(parts, robots)

@@ -36,7 +36,7 @@ STEP = 0.06  # time units, ours
 
 
 def sweep(rows: int) -> dict[str, np.ndarray]:
-    return load_design("sweep.toml").with_rows(rows).points()
+    return load_design().with_rows(rows).points()
 
 
 def robots() -> None:

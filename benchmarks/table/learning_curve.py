@@ -6,7 +6,7 @@ which do not touch. Two networks are trained: a quick one, and a larger one for 
 rows do not help; where the two lie apart, the network and its training limit the table, and not the rows.
 
 Usage: python -m benchmarks learning_curve DATA [--picture docs/learning.png]
-       (docs/learning.png is made from sweeps/domain.toml)
+       (docs/learning.png is made from surrogate/shipped/domain.toml)
 
 Takes 20 minutes.
 """

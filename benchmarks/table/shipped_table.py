@@ -1,6 +1,6 @@
 """Train the look-up table that comes with the package, and evaluate it on held-out robots.
 
-Usage: python -m dataset build --config sweeps/domain.toml --out SWEEP
+Usage: softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
        python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
        python -m benchmarks shipped_table WORK --test MODEL   errors and coverage on the locked robots
 
@@ -149,7 +149,7 @@ def main(*words: str) -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("work", type=Path)
     parser.add_argument("--out")
-    parser.add_argument("--sweep", help="data set built from sweeps/domain.toml")
+    parser.add_argument("--sweep", help="data set built from surrogate/shipped/domain.toml")
     parser.add_argument("--test")
     parser.add_argument("--picture", help="with --test: draw the errors of the locked robots")
     given = parser.parse_args(words)

@@ -1,7 +1,7 @@
-"""Robots -> rows: simulate a design in chunks, on this machine or a cluster, into a folder.
+"""Build a data set: simulate a design in chunks, on this machine or a cluster, into a folder.
 
-What is there already is kept and checked; only rows that are missing are simulated. More rows of the same
-design only add chunks. An interruption loses the chunks under way.
+Rows that are stored already are kept and checked; only missing rows are simulated. More rows of the same design
+only add chunks. An interruption loses the chunks under way.
 """
 
 from __future__ import annotations
@@ -12,33 +12,29 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from dataset.build import scheduler as engine
-from dataset.build.signals import interruptible
-from dataset.build.sweep_folder import Held, SweepFolder, load_sweep
-from dataset.rows.design import Design
-from dataset.storage.data_set import MANIFEST, PENDING
+from dataset.build import scheduler
+from dataset.build.scheduler import Progress
+from dataset.build.signals import UnfinishedError, interruptible
+from dataset.build.sweep_folder import Stored, SweepFolder, load_sweep
+from dataset.rows.design import SweepDesign
+from dataset.rows.version import rows_version
+from dataset.storage.data_set import MANIFEST
 from dataset.storage.lock import locked
-from dataset.storage.shards import Piece, piece_name
-from dataset.storage.storage import Place, place
-from dataset.workers.open_backend import Backend, check_backend, open_backend
-from dataset.workers.tasks import Joining, Receipt, Simulate, Task, Work, compile_on_this_host, rows_version
+from dataset.storage.storage import Storage, open_storage
+from dataset.workers.backend import Backend
+from dataset.workers.open_backend import check_backend, open_backend
+from dataset.workers.tasks import Join, Receipt, Simulate, Task, compile_on_this_host
 from sim.io.errors import InputError
 
 _SECONDS = 20.0  # of processor time that a chunk should take
 _FEWEST, _MOST = 1024, 4096  # rows of a chunk, unless there are few rows for many workers
 _CHUNKS = 4  # a worker, where there are few rows
-_STANDARD = "dataset.simulate.simulate"
-_GUESS = 0.02  # seconds a row, until rows are there that tell
-
-
-class UnfinishedError(RuntimeError):
-    """A sweep ended before all rows were there; the message is one line, `status` the exit status."""
-
-    status = 1
+_STANDARD = "dataset.simulate.simulate"  # in the key of every row and in sweep.json: part of the format
+_GUESS = 0.02  # seconds a row, until stored rows tell
 
 
 def build(
-    design: Design,
+    design: SweepDesign,
     folder: str | Path,
     *,
     jobs: int | None = None,
@@ -47,8 +43,9 @@ def build(
     title: str = "sweep",
     resume: str = "run the same build again",
     simulate: Simulate | None = None,
+    force: bool = False,
 ) -> dict[str, Any]:
-    """Simulate a design into a folder; goes on where an earlier build stopped.
+    """Simulate a design into a folder; a build that stopped continues.
 
     Args:
         design: which robots.
@@ -59,25 +56,25 @@ def build(
         title: of the progress line; empty for none.
         resume: what the last line of an interrupted build tells the user to do.
         simulate: makes the rows; default `dataset.rows.simulate.simulate`. Workers must be able to import it.
+        force: take over a folder behind a URL that another build has claimed.
 
     Returns:
         The manifest.
 
     Raises:
         InputError: the folder holds something else or refuses, another process writes there, no such backend.
-        UnfinishedError: some chunks were set aside, or there were no workers.
+        UnfinishedError: some chunks were skipped, or there were no workers.
     """
     check_backend(backend, jobs)
-    there = place(folder)
-    begun = _Begun(there, resume)
-    with interruptible(begun.words), locked(there):
-        return _build(
-            design, there, simulate, begun, lambda: open_backend(backend, jobs=jobs, address=address), title
-        )
+    storage = open_storage(folder)
+    message = _Message(storage, resume)
+    workers = _Workers(lambda: open_backend(backend, jobs=jobs, address=address), message)
+    with interruptible(message.text), locked(storage, force=force):
+        return _build(design, storage, simulate, message, workers, title)
 
 
-def mend(folder: str | Path, *, jobs: int | None = None, title: str = "mend") -> str:
-    """Repair a data set: remove what is damaged or doubled, simulate what is missing, write the manifest anew.
+def mend(folder: str | Path, *, jobs: int | None = None, title: str = "mend", force: bool = False) -> str:
+    """Repair a data set: remove damaged and duplicate shards, simulate missing rows, write the manifest anew.
 
     Returns:
         One line that says what was done.
@@ -86,137 +83,107 @@ def mend(folder: str | Path, *, jobs: int | None = None, title: str = "mend") ->
         InputError: no data set there, or its rows were made by another version of the code.
         UnfinishedError: as for `build`.
     """
-    there = place(folder)
-    if not there.names():
-        raise InputError(f"{there.address} is no data set; make it with python -m dataset build")
-    begun = _Begun(there, f"python -m dataset verify {there.address} --mend")
-    with interruptible(begun.words), locked(there):
-        design, source = load_sweep(there)
+    storage = open_storage(folder)
+    if not storage.names():
+        raise InputError(f"{storage.address} is no data set; make it with softflagella sweep")
+    message = _Message(storage, f"softflagella dataset verify {storage.address} --mend")
+    workers = _Workers(lambda: open_backend("loky", jobs=jobs), message)
+    with interruptible(message.text), locked(storage, force=force):
+        design, source = load_sweep(storage, same_version=True)
         simulate = None if source == _STANDARD else _imported(source)
-        before = there.read(MANIFEST).to_pybytes() if there.size(MANIFEST) is not None else b""
-        manifest = _build(
-            design, there, simulate, begun, lambda: open_backend("loky", jobs=jobs), title, mending=True
-        )
-    line = begun.progress
-    again = f"{line.simulated} rows simulated again, " if line else "no row simulated again, "
+        before = storage.read(MANIFEST).to_pybytes() if storage.size(MANIFEST) is not None else b""
+        manifest = _build(design, storage, simulate, message, workers, title, mending=True)
+    progress = message.progress
+    again = f"{progress.simulated} rows simulated again, " if progress else "no row simulated again, "
     same = json.dumps(manifest, indent=1).encode() == before.strip()
     return f"{manifest['rows']} rows are whole: {again}manifest {'kept' if same else 'written anew'}"
 
 
-class _Begun:
-    """What an interrupted build can say for itself."""
+class _Message:
+    """The last line of a build that ends early: how far it is, and how to continue."""
 
-    def __init__(self, there: Place, resume: str):
-        self._there, self._resume, self.progress = there, resume, None
+    def __init__(self, storage: Storage, resume: str):
+        self._storage, self._resume, self.progress = storage, resume, None
 
-    progress: engine.Progress | None
+    progress: Progress | None
 
-    def words(self, why: str = "stopped") -> str:
-        """One line: what is done and how to go on."""
-        line = self.progress
-        done = f"{line.rows} of {line.total} rows are stored in {self._there.address}; " if line else ""
+    def text(self, why: str = "stopped") -> str:
+        """Write the line."""
+        progress, address = self.progress, self._storage.address
+        done = f"{progress.rows} of {progress.total} rows are stored in {address}; " if progress else ""
         return f"{why}: {done}go on with: {self._resume}"
 
 
+class _Workers:
+    """The workers of a build; they start when they are first needed."""
+
+    def __init__(self, open_workers: Callable[[], Backend], message: _Message):
+        self._open, self._message = open_workers, message
+        self._backend: Backend | None = None
+
+    def backend(self) -> Backend:
+        """Start the workers, once."""
+        if self._backend is None:
+            self._backend = self._open()
+        return self._backend
+
+    def run(self, tasks: Sequence[Task | Join], progress: Progress) -> Iterator[tuple[Task | Join, Receipt]]:
+        """Run tasks; yield each with its receipt as soon as it is done.
+
+        Raises:
+            UnfinishedError: some were skipped, or there are no workers.
+        """
+        try:
+            yield from scheduler.run(tasks, self.backend(), progress)
+        except (scheduler.NoWorkersError, scheduler.SkippedError) as end:
+            raise UnfinishedError(self._message.text(str(end))) from None
+        finally:
+            progress.close()
+
+    def stop(self) -> None:
+        """Release the workers."""
+        if self._backend is not None:
+            self._backend.stop()
+
+
 def _build(
-    design: Design,
-    there: Place,
+    design: SweepDesign,
+    storage: Storage,
     simulate: Simulate | None,
-    begun: _Begun,
-    opened: Callable[[], Backend],
+    message: _Message,
+    workers: _Workers,
     title: str,
     *,
     mending: bool = False,
 ) -> dict[str, Any]:
-    code = rows_version()
+    """Simulate the missing rows, join the shards, and write the manifest."""
     source = f"{simulate.__module__}.{simulate.__qualname__}" if simulate else _STANDARD
-    folder = SweepFolder(there, design, code, source)
+    folder = SweepFolder(storage, design, rows_version(), source)
     folder.claim(mending=mending)
-    rows = max(design.rows, folder.rows_there())
-    held = folder.holds(mending=mending)
-    crew = _Crew(opened, begun)
+    rows = max(design.rows, folder.finished_rows())
+    stored = folder.check_shards(mending=mending)
     try:
-        return _complete(folder, held, rows, simulate, begun, crew, title)
+        gaps = folder.missing(stored, rows)
+        if gaps:
+            if simulate is None:
+                compile_on_this_host()
+            done = rows - sum(stop - start for start, stop in gaps)
+            message.progress = Progress(title, rows, done=done, failed=sum(c.failed for c in stored.values()))
+            tasks = [
+                Task(storage.address, folder.config, folder.key, folder.code, simulate, start, stop)
+                for start, stop in chunks(gaps, workers.backend().slots(), _cost(stored))
+            ]
+            for task, receipt in workers.run(tasks, message.progress):
+                folder.add(stored, task, receipt.contents)
+        joins = folder.joins(stored, rows)
+        if joins:
+            size = sum(join.stop - join.start for join in joins)
+            progress = Progress(title and f"{title}: joining files", size, done=0, failed=0)
+            for join, receipt in workers.run(joins, progress):
+                folder.add(stored, join, receipt.contents)
+        return folder.publish(stored, rows)
     finally:
-        crew.stop()
-
-
-def _complete(
-    folder: SweepFolder,
-    held: Held,
-    rows: int,
-    simulate: Simulate | None,
-    begun: _Begun,
-    crew: _Crew,
-    title: str,
-) -> dict[str, Any]:
-    gaps = folder.missing(held, rows)
-    if gaps:
-        if simulate is None:
-            compile_on_this_host()
-        done = rows - sum(stop - start for start, stop in gaps)
-        begun.progress = engine.Progress(title, rows, done=done, failed=sum(c.failed for c in held.values()))
-        workers = crew.workers()
-        chosen = folder.design.chosen
-        tasks = [
-            Task(
-                folder.place.address, folder.config, folder.key, folder.code, simulate, start, stop,
-                None if chosen is None else chosen[start:stop],
-            )
-            for start, stop in chunks(gaps, workers.slots(), _cost(held))
-        ]  # fmt: skip
-        for receipt in crew.run(tasks, begun.progress):
-            c = receipt.contents
-            held[Piece(piece_name(PENDING, c.start, c.stop), c.start, c.stop)] = c
-
-    def joined(tasks: Sequence[Joining], then: Callable[[Work, Receipt], None]) -> None:
-        if not tasks:
-            return
-        size = sum(task.stop - task.start for task in tasks)
-        line = engine.Progress(title and f"{title}: joining files", size, done=0, failed=0)
-        crew.run(tasks, line, then)
-
-    return folder.complete(held, rows, joined)
-
-
-class _Crew:
-    """The workers of a build; they start when they are needed."""
-
-    def __init__(self, opened: Callable[[], Backend], begun: _Begun):
-        self._opened, self._begun = opened, begun
-        self._backend: Backend | None = None
-
-    def workers(self) -> Backend:
-        """The workers."""
-        if self._backend is None:
-            self._backend = self._opened()
-        return self._backend
-
-    def run(
-        self,
-        tasks: Sequence[Work],
-        progress: engine.Progress,
-        then: Callable[[Work, Receipt], None] = lambda *_: None,
-    ) -> list[Receipt]:
-        """Run tasks to their end.
-
-        Raises:
-            UnfinishedError: some were set aside, or there are no workers.
-        """
-        try:
-            result = engine.run(tasks, self.workers(), progress, then=then) if tasks else engine.Result()
-        except engine.NoWorkersError as nobody:
-            raise UnfinishedError(self._begun.words(str(nobody))) from None
-        finally:
-            progress.close()
-        if result.set_aside:
-            raise UnfinishedError(self._begun.words(_aside(result.set_aside)))
-        return result.receipts
-
-    def stop(self) -> None:
-        """Let go of the workers."""
-        if self._backend is not None:
-            self._backend.stop()
+        workers.stop()
 
 
 def chunks(gaps: Sequence[tuple[int, int]], workers: int, cost: float) -> Iterator[tuple[int, int]]:
@@ -224,7 +191,7 @@ def chunks(gaps: Sequence[tuple[int, int]], workers: int, cost: float) -> Iterat
 
     Args:
         gaps: runs of rows, ends exclusive.
-        workers: that run at once.
+        workers: how many run at once.
         cost: seconds a row.
     """
     rows = sum(stop - start for start, stop in gaps)
@@ -234,21 +201,17 @@ def chunks(gaps: Sequence[tuple[int, int]], workers: int, cost: float) -> Iterat
             yield first, min(first + size, stop)
 
 
-def _cost(held: Held) -> float:
-    """Seconds a row, from the rows that are there."""
-    rows, cost = sum(p.stop - p.start for p in held), sum(c.cost_s for c in held.values())
+def _cost(stored: Stored) -> float:
+    """Return the mean seconds a row of the stored rows."""
+    rows, cost = sum(shard.stop - shard.start for shard in stored), sum(c.cost_s for c in stored.values())
     return max(cost / rows, 1e-6) if rows else _GUESS
 
 
 def _imported(name: str) -> Simulate:
+    """Import the function that made the rows."""
     module, _, function = name.rpartition(".")
     try:
-        found: Simulate = getattr(import_module(module), function)
+        simulate: Simulate = getattr(import_module(module), function)
     except (ImportError, AttributeError):
         raise InputError(f"its rows were made by {name}, which cannot be imported here") from None
-    return found
-
-
-def _aside(chunks: Sequence[tuple[Work, str]]) -> str:
-    parts = [f"rows {task.start} to {task.stop - 1} ({reason})" for task, reason in chunks]
-    return f"set aside: {', '.join(parts)}"
+    return simulate

@@ -1,47 +1,46 @@
-"""The engine of a sweep: hands chunks to a backend until all are stored, whatever happens to its workers.
+"""Schedule the chunks of a sweep on a backend until all are stored, and survive worker failures.
 
-A chunk whose worker dies is tried again; one that kills THREE workers is set aside and named, and so is one
-that ends with an error; the other chunks go on. Where no worker is there for PATIENCE seconds, the storage
-refuses, or a worker has other code, the sweep ends with one line; what is stored stays stored.
+A chunk whose worker dies is tried again. One that kills KILLS workers is skipped and named in the end, and so is
+one that raises an error; the other chunks go on. If there is no worker for PATIENCE seconds, the storage refuses,
+or a worker has other code, the sweep ends with one line; what is stored stays stored.
 """
 
 from __future__ import annotations
 
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from tqdm import tqdm
 
 from dataset.storage.storage import StorageError
-from dataset.workers.open_backend import GONE, KILLER, LOST, Backend
-from dataset.workers.tasks import Receipt, Refusal, Work
+from dataset.workers.backend import GONE, KILLER, LOST, Backend
+from dataset.workers.tasks import Join, Receipt, Refusal, Task
 from sim.io.errors import InputError
 
-KILLS = 3  # dead workers after which a chunk is set aside
+KILLS = 3  # dead workers after which a chunk is skipped
 PATIENCE = 60.0  # seconds without any worker
 _POLL = 0.2  # seconds
 
 
 class NoWorkersError(RuntimeError):
-    """No workers for too long."""
+    """There were no workers for too long."""
 
 
-@dataclass
-class Result:
-    """What came of a sweep's chunks."""
+class SkippedError(RuntimeError):
+    """Some tasks could not be completed; the others have been."""
 
-    receipts: list[Receipt] = field(default_factory=list)
-    set_aside: list[tuple[Work, str]] = field(default_factory=list)  # with the reason
+    def __init__(self, skipped: Sequence[tuple[Task | Join, str]]):
+        tasks = [f"rows {task.start} to {task.stop - 1} ({reason})" for task, reason in skipped]
+        super().__init__(f"skipped: {', '.join(tasks)}")
 
 
 class Progress:
-    """A line on stderr: rows, rows a second, time left, failures so far.
+    """A progress line on stderr: rows, rows a second, time left, failures so far.
 
-    Chunks are runs of a low-discrepancy sequence, so each has its share of robots that take long. The time left
-    is what a row has cost its worker so far, times the rows left, over the workers.
+    Chunks are runs of a low-discrepancy sequence, so each has its share of slow robots. The time left is what a
+    row has cost its worker so far, times the rows left, over the workers.
     """
 
     def __init__(self, title: str, rows: int, *, done: int, failed: int):
@@ -58,7 +57,7 @@ class Progress:
         return self.rows - self._before
 
     def add(self, receipt: Receipt) -> None:
-        """A chunk is stored."""
+        """Count a chunk that has been stored."""
         count = receipt.contents.stop - receipt.contents.start
         self.rows += count
         self._cost += receipt.seconds
@@ -66,18 +65,16 @@ class Progress:
         self._bar.n = self.rows
 
     def show(self, workers: int, *, now: bool = False) -> None:
-        """Renew the line, once a second."""
+        """Update the line, once a second."""
         if time.monotonic() - self._shown < 1 and not now:
             return
         self._shown = time.monotonic()
         new = self.simulated
-        words = f"{self._title}: {self.rows}/{self.total} rows"
+        text = f"{self._title}: {self.rows}/{self.total} rows"
         if new:
-            left = (self.total - self.rows) * self._cost / new / max(workers, 1)
-            words += f", {new / (self._shown - self._began):.3g} rows/s, {duration(left)} left"
-        self._bar.set_description_str(
-            f"{words}, {self._failed} failed{'' if workers else ', waiting for workers'}"
-        )
+            seconds = (self.total - self.rows) * self._cost / new / max(workers, 1)
+            text += f", {new / (self._shown - self._began):.3g} rows/s, {duration(seconds)} left"
+        self._bar.set_description_str(f"{text}, {self._failed} failed{'' if workers else ', waiting for workers'}")
 
     def close(self) -> None:
         """End the line."""
@@ -86,30 +83,25 @@ class Progress:
 
 
 def duration(seconds: float) -> str:
-    """A time in words."""
+    """Write a time with a fitting unit."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
 def run(
-    tasks: Sequence[Work],
-    backend: Backend,
-    progress: Progress,
-    *,
-    then: Callable[[Work, Receipt], None] = lambda *_: None,
-) -> Result:
-    """Run all tasks.
-
-    Args:
-        then: called with each task as soon as it is done.
+    tasks: Sequence[Task | Join], backend: Backend, progress: Progress
+) -> Iterator[tuple[Task | Join, Receipt]]:
+    """Run all tasks; yield each with its receipt as soon as it is done.
 
     Raises:
-        NoWorkersError: nobody works for PATIENCE seconds.
+        NoWorkersError: there are no workers for PATIENCE seconds.
+        SkippedError: some tasks could not be completed; raised when all others are done.
         StorageError: the storage refuses.
         InputError: a worker has another version of the code.
     """
-    result, kills = Result(), Counter[int]()
+    skipped: list[tuple[Task | Join, str]] = []
+    kills = Counter[int]()
     waiting, under_way = deque(range(len(tasks))), set[int]()
     last_seen = time.monotonic()
     while waiting or under_way:
@@ -125,19 +117,18 @@ def run(
         for number, outcome in backend.collect(_POLL):
             under_way.discard(number)
             if isinstance(outcome, Receipt):
-                result.receipts.append(outcome)
                 progress.add(outcome)
-                then(tasks[number], outcome)
+                yield tasks[number], outcome
             elif isinstance(outcome, Refusal):
-                if outcome.kind == "error":
-                    result.set_aside.append((tasks[number], outcome.message))
-                else:
+                if outcome.kind != "error":
                     raise (StorageError if outcome.kind == "storage" else InputError)(outcome.message)
+                skipped.append((tasks[number], outcome.message))
             else:
                 kills[number] += {LOST: 1, KILLER: KILLS, GONE: 0}[outcome]
                 if kills[number] < KILLS:
                     waiting.appendleft(number)
                 else:
-                    result.set_aside.append((tasks[number], f"its worker died {KILLS} times"))
+                    skipped.append((tasks[number], f"its worker died {KILLS} times"))
         progress.show(slots)
-    return result
+    if skipped:
+        raise SkippedError(skipped)

@@ -1,7 +1,7 @@
-"""Ctrl-C and SIGTERM: a long run ends within two seconds, with one line.
+"""Turn interruptions of a long command into one line and an exit status.
 
-Python runs its own handlers between two operations; one operation of a library may take longer. So a thread
-waits for the signal, too, and ends the process if the handler does not get its turn.
+Ctrl-C and SIGTERM raise `Interrupted` in the main thread, once. A second signal ends the process at once, as it
+would without this module: what is stored stays stored, and workers end with their user.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import TypeVar
 
-_GRACE = 1.3  # seconds for an orderly end
+T = TypeVar("T")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -26,54 +27,54 @@ class Interrupted(KeyboardInterrupt):
         super().__init__(signal.Signals(number).name)
 
 
+class UnfinishedError(RuntimeError):
+    """A sweep ended before all rows were stored; the message is one line, `status` the exit status."""
+
+    status = 1
+
+
 @contextmanager
 def interruptible(last_words: Callable[[], str]) -> Iterator[None]:
-    """Ctrl-C and SIGTERM inside raise `Interrupted`, once; `last_words` are printed, here or in the emergency.
+    """Turn the first SIGINT or SIGTERM inside into `Interrupted`, and print `last_words`.
 
     Outside the main thread, where Python handles no signals, this does nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    said, received = threading.Event(), list[int]()
-
-    def say(number: int) -> None:
-        if not said.is_set():
-            said.set()
-            print(f"\n{last_words()}", file=sys.stderr, flush=True)
+    received: list[int] = []
 
     def handle(number: int, _: FrameType | None) -> None:
-        for each in _SIGNALS:
-            signal.signal(each, signal.SIG_IGN)
         received.append(number)
+        for each in _SIGNALS:
+            signal.signal(each, signal.SIG_DFL)
         raise Interrupted(number)
 
-    heard, wakes = os.pipe()
-    os.set_blocking(wakes, False)
-    over = threading.Event()
-
-    def watch() -> None:
-        while data := os.read(heard, 1):
-            if data[0] in _SIGNALS and not over.wait(_GRACE):
-                say(data[0])
-                os._exit(128 + data[0])
-
     before = {each: signal.signal(each, handle) for each in _SIGNALS}
-    awake = signal.set_wakeup_fd(wakes, warn_on_full_buffer=False)
-    watcher = threading.Thread(target=watch, daemon=True)
-    watcher.start()
     try:
         yield
     except BaseException:
         if not received:
             raise
-        say(received[0])  # whatever libraries have made of `Interrupted` on its way
-        raise Interrupted(received[0]) from None
+        print(f"\n{last_words()}", file=sys.stderr, flush=True)
+        raise Interrupted(received[0]) from None  # whatever libraries have made of the first one on its way
     finally:
-        over.set()
-        signal.set_wakeup_fd(awake)
         for each, handler in before.items():
             signal.signal(each, handler)
-        os.close(wakes)
-        watcher.join(timeout=1)
-        os.close(heard)
+
+
+def run_long_command(work: Callable[[], T]) -> T:
+    """Return the result of long work; where it ends early, print one line and exit with its status."""
+    try:
+        return work()
+    except Interrupted as stop:  # its line has been printed
+        emergency = threading.Timer(1.0, os._exit, (stop.status,))  # for libraries that wait at an ordinary exit
+        emergency.daemon = True
+        emergency.start()
+        sys.exit(stop.status)
+    except KeyboardInterrupt:
+        print("\nstopped before the build began", file=sys.stderr)
+        sys.exit(130)
+    except UnfinishedError as unfinished:
+        print(f"unfinished: {unfinished}", file=sys.stderr)
+        sys.exit(unfinished.status)

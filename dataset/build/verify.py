@@ -1,7 +1,7 @@
-"""Check a data set: files, digests, inputs, flags, and some rows simulated again.
+"""Verify a data set: files, digests, inputs, flags, and some rows simulated again.
 
 A row simulated again must give the same bits, and time stepping from rest must agree with its steady motion to the
-error of stepping (1 % in spins, 3 % in the rest).
+error of stepping (1 % in spins, 3 % in other outputs).
 """
 
 from __future__ import annotations
@@ -12,77 +12,73 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from dataset.build.sweep_folder import chosen_digest, load_sweep
-from dataset.rows.design import Design
-from dataset.rows.schema import COST, schema, table_of
+from dataset.build.sweep_folder import load_sweep
+from dataset.rows.design import SweepDesign
+from dataset.rows.schema import COST, arrow_table, schema
 from dataset.rows.simulate import HISTORY, simulate
-from dataset.storage.data_set import batches, read_manifest
-from dataset.storage.storage import place
-from dataset.workers.tasks import rows_version
+from dataset.storage.data_set import batches, check_version, read_manifest
+from dataset.storage.storage import open_storage
 from sim.io.errors import InputError
 from sim.motion.batches import stepped_columns
 
 _SPINS = ("omega_t_bar", "omega_h_bar")
-_REST = ("omega_yr_bar", "v_x", "R_yr_over_l")
-_SPIN_ERROR, _REST_ERROR = 0.01, 0.03
+_OTHERS = ("omega_yr_bar", "v_x", "R_yr_over_l")
+_SPIN_ERROR, _OTHER_ERROR = 0.01, 0.03
 
 
 def verify(folder: str | Path, *, rows: int = 8) -> str:
-    """Verify a data set; returns a line that says what was checked.
+    """Verify a data set; return a line that says what was checked.
 
     Raises:
         InputError: what is wrong with it.
     """
-    there = place(folder)
-    manifest = read_manifest(there)
-    if manifest["code_version"] != rows_version():
-        raise InputError(
-            f"{there.address} was made by version {manifest['code_version']}, this is {rows_version()}; "
-            "verify it with the version that made it"
-        )
-    design = load_sweep(there)[0].with_rows(manifest["rows"])
-    if design.config() != manifest["config"] or manifest.get("chosen") != chosen_digest(design, design.rows):
-        raise InputError(f"{there.address}: sweep.json is not that of the manifest; mend it with --mend")
+    storage = open_storage(folder)
+    manifest = read_manifest(storage)
+    check_version(storage, manifest["code_version"])
+    design = load_sweep(storage)[0].with_rows(manifest["rows"])
+    if design.config() != manifest["config"]:
+        raise InputError(f"{storage.address}: sweep.json is not that of the manifest; repair it with --mend")
     chosen = np.sort(np.random.default_rng(1).choice(design.rows, min(rows, design.rows), replace=False))
     sample, start = [], 0
-    for batch in batches(there):
+    for batch in batches(storage):
         stop = start + batch.num_rows
-        _check_batch(there.address, design, batch, start)
+        _check_batch(storage.address, design, batch, start)
         sample.append(pa.Table.from_batches([batch]).take(chosen[(chosen >= start) & (chosen < stop)] - start))
         start = stop
     if start != manifest["rows"]:
-        raise InputError(f"{there.address} has {start} of {manifest['rows']} rows; mend it with --mend")
+        raise InputError(f"{storage.address} has {start} of {manifest['rows']} rows; repair it with --mend")
     stored = pa.concat_tables(sample)
-    _check_again(there.address, design, stored, chosen)
+    _check_again(storage.address, design, stored, chosen)
     line = f"{start} rows as configured, flags consistent; {len(chosen)} rows simulated again: the same bits"
-    stepped = _check_stepped(there.address, design, stored.to_pandas())
-    return f"{line}; stepped in time from rest: largest difference {100 * stepped * _REST_ERROR:.2f} %"
+    stepped = _check_stepped(storage.address, design, stored.to_pandas())
+    return f"{line}; stepped in time from rest: largest difference {100 * stepped * _OTHER_ERROR:.2f} %"
 
 
-def _check_batch(address: str, design: Design, batch: pa.RecordBatch, start: int) -> None:
+def _check_batch(address: str, design: SweepDesign, batch: pa.RecordBatch, start: int) -> None:
+    """Check order, inputs and flags of consecutive rows."""
     stop = start + batch.num_rows
     if not np.array_equal(batch["row"].to_numpy(), design.indices(start, stop)):
-        raise InputError(f"{address}: rows {start} to {stop - 1} are not in order; mend it with --mend")
+        raise InputError(f"{address}: rows {start} to {stop - 1} are not in order; repair it with --mend")
     for name, values in design.points(start, stop).items():
         if not np.array_equal(batch[name].to_numpy(), values):
             raise InputError(f"{address}: {name} in rows {start} to {stop - 1} is not that of its design")
-    outputs = [batch[n].to_numpy() for n in (*_SPINS, *_REST)]
+    outputs = [batch[name].to_numpy() for name in (*_SPINS, *_OTHERS)]
     failed = batch["failed"].to_numpy(zero_copy_only=False)
-    lost = int((np.isnan(outputs).any(0) & ~failed).sum())
-    if lost:
-        raise InputError(f"{address} has {lost} rows with empty outputs that are not flagged as failed")
+    unflagged = int((np.isnan(outputs).any(0) & ~failed).sum())
+    if unflagged:
+        raise InputError(f"{address} has {unflagged} rows with empty outputs that are not flagged as failed")
 
 
-def _check_again(address: str, design: Design, stored: pa.Table, chosen: np.ndarray) -> None:
+def _check_again(address: str, design: SweepDesign, stored: pa.Table, chosen: np.ndarray) -> None:
+    """Simulate stored rows again and compare all bits."""
     points = {name: stored[name].to_numpy().astype(float) for name in design.axes}
     points[HISTORY] = stored[HISTORY].to_numpy()
-    again = table_of(
+    again = arrow_table(
         {**simulate(points, sensitivities=design.sensitivities), "row": design.indices()[chosen]},
         schema(design.effects, design.sensitivities),
     )
     for name in stored.schema.names:
-        one, other = (_bits(table[name]) for table in (stored, again))
-        if name != COST and one != other:
+        if name != COST and _bits(stored[name]) != _bits(again[name]):
             raise InputError(
                 f"{address}: {name} of rows simulated again differs; processors differ in last digits, so verify "
                 "on a machine of the kind that made it, or build it anew"
@@ -96,19 +92,22 @@ def _bits(column: pa.ChunkedArray) -> object:
     return values.to_pylist() if pa.types.is_string(values.type) else values.to_numpy(False).tobytes()
 
 
-def _check_stepped(address: str, design: Design, stored: pd.DataFrame) -> float:
-    """Largest difference, in units of the error of stepping."""
+def _check_stepped(address: str, design: SweepDesign, stored: pd.DataFrame) -> float:
+    """Compare with time steps from rest; return the largest difference, in units of the error of stepping."""
     good = stored[stored["converged"]]
     if good.empty:
         return 0.0
-    again = stepped_columns({n: good[n].to_numpy(dtype=float) for n in design.axes}, title="")
-    worst = max(_worst(good, again, _SPINS) / _SPIN_ERROR, _worst(good, again, _REST) / _REST_ERROR)
+    again = stepped_columns({name: good[name].to_numpy(dtype=float) for name in design.axes}, title="")
+    worst = max(
+        _largest_difference(good, again, _SPINS) / _SPIN_ERROR,
+        _largest_difference(good, again, _OTHERS) / _OTHER_ERROR,
+    )
     if worst > 1:
         raise InputError(
-            f"{address}: rows stepped in time differ by {100 * worst * _REST_ERROR:.2f} %; build it anew"
+            f"{address}: rows stepped in time differ by {100 * worst * _OTHER_ERROR:.2f} %; build it anew"
         )
     return worst
 
 
-def _worst(rows: pd.DataFrame, again: dict[str, np.ndarray], names: tuple[str, ...]) -> float:
-    return max(float(np.max(np.abs(again[n] / rows[n].to_numpy() - 1))) for n in names)
+def _largest_difference(rows: pd.DataFrame, again: dict[str, np.ndarray], names: tuple[str, ...]) -> float:
+    return max(float(np.max(np.abs(again[name] / rows[name].to_numpy() - 1))) for name in names)

@@ -1,6 +1,7 @@
-"""The data card: one page of Markdown beside the data, for whoever finds the folder.
+"""Write the data card: one page of Markdown beside the data, for whoever finds the folder.
 
-Ranges, coverage, failures by reason and region, cost, code, and how to read it. Made in one pass over the rows.
+It lists ranges, coverage, failures by reason and region, cost and code, and says how to read the data. It takes
+one pass over the rows.
 """
 
 from __future__ import annotations
@@ -14,24 +15,24 @@ import numpy as np
 from dataset.rows.schema import COST
 from dataset.storage.data_set import CARD, batches, read_manifest
 from dataset.storage.shards import plain
-from dataset.storage.storage import Place
+from dataset.storage.storage import Storage
 
-_BINS = 16  # of an input's range, for its coverage
+_BINS = 16  # of equal width in an input's range, for its coverage
 _SPEEDS = 4  # regions of ω̄
 
 
-def write_card(place: Place) -> None:
+def write_card(storage: Storage) -> None:
     """Write the card of a finished data set."""
-    manifest = read_manifest(place)
+    manifest = read_manifest(storage)
     inputs = manifest["config"]["inputs"]
-    seen = _Seen(inputs)
-    for batch in batches(place, [*inputs, *({"N", "omega_bar"} - set(inputs)), "failed", "reason", COST]):
-        seen.add({name: plain(batch[name]) for name in batch.schema.names})
-    place.write(CARD, "\n\n".join(_parts(place, manifest, seen)) + "\n")
+    statistics = _Statistics(inputs)
+    for batch in batches(storage, [*inputs, *({"N", "omega_bar"} - set(inputs)), "failed", "reason", COST]):
+        statistics.add({name: plain(batch[name]) for name in batch.schema.names})
+    storage.write(CARD, "\n\n".join(_sections(storage, manifest, statistics)) + "\n")
 
 
-class _Seen:
-    """Ranges, coverage, failures and cost of the rows so far."""
+class _Statistics:
+    """Running ranges, coverage, failures and cost of the rows."""
 
     def __init__(self, inputs: dict[str, Any]):
         self.inputs = inputs
@@ -45,7 +46,7 @@ class _Seen:
         self.cost: Counter[int] = Counter()  # nanoseconds, by N
 
     def add(self, rows: dict[str, np.ndarray]) -> None:
-        """Count a batch."""
+        """Add a batch."""
         for name, spec in self.inputs.items():
             values, (low, high) = rows[name], self.ends[name]
             self.ends[name] = min(low, float(values.min())), max(high, float(values.max()))
@@ -56,21 +57,21 @@ class _Seen:
         for count in np.unique(tails).tolist():
             same = tails == count
             self.cost[count] += round(1e9 * float(np.sum(rows[COST][same], dtype=float)))
-            for place in np.unique(region[same]).tolist():
-                here = same & (region == place)
-                self.rows[count, place] += int(here.sum())
-                lost = rows["reason"][here & rows["failed"]]
-                self.failed[count, place] += len(lost)
-                for reason in lost.tolist():
-                    self.reasons[reason, count, place] += 1
+            for index in np.unique(region[same]).tolist():
+                inside = same & (region == index)
+                self.rows[count, index] += int(inside.sum())
+                failures = rows["reason"][inside & rows["failed"]]
+                self.failed[count, index] += len(failures)
+                for reason in failures.tolist():
+                    self.reasons[reason, count, index] += 1
 
     def speed(self, region: int) -> str:
-        """A region of ω̄ in words."""
+        """Write the bounds of a region of ω̄."""
         return f"{self.speeds[region]:.3g} to {self.speeds[region + 1]:.3g}"
 
 
 def _share(values: np.ndarray, spec: dict[str, Any]) -> np.ndarray:
-    """Where values lie in their range, 0 to 1, on its scale."""
+    """Return the positions of values in their range, 0 to 1, on its scale."""
     low, high = spec["range"]
     if low == high:
         return np.zeros(len(values))
@@ -79,7 +80,8 @@ def _share(values: np.ndarray, spec: dict[str, Any]) -> np.ndarray:
     return np.asarray((values - low) / (high - low))
 
 
-def _parts(place: Place, manifest: dict[str, Any], seen: _Seen) -> Iterable[str]:
+def _sections(storage: Storage, manifest: dict[str, Any], statistics: _Statistics) -> Iterable[str]:
+    """Yield the paragraphs of the card."""
     rows, seconds = manifest["rows"], manifest["cost_s"]
     yield "# Data card"
     yield (
@@ -88,26 +90,27 @@ def _parts(place: Place, manifest: dict[str, Any], seen: _Seen) -> Iterable[str]
         "numbers are dimensionless; the unit and meaning of each column are in the Parquet schema."
     )
     yield "## How to read it"
-    yield _reading(place)
+    yield _reading(storage)
     yield "## Inputs"
-    which = "row i is its point i" if manifest.get("chosen") is None else "chosen ones, the column row says which"
     yield (
-        f"Points of a scrambled Sobol sequence, seed {manifest['config']['seed']}; {which}. "
+        f"Points of a scrambled Sobol sequence, seed {manifest['config']['seed']}; row i is its point i. "
         f"Coverage: rows in the emptiest and the fullest of {_BINS} equal parts of the range, over their mean."
     )
-    yield _table(("input", "range", "scale", "smallest", "largest", "coverage"), _inputs(seen))
+    yield _table(("input", "range", "scale", "smallest", "largest", "coverage"), _inputs(statistics))
     yield "## Failures"
     if manifest["failed"]:
-        yield _table(("N", "ω̄", "rows", "failed"), _regions(seen))
-        yield _table(("reason", "N", "ω̄", "rows"), _reasons(seen))
+        yield _table(("N", "ω̄", "rows", "failed"), _regions(statistics))
+        yield _table(("reason", "N", "ω̄", "rows"), _reasons(statistics))
     else:
         yield "None."
     yield "## Cost"
     yield f"{seconds:.1f} s of processor time, {1e3 * seconds / max(rows, 1):.2f} ms a row."
     by_tails = Counter[int]()
-    for (tails, _), count in seen.rows.items():
+    for (tails, _), count in statistics.rows.items():
         by_tails[tails] += count
-    yield _table(("N", "ms a row"), [(n, f"{seen.cost[n] / by_tails[n] / 1e6:.2f}") for n in sorted(by_tails)])
+    yield _table(
+        ("N", "ms a row"), [(n, f"{statistics.cost[n] / by_tails[n] / 1e6:.2f}") for n in sorted(by_tails)]
+    )
     yield "## Made by"
     libraries = ", ".join(f"{name} {version}" for name, version in manifest["libraries"].items())
     yield (
@@ -116,8 +119,9 @@ def _parts(place: Place, manifest: dict[str, Any], seen: _Seen) -> Iterable[str]
     )
 
 
-def _reading(place: Place) -> str:
-    folder = place.path("rows")
+def _reading(storage: Storage) -> str:
+    """Return examples of how to read the rows."""
+    folder = storage.path("rows")
     return "\n".join(
         (
             "```python",
@@ -127,33 +131,32 @@ def _reading(place: Place) -> str:
             "```",
             "",
             "These do not check the files against the manifest; "
-            f'`dataset.storage.data_set.read("{place.address}")` does, '
-            "and so does `dataset.storage.data_set.batches`, piece by piece.",
+            f'`dataset.storage.data_set.read("{storage.address}")` does, '
+            "and so does `dataset.storage.data_set.batches`, shard by shard.",
         )
     )
 
 
-def _inputs(seen: _Seen) -> Iterable[Sequence[object]]:
-    for name, spec in seen.inputs.items():
-        bins = seen.bins[name]
-        whole = spec["scale"] == "integer"
-        used = bins[bins > 0] if whole or spec["range"][0] == spec["range"][1] else bins
-        low, high = seen.ends[name]
+def _inputs(statistics: _Statistics) -> Iterable[Sequence[object]]:
+    for name, spec in statistics.inputs.items():
+        bins = statistics.bins[name]
+        used = bins[bins > 0] if spec["scale"] == "integer" or spec["range"][0] == spec["range"][1] else bins
+        low, high = statistics.ends[name]
         cover = f"{used.min() / used.mean():.2f} to {used.max() / used.mean():.2f}"
         ends = f"{spec['range'][0]:g} to {spec['range'][1]:g}"
         scale = spec["scale"] + (", both directions" if spec.get("both_directions") else "")
         yield name, ends, scale, f"{low:.4g}", f"{high:.4g}", cover
 
 
-def _regions(seen: _Seen) -> Iterable[Sequence[object]]:
-    for (tails, region), count in sorted(seen.rows.items()):
-        if seen.failed[tails, region]:
-            yield tails, seen.speed(region), count, seen.failed[tails, region]
+def _regions(statistics: _Statistics) -> Iterable[Sequence[object]]:
+    for (tails, region), count in sorted(statistics.rows.items()):
+        if statistics.failed[tails, region]:
+            yield tails, statistics.speed(region), count, statistics.failed[tails, region]
 
 
-def _reasons(seen: _Seen) -> Iterable[Sequence[object]]:
-    for (reason, tails, region), count in sorted(seen.reasons.items()):
-        yield reason, tails, seen.speed(region), count
+def _reasons(statistics: _Statistics) -> Iterable[Sequence[object]]:
+    for (reason, tails, region), count in sorted(statistics.reasons.items()):
+        yield reason, tails, statistics.speed(region), count
 
 
 def _table(header: Sequence[object], rows: Iterable[Sequence[object]]) -> str:

@@ -1,4 +1,4 @@
-"""The pictures of the sweep report."""
+"""Draw the figures of the sweep report."""
 
 from __future__ import annotations
 
@@ -13,18 +13,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from dataset.report.sobol_indices import Indices
+from dataset.rows.schema import column_named
 from sim.arrays import Floats
 from sim.model.response import DWELLS
 
 COLOURS = ("#5b6a78", "#2a7fba", "#e08a1e", "#3d9a5f", "#8a4fa3", "#c8452f", "#7a5c3e", "#1c2733")  # N = 1 to 8
-LABELS = {
-    "C_t": "$C_t$", "C_r": "$C_r$", "C_yr": "$C_{yr}$", "l_over_R": "$l/R$", "L_over_R": "$L/R$",
-    "l_over_r0": "$l/r_0$", "omega_bar": "$\\bar\\omega$", "N": "$N$", "a_over_R": "$a/R$",
-    "omega_yr_bar": "yaw rate $\\bar\\omega_{yr}$", "v_z": "surge $v_z$", "R_yr_over_l": "turn radius $R_{yr}/l$",
-    "theta_deg": "slip angle $\\theta$ [deg]",
-}  # fmt: skip
-_LOGARITHMIC = ("omega_yr_bar", "v_z", "R_yr_over_l")
-_Along = Literal["both", "x", "y"]
+RESPONSES = ("lag_psi_rad", "lag_z", "net_speed_bar")  # the columns of responses that are drawn
+_Axes = Literal["both", "x", "y"]
 _BINS = 10
 _MOST_BANDS = 4  # with more numbers of tails, one band is drawn for all
 _ALL = "#5b6a78"
@@ -32,15 +27,16 @@ _FEWEST = 12  # rows in a bin that is drawn
 
 
 def colour(tails: float) -> str:
+    """Return the colour of a number of tails."""
     return COLOURS[(int(tails) - 1) % len(COLOURS)]
 
 
 def draw_trends(rows: pd.DataFrame, output: str, inputs: Sequence[str]) -> Figure:
-    """An output against each input: medians and the middle half of the rows, by number of tails."""
+    """Draw an output against each input: medians and the middle half of the rows, by number of tails."""
     columns = 4
     figure = Figure(figsize=(11, 2.6 * -(-len(inputs) // columns)))
-    for place, name in enumerate(inputs):
-        axes = figure.add_subplot(-(-len(inputs) // columns), columns, place + 1)
+    for panel, name in enumerate(inputs):
+        axes = figure.add_subplot(-(-len(inputs) // columns), columns, panel + 1)
         parts = [(colour(float(str(tails))), part) for tails, part in rows.groupby("N")]
         if len(parts) > _MOST_BANDS:
             _draw_band(axes, rows[name].to_numpy(float), rows[output].to_numpy(float), _ALL, line=False)
@@ -49,71 +45,67 @@ def draw_trends(rows: pd.DataFrame, output: str, inputs: Sequence[str]) -> Figur
             _draw_band(axes, x, y, shade, band=len(parts) <= _MOST_BANDS)
         _style(
             axes,
-            x=LABELS.get(name, name),
-            y=LABELS.get(output, output) if place % columns == 0 else "",
-            logarithmic=("x" if name == "omega_bar" else "") + ("y" if output in _LOGARITHMIC else ""),
+            x=column_named(name).title,
+            y=column_named(output).title if panel % columns == 0 else "",
+            logarithmic="x" * column_named(name).logarithmic + "y" * column_named(output).logarithmic,
         )
     return _with_tails_above(figure, rows, 0.95)
 
 
 def _draw_band(axes: Axes, x: Floats, y: Floats, shade: str, *, line: bool = True, band: bool = True) -> None:
-    """Median (line) and quartiles (band) of y in bins of equally many rows."""
+    """Draw median (line) and quartiles (band) of y in bins of equally many rows."""
     good = np.isfinite(x) & np.isfinite(y)
     if good.sum() < 2 * _FEWEST:
         return
     x, y = x[good], y[good]
     bins = min(_BINS, good.sum() // _FEWEST)
     edges = np.quantile(x, np.linspace(0, 1, bins + 1))
-    place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, bins - 1)
-    middle = [float(np.median(x[place == i])) for i in range(bins) if (place == i).any()]
-    quartiles = np.array(
-        [np.quantile(y[place == i], [0.25, 0.5, 0.75]) for i in range(bins) if (place == i).any()]
-    )
+    bin_number = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, bins - 1)
+    members = [bin_number == i for i in range(bins) if (bin_number == i).any()]
+    middle = [float(np.median(x[rows])) for rows in members]
+    quartiles = np.array([np.quantile(y[rows], [0.25, 0.5, 0.75]) for rows in members])
     if line:
         axes.plot(middle, quartiles[:, 1], color=shade, lw=1.4)
     if band:
         axes.fill_between(middle, quartiles[:, 0], quartiles[:, 2], color=shade, alpha=0.15, lw=0)
 
 
-def draw_indices(found: Mapping[str, Indices]) -> Figure:
-    """Total indices as pale bars with their intervals, first-order indices as full ones."""
+def draw_indices(by_output: Mapping[str, Indices]) -> Figure:
+    """Draw total indices as pale bars with their intervals, first-order indices as full bars."""
     figure = Figure(figsize=(11, 3.2))
-    for place, (output, one) in enumerate(found.items()):
-        axes = figure.add_subplot(1, len(found), place + 1)
-        y = np.arange(len(one.inputs))[::-1]
-        axes.barh(y, one.total, color="#2a7fba", alpha=0.3, height=0.7, label="total")
-        axes.barh(y, one.first, color="#2a7fba", height=0.4, label="first order")
-        spread = np.abs(one.total_bounds.T - one.total)
-        axes.errorbar(one.total, y, xerr=spread, fmt="none", ecolor="#1c2733", elinewidth=0.8, capsize=2)
-        axes.set_yticks(y, [LABELS.get(name, name) for name in one.inputs], fontsize=9)
+    for panel, (output, indices) in enumerate(by_output.items()):
+        axes = figure.add_subplot(1, len(by_output), panel + 1)
+        y = np.arange(len(indices.inputs))[::-1]
+        axes.barh(y, indices.total, color="#2a7fba", alpha=0.3, height=0.7, label="total")
+        axes.barh(y, indices.first, color="#2a7fba", height=0.4, label="first order")
+        spread = np.abs(indices.total_bounds.T - indices.total)
+        axes.errorbar(indices.total, y, xerr=spread, fmt="none", ecolor="#1c2733", elinewidth=0.8, capsize=2)
+        axes.set_yticks(y, [column_named(name).title for name in indices.inputs], fontsize=9)
         axes.set_xlim(0, 1)
-        _style(axes, title=LABELS.get(output, output), along="x")
+        _style(axes, title=column_named(output).title, numbered="x")
     return _finished(figure, loc="lower right")
 
 
 def draw_collapse(rows: pd.DataFrame, linear: Mapping[str, Floats], outputs: Sequence[str]) -> Figure:
-    """Outputs over their values in linear theory, against the drag number S of a tail."""
+    """Draw outputs over their values in linear theory, against the drag number S of a tail."""
     figure = Figure(figsize=(11, 3))
-    for place, output in enumerate(outputs):
-        axes = figure.add_subplot(1, len(outputs), place + 1)
+    for panel, output in enumerate(outputs):
+        axes = figure.add_subplot(1, len(outputs), panel + 1)
         ratio = np.abs(rows[output].to_numpy(float)) / linear[output]
         tails = rows["N"].to_numpy()
         for n in sorted(set(tails)):
-            some = (tails == n) & np.isfinite(ratio)
-            axes.plot(linear["S"][some], ratio[some], ".", ms=2.5, alpha=0.5, color=colour(n))
+            finite = (tails == n) & np.isfinite(ratio)
+            axes.plot(linear["S"][finite], ratio[finite], ".", ms=2.5, alpha=0.5, color=colour(n))
         axes.axhline(1, color="#1c2733", lw=0.8)
         low, high = np.nanquantile(ratio, [0.005, 0.995])
         axes.set_ylim(low - 0.1 * (high - low), high + 0.1 * (high - low))
-        title = f"{LABELS.get(output, output)} / linear theory"
+        title = f"{column_named(output).title} / linear theory"
         _style(axes, x="$S = \\zeta_\\perp\\omega_t l^4/EI$", title=title, logarithmic="x")
     return _with_tails_above(figure, rows, 0.92)
 
 
-SHOWN = ("lag_psi_rad", "lag_z", "net_speed_bar")  # columns of responses that are drawn
-
-
 def draw_responses(rows: pd.DataFrame) -> Figure:
-    """Lags and net speed over the dwell: medians and the middle half, for slow, middling and fast motors."""
+    """Draw lags and net speed over the dwell: medians and the middle half, for slow, medium and fast motors."""
     figure = Figure(figsize=(11, 3))
     speed = np.hypot(rows["v_x"].to_numpy(float), rows["v_z"].to_numpy(float))
     turn = np.abs(rows["omega_yr_bar"]).to_numpy(float)
@@ -123,18 +115,18 @@ def draw_responses(rows: pd.DataFrame) -> Figure:
         (speed, "net speed / speed"),
     )
     thirds = np.asarray(pd.qcut(rows["omega_bar"].abs(), 3, labels=False))
-    for place, (name, (scale, label)) in enumerate(zip(SHOWN, scales, strict=True)):
-        axes = figure.add_subplot(1, 3, place + 1)
+    for panel, (name, (scale, label)) in enumerate(zip(RESPONSES, scales, strict=True)):
+        axes = figure.add_subplot(1, 3, panel + 1)
         curves = np.stack([np.asarray(curve, dtype=float) for curve in rows[name]]) / scale[:, None]
-        if name == "net_speed_bar" and rows["history"].any():  # without, that of short dwells is not known
+        if name == "net_speed_bar" and rows["history"].any():  # else that of short dwells is unknown
             curves[~rows["history"].to_numpy(bool)] = np.nan
-        for third, (shade, which) in enumerate(zip(COLOURS[1:4], ("slow", "middling", "fast"), strict=True)):
-            some = curves[thirds == third]
-            some = some[np.isfinite(some).any(1)]
-            if not len(some):
+        for third, (shade, which) in enumerate(zip(COLOURS[1:4], ("slow", "medium", "fast"), strict=True)):
+            group = curves[thirds == third]
+            group = group[np.isfinite(group).any(1)]
+            if not len(group):
                 continue
-            known = np.isfinite(some).mean(0) > 0.5
-            low, middle, high = np.nanquantile(some[:, known], [0.25, 0.5, 0.75], axis=0)
+            known = np.isfinite(group).mean(0) > 0.5
+            low, middle, high = np.nanquantile(group[:, known], [0.25, 0.5, 0.75], axis=0)
             axes.plot(DWELLS[known], middle, color=shade, lw=1.4, label=f"{which} motors")
             axes.fill_between(DWELLS[known], low, high, color=shade, alpha=0.15, lw=0)
         _style(axes, x="dwell $\\bar T$", title=label, logarithmic="x")
@@ -142,30 +134,30 @@ def draw_responses(rows: pd.DataFrame) -> Figure:
 
 
 def draw_where(rows: pd.DataFrame) -> Figure:
-    """Share of rows whose tails touch, and of rows that were not solved for directly or failed, over ω̄."""
+    """Draw the shares of rows whose tails touch, and of rows that failed or needed time steps, over ω̄."""
     figure = Figure(figsize=(11, 2.8))
     panels = (("touching", "tails touch"), ("hard", "failed, or needed time steps"))
-    for place, (name, label) in enumerate(panels):
-        axes = figure.add_subplot(1, 2, place + 1)
+    for panel, (name, label) in enumerate(panels):
+        axes = figure.add_subplot(1, 2, panel + 1)
         for tails, part in rows.groupby("N"):
             bins = np.array_split(np.argsort(part["omega_bar"].to_numpy()), max(1, min(_BINS, len(part) // 20)))
             speed = [float(np.median(part["omega_bar"].to_numpy()[b])) for b in bins]
             share = [100 * float(np.mean(part[name].to_numpy()[b])) for b in bins]
             axes.plot(speed, share, "-o", ms=3, lw=1.2, color=colour(float(str(tails))), label=f"N = {tails}")
         axes.set_ylim(bottom=0)
-        _style(axes, x=LABELS["omega_bar"], y="share of rows [%]", title=label, logarithmic="x")
+        _style(axes, x=column_named("omega_bar").title, y="share of rows [%]", title=label, logarithmic="x")
     return _finished(figure)
 
 
 def _style(
-    axes: Axes, *, x: str = "", y: str = "", title: str = "", logarithmic: str = "", along: _Along = "both"
+    axes: Axes, *, x: str = "", y: str = "", title: str = "", logarithmic: str = "", numbered: _Axes = "both"
 ) -> None:
-    """What all pictures have in common: labels, scales, small ticks and a pale grid.
+    """Give axes what all figures have in common: labels, scales, small ticks and a pale grid.
 
     Args:
         x, y, title: labels.
         logarithmic: the axes with a logarithmic scale: "", "x", "y" or "xy".
-        along: the axes with numbers, and with lines of the grid.
+        numbered: the axes with numbers and grid lines.
     """
     axes.set_xlabel(x, fontsize=9)
     axes.set_ylabel(y, fontsize=9)
@@ -176,12 +168,12 @@ def _style(
     if "y" in logarithmic:
         axes.set_yscale("log")
         plain_logarithms(axes.yaxis)
-    axes.tick_params(axis=along, labelsize=7)
-    axes.grid(axis=along, alpha=0.25, lw=0.5)
+    axes.tick_params(axis=numbered, labelsize=7)
+    axes.grid(axis=numbered, alpha=0.25, lw=0.5)
 
 
 def _with_tails_above(figure: Figure, rows: pd.DataFrame, top: float) -> Figure:
-    """The figure with the colours of the numbers of tails above its panels, which end at `top` of its height."""
+    """Add a legend of the numbers of tails above the panels, which end at `top` of the figure's height."""
     axes = figure.axes[0]
     handles = [axes.plot([], [], color=colour(n), label=f"N = {n}")[0] for n in sorted(set(rows["N"]))]
     figure.legend(handles=handles, ncols=len(handles), fontsize=8, frameon=False, loc="upper center")
@@ -190,14 +182,14 @@ def _with_tails_above(figure: Figure, rows: pd.DataFrame, top: float) -> Figure:
 
 
 def _finished(figure: Figure, **legend: Any) -> Figure:
-    """The figure with a legend in its first panel."""
+    """Add a legend in the first panel."""
     figure.axes[0].legend(fontsize=7, frameon=False, **legend)
     figure.tight_layout()
     return figure
 
 
 def plain_logarithms(axis: Axis) -> None:
-    """Label a logarithmic axis with few plain numbers (1, 2, 5, 10, …)."""
+    """Label a logarithmic axis with a few plain numbers (1, 2, 5, 10, …)."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())

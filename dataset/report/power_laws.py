@@ -1,4 +1,4 @@
-"""How outputs go with inputs: exponents of scaling laws, and linear theory beside them.
+"""Fit scaling laws: exponents of outputs in inputs, and those of linear theory for comparison.
 
 An exponent is ∂ln y/∂ln x with all other inputs held. It comes from a linear fit of ln y to the logarithms of all
 inputs, over the rows in which x lies in one third of its range. A scaling law holds where the three thirds agree.
@@ -33,12 +33,12 @@ class Exponents:
 
     @property
     def holds(self) -> bool:
-        """Whether one power law describes all thirds: exponents differ by less than 0.1."""
+        """Return whether one power law describes all thirds: exponents differ by less than 0.1."""
         return max(self.value) - min(self.value) < 0.1
 
 
 def exponents(inputs: Mapping[str, Floats], output: str, values: Floats) -> list[Exponents]:
-    """Exponents of an output (M,) in every input (M,) that varies; rows that are not above 0 are left out."""
+    """Fit exponents of an output (M,) in every input (M,) that varies; rows that are not above 0 are left out."""
     good = np.isfinite(values) & (values > 0)
     names = [name for name, column in inputs.items() if np.ptp(column[good]) > 0]
     logs = np.stack([np.log(inputs[name][good]) for name in names], 1)
@@ -47,25 +47,27 @@ def exponents(inputs: Mapping[str, Floats], output: str, values: Floats) -> list
 
 
 def _by_third(logs: Floats, y: Floats, k: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Fit exponents and half-widths of intervals in the thirds of input k."""
     edges = np.quantile(logs[:, k], [0, 1 / 3, 2 / 3, 1])
     slopes, errors = [], []
     for low, high in pairwise(edges):
-        some = (logs[:, k] >= low) & (logs[:, k] <= high)
-        x = logs[some] - logs[some].mean(0)
-        if np.ptp(x[:, k]) == 0 or some.sum() < 3 * logs.shape[1]:
+        third = (logs[:, k] >= low) & (logs[:, k] <= high)
+        x = logs[third] - logs[third].mean(0)
+        if np.ptp(x[:, k]) == 0 or third.sum() < 3 * logs.shape[1]:
             slopes.append(np.nan)
             errors.append(np.nan)
             continue
-        slope, _, _, _ = np.linalg.lstsq(x, y[some] - y[some].mean(), rcond=None)
-        left = y[some] - y[some].mean() - x @ slope
-        covariance = np.linalg.pinv(x.T @ x) * left.var() * len(left) / max(len(left) - x.shape[1] - 1, 1)
+        slope, _, _, _ = np.linalg.lstsq(x, y[third] - y[third].mean(), rcond=None)
+        residual = y[third] - y[third].mean() - x @ slope
+        freedom = max(len(residual) - x.shape[1] - 1, 1)
+        covariance = np.linalg.pinv(x.T @ x) * residual.var() * len(residual) / freedom
         slopes.append(float(slope[k]))
         errors.append(_ERRORS * float(np.sqrt(covariance[k, k])))
     return (slopes[0], slopes[1], slopes[2]), (errors[0], errors[1], errors[2])
 
 
 def linear_rows(columns: Mapping[str, Floats], *, seed: int = 0) -> tuple[np.ndarray, dict[str, Floats]]:
-    """Linear theory for some of the rows: their numbers (K,), and its outputs and drag number S, (K,) each.
+    """Evaluate linear theory for some of the rows: their numbers (K,), and outputs and drag number S, (K,) each.
 
     Args:
         columns: inputs by name, each (M,), without effects.
@@ -75,12 +77,14 @@ def linear_rows(columns: Mapping[str, Floats], *, seed: int = 0) -> tuple[np.nda
     if count > _MOST_LINEAR_ROWS:
         rows = np.sort(np.random.default_rng(seed).choice(count, _MOST_LINEAR_ROWS, replace=False))
     values = check_columns({name: column[rows] for name, column in columns.items()})
-    found = []
+    values_by_row = []
     for i in range(len(rows)):
         groups = Groups.from_columns({name: column[i : i + 1] for name, column in values.items()})
         motion, perpendicular = linear_motion(groups), float(tail_coefficients(groups.l_over_r0)[1])
-        found.append((motion.omega_t, motion.omega_yr, motion.v_x, motion.v_z, perpendicular * motion.omega_t))
-    omega_t, omega_yr, v_x, v_z, drag_number = np.abs(np.array(found).T)
+        values_by_row.append(
+            (motion.omega_t, motion.omega_yr, motion.v_x, motion.v_z, perpendicular * motion.omega_t)
+        )
+    omega_t, omega_yr, v_x, v_z, drag_number = np.abs(np.array(values_by_row).T)
     return rows, {
         "omega_t_bar": omega_t,
         "omega_yr_bar": omega_yr,

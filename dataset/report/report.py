@@ -1,7 +1,8 @@
-"""A sweep as one page: what was swept, what depends on what, where model or solver meet their limits."""
+"""Report a sweep on one page: what was swept, what depends on what, where model or solver reach their limits."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,24 +11,22 @@ import pyarrow as pa
 from scipy.stats import qmc
 
 from dataset.report.figures import (
-    LABELS,
-    SHOWN,
+    RESPONSES,
     draw_collapse,
     draw_indices,
     draw_responses,
     draw_trends,
     draw_where,
 )
-from dataset.report.power_laws import Exponents, exponents, linear_rows
+from dataset.report.power_laws import exponents, linear_rows
 from dataset.report.sobol_indices import sobol_indices
-from dataset.rows.schema import COST, INPUTS, schema
+from dataset.rows.schema import COST, INPUTS, Column, schema, shown_outputs
 from dataset.storage.data_set import read, read_manifest
 from sim.arrays import Floats
 from sim.io.pages import Page
 
-OUTPUTS = ("omega_yr_bar", "v_z", "R_yr_over_l", "theta_deg")
 _FEW = 40  # usable rows below which nothing is fitted
-_SIZE = r" by [-+.0-9e]+ a revolution"  # in a reason: counted without
+_SIZE = r" by [-+.0-9e]+ a revolution"  # of a reason: left out when reasons are counted
 _SMALL = 0.1  # exponents below it are not listed
 
 
@@ -36,19 +35,14 @@ def write_report(folder: str, out: str | Path) -> None:
     manifest = read_manifest(folder)
     rows = read(folder, _columns(manifest["effects"]))
     page = Page("Sweep report", _lead(rows))
-    if manifest.get("chosen") is not None:
-        page.text(
-            "These robots were chosen where a look-up table was unsure. Shares, medians and indices below are of "
-            "the chosen robots, not of the whole sweep."
-        )
     add_sections(page, rows)
     page.write(out, f"configuration {manifest['config_hash']}, code {manifest['code_version']}")
 
 
 def _columns(effects: list[str]) -> list[str]:
-    """Columns that the page shows: every column of single numbers, and few of the long lists."""
-    plain = [field.name for field in schema(effects) if not pa.types.is_fixed_size_list(field.type)]
-    return [*plain, *SHOWN]
+    """List the columns that the page needs: every column of single numbers, and a few of the long lists."""
+    single = [field.name for field in schema(effects) if not pa.types.is_fixed_size_list(field.type)]
+    return [*single, *RESPONSES]
 
 
 def _lead(rows: pd.DataFrame) -> str:
@@ -60,50 +54,47 @@ def _lead(rows: pd.DataFrame) -> str:
 
 
 def usable_rows(rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows that converged and whose tails do not touch."""
+    """Select rows that converged and whose tails do not touch."""
     return rows[rows["converged"] & ~rows["failed"] & ~rows["touching"]]
 
 
 def add_sections(page: Page, rows: pd.DataFrame) -> None:
-    """All sections of the report."""
+    """Add all sections of the report."""
     usable = usable_rows(rows)
     inputs = {c.name: rows[c.name].to_numpy(float) for c in INPUTS if np.ptp(rows[c.name].to_numpy(float)) > 0}
     _add_inputs(page, rows, inputs)
     if len(usable) < _FEW:
         page.section("Too few usable rows")
-        page.text(f"{len(usable)} rows are usable; what depends on what needs {_FEW} or more.", tone="bad")
+        page.text(f"{len(usable)} rows are usable; the analysis needs {_FEW} or more.", tone="bad")
     else:
         _add_dependence(page, usable, list(inputs))
         _add_linear_theory(page, usable, list(inputs))
         page.section("Response to a flip of the motor")
         page.text(
-            "After a flip the robot lags its new circle until the tails have turned over. Lags are divided by the "
-            "speed that they cost, so they are times. Lines: medians; bands: the middle half of the rows."
+            "After a flip the robot lags behind its new circle until the tails have turned over. Lags are divided "
+            "by the speed in their direction, so they are times. Lines: medians; bands: the middle half of rows."
         )
-        page.figure(
-            draw_responses(usable), "lags and net speed over the dwell, for slow, middling and fast motors"
-        )
+        page.figure(draw_responses(usable), "lags and net speed over the dwell, for slow, medium and fast motors")
     _add_limits(page, rows)
 
 
 def _add_inputs(page: Page, rows: pd.DataFrame, inputs: dict[str, Floats]) -> None:
     page.section("What was swept")
-    table = np.stack([_ranks(values) for values in inputs.values()], 1)
-    some = table[:2048]
-    random = np.random.default_rng(0).random(some.shape)
+    ranks = np.stack([_ranks(values) for values in inputs.values()], 1)[:2048]
+    random = np.random.default_rng(0).random(ranks.shape)
     page.text(
         f"{len(inputs)} inputs varied. Discrepancy of the design (0: perfectly even) "
-        f"{qmc.discrepancy(some):.2g}, of as many random points {qmc.discrepancy(random):.2g}."
+        f"{qmc.discrepancy(ranks):.2g}, of as many random points {qmc.discrepancy(random):.2g}."
     )
-    found = [
+    ranges = [
         (c.name, f"{rows[c.name].min():.4g}", f"{rows[c.name].median():.4g}", f"{rows[c.name].max():.4g}", c.unit)
         for c in INPUTS
     ]
-    page.table(("input", "smallest", "median", "largest", "unit"), found)
+    page.table(("input", "smallest", "median", "largest", "unit"), ranges)
 
 
 def _ranks(values: Floats) -> Floats:
-    """Values as even ranks between 0 and 1; equal values are spread."""
+    """Return the ranks of values, evenly between 0 and 1; ties are spread."""
     order = np.argsort(values + 1e-12 * np.arange(len(values)), kind="stable")
     ranks = np.empty(len(values))
     ranks[order] = (np.arange(len(values)) + 0.5) / len(values)
@@ -113,24 +104,26 @@ def _ranks(values: Floats) -> Floats:
 def _add_dependence(page: Page, usable: pd.DataFrame, names: list[str]) -> None:
     page.section("What depends on what")
     inputs = {name: usable[name].to_numpy(float) for name in names}
-    found = {}
-    for output in OUTPUTS:
-        values = np.abs(usable[output].to_numpy(float))
-        found[output] = sobol_indices(inputs, values if output == "theta_deg" else np.log(values))
+    outputs = shown_outputs()
+    indices = {}
+    for output in outputs:
+        values = np.abs(usable[output.name].to_numpy(float))
+        indices[output.name] = sobol_indices(inputs, np.log(values) if output.logarithmic else values)
     page.text(
         "Sobol indices: the share of an output's variance over the sweep that an input explains alone (first "
-        "order) and with all others together (total). Yaw rate, surge and radius are taken as logarithms."
+        "order) and together with all others (total). Logarithms are taken of "
+        f"{', '.join(output.words for output in outputs if output.logarithmic)}."
     )
-    page.figure(draw_indices(found), "Sobol indices of four outputs in all inputs, with 95 % intervals")
-    worst = min(found, key=lambda output: found[output].explained)
+    page.figure(draw_indices(indices), "Sobol indices of the outputs in all inputs, with 95 % intervals")
+    worst = min(outputs, key=lambda output: indices[output.name].explained)
     page.text(
-        f"The polynomials behind the indices explain {100 * found[worst].explained:.1f} % of the variance or more "
-        f"(least: {_plain(worst)})."
+        f"The polynomials behind the indices explain {100 * indices[worst.name].explained:.1f} % of the variance "
+        f"or more (least: {worst.words})."
     )
-    for output in OUTPUTS:
+    for output in outputs:
         page.figure(
-            draw_trends(usable, output, [name for name in names if name != "N"]),
-            f"{_plain(output)} against each input, by number of tails",
+            draw_trends(usable, output.name, [name for name in names if name != "N"]),
+            f"{output.words} against each input, by number of tails",
         )
     page.text(
         "Lines: medians by number of tails. Bands: the middle half of the rows, of all tails if N has many values."
@@ -140,8 +133,8 @@ def _add_dependence(page: Page, usable: pd.DataFrame, names: list[str]) -> None:
 def _add_linear_theory(page: Page, usable: pd.DataFrame, names: list[str]) -> None:
     base = [c.name for c in INPUTS]
     rows, linear = linear_rows({name: usable[name].to_numpy(float) for name in base})
-    some = usable.iloc[rows]
-    inputs = {name: some[name].to_numpy(float) for name in names}
+    sample = usable.iloc[rows]
+    inputs = {name: sample[name].to_numpy(float) for name in names}
     page.section("Scaling laws")
     page.text(
         "Exponents: by how many per cent an output grows when an input grows by one per cent and all others are "
@@ -149,14 +142,7 @@ def _add_linear_theory(page: Page, usable: pd.DataFrame, names: list[str]) -> No
         "over the sweep. The last three columns are those of linear theory, for the same robots. Inputs that "
         f"change an output by less than the power {_SMALL:g} are left out."
     )
-    table = []
-    for output in OUTPUTS:
-        simulated = exponents(inputs, output, np.abs(some[output].to_numpy(float)))
-        theory = exponents(inputs, output, linear[output])
-        for one, other in zip(simulated, theory, strict=True):
-            if np.nanmax(np.abs(one.value)) > _SMALL:
-                verdict = "power law" if one.holds else "changes"
-                table.append((_plain(output), one.input, *_cells(one), verdict, *_plain_cells(other)))
+    table = [line for output in shown_outputs() for line in _exponent_lines(output, sample, inputs, linear)]
     thirds = ("lower", "middle", "upper")
     page.table(("output", "input", *thirds, "", *(f"linear: {third}" for third in thirds)), table)
     page.section("Against linear theory")
@@ -164,26 +150,33 @@ def _add_linear_theory(page: Page, usable: pd.DataFrame, names: list[str]) -> No
         "Each point is a robot. S is the drag number of a tail: viscous against elastic forces. For small S the "
         "tails stay nearly straight and the ratio tends to what linear theory leaves out."
     )
-    page.figure(draw_collapse(some, linear, OUTPUTS), "outputs over linear theory against the drag number")
+    outputs = [output.name for output in shown_outputs() if output.name in linear]
+    page.figure(draw_collapse(sample, linear, outputs), "outputs over linear theory against the drag number")
 
 
-def _cells(one: Exponents) -> list[str]:
-    return [f"{v:.2f} ± {w:.2f}" for v, w in zip(one.value, one.half_width, strict=True)]
-
-
-def _plain_cells(one: Exponents) -> list[str]:
-    return [f"{v:.2f}" for v in one.value]
+def _exponent_lines(
+    output: Column, sample: pd.DataFrame, inputs: dict[str, Floats], linear: Mapping[str, Floats]
+) -> Iterator[tuple[str, ...]]:
+    """Yield a line for each input that matters; outputs that linear theory does not have get no numbers of it."""
+    simulated = exponents(inputs, output.name, np.abs(sample[output.name].to_numpy(float)))
+    known = output.name in linear
+    theory = exponents(inputs, output.name, linear[output.name]) if known else [None] * len(simulated)
+    for law, linear_law in zip(simulated, theory, strict=True):
+        if np.nanmax(np.abs(law.value)) > _SMALL:
+            thirds = (f"{v:.2f} ± {w:.2f}" for v, w in zip(law.value, law.half_width, strict=True))
+            linear_thirds = (f"{v:.2f}" for v in linear_law.value) if linear_law else ("–",) * 3
+            yield output.words, law.input, *thirds, "power law" if law.holds else "changes", *linear_thirds
 
 
 def _add_limits(page: Page, rows: pd.DataFrame) -> None:
-    page.section("Where tails touch, where the solver struggled")
+    page.section("Where tails touch, and where the solver had difficulties")
     stepped = rows["reason"].astype(str) != ""
     page.figure(
         draw_where(rows.assign(hard=rows["failed"] | stepped)), "share of rows that touch, and that failed, over ω̄"
     )
     page.text(
-        f"In {int(rows['touching'].sum())} of {len(rows)} rows tails touch: their numbers are of a model without "
-        f"contact. {int(rows['failed'].sum())} rows failed."
+        f"In {int(rows['touching'].sum())} of {len(rows)} rows tails touch: their numbers come from a model "
+        f"without contact. {int(rows['failed'].sum())} rows failed."
     )
     reasons = rows.loc[stepped, "reason"].astype(str).str.replace(_SIZE, "", regex=True).value_counts()
     if len(reasons):
@@ -202,8 +195,3 @@ def _add_limits(page: Page, rows: pd.DataFrame) -> None:
             for n, part in rows.groupby("N")
         ],
     )
-
-
-def _plain(name: str) -> str:
-    """A label without formulas."""
-    return LABELS.get(name, name).split(" $")[0]

@@ -1,4 +1,4 @@
-"""Which inputs an output depends on: Sobol indices from the rows of a sweep.
+"""Compute Sobol indices from the rows of a sweep: which inputs an output depends on.
 
 The output is fitted by polynomials of all inputs together that are orthonormal over the rows (a polynomial chaos
 expansion). The variance then is the sum of squared coefficients:
@@ -38,12 +38,12 @@ class Indices:
     first_bounds: Floats  # (K, 2)
     total: Floats  # (K,)
     total_bounds: Floats  # (K, 2)
-    explained: float  # share of the variance that the polynomials explain in rows left out of the fit
+    explained: float  # share of the variance that the polynomials explain in held-out rows
     degree: int
 
 
 def sobol_indices(inputs: Mapping[str, Floats], output: Floats, *, seed: int = 0) -> Indices:
-    """Indices of the inputs (M,) that vary, for an output (M,).
+    """Compute the indices of the inputs (M,) that vary, for an output (M,).
 
     Rows with an output that is not finite are left out.
     """
@@ -61,27 +61,27 @@ def sobol_indices(inputs: Mapping[str, Floats], output: Floats, *, seed: int = 0
     first, total = _shares(_fit(basis, y), powers)
     drawn = [_shares(c, powers) for c in _resampled(basis, y, rng)]
     bounds = np.quantile(np.array(drawn), [0.025, 0.975], axis=0)  # (2, first and total, K)
-    half = rng.permutation(len(y)) < len(y) // 5
-    left_out = y[half] - basis[half] @ _fit(basis[~half], y[~half])
-    explained = 1 - float(np.var(left_out) / np.var(y[half]))
+    held_out = rng.permutation(len(y)) < len(y) // 5
+    residual = y[held_out] - basis[held_out] @ _fit(basis[~held_out], y[~held_out])
+    explained = 1 - float(np.var(residual) / np.var(y[held_out]))
     return Indices(names, first, bounds[:, 0].T, total, bounds[:, 1].T, explained, degree)
 
 
 def _powers(inputs: int, degree: int) -> np.ndarray:
-    """Degrees of each term in each input, (P, K); the constant comes first."""
+    """List the degrees of each term in each input, (P, K); the constant comes first."""
     terms = [np.zeros(inputs, dtype=int)]
     for order in range(1, degree + 1):
-        for chosen in combinations_with_replacement(range(inputs), order):
-            terms.append(np.bincount(chosen, minlength=inputs))
+        for factors in combinations_with_replacement(range(inputs), order):
+            terms.append(np.bincount(factors, minlength=inputs))
     return np.array(terms)
 
 
 def _basis(values: Floats, powers: np.ndarray, degree: int) -> Floats:
-    """Products of polynomials that are orthonormal over the ranks of each input, (M, P)."""
+    """Evaluate products of polynomials that are orthonormal over the ranks of each input, (M, P)."""
     single = np.ones((*values.shape, degree + 1))
     for k in range(values.shape[1]):
-        _, place, counts = np.unique(values[:, k], return_inverse=True, return_counts=True)
-        rank = (np.cumsum(counts) - 0.5 * counts)[place] / len(values)
+        _, position, counts = np.unique(values[:, k], return_inverse=True, return_counts=True)
+        rank = (np.cumsum(counts) - 0.5 * counts)[position] / len(values)
         most = min(degree, len(counts) - 1)
         orthogonal, size = np.linalg.qr(np.vander(2 * rank - 1, most + 1, increasing=True))
         single[:, k, : most + 1] = orthogonal * np.sign(np.diag(size)) * math.sqrt(len(values))
@@ -93,26 +93,26 @@ def _basis(values: Floats, powers: np.ndarray, degree: int) -> Floats:
 
 
 def _fit(basis: Floats, y: Floats) -> Floats:
-    """Least squares; terms that carry nothing get 0."""
+    """Fit by least squares; terms without influence get 0."""
     normal = basis.T @ basis + 1e-9 * len(y) * np.eye(basis.shape[1])
     return np.asarray(np.linalg.solve(normal, basis.T @ y))
 
 
 def _resampled(basis: Floats, y: Floats, rng: np.random.Generator) -> list[Floats]:
-    """Least squares on blocks of rows drawn with replacement. The blocks are random; each is summed once."""
+    """Fit to blocks of rows drawn with replacement. The blocks are random; each is summed once."""
     blocks = np.array_split(rng.permutation(len(y)), min(_BLOCKS, len(y) // 2))
     normal = np.array([basis[rows].T @ basis[rows] for rows in blocks])
     right = np.array([basis[rows].T @ y[rows] for rows in blocks])
     ridge = 1e-9 * len(y) * np.eye(basis.shape[1])
-    found = []
+    coefficients = []
     for _ in range(_RESAMPLED):
         times = rng.multinomial(len(blocks), np.full(len(blocks), 1 / len(blocks))).astype(float)
-        found.append(np.linalg.solve(np.tensordot(times, normal, 1) + ridge, times @ right))
-    return found
+        coefficients.append(np.linalg.solve(np.tensordot(times, normal, 1) + ridge, times @ right))
+    return coefficients
 
 
 def _shares(coefficients: Floats, powers: np.ndarray) -> tuple[Floats, Floats]:
-    """First-order and total shares of the variance, (K,) each."""
+    """Return first-order and total shares of the variance, (K,) each."""
     part = coefficients[1:] ** 2 / (coefficients[1:] ** 2).sum()
     involved = powers[1:] > 0
     alone = involved.sum(1) == 1

@@ -1,8 +1,8 @@
-"""Design of a sweep: which robots are simulated.
+"""The design of a sweep: which robots are simulated.
 
-A scrambled Sobol sequence over the inputs of `sweep.toml`: low discrepancy, so that every projection is covered
-evenly. A row is an index of that sequence. What it is depends on the seed, the inputs and its index, not on how
-many rows are asked for: a longer sweep begins with the shorter one. A log scale spreads rows evenly over
+The design is a scrambled Sobol sequence over the inputs of `sweep.toml`, of low discrepancy, so that every
+projection is covered evenly. A row is an index of that sequence. Its robot depends on the seed, the inputs and the
+index, not on the number of rows: a longer sweep begins with the shorter one. A log scale spreads rows evenly over
 ratios; an integer scale gives each whole number of the range the same share; with `both_directions` half of the
 robots turn their motor the other way.
 Source: Sobol (1967); scrambling: Owen (1998), as in scipy.stats.qmc.
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,9 +27,10 @@ from sim.model.groups import DWELL, GROUP_COLUMNS, MOST_TAILS, OPTIONAL_COLUMNS
 
 _ENTRIES = ("rows", "seed", "history_every", "sensitivities", "inputs")
 _SCALES = ("linear", "log", "integer")
+SWEEP_TOML = Path(__file__).parents[1] / "sweep.toml"  # the default sweep
 MOST_ROWS = 2**30  # points of the sequence in double precision
 HISTORY_BLOCK = 256  # rows
-# Beyond these ends every robot would only be flagged.
+# Beyond these limits every robot would only be flagged.
 _LIMITS = {
     "C_t": (1e-3, 1e3), "C_r": (1e-3, 1e3), "C_yr": (1e-3, 1e3), "l_over_R": (0.1, 100), "L_over_R": (0.1, 100),
     "l_over_r0": (5, 1e4), "omega_bar": (1e-3, 1e3), "N": (1, MOST_TAILS), "a_over_R": (0.01, 10),
@@ -38,7 +39,7 @@ _LIMITS = {
 
 @dataclass(frozen=True)
 class Axis:
-    """One input: its range and how rows are spread over it."""
+    """One input: its range, and how rows are spread over it."""
 
     low: float
     high: float
@@ -46,7 +47,7 @@ class Axis:
     both_directions: bool = False  # half of the rows are mirrored to -high … -low
 
     def at(self, share: Floats) -> Floats:
-        """Values at shares in [0, 1)."""
+        """Return the values at shares in [0, 1)."""
         if self.both_directions:
             half = replace(self, both_directions=False)
             return np.where(share < 0.5, -half.at(2 * share), half.at(2 * share - 1))
@@ -57,39 +58,32 @@ class Axis:
         return np.asarray(self.low + (self.high - self.low) * share)
 
     def config(self) -> dict[str, Any]:
-        """As in sweep.toml."""
+        """Return the axis as in sweep.toml."""
         mirrored = {"both_directions": True} if self.both_directions else {}
         return {"range": [self.low, self.high], "scale": self.scale, **mirrored}
 
 
 @dataclass(frozen=True)
-class Design:
-    """A sweep: axes by column name, number of rows, seed, and the share of rows with memory and rest.
-
-    Its rows are the first points of the sequence, or those with the indices `chosen`, in that order.
-    """
+class SweepDesign:
+    """A sweep: axes by column name, number of rows, seed, and the share of rows with memory and rest."""
 
     axes: dict[str, Axis]
     rows: int
     seed: int
     history_every: int = 4  # one block of HISTORY_BLOCK rows in so many has them; 0: none
     sensitivities: bool = False  # derivatives of the steady motion in the inputs, as columns
-    chosen: tuple[int, ...] | None = None
 
     @staticmethod
-    def from_config(config: Mapping[str, Any], rows: int, chosen: Sequence[int] | None = None) -> Design:
-        """The design that `config` describes."""
+    def from_config(config: Mapping[str, Any], rows: int) -> SweepDesign:
+        """Return the design that `config` describes."""
         axes = {
             name: Axis(spec["range"][0], spec["range"][1], spec["scale"], spec.get("both_directions", False))
             for name, spec in config["inputs"].items()
         }
-        given = None if chosen is None else tuple(chosen)
-        return Design(
-            axes, rows, config["seed"], config["history_every"], config.get("sensitivities", False), given
-        )
+        return SweepDesign(axes, rows, config["seed"], config["history_every"], config.get("sensitivities", False))
 
     def config(self) -> dict[str, Any]:
-        """What determines the robot of each index, JSON-like: without the number of rows and the chosen ones."""
+        """Return what determines the robot of each index, JSON-like: all but the number of rows."""
         inputs = {name: axis.config() for name, axis in self.axes.items()}
         extra = {"history_every": self.history_every, "sensitivities": self.sensitivities}
         return {"seed": self.seed, **extra, "inputs": inputs}
@@ -100,57 +94,46 @@ class Design:
         return sorted(set(self.axes) & set(catalogue()))
 
     def indices(self, start: int = 0, stop: int | None = None) -> Integers:
-        """Which points of the sequence the rows `start` … `stop` − 1 are; by default all `rows`."""
-        end = self.rows if stop is None else stop
-        if self.chosen is None:
-            return np.arange(start, end)
-        return np.array(self.chosen[start:end], dtype=int)
+        """Return the numbers of the rows `start` … `stop` − 1; by default all `rows`."""
+        return np.arange(start, self.rows if stop is None else stop)
 
     def points(self, start: int = 0, stop: int | None = None) -> dict[str, Floats]:
-        """Columns of the robots in the rows `start` … `stop` − 1; by default all `rows`."""
+        """Return columns of the robots in the rows `start` … `stop` − 1; by default all `rows`."""
         from scipy.stats import qmc  # slow to import, and only workers need points
 
-        indices = self.indices(start, stop)
-        order = np.argsort(indices, kind="stable")
+        rows = len(self.indices(start, stop))
         names = [name for name in _order() if name in self.axes]
         sampler = qmc.Sobol(len(names), scramble=True, rng=np.random.default_rng(self.seed))
-        share = np.empty((len(indices), len(names)))
-        for place in np.split(order, np.flatnonzero(np.diff(indices[order]) != 1) + 1):
-            if not len(place):
-                continue
-            skipped = int(indices[place[0]]) - sampler.num_generated
-            if skipped:
-                sampler.fast_forward(skipped)
-            if sampler.num_generated == 0:  # alone: scipy warns of a first draw that is no power of two
-                share[place[:1]], place = sampler.random(1), place[1:]
-            if len(place):
-                share[place] = sampler.random(len(place))
+        if start:
+            sampler.fast_forward(start)
+        first = 0 if start else min(1, rows)  # alone: scipy warns of a first draw that is no power of two
+        share = np.concatenate([sampler.random(count) for count in (first, rows - first)])
         columns = {name: self.axes[name].at(np.ascontiguousarray(share[:, i])) for i, name in enumerate(names)}
         return {name: columns[name] for name in self.axes}
 
     def history(self, start: int = 0, stop: int | None = None) -> np.ndarray:
-        """Whether memory and rest are simulated for the robots in the rows `start` … `stop` − 1.
+        """Return whether memory and rest are simulated for the robots in the rows `start` … `stop` − 1.
 
-        Whole blocks of the sequence are, since each block covers the inputs evenly.
+        They are simulated for whole blocks of the sequence, since each block covers the inputs evenly.
         """
         block = self.indices(start, stop) // HISTORY_BLOCK
         return block % self.history_every == 0 if self.history_every else np.zeros(len(block), dtype=bool)
 
-    def with_rows(self, rows: int | None) -> Design:
-        """The same design, longer or shorter."""
+    def with_rows(self, rows: int | None) -> SweepDesign:
+        """Return the same design, longer or shorter."""
         return self if rows is None else replace(self, rows=_check_rows(rows))
 
 
 def _order() -> tuple[str, ...]:
-    """Inputs in the order of the sequence's dimensions, whatever the order in sweep.toml."""
+    """Return all inputs in the order of the sequence's dimensions, whatever the order in sweep.toml."""
     return (*GROUP_COLUMNS, *OPTIONAL_COLUMNS, *catalogue())
 
 
-def load_design(path: str | Path) -> Design:
-    """The design in a sweep.toml.
+def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
+    """Load the design in a sweep.toml, by default the one that comes with the package.
 
     Raises:
-        InputError: an input is missing, unknown, or its range makes no robots.
+        InputError: an input is missing or unknown, or its range contains impossible robots.
     """
     try:
         content = tomllib.loads(Path(path).read_text())
@@ -165,7 +148,7 @@ def load_design(path: str | Path) -> Design:
         raise InputError(f"{path}: inputs = {inputs!r}; write a table [inputs]")
     for name in inputs:
         if name == DWELL:
-            raise InputError(f"{path}: {name} is no input any more, rows hold all dwells; take the line out")
+            raise InputError(f"{path}: {name} is no longer an input, rows hold all dwells; remove the line")
         if name not in _order():
             raise InputError(f"{path}: unknown input {name!r}; allowed are {', '.join(sorted(_order()))}")
     for name in GROUP_COLUMNS:
@@ -182,7 +165,7 @@ def load_design(path: str | Path) -> Design:
     slopes = content.get("sensitivities", False)
     if not isinstance(slopes, bool):
         raise InputError(f"{path}: sensitivities = {slopes!r}; give true or false")
-    return Design(axes, _check_rows(content.get("rows", 1024)), seed, every, slopes)
+    return SweepDesign(axes, _check_rows(content.get("rows", 1024)), seed, every, slopes)
 
 
 def _axis(path: str, name: str, spec: Any) -> Axis:
@@ -212,7 +195,7 @@ def _axis(path: str, name: str, spec: Any) -> Axis:
 
 
 def _check_ends(path: str, axes: dict[str, Axis]) -> None:
-    """Refuse ranges with robots that cannot be simulated."""
+    """Reject ranges with robots that cannot be simulated."""
     for name, (least, most) in _LIMITS.items():
         if name in axes and not least <= axes[name].low <= axes[name].high <= most:
             a = axes[name]
@@ -223,7 +206,7 @@ def _check_ends(path: str, axes: dict[str, Axis]) -> None:
         try:
             check_columns({name: np.array([getattr(a, end)]) for name, a in axes.items()})
         except InputError as refusal:
-            raise InputError(f"{path}: the {end} ends of the ranges make no robot: {refusal}") from None
+            raise InputError(f"{path}: the {end} ends of the ranges make an impossible robot: {refusal}") from None
 
 
 def _check_rows(rows: object) -> int:

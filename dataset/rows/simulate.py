@@ -1,8 +1,8 @@
-"""Inputs -> rows: what is simulated of each robot.
+"""Simulate rows: all columns of each robot, from its inputs.
 
-Each robot's steady motion is solved for (`sim.motion.steady`), and from there its response to a flip of the
-motor, over all dwells (`sim.motion.response`). Robots are simulated one by one, so that a row depends on nothing
-but its inputs: not on the robots beside it, and not on their order.
+Each robot's steady motion is solved for (`sim.motion.steady`), and from there its response to a flip of the motor,
+over all dwells (`sim.motion.response`). Robots are simulated one by one, so that a row depends only on its inputs,
+neither on other robots nor on their order.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from dataset.rows.schema import COST, OUTPUTS
 from sim.arrays import Floats
 from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.effects.tail_contact import least_gap
@@ -26,15 +27,16 @@ from sim.motion.steady_motion import STEADY_COLUMNS
 
 Columns = dict[str, Any]
 NO_RESPONSE = "the response to a flip broke down, or asked for more time steps than a row may"
-HISTORY = "history"  # an input of a row that is no number of the robot: whether memory and rest are simulated
+HISTORY = "history"  # not a property of the robot: whether memory and rest are simulated
 
 
 def simulate(inputs: dict[str, Any], *, sensitivities: bool = False) -> Columns:
-    """All columns of the schema except `row`.
+    """Simulate all columns of the schema except `row`.
 
     Args:
-        inputs: robots by column name, each (B,); `history`, (B,), says of which memory and rest are simulated.
-        sensitivities: with derivatives of the steady motion in the inputs.
+        inputs: robots by column name, each (B,); `history`, (B,), says for which robots memory and rest are
+        simulated.
+        sensitivities: also return derivatives of the steady motion in the inputs.
 
     Raises:
         InputError: a column is missing or unknown, or a number is outside its range.
@@ -49,6 +51,7 @@ def simulate(inputs: dict[str, Any], *, sensitivities: bool = False) -> Columns:
 
 
 def _row(values: dict[str, Floats], history: bool, sensitivities: bool) -> Columns:
+    """Simulate one robot."""
     began = time.thread_time()
     groups = Groups.from_columns(values)
     motion = steady(groups)
@@ -70,11 +73,13 @@ def _row(values: dict[str, Floats], history: bool, sensitivities: bool) -> Colum
     for name, curve in curves.items():
         for i, axis in enumerate(LAG_PARTS):
             columns[f"{name}_{axis}"] = curve[..., i].reshape(1, -1)
-    for name in STEADY_COLUMNS[:7]:
-        columns[name] = np.where(failed, np.nan, columns[name])
+    for column in OUTPUTS:
+        if not column.kept:
+            columns[column.name] = np.array(columns[column.name])
+            columns[column.name][failed] = np.nan
     if sensitivities:
         slopes = derivatives(groups, SLOPE_INPUTS).derivatives
         columns |= {f"d_{name}": slope for name, slope in slopes.items()}
     columns["N"] = values["N"].astype(int)
-    columns["cost_s"] = np.array([time.thread_time() - began])
+    columns[COST] = np.array([time.thread_time() - began])
     return columns

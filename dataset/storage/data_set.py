@@ -1,13 +1,14 @@
-"""A data set on disk or behind a URL.
+"""Read a data set on disk or behind a URL.
 
     DIR/sweep.json         what determines a row: seed, inputs, code; written before the first row
-    DIR/pending/           pieces that workers have written, until the build is complete
+    DIR/pending/           shards that workers have written, until the build is complete
     DIR/rows/*.parquet     the rows; pandas, polars and duckdb read this folder
     DIR/manifest.json      what is in rows/: files, digests, counts; written when all rows are there
     DIR/card.md            what a reader should know
 
 `read` and `batches` check everything that they read: files, digests, checksums of pages. Where something is
-missing, doubled or changed they refuse. `python -m dataset verify DIR --mend` repairs.
+missing, duplicate or changed they refuse. `softflagella dataset verify DIR --mend` repairs, if this version of the
+code made the rows.
 """
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from dataset.rows.schema import schema, table_of
-from dataset.storage.shards import BadPieceError, Contents, Piece, piece_name, tables, write_piece
-from dataset.storage.storage import Place, place
+from dataset.rows.schema import schema
+from dataset.rows.version import rows_version
+from dataset.storage.shards import BadShardError, Contents, OtherColumnsError, Shard, shard_name, tables
+from dataset.storage.storage import Storage, open_storage
 from sim.io.errors import InputError
 from sim.io.provenance import fingerprint, provenance
 
@@ -32,20 +34,48 @@ if TYPE_CHECKING:
 
 MANIFEST, SWEEP, CARD, ROWS, PENDING = "manifest.json", "sweep.json", "card.md", "rows", "pending"
 FORMAT = 2  # of the folder
-_MEND = "; repair it with python -m dataset verify {} --mend"
 
 
-def write_manifest(folder: Place | str | Path, content: dict[str, Any]) -> dict[str, Any]:
-    """Write the manifest, sealed with its own digest; returns it."""
+def check_version(storage: Storage, theirs: str, ours: str | None = None) -> None:
+    """Reject a data set whose rows were made by another version of the code.
+
+    Args:
+        theirs: the version that made the rows.
+        ours: this version; default `rows_version`.
+    """
+    if theirs != (ours or rows_version()):
+        raise InputError(_other_version(storage, theirs, ours))
+
+
+def _other_version(storage: Storage, theirs: str, ours: str | None = None) -> str:
+    return (
+        f"{storage.address} holds rows of another version: {theirs} there, {ours or rows_version()} here; use "
+        "that version, or build the data set anew in another folder"
+    )
+
+
+def _damage(storage: Storage, what: str) -> InputError:
+    """Name a damage, and how to repair it: by this version if it made the rows, which sweep.json says."""
+    try:
+        theirs = json.loads(bytes(storage.read(SWEEP)))["code"]
+    except (ValueError, TypeError, KeyError, InputError, OSError):
+        theirs = rows_version()
+    if theirs != rows_version():
+        return InputError(f"{what}; {_other_version(storage, theirs)}")
+    return InputError(f"{what}; repair it with softflagella dataset verify {storage.address} --mend")
+
+
+def write_manifest(storage: Storage, content: dict[str, Any]) -> dict[str, Any]:
+    """Write the manifest, sealed with its own digest; return it."""
     sealed = {**content, "digest": fingerprint(content)}
-    place(folder).write(MANIFEST, json.dumps(sealed, indent=1) + "\n")
+    storage.write(MANIFEST, json.dumps(sealed, indent=1) + "\n")
     return sealed
 
 
-def manifest_of(
+def manifest_content(
     config: dict[str, Any], key: str, code: str, effects: list[str], parts: Sequence[Contents]
 ) -> dict[str, Any]:
-    """What the manifest of these parts says."""
+    """Compile the manifest of these shards."""
     reasons: dict[str, int] = {}
     for part in parts:
         for reason, count in part.reasons.items():
@@ -65,68 +95,40 @@ def manifest_of(
     }
 
 
-def read_manifest(folder: Place | str | Path) -> dict[str, Any]:
-    """The manifest of a finished data set.
+def read_manifest(folder: Storage | str | Path) -> dict[str, Any]:
+    """Read the manifest of a finished data set.
 
     Raises:
         InputError: there is none, or it has been changed since it was written.
     """
-    there = place(folder)
-    if there.size(MANIFEST) is None:
+    storage = open_storage(folder)
+    path = storage.path(MANIFEST)
+    if storage.size(MANIFEST) is None:
         raise InputError(
-            f"{there.address} is no finished data set (no {MANIFEST}); make it with python -m dataset build"
+            f"{storage.address} is no finished data set (no {MANIFEST}); make it with softflagella sweep"
         )
     try:
-        content = json.loads(bytes(there.read(MANIFEST)))
+        content = json.loads(bytes(storage.read(MANIFEST)))
         digest = content.pop("digest", None)
         known = "config_hash" in content and "effects" in content and "parts" in content
     except (ValueError, AttributeError, TypeError) as broken:
-        raise InputError(f"{there.path(MANIFEST)} is damaged: {broken}" + _MEND.format(there.address)) from None
+        raise _damage(storage, f"{path} is damaged: {broken}") from None
     if not known or content.get("format") != FORMAT:
-        raise InputError(
-            f"{there.path(MANIFEST)} is not the manifest of a data set of this version; build the data set anew"
-        )
+        raise InputError(f"{path} is not the manifest of a data set of this version; build the data set anew")
     if digest != fingerprint(content):
-        raise InputError(
-            f"{there.path(MANIFEST)} has been edited: it does not fit its own digest" + _MEND.format(there.address)
-        )
+        raise _damage(storage, f"{path} has been edited: it does not fit its own digest")
     return {**content, "digest": digest}
 
 
-def parts_of(manifest: dict[str, Any]) -> list[Contents]:
-    """The files of a manifest."""
+def manifest_parts(manifest: dict[str, Any]) -> list[Contents]:
+    """List the shards of a manifest."""
     return [Contents(**part) for part in manifest["parts"]]
 
 
-def write_rows(
-    folder: str | Path, config: dict[str, Any], columns: dict[str, Any], *, code: str
-) -> dict[str, Any]:
-    """Store rows that were made elsewhere as a finished data set.
-
-    Args:
-        folder: a new or empty folder.
-        config: as `Design.config` gives it.
-        columns: by column name, the whole schema, each (M,) or (M, K).
-        code: what made the rows.
-
-    Returns:
-        The manifest.
-    """
-    from sim.effects import catalogue
-
-    effects = sorted(set(config["inputs"]) & set(catalogue()))
-    there, key = place(folder), fingerprint({**config, "code": code})
-    if there.names():
-        raise InputError(f"{there.address} is not empty; give a new folder")
-    table = table_of({**columns, "row": np.arange(len(columns["row"]))}, schema(effects, config["sensitivities"]))
-    part = write_piece(there, piece_name(ROWS, 0, len(table)), table, key)
-    return write_manifest(there, manifest_of(config, key, code, effects, [part]))
-
-
 def batches(
-    folder: Place | str | Path, columns: Sequence[str] | None = None, *, rows: int = 2**16
+    folder: Storage | str | Path, columns: Sequence[str] | None = None, *, rows: int = 2**16
 ) -> Iterator[pa.RecordBatch]:
-    """The rows of a finished data set in order, `rows` at a time: no more of them than that is in memory.
+    """Yield the rows of a finished data set in order, `rows` at a time: no more of them than that is in memory.
 
     Args:
         folder: a folder or URL.
@@ -134,50 +136,51 @@ def batches(
         rows: most rows of a batch.
 
     Raises:
-        InputError: no finished data set there, or a file is missing, doubled, changed or damaged.
+        InputError: no finished data set there, or a file is missing, duplicate, changed or damaged.
 
     Example:
         >>> from dataset.storage.data_set import batches
         >>> sum(batch.num_rows for batch in batches("data/sweep", ["omega_yr_bar"]))  # doctest: +SKIP
         8192
     """
-    there = place(folder)
-    manifest = read_manifest(there)
+    storage = open_storage(folder)
+    manifest = read_manifest(storage)
     form = schema(manifest["effects"], manifest["config"].get("sensitivities", False))
     unknown = sorted(set(columns or ()) - set(form.names))
     if unknown:
         raise InputError(f"no column {unknown[0]!r} in a data set; there are {', '.join(form.names)}")
-    _check_files(there, manifest)
-    for part in parts_of(manifest):
-        piece = Piece(piece_name(ROWS, part.start, part.stop), part.start, part.stop)
+    _check_files(storage, manifest)
+    for part in manifest_parts(manifest):
+        shard = Shard(shard_name(ROWS, part.start, part.stop), part.start, part.stop)
         try:
-            data = there.read(piece.name)
+            data = storage.read(shard.name)
             if hashlib.sha256(data).hexdigest() != part.sha256:
-                raise BadPieceError("it does not have the digest that the manifest states")
-            for table in tables(data, piece, form, manifest["config_hash"], columns):
+                raise BadShardError("it does not have the digest that the manifest states")
+            for table in tables(data, shard, form, manifest["config_hash"], columns):
                 yield from table.combine_chunks().to_batches(max_chunksize=rows)
-        except BadPieceError as bad:
-            raise InputError(f"{there.path(piece.name)}: {bad}" + _MEND.format(there.address)) from None
+        except OtherColumnsError as bad:
+            if manifest["code_version"] != rows_version():
+                raise InputError(f"{_other_version(storage, manifest['code_version'])}: {bad}") from None
+            raise _damage(storage, f"{storage.path(shard.name)}: {bad}") from None
+        except BadShardError as bad:
+            raise _damage(storage, f"{storage.path(shard.name)}: {bad}") from None
 
 
-def _check_files(there: Place, manifest: dict[str, Any]) -> None:
-    """Refuse missing files and files that the manifest does not know."""
-    found = {f"{ROWS}/{name}" for name in there.names(ROWS)}
-    listed = {piece_name(ROWS, part.start, part.stop): part.bytes for part in parts_of(manifest)}
-    for name in sorted(set(listed) - found):
-        raise InputError(f"{there.path(name)} is missing" + _MEND.format(there.address))
-    for name in sorted(found - set(listed)):
-        raise InputError(
-            f"{there.path(name)} is not in the manifest: a copy, or an interrupted build"
-            + _MEND.format(there.address)
-        )
+def _check_files(storage: Storage, manifest: dict[str, Any]) -> None:
+    """Reject missing files and files that the manifest does not know."""
+    stored = {f"{ROWS}/{name}" for name in storage.names(ROWS)}
+    listed = {shard_name(ROWS, part.start, part.stop): part.bytes for part in manifest_parts(manifest)}
+    for name in sorted(set(listed) - stored):
+        raise _damage(storage, f"{storage.path(name)} is missing")
+    for name in sorted(stored - set(listed)):
+        raise _damage(storage, f"{storage.path(name)} is not in the manifest: a copy, or an interrupted build")
     for name, size in listed.items():
-        if there.size(name) != size:
-            raise InputError(f"{there.path(name)} is cut short or longer" + _MEND.format(there.address))
+        if storage.size(name) != size:
+            raise _damage(storage, f"{storage.path(name)} is cut short or longer")
 
 
 def read(folder: str | Path, columns: Sequence[str] | None = None) -> pd.DataFrame:
-    """All rows of a finished data set, in the order of the design.
+    """Read all rows of a finished data set, in the order of the design.
 
     Args:
         folder: a folder or URL.
@@ -186,12 +189,12 @@ def read(folder: str | Path, columns: Sequence[str] | None = None) -> pd.DataFra
     Raises:
         InputError: as for `batches`.
     """
-    found = list(batches(folder, columns, rows=2**20))
-    return pa.Table.from_batches(found).replace_schema_metadata(None).to_pandas()
+    parts = list(batches(folder, columns, rows=2**20))
+    return pa.Table.from_batches(parts).replace_schema_metadata(None).to_pandas()
 
 
 def usable(rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows to learn from: converged, not failed, all outputs finite (touching tails included)."""
+    """Select rows to learn from: converged, not failed, all outputs finite (touching tails included)."""
     good = rows["converged"] & ~rows["failed"]
     numbers = rows.select_dtypes("number").drop(columns="tail_gap").to_numpy(dtype=float)
     return rows[good.to_numpy(dtype=bool) & np.isfinite(numbers).all(axis=1)]

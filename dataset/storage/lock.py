@@ -1,7 +1,7 @@
-"""One writer a folder: a lock that says who holds it and since when.
+"""Lock a data set: one writer a folder, and a note that says who writes and since when.
 
-On a disk the operating system holds the lock and lets go when the writer ends, however it ends. Behind a URL the
-lock is a file that its owner renews; one that has not been renewed for STALE seconds is taken over.
+On a disk the operating system holds the lock and releases it when the writer ends, however it ends. Behind a URL
+the lock is a file, which stays if its writer is killed; `force` takes it over.
 """
 
 from __future__ import annotations
@@ -10,73 +10,75 @@ import fcntl
 import json
 import os
 import socket
-import threading
 import time
-import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import IO
 
-from dataset.storage.storage import Folder, Place, Remote, StorageError
+from dataset.storage.storage import LocalStorage, RemoteStorage, Storage, StorageError
 from sim.io.errors import InputError
 
 LOCK = ".lock"
-STALE = 120.0  # seconds
-_RENEWED = 20.0  # seconds
 
 
 @contextmanager
-def locked(place: Place) -> Iterator[None]:
-    """The only writer of a place for as long as the block lasts.
+def locked(storage: Storage, *, force: bool = False) -> Iterator[None]:
+    """Be the only writer of a storage for as long as the block lasts.
+
+    Args:
+        force: take over the lock file of another writer behind a URL.
 
     Raises:
         InputError: another process writes there.
     """
-    with _lock_folder(place) if isinstance(place, Folder) else _lock_remote(place):  # type: ignore[arg-type]
-        yield
+    if isinstance(storage, RemoteStorage):
+        with _lock_remote(storage, force):
+            yield
+    else:
+        assert isinstance(storage, LocalStorage)
+        with _lock_folder(storage):
+            yield
 
 
-def _note(token: str = "") -> str:
-    now = time.time()
-    return json.dumps(
-        {"host": socket.gethostname(), "pid": os.getpid(), "since": now, "seen": now, "token": token}
-    )
+def _note() -> str:
+    return json.dumps({"host": socket.gethostname(), "pid": os.getpid(), "since": time.time()})
 
 
-def _refuse(place: Place, text: str) -> InputError:
+def _refusal(storage: Storage, note: str, remedy: str) -> InputError:
     try:
-        note = json.loads(text)
-        minutes = max(0.0, time.time() - note["since"]) / 60
-        owner = f"process {note['pid']} on {note['host']}, for {minutes:.0f} min"
+        content = json.loads(note)
+        minutes = max(0.0, time.time() - content["since"]) / 60
+        owner = f"process {content['pid']} on {content['host']}, for {minutes:.0f} min"
     except (ValueError, KeyError, TypeError):
         owner = "another process"
-    return InputError(f"{place.address} is being written by {owner}; wait until it ends, or give another folder")
+    return InputError(f"{storage.address} is being written by {owner}; {remedy}")
 
 
 @contextmanager
-def _lock_folder(place: Folder) -> Iterator[None]:
+def _lock_folder(storage: LocalStorage) -> Iterator[None]:
     try:
-        os.makedirs(place.address, exist_ok=True)
-        file = _acquired(place)
+        os.makedirs(storage.address, exist_ok=True)
+        file = _acquired(storage)
     except OSError as refusal:
-        raise StorageError(f"cannot write {place.path(LOCK)}: {refusal.strerror}") from None
+        raise StorageError(f"cannot write {storage.path(LOCK)}: {refusal.strerror}") from None
     try:
         yield
     finally:
         with suppress(OSError):
-            os.unlink(place.path(LOCK))
+            os.unlink(storage.path(LOCK))
         file.close()
 
 
-def _acquired(place: Folder) -> IO[str]:
-    path = place.path(LOCK)
+def _acquired(storage: LocalStorage) -> IO[str]:
+    """Open the lock file, lock it, and write who holds it."""
+    path = storage.path(LOCK)
     while True:
         file = open(path, "a+")  # noqa: SIM115
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             file.seek(0)
-            refusal = _refuse(place, file.read())
+            refusal = _refusal(storage, file.read(), "wait until it ends, or give another folder")
             file.close()
             raise refusal from None
         except OSError:
@@ -85,7 +87,7 @@ def _acquired(place: Folder) -> IO[str]:
         with suppress(FileNotFoundError):
             if os.fstat(file.fileno()).st_ino == os.stat(path).st_ino:
                 break
-        file.close()  # its owner removed it between our opening and locking it
+        file.close()  # its owner removed it after we had opened and before we locked it
     try:
         file.truncate(0)
         file.write(_note())
@@ -97,37 +99,14 @@ def _acquired(place: Folder) -> IO[str]:
 
 
 @contextmanager
-def _lock_remote(place: Remote) -> Iterator[None]:
-    token = uuid.uuid4().hex
-    if not place.create(LOCK, _note(token)):
-        held = bytes(place.read(LOCK)).decode(errors="replace")
-        if not _is_stale(held):
-            raise _refuse(place, held)
-        place.write(LOCK, _note(token))
-        time.sleep(1.0)  # where two take over at once, the later one has it
-        if token not in bytes(place.read(LOCK)).decode(errors="replace"):
-            raise _refuse(place, held)
-    over = threading.Event()
-    renewal = threading.Thread(target=_renew, args=(place, token, over), daemon=True)
-    renewal.start()
+def _lock_remote(storage: RemoteStorage, force: bool) -> Iterator[None]:
+    if force:
+        storage.write(LOCK, _note())
+    elif not storage.create(LOCK, _note()):
+        note = bytes(storage.read(LOCK)).decode(errors="replace")
+        raise _refusal(storage, note, "wait until it ends, or take over with --force if it was killed")
     try:
         yield
     finally:
-        over.set()
-        renewal.join()
         with suppress(InputError):
-            place.delete(LOCK)
-
-
-def _renew(place: Remote, token: str, over: threading.Event) -> None:
-    note = json.loads(_note(token))
-    while not over.wait(_RENEWED):
-        with suppress(InputError):
-            place.write(LOCK, json.dumps({**note, "seen": time.time()}))
-
-
-def _is_stale(text: str) -> bool:
-    try:
-        return bool(time.time() - json.loads(text)["seen"] > STALE)
-    except (ValueError, KeyError, TypeError):
-        return True
+            storage.delete(LOCK)

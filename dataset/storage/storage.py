@@ -1,8 +1,8 @@
-"""Where a data set lies: a folder on a disk, or behind a URL that fsspec knows (s3://bucket/name, …).
+"""The storage of a data set: a folder on a disk, or behind a URL that fsspec knows (s3://bucket/name, …).
 
 A file appears whole or not at all. On a disk it is written under another name, synchronised and renamed; behind
-a URL the upload is complete when the file is closed. Whatever the storage refuses (full, read-only, no rights)
-is one line.
+a URL the upload is complete when the file is closed. Every refusal of the storage (full, read-only, no rights)
+becomes one line.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ _URL = re.compile(r"^[a-zA-Z][a-zA-Z0-9+.-]+://")
 
 
 class StorageError(InputError):
-    """The storage refuses; the message is one line."""
+    """The storage refuses an operation; the message is one line."""
 
 
 class Sink:
-    """A file that is being written; knows the digest and size of what went through it."""
+    """A file that is being written; knows the digest and size of what has been written."""
 
     def __init__(self, file: IO[bytes]):
         self._file, self._sha, self.size, self.closed = file, hashlib.sha256(), 0, False
@@ -51,7 +51,7 @@ class Sink:
         return self.size
 
     def close(self) -> None:
-        """The place closes the file, not the writer of Parquet."""
+        """Do nothing: the storage closes the file, not the writer of Parquet."""
 
     @property
     def sha256(self) -> str:
@@ -59,7 +59,7 @@ class Sink:
         return self._sha.hexdigest()
 
 
-class Place(ABC):
+class Storage(ABC):
     """A folder with files in it and in its sub-folders; names are relative, with "/"."""
 
     def __init__(self, address: str):
@@ -67,19 +67,19 @@ class Place(ABC):
 
     @abstractmethod
     def names(self, folder: str = "") -> list[str]:
-        """Files and folders in a sub-folder, sorted, without the folder's name; none where it is missing."""
+        """List files and folders in a sub-folder, sorted, without the folder's name; none where it is missing."""
 
     @abstractmethod
     def size(self, name: str) -> int | None:
-        """Bytes of a file; None where it is missing."""
+        """Return the bytes of a file; None where it is missing."""
 
     @abstractmethod
     def read(self, name: str) -> pa.Buffer:
-        """The bytes of a file."""
+        """Read a file."""
 
     @abstractmethod
     def writer(self, name: str) -> Any:
-        """A context with a `Sink`; the file is there when the context ends without an exception."""
+        """Open a context with a `Sink`; the file appears when the context ends without an exception."""
 
     @abstractmethod
     def move(self, source: str, target: str) -> None:
@@ -95,21 +95,21 @@ class Place(ABC):
             sink.write(text.encode())
 
     def path(self, name: str) -> str:
-        """A file's full address, for messages."""
+        """Return a file's full address, for messages."""
         return f"{self.address}/{name}" if name else self.address
 
 
-def place(address: str | Path | Place) -> Place:
-    """The place at a path or URL."""
-    if isinstance(address, Place):
+def open_storage(address: str | Path | Storage) -> Storage:
+    """Open the storage at a path or URL."""
+    if isinstance(address, Storage):
         return address
     text = str(address)
     if text.startswith("file://"):
         text = text[len("file://") :]
-    return Remote(text.rstrip("/")) if _URL.match(text) else Folder(os.path.abspath(text))
+    return RemoteStorage(text.rstrip("/")) if _URL.match(text) else LocalStorage(os.path.abspath(text))
 
 
-class Folder(Place):
+class LocalStorage(Storage):
     """A folder on a disk that all workers see."""
 
     def names(self, folder: str = "") -> list[str]:
@@ -139,7 +139,7 @@ class Folder(Place):
             path.parent.mkdir(parents=True, exist_ok=True)
             try:
                 with open(part, "wb", buffering=0) as file:
-                    sink = Sink(_Whole(file))  # type: ignore[arg-type]
+                    sink = Sink(_Unbuffered(file))  # type: ignore[arg-type]
                     yield sink
                     os.fsync(file.fileno())
                 os.replace(part, path)
@@ -164,24 +164,24 @@ class Folder(Place):
                 path.unlink(missing_ok=True)
 
 
-class _Whole:
-    """An unbuffered file whose `write` writes everything, or says why not."""
+class _Unbuffered:
+    """An unbuffered file whose `write` writes everything, or raises."""
 
     def __init__(self, file: Any):
         self._file = file
 
     def write(self, view: memoryview) -> None:
         """Write all of it."""
-        rest = view.cast("B")
-        while len(rest):
-            rest = rest[self._file.write(rest) :]
+        remaining = view.cast("B")
+        while len(remaining):
+            remaining = remaining[self._file.write(remaining) :]
 
     def flush(self) -> None:
-        """Nothing is buffered."""
+        """Do nothing: nothing is buffered."""
 
 
 class _Refusing:
-    """A file behind a URL whose errors are one line."""
+    """A file behind a URL whose errors become one line."""
 
     def __init__(self, file: Any, attempt: str):
         self._file, self._attempt = file, attempt
@@ -192,10 +192,10 @@ class _Refusing:
             self._file.write(view)
 
     def flush(self) -> None:
-        """The upload decides when."""
+        """Do nothing: the upload decides when."""
 
 
-class Remote(Place):
+class RemoteStorage(Storage):
     """A folder behind a URL."""
 
     def __init__(self, address: str):
@@ -210,7 +210,7 @@ class Remote(Place):
             raise InputError(f"{address}: {unknown}; give a folder or a URL that fsspec knows") from None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return (Remote, (self.address,))
+        return (RemoteStorage, (self.address,))
 
     def _path(self, name: str) -> str:
         return f"{self._root}/{name}" if name else self._root
@@ -219,10 +219,10 @@ class Remote(Place):
         with _refusals(f"read {self.path(folder)}", Exception):
             self._files.invalidate_cache()
             try:
-                found = self._files.ls(self._path(folder), detail=False)
+                paths = self._files.ls(self._path(folder), detail=False)
             except FileNotFoundError:
                 return []
-            return sorted({str(path).rstrip("/").rsplit("/", 1)[-1] for path in found})
+            return sorted({str(path).rstrip("/").rsplit("/", 1)[-1] for path in paths})
 
     def size(self, name: str) -> int | None:
         with _refusals(f"read {self.path(name)}", Exception):
@@ -254,7 +254,7 @@ class Remote(Place):
             file.commit()
 
     def create(self, name: str, text: str) -> bool:
-        """Write a file unless it is there; False where it is."""
+        """Write a file unless it exists; return False where it does."""
         with _refusals(f"write {self.path(name)}", Exception):
             if self.size(name) is not None:
                 return False
@@ -275,18 +275,18 @@ class Remote(Place):
 
 @contextmanager
 def _refusals(attempt: str, kinds: type[Exception] = OSError) -> Iterator[None]:
-    """Turn what the storage says into one line."""
+    """Turn a refusal of the storage into one line."""
     try:
         yield
     except InputError:
         raise
     except kinds as refusal:
-        words = getattr(refusal, "strerror", None) or str(refusal) or type(refusal).__name__
-        raise StorageError(f"cannot {attempt}: {words}") from None
+        reason = getattr(refusal, "strerror", None) or str(refusal) or type(refusal).__name__
+        raise StorageError(f"cannot {attempt}: {reason}") from None
 
 
 def _sync_folder(path: Path) -> None:
-    """Make renames in a folder last."""
+    """Make renames in a folder durable."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -1,1 +1,3 @@
-"""Processes and machines that simulate rows."""
+"""Workers: what they do, and the backends that run them."""
+
+BACKENDS = ("loky", "dask", "ray")

@@ -1,4 +1,4 @@
-"""A dask cluster, by its own client: a running scheduler's address, or workers started on this machine."""
+"""Run tasks on a dask cluster: at a running scheduler's address, or on workers started on this machine."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 import dask
 from distributed import Client, Future, KilledWorker, LocalCluster
 
-from dataset.workers.open_backend import GONE, KILLER, Lost
-from dataset.workers.tasks import Outcome, Refusal, Work, run_task
+from dataset.workers.backend import GONE, KILLER, Lost
+from dataset.workers.tasks import Join, Outcome, Refusal, Task, run_task
 from sim.io.errors import InputError
 
 ADDRESS = "DASK_SCHEDULER_ADDRESS"
@@ -30,7 +30,7 @@ class DaskCluster:
     def __init__(self, address: str | None, count: int):
         address = address or os.environ.get(ADDRESS)
         for name in ("distributed", "distributed.client", "distributed.scheduler", "distributed.nanny", "tornado"):
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters is said by this program
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # this program reports what matters
         self._cluster: Any = None
         try:
             with dask.config.set(_SETTINGS):
@@ -48,24 +48,24 @@ class DaskCluster:
         self._looked, self._slots = 0.0, 0
 
     def slots(self) -> int:
-        """Threads of the workers that the scheduler knows now."""
+        """Count the threads of the workers that the scheduler knows now."""
         if time.monotonic() - self._looked > _LOOKED:
             try:
                 threads = self._client.sync(self._client.scheduler.ncores, callback_timeout=2)
                 self._slots = sum(threads.values())
-            except Exception:  # whatever a connection can say: nobody is there
+            except Exception:  # whatever a connection can raise: no workers
                 self._slots = 0
             self._looked = time.monotonic()
         return self._slots
 
-    def submit(self, number: int, task: Work) -> None:
-        """Hand a task to the scheduler."""
+    def submit(self, number: int, task: Task | Join) -> None:
+        """Submit a task to the scheduler."""
         self._busy[self._client.submit(run_task, task, pure=False)] = number
 
     def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
-        """What has ended."""
-        until = time.monotonic() + seconds
-        while not any(future.done() for future in self._busy) and time.monotonic() < until:
+        """Return the tasks that have ended."""
+        deadline = time.monotonic() + seconds
+        while not any(future.done() for future in self._busy) and time.monotonic() < deadline:
             time.sleep(0.02)
         ended: list[tuple[int, Outcome | Lost]] = []
         for future in [future for future in self._busy if future.done()]:
@@ -74,17 +74,17 @@ class DaskCluster:
         return ended
 
     def stop(self) -> None:
-        """Forget the tasks under way and leave."""
+        """Cancel the tasks under way and disconnect."""
 
-        def leave() -> None:
+        def disconnect() -> None:
             self._client.cancel(list(self._busy), force=True)
             self._client.close(timeout=1)
             if self._cluster is not None:
                 self._cluster.close(timeout=1)
 
-        leaving = threading.Thread(target=leave, daemon=True)  # a scheduler that is gone keeps nobody waiting
-        leaving.start()
-        leaving.join(timeout=1.5)
+        closing = threading.Thread(target=disconnect, daemon=True)  # do not wait for a scheduler that is gone
+        closing.start()
+        closing.join(timeout=1.5)
 
 
 def _outcome(future: Future) -> Outcome | Lost:

@@ -1,10 +1,10 @@
-"""Processes of this machine, by joblib's loky: one executor a worker.
+"""Run tasks in processes of this machine, by joblib's loky: one executor for each worker.
 
-With one executor for all workers the death of one breaks all of them, and nobody knows which task killed it.
-With one each, only the dead one is replaced, and its task is known.
+With one executor for all workers, the death of one worker breaks all of them, and the task that killed it is
+unknown. With one executor each, only the dead worker is replaced, and its task is known.
 
-Workers are forked from a process that has loaded the simulator and its machine code (a fork server), so that a
-worker more costs next to nothing.
+Workers are forked from a process that has loaded the simulator and its machine code (a fork server), so that
+another worker costs next to nothing.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from typing import Any
 
 from joblib.externals.loky import ProcessPoolExecutor
 
-from dataset.workers.open_backend import LOST, Lost
-from dataset.workers.tasks import Outcome, Work, run_task
+from dataset.workers.backend import LOST, Lost
+from dataset.workers.tasks import Join, Outcome, Task, run_task
 
 
 class Processes:
@@ -37,19 +37,19 @@ class Processes:
         self._busy: dict[Future[Outcome], tuple[int, Any]] = {}
 
     def slots(self) -> int:
-        """Workers; a dead one is replaced."""
+        """Count the workers; a dead one is replaced."""
         return self._count
 
-    def submit(self, number: int, task: Work) -> None:
-        """Hand a task to a free worker."""
+    def submit(self, number: int, task: Task | Join) -> None:
+        """Submit a task to a free worker."""
         executor = self._free.pop()
-        with _apart():
+        with _isolated():
             if executor is None:
-                executor = ProcessPoolExecutor(1, timeout=None, context=self._context, initializer=_begin)
+                executor = ProcessPoolExecutor(1, timeout=None, context=self._context, initializer=_follow_user)
             self._busy[executor.submit(run_task, task)] = (number, executor)
 
     def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
-        """What has ended."""
+        """Return the tasks that have ended."""
         ended: list[tuple[int, Outcome | Lost]] = []
         for future in wait(self._busy, timeout=seconds, return_when=FIRST_COMPLETED).done:
             number, executor = self._busy.pop(future)
@@ -74,8 +74,8 @@ class Processes:
 
 
 @contextmanager
-def _apart() -> Iterator[None]:
-    """Processes that start inside do not run the user's script again, and do not see Ctrl-C, which is for us."""
+def _isolated() -> Iterator[None]:
+    """Keep processes that start inside from running the user's script again, and from receiving Ctrl-C."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     script, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
     try:
@@ -85,8 +85,8 @@ def _apart() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin() -> None:
-    """In a worker: end when the process that uses it does, however that ends."""
+def _follow_user() -> None:
+    """End this worker when the process that uses it ends, however that happens."""
     user = multiprocessing.parent_process()
 
     def watch() -> None:

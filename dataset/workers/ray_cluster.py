@@ -1,4 +1,4 @@
-"""A ray cluster, by its own tasks: a running head's address (RAY_ADDRESS), or one started on this machine."""
+"""Run tasks on a ray cluster: at a running head's address (RAY_ADDRESS), or on one started on this machine."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 import ray
 from ray import exceptions
 
-from dataset.workers.open_backend import GONE, LOST, Lost
-from dataset.workers.tasks import Outcome, Refusal, Work, run_task
+from dataset.workers.backend import GONE, LOST, Lost
+from dataset.workers.tasks import Join, Outcome, Refusal, Task, run_task
 from sim.io.errors import InputError
 
 ADDRESS = "RAY_ADDRESS"
@@ -39,21 +39,21 @@ class RayCluster:
         self._looked, self._slots = 0.0, 0
 
     def slots(self) -> int:
-        """Processors of the nodes that live."""
+        """Count the processors of the nodes that are alive."""
         if time.monotonic() - self._looked > _LOOKED:
-            there = not self._head or self._answers()
-            self._slots = int(ray.cluster_resources().get("CPU", 0)) if there else 0
+            alive = not self._head or self._answers()
+            self._slots = int(ray.cluster_resources().get("CPU", 0)) if alive else 0
             self._looked = time.monotonic()
         return self._slots
 
-    def submit(self, number: int, task: Work) -> None:
-        """Hand a task to the cluster."""
+    def submit(self, number: int, task: Task | Join) -> None:
+        """Submit a task to the cluster."""
         self._busy[self._run.remote(task)] = number
 
     def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
-        """What has ended."""
+        """Return the tasks that have ended."""
         if self._head and not self._slots:
-            time.sleep(seconds)  # ray waits for a lost head without limit
+            time.sleep(seconds)  # ray would wait for a lost head without limit
             return []
         if not self._busy:
             time.sleep(seconds)
@@ -62,7 +62,7 @@ class RayCluster:
         return [(self._busy.pop(reference), _outcome(reference)) for reference in done]
 
     def stop(self) -> None:
-        """Cancel the tasks under way and leave."""
+        """Cancel the tasks under way and disconnect."""
         if self._slots:
             for reference in self._busy:
                 ray.cancel(reference, force=True)
@@ -82,13 +82,13 @@ def _outcome(reference: Any) -> Outcome | Lost:
     except exceptions.WorkerCrashedError:
         return LOST
     except (exceptions.RayTaskError, exceptions.RaySystemError) as error:  # `run_task` itself raises nothing
-        words = str(error).strip().splitlines()[-1]
-        return Refusal("code", f"a worker cannot load this package ({words}); install it there", "a ray worker")
+        reason = str(error).strip().splitlines()[-1]
+        return Refusal("code", f"a worker cannot load this package ({reason}); install it there", "a ray worker")
     except exceptions.RayError:
         return GONE
 
 
 def _head(address: str | None) -> tuple[str, int] | None:
-    """Host and port of a head's address; None where ray finds it by itself."""
+    """Split a head's address into host and port; None where ray finds it by itself."""
     host, _, port = (address or "").removeprefix("ray://").rpartition(":")
     return (host, int(port)) if host and port.isdigit() else None

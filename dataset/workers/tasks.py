@@ -1,38 +1,34 @@
-"""What a worker does: simulate one chunk of rows and store it as a piece, or join pieces.
+"""The tasks of a worker: simulate one chunk of rows and store it as a shard, or join shards.
 
-A worker may be another process or another machine. It needs this package and the folder, and gives back a
-receipt, or the reason why it has none. It never raises: a reason travels through any backend.
+A worker may be another process or another machine. It needs this package and the folder, and returns a receipt, or
+the reason why there is none. It never raises: a reason can pass through any backend.
 """
 
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import os
 import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from tempfile import gettempdir
 from typing import Any, NamedTuple
 
-from dataset.rows.design import Design
-from dataset.rows.schema import schema, table_of
+from dataset.rows.design import SweepDesign
+from dataset.rows.schema import arrow_table, schema
+from dataset.rows.version import rows_version
 from dataset.storage.data_set import PENDING, SWEEP
-from dataset.storage.shards import Contents, Piece, join, piece_name, write_piece
-from dataset.storage.storage import Place, StorageError, place
+from dataset.storage.shards import Contents, Shard, join, shard_name, write_shard
+from dataset.storage.storage import Storage, StorageError, open_storage
 from sim.io.errors import InputError
-from sim.io.provenance import code_version
 
 Simulate = Callable[[dict[str, Any]], dict[str, Any]]
-_PACKAGE = Path(__file__).parents[1]
-_OURS = ("rows/design.py", "rows/schema.py", "rows/simulate.py")  # beside sim/, what a row depends on
 
 
 class Task(NamedTuple):
-    """Rows start … stop − 1 of a design, and where to store them."""
+    """Rows start … stop − 1 of a design, to be simulated and stored at an address."""
 
     address: str
     config: dict[str, Any]
@@ -41,24 +37,23 @@ class Task(NamedTuple):
     simulate: Simulate | None  # None: `dataset.rows.simulate.simulate`, which only workers import
     start: int
     stop: int
-    chosen: tuple[int, ...] | None = None  # points of the sequence that these rows are, where they were chosen
 
-    def done(self, there: Place) -> Contents:
+    def run(self, storage: Storage) -> Contents:
         """Simulate the rows and store them."""
-        design = Design.from_config(self.config, self.stop - self.start, self.chosen)
-        columns = _simulated(self, design, *((0, None) if self.chosen else (self.start, self.stop)))
-        table = table_of(columns, schema(design.effects, design.sensitivities))
-        return write_piece(there, piece_name(PENDING, self.start, self.stop), table, self.key)
+        design = SweepDesign.from_config(self.config, self.stop - self.start)
+        columns = _simulated(self, design)
+        table = arrow_table(columns, schema(design.effects, design.sensitivities))
+        return write_shard(storage, shard_name(PENDING, self.start, self.stop), table, self.key)
 
 
-class Joining(NamedTuple):
-    """Pieces that follow each other, to be joined to one."""
+class Join(NamedTuple):
+    """Consecutive shards, to be joined to one."""
 
     address: str
     config: dict[str, Any]
     key: str
     code: str
-    sources: tuple[Piece, ...]
+    sources: tuple[Shard, ...]
 
     @property
     def start(self) -> int:
@@ -70,18 +65,15 @@ class Joining(NamedTuple):
         """The row after the last one."""
         return self.sources[-1].stop
 
-    def done(self, there: Place) -> Contents:
-        """Write the joined piece, beside its sources."""
-        design = Design.from_config(self.config, 1)
+    def run(self, storage: Storage) -> Contents:
+        """Write the joined shard beside its sources."""
+        design = SweepDesign.from_config(self.config, 1)
         form = schema(design.effects, design.sensitivities)
-        return join(there, self.sources, piece_name(PENDING, self.start, self.stop), form, self.key)
-
-
-Work = Task | Joining
+        return join(storage, self.sources, shard_name(PENDING, self.start, self.stop), form, self.key)
 
 
 class Receipt(NamedTuple):
-    """A piece that is stored."""
+    """A shard that has been stored."""
 
     contents: Contents
     seconds: float  # of its worker's time
@@ -89,7 +81,7 @@ class Receipt(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """A piece that is not: `kind` is "code", "storage" or "error"."""
+    """The reason why a shard has not been stored; `kind` is "code", "storage" or "error"."""
 
     kind: str
     message: str
@@ -99,40 +91,35 @@ class Refusal(NamedTuple):
 Outcome = Receipt | Refusal
 
 
-@cache
-def rows_version() -> str:
-    """Version of all code that a row depends on, e.g. "0.1.0+1a2b3c4d.5e6f7a8b"."""
-    digest = hashlib.sha256(b"".join((_PACKAGE / name).read_bytes() for name in _OURS))
-    return f"{code_version()}.{digest.hexdigest()[:8]}"
-
-
 def worker_name() -> str:
-    """Host and process."""
+    """Return host and process of this worker."""
     return f"{socket.gethostname()}:{os.getpid()}"
 
 
-def run_task(task: Work) -> Outcome:
-    """Do a task."""
-    here = worker_name()
+def run_task(task: Task | Join) -> Outcome:
+    """Run a task in this process."""
+    worker = worker_name()
     if rows_version() != task.code:
-        words = f"worker {here} has version {rows_version()} of the code, the build has {task.code}"
-        return Refusal("code", f"{words}; install the same version on both", here)
+        versions = f"worker {worker} has version {rows_version()} of the code, the build has {task.code}"
+        return Refusal("code", f"{versions}; install the same version on both", worker)
     try:
-        there = place(task.address)
-        if there.size(SWEEP) is None:
+        storage = open_storage(task.address)
+        if storage.size(SWEEP) is None:
             return Refusal(
-                "storage", f"worker {here} does not see {there.address}; give a folder that it sees", here
+                "storage", f"worker {worker} does not see {storage.address}; give a folder that it sees", worker
             )
         began = time.perf_counter()
-        contents = task.done(there)
-        return Receipt(contents, time.perf_counter() - began, here)
+        contents = task.run(storage)
+        return Receipt(contents, time.perf_counter() - began, worker)
     except StorageError as refusal:
-        return Refusal("storage", str(refusal), here)
-    except Exception as error:  # a bug, or a robot that nothing foresaw: named, and the other chunks go on
-        return Refusal("error", f"{type(error).__name__}: {' '.join(str(error).split())[:300]}", here)
+        return Refusal("storage", str(refusal), worker)
+    except Exception as error:  # a bug, or an unforeseen robot: named, and the other chunks go on
+        return Refusal("error", f"{type(error).__name__}: {' '.join(str(error).split())[:300]}", worker)
 
 
-def _simulated(task: Task, design: Design, start: int, stop: int | None) -> dict[str, Any]:
+def _simulated(task: Task, design: SweepDesign) -> dict[str, Any]:
+    """Simulate the columns of a task's rows."""
+    start, stop = task.start, task.stop
     points: dict[str, Any] = {**design.points(start, stop), "history": design.history(start, stop)}
     if task.simulate is not None:
         columns = task.simulate(points)
@@ -146,7 +133,7 @@ def _simulated(task: Task, design: Design, start: int, stop: int | None) -> dict
 
 @contextmanager
 def _loops() -> Iterator[None]:
-    """The simulator's loops, compiled, on one thread: chunks are the parallelism."""
+    """Compile the simulator's loops if need be, and hold them to one thread: chunks are the parallelism."""
     from sim.motion.batches import one_thread
 
     compile_on_this_host()
@@ -169,4 +156,4 @@ def compile_on_this_host() -> None:
         from sim.motion.warm import compile_once
 
         if not compile_once():
-            raise InputError("the simulator's loops do not compile; python -m sim compile says why")
+            raise InputError("the simulator's loops do not compile; softflagella sim compile says why")

@@ -1,4 +1,4 @@
-"""What every worker of this machine needs, pandas for pyarrow included: loaded once, before workers are forked."""
+"""Load once what every worker of this machine needs, before workers are forked (pandas too, for pyarrow)."""
 
 import gc
 
@@ -18,4 +18,4 @@ if all_compiled():  # load the machine code, too
     simulate({name: np.array([value]) for name, value in _values.items()})
 
 gc.collect()
-gc.freeze()  # loky collects garbage after each task: workers need not go through all this again, nor copy it
+gc.freeze()  # loky collects garbage after each task: workers need neither scan nor copy all this

@@ -5,7 +5,8 @@
     @program.command("steady", "mean motion at constant motor speed", argument("points", help="CSV"), out("CSV"))
     def _steady(arguments: Namespace) -> None: ...
 
-`python -m sim steady …` and `softflagella sim steady …` run the same function.
+`softflagella sim steady …` runs the function; the most important commands have a word of their own, such as
+`softflagella plan …` (`softflagella.__main__`).
 """
 
 from __future__ import annotations
@@ -21,19 +22,19 @@ Run = Callable[[Namespace], None]
 
 
 class Argument(NamedTuple):
-    """Arguments for `ArgumentParser.add_argument`."""
+    """Arguments of `ArgumentParser.add_argument`."""
 
     names: tuple[str, ...]
     options: dict[str, Any]
 
 
 def argument(*names: str, **options: Any) -> Argument:
-    """An argument of a command, written as for argparse."""
+    """Declare an argument of a command, written as for argparse."""
     return Argument(names, options)
 
 
 def out(what: str, **options: Any) -> Argument:
-    """The option --out; it is required unless it has a default."""
+    """Declare the option --out; it is required unless it has a default."""
     return Argument(("--out",), {"required": "default" not in options, "help": f"output: {what}", **options})
 
 
@@ -42,12 +43,26 @@ JOBS = argument("--jobs", type=int, help="processes or threads (default: all pro
 MODEL = argument("--model", help="look-up table (default: the one that comes with the package)")
 
 
-class _Command(NamedTuple):
+class Command(NamedTuple):
+    """A command of a program."""
+
     run: Run
     name: str
     help: str
     arguments: tuple[Argument, ...]
     aliases: tuple[str, ...]
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Add the arguments to a parser, and the function that runs the command."""
+        for names, options in self.arguments:
+            parser.add_argument(*names, **options)
+        parser.set_defaults(run=self.run)
+
+    def parser(self, prog: str) -> ArgumentParser:
+        """Return a parser of this command alone."""
+        parser = ArgumentParser(prog=prog, description=_sentence(self.help))
+        self.add_arguments(parser)
+        return parser
 
 
 class Program:
@@ -55,49 +70,39 @@ class Program:
 
     def __init__(self, package: str, about: str):
         self.package, self.about = package, about
-        self._commands: list[_Command] = []
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the commands."""
-        return [command.name for command in self._commands]
+        self.commands: dict[str, Command] = {}
 
     def command(
         self, name: str, help: str, *arguments: Argument, aliases: Sequence[str] = ()
     ) -> Callable[[Run], Run]:
-        """Decorator of the function that runs a command."""
+        """Decorate the function that runs a command."""
 
         def add(run: Run) -> Run:
-            self._commands.append(_Command(run, name, help, arguments, tuple(aliases)))
+            self.commands[name] = Command(run, name, help, arguments, tuple(aliases))
             return run
 
         return add
 
-    def parser(self, prog: str | None = None) -> ArgumentParser:
-        """The parser of all commands."""
-        return self._parsers(prog)[0]
+    @property
+    def prog(self) -> str:
+        """What a user types to run the program."""
+        return f"softflagella {self.package}".removesuffix(" softflagella")
 
-    def help_texts(self, prog: str | None = None) -> dict[str, str]:
-        """What --help prints, by command."""
-        return {name: parser.format_help() for name, parser in self._parsers(prog)[1].items()}
-
-    def _parsers(self, prog: str | None) -> tuple[ArgumentParser, dict[str, ArgumentParser]]:
-        parser = ArgumentParser(prog=prog or f"python -m {self.package}", description=self.about)
-        commands = parser.add_subparsers(required=True, metavar="COMMAND")
-        own_parsers = {}
-        for command in self._commands:
-            own = commands.add_parser(
-                command.name, help=command.help, description=_sentence(command.help), aliases=command.aliases
+    def parser(self) -> ArgumentParser:
+        """Return the parser of all commands."""
+        parser = ArgumentParser(prog=self.prog, description=self.about)
+        subparsers = parser.add_subparsers(required=True, metavar="COMMAND")
+        for command in self.commands.values():
+            command.add_arguments(
+                subparsers.add_parser(
+                    command.name, help=command.help, description=_sentence(command.help), aliases=command.aliases
+                )
             )
-            for names, options in command.arguments:
-                own.add_argument(*names, **options)
-            own.set_defaults(run=command.run)
-            own_parsers[command.name] = own
-        return parser, own_parsers
+        return parser
 
-    def main(self, argv: list[str] | None = None, *, prog: str | None = None) -> None:
-        """Parse and run; bad input raises `InputError`."""
-        arguments = self.parser(prog).parse_args(argv)
+    def main(self, argv: list[str] | None = None) -> None:
+        """Parse and run a command; bad input raises `InputError`."""
+        arguments = self.parser().parse_args(argv)
         arguments.run(arguments)
 
     def exit(self) -> None:

@@ -36,7 +36,7 @@ import numpy as np
 
 from sim.arrays import Floats, Integers
 from sim.compiling import compiled
-from sim.linear.blocks import add_at, put, put_at, vector, vector_at
+from sim.linear.blocks import add, add_at, put_at, vector, vector_at
 from sim.linear.vectors import E_Z, ZERO, Vector, cross, dot, minus, plus, times
 from sim.mechanics.balance import Motion, head_drag, motion_at
 from sim.mechanics.drag import node_drag
@@ -89,13 +89,13 @@ def add_flow(
     body: Body, geometry: Geometry, x: Floats, u: Floats, phase: float, instant: int, tails: int,
     flow: Floats, wrench: Floats,
 ) -> None:  # fmt: skip
-    """The fluid's velocity around a robot at one instant.
+    """Add the fluid's velocity around a robot at one instant.
 
     Args:
         x: free nodes, (n, M, 3); tail j at instant p of P is column p + j P, at phase φ + 2πj/N.
         u: (v_x, v_z, ω_yr, ω_h), (4,).
         phase: φ.
-        flow: (n + 1, M, 3), filled in the columns of this instant, each in the frame of its tail.
+        flow: (n + 1, M, 3); added in the columns of this instant, each in the frame of its tail.
         wrench: (4,), about J; the effect of the flow on the head is added.
     """
     n, columns, _ = x.shape
@@ -114,7 +114,7 @@ def add_flow(
     for j in range(tails):
         motion = motion_at(body, u, phase + 2 * np.pi * j / tails)
         for k in range(n + 1):
-            put(flow, k, instant + j * instants, _in_tail(motion, vector_at(moved, j * (n + 1) + k)))
+            add(flow, k, instant + j * instants, _in_tail(motion, vector_at(moved, j * (n + 1) + k)))
     across, along = _head_resistance(body)
     for i in range(nodes, nodes + _PIECES):
         wrench[0] += across * moved[i, 0] / _PIECES

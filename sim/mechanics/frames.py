@@ -26,7 +26,7 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.compiling import compiled
-from sim.linear.blocks import add, put, vector
+from sim.linear.blocks import add, add_at, put, vector
 from sim.linear.vectors import ZERO, Vector, cross, dot, formula, minus, plus, times
 from sim.mechanics.balance import Motion
 from sim.mechanics.geometry import ROOT_TANGENT, Geometry, inverse_voronoi
@@ -165,7 +165,7 @@ def has_frames(body: Body) -> bool:
 
 @compiled
 def add_frames(body: Body, geometry: Geometry, motion: Motion, m: int, x_dot: Floats, moments: Floats) -> None:
-    """Add the forces of the frames to the edges of tail m, and put the clamp's further moment into `moments`.
+    """Add the forces of the frames to the edges of tail m, and the clamp's further moment to `moments`.
 
     Args:
         x_dot: velocities of the free nodes in the disc frame, (n, M, 3).
@@ -201,7 +201,7 @@ def add_frames(body: Body, geometry: Geometry, motion: Motion, m: int, x_dot: Fl
         else:  # the clamp turns with the disc: moment = e_0 × ∂E_0/∂e_0 + t_0 ∂E_0/∂θ_0
             about = twist_moment + 0.5 * (a[0] * np.sin(theta[0]) + b[0] * np.cos(theta[0]))
             moment = plus(moment, plus(cross(after, change), times(about, after)))
-    moments[m, 0], moments[m, 1], moments[m, 2] = moment
+    add_at(moments, m, moment)
 
 
 @compiled

@@ -24,7 +24,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.compiling import compiled
 from sim.linear.spectral import with_phases
-from sim.mechanics.balance import head_drag, tail_spin
+from sim.mechanics.balance import tail_spin
 from sim.mechanics.contact import tail_gap
 from sim.mechanics.geometry import measure, new_geometry, straight
 from sim.model.body import Body
@@ -66,13 +66,6 @@ def largest_force(body: Body, x: Floats) -> float:
     geometry = new_geometry(x.shape[0], x.shape[1])
     measure(geometry, x, body.offset, body.axial_stiffness)
     return float(np.max(np.abs(geometry.force)))
-
-
-def mean_tail_wrench(body: Body, x: Floats, u: Floats) -> Floats:
-    """(F_x, F_z, M_y, M_z) of the tails on the disc about J, mean over the phases, (4,)."""
-    _, t = residual_on_orbit(body, x, u)
-    on_head = [[head_drag(body, now, a) for a in range(4)] for now in u]
-    return np.asarray((t + np.array(on_head)).mean(0))
 
 
 @compiled

@@ -5,7 +5,8 @@
 `fill_residual` adds up all forces: local drag and the elastic forces of straight tails (`sim.mechanics.balance`),
 and the non-local effects. These are material frames (`frames`), flow between the parts (`flow`), contact
 between tails (`tail_contact`), friction of the contact line, and thinning of the fluid, which changes the drag on
-every node (`thinning`). A new non-local effect is called in `_surround`. Units: l, μ0 l⁴/EI, EI/l².
+every node (`thinning`). A new non-local effect is called in `_surround` and adds to what `Surroundings` holds,
+which is zero before the first one. Units: l, μ0 l⁴/EI, EI/l².
 
 The Newton matrices of `sim.solve.linearise` leave the non-local effects out; GMRES takes them into account
 (`sim.solve.newton`).
@@ -33,7 +34,7 @@ from sim.solve.rates import Rates, base_phase, fill_rates
 
 
 class Surroundings(NamedTuple):
-    """Results of the non-local effects; zero without them."""
+    """What the non-local effects add up; zero without them."""
 
     flow: Floats  # of the fluid at nodes 0..n, (n + 1, M, 3)
     moment: Floats  # further moment of each clamp on the disc, (M, 3)
@@ -79,6 +80,8 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
     measure(room.geometry, x, body.offset, body.axial_stiffness)
     fill_rates(rates, body, x, u, room.x_dot, room.by_spin)
     base = base_phase(rates, body, u)
+    room.around.flow[:] = 0.0
+    room.around.moment[:] = 0.0
     room.around.wrench[:] = 0.0
     for p in range(instants):
         phase = base + 2 * np.pi * p / columns

@@ -91,7 +91,7 @@ class RobotTable:
             for value in given[~(np.abs(given - own) <= 1e-9 * max(abs(own), 1.0))][:1]:
                 raise InputError(
                     f"{name} = {value:g} is outside this robot's table ({own:g} only); make its own table with "
-                    "python -m surrogate robot"
+                    "softflagella surrogate robot"
                 )
         omega = columns.get("omega_bar", np.ones(count))
         return np.where(np.asarray(omega) < 0, 1, 0)
@@ -109,7 +109,7 @@ def load_robot_table(path: str | Path) -> RobotTable:
     Raises:
         InputError: the file is not such a table, or one of another version, or it was changed.
     """
-    remedy = "make one with python -m surrogate robot"
+    remedy = "make one with softflagella surrogate robot"
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as missing:

@@ -101,7 +101,7 @@ def shortcomings(errors: Errors) -> list[str]:
         if error and error["p95"] > _POOR:
             found.append(
                 f"{words} is off by {100 * error['p95']:.0f} % at 95 % of the held-out rows; learn more rows, or "
-                "give robots tables of their own (python -m surrogate robot)"
+                "give robots tables of their own (softflagella surrogate robot)"
             )
     return found
 

@@ -227,7 +227,7 @@ class NeuralTable:
                 break
         return (
             f"the robot in row {row + 1} is outside the look-up table: {reason}; change the robot, or simulate it "
-            "(python -m sim steady, python -m surrogate robot)"
+            "(softflagella sim steady, softflagella surrogate robot)"
         )
 
     def _responses(self, found: Motions, steady: Mapping[str, Floats]) -> Responses:
@@ -245,12 +245,12 @@ def _check_flips(values: Mapping[str, Floats]) -> None:
         if name in catalogue() and catalogue()[name].symmetry == "odd" and size.any():
             raise InputError(
                 f"{name} makes left and right turns differ, which the look-up table has not learned; make the "
-                "robot a table of its own: python -m surrogate robot ROBOT.toml --out TABLE.json"
+                "robot a table of its own: softflagella surrogate robot ROBOT.toml --out TABLE.json"
             )
     if (values["N"] < 2).any():
         raise InputError(
             "N = 1: the response of one tail depends too much on the phase of the disc, so the look-up table "
-            "has not learned it; simulate it (python -m sim replay)"
+            "has not learned it; simulate it (softflagella replay)"
         )
 
 

@@ -42,8 +42,8 @@ def load(path: str | Path | None = None) -> NeuralTable:
     """
     path = SHIPPED if path is None else path
     if not Path(path).is_file():
-        raise InputError(f"no model {path}; train one with python -m surrogate train DATA --out {path}")
-    remedy = "train it again with python -m surrogate train"
+        raise InputError(f"no model {path}; train one with softflagella train DATA --out {path}")
+    remedy = "train it again with softflagella train"
     content = tensor_file.read(path, FORMAT, remedy)
     try:
         return _lookup(content)

@@ -59,7 +59,7 @@ def train(
     """A look-up table from a finished data set, or from several.
 
     Args:
-        folder: data set written by `python -m dataset build` or `python -m surrogate refine`, or several. A row
+        folder: data set written by `softflagella sweep` or `softflagella surrogate refine`, or several. A row
             that is in two of them counts once.
         settings: networks of the tails and their optimiser.
         curve_settings: the same for the response to a flip.

@@ -68,7 +68,7 @@ def heads_and_tails(columns: Mapping[str, Floats | Tensor], keep: Collection[str
         if not needs_no_learning(name):
             raise InputError(
                 f"{name} changes more than head, disc and motor, so the look-up table does not know it; make the "
-                "robot a table of its own: python -m surrogate robot ROBOT.toml --out TABLE.json"
+                "robot a table of its own: softflagella surrogate robot ROBOT.toml --out TABLE.json"
             )
     tails_of_each: Any = count  # a batch of the simulator has one N, formulas take N by row as well
     body = assemble(Groups(**own, N=tails_of_each, effects=effects))

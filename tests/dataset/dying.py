@@ -19,9 +19,10 @@ from typing import Any
 import dataset.build.build
 import dataset.build.sweep_folder
 import dataset.storage.shards
+from dataset.rows.version import rows_version
 from dataset.storage.data_set import read
-from dataset.workers.open_backend import Lost
-from dataset.workers.tasks import Outcome, Work, rows_version, run_task
+from dataset.workers.backend import Lost
+from dataset.workers.tasks import Join, Outcome, Task, run_task
 from sim.io.errors import InputError
 from tests.dataset.sweeps import design, invented
 
@@ -38,7 +39,7 @@ class Here:
     def slots(self) -> int:
         return 1
 
-    def submit(self, number: int, task: Work) -> None:
+    def submit(self, number: int, task: Task | Join) -> None:
         self._ended.append((number, run_task(task)))
 
     def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:

@@ -12,8 +12,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dataset.rows.design import Axis, Design
-from dataset.rows.schema import COST
+from dataset.rows.design import Axis, SweepDesign
+from dataset.rows.schema import COST, arrow_table, schema
+from dataset.storage.data_set import ROWS, manifest_content, write_manifest
+from dataset.storage.shards import shard_name, write_shard
+from dataset.storage.storage import open_storage
 from sim.model.response import BEFORE, DWELLS
 
 SMALL = """
@@ -35,14 +38,14 @@ ROOT = Path(__file__).parents[2]
 MARKS = Path(os.environ.setdefault("SOFTFLAGELLA_TEST_MARKS", mkdtemp()))
 
 
-def design(rows: int, seed: int = 5) -> Design:
+def design(rows: int, seed: int = 5) -> SweepDesign:
     """A sweep for invented rows."""
     axes = {
         "C_t": Axis(2, 5, "linear"), "C_r": Axis(1.5, 3.5, "linear"), "C_yr": Axis(1, 7, "linear"),
         "l_over_R": Axis(4, 9, "linear"), "L_over_R": Axis(3, 5, "linear"), "l_over_r0": Axis(20, 45, "linear"),
         "omega_bar": Axis(3, 18, "log"), "N": Axis(2, 5, "integer"),
     }  # fmt: skip
-    return Design(axes, rows, seed)
+    return SweepDesign(axes, rows, seed)
 
 
 def invented(p: dict[str, np.ndarray]) -> dict[str, Any]:
@@ -114,6 +117,15 @@ def endless(p: dict[str, np.ndarray]) -> dict[str, Any]:
     _mark(p, "endless")
     time.sleep(600)
     return invented(p)
+
+
+def write_rows(folder: Path, manifest: dict[str, Any], columns: dict[str, Any]) -> None:
+    """Store rows as a finished data set with the configuration and version of another one."""
+    config, effects, code = manifest["config"], manifest["effects"], manifest["code_version"]
+    storage, key = open_storage(folder), manifest["config_hash"]
+    table = arrow_table(columns, schema(effects, config["sensitivities"]))
+    contents = write_shard(storage, shard_name(ROWS, 0, len(table)), table, key)
+    write_manifest(storage, manifest_content(config, key, code, effects, [contents]))
 
 
 def without_cost(rows: pd.DataFrame) -> pd.DataFrame:

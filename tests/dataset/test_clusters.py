@@ -17,7 +17,8 @@ from typing import Any
 import pytest
 
 from dataset.build import scheduler as engine
-from dataset.build.build import UnfinishedError, build
+from dataset.build.build import build
+from dataset.build.signals import UnfinishedError
 from dataset.storage.data_set import read
 from sim.io.errors import InputError
 from tests.dataset import sweeps
@@ -162,9 +163,9 @@ def build_apart(
     code = (
         "import sys, dataset.build.scheduler; from tests.dataset.sweeps import *; "
         "from dataset.build.build import *; "
-        f"from dataset.build.exits import ended; dataset.build.scheduler.PATIENCE = {patience}; "
-        f"ended(lambda: build(design(200), {str(folder)!r}, backend={backend!r}, address={address!r}, title='', "
-        f"simulate={rows_by}))"
+        f"from dataset.build.signals import run_long_command; dataset.build.scheduler.PATIENCE = {patience}; "
+        f"run_long_command(lambda: build(design(200), {str(folder)!r}, backend={backend!r}, address={address!r}, "
+        f"title='', simulate={rows_by}))"
     )
     return subprocess.Popen(
         [sys.executable, "-c", code], env=ENVIRONMENT, cwd=ROOT, text=True,

@@ -17,10 +17,10 @@ from dataset.__main__ import main
 from dataset.build.build import build
 from dataset.build.verify import verify
 from dataset.rows.design import load_design
-from dataset.rows.schema import schema, table_of
-from dataset.storage.data_set import SWEEP, read, read_manifest, write_rows
+from dataset.rows.schema import arrow_table, schema
+from dataset.storage.data_set import SWEEP, read, read_manifest
 from sim.io.errors import InputError, run_command
-from tests.dataset.sweeps import ROOT, SMALL
+from tests.dataset.sweeps import ROOT, SMALL, write_rows
 
 pytestmark = pytest.mark.slow
 
@@ -60,7 +60,7 @@ def test_verify_notices_a_changed_number_under_sound_digests(built: Path, tmp_pa
         columns = {name: table[name].to_numpy() for name in table}
         columns[column] = columns[column] * change
         out = tmp_path / column
-        write_rows(out, manifest["config"], columns, code=manifest["code_version"])
+        write_rows(out, manifest, columns)
         shutil.copy(built / "out" / SWEEP, out)
         with pytest.raises(InputError, match=words):
             verify(out, rows=6)
@@ -84,7 +84,7 @@ def test_a_sweep_over_effects_and_both_directions(tmp_path: Path) -> None:
     assert (np.sign(table["omega_yr_bar"]) == np.sign(table["omega_bar"])).all()
     assert {True, False} == set(table["omega_bar"] > 0)
     assert pa.Table.from_pandas(table).num_columns == len(schema(["left_right_bias"]))
-    assert table_of({n: table[n].to_numpy() for n in table}, schema(["left_right_bias"])).num_rows == 6
+    assert arrow_table({n: table[n].to_numpy() for n in table}, schema(["left_right_bias"])).num_rows == 6
 
 
 def make(target: str, *words: str) -> subprocess.CompletedProcess[str]:

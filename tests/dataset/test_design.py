@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dataset.__main__ import main
-from dataset.rows.design import Axis, Design, load_design
+from dataset.rows.design import Axis, SweepDesign, load_design
 from sim.io.errors import run_command
 from tests.dataset.sweeps import SMALL, design
 
 
-def loaded(folder: Path, text: str) -> Design:
+def loaded(folder: Path, text: str) -> SweepDesign:
     (folder / "sweep.toml").write_text(text)
     return load_design(folder / "sweep.toml")
 
@@ -67,7 +66,9 @@ def test_optional_inputs_effects_and_directions_are_swept(tmp_path: Path) -> Non
     assert sweep.effects == ["left_right_bias"]
     assert (points["omega_bar"] < 0).sum() == 128
     assert sorted(set(points["N"])) == [1, 2, 3, 4, 5, 6, 7, 8]
-    assert Design.from_config(sweep.config(), 256).points()["a_over_R"].tolist() == points["a_over_R"].tolist()
+    assert (
+        SweepDesign.from_config(sweep.config(), 256).points()["a_over_R"].tolist() == points["a_over_R"].tolist()
+    )
 
 
 @pytest.mark.parametrize(
@@ -113,14 +114,3 @@ def test_bad_configurations(
     assert expected in error
     assert len(error.splitlines()) == 1
     assert not (tmp_path / "out").exists()
-
-
-def test_chosen_points_are_those_of_the_sequence() -> None:
-    whole = design(3000)
-    chosen = (2999, 0, 7, 8, 9, 1024, 1, 2000)
-    some = replace(whole, rows=len(chosen), chosen=chosen)
-    assert some.indices().tolist() == list(chosen)
-    for name, values in whole.points().items():
-        assert some.points()[name].tobytes() == values[list(chosen)].tobytes()
-        assert some.points(2, 5)[name].tobytes() == values[[7, 8, 9]].tobytes()
-    assert some.history().tolist() == whole.history()[list(chosen)].tolist()

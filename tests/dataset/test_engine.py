@@ -8,13 +8,15 @@ from pathlib import Path
 import pytest
 
 from dataset.build import scheduler as engine
-from dataset.build.build import UnfinishedError, build, chunks
+from dataset.build.build import build, chunks
+from dataset.build.signals import UnfinishedError
 from dataset.rows.design import Axis
+from dataset.rows.version import rows_version
 from dataset.storage.data_set import read, read_manifest
 from dataset.storage.lock import locked
-from dataset.storage.storage import place
-from dataset.workers.open_backend import GONE, Lost
-from dataset.workers.tasks import Joining, Outcome, Task, Work, rows_version, run_task
+from dataset.storage.storage import open_storage
+from dataset.workers.backend import GONE, Lost
+from dataset.workers.tasks import Join, Outcome, Task, run_task
 from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import design, invented
@@ -66,7 +68,7 @@ def test_another_configuration_is_not_mixed_in(tmp_path: Path) -> None:
     other.axes["C_r"] = Axis(1.5, 3.0, "linear")
     with pytest.raises(InputError, match=r"C_r \[1.5, 3.5\] linear there, \[1.5, 3\] linear here"):
         build(other, tmp_path / "out", jobs=1, title="", simulate=invented)
-    with pytest.raises(InputError, match="another version"):
+    with pytest.raises(InputError, match=r"made by tests.*invented, not by tests.*raising"):
         build(design(20), tmp_path / "out", jobs=1, title="", simulate=sweeps.raising)
     assert files(tmp_path / "out") == before
 
@@ -82,7 +84,7 @@ def test_a_folder_with_other_files_is_left_alone(name: str, tmp_path: Path) -> N
 
 def test_a_second_writer_is_refused_and_told_who_writes(tmp_path: Path) -> None:
     with (
-        locked(place(tmp_path / "out")),
+        locked(open_storage(tmp_path / "out")),
         pytest.raises(InputError, match=r"is being written by process \d+ on .* min"),
     ):
         build(design(20), tmp_path / "out", jobs=1, title="", simulate=invented)
@@ -143,14 +145,14 @@ class Forgetful:
     """A backend in this process that forgets every task once, and has no workers for a while."""
 
     def __init__(self, absent: int = 0):
-        self.absent, self.forgotten, self.waiting = absent, set[tuple[type, int]](), list[tuple[int, Work]]()
-        self.seen = list[Work]()
+        self.absent, self.forgotten = absent, set[tuple[type, int]]()
+        self.waiting, self.seen = list[tuple[int, Task | Join]](), list[Task | Join]()
 
     def slots(self) -> int:
         self.absent -= 1
         return 0 if self.absent >= 0 else 2
 
-    def submit(self, number: int, task: Work) -> None:
+    def submit(self, number: int, task: Task | Join) -> None:
         self.seen.append(task)
         self.waiting.append((number, task))
 
@@ -178,7 +180,7 @@ def test_files_are_joined_by_workers(tmp_path: Path, monkeypatch: pytest.MonkeyP
     crew = Forgetful()
     monkeypatch.setattr("dataset.build.build.open_backend", lambda *_, **__: crew)
     build(design(200), tmp_path / "out", title="", simulate=invented)
-    joined = [(task.start, task.stop) for task in crew.seen if isinstance(task, Joining)]
+    joined = [(task.start, task.stop) for task in crew.seen if isinstance(task, Join)]
     assert sorted(joined) == sorted(2 * [(0, 64), (64, 128), (128, 192)])  # each of them forgotten once
     assert len(list((tmp_path / "out" / "rows").iterdir())) == 4
     monkeypatch.undo()
@@ -188,14 +190,14 @@ def test_files_are_joined_by_workers(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 def test_a_piece_that_is_damaged_before_it_is_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Damaging(Forgetful):
-        def submit(self, number: int, task: Work) -> None:
-            if isinstance(task, Joining):
+        def submit(self, number: int, task: Task | Join) -> None:
+            if isinstance(task, Join):
                 path = tmp_path / "out" / task.sources[0].name
                 path.write_bytes(path.read_bytes()[:-50])
             super().submit(number, task)
 
     monkeypatch.setattr("dataset.build.build.open_backend", lambda *_, **__: Damaging())
-    with pytest.raises(UnfinishedError, match=r"set aside: rows 0 to 199 \(BadPieceError: it is damaged"):
+    with pytest.raises(UnfinishedError, match=r"skipped: rows 0 to 199 \(BadShardError: it is damaged"):
         build(design(200), tmp_path / "out", title="", simulate=invented)
     monkeypatch.setattr("dataset.build.build.open_backend", lambda *_, **__: Forgetful())
     build(design(200), tmp_path / "out", title="", simulate=invented)
@@ -217,7 +219,7 @@ def test_a_worker_with_other_code_is_refused(tmp_path: Path, monkeypatch: pytest
 
 
 def test_a_worker_that_does_not_see_the_folder_is_refused(tmp_path: Path) -> None:
-    there = place(tmp_path / "elsewhere")
+    there = open_storage(tmp_path / "elsewhere")
     outcome = run_task(Task(there.address, design(1).config(), "", rows_version(), invented, 0, 1))
     assert outcome[0] == "storage"
     assert "does not see" in outcome[1]

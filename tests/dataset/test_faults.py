@@ -51,10 +51,10 @@ def started(code: str, *, limit: int | None = None) -> subprocess.Popen[str]:
 def building(folder: Path, rows: int, rows_by: str, jobs: int = 2) -> str:
     """Code that builds as the command line does."""
     return (
-        "import sys; from dataset.build.exits import ended; "
+        "import sys; from dataset.build.signals import run_long_command; "
         "from sim.io.errors import run_command; "
-        f"sys.exit(run_command(lambda _: ended(lambda: build(design({rows}), {str(folder)!r}, jobs={jobs}, "
-        f"title='', simulate={rows_by}, resume='the same words'))))"
+        f"sys.exit(run_command(lambda _: run_long_command(lambda: build(design({rows}), {str(folder)!r}, "
+        f"jobs={jobs}, title='', simulate={rows_by}, resume='the same words'))))"
     )
 
 
@@ -98,11 +98,11 @@ def test_the_command_line_stops_and_goes_on(tmp_path: Path) -> None:
     line = error.strip().splitlines()[-1]
     assert line.startswith("stopped: ")
     command = line.split("go on with: ")[1].split()
-    assert command[1:] == ["-m", "dataset", *words]
+    assert command == ["softflagella", "sweep", *words[1:]]
     kept = {p.name for p in (tmp_path / "out" / "pending").iterdir() if p.name[0] != "."}
     assert kept
     calm = [str(tmp_path / "calm") if word == str(tmp_path / "out") else word for word in words]
-    for each in (command[3:], calm):
+    for each in (["build", *command[2:]], calm):
         again = started(f"import sys; sys.argv[1:] = {each}; program.exit()")
         assert "64 rows: 64 converged" in again.communicate()[0]
     assert without_cost(read(tmp_path / "out")).equals(without_cost(read(tmp_path / "calm")))

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dataset.report.figures import SHOWN, draw_responses
+from dataset.report.figures import RESPONSES, draw_responses
 from dataset.report.power_laws import exponents, linear_rows
 from dataset.report.sobol_indices import sobol_indices
 from sim.model.response import DWELLS
@@ -71,7 +71,7 @@ def test_motors_of_which_nothing_is_known_have_no_median() -> None:
     rows = pd.DataFrame({name: np.full(count, value) for name, value in steady.items()})
     rows["omega_bar"] = np.arange(1.0, count + 1)
     rows["history"] = np.arange(count) < 20
-    for name in SHOWN:
+    for name in RESPONSES:
         rows[name] = [np.ones(len(DWELLS))] * count
     with warnings.catch_warnings():
         warnings.simplefilter("error")

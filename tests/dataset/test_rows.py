@@ -14,7 +14,7 @@ from sim.model.slopes import SLOPE_INPUTS
 CONTROL = {**PRESETS["paper-control"].group_values(), "history": True}
 
 
-def rows_of(*changes: dict[str, float]) -> dict[str, np.ndarray]:
+def some_rows(*changes: dict[str, float]) -> dict[str, np.ndarray]:
     return {
         name: np.array([{**CONTROL, **change}[name] for change in changes]) for name in {**CONTROL, **changes[0]}
     }
@@ -27,7 +27,7 @@ def bits(columns: dict[str, np.ndarray], row: int) -> dict[str, object]:
 @pytest.mark.slow
 def test_any_batch_and_any_order_give_the_same_bits() -> None:
     """Robots that fall back to time steps used to take their mesh from the fastest robot of their batch."""
-    points = load_design("sweep.toml").with_rows(24).points()
+    points = load_design().with_rows(24).points()
     quick = {"C_t": 0.55, "C_r": 0.54, "C_yr": 4.1, "l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2,
              "omega_bar": 117.0, "N": 6.0}  # fmt: skip
     points = {name: np.append(values, quick[name]) for name, values in points.items()}
@@ -45,7 +45,7 @@ def test_any_batch_and_any_order_give_the_same_bits() -> None:
 
 def test_rows_beyond_their_budget_say_so() -> None:
     """C_t = C_r = 1e-9 asked for 24 TiB, ω̄ = 1e-6 for days, ω̄ = 1e9 for 85 GiB."""
-    found = simulate(rows_of({"C_t": 1e-9, "C_r": 1e-9}, {"omega_bar": 1e-6}, {"omega_bar": 1e9}, {}))
+    found = simulate(some_rows({"C_t": 1e-9, "C_r": 1e-9}, {"omega_bar": 1e-6}, {"omega_bar": 1e9}, {}))
     assert found["failed"].tolist() == [True, True, True, False]
     assert all(found["reason"][:3])
     assert found["reason"][3] == ""
@@ -56,7 +56,7 @@ def test_rows_beyond_their_budget_say_so() -> None:
 
 def test_one_to_eight_tails_other_discs_and_a_reversed_motor() -> None:
     found = simulate(
-        rows_of(
+        some_rows(
             {"N": 1.0, "a_over_R": 1.0}, {"N": 8.0, "a_over_R": 1.0}, {"a_over_R": 0.5},
             {"omega_bar": -10.0, "a_over_R": 1.0}, {"omega_bar": 150.0, "a_over_R": 1.0},
             {"omega_bar": 10.0, "a_over_R": 1.0},
@@ -68,7 +68,7 @@ def test_one_to_eight_tails_other_discs_and_a_reversed_motor() -> None:
 
 
 def test_memory_and_rest_are_simulated_where_asked_for() -> None:
-    found = simulate(rows_of({"history": True}, {"history": False}))
+    found = simulate(some_rows({"history": True}, {"history": False}))
     assert np.isfinite(found["memory_psi_rad"][0]).all()
     assert np.isfinite(found["rest_z"][0]).all()
     assert np.isnan(found["memory_psi_rad"][1]).all()
@@ -78,7 +78,7 @@ def test_memory_and_rest_are_simulated_where_asked_for() -> None:
 def test_derivatives_on_request() -> None:
     """Against differences of rows."""
     step = 1e-3
-    rows = rows_of(
+    rows = some_rows(
         {"history": False}, {"history": False, "C_yr": 2.0 - step}, {"history": False, "C_yr": 2.0 + step}
     )
     found = simulate(rows, sensitivities=True)
@@ -89,7 +89,7 @@ def test_derivatives_on_request() -> None:
 
 
 def test_odd_effects_make_the_two_directions_differ() -> None:
-    found = simulate(rows_of(*({"omega_bar": speed, "left_right_bias": 0.05} for speed in (10.0, -10.0))))
+    found = simulate(some_rows(*({"omega_bar": speed, "left_right_bias": 0.05} for speed in (10.0, -10.0))))
     assert found["converged"].all()
     assert abs(found["omega_yr_bar"].sum() / found["omega_yr_bar"][0]) > 0.01
 
@@ -109,7 +109,7 @@ def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(response, "orbit_on_mesh", lambda *_: (False, None, None))
     monkeypatch.setattr(settling, "state_on_orbit", lambda *_: None)
     monkeypatch.setattr(run, "advance", lambda *_: False)
-    columns = simulate(rows_of({}))
+    columns = simulate(some_rows({}))
     assert columns["failed"].tolist() == [True]
     assert columns["converged"].tolist() == [False]
     assert np.isnan(columns["omega_yr_bar"]).all()

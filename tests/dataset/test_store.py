@@ -13,10 +13,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from dataset.build.build import build, mend
-from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS, Column, field_of, schema, table_of
+from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS, Column, arrow_table, parquet_field, schema
 from dataset.storage.data_set import batches, read, read_manifest, usable
-from dataset.storage.shards import BadPieceError, Piece, contents_of, join, pieces, plain, write_piece
-from dataset.storage.storage import place
+from dataset.storage.shards import BadShardError, Shard, check_shard, join, plain, shards_in, write_shard
+from dataset.storage.storage import open_storage
 from sim.io.errors import InputError
 from tests.dataset.sweeps import design, invented, without_cost
 
@@ -99,8 +99,8 @@ def test_one_flipped_bit_is_never_silent(built: Path, original: Path) -> None:
 
 def test_a_flipped_bit_in_a_page_is_found_without_the_manifest(original: Path) -> None:
     """Pieces that wait to be joined have no digest yet: their pages have checksums."""
-    there, key = place(original), read_manifest(original)["config_hash"]
-    (piece,) = pieces(there, "rows")
+    there, key = open_storage(original), read_manifest(original)["config_hash"]
+    (piece,) = shards_in(there, "rows")
     whole = part(original).read_bytes()
     end = len(whole) - 8 - int.from_bytes(whole[-8:-4], "little")  # of the pages
     silent = 0
@@ -110,12 +110,12 @@ def test_a_flipped_bit_in_a_page_is_found_without_the_manifest(original: Path) -
         (original.parent / "p").mkdir(exist_ok=True)
         (original.parent / "p" / part(original).name).write_bytes(bad)
         try:
-            other = place(original.parent)
-            found = contents_of(other, Piece(f"p/{part(original).name}", 0, ROWS), schema([]), key)
-            silent += found._replace(sha256="", bytes=0) != contents_of(there, piece, schema([]), key)._replace(
+            other = open_storage(original.parent)
+            found = check_shard(other, Shard(f"p/{part(original).name}", 0, ROWS), schema([]), key)
+            silent += found._replace(sha256="", bytes=0) != check_shard(there, piece, schema([]), key)._replace(
                 sha256="", bytes=0
             )
-        except BadPieceError:
+        except BadShardError:
             pass
     assert silent == 0
 
@@ -216,17 +216,17 @@ def test_lists_on_a_grid_are_stored_and_joined(tmp_path: Path) -> None:
     grid = tuple(np.linspace(0.2, 4.0, 5).tolist())
     names = ("row", "converged", "failed", "touching", "reason", "cost_s")
     plain = [column for column in FLAGS if column.name in names]
-    form = pa.schema(map(field_of, [*plain, Column("lag", pa.list_(pa.float32(), 5), "l", "offset", grid)]))
+    form = pa.schema(map(parquet_field, [*plain, Column("lag", pa.list_(pa.float32(), 5), "l", "offset", grid)]))
     values = np.arange(50, dtype=np.float32).reshape(10, 5) / 7
     flags = {"converged": np.ones(5, bool), "failed": np.zeros(5, bool), "touching": np.zeros(5, bool)}
-    there = place(tmp_path)
+    there = open_storage(tmp_path)
     for start in (0, 5):
         rows = {"row": np.arange(start, start + 5), "lag": values[start : start + 5], "cost_s": np.ones(5)}
-        table = table_of({**rows, **flags, "reason": [""] * 5}, form)
-        write_piece(there, f"p/rows-{start:010d}-{start + 5:010d}.parquet", table, "key")
+        table = arrow_table({**rows, **flags, "reason": [""] * 5}, form)
+        write_shard(there, f"p/rows-{start:010d}-{start + 5:010d}.parquet", table, "key")
     name = "p/rows-0000000000-0000000010.parquet"
-    joined = join(there, pieces(there, "p"), name, form, "key")
-    assert contents_of(there, Piece(name, 0, 10), form, "key") == joined
+    joined = join(there, shards_in(there, "p"), name, form, "key")
+    assert check_shard(there, Shard(name, 0, 10), form, "key") == joined
     stored = pq.read_table(tmp_path / name)
     assert np.stack(stored.to_pandas()["lag"].to_list()).tobytes() == values.tobytes()
     assert json.loads(stored.schema.field("lag").metadata[b"grid"]) == list(grid)

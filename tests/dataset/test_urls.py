@@ -20,14 +20,14 @@ from dataset.build.build import build, mend
 from dataset.storage import lock
 from dataset.storage.data_set import batches, read, read_manifest
 from dataset.storage.lock import locked
-from dataset.storage.storage import Remote, place
+from dataset.storage.storage import RemoteStorage, open_storage
 from sim.io.errors import InputError
 from tests.dataset.dying import Here
 from tests.dataset.sweeps import ROOT, design, invented
 
 
 def files(address: str) -> dict[str, str]:
-    there = place(address)
+    there = open_storage(address)
     names = [n for n in there.names() if "." in n] + [f"rows/{name}" for name in there.names("rows")]
     return {name: hashlib.sha256(there.read(name)).hexdigest() for name in names if name != "card.md"}
 
@@ -57,7 +57,7 @@ def test_damage_behind_a_url_is_refused_and_mended(
     memory: str, calm: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     build(design(200), memory, title="", simulate=invented)
-    there = place(memory)
+    there = open_storage(memory)
     (name,) = there.names("rows")
     whole = bytes(there.read(f"rows/{name}"))
     with there.writer(f"rows/{name}") as sink:
@@ -72,12 +72,15 @@ def test_damage_behind_a_url_is_refused_and_mended(
 
 
 def test_one_writer_behind_a_url(memory: str) -> None:
-    there = place(memory)
+    there = open_storage(memory)
     with locked(there), pytest.raises(InputError, match="is being written by process"):
         build(design(9), memory, title="", simulate=invented)
-    old = {"host": "elsewhere", "pid": 1, "since": 0, "seen": time.time() - lock.STALE - 1, "token": "x"}
-    there.write(lock.LOCK, json.dumps(old))
-    build(design(9), memory, title="", simulate=invented)  # its owner has not been seen for too long
+    killed = {"host": "elsewhere", "pid": 1, "since": time.time() - 7200}
+    there.write(lock.LOCK, json.dumps(killed))
+    with pytest.raises(InputError, match=r"process 1 on elsewhere, for 120 min; .* take over with --force"):
+        build(design(9), memory, title="", simulate=invented)
+    assert json.loads(bytes(there.read(lock.LOCK))) == killed
+    build(design(9), memory, title="", simulate=invented, force=True)
     assert there.size(lock.LOCK) is None
 
 
@@ -117,7 +120,7 @@ def bucket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
     server.wait()
 
 
-def break_off(there: Remote) -> None:
+def break_off(there: RemoteStorage) -> None:
     with there.writer("rows/x") as sink:
         sink.write(b"half")
         raise ZeroDivisionError
@@ -137,8 +140,8 @@ def test_s3_holds_the_same_files(bucket: str, calm: Path) -> None:
     assert read(bucket).equals(read(calm))
     assert files(bucket) == files(str(calm))
     assert read_manifest(bucket) == read_manifest(calm)
-    there = place(bucket)
-    assert isinstance(there, Remote)
+    there = open_storage(bucket)
+    assert isinstance(there, RemoteStorage)
     with locked(there):
         assert not there.create(lock.LOCK, "{}")
     with pytest.raises(ZeroDivisionError):

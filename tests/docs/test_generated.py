@@ -11,7 +11,7 @@ import pytest
 
 from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
-from softflagella.__main__ import PACKAGES
+from softflagella.__main__ import PACKAGES, WORDS
 from tests.docs.pages import DOCS, PAGES, ROOT, generator, name_of
 
 TOP = (*PACKAGES, "softflagella", "benchmarks", "tests")
@@ -40,8 +40,10 @@ def test_the_page_of_columns_has_each() -> None:
 def test_the_page_of_commands_has_each() -> None:
     page = generator().commands_page()
     for package in PACKAGES:
-        for name in import_module(f"{package}.__main__").program.names:
+        for name in import_module(f"{package}.__main__").program.commands:
             assert f"usage: softflagella {package} {name}" in page
+    for word in WORDS:
+        assert f"usage: softflagella {word}" in page
 
 
 def test_generated_pages_are_written_once(tmp_path: Path) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from dataset.rows.design import load_design
@@ -11,4 +9,4 @@ from dataset.rows.design import load_design
 
 def sweep_points(count: int) -> dict[str, np.ndarray]:
     """Columns of the first `count` robots of sweep.toml."""
-    return load_design(Path(__file__).parents[2] / "sweep.toml").with_rows(count).points()
+    return load_design().with_rows(count).points()

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import torch
 
+from sim.mechanics.balance import head_drag
 from sim.model.body import Body
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.reference.balance import TensorRobots, tensor_robots
 from sim.solve.assembly import bodies
-from sim.solve.orbit import mean_tail_wrench, solve_orbit, straight_start
+from sim.solve.orbit import residual_on_orbit, solve_orbit, straight_start
 from sim.solve.refinement import MESHES, extrapolate
 
 CONTROL_VALUES = PRESETS["paper-control"].group_values()
@@ -33,6 +34,13 @@ def held(robots: TensorRobots) -> TensorRobots:
     """The same tails on a disc that nothing moves: the motor alone turns it."""
     resistance = 1e12 * torch.eye(4, 5, dtype=torch.float64).unsqueeze(-1).expand(4, 5, robots.robots)
     return replace(robots, body=robots.body._replace(resistance=resistance))
+
+
+def mean_tail_wrench(body: Body, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Return (F_x, F_z, M_y, M_z) of the tails on the disc about J, mean over the phases, (4,)."""
+    _, t = residual_on_orbit(body, x, u)
+    on_head = [[head_drag(body, now, a) for a in range(4)] for now in u]
+    return np.asarray((t + np.array(on_head)).mean(0))
 
 
 def held_loads(

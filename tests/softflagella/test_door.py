@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import doctest
 import subprocess
 import sys
@@ -13,34 +12,28 @@ import pytest
 
 import softflagella as sf
 from sim.io.errors import run_command
-from softflagella.__main__ import PACKAGES, main
+from softflagella.__main__ import PACKAGES, WORDS, command, main
 
-SOURCE = Path(sf.__file__)
 NAMES = [name for name in sf.__all__ if not name.startswith("_")]
 
 
-def imported_for_type_checkers() -> dict[str, str]:
-    """Name -> home, from the block under TYPE_CHECKING."""
-    block = next(node for node in ast.parse(SOURCE.read_text()).body if isinstance(node, ast.If))
-    homes = {}
-    for node in block.body:
-        assert isinstance(node, ast.ImportFrom)
-        for alias in node.names:
-            renamed = f":{alias.name}" if alias.asname else ""
-            homes[alias.asname or alias.name] = f"{node.module}{renamed}"
-    return homes
-
-
-def test_the_three_lists_of_names_are_one() -> None:
-    assert sorted(sf._HOMES) == sorted(sf.__all__)
-    assert imported_for_type_checkers() == sf._HOMES
-    assert set(sf.__all__) <= set(dir(sf))
-
-
 @pytest.mark.parametrize("name", sf.__all__)
-def test_every_name_is_what_its_home_has(name: str) -> None:
-    module, _, attribute = sf._HOMES[name].partition(":")
-    assert getattr(sf, name) is getattr(import_module(module), attribute or name)
+def test_every_name_is_what_its_module_has(name: str) -> None:
+    module, attribute = sf._HOMES[name]
+    assert getattr(sf, name) is getattr(import_module(module), attribute)
+    assert name in dir(sf)
+
+
+def test_the_stub_lists_each_name_once() -> None:
+    assert len(sf.__all__) == len(set(sf.__all__)) > 30
+    assert {"plan", "effects", "__version__", "Robot"} <= set(sf.__all__)
+
+
+@pytest.mark.parametrize(("old", "new"), [("Voyage", "GoalPlan"), ("switch_response", "response")])
+def test_old_names_work_with_a_warning(old: str, new: str) -> None:
+    with pytest.warns(DeprecationWarning, match=f"{old} is deprecated; use softflagella.{new}"):
+        assert callable(getattr(sf, old))
+    assert old not in sf.__all__
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -57,11 +50,6 @@ def test_a_name_that_is_not_there() -> None:
         sf.swim  # noqa: B018
 
 
-def test_an_old_name_warns_and_works() -> None:
-    with pytest.warns(DeprecationWarning, match="Voyage is now GoalPlan"):
-        assert sf.Voyage is sf.GoalPlan
-
-
 def test_importing_the_package_loads_nothing_heavy() -> None:
     heavy = ("numpy", "torch", "numba", "pandas", "matplotlib", "scipy", "pyarrow", "sim")
     code = f"import sys, softflagella; print([name for name in {heavy!r} if name in sys.modules])"
@@ -76,8 +64,31 @@ def test_one_command_has_those_of_all_packages(package: str, capsys: pytest.Capt
     assert ended.value.code == 0
     said = capsys.readouterr().out
     assert f"usage: softflagella {package}" in said
-    for command in import_module(f"{package}.__main__").program.names:
-        assert command in said
+    for name in import_module(f"{package}.__main__").program.commands:
+        assert name in said
+
+
+def test_words_are_commands_of_packages_and_stand_first(capsys: pytest.CaptureFixture[str]) -> None:
+    assert {"plan", "sweep", "train", "calibrate", "replay", "query"} <= set(WORDS)
+    main([])
+    lines = capsys.readouterr().out.splitlines()
+    places = [next(i for i, line in enumerate(lines) if line.startswith(f"  {word} ")) for word in WORDS]
+    assert places == sorted(places)
+    assert max(places) < lines.index("further commands, by package (softflagella PACKAGE COMMAND …):")
+    for word, (package, name) in WORDS.items():
+        packaged = import_module(f"{package}.__main__").program.commands[name]
+        assert command(word) is packaged
+        with pytest.raises(SystemExit) as ended:
+            main([word, "--help"])
+        assert ended.value.code == 0
+        assert f"usage: softflagella {word} " in capsys.readouterr().out
+
+
+def test_a_word_runs_its_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(main, ["plan", "no-such-path.csv", "--robot", "paper-control", "--out", str(tmp_path)]) == 2
+    assert "no-such-path.csv" in capsys.readouterr().err
+    assert run_command(main, ["sweep", "--config", "none.toml", "--out", str(tmp_path / "out")]) == 2
+    assert "none.toml" in capsys.readouterr().err
 
 
 def test_the_command_runs_what_the_package_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -95,4 +106,4 @@ def test_version_and_unknown_words(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["swim"])
     assert ended.value.code == 2
-    assert "no package 'swim'" in capsys.readouterr().err
+    assert "no command 'swim'" in capsys.readouterr().err

@@ -29,7 +29,7 @@ def test_the_support_is_joint() -> None:
 
 
 def test_the_sweep_of_the_domain_and_the_bounds_of_the_inverse_are_those_of_the_domain() -> None:
-    axes = load_design(Path(__file__).parents[2] / "sweeps/domain.toml").axes
+    axes = load_design(Path(__file__).parents[2] / "surrogate/shipped/domain.toml").axes
     assert {name: (axis.low, axis.high) for name, axis in axes.items()} == {**DOMAIN, "N": (1, MOST_TAILS)}
     for name, (low, high) in BOUNDS.items():
         assert WIDE[name][0] <= low <= DOMAIN[name][0]

@@ -9,10 +9,10 @@ import torch
 from sim.model.groups import Groups
 from sim.reference.linear_theory import linear_filament
 from sim.solve.assembly import bodies
-from sim.solve.orbit import mean_tail_wrench
 from sim.solve.refinement import orbit_on_mesh
 from surrogate.wrench.heads import heads_and_tails
 from surrogate.wrench.tails import linear_thrust, linear_torque, straight_wrench
+from tests.sim.robots import mean_tail_wrench
 from tests.surrogate.small import rows
 
 

@@ -7,9 +7,8 @@ import pytest
 from scipy.integrate import quad_vec
 
 from sim.mechanics.stokeslets import stokeslets
-from sim.solve.orbit import mean_tail_wrench
 from sim.solve.refinement import orbit_on_mesh
-from tests.sim.robots import body_of, control
+from tests.sim.robots import body_of, control, mean_tail_wrench
 
 
 @pytest.mark.parametrize("where", [(0.3, 0.1, -0.2), (0.02, 0.01, -0.5), (0.0, 0.0, -0.5), (0.1, 0.0, 0.9)])

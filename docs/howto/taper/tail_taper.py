@@ -1,0 +1,27 @@
+"""Tails whose bending stiffness changes from the clamp to the tip.
+
+    EI(s) = EI (1 + ε (1 − 2 s/l))
+
+The mean over the tail is EI, whatever ε. A cast tail is drawn from a mould with a draft angle, so it is thicker and
+stiffer at the clamp. Left out: the taper of the radius in the drag and in the axial stiffness, and natural
+curvature, twist and bending viscosity of tails that are tapered, too (they keep the mean stiffness).
+"""
+
+from __future__ import annotations
+
+from sim.model.effect import Effect
+
+EFFECT = Effect(
+    name="tail_taper",
+    title="taper of the tails' bending stiffness",
+    equation="EI(s) = EI (1 + ε (1 − 2 s/l))",
+    source="Euler-Bernoulli beam of variable section",
+    unit="1",
+    null=0.0,
+    bounds=(-0.9, 0.9),
+    typical=0.2,
+    plausible=(0.0, 0.5),
+    symmetry="even",
+    dissipative=False,
+    reach="nonlocal",
+)

@@ -1,0 +1,39 @@
+# The public names of softflagella and their modules: the one list, for type checkers and for `__init__.py`.
+from calibration.swimmer.synthetic_table import make_table as make_table
+from calibration.verdict.verdict import Verdict as Verdict
+from planner.files.plan_files import write_plan as write_plan
+from planner.goal.obstacles import Circle as Circle
+from planner.goal.to_goal import GoalPlan as GoalPlan
+from planner.goal.to_goal import to_goal as to_goal
+from planner.paths.path import Path2D as Path2D
+from planner.paths.path import circle as circle
+from planner.paths.path import polygon as polygon
+from planner.paths.path_files import read_path as read_path
+from planner.planning.plan import Plan as Plan
+from planner.planning.plan import plan as plan
+from planner.tracking.tracker import Tracker as Tracker
+from sim.effects import catalogue
+from sim.inputs import load_robot as load_robot
+from sim.inputs import save_robot as save_robot
+from sim.io.errors import InputError as InputError
+from sim.io.provenance import __version__ as __version__
+from sim.model.effect import Effect as Effect
+from sim.model.robot import Robot as Robot
+from sim.model.schedule import Schedule as Schedule
+from sim.model.schedule import load_schedule as load_schedule
+from softflagella.api.calibrate import calibrate as calibrate
+from softflagella.api.simulate import replay as replay
+from softflagella.api.simulate import response as response
+from softflagella.api.simulate import sensitivities as sensitivities
+from softflagella.api.simulate import steady as steady
+from softflagella.api.sweep import read_sweep as read_sweep
+from softflagella.api.sweep import sweep as sweep
+from surrogate.interface import LookupTable as LookupTable
+from surrogate.one_robot.tabulate import tabulate as tabulate
+from surrogate.table.model_file import load_table as load_table
+from surrogate.training.train import train as train
+
+effects = catalogue
+__all__: list[str]
+
+def __dir__() -> list[str]: ...
