@@ -1,4 +1,4 @@
-"""The worked effect of docs/howto/effect.md: its formula against its energy, its declaration against the contract."""
+"""The worked effect of docs/howto/effect.md: its formula against its energy, and its declaration."""
 
 from __future__ import annotations
 

@@ -2,9 +2,9 @@
 
     EI(s) = EI (1 + ε (1 − 2 s/l))
 
-The mean over the tail is EI, whatever ε. A cast tail is drawn from a mould with a draft angle, so it is thicker and
-stiffer at the clamp. Left out: the taper of the radius in the drag and in the axial stiffness, and natural
-curvature, twist and bending viscosity of tails that are tapered, too (they keep the mean stiffness).
+The mean over the tail is EI for every ε. A tail is drawn from a mould with a draft angle, so it is thicker and
+stiffer at the clamp. Left out: the taper of the radius in drag and axial stiffness. Natural curvature, twist and
+bending viscosity keep the mean stiffness.
 """
 
 from __future__ import annotations
