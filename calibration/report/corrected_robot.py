@@ -21,13 +21,14 @@ from calibration.statistics.held_out import FinalRefit
 from calibration.swimmer.candidate_effects import CURRENT
 from calibration.swimmer.head_correction import HeadCorrection
 from calibration.swimmer.nuisance_numbers import LENGTH
-from calibration.swimmer.swimmer import COEFFICIENTS, robot_numbers
+from calibration.swimmer.swimmer import robot_numbers
 from calibration.verdict.experiment import LearntCorrection
 from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, knowledge_toml
 from sim.effects import catalogue
 from sim.inputs import robot_toml
 from sim.io.errors import InputError
 from sim.model.robot import Robot
+from surrogate.input_ranges import COEFFICIENTS
 
 
 def check_given(robot: Robot) -> None:
