@@ -50,7 +50,7 @@ def _calibrate(arguments: Namespace) -> None:
     check_given(robot)
     data = read_measurements(arguments.table)
     for line in data.excluded:
-        print(f"set aside: {line}", file=sys.stderr)
+        print(f"excluded: {line}", file=sys.stderr)
     data, held_out = PROTOCOLS[arguments.protocol](data)
     model = SwimmerModel(robot, data, arguments.jobs, own=own)
     result = calibrate(model, held_out=held_out, correction=learn_head_correction, seed=arguments.seed)
@@ -71,7 +71,7 @@ def _calibrate(arguments: Namespace) -> None:
     for limit in result.conditions.caveats:
         print(f"the conclusion is weaker: {limit}")
     if result.conditions.excluded:
-        print(f"set aside: {len(result.conditions.excluded)}, first {result.conditions.excluded[0]}")
+        print(f"excluded: {len(result.conditions.excluded)}, first {result.conditions.excluded[0]}")
     print(f"-> {folder / 'verdict.json'}, {folder / 'report.html'}, {folder / 'corrected.toml'}")
 
 
@@ -144,7 +144,7 @@ def _tracks(arguments: Namespace) -> None:
 
     table, aside = measure_tracks(arguments.tracks, arguments.runs)
     for line in aside:
-        print(f"set aside: {line}", file=sys.stderr)
+        print(f"excluded: {line}", file=sys.stderr)
     write_csv(table, arguments.out, digits=6)
     print(f"{len(table)} runs -> {arguments.out}")
 

@@ -41,8 +41,8 @@ class Candidate:
     def doubted(self) -> bool:
         """Whether the claim may be something outside the catalogue that looks like it.
 
-        An effect that explains the runs only beside a wrong nuisance parameter counts as a pair, and is always in
-        doubt.
+        An effect that explains the runs only beside a wrong nuisance parameter counts as a pair, and is always
+        uncertain.
         """
         return self.imitable > DOUBT or self.transfer < SURE or bool(self.refit and self.refit.wrong_numbers)
 

@@ -1,4 +1,4 @@
-"""Doubts about a claim: whether something outside the catalogue may look like it, and whether it carries over."""
+"""Test a claim: whether something outside the catalogue may look like it, and whether it carries over."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Fits, residual tests and their statistics; knows no robots."""
+"""Fits, residual tests and their statistics; independent of robots."""

@@ -93,7 +93,7 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
     try:
         return [Explanation.read(one) for one in record["explanations"]], set(record["sessions"])
     except (KeyError, TypeError, ValueError):
-        raise InputError(f"{path} is no verdict.json of this version: close the table again") from None
+        raise InputError(f"{path} is no verdict.json of this version: calibrate the table again") from None
 
 
 def new_runs(runs: Runs, before: set[str]) -> Flags:
@@ -148,5 +148,5 @@ def sentence(standing: Sequence[Standing]) -> str:
     """Say what to do now."""
     titles = [s.title for s in standing if not s.given_up]
     if len(titles) == 1:
-        return f"Decided: {titles[0]}. The next step is to close the loop with all runs."
+        return f"Decided: {titles[0]}. The next step is to calibrate with all runs."
     return f"Not decided between {' and '.join(titles)}: make more runs."

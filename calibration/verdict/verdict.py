@@ -224,7 +224,7 @@ class Verdict:
         """The nuisance parameters that are wrong, or the one that is farthest off if it is notable."""
         if self.wrong_numbers:
             said = "; and ".join(", or ".join(p.words for p in alike) for alike in self.wrong_numbers)
-            return f"A number as given is wrong: {said}."
+            return f"A nuisance parameter is wrong: {said}."
         farthest = self.fits.pulls[0] if self.fits.pulls and self.verdict != "unexplained" else None
         if farthest is not None and farthest.learnt and abs(farthest.z) > _NOTABLE:
             return f"{farthest.words}."

@@ -1,1 +1,1 @@
-"""Networks and their training; knows no robots."""
+"""Networks and their training; independent of robots."""

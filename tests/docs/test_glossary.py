@@ -24,7 +24,7 @@ from sim.model.groups import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS
 from tests.docs.pages import DOCS, PAGES, ROOT, glossary, replaced_words
 
-PACKAGES = ("sim", "dataset", "planner", "softflagella", "benchmarks")
+PACKAGES = ("sim", "dataset", "surrogate", "planner", "calibration", "softflagella", "benchmarks")
 TEXTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
 HISTORY = {DOCS / "log.md", DOCS / "reference" / "glossary.md"}
 SOURCES = sorted(file for top in PACKAGES for file in (ROOT / top).rglob("*.py"))
