@@ -15,9 +15,11 @@ import pyarrow as pa
 from dataset.build.sweep_folder import load_sweep
 from dataset.rows.design import SweepDesign
 from dataset.rows.schema import COST, arrow_table, schema
-from dataset.rows.simulate import HISTORY, simulate
+from dataset.rows.simulate import HISTORY
 from dataset.storage.data_set import batches, check_version, read_manifest
 from dataset.storage.storage import open_storage
+from dataset.workers.processes import call_in_worker
+from dataset.workers.tasks import simulate_in_worker
 from sim.io.errors import InputError
 from sim.motion.batches import stepped_columns
 
@@ -73,8 +75,9 @@ def _check_again(address: str, design: SweepDesign, stored: pa.Table, chosen: np
     """Simulate stored rows again and compare all bits."""
     points = {name: stored[name].to_numpy().astype(float) for name in design.axes}
     points[HISTORY] = stored[HISTORY].to_numpy()
+    again_columns = call_in_worker(simulate_in_worker, points, design.sensitivities)
     again = arrow_table(
-        {**simulate(points, sensitivities=design.sensitivities), "row": design.indices()[chosen]},
+        {**again_columns, "row": design.indices()[chosen]},
         schema(design.effects, design.sensitivities),
     )
     for name in stored.schema.names:

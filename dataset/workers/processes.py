@@ -14,24 +14,24 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from joblib.externals.loky import ProcessPoolExecutor
 
 from dataset.workers.backend import LOST, Lost
 from dataset.workers.tasks import Join, Outcome, Task, run_task
 
+Result = TypeVar("Result")
+
 
 class Processes:
     """Workers on this machine."""
 
     def __init__(self, count: int):
-        self._context = multiprocessing.get_context("forkserver")
-        self._context.set_forkserver_preload(["dataset.workers.warm"])
         self._free: list[Any] = [None] * count  # executors; None: not started yet
         self._count = count
         self._busy: dict[Future[Outcome], tuple[int, Any]] = {}
@@ -45,7 +45,7 @@ class Processes:
         executor = self._free.pop()
         with _isolated():
             if executor is None:
-                executor = ProcessPoolExecutor(1, timeout=None, context=self._context, initializer=_follow_user)
+                executor = _new_worker()
             self._busy[executor.submit(run_task, task)] = (number, executor)
 
     def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
@@ -71,6 +71,28 @@ class Processes:
         for executor in executors:  # wait, since a thread that dies with the program leaves semaphores behind
             executor.shutdown(wait=True, kill_workers=True)
         self._busy, self._free = {}, []
+
+
+def call_in_worker(function: Callable[..., Result], *arguments: Any) -> Result:
+    """Call a function in a new worker and return its result.
+
+    A worker has loaded its machine code in the order of `dataset.workers.warm`. Another process may have loaded or
+    compiled other loops first, and then its last digits differ (`sim.compiling`).
+    """
+    with _isolated():
+        executor = _new_worker()
+        future = executor.submit(function, *arguments)
+    try:
+        return cast(Result, future.result())
+    finally:
+        executor.shutdown(wait=True, kill_workers=True)
+
+
+def _new_worker() -> Any:
+    """Start an executor of one process, forked from the server that has loaded the machine code."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["dataset.workers.warm"])
+    return ProcessPoolExecutor(1, timeout=None, context=context, initializer=_follow_user)
 
 
 @contextmanager

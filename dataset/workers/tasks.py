@@ -10,8 +10,7 @@ import fcntl
 import os
 import socket
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import gettempdir
 from typing import Any, NamedTuple
@@ -124,21 +123,18 @@ def _simulated(task: Task, design: SweepDesign) -> dict[str, Any]:
     if task.simulate is not None:
         columns = task.simulate(points)
     else:
-        with _loops():
-            from dataset.rows.simulate import simulate
-
-            columns = simulate(points, sensitivities=design.sensitivities)
+        columns = simulate_in_worker(points, design.sensitivities)
     return {**columns, "row": design.indices(start, stop)}
 
 
-@contextmanager
-def _loops() -> Iterator[None]:
-    """Compile the simulator's loops if need be, and hold them to one thread: chunks are the parallelism."""
+def simulate_in_worker(points: dict[str, Any], sensitivities: bool) -> dict[str, Any]:
+    """Simulate rows with compiled loops on one thread: chunks are the parallelism."""
+    compile_on_this_host()
+    from dataset.rows.simulate import simulate
     from sim.motion.batches import one_thread
 
-    compile_on_this_host()
     with one_thread():
-        yield
+        return simulate(points, sensitivities=sensitivities)
 
 
 def compile_on_this_host() -> None:
