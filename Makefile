@@ -42,7 +42,7 @@ demo: reports/demo.html ## the whole pipeline on the paper's robot, ends with re
 reports/demo.html: $(STAMP) $(SOURCES) $(wildcard $(foreach p,dataset surrogate planner calibration softflagella,$(p)/*.py $(p)/*/*.py) surrogate/shipped/*) softflagella/demo.toml
 	$(RUN) -m softflagella demo --out $@
 
-test: $(VENV)/.extras ## run the tests of every feature, about six minutes on two cores
+test: $(VENV)/.extras ## run the tests of every feature
 	$(RUN) -m pytest $(TWO) -m "not ($(REST))"
 test-rest: $(VENV)/.extras ## run what `make test` leaves out: rates over many tables, clusters, the longest tests
 	$(RUN) -m pytest $(TWO) -m "$(REST)"
@@ -52,7 +52,7 @@ $(VENV)/.extras: $(STAMP)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[clusters]'
 	touch $@
 
-quick: $(STAMP) ## run the quick tests, under a minute
+quick: $(STAMP) ## run the quick tests, a minute or two
 	$(RUN) -m pytest $(TWO) -m "not (slow or page or $(REST))"
 
 lint: $(STAMP) ## style and types
