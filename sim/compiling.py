@@ -25,7 +25,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -51,15 +51,19 @@ def code_digest(root: Path, patterns: Iterable[str] = _SOURCES) -> str:
     """Return twelve characters that name the code of the files under `root`, not their comments."""
     digest = sha256()
     for path in sorted(path for pattern in patterns for path in root.glob(pattern)):
-        digest.update(str(path.relative_to(root)).encode())
-        tree = ast.parse(path.read_bytes())
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and ast.get_docstring(
-                node, clean=False
-            ):
-                node.body = node.body[1:] or [ast.Pass(lineno=1, col_offset=0)]
-        _add_code(digest, compile(tree, "", "exec", dont_inherit=True))
+        digest.update(str(path.relative_to(root)).encode() + _code_of_source(path.read_bytes()))
     return digest.hexdigest()[:12]
+
+
+@cache
+def _code_of_source(source: bytes) -> bytes:
+    """Return the digest of the code of one file."""
+    digest, tree = sha256(), ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and ast.get_docstring(node, clean=False):
+            node.body = node.body[1:] or [ast.Pass(lineno=1, col_offset=0)]
+    _add_code(digest, compile(tree, "", "exec", dont_inherit=True))
+    return digest.digest()
 
 
 def _add_code(digest: Any, code: CodeType) -> None:
@@ -80,11 +84,31 @@ def prune(folder: Path, kept: int) -> None:
         rmtree(old, ignore_errors=True)
 
 
+def folder_for_code(parent: Path, name: str, root: Path, patterns: Iterable[str] = _SOURCES) -> Path:
+    """Return the folder in `parent` for the loops of the files under `root`: `name` and the digest of their code.
+
+    To parse all files takes a quarter of a second. So a folder that exists gets an empty file for each text of the
+    sources that has led to it.
+    """
+    sources = sorted(path for pattern in patterns for path in root.glob(pattern))
+    text = sha256(sys.version.encode())
+    for path in sources:
+        text.update(str(path.relative_to(root)).encode() + sha256(path.read_bytes()).digest())
+    mark = f"sources-{text.hexdigest()[:12]}"
+    for known in parent.glob(f"{name}-*/{mark}"):
+        return known.parent
+    folder = parent / f"{name}-{code_digest(root, patterns)}"
+    if folder.exists():
+        with suppress(OSError):
+            (folder / mark).touch()
+    return folder
+
+
 def _cache_folder() -> Path:
-    """Where this version's loops are kept."""
+    """Return where this version's loops are kept."""
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    place = _HERE / "__pycache__" if os.access(_HERE, os.W_OK) else home / "softflagella"
-    return place / f"compiled-{code_digest(_HERE)}"
+    parent = _HERE / "__pycache__" if os.access(_HERE, os.W_OK) else home / "softflagella"
+    return folder_for_code(parent, "compiled", _HERE)
 
 
 CACHE = _cache_folder()
@@ -121,7 +145,7 @@ _modules: set[str] = set()  # with compiled loops
 @cache
 def folder_of_package(root: Path) -> Path:
     """Return where the loops of another package are kept: all its files, in all its folders, name the folder."""
-    return CACHE / f"{root.name}-{code_digest(root, ('**/*.py',))}"
+    return folder_for_code(CACHE, root.name, root, ("**/*.py",))
 
 
 def _package_root(file: Path) -> Path:

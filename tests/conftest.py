@@ -1,7 +1,7 @@
 """Shared by all tests: one thread, the marks by duration, the order, and the processor time that each test takes.
 
-tests/durations.json has the processor seconds of the longer tests, by name; `pytest --write-durations` brings it
-up to date for the tests that it runs. Tests over `SLOW` are marked. The longest run first, so that two processes
+tests/durations.json has the processor seconds of the longer tests; `pytest --write-durations` brings it up to date
+for the tests that it runs. Tests over `SLOW` are marked. The longest run first, so that two processes
 end at about the same time. The quick tests of a file stay in one process; a slow one goes to whichever process is
 free, unless an `xdist_group` keeps it with those that share its fixtures.
 """
@@ -24,18 +24,25 @@ import torch  # noqa: E402
 torch.set_num_threads(1)
 
 DURATIONS = Path(__file__).parent / "durations.json"
-NOTED, SLOW = 0.5, 1.0  # s of processor time
+NOTED, SLOW = 0.2, 0.3  # s of processor time
 _measured: dict[str, float] = defaultdict(float)
 _last = 0.0
 
 
 def noted_durations() -> dict[str, float]:
-    """Processor seconds of the longer tests, by name."""
+    """Return the processor seconds of the longer tests."""
     return dict(json.loads(DURATIONS.read_text())) if DURATIONS.exists() else {}
 
 
+def exists(test: str) -> bool:
+    """Whether the file of a test still has a function of its name."""
+    file, _, name = test.partition("::")
+    path = DURATIONS.parents[1] / file
+    return path.exists() and f"def {name.partition('[')[0]}(" in path.read_text()
+
+
 def processor_seconds() -> float:
-    """Processor time of this process and of those that it started and that have ended [s]."""
+    """Return the processor time of this process and of those that it started and that have ended [s]."""
     usages = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(usage.ru_utime + usage.ru_stime for usage in usages)
 
@@ -50,14 +57,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     groups: dict[pytest.Item, str] = {}
     seconds: dict[str, float] = defaultdict(float)
     for item in items:
-        if durations.get(item.name, 0.0) > SLOW:
+        if durations.get(item.nodeid, 0.0) > SLOW:
             item.add_marker(pytest.mark.slow)
         named = item.get_closest_marker("xdist_group")
         file = item.nodeid.partition("::")[0]
         group = named.args[0] if named else item.nodeid if item.get_closest_marker("slow") else file
         item.add_marker(pytest.mark.xdist_group(group))
         groups[item] = group
-        seconds[group] += durations.get(item.name, 0.0)
+        seconds[group] += durations.get(item.nodeid, 0.0)
     items.sort(key=lambda item: -seconds[groups[item]])
 
 
@@ -72,17 +79,17 @@ def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
     global _last
     report = yield
     now = processor_seconds()
-    report.test_name, report.processor_seconds, _last = item.name, now - _last, now
+    report.processor_seconds, _last = now - _last, now
     return report
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     if hasattr(report, "processor_seconds"):
-        _measured[report.test_name] += report.processor_seconds
+        _measured[report.nodeid] += report.processor_seconds
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     if session.config.getoption("--write-durations") and not hasattr(session.config, "workerinput"):
-        durations = {**noted_durations(), **{name: round(seconds, 1) for name, seconds in _measured.items()}}
-        kept = {name: durations[name] for name in sorted(durations) if durations[name] >= NOTED}
+        durations = {**noted_durations(), **{test: round(seconds, 1) for test, seconds in _measured.items()}}
+        kept = {test: durations[test] for test in sorted(durations) if durations[test] >= NOTED and exists(test)}
         DURATIONS.write_text(json.dumps(kept, indent=0, ensure_ascii=False) + "\n")

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 import sim
-from sim.compiling import CACHE, Locator, code_digest, folder_of_package, prune
+from sim import compiling
+from sim.compiling import CACHE, Locator, code_digest, folder_for_code, folder_of_package, prune
 from tests.processes import LIMIT
 
 SIM = Path(sim.__file__).parent
@@ -85,8 +86,29 @@ def test_the_folder_is_named_by_the_code(copied: Path) -> None:
     assert code_digest(copied) == code_digest(SIM)
 
 
+def test_sources_are_parsed_once_for_each_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A start of the program reads its sources, but parses them only where they have changed."""
+    (tmp_path / "code").mkdir()
+    source = tmp_path / "code" / "loop.py"
+    source.write_text("x = 1\n")
+    folder = folder_for_code(tmp_path, "loops", tmp_path / "code", ["*.py"])
+    folder.mkdir()
+    folder_for_code(tmp_path, "loops", tmp_path / "code", ["*.py"])
+    parsed: list[Path] = []
+    monkeypatch.setattr(
+        compiling, "code_digest", lambda root, _: parsed.append(root) or code_digest(root, ["*.py"])
+    )
+    assert folder_for_code(tmp_path, "loops", tmp_path / "code", ["*.py"]) == folder
+    assert not parsed
+    source.write_text("x = 1  # a comment\n")
+    assert folder_for_code(tmp_path, "loops", tmp_path / "code", ["*.py"]) == folder
+    source.write_text("x = 2\n")
+    assert folder_for_code(tmp_path, "loops", tmp_path / "code", ["*.py"]) != folder
+    assert len(parsed) == 2
+
+
 def test_loops_are_found_where_they_are() -> None:
-    """The list of the tests below is no empty one."""
+    """The lists of the tests below are not empty."""
     assert {SIM / "linear" / "gmres.py", SIM / "mechanics" / "drag.py", SIM / "solve" / "newton.py"} <= LOOPS
     assert {"arrays.py", "compiling.py", "model/body.py", "mechanics/drag.py", "mechanics/rod.py"} <= set(MADE_OF)
     assert {"effects/inertia.py", "motion/run.py"} <= set(ELSEWHERE)
