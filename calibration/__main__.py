@@ -10,6 +10,7 @@ from pathlib import Path
 from sim.io.commands import JOBS, ROBOT, Program, argument, out
 from sim.io.errors import InputError
 
+FILES = ("verdict.json", "report.html", "corrected.toml")
 program = Program("calibration", "Find from measured runs what the model of a robot lacks, and correct it.")
 main = program.main
 
@@ -43,7 +44,7 @@ def _calibrate(arguments: Namespace) -> None:
     from calibration.verdict.calibrate import calibrate
     from calibration.verdict.verdict_json import verdict_record
     from sim.inputs import load_robot
-    from sim.io.files import write_text
+    from sim.io.files import files_together, write_text
 
     own = owned(arguments.own)
     robot = load_robot(arguments.robot)
@@ -56,11 +57,11 @@ def _calibrate(arguments: Namespace) -> None:
     result = calibrate(model, held_out=held_out, correction=learn_head_correction, seed=arguments.seed)
     folder = Path(arguments.out)
     record = verdict_record(result, table=Path(arguments.table).name)
-    write_report(result, data, folder / "report.html", title=Path(arguments.table).name)
-    write_text(
-        folder / "corrected.toml", corrected_toml(robot, result.fits.final_refit, result.corrections.learnt)
-    )
-    write_text(folder / "verdict.json", json.dumps(record, indent=1) + "\n")
+    corrected = corrected_toml(robot, result.fits.final_refit, result.corrections.learnt)
+    with files_together(folder, FILES) as temporary:
+        write_report(result, data, temporary / "report.html", title=Path(arguments.table).name)
+        write_text(temporary / "corrected.toml", corrected)
+        write_text(temporary / "verdict.json", json.dumps(record, indent=1) + "\n")
     print(result.sentence)
     held_out_runs = result.conditions.split.names
     print(

@@ -61,17 +61,16 @@ _PLANNING = (
 )
 def _plan(arguments: Namespace) -> None:
     from planner.files.plan_files import write_plan
-    from planner.files.trade_off import write_trade_off
+    from planner.files.trade_off import draw_trade_off, trade_off
 
     result, request = _planned(arguments)
-    paths = write_plan(result, arguments.out)
+    pictures = {"trade_off.svg": draw_trade_off(trade_off(result, request))} if arguments.trade_off else {}
+    paths = write_plan(result, arguments.out, pictures=pictures)
     _say(result)
     print(
         f"from the path as drawn {result.errors.drawn_rms:.4f} l rms, {result.errors.drawn_max:.3f} l at most; "
         f"every drawn point is within {result.declared.missed:.3f} l of the declared path"
     )
-    if arguments.trade_off:
-        paths.append(write_trade_off(result, request, arguments.out))
     print(f"-> {', '.join(map(str, paths))}")
 
 

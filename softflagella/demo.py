@@ -45,7 +45,7 @@ from planner.files.plan_json import load_plan
 from planner.files.tracking_error import TrackingError, draw_overlay, tracking_error
 from planner.paths.path import polygon
 from sim.inputs import robot_toml
-from sim.io.files import write_text
+from sim.io.files import whole_file, write_csv, write_text
 from sim.io.pages import Page
 from sim.io.provenance import code_version
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
@@ -173,7 +173,7 @@ def _calibrate(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     table = make_table(truth, seed=seed, lengths_cm=_LENGTHS_CM, title=f"table, {name}")
     case = folder / name.replace(" ", "-")
     case.mkdir(exist_ok=True)
-    table.to_csv(case / "table.csv", index=False, float_format="%.6g")
+    write_csv(table, case / "table.csv", digits=6)
     data = read_measurements(case / "table.csv")
     verdict = calibrate(SwimmerModel(start, data), correction=learn_head_correction)
     record = verdict_record(verdict, table="table.csv")
@@ -218,7 +218,8 @@ def _write_page(
         "cannot turn on the spot."
     )
     plans = _draw_plans(tracks)
-    plans.savefig(out.parent / "demo" / "plans.png", dpi=90, bbox_inches="tight")
+    with whole_file(out.parent / "demo" / "plans.png") as part:
+        plans.savefig(part, format="png", dpi=90, bbox_inches="tight")
     page.figure(plans, "three planned paths with the replayed tracks")
     header = (
         "path",

@@ -6,13 +6,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-from planner.files.plan_files import write_plan
+from planner.files.plan_files import EXTRA, FILES, write_plan_files
 from planner.goal.obstacles import Circle, Polygon, Region
 from planner.goal.to_goal import GoalPlan
 from planner.paths.path_files import read_path
 from planner.paths.units import in_tails
 from sim.io.errors import InputError
-from sim.io.files import write_text
+from sim.io.files import files_together, write_text
 from sim.model.robot import Robot
 
 FORMAT = 1
@@ -49,14 +49,14 @@ def read_region(words: str, unit: str, robot: Robot) -> Region:
 
 
 def write_goal_plan(goal_plan: GoalPlan, folder: str | Path) -> list[Path]:
-    """Write the files of the plan, goal.json and a picture; return their paths."""
+    """Write the files of the plan, goal.json and a picture, all or none; return their paths."""
     from planner.files.pictures import draw_goal_plan, write_svg
 
-    paths = write_plan(goal_plan.plan, folder)
-    out = Path(folder)
-    write_text(out / "goal.json", json.dumps(goal_record(goal_plan)) + "\n")
-    write_svg(draw_goal_plan(goal_plan), out / "goal.svg")
-    return [*paths, out / "goal.json", out / "goal.svg"]
+    with files_together(folder, (*FILES, *EXTRA)) as temporary:
+        identity = write_plan_files(goal_plan.plan, temporary)
+        write_text(temporary / "goal.json", json.dumps({**goal_record(goal_plan), "plan_id": identity}) + "\n")
+        write_svg(draw_goal_plan(goal_plan), temporary / "goal.svg", identity)
+    return [Path(folder, name) for name in (*FILES, "goal.json", "goal.svg")]
 
 
 def goal_record(goal_plan: GoalPlan) -> dict[str, Any]:

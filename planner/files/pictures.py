@@ -20,10 +20,10 @@ KEEP_OUT = "#d8b365"
 RAW, DECLARED, PREDICTED, REPLAYED = "#b0b0b0", "#1a1a1a", "#2a7fba", "#c8452f"
 
 
-def write_svg(figure: Figure, path: Path) -> None:
-    """Write a figure as SVG, whole or not at all."""
+def write_svg(figure: Figure, path: Path, identity: str) -> None:
+    """Write a figure as SVG, completely or not at all; `identity` names the plan."""
     with whole_file(path) as part:
-        figure.savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None})
+        figure.savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None, "Identifier": identity})
 
 
 def draw_plan(result: Plan) -> Figure:
@@ -38,6 +38,7 @@ def draw_plan(result: Plan) -> Figure:
         f"{result.robot.name}: {len(result.dwells)} dwells, {minutes:.1f} min\n"
         f"predicted error {result.predicted_rms:.3f} l rms, stated error {result.stated_error:.2f} l",
         fontsize=10,
+        parse_math=False,
     )
     axes.legend(loc="center", fontsize=8, frameon=False)
     return figure

@@ -1,5 +1,7 @@
 """The files of a plan: plan.json, plan.csv, plan.svg; schedule.h and tracker.h for a microcontroller.
 
+They appear together, and each has the identity of the plan, so files of two plans cannot be taken for one.
+
 schedule.h has dwell times in whole milliseconds as 16-bit numbers. The motor flips after each. The rounding error
 of a dwell is carried over to the next one, so no flip is more than half a millisecond early or late. A dwell that
 does not fit 16 bits is split by entries of 0 ms: two flips at once, so the direction stays. A dwell that rounds to
@@ -9,7 +11,9 @@ does not fit 16 bits is split by entries of 0 ms: two flips at once, so the dire
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -18,22 +22,28 @@ from planner.files.plan_json import plan_record
 from planner.files.tracker_header import safe_name, tracker_header
 from planner.planning.plan import Plan
 from sim.io.errors import InputError
-from sim.io.files import whole_file, write_text
+from sim.io.files import files_together, write_csv, write_text
 from sim.io.provenance import code_version
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FILES = ("plan.json", "plan.csv", "schedule.h", "tracker.h", "plan.svg")
+EXTRA = ("trade_off.svg", "goal.json", "goal.svg")  # of a folder that was planned into
 _MOST_MS = 65_535
 _CHECKPOINTS = 32
 
 
-def write_plan(result: Plan, folder: str | Path) -> list[Path]:
-    """Write the five files of a plan; returns their paths.
+def write_plan(result: Plan, folder: str | Path, *, pictures: Mapping[str, Figure] | None = None) -> list[Path]:
+    """Write the five files of a plan, all or none, and return their paths.
 
     Args:
         result: the plan.
         folder: it is made if it is missing.
+        pictures: more pictures, by the name of their file, one of EXTRA.
 
     Raises:
-        InputError: a dwell is too short for whole milliseconds, or the folder cannot be written.
+        InputError: a dwell is too short for whole milliseconds, or a file cannot be written.
 
     Example:
         >>> import tempfile
@@ -42,19 +52,27 @@ def write_plan(result: Plan, folder: str | Path) -> list[Path]:
         ...     [path.name for path in write_plan(plan(circle(2.0), load_robot("paper-control")), folder)]
         ['plan.json', 'plan.csv', 'schedule.h', 'tracker.h', 'plan.svg']
     """
-    from planner.files.pictures import draw_plan, write_svg  # loads matplotlib
+    from planner.files.pictures import write_svg  # loads matplotlib
 
-    out = Path(folder)
-    header = controller_header(result)
-    record = {**plan_record(result), "code_version": code_version()}
-    paths = [out / name for name in ("plan.json", "plan.csv", "schedule.h", "tracker.h", "plan.svg")]
-    write_text(paths[0], json.dumps(record) + "\n")
-    with whole_file(paths[1]) as part:
-        dwell_table(result).to_csv(part, index=False, float_format="%.8g")
-    write_text(paths[2], header)
-    write_text(paths[3], tracker_header(result))
-    write_svg(draw_plan(result), paths[4])
-    return paths
+    with files_together(folder, (*FILES, *EXTRA)) as temporary:
+        identity = write_plan_files(result, temporary)
+        for name, figure in (pictures or {}).items():
+            write_svg(figure, temporary / name, identity)
+    return [Path(folder, name) for name in (*FILES, *(pictures or ()))]
+
+
+def write_plan_files(result: Plan, folder: Path) -> str:
+    """Write the five files of a plan into a folder, one after the other, and return the plan's identity."""
+    from planner.files.pictures import draw_plan, write_svg
+
+    record = plan_record(result)
+    identity = record["id"]
+    write_text(folder / "plan.json", json.dumps({**record, "code_version": code_version()}) + "\n")
+    write_csv(dwell_table(result).assign(plan_id=identity), folder / "plan.csv")
+    write_text(folder / "schedule.h", controller_header(result, identity))
+    write_text(folder / "tracker.h", tracker_header(result, identity))
+    write_svg(draw_plan(result), folder / "plan.svg", identity)
+    return identity
 
 
 def dwell_table(result: Plan) -> pd.DataFrame:
@@ -95,7 +113,7 @@ def milliseconds(seconds: np.ndarray) -> list[int]:
     return entries
 
 
-def controller_header(result: Plan) -> str:
+def controller_header(result: Plan, identity: str) -> str:
     """Write schedule.h as text."""
     entries = milliseconds(result.seconds)
     lines = [", ".join(map(str, entries[i : i + 12])) for i in range(0, len(entries), 12)]
@@ -103,7 +121,8 @@ def controller_header(result: Plan) -> str:
     x, y, heading = result.start
     checkpoints = _checkpoints(result)
     places = ",\n    ".join(checkpoints)
-    return f"""/* Motor schedule for robot "{safe_name(result)}": turn in FIRST_DIRECTION for the first entry,
+    return f"""/* Plan {identity}.
+ * Motor schedule for robot "{safe_name(result)}": turn in FIRST_DIRECTION for the first entry,
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
  * lengthens the dwell before it. Stop after the last entry. Look-up table {result.tracked.model}.
  * Put the head's centre at START_X, START_Y with heading START_HEADING, at rest. Checkpoints say where it should

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,15 @@ _TABLES = {"reference": 2, "raw_path": 2, "predicted_poses": 3}
 
 
 def plan_record(result: Plan) -> dict[str, Any]:
-    """Return the plan as JSON-like content; `sim.model.schedule.load_schedule` reads its schedule."""
+    """Return the plan as JSON-like content; `sim.model.schedule.load_schedule` reads its schedule.
+
+    `id` is a digest of all the rest. The other files of the plan have it, too.
+    """
+    content = _content(result)
+    return {"id": sha256(json.dumps(content).encode()).hexdigest()[:12], **content}
+
+
+def _content(result: Plan) -> dict[str, Any]:
     robot, schedule = result.robot, result.schedule()
     declared, errors = result.declared, result.errors
     x, y, heading = schedule.start

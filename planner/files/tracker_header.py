@@ -29,10 +29,10 @@ _LARGEST = 32_767
 _FLOAT_EXACT = 3e-6  # rad; in single precision a smaller angle is lost in the rounding
 
 
-def tracker_header(result: Plan) -> str:
-    """Write tracker.h as text."""
+def tracker_header(result: Plan, identity: str) -> str:
+    """Write tracker.h as text; `identity` names the plan."""
     code = "\n".join((_CODE / name).read_text() for name in _PARTS)
-    return f"{_intro(result)}\n{_numbers(result)}\n{_tables(result)}\n{code}#endif\n"
+    return f"{_intro(result, identity)}\n{_numbers(result)}\n{_tables(result)}\n{code}#endif\n"
 
 
 def rounded(result: Plan) -> Plan:
@@ -59,9 +59,10 @@ def safe_name(result: Plan) -> str:
     return "".join(c for c in result.robot.name if c.isalnum() or c in " -_.")
 
 
-def _intro(result: Plan) -> str:
+def _intro(result: Plan, identity: str) -> str:
     name, model = safe_name(result), result.tracked.model
-    return f"""/* Tracker for robot "{name}", look-up table {model}: keeps the robot on its plan
+    return f"""/* Plan {identity}.
+ * Tracker for robot "{name}", look-up table {model}: keeps the robot on its plan
  * with poses from a camera, and learns the robot. It is planner.Tracker in C99, with the same formulas in the same
  * order. It needs <math.h> and <stdint.h>, and no heap. Tables: {table_bytes(result)} bytes in single precision.
  *

@@ -79,4 +79,4 @@ def draw_overlay(axes: Axes, plan: dict[str, Any], error: TrackingError, title: 
     """Draw the replayed track over the declared and the raw path."""
     draw_tracks(axes, np.array(plan["raw_path"]), np.array(plan["reference"]), error.stated)
     axes.plot(*error.track.T, color=REPLAYED, lw=0.8, label="replayed in the simulator")
-    axes.set_title(f"{title}\n{error.rms:.3f} l rms, {error.largest:.3f} l at most", fontsize=10)
+    axes.set_title(f"{title}\n{error.rms:.3f} l rms, {error.largest:.3f} l at most", fontsize=10, parse_math=False)

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from planner.files.pictures import DECLARED, PREDICTED, RAW, REPLAYED, write_svg
+from planner.files.pictures import DECLARED, PREDICTED, RAW, REPLAYED
 from planner.planning.plan import Plan, make_plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.dwell_choice import QUICK, longest_dwell
@@ -44,13 +43,6 @@ def trade_off(chosen: Plan, request: PlanRequest) -> TradeOff:
         except InputError:  # such dwells do not get the robot around the path
             continue
     return TradeOff(tuple(plans), chosen)
-
-
-def write_trade_off(chosen: Plan, request: PlanRequest, folder: str | Path) -> Path:
-    """Draw trade_off.svg in the folder of a plan, and return its path."""
-    target = Path(folder) / "trade_off.svg"
-    write_svg(draw_trade_off(trade_off(chosen, request)), target)
-    return target
 
 
 def draw_trade_off(comparison: TradeOff) -> Figure:

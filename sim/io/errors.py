@@ -1,13 +1,17 @@
 """Errors for bad input: one sentence that says what was given, what is allowed, what to change.
 
 Every command turns an `InputError` into one line on stderr and exit status 2 (`run_command`). In Python it is a
-`ValueError`. All other errors are bugs and keep their traceback.
+`ValueError`. Ctrl-C, a closed pipe and a refusal of the operating system end a command without a traceback, too.
+All other errors are bugs and keep their traceback.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
+
+INTERRUPTED, CLOSED_PIPE = 130, 141  # exit statuses as shells give them: 128 + SIGINT, 128 + SIGPIPE
 
 
 class InputError(ValueError):
@@ -26,13 +30,32 @@ class InputError(ValueError):
 
 
 def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None = None) -> int:
-    """Run a command-line entry point. Returns 0; for bad input the error's status, after one line on stderr."""
+    """Run a command-line entry point and return its exit status.
+
+    Returns:
+        0; 2, or the error's status, for bad input, after one line on stderr; 130 after Ctrl-C; 141 where the
+        reader of a pipe has gone.
+    """
     try:
         main(argv)
+        sys.stdout.flush()
     except InputError as refusal:
-        print(f"error: {' '.join(str(refusal).split())}", file=sys.stderr)
-        return refusal.status
+        return _end(str(refusal), refusal.status)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or the interpreter complains when it flushes at its end
+        return CLOSED_PIPE
     except FileNotFoundError as missing:
-        print(f"error: no such file: {missing.filename}; check the path", file=sys.stderr)
-        return 2
+        return _end(f"no such file: {missing.filename}; check the path", 2)
+    except OSError as refusal:
+        if refusal.filename is None:
+            raise
+        return _end(f"{refusal.filename}: {refusal.strerror}", 2)
+    except KeyboardInterrupt as stop:
+        print("interrupted", file=sys.stderr)
+        return getattr(stop, "status", INTERRUPTED)
     return 0
+
+
+def _end(message: str, status: int) -> int:
+    print(f"error: {' '.join(message.split())}", file=sys.stderr)
+    return status

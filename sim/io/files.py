@@ -1,39 +1,102 @@
-"""Write files completely or not at all.
+"""Write files completely or not at all, one alone or several together.
 
-A file is written under another name in the same folder. When it is complete, it is renamed. So an error or an
-interruption leaves either the old file or the new one.
+A regular file is written under another name in the same folder and renamed when it is complete. So an error or an
+interruption leaves either the old file or the new one. A device, a pipe or the standard output is written into
+when the content is complete.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import re
+import shutil
+import sys
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from tempfile import TemporaryDirectory
+from typing import IO, TYPE_CHECKING
 
 from sim.io.errors import InputError
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+_DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/(?:stdout|stderr|fd/(\d+))")
+
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path; move it to `path` when the block succeeds, remove it otherwise."""
+    """Yield the path of a temporary file; it becomes `path` when the block succeeds, and is removed otherwise.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
     target = Path(path)
     if target.is_dir():
         raise InputError(f"{target} is a folder; give the name of a file")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError, PermissionError) as blocked:
-        raise InputError(f"cannot make the folder {target.parent}: {blocked.strerror}") from None
+    if _is_stream(target):
+        with TemporaryDirectory() as folder:
+            part = Path(folder, target.name)
+            yield part
+            _write_into(target, part)
+        return
+    target = target.resolve()  # a link stays, and what it points to is written
+    make_folder(target.parent)
     part = target.with_name(f".{target.name}.part{os.getpid()}")
     try:
-        yield part
-        os.replace(part, target)
+        with _refusals(target):
+            yield part
+            os.replace(part, target)
     finally:
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def files_together(folder: str | Path, names: Sequence[str]) -> Iterator[Path]:
+    """Yield a temporary folder; when the block succeeds, its files appear in `folder`, all or none.
+
+    Args:
+        folder: it is made if it is missing.
+        names: all that such a folder may hold. What the block does not write is removed, since an older file
+            would belong to something else.
+
+    Raises:
+        InputError: the files cannot be written.
+    """
+    target = Path(folder)
+    make_folder(target)
+    for name in names:
+        if (target / name).exists() and not (target / name).is_file():
+            raise InputError(f"{target / name} is not a regular file; remove it, or give another folder")
+    with _refusals(target), TemporaryDirectory(dir=target, prefix=".part-") as temporary:
+        new, old = Path(temporary, "new"), Path(temporary, "old")
+        new.mkdir()
+        old.mkdir()
+        yield new
+        moved: list[tuple[Path, Path]] = []  # from, to
+        try:
+            for name in names:
+                for source, place in ((target / name, old / name), (new / name, target / name)):
+                    if source.exists():
+                        os.replace(source, place)
+                        moved.append((source, place))
+        except BaseException:
+            for source, place in reversed(moved):
+                os.replace(place, source)
+            raise
+
+
+def make_folder(folder: str | Path) -> None:
+    """Make a folder and those around it.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as blocked:
+        raise InputError(f"cannot make the folder {folder}: {blocked.strerror}") from None
 
 
 def write_csv(table: DataFrame, path: str | Path, *, digits: int = 8) -> None:
@@ -45,4 +108,36 @@ def write_csv(table: DataFrame, path: str | Path, *, digits: int = 8) -> None:
 def write_text(path: str | Path, text: str) -> None:
     """Write a text file completely or not at all."""
     with whole_file(path) as part:
-        part.write_text(text)
+        part.write_text(text, encoding="utf-8")
+
+
+def _is_stream(path: Path) -> bool:
+    """Whether a path exists, but is no regular file that could be replaced."""
+    return bool(_DESCRIPTOR.fullmatch(str(path))) or (path.exists() and not path.is_file())
+
+
+def _write_into(target: Path, part: Path) -> None:
+    """Copy a complete file into a device, a pipe, or an open file of this process."""
+    with _refusals(target), open(part, "rb") as source, _opened(target) as sink:
+        shutil.copyfileobj(source, sink)
+
+
+def _opened(target: Path) -> IO[bytes]:
+    """Open a stream for writing; an open file of this process goes on where it is."""
+    match = _DESCRIPTOR.fullmatch(str(target))
+    if match is None:
+        return open(target, "wb")
+    sys.stdout.flush()
+    number = int(match[1]) if match[1] else 2 if str(target).endswith("stderr") else 1
+    return os.fdopen(os.dup(number), "wb")
+
+
+@contextmanager
+def _refusals(target: Path) -> Iterator[None]:
+    """Turn what the operating system refuses into one line; the end of a pipe is no error of the file."""
+    try:
+        yield
+    except (BrokenPipeError, FileNotFoundError):
+        raise
+    except OSError as refusal:
+        raise InputError(f"cannot write {target}: {refusal.strerror or refusal}") from None

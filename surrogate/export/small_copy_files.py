@@ -10,7 +10,6 @@ vectors.csv         robots and answers, to test a reader with; NaN where a reade
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 import safetensors.numpy
 
-from sim.io.files import whole_file, write_text
+from sim.io.files import files_together, write_text
 from sim.model.groups import DWELL
 from sim.model.response import DWELLS
 from sim.motion.steady_motion import STEADY_OUTPUTS
@@ -46,7 +45,7 @@ _UNITS = {
 
 
 def save_small_copy(table: NeuralTable, folder: str | Path) -> str:
-    """Write the folder of the small copy; gives the losses in words.
+    """Write the files of the small copy into a folder, all or none; return the losses in words.
 
     Raises:
         InputError: no copy fits into MOST_BYTES.
@@ -54,20 +53,19 @@ def save_small_copy(table: NeuralTable, folder: str | Path) -> str:
     small = make_small_copy(table)
     losses = measure_losses(table, small)
     vectors = make_vectors(table, small)
-    folder = Path(folder)
-    with whole_file(folder / "lookup.safetensors") as part:
-        manifest = json.dumps(_manifest(table, small, losses))
-        data = safetensors.numpy.save(small.arrays, {"manifest": manifest})
-        part.write_bytes(data)
-    write_text(folder / "lookup_weights.h", weights_header(table, small, losses))
-    for reader in sorted(READERS.iterdir()):
-        with whole_file(folder / reader.name) as part:
-            shutil.copyfile(reader, part)
+    manifest = json.dumps(_manifest(table, small, losses))
+    data = safetensors.numpy.save(small.arrays, {"manifest": manifest})
+    readers = {reader.name: reader.read_text() for reader in sorted(READERS.iterdir())}
     lines = [
         ",".join(vectors),
         *(",".join(repr(float(v)) for v in row) for row in zip(*vectors.values(), strict=True)),
     ]
-    write_text(folder / "vectors.csv", "\n".join(lines) + "\n")
+    with files_together(folder, ("lookup.safetensors", "lookup_weights.h", *readers, "vectors.csv")) as temporary:
+        (temporary / "lookup.safetensors").write_bytes(data)
+        write_text(temporary / "lookup_weights.h", weights_header(table, small, losses))
+        for name, text in readers.items():
+            write_text(temporary / name, text)
+        write_text(temporary / "vectors.csv", "\n".join(lines) + "\n")
     rows = [f"{name:<24}{f['median']:10.1e}{f['p95']:10.1e}" for name, f in losses.items()]
     return "\n".join([f"{len(data) / 1000:.1f} kB; loss against the whole table: median, 95 %", *rows])
 

@@ -53,7 +53,7 @@ class CompiledTracker:
     def __init__(
         self, plan: Plan, folder: Path, *, single: bool = False, noise: tuple[float, float] = (0.01, 0.01)
     ):
-        (folder / "tracker.h").write_text(tracker_header(plan))
+        (folder / "tracker.h").write_text(tracker_header(plan, "test"))
         (folder / "library.c").write_text(_LIBRARY)
         out = folder / f"library{int(single)}.so"
         compile_c(folder / "library.c", out, "-shared", "-fPIC", *(["-DTRACKER_FLOAT"] if single else []))

@@ -121,7 +121,7 @@ def test_memory_is_what_the_documentation_says(tmp_path: Path, compiled: Compile
 
 
 def test_the_example_in_the_header_compiles(tmp_path: Path) -> None:
-    text = tracker_header(planned())
+    text = tracker_header(planned(), "test")
     (tmp_path / "tracker.h").write_text(text)
     lines = [line[3:] for line in text.splitlines()[:16] if line.startswith(" *     ")]
     code = "\n".join(line.partition(";")[0] + ";" for line in lines)
