@@ -82,16 +82,23 @@ def _report(arguments: Namespace) -> None:
     _DATA,
     argument("--rows", type=int, default=8, help="rows to simulate again (default: 8)"),
     argument("--mend", action="store_true", help="repair first: remove damaged files, simulate missing rows"),
+    argument(
+        "--rows-by",
+        metavar="MODULE.FUNCTION",
+        help="with --mend: the function of yours that made the rows",
+    ),
     JOBS,
     _FORCE,
 )
 def _verify(arguments: Namespace) -> None:
-    from dataset.build.build import mend
+    from dataset.build.build import imported_function, mend
     from dataset.build.signals import run_long_command
     from dataset.build.verify import verify
 
     if arguments.mend:
-        print(run_long_command(lambda: mend(arguments.data, jobs=arguments.jobs, force=arguments.force)))
+        named = imported_function(arguments.rows_by) if arguments.rows_by else None
+        options = {"jobs": arguments.jobs, "simulate": named, "force": arguments.force}
+        print(run_long_command(lambda: mend(arguments.data, **options)))
     print(verify(arguments.data, rows=arguments.rows))
 
 

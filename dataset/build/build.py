@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from dataset.build import scheduler
 from dataset.build.scheduler import Progress
@@ -73,14 +73,29 @@ def build(
         return _build(design, storage, simulate, message, workers, title)
 
 
-def mend(folder: str | Path, *, jobs: int | None = None, title: str = "mend", force: bool = False) -> str:
+def mend(
+    folder: str | Path,
+    *,
+    jobs: int | None = None,
+    title: str = "mend",
+    simulate: Simulate | None = None,
+    force: bool = False,
+) -> str:
     """Repair a data set: remove damaged and duplicate shards, simulate missing rows, write the manifest anew.
+
+    Args:
+        folder: a folder, or a URL that fsspec knows.
+        jobs: processes on this machine; default all processors.
+        title: of the progress line; empty for none.
+        simulate: made the rows, where it is not `dataset.rows.simulate.simulate`. The folder only has its name,
+            and no function is imported because a file names it.
+        force: take over a folder behind a URL that another build has claimed.
 
     Returns:
         One line that says what was done.
 
     Raises:
-        InputError: no data set there, or its rows were made by another version of the code.
+        InputError: no data set there, or its rows were made by another version of the code or another function.
         UnfinishedError: as for `build`.
     """
     storage = open_storage(folder)
@@ -90,7 +105,11 @@ def mend(folder: str | Path, *, jobs: int | None = None, title: str = "mend", fo
     workers = _Workers(lambda: open_backend("loky", jobs=jobs), message)
     with interruptible(message.text), locked(storage, force=force):
         design, source = load_sweep(storage, same_version=True)
-        simulate = None if source == _STANDARD else _imported(source)
+        if source != row_source(simulate):
+            raise InputError(
+                f"{storage.address}: its rows were made by {source!r}, not by {row_source(simulate)!r}; if you "
+                "trust that function, name it: softflagella dataset verify … --mend --rows-by MODULE.FUNCTION"
+            )
         before = storage.read(MANIFEST).to_pybytes() if storage.size(MANIFEST) is not None else b""
         manifest = _build(design, storage, simulate, message, workers, title, mending=True)
     progress = message.progress
@@ -157,8 +176,7 @@ def _build(
     mending: bool = False,
 ) -> dict[str, Any]:
     """Simulate the missing rows, join the shards, and write the manifest."""
-    source = f"{simulate.__module__}.{simulate.__qualname__}" if simulate else _STANDARD
-    folder = SweepFolder(storage, design, rows_version(), source)
+    folder = SweepFolder(storage, design, rows_version(), row_source(simulate))
     folder.claim(mending=mending)
     rows = max(design.rows, folder.finished_rows())
     stored = folder.check_shards(mending=mending)
@@ -207,11 +225,22 @@ def _cost(stored: Stored) -> float:
     return max(cost / rows, 1e-6) if rows else _GUESS
 
 
-def _imported(name: str) -> Simulate:
-    """Import the function that made the rows."""
+def row_source(simulate: Simulate | None) -> str:
+    """Return the name of the function that makes the rows, as in sweep.json."""
+    return f"{simulate.__module__}.{simulate.__qualname__}" if simulate else _STANDARD
+
+
+def imported_function(name: str) -> Simulate:
+    """Import a function that the user names, as MODULE.FUNCTION.
+
+    Raises:
+        InputError: there is none.
+    """
     module, _, function = name.rpartition(".")
     try:
-        simulate: Simulate = getattr(import_module(module), function)
-    except (ImportError, AttributeError):
-        raise InputError(f"its rows were made by {name}, which cannot be imported here") from None
-    return simulate
+        simulate = getattr(import_module(module), function)
+    except (ImportError, AttributeError, ValueError) as missing:
+        raise InputError(f"no function {name!r} ({missing}); give MODULE.FUNCTION, importable from here") from None
+    if not callable(simulate):
+        raise InputError(f"{name} is no function; give MODULE.FUNCTION")
+    return cast(Simulate, simulate)

@@ -80,7 +80,7 @@ def test_new_code_on_an_old_folder_names_the_versions_first(older: Path, tmp_pat
     for act in (
         lambda: write_report(str(older), tmp_path / "page.html"),
         lambda: next(batches(older)),
-        lambda: mend(older, title=""),
+        lambda: mend(older, title="", simulate=invented),
         lambda: verify(older),
         lambda: build(design(90), older, title="", simulate=invented),
     ):
@@ -100,4 +100,4 @@ def test_another_version_with_the_same_columns_is_read(older: Path, monkeypatch:
     monkeypatch.setattr(schema, "OUTPUTS", schema.OUTPUTS[:-1])
     assert len(read(older)) == 60
     with pytest.raises(InputError, match="another version"):
-        mend(older, title="")
+        mend(older, title="", simulate=invented)

@@ -12,12 +12,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from dataset.__main__ import main
 from dataset.build.build import build, mend
+from dataset.build.sweep_folder import sweep_key
 from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS, Column, arrow_table, parquet_field, schema
 from dataset.storage.data_set import batches, read, read_manifest, usable
 from dataset.storage.shards import BadShardError, Shard, check_shard, join, plain, shards_in, write_shard
 from dataset.storage.storage import open_storage
-from sim.io.errors import InputError
+from sim.io.errors import InputError, run_command
 from tests.dataset.sweeps import design, invented, without_cost
 
 ROWS = 300
@@ -45,7 +47,7 @@ def assert_refused_then_mended(built: Path, original: Path, words: str) -> None:
         with pytest.raises(InputError, match=words) as refusal:
             reads()
         assert "--mend" in str(refusal.value)
-    mend(built, jobs=1, title="")
+    mend(built, jobs=1, title="", simulate=invented)
     assert read(built).equals(read(original))
     assert without_parts(built) == without_parts(original)
 
@@ -149,7 +151,7 @@ def test_a_broken_manifest(text: str, built: Path, original: Path) -> None:
     (built / "manifest.json").write_text(text)
     with pytest.raises(InputError, match=r"manifest\.json"):
         read(built)
-    mend(built, jobs=1, title="")
+    mend(built, jobs=1, title="", simulate=invented)
     assert read(built).equals(read(original))
 
 
@@ -163,14 +165,14 @@ def test_rows_rewritten_with_another_number(built: Path, original: Path) -> None
 
 def test_mending_what_is_whole_changes_nothing(built: Path) -> None:
     before = {p: p.stat().st_mtime_ns for p in built.rglob("*") if p.is_file()}
-    assert "manifest kept" in mend(built, jobs=1, title="")
+    assert "manifest kept" in mend(built, jobs=1, title="", simulate=invented)
     assert {p: p.stat().st_mtime_ns for p in built.rglob("*") if p.is_file()} == before
 
 
 def test_strange_files_are_left_alone(built: Path) -> None:
     (built / "rows" / "thesis.txt").write_text("x")
     with pytest.raises(InputError, match=r"thesis\.txt"):
-        mend(built, jobs=1, title="")
+        mend(built, jobs=1, title="", simulate=invented)
     assert (built / "rows" / "thesis.txt").read_text() == "x"
 
 
@@ -239,3 +241,33 @@ def test_usable_leaves_failed_rows_out(original: Path) -> None:
     table.loc[2, "v_z"] = np.nan
     assert usable(table)["row"].tolist() == [3, 4, 5]
     assert len(without_cost(table).columns) == len(table.columns) - 1
+
+
+def test_no_function_runs_because_a_file_names_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A sweep.json may name any function, and its key can be computed by anyone who writes one."""
+    folder = tmp_path / "data"
+    build(design(40), folder, jobs=1, title="", simulate=invented)
+    sweep = json.loads((folder / "sweep.json").read_text())
+    sweep["rows_by"] = "forged.rows"
+    sweep["key"] = sweep_key(sweep["config"], sweep["code"], sweep["rows_by"])
+    (folder / "sweep.json").write_text(json.dumps(sweep))
+    (tmp_path / "forged.py").write_text("import pathlib\npathlib.Path('ran').touch()\nrows = print\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    assert run_command(main, ["verify", str(folder), "--mend"]) == 2
+    assert "rows were made by 'forged.rows'" in capsys.readouterr().err
+    assert not (tmp_path / "ran").exists()
+    assert run_command(main, ["verify", str(folder), "--mend", "--rows-by", "forged.nothing"]) == 2
+    assert "no function 'forged.nothing'" in capsys.readouterr().err
+
+
+def test_a_function_of_the_lab_mends_when_it_is_named(
+    built: Path, original: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    part(built).unlink()
+    words = ["verify", str(built), "--mend", "--jobs", "1", "--rows", "0"]
+    run_command(main, [*words, "--rows-by", "tests.dataset.sweeps.invented"])
+    assert "300 rows are whole" in capsys.readouterr().out
+    assert read(built).equals(read(original))

@@ -67,7 +67,7 @@ def test_damage_behind_a_url_is_refused_and_mended(
     there.delete(f"rows/{name}")
     with pytest.raises(InputError, match="missing"):
         read(memory)
-    mend(memory, title="")
+    mend(memory, title="", simulate=invented)
     assert read(memory).equals(read(calm))
 
 
