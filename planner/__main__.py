@@ -33,7 +33,7 @@ _PLANNING = (
     argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE"),
     ROBOT,
     MODEL,
-    argument("--unit", choices=("l", *UNITS), help="unit of the path (default: the drawing's, or tail lengths)"),
+    argument("--unit", choices=("l", *UNITS), help="unit of the path's numbers (default: tail lengths)"),
     argument("--scale", type=float, default=1.0, help="multiply the path's coordinates"),
     argument("--shape", help="which path of an SVG with several"),
     argument("--closed", action="store_true", help="join the path's end to its start"),
@@ -240,10 +240,16 @@ def _path(arguments: Namespace, robot: Robot) -> Path2D:
     else:
         closed = True if arguments.closed else None
         drawing = read_path(arguments.path, closed=closed, shape=arguments.shape)
-    if arguments.unit is None and drawing.unit is not None:
+    if drawing.unit is None:
+        unit = in_tails(arguments.unit or "l", robot)
+    elif arguments.unit is None:
         unit = drawing.unit / robot.tail_length
     else:
-        unit = in_tails(arguments.unit or "l", robot)
+        metres = drawing.path.length * drawing.unit
+        raise InputError(
+            f"--unit {arguments.unit}: {arguments.path} has a size of its own, it is {metres:.3g} m long; "
+            "leave --unit out, or use --scale to make it larger or smaller"
+        )
     scale = arguments.scale * unit
     if not 0 < scale < float("inf"):
         raise InputError(f"--scale {arguments.scale}; give a number above 0")

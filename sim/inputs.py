@@ -8,7 +8,6 @@ standard deviation of it: a number in the same unit, or a text like "10 %".
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from sim.arrays import Floats
 from sim.effects import catalogue, check_effects, check_size
 from sim.io.errors import InputError
 from sim.io.files import write_text
+from sim.io.reading import read_toml
 from sim.model.correction import correction_tables, read_correction
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
 from sim.model.presets import PRESETS
@@ -82,12 +82,9 @@ def load_robot(source: str | Path) -> Robot:
     if str(source) in PRESETS:
         return PRESETS[str(source)]
     path = Path(source)
-    if not path.is_file():
+    if not path.exists():
         raise InputError(f"no robot {str(source)!r}; give a robot.toml or one of {', '.join(PRESETS)}")
-    try:
-        tables = tomllib.loads(path.read_text())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as broken:
-        raise InputError(f"{path} is not TOML: {broken}") from None
+    tables = read_toml(path)
     name = tables.pop("name", path.stem)
     tables.pop("calibration", None)  # read by planner.vehicle.calibration_table
     correction = read_correction(tables.pop("correction"), str(path)) if "correction" in tables else None

@@ -9,7 +9,6 @@ is given up if it is behind the best one by more than 2 ln STOP. Source: Grünwa
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +22,7 @@ from calibration.statistics.noise import Noise
 from calibration.verdict.next_runs import GIVEN_UP
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
+from sim.io.reading import read_json
 
 
 @dataclass(frozen=True)
@@ -82,12 +82,7 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
     Raises:
         InputError: no such file, or its verdict has nothing to decide.
     """
-    try:
-        record = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from None
-    except ValueError:
-        raise InputError(f"{path} is not a verdict.json") from None
+    record = read_json(path)
     if not isinstance(record, dict) or not record.get("explanations"):
         raise InputError(f"{path}: this verdict has no two explanations between which new runs could decide")
     try:

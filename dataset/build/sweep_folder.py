@@ -26,6 +26,7 @@ from dataset.storage.data_set import (
     check_version,
     manifest_content,
     read_manifest,
+    stored_json,
     write_manifest,
 )
 from dataset.storage.lock import LOCK
@@ -261,7 +262,7 @@ def _published(stored: Stored, rows: int) -> list[Shard]:
 
 def _loaded(storage: Storage) -> dict[str, Any]:
     try:
-        sweep = json.loads(_text(storage, SWEEP))
+        sweep = stored_json(storage, SWEEP)
         sound = sweep["key"] == sweep_key(sweep["config"], sweep["code"], sweep["rows_by"])
     except (ValueError, KeyError, TypeError):
         sound = False

@@ -11,7 +11,6 @@ Source: Sobol (1967); scrambling: Owen (1998), as in scipy.stats.qmc.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from sim.arrays import Floats, Integers
 from sim.effects import catalogue
 from sim.inputs import check_columns
 from sim.io.errors import InputError
+from sim.io.reading import read_toml
 from sim.model.groups import DWELL, GROUP_COLUMNS, MOST_TAILS, OPTIONAL_COLUMNS
 
 _ENTRIES = ("rows", "seed", "history_every", "sensitivities", "inputs")
@@ -135,12 +135,7 @@ def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
     Raises:
         InputError: an input is missing or unknown, or its range contains impossible robots.
     """
-    try:
-        content = tomllib.loads(Path(path).read_text())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as broken:
-        raise InputError(f"{path} is not TOML: {broken}") from None
-    except IsADirectoryError:
-        raise InputError(f"{path} is a folder; give a sweep.toml") from None
+    content = read_toml(path)
     for name in set(content) - set(_ENTRIES):
         raise InputError(f"{path}: unknown entry {name!r}; allowed are {', '.join(_ENTRIES)}")
     inputs = content.get("inputs", {})

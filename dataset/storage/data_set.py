@@ -54,10 +54,22 @@ def _other_version(storage: Storage, theirs: str, ours: str | None = None) -> st
     )
 
 
+def stored_json(storage: Storage, name: str) -> Any:
+    """Parse a file of the folder.
+
+    Raises:
+        ValueError: it is no JSON, or its content is nested too deeply.
+    """
+    try:
+        return json.loads(bytes(storage.read(name)))
+    except RecursionError:
+        raise ValueError("its content is nested too deeply") from None
+
+
 def _damage(storage: Storage, what: str) -> InputError:
     """Name a damage, and how to repair it: by this version if it made the rows, which sweep.json says."""
     try:
-        theirs = json.loads(bytes(storage.read(SWEEP)))["code"]
+        theirs = stored_json(storage, SWEEP)["code"]
     except (ValueError, TypeError, KeyError, InputError, OSError):
         theirs = rows_version()
     if theirs != rows_version():
@@ -108,7 +120,7 @@ def read_manifest(folder: Storage | str | Path) -> dict[str, Any]:
             f"{storage.address} is no finished data set (no {MANIFEST}); make it with softflagella sweep"
         )
     try:
-        content = json.loads(bytes(storage.read(MANIFEST)))
+        content = stored_json(storage, MANIFEST)
         digest = content.pop("digest", None)
         known = "config_hash" in content and "effects" in content and "parts" in content
     except (ValueError, AttributeError, TypeError) as broken:

@@ -15,7 +15,6 @@ fields of `Robot`: E, μ0, r0, l, R, L and a. Their errors are correlated with t
 from __future__ import annotations
 
 import json
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.io.errors import InputError
+from sim.io.reading import read_toml
 from sim.model.uncertainty import DEFAULTS
 
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
@@ -64,12 +64,12 @@ def read_knowledge(path: str | Path) -> CalibrationKnowledge:
     """
     if not Path(path).is_file():
         return CalibrationKnowledge()
+    table: Any = read_toml(path).get("calibration", {})
     try:
-        table: dict[str, Any] = tomllib.loads(Path(path).read_text()).get("calibration", {})
         names = tuple(str(name) for name in table.get("names", ()))
         covariance = np.array(table.get("covariance", []), dtype=float).reshape(len(names), len(names))
         current, error = (_pair(table.get(key, (0.0, 0.0))) for key in ("current_m_s", "current_error_m_s"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, TypeError, ValueError, AttributeError) as broken:
+    except (TypeError, ValueError, AttributeError) as broken:
         raise InputError(f"{path}: [calibration] cannot be read: {broken}") from None
     return CalibrationKnowledge(names, covariance, current, error)
 

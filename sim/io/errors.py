@@ -50,6 +50,10 @@ def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None
         if refusal.filename is None:
             raise
         return _end(f"{refusal.filename}: {refusal.strerror}", 2)
+    except RecursionError:
+        return _end("the input is nested too deeply; give a simpler one", 2)
+    except MemoryError:
+        return _end("the memory of this machine does not suffice; give a smaller input", 2)
     except KeyboardInterrupt as stop:
         print("interrupted", file=sys.stderr)
         return getattr(stop, "status", INTERRUPTED)

@@ -5,12 +5,12 @@ The planner writes the file and reads it again, and the simulator replays it. So
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
 
 from sim.io.errors import InputError
+from sim.io.reading import read_json
 
 FORMAT = 2
 FASTEST = 1e4  # ω̄ above which the file is taken for edited
@@ -24,11 +24,9 @@ def read_plan_file(path: str | Path) -> dict[str, Any]:
             a motor speed that cannot be.
     """
     try:
-        content = json.loads(Path(path).read_text(), parse_constant=_finite, parse_float=_finite)
-    except OSError as missing:
-        raise InputError(f"{path} cannot be read ({missing.strerror}); give a plan.json of the planner") from None
-    except (ValueError, RecursionError) as broken:  # JSON, text encoding, numbers
-        raise InputError(f"{path} is not a plan.json of the planner ({broken}); plan again") from None
+        content = read_json(path, parse_constant=_finite, parse_float=_finite)
+    except InputError as unreadable:
+        raise InputError(f"{unreadable}; give a plan.json of the planner") from None
     if not isinstance(content, dict) or "format" not in content:
         raise InputError(f"{path} is not a plan.json of the planner (it has no format); plan again")
     if content["format"] != FORMAT:

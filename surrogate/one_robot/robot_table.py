@@ -20,6 +20,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.files import write_text
+from sim.io.reading import read_json
 from sim.model.response import DWELLS, Responses
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
@@ -111,11 +112,9 @@ def load_robot_table(path: str | Path) -> RobotTable:
     """
     remedy = "make one with softflagella surrogate robot"
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as missing:
-        raise InputError(f"{path} cannot be read ({missing.strerror}); {remedy}") from None
-    except (ValueError, RecursionError):  # not UTF-8, or no JSON
-        content = None
+        content = read_json(path)
+    except InputError as unreadable:
+        raise InputError(f"{unreadable}; {remedy}") from None
     if not isinstance(content, dict):
         raise InputError(f"{path} is no table of a robot, or is damaged; {remedy}")
     version = content.pop("format", 1)

@@ -10,7 +10,8 @@ import pytest
 
 from planner.paths.fillets import CORNER, kinks
 from planner.paths.path import Path2D
-from planner.paths.path_files import METRES_PER_PIXEL, Drawing, read_path
+from planner.paths.path_files import Drawing, read_path
+from planner.paths.svg_drawing import METRES_PER_PIXEL
 from sim.io.errors import InputError
 
 
@@ -126,3 +127,30 @@ def test_a_table_has_no_shapes(tmp_path: Path) -> None:
 def test_tables_of_several_kinds_are_the_same_path(text: str, tmp_path: Path) -> None:
     (tmp_path / "path.csv").write_text(text, encoding="utf-8")
     assert read_path(tmp_path / "path.csv").path.points.tolist() == [[0, 0], [3, 0], [3, 4.5]]
+
+
+USES = "".join(f"<g id='g{i + 1}'>" + f"<use href='#g{i}'/>" * 10 + "</g>" for i in range(7))
+OWN_GROUP = "a <use> shows a group that it belongs to"
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (f"<defs><g id='g0'><path d='M 0 0 L 1 1'/></g>{USES}</defs><use href='#g7'/>", "more than 50000 shapes"),
+        ("<g id='a'><use href='#a'/></g>", OWN_GROUP),
+        (
+            "<g id='a'><use href='#b'/></g><g id='b'><use href='#a'/></g>",
+            "a <use> shows a group that it belongs to",
+        ),
+        ("<g>" * 200_000 + "</g>" * 200_000, "more than 100 levels"),
+        ("<path d='M 0 0" + " L 1 2" * 30_000 + "'/>", "more than 50000 shapes and coordinates"),
+    ],
+)
+def test_a_drawing_that_would_take_minutes_is_rejected(body: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=words):
+        drawn(tmp_path, body)
+
+
+def test_uses_within_the_limits_are_drawn(tmp_path: Path) -> None:
+    body = "<defs><g id='a'><path d='M 0 0 L 3 4'/></g></defs><use href='#a' transform='scale(2)'/>"
+    assert path_of(tmp_path, body).length == pytest.approx(10)
