@@ -26,7 +26,7 @@ METRES_PER_PIXEL = 0.0254 / 96  # of SVG
 _PHYSICAL = re.compile(r"\s*[0-9.eE+-]+\s*(mm|cm|in|pt|pc)\s*$")
 _TURN = math.radians(2.0)  # largest turn of a curve between two points
 _PROBES = 64  # places on a curve where its direction is measured
-_MOST_NUMBERS, _DEEPEST = 50_000, 100
+_MOST_NUMBERS, _MOST_POINTS, _DEEPEST = 50_000, 200_000, 100
 _NUMBER = re.compile(r"[0-9.eE+-]+")
 _XLINK = "{http://www.w3.org/1999/xlink}href"
 
@@ -137,17 +137,19 @@ def _points(subpath: Any) -> tuple[Floats, bool]:
     """Sample the points of one subpath, curves as polylines, and tell whether it is closed."""
     from svgelements import Close, Line, Move
 
-    points: list[tuple[float, float]] = []
+    points: list[list[float]] = []
     closed = False
     for segment in subpath:
         closed |= isinstance(segment, Close)
         if isinstance(segment, Move):
-            points = [(segment.end.x, segment.end.y)]
+            points = [[segment.end.x, segment.end.y]]
         elif isinstance(segment, Line | Close):
             if segment.end is not None:
-                points.append((segment.end.x, segment.end.y))
+                points.append([segment.end.x, segment.end.y])
         else:
             points += segment.npoint(np.linspace(0, 1, _enough(segment) + 1)[1:]).tolist()
+        if len(points) > _MOST_POINTS:
+            raise InputError(f"a curve of the drawing needs more than {_MOST_POINTS} points; simplify the drawing")
     return np.array(points, dtype=float).reshape(-1, 2), closed
 
 

@@ -143,6 +143,7 @@ OWN_GROUP = "a <use> shows a group that it belongs to"
             "a <use> shows a group that it belongs to",
         ),
         ("<g>" * 200_000 + "</g>" * 200_000, "more than 100 levels"),
+        ("<path d='M 0 0" + " C 9 0 0 9 0 0" * 1_000 + "'/>", "more than 200000 points"),
         ("<path d='M 0 0" + " L 1 2" * 30_000 + "'/>", "more than 50000 shapes and coordinates"),
     ],
 )
