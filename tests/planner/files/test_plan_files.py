@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from planner.files.pictures import draw_plan
 from planner.files.plan_files import milliseconds, write_plan
 from planner.files.plan_json import plan_record
 from planner.paths.path import circle, polygon
@@ -40,8 +44,6 @@ def test_files_of_a_plan(tmp_path: Path) -> None:
 
 
 def test_the_header_compiles(tmp_path: Path) -> None:
-    import shutil
-
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
         pytest.skip("no C compiler on this machine")
@@ -74,3 +76,52 @@ def test_milliseconds_carry_rounding_and_split_long_dwells() -> None:
     assert milliseconds(np.array([1.0, 140.0])) == [1000, 65535, 0, 65535, 0, 8930]
     with pytest.raises(InputError, match="longer minimum dwell"):
         milliseconds(np.array([1.0, 0.0001]))
+
+
+def identities(folder: Path) -> set[str]:
+    """What the files of a plan say which plan they belong to."""
+    header, tracker = ((folder / name).read_text().split("Plan ")[1][:12] for name in ("schedule.h", "tracker.h"))
+    (column,) = set(pd.read_csv(folder / "plan.csv", dtype={"plan_id": str})["plan_id"])
+    named = (folder / "plan.svg").read_text().split("<dc:identifier>")[1].split("<")[0].strip()
+    return {json.loads((folder / "plan.json").read_text())["id"], column, header, tracker, named}
+
+
+def test_all_files_name_the_same_plan_and_another_plan_replaces_them(tmp_path: Path) -> None:
+    """Two plans in one folder used to mix: plan.json of one beside schedule.h of the other."""
+    small, large = plan(circle(2.0), CONTROL), plan(circle(2.5), CONTROL)
+    (tmp_path / "goal.json").write_text("{}")
+    write_plan(small, tmp_path, pictures={"trade_off.svg": draw_plan(small)})
+    first = identities(tmp_path)
+    assert not (tmp_path / "goal.json").exists()
+    write_plan(large, tmp_path)
+    assert len(first) == len(identities(tmp_path)) == 1
+    assert first != identities(tmp_path)
+    assert not (tmp_path / "trade_off.svg").exists()
+
+
+def test_a_plan_that_cannot_be_drawn_leaves_the_plan_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_plan(plan(circle(2.0), CONTROL), tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def broken(_: object) -> None:
+        raise RuntimeError
+
+    monkeypatch.setattr("planner.files.pictures.draw_plan", broken)
+    with pytest.raises(RuntimeError):
+        write_plan(plan(circle(2.5), CONTROL), tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("name", [r"a$\frac$b", "*/ #error", '"', "ü\n"])
+def test_any_name_of_a_robot_can_be_drawn_and_compiled(name: str, tmp_path: Path) -> None:
+    """A formula in the name used to end with a traceback of the drawing, after four of five files."""
+    write_plan(plan(circle(2.0), replace(CONTROL, name=name)), tmp_path)
+    assert len(identities(tmp_path)) == 1
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler:
+        source = '#include "schedule.h"\n#include "tracker.h"\nint main(void){return schedule_ms[0]==0;}'
+        (tmp_path / "main.c").write_text(source)
+        words = [compiler, "-std=c99", "-o", str(tmp_path / "a"), str(tmp_path / "main.c"), "-lm"]
+        subprocess.run(words, check=True, timeout=LIMIT)

@@ -1,0 +1,160 @@
+"""Files are written completely or not at all, one or several; devices and pipes stay what they are."""
+
+from __future__ import annotations
+
+import os
+import stat
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from sim.io.errors import CLOSED_PIPE, INTERRUPTED, InputError, run_command
+from sim.io.files import files_together, whole_file, write_csv, write_text
+from tests.processes import LIMIT
+
+ROOT = Path(__file__).parents[3]
+TABLE = pd.DataFrame({"a": [1.0, 2.5]})
+
+
+def test_a_failure_leaves_the_old_file(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("old")
+
+    def fail() -> None:
+        with whole_file(tmp_path / "a.txt") as part:
+            part.write_text("half")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail()
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+    assert (tmp_path / "a.txt").read_text() == "old"
+
+
+def test_a_pipe_is_written_into_and_stays_a_pipe(tmp_path: Path) -> None:
+    """It used to be replaced by a regular file, and its reader waited for ever."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    texts: list[str] = []
+    reader = threading.Thread(target=lambda: texts.append(pipe.read_text()))
+    reader.start()
+    write_csv(TABLE, pipe)
+    reader.join(LIMIT)
+    assert texts == ["a\n1\n2.5\n"]
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
+
+
+def test_a_device_is_written_into_and_stays_a_device() -> None:
+    """As root, /dev/full used to become a regular file."""
+    write_text("/dev/null", "x")
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+    with pytest.raises(InputError, match="cannot write /dev/full: No space left on device"):
+        write_text("/dev/full", "x")
+    assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
+
+
+def test_the_standard_output_is_written_into(tmp_path: Path) -> None:
+    code = (
+        "from sim.io.files import write_text\n"
+        "print('first'); write_text('/dev/stdout', 'second\\n'); print('third')"
+    )
+    printed = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=LIMIT)
+    assert printed.stdout == "first\nsecond\nthird\n"
+    with open(tmp_path / "out", "w") as sink:
+        subprocess.run([sys.executable, "-c", code], cwd=ROOT, stdout=sink, timeout=LIMIT, check=True)
+    assert (tmp_path / "out").read_text() == "first\nsecond\nthird\n"
+    assert os.path.islink("/dev/stdout")
+
+
+def test_a_link_stays_and_its_file_is_written(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("old")
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    write_text(tmp_path / "link", "new")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "file").read_text() == "new"
+
+
+def test_several_files_appear_together_and_what_is_old_goes(tmp_path: Path) -> None:
+    names = ("a", "b", "c")
+    for name in (*names, "notes"):
+        (tmp_path / name).write_text("old")
+    with files_together(tmp_path, names) as folder:
+        (folder / "a").write_text("new")
+        (folder / "b").write_text("new")
+        assert (tmp_path / "a").read_text() == "old"
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "new", "b": "new", "notes": "old"}
+
+
+@pytest.mark.parametrize("moves", range(6))
+def test_several_files_stay_as_they_were_where_one_cannot_be_moved(
+    moves: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three files that replace three others are six moves; each of them may fail."""
+    names = ("a", "b", "c")
+    for name in names:
+        (tmp_path / name).write_text("old")
+    done, move = [0], os.replace
+
+    def failing(source: Path, target: Path) -> None:
+        done[0] += 1
+        if done[0] == moves + 1:
+            raise OSError(5, "Input/output error")
+        move(source, target)
+
+    def write() -> None:
+        with files_together(tmp_path, names) as folder:
+            for name in names:
+                (folder / name).write_text("new")
+            monkeypatch.setattr(os, "replace", failing)
+
+    with pytest.raises(InputError, match="Input/output error"):
+        write()
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys(names, "old")
+
+
+def test_a_folder_where_a_file_should_be_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    (tmp_path / "b").mkdir()
+    with pytest.raises(InputError, match="is not a regular file"), files_together(tmp_path, ("a", "b")):
+        pytest.fail("the block must not run")
+    assert [path.name for path in tmp_path.iterdir()] == ["b"]
+
+
+def raising(error: BaseException) -> int:
+    def main(_: list[str] | None) -> None:
+        raise error
+
+    return run_command(main)
+
+
+def test_an_interruption_is_one_line_and_a_status(capsys: pytest.CaptureFixture[str]) -> None:
+    assert raising(KeyboardInterrupt()) == INTERRUPTED == 130
+    assert capsys.readouterr().err == "interrupted\n"
+
+
+@pytest.mark.parametrize("error", [RecursionError(), MemoryError(), PermissionError(13, "Permission denied", "x")])
+def test_what_a_machine_refuses_is_one_line(error: BaseException, capsys: pytest.CaptureFixture[str]) -> None:
+    assert raising(error) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_reader_that_goes_ends_the_command_without_a_word() -> None:
+    """`softflagella … | head -1` used to end with a traceback."""
+    code = (
+        "from sim.io.errors import run_command; import sys\n"
+        "def main(_):\n    for i in range(10**6): print(i)\n"
+        "sys.exit(run_command(main))"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stderr is not None
+    assert process.stdout.readline() == "0\n"
+    process.stdout.close()
+    assert process.stderr.read() == ""
+    assert process.wait(LIMIT) == CLOSED_PIPE == 141
+    process.stderr.close()
