@@ -14,8 +14,9 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from contextlib import contextmanager
 from types import ModuleType
 from typing import Any, TypeVar, cast
@@ -24,8 +25,10 @@ from joblib.externals.loky import ProcessPoolExecutor
 
 from dataset.workers.backend import LOST, Lost
 from dataset.workers.tasks import Join, Outcome, Task, run_task
+from sim.io.errors import InputError
 
 Result = TypeVar("Result")
+_ATTEMPTS, _PAUSE = 5, 0.2  # s
 
 
 class Processes:
@@ -42,11 +45,8 @@ class Processes:
 
     def submit(self, number: int, task: Task | Join) -> None:
         """Submit a task to a free worker."""
-        executor = self._free.pop()
-        with _isolated():
-            if executor is None:
-                executor = _new_worker()
-            self._busy[executor.submit(run_task, task)] = (number, executor)
+        executor, future = _submit(self._free.pop(), run_task, task)
+        self._busy[future] = (number, executor)
 
     def collect(self, seconds: float) -> list[tuple[int, Outcome | Lost]]:
         """Return the tasks that have ended."""
@@ -78,14 +78,39 @@ def call_in_worker(function: Callable[..., Result], *arguments: Any) -> Result:
 
     A worker has loaded its machine code in the order of `dataset.workers.warm`. Another process may have loaded or
     compiled other loops first, and then its last digits differ (`sim.compiling`).
+
+    Raises:
+        InputError: the worker was killed.
     """
-    with _isolated():
-        executor = _new_worker()
-        future = executor.submit(function, *arguments)
+    executor, future = _submit(None, function, *arguments)
     try:
-        return cast(Result, future.result())
+        return future.result()
+    except BrokenExecutor:
+        raise InputError("a worker was killed, perhaps for want of memory; run the command again") from None
     finally:
         executor.shutdown(wait=True, kill_workers=True)
+
+
+def _submit(executor: Any, function: Callable[..., Result], *arguments: Any) -> tuple[Any, Future[Result]]:
+    """Submit work to a worker, or to a new one: where there is none, where it was killed, or its fork server.
+
+    Returns:
+        The worker that has taken the work, and its result to come.
+
+    Raises:
+        InputError: no worker can be started.
+    """
+    for _ in range(_ATTEMPTS):
+        try:
+            with _isolated():
+                executor = executor or _new_worker()
+                return executor, cast("Future[Result]", executor.submit(function, *arguments))
+        except (BrokenExecutor, ConnectionError, EOFError):
+            if executor is not None:
+                executor.shutdown(wait=False, kill_workers=True)
+            executor = None
+            time.sleep(_PAUSE)  # until the system knows that the fork server has gone
+    raise InputError(f"no worker process can be started: {_ATTEMPTS} in a row were killed")
 
 
 def _new_worker() -> Any:

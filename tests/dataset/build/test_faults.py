@@ -12,12 +12,15 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from dataset.build.build import build
 from dataset.storage.data_set import read, read_manifest
+from dataset.workers.processes import call_in_worker
+from sim.io.errors import InputError
 from tests.dataset import sweeps
 from tests.dataset.sweeps import MARKS, ROOT, SMALL, design, invented, without_cost
 from tests.processes import LIMIT, printed, until
@@ -227,3 +230,33 @@ def test_a_file_in_the_way(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("x")
     assert "File exists" in refused(tmp_path / "out", 20)
     assert (tmp_path / "out").read_text() == "x"
+
+
+def fork_server(user: int) -> int:
+    """The process from which the workers of `user` are forked."""
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            parent = int(status.read_text().rsplit(")", 1)[1].split()[1])
+            if parent == user and b"multiprocessing.forkserver" in status.with_name("cmdline").read_bytes():
+                return int(status.parent.name)
+    raise AssertionError("no fork server")
+
+
+def test_a_fork_server_that_is_killed_is_started_anew(tmp_path: Path) -> None:
+    """A traceback ended the build."""
+    process = started(building(tmp_path / "out", 400, "slow"))
+    until(lambda: len(workers()) > 2, process)
+    os.kill(fork_server(process.pid), signal.SIGKILL)
+    assert printed(process)[1] == ""
+    assert process.returncode == 0
+    build(design(400), tmp_path / "calm", jobs=1, title="", simulate=invented)
+    assert without_cost(read(tmp_path / "out")).equals(without_cost(read(tmp_path / "calm")))
+
+
+def kill_this_process() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_call_in_a_worker_that_is_killed_is_one_line() -> None:
+    with pytest.raises(InputError, match="a worker was killed"):
+        call_in_worker(kill_this_process)
