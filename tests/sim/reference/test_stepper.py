@@ -74,7 +74,7 @@ def yaw_after(steps: int, *, edges: int = 12, time: float = 1.5) -> float:
 
 @pytest.mark.slow
 def test_time_steps_are_of_second_order() -> None:
-    coarse, middle, fine = (yaw_after(n) for n in (240, 480, 960))
+    coarse, middle, fine = (yaw_after(n, time=0.5) for n in (80, 160, 320))
     assert math.log2(abs((coarse - middle) / (middle - fine))) > 1.8
 
 
