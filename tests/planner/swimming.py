@@ -16,7 +16,7 @@ from sim.mechanics import planar
 
 
 class Tracks(Protocol):
-    """`planner.Tracker`, or what is fed like it."""
+    """`softflagella.Tracker`, or what is fed like it."""
 
     def update(
         self, now: float, pose: tuple[float, float, float] | None = None, seen_at: float | None = None
