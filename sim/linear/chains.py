@@ -38,7 +38,7 @@ class Chains(NamedTuple):
 
 @compiled
 def new_chains(n: int, chains: int, instants: int) -> Chains:
-    """Room for M chains of n ≥ 2 nodes and P instants."""
+    """Allocate room for M chains of n ≥ 2 nodes and P instants."""
     return Chains(
         np.zeros((n, chains, 3, 3)),
         np.zeros((n, chains, 3, 3)),
@@ -75,7 +75,7 @@ def factor(chains: Chains) -> None:
 
 @compiled
 def _eliminate(chains: Chains, m: int) -> None:
-    """Chain m from tip to root."""
+    """Eliminate chain m from tip to root."""
     n = chains.own.shape[0]
     for k in range(n - 1, -1, -1):
         inverted = inverse(block(chains.own, k, m))

@@ -44,7 +44,7 @@ class Coupled(NamedTuple):
 
 @compiled
 def new_coupled(n: int, chains: int, instants: int) -> Coupled:
-    """Room for n ≥ 2 nodes in M chains, and a body with four unknowns at each of P instants."""
+    """Allocate room for n ≥ 2 nodes in M chains, and a body with four unknowns at each of P instants."""
     m, unknowns = 3 * chains, 4 * instants
     width = 2 * m + unknowns + 1
     return Coupled(
@@ -114,7 +114,7 @@ def factor_and_solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> N
 
 @compiled
 def _fold_up(system: Coupled, i: int) -> None:
-    """Rows i − 1 −= A_{i−1,i} Z_i, whose columns belong to nodes i − 1 and i − 2, body and right-hand side."""
+    """Subtract A_{i−1,i} Z_i from row i − 1: columns of nodes i − 1 and i − 2, body and right-hand side."""
     own, others, product = system.own[i - 1], system.others[i - 1], system.product
     m, width = product.shape
     for a in range(m):
@@ -127,7 +127,7 @@ def _fold_up(system: Coupled, i: int) -> None:
 
 @compiled
 def _fold_two_up(system: Coupled, chains: Chains, i: int) -> None:
-    """Rows i − 2 −= A_{i−2,i} Z_i, whose first columns belong to node i − 1."""
+    """Subtract A_{i−2,i} Z_i, whose first columns belong to node i − 1, from row i − 2."""
     own, others, upper, folded = system.own[i - 2], system.others[i - 2], system.upper[i - 1], system.folded[i]
     m, width = folded.shape
     for chain in range(m // 3):
@@ -144,7 +144,7 @@ def _fold_two_up(system: Coupled, chains: Chains, i: int) -> None:
 
 @compiled
 def _reduce_body(system: Coupled, chains: Chains) -> None:
-    """The body's equations with all nodes eliminated."""
+    """Form the body's equations with all nodes eliminated."""
     instants, count = chains.corner.shape[0], chains.own.shape[1]
     m, unknowns = 3 * count, 4 * instants
     first = np.ascontiguousarray(system.folded[0][:, 2 * m : 2 * m + unknowns])

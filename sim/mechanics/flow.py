@@ -79,7 +79,7 @@ def _new_scene(n: int, tails: int) -> Scene:
 
 @compiled
 def has_flow(body: Body) -> bool:
-    """Whether any part of the robot is in the flow of another part."""
+    """Tell whether any part of the robot is in the flow of another part."""
     terms = body.nonlocal_terms
     return bool(terms.tail_interaction != 0 or terms.head_flow != 0 or terms.free_surface != 0)
 
@@ -126,7 +126,7 @@ def add_flow(
 def _place_tail(
     scene: Scene, body: Body, geometry: Geometry, motion: Motion, x: Floats, j: int, column: int
 ) -> None:
-    """Nodes of tail j, and its edges under the forces of its free nodes."""
+    """Place the nodes of tail j, and its edges under the forces of its free nodes."""
     n = x.shape[0]
     cell = 1.0 / n
     first_clamp = n * ((len(scene.by) - _PIECES) // (n + 1))
@@ -167,7 +167,7 @@ def _place_head(scene: Scene, body: Body, n: int, tails: int) -> None:
 def _answer(
     scene: Scene, body: Body, geometry: Geometry, u: Floats, phase: float, instant: int, tails: int, moved: Floats
 ) -> None:
-    """Forces on the fluid of clamps and head, which have given velocities, in a fluid with the velocities `moved`.
+    """Find the forces on the fluid of clamps and head, whose velocities are given, in a fluid moving by `moved`.
 
     The forces depend on each other's flow. They are found in a few rounds; each change is smaller than the last
     one.
@@ -199,13 +199,13 @@ def _answer(
 
 @compiled
 def _in_body(motion: Motion, v: Vector) -> Vector:
-    """Components in the body frame of a vector in a tail's frame."""
+    """Convert a vector from a tail's frame to the body frame."""
     return dot(motion.e_x, v), dot(motion.e_y, v), v[2]
 
 
 @compiled
 def _in_tail(motion: Motion, v: Vector) -> Vector:
-    """Components in a tail's frame of a vector in the body frame."""
+    """Convert a vector from the body frame to a tail's frame."""
     return plus(plus(times(v[0], motion.e_x), times(v[1], motion.e_y)), times(v[2], E_Z))
 
 
@@ -233,7 +233,7 @@ def _add_stokeslets(body: Body, scene: Scene, places: Integers, pieces: Integers
 
 @compiled
 def _shares(body: Body, on: int, by: int, head: int) -> tuple[float, float]:
-    """Factors on the flow of one part at another part: on the direct flow, and on that of the image."""
+    """Return the factors on the flow of one part at another part: on the direct flow, and on that of the image."""
     terms = body.nonlocal_terms
     if on == by:
         return 0.0, 0.0 if on == head else terms.free_surface
@@ -243,7 +243,7 @@ def _shares(body: Body, on: int, by: int, head: int) -> tuple[float, float]:
 
 @compiled
 def _head_resistance(body: Body) -> tuple[float, float]:
-    """The part of the head's drag that moves the fluid, across and along the axis.
+    """Compute the part of the head's drag that moves the fluid, across and along the axis.
 
     It is at most the drag with which the head's segments would move with the flow that they produce.
     """

@@ -12,7 +12,7 @@ from sim.linear.vectors import Vector, cross, dot, formula, minus, plus, times
 
 @formula
 def stokeslets(at: Vector, start: Vector, end: Vector, force: Vector, spread: float) -> Vector:
-    """Velocity at a point, from a force on the fluid that is constant on a straight segment, spread over a length.
+    """Compute the velocity at a point from a force that is constant on a straight segment, spread over a length.
 
     With σ along the segment from the foot of the perpendicular c, and R² = σ² + |c|² + spread²:
     ∫ [(1/R + spread²/R³) f + (r·f) r/R³] dσ/8π, r = c − σ t.
@@ -44,7 +44,7 @@ def stokeslets(at: Vector, start: Vector, end: Vector, force: Vector, spread: fl
 
 @formula
 def rotlet(away: Vector, torque: Vector, spread: float) -> Vector:
-    """Velocity at a distance `away` from a torque on the fluid that is spread over a length."""
+    """Compute the velocity at a distance `away` from a torque on the fluid that is spread over a length."""
     square = dot(away, away) + spread * spread
     scale = (square + 1.5 * spread * spread) / (8 * np.pi * square * square * np.sqrt(square))
     return times(scale, cross(torque, away))

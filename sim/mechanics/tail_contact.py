@@ -46,7 +46,7 @@ _EDGES = 24  # of the smooth tail, or more
 
 @compiled
 def has_contact(body: Body) -> bool:
-    """Whether the tails feel each other's touch."""
+    """Tell whether the tails feel each other's touch."""
     return bool(body.nonlocal_terms.tail_contact != 0)
 
 
@@ -83,7 +83,7 @@ def add_contact(
 
 @compiled
 def contact_forces(body: Body, x: Floats, instant: int, tails: int, force: Floats) -> None:
-    """Forces of contact on the tails at one instant.
+    """Compute the forces of contact on the tails at one instant.
 
     Args:
         x: free nodes, (n, M, 3); tail j at instant p of P is column p + j P.
@@ -115,7 +115,7 @@ def contact_forces(body: Body, x: Floats, instant: int, tails: int, force: Float
 
 @compiled
 def _smooth_chain(n: int) -> Floats:
-    """Weights (E + 1, n + 1) of the nodes 0..n in the nodes of a finer chain: a cubic (Catmull-Rom) through them.
+    """Compute the weights (E + 1, n + 1) of the nodes 0..n in a finer chain: a cubic (Catmull-Rom) through them.
 
     Forces go back to the nodes by the same weights, which keeps their sum and their moment.
     """
@@ -141,14 +141,14 @@ def _smooth_chain(n: int) -> Floats:
 
 @compiled
 def _turned(v: Vector, share: float) -> Vector:
-    """A vector turned about e_z by a share of a whole turn."""
+    """Turn a vector about e_z by a share of a whole turn."""
     cos, sin = np.cos(2 * np.pi * share), np.sin(2 * np.pi * share)
     return cos * v[0] - sin * v[1], sin * v[0] + cos * v[1], v[2]
 
 
 @compiled
 def _edges_near(body: Body, one: Floats, k: int, other: Floats, near: Integers) -> int:
-    """Number of edges of the other tail that may touch edge k of this one; `near` gets them."""
+    """Count the edges of the other tail that may touch edge k of this one, and list them in `near`."""
     n, count, j = len(one) - 1, 0, 0
     within = 1.1 / n + 2 * 1.2 * body.tail_radius  # half an edge each; edges hardly stretch
     middle = times(0.5, plus(vector_at(one, k), vector_at(one, k + 1)))
@@ -207,7 +207,7 @@ def _push(
 
 @compiled
 def _squared_distance(at: Vector, start: Vector, end: Vector) -> float:
-    """Squared distance of a point from an edge."""
+    """Compute the squared distance of a point from an edge."""
     edge, away = minus(end, start), minus(at, start)
     foot = min(max(dot(away, edge) / dot(edge, edge), 0.0), 1.0)
     away = minus(away, times(foot, edge))
@@ -216,7 +216,7 @@ def _squared_distance(at: Vector, start: Vector, end: Vector) -> float:
 
 @compiled
 def _closeness(at: Vector, start: Vector, end: Vector, width: float) -> tuple[float, Vector, Vector]:
-    """∫ g dσ over an edge y = start + σ e, g = exp(−|x − y|²/2w²)/√(2π) w; and the parts of ∫ (x − y) g dσ.
+    """Integrate g over an edge y = start + σ e, g = exp(−|x − y|²/2w²)/√(2π) w; and the parts of ∫ (x − y) g dσ.
 
     Returns:
         The integral; the part with 1 − σ, of the edge's start; the part with σ, of its end.

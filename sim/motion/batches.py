@@ -35,14 +35,14 @@ Result = TypeVar("Result")
 
 
 def split(tails: Floats, rows: int) -> list[Integers]:
-    """Row numbers of batches of one N with at most `rows` rows."""
+    """Split rows into batches of one N with at most `rows` rows; yield their row numbers."""
     order = np.argsort(tails, kind="stable")
     ends = np.flatnonzero(np.diff(tails[order])) + 1
     return [part for same in np.split(order, ends) for part in np.array_split(same, -(-len(same) // rows))]
 
 
 def available_jobs() -> int:
-    """Number of processes to use by default: the processors that this process may run on."""
+    """Count the processes to use by default: the processors that this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -89,7 +89,7 @@ def run_batches(
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Tensor and matrix operations of this process use one thread each."""
+    """Let tensor and matrix operations of this process use one thread each."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -107,7 +107,7 @@ def _single_threaded(work: Callable[[Job], Result], job: Job) -> Result:
 def steady_columns(
     columns: Mapping[str, Floats], *, jobs: int | None = None, title: str = "steady"
 ) -> dict[str, Any]:
-    """Steady motion of any robots, in parallel (`sim.motion.steady`).
+    """Simulate the steady motion of any robots, in parallel (`sim.motion.steady`).
 
     Args:
         columns: robots by column name, see `sim.inputs.check_columns`, each (M,).
@@ -129,7 +129,7 @@ def sensitivity_columns(
     jobs: int | None = None,
     title: str = "sensitivities",
 ) -> Sensitivities:
-    """Steady motion of any robots and its derivatives, in parallel (`sim.motion.sensitivity`).
+    """Simulate the steady motion of any robots and its derivatives, in parallel (`sim.motion.sensitivity`).
 
     Args:
         columns: robots by column name, each (M,).
@@ -159,7 +159,7 @@ def stepped_columns(
     jobs: int | None = None,
     title: str = "time stepping",
 ) -> dict[str, Any]:
-    """The same by time stepping from rest (`sim.motion.settling`): the reference for the direct solution.
+    """Simulate by time stepping from rest (`sim.motion.settling`): the reference for the direct solution.
 
     Args:
         columns: robots by column name, each (M,).

@@ -60,7 +60,7 @@ class Equations(NamedTuple):
 
 @compiled
 def new_equations(x: Floats, u: Floats) -> Equations:
-    """Room for unknowns like x (n, M, 3) and u (P, 4)."""
+    """Allocate room for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, _ = x.shape
     chains = new_chains(n, columns, u.shape[0])
     return Equations(chains, np.zeros((n, columns, 3, 3)), np.zeros_like(x), np.zeros_like(u))
@@ -83,7 +83,7 @@ def linearise(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, equati
 
 @compiled
 def _head(body: Body, u: Floats, corner: Floats, t: Floats) -> None:
-    """The drag on head and disc, and its derivative in u."""
+    """Compute the drag on head and disc, and its derivative in u."""
     gain = motor_gain(body)
     for a in range(4):
         for c in range(4):
@@ -135,7 +135,7 @@ def _tail(body: Body, motion: Motion, rates: Rates, x: Floats, room: Room, equat
 
 @compiled
 def _clamp(body: Body, motion: Motion, rates: Rates, room: Room, equations: Equations, m: int, p: int) -> None:
-    """Force and moment of column m on the disc at instant p."""
+    """Compute the force and moment of column m on the disc at instant p."""
     clamp = clamp_balance(room.geometry, body, m, motion, ZERO, ZERO)
     chains, root = equations.chains, (body.offset, 0.0, 0.0)
     wrench = wrench_of(motion, clamp.force, clamp.moment)
@@ -162,13 +162,13 @@ def _clamp(body: Body, motion: Motion, rates: Rates, room: Room, equations: Equa
 
 @compiled
 def _load_by_phase(body: Body, motion: Motion) -> Vector:
-    """Derivative of the load on a tail, force per length, in the phase."""
+    """Compute the derivative of the load on a tail, force per length, in the phase."""
     return minus(times(body.tail_load[1], motion.e_x), times(body.tail_load[0], motion.e_y))
 
 
 @compiled
 def _put_foot(foot: Floats, m: int, motion: Motion, force: Matrix, moment: Matrix) -> None:
-    """Rows of the robot's equations for one node of column m."""
+    """Put the rows of the robot's equations for one node of column m."""
     put(foot, m, 0, applied(transposed(force), motion.e_x))
     put(foot, m, 1, force[2])
     put(foot, m, 2, applied(transposed(moment), motion.e_y))

@@ -118,7 +118,7 @@ def transient(
 
 @compiled
 def _towards(left: float, dt: float) -> float:
-    """The next step, so that steps end on a goal without a tiny last one."""
+    """Choose the next step, so that steps end on a goal without a tiny last one."""
     if 1.2 * dt > left:
         return left
     return min(dt, 0.5 * left) if 2 * dt > left else dt
@@ -129,7 +129,7 @@ def _try_step(
     body: Body, x: Floats, u: Floats, twist: Floats, x_now: Floats, slope_now: Floats, lag_now: Floats,
     now: float, dt: float, step: _Step, work: Workspace,
 ) -> bool:  # fmt: skip
-    """Both stages; x, u and `step` hold the end of the step. Whether Newton's method converged."""
+    """Solve both stages; x, u and `step` hold the end of the step. Return whether Newton's method converged."""
     tau = GAMMA * dt
     for stage in range(2):
         step.start[:] = x_now
@@ -150,7 +150,7 @@ def _try_step(
 def _solve_stage(
     body: Body, x: Floats, u: Floats, rate: float, start: Floats, anew: bool, work: Workspace
 ) -> bool:
-    """Newton's method with ẋ = ω_t ∂x/∂φ + rate (x − start); `anew`: factorise once, else with stored factors."""
+    """Solve with ẋ = ω_t ∂x/∂φ + rate (x − start); `anew`: factorise once, else with stored factors."""
     rates = in_transient(rate, FIRST_PHASE, start)
     before = np.inf
     for count in range(_MOST_CORRECTIONS):
@@ -168,7 +168,7 @@ def _solve_stage(
 
 @compiled
 def _error_of(step: _Step, dt: float) -> float:
-    """Difference to the embedded method, (1/2, 1/2) in place of (1 − γ, γ), in the largest entry."""
+    """Compare with the embedded method, (1/2, 1/2) in place of (1 − γ, γ), in the largest entry."""
     _, n, columns, _ = step.slope.shape
     factor, largest = (0.5 - GAMMA) * dt, 0.0
     for k in range(n):
@@ -211,7 +211,7 @@ def _advance_lag(
 
 @compiled
 def _instants(body: Body, u: Floats, fields: int) -> Floats:
-    """(v_z, h_x, ω_yr, ω_t) at every instant of a turn, or their mean over time where only that is followed."""
+    """Compute (v_z, h_x, ω_yr, ω_t) at every instant of a turn, or their mean over time."""
     found = np.empty((u.shape[0], 4))
     for p in range(u.shape[0]):
         found[p, 0], found[p, 1] = u[p, 1], u[p, 0] + u[p, 2] * body.head_length / 2
@@ -227,7 +227,7 @@ def _instants(body: Body, u: Floats, fields: int) -> Floats:
 
 @compiled
 def lag_at(found: Transient, times: Floats) -> Floats:
-    """The lag (T, Q, 3) at `times` (T,) between the first step and the last: cubic Hermite interpolation."""
+    """Interpolate the lag (T, Q, 3) to `times` (T,) between the first step and the last (cubic Hermite)."""
     out = np.empty((len(times), found.lag.shape[1], 3))
     k = 1
     for i in range(len(times)):
@@ -243,7 +243,7 @@ def lag_at(found: Transient, times: Floats) -> Floats:
 
 @compiled
 def _on_circle(twist: Floats, time: float) -> tuple[float, float]:
-    """Where the steady circle is after a time: forward and to the left."""
+    """Return where the steady circle is after a time: forward and to the left."""
     angle = twist[2] * time
     along = time * (np.sin(angle) / angle if abs(angle) > 1e-6 else 1.0)
     half = angle / 2
