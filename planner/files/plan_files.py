@@ -82,16 +82,16 @@ def milliseconds(seconds: np.ndarray) -> list[int]:
     """
     edges = np.round(1000 * np.cumsum(seconds)).astype(np.int64)
     entries: list[int] = []
-    for index, whole in enumerate(np.diff(edges, prepend=0).tolist()):
-        if whole < 1:
+    for index, count in enumerate(np.diff(edges, prepend=0).tolist()):
+        if count < 1:
             raise InputError(
                 f"dwell {index + 1} is {1000 * seconds[index]:.3g} ms; the header counts whole milliseconds: "
                 "use a longer minimum dwell"
             )
-        while whole > _MOST_MS:
+        while count > _MOST_MS:
             entries += [_MOST_MS, 0]
-            whole -= _MOST_MS
-        entries.append(whole)
+            count -= _MOST_MS
+        entries.append(count)
     return entries
 
 

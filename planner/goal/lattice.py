@@ -171,8 +171,10 @@ class Lattice:
         radius = self.limits.radius
         reach = max(_LINK * radius, 2 * self.spacing)
         near = np.flatnonzero(np.hypot(*(self.poses[:, :2] - pose[:2]).T) <= reach)
-        here, there = np.repeat(pose[None], len(near), 0), self.poses[near]
-        tracks = shortest_paths(here, there, radius) if onward else shortest_paths(there, here, radius)
+        origin, neighbours = np.repeat(pose[None], len(near), 0), self.poses[near]
+        tracks = (
+            shortest_paths(origin, neighbours, radius) if onward else shortest_paths(neighbours, origin, radius)
+        )
         rows = np.flatnonzero(tracks.length <= _LONGEST_LINK * radius + self.spacing)
         rows = rows[self.limits.free(tracks.take(rows), margin, self.map)]
         return near[rows], tracks.length[rows]

@@ -215,31 +215,31 @@ def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Fl
     slip = (drift.sideways - cx * s + cy * c) / way
     steps, pair = np.zeros((len(move), 5)), np.zeros((len(move), 5, 6))
 
-    def put(row: int, along: Floats, across: Floats, turning: Floats) -> None:
+    def put(row: int, forward_part: Floats, sideways_part: Floats, turning: Floats) -> None:
         """Store a residual's derivatives by forward part, sideways part and turn of the step."""
-        dx, dy = along * c - across * s, along * s + across * c
-        swing = (along * aside - across * forward) / 2
+        dx, dy = forward_part * c - sideways_part * s, forward_part * s + sideways_part * c
+        swing = (forward_part * aside - sideways_part * forward) / 2
         pair[:, row, 0], pair[:, row, 1], pair[:, row, 2] = -dx, -dy, swing - turning
         pair[:, row, 3], pair[:, row, 4], pair[:, row, 5] = dx, dy, swing + turning
 
-    one, none = np.ones(len(move)), np.zeros(len(move))
+    ones, zeros = np.ones(len(move)), np.zeros(len(move))
     broken: Floats
     steps[:, 0] = weight * (aside - slip * forward)
-    put(0, np.asarray(-weight * slip, dtype=np.float64), weight * one, none)
+    put(0, np.asarray(-weight * slip, dtype=np.float64), weight * ones, zeros)
     sense = np.sign(turn)
     over = sense * turn * radius - forward
     broken = np.asarray(weight * (over > 0), dtype=np.float64)
     steps[:, 1] = broken * over
-    put(1, -broken, none, np.asarray(broken * sense * radius, dtype=np.float64))
+    put(1, -broken, zeros, np.asarray(broken * sense * radius, dtype=np.float64))
     short = _SHORTEST_STEP * spacing - forward
     broken = np.asarray(10.0 * (short > 0), dtype=np.float64)
     steps[:, 2] = broken * short
-    put(2, -broken * one, none, none)
+    put(2, -broken * ones, zeros, zeros)
     steps[:, 3] = _EVEN * (forward - spacing)
-    put(3, _EVEN * one, none, none)
+    put(3, _EVEN * ones, zeros, zeros)
     length = np.maximum(forward, _SHORTEST_STEP * spacing)
     steps[:, 4] = np.sqrt(time_weight / spacing * length)
-    put(4, np.asarray(steps[:, 4] / (2 * length) * (length == forward), dtype=np.float64), none, none)
+    put(4, np.asarray(steps[:, 4] / (2 * length) * (length == forward), dtype=np.float64), zeros, zeros)
     return (pose_residual, steps), single, pair
 
 

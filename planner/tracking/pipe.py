@@ -24,7 +24,7 @@ from planner.tracking.tracker import Tracker
 
 
 def answers(tracker: Tracker, lines: Iterable[str], time_scale: float) -> Iterator[str]:
-    """One answer for every line, until the path ends.
+    """Answer every line, until the path ends.
 
     Args:
         tracker: at rest at the plan's start.

@@ -164,12 +164,12 @@ class Tracker:
 
     def _see(self, pose: POSE, when: float) -> bool:
         """Learn from a pose; return false if it was left out."""
-        found = self._estimate.seen_from(when, self._dwell, self._past)
-        if found is None:
+        prediction = self._estimate.seen_from(when, self._dwell, self._past)
+        if prediction is None:
             return False
-        expected, H = found
-        left = (pose[0] - expected[0], pose[1] - expected[1], _wrapped(pose[2] - expected[2]))
-        size = self._estimate.update(left, H, GATE)
+        expected, H = prediction
+        residual = (pose[0] - expected[0], pose[1] - expected[1], _wrapped(pose[2] - expected[2]))
+        size = self._estimate.update(residual, H, GATE)
         if size <= GATE:
             self._rejected = 0
             self._judge(size)
