@@ -59,7 +59,7 @@ class Problem:
     residual: Residual
 
     def errors(self, network: Ensemble, rows: Tensor) -> Tensor:
-        """|r| of rows (m,), (K, m)."""
+        """Compute |r| of rows (m,), (K, m)."""
         return self._residuals(network, rows).norm(dim=-1)
 
     def loss(self, network: Ensemble, rows: Tensor, soft: float) -> Tensor:

@@ -83,7 +83,7 @@ class RobotTable:
         return Responses(lag, memory, rest, spread, speed, none, none, before)
 
     def _side(self, columns: Mapping[str, Floats]) -> Any:
-        """0 or 1 for every row, by the direction of its motor."""
+        """Return 0 or 1 for every row, by the direction of its motor."""
         count = len(next(iter(columns.values())))
         for name, values in columns.items():
             expected = self.robot.get(name, 0.0)

@@ -100,7 +100,7 @@ class Intervals:
 
 
 def _design(x: Tensor) -> Tensor:
-    """1, x and all products of two, (M, P), with x held to five standard deviations."""
+    """Assemble 1, x and all products of two, (M, P), with x held to five standard deviations."""
     x = x.clamp(-5, 5)
     first, second = torch.triu_indices(x.shape[1], x.shape[1]).unbind(0)
     return torch.cat([torch.ones_like(x[:, :1]), x, x[:, first] * x[:, second]], 1)

@@ -55,8 +55,9 @@ class Support:
 
 @cache
 def _products(inputs: int) -> tuple[Integers, Integers]:
-    """Monomials up to DEGREE of some inputs, the constant first: monomial p is that of parents[p] times the input
-    last[p]; both (P,).
+    """List the monomials up to DEGREE of some inputs, the constant first: `parents` and `last`, both (P,).
+
+    Monomial p is monomial parents[p] times the input last[p].
     """
     parents, last = [0], [0]
     index: dict[tuple[int, ...], int] = {(): 0}

@@ -40,7 +40,7 @@ _QUIET = TrainingContext()
 
 
 def split(rows: Integers) -> Integers:
-    """0 learned, 1 for the widths of intervals, 2 held out: a fixed pseudo-random split by row number."""
+    """Split rows pseudo-randomly, fixed by row number: 0 learned, 1 for the widths of intervals, 2 held out."""
     mixed = (rows.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(40)
     tenth = mixed % np.uint64(10)
     return np.where(tenth == 8, 1, np.where(tenth == 9, 2, 0))
