@@ -40,7 +40,7 @@ Change = Callable[[Robot, float], Robot]
 
 
 def effect_change(name: str) -> Change:
-    """Puts a size of an effect into a robot."""
+    """Make a function that puts a size of an effect into a robot."""
 
     def changed(robot: Robot, size: float) -> Robot:
         return replace(robot, effects={**robot.effects, **BESIDE.get(name, {}), name: size})
@@ -59,12 +59,12 @@ def number_change(name: str) -> Change:
 
 
 def head_shares(robots: Sequence[Robot]) -> np.ndarray:
-    """ω_h/ω of robots; NaN where they have no orbit."""
+    """Compute ω_h/ω of robots; NaN where they have no orbit."""
     return motions(robots)[0]
 
 
 def motions(robots: Sequence[Robot]) -> np.ndarray:
-    """ω_h/ω and the yaw rate [rad/s] of orbits, (2, B)."""
+    """Compute ω_h/ω and the yaw rate [rad/s] of orbits, (2, B)."""
     rows = []
     for robot in robots:
         motion = orbits(robot.groups())
@@ -74,7 +74,7 @@ def motions(robots: Sequence[Robot]) -> np.ndarray:
 
 
 def closing_size(change: Change, robot: Robot, null: float, bounds: tuple[float, float]) -> tuple[float, float]:
-    """The smallest change that gives the measured share (NaN: none), and the share nearest to it on the way."""
+    """Find the smallest change that gives the measured share (NaN: none), and the nearest share on the way."""
     best, nearest = np.nan, float(head_shares([change(robot, null)])[0])
     for end in bounds:
         sizes = null + (end - null) * np.linspace(0, 1, STEPS + 1)

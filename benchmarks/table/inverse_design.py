@@ -35,7 +35,7 @@ _SOLVED = 1e-6  # misfit of a solution of the table's equations
 
 
 def targets(lookup: NeuralTable, count: int) -> SimulatedRobots:
-    """Simulated robots inside the table's domain, with two tails and more that do not touch."""
+    """Simulate robots inside the table's domain, with two tails and more that do not touch."""
     rows = as_reached(draw_robots(_DRAWN, _SEED, wide=False))
     inside = ~lookup.query(rows.robots, flag=True)[OUTSIDE]
     good = inside & (rows.robots["N"] > 1) & (rows.motion["tail_gap"] >= 1)

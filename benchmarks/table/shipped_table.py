@@ -48,7 +48,7 @@ _FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated
 
 
 def robots(name: str) -> dict[str, Floats]:
-    """The robots of one set."""
+    """Draw the robots of one set."""
     if name in FLIPS:
         count, seed = FLIPS[name]
         if name != "flips":
@@ -62,7 +62,7 @@ def robots(name: str) -> dict[str, Floats]:
 
 
 def kept(work: Path, name: str) -> SimulatedRobots:
-    """One set, simulated, or read from the folder if it is there."""
+    """Simulate one set, or read it from the folder if it is there."""
     path = work / f"{name}.npz"
     if path.exists():
         with np.load(path) as file:
@@ -79,8 +79,10 @@ def kept(work: Path, name: str) -> SimulatedRobots:
 
 
 def swept(folder: str) -> tuple[SimulatedRobots, SimulatedRobots, SimulatedRobots]:
-    """Rows of a sweep: one tail; with response curves, to learn (with memory and rest, and _SWEPT without); and
-    held out.
+    """Read the rows of a sweep in three parts.
+
+    They are those with one tail; those to learn, with response curves (with memory and rest, and _SWEPT without);
+    and the held-out ones.
     """
     rows, numbers = read_robots(folder)
     part, history = split(numbers), np.isfinite(rows.curves["rest"]).all((1, 2))
@@ -120,7 +122,7 @@ def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> 
 
 
 def draw(lookup: NeuralTable, rows: SimulatedRobots, path: str) -> None:
-    """Error of the yaw rate against motor speed, of robots whose tails do not touch."""
+    """Plot the error of the yaw rate against motor speed, of robots whose tails do not touch."""
     from matplotlib.figure import Figure
 
     answer = lookup.query(rows.robots, flag=True)
