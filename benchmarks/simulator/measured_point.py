@@ -137,11 +137,11 @@ def gaps() -> dict[str, float]:
 def deciding_runs(sizes: dict[str, float]) -> None:
     """Print for each explanation the run that tells it best from all others, in standard deviations of a run."""
     known = candidates()
-    made = [
+    robots = [
         replace(MEASURED, tails=tails, tail_length=length, motor_speed=rpm * np.pi / 30, effects=CONTACT)
         for tails, length, rpm in RUNS
     ]
-    predicted = {name: motions([known[name][0](robot, size) for robot in made]) for name, size in sizes.items()}
+    predicted = {name: motions([known[name][0](robot, size) for robot in robots]) for name, size in sizes.items()}
     print(
         f"\n{'explanation':28}{'size':>7}   deciding run             omega_h/omega    yaw [rad/s]   sd to the next"
     )

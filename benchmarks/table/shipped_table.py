@@ -162,23 +162,25 @@ def main(*words: str) -> None:
     parser.add_argument("--sweep", help="data set built from surrogate/shipped/domain.toml")
     parser.add_argument("--test")
     parser.add_argument("--picture", help="with --test: draw the errors of the held-out robots")
-    given = parser.parse_args(words)
-    if given.out:
-        if not given.sweep:
+    arguments = parser.parse_args(words)
+    if arguments.out:
+        if not arguments.sweep:
             parser.error("--out needs --sweep")
-        tails, widths, held_out, flips = (kept(given.work, n) for n in ("tails", "widths", "held_out", "flips"))
-        source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(given.sweep)["config_hash"]}
-        single, learned, others = swept(given.sweep)
+        tails, widths, held_out, flips = (
+            kept(arguments.work, n) for n in ("tails", "widths", "held_out", "flips")
+        )
+        source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(arguments.sweep)["config_hash"]}
+        single, learned, swept_held_out = swept(arguments.sweep)
         tails = join_robots([tails, single])
         lookup = learn(
             tails, widths, held_out, join_robots([flips, learned]), TAILS, CURVES, source=source,
-            flips_held_out=others, work=TrainingContext("train", folder=given.work / "states"),
+            flips_held_out=swept_held_out, work=TrainingContext("train", folder=arguments.work / "states"),
         )  # fmt: skip
-        save(lookup, given.out)
-        remove_states(given.work / "states")
+        save(lookup, arguments.out)
+        remove_states(arguments.work / "states")
         print(error_table(lookup.errors))
-    if given.test:
-        lookup, locked = load(given.test), kept(given.work, "locked")
-        test(lookup, locked, kept(given.work, "locked_flips"))
-        if given.picture:
-            draw(lookup, locked, given.picture)
+    if arguments.test:
+        lookup, locked = load(arguments.test), kept(arguments.work, "locked")
+        test(lookup, locked, kept(arguments.work, "locked_flips"))
+        if arguments.picture:
+            draw(lookup, locked, arguments.picture)

@@ -1,9 +1,9 @@
 """The files of a plan: plan.json, plan.csv, plan.svg; schedule.h and tracker.h for a microcontroller.
 
-schedule.h has dwell times in whole milliseconds as 16-bit numbers. The motor flips after each. The rounding error
-of a dwell is carried over to the next one, so no flip is more than half a millisecond early or late. A dwell that
-does not fit 16 bits is split by entries of 0 ms: two flips at once, so the direction stays. A dwell that rounds to
-0 ms is refused, because 0 has this other meaning.
+schedule.h lists dwell times in whole milliseconds as 16-bit integers. The motor flips after each. The rounding
+error of a dwell is carried over to the next one, so no flip is more than half a millisecond early or late. A dwell
+that does not fit 16 bits is split by entries of 0 ms: two flips at once, so the direction stays. A dwell that
+rounds to 0 ms is rejected, because 0 has this other meaning.
 """
 
 from __future__ import annotations

@@ -87,9 +87,9 @@ def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lat
         if (spacing, courses) not in lattices:
             lattices[spacing, courses] = _lattice(stops, limits, spacing * limits.radius, courses)
         around = _around(stops, lattices[spacing, courses], margin)
-        both = [candidate for candidate in (direct, around) if candidate is not None]
-        if both:
-            return min(both, key=lambda candidate: candidate.length)
+        candidates = [candidate for candidate in (direct, around) if candidate is not None]
+        if candidates:
+            return min(candidates, key=lambda candidate: candidate.length)
     raise NoWayError(
         f"there is no way to the goal that leaves {margin:.3g} l around the robot and turns with a radius of "
         f"{limits.radius:.3g} l, on a lattice with steps of {LEVELS[-1][0] * limits.radius:.2g} l and "
@@ -252,10 +252,10 @@ def _cut(leg: DubinsPaths, spacing: float, radius: float) -> DubinsPaths:
         if length == 0:
             continue
         edges = np.linspace(0, length, math.ceil(length / spacing) + 1)
-        ends = np.cumsum(leg.pieces[row])
+        ends = np.cumsum(leg.lengths[row])
         before = np.concatenate([[0.0], ends[:-1]])
-        pieces = np.maximum(np.minimum(ends, edges[1:, None]) - np.maximum(before, edges[:-1, None]), 0.0)
+        lengths = np.maximum(np.minimum(ends, edges[1:, None]) - np.maximum(before, edges[:-1, None]), 0.0)
         turns = leg.take(np.full(len(edges) - 1, row)).turns
         poses = leg.take(np.array([row])).poses(edges[None, :-1], radius)[0]
-        parts.append(DubinsPaths(poses, turns, pieces))
+        parts.append(DubinsPaths(poses, turns, lengths))
     return DubinsPaths(*(np.concatenate([part[i] for part in parts]) for i in range(3)))

@@ -63,15 +63,15 @@ def run_batches(
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs = {jobs}; give at least 1, or nothing for all processors")
     count = min(jobs or available_jobs(), len(jobs_to_do))
-    here = (
+    in_this_process = (
         threads or count <= 1
     )  # the number of threads is a setting of the process: set it once, not in each worker
-    task = work if here else partial(_single_threaded, work)
+    task = work if in_this_process else partial(_single_threaded, work)
     results: list[Result] = []
-    if not here:
+    if not in_this_process:
         compile_once()
     with (
-        one_thread() if here else nullcontext(),
+        one_thread() if in_this_process else nullcontext(),
         tqdm(total=sum(sizes), desc=title, unit="row", delay=1.0, disable=not title) as bar,
     ):
         if count <= 1:

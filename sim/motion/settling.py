@@ -68,8 +68,8 @@ def settle(
     for body in robots:
         chosen = resolution if isinstance(resolution, Resolution) else resolution(body.omega)
         settled = settle_one(body, groups.N, chosen)
-        again = settled.failed == BROKE_DOWN
-        ended.append(settle_one(body, groups.N, chosen.refined()) if again else settled)
+        broke_down = settled.failed == BROKE_DOWN
+        ended.append(settle_one(body, groups.N, chosen.refined()) if broke_down else settled)
     means = np.array([e.means for e in ended]).T
     return Steady(
         omega_t=means[0],

@@ -83,8 +83,8 @@ def switch_response(
     motion = steady(groups) if motion is None else motion
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
     robots = bodies(groups)
-    both = zip(robots, reversed_bodies(groups), dwell, strict=True)
-    lag = np.array([_lag(body, reverse, groups.N, T, even, resolution) for body, reverse, T in both])
+    pairs = zip(robots, reversed_bodies(groups), dwell, strict=True)
+    lag = np.array([_lag(body, reverse, groups.N, T, even, resolution) for body, reverse, T in pairs])
     sense = np.sign([body.omega for body in robots])
     twist = twists(motion.v_z, motion.v_x, motion.omega_yr, sense)
     speed = planar.net_speed(twist, lag, dwell)

@@ -49,9 +49,9 @@ def tabulate(robot: Robot) -> RobotTable:
         True
     """
     values = robot.group_values()
-    both = {name: np.array([value, value]) for name, value in values.items()}
-    both["omega_bar"] = both["omega_bar"] * [1.0, -1.0]
-    groups = Groups.from_columns(both)
+    directions = {name: np.array([value, value]) for name, value in values.items()}
+    directions["omega_bar"] = directions["omega_bar"] * [1.0, -1.0]
+    groups = Groups.from_columns(directions)
     motion = steady(groups)
     if not motion.converged.all():
         raise InputError(f"{robot.name} has no steady motion to tabulate: {motion.note[0]}")

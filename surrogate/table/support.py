@@ -1,4 +1,4 @@
-"""The domain of the table: the joint support of the rows that it learned, as a smooth measure.
+"""The domain of the table: the joint support of its training data, as a smooth measure.
 
     q(x) = φ(x)ᵀ M⁻¹ φ(x)/F,   M = mean of φ φᵀ over the rows,   φ: the F monomials up to degree 3
 

@@ -85,7 +85,7 @@ def test_it_learns_the_robot() -> None:
 
 
 def alarmed(car: Vehicle, camera: Camera) -> bool:
-    """Whether the alarm came at any pose of a swim."""
+    """Tell whether the alarm came at any pose of a swim."""
     tracker, rang = Tracker(planned()), False
     update = tracker.update
 
