@@ -150,10 +150,7 @@ SIMULATOR = {"sim.linear", "sim.motion", "sim.reference", "sim.solve"}
 
 @pytest.mark.parametrize(
     ("module", "may_load"),
-    [
-        *((package, set()) for package in ORDER),
-        *((f"{package}.__main__", set()) for package in ORDER),
-    ],
+    [*((package, set()) for package in ORDER), *((f"{package}.__main__", set()) for package in ORDER)],
 )
 def test_importing_loads_only_what_is_used(module: str, may_load: set[str]) -> None:
     """Of the large libraries, of the other packages but `sim`, and of the simulator."""

@@ -141,7 +141,7 @@ def sensitivity_columns(
     values = check_columns(columns)
     batches = split(values["N"], _SLOPE_ROWS)
     parts = [Groups.from_columns({name: array[rows] for name, array in values.items()}) for rows in batches]
-    work = partial(_slopes_batch, parameters=tuple(parameters), phases=phases)
+    work = partial(sensitivities, parameters=tuple(parameters), phases=phases)
     done = run_batches(work, parts, sizes=[len(b) for b in batches], jobs=jobs, title=title, threads=True)
     order = np.argsort(np.concatenate(batches))
     return Sensitivities(
@@ -186,10 +186,6 @@ def _in_batches(
     done = run_batches(work, parts, sizes=sizes, jobs=jobs, title=title, threads=True)
     order = np.argsort(np.concatenate(batches))
     return {name: np.concatenate([d[name] for d in done])[order] for name in done[0]}
-
-
-def _slopes_batch(groups: Groups, *, parameters: tuple[str, ...], phases: int) -> Sensitivities:
-    return sensitivities(groups, parameters, phases=phases)
 
 
 def _steady_batch(columns: dict[str, Floats]) -> dict[str, Any]:

@@ -166,13 +166,7 @@ def _body_load(robots: TensorRobots, u: Tensor, omega: Tensor) -> Tensor:
 
 
 def newton_correction(
-    robots: TensorRobots,
-    x: Tensor,
-    x_dot: Tensor,
-    phase: Tensor,
-    u: Tensor,
-    omega: Tensor,
-    rate: Tensor,
+    robots: TensorRobots, x: Tensor, x_dot: Tensor, phase: Tensor, u: Tensor, omega: Tensor, rate: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Compute one Newton correction (δx, δu) of the balance.
 
@@ -233,13 +227,7 @@ def _add_elastic(matrix: BlockBanded, stiffness: EdgeStiffness) -> None:
 
 
 def _add_drag(
-    matrix: BlockBanded,
-    shape: Shape,
-    drag_: _Drag,
-    velocity: Tensor,
-    w: Tensor,
-    e_y: Tensor,
-    rate: Tensor,
+    matrix: BlockBanded, shape: Shape, drag_: _Drag, velocity: Tensor, w: Tensor, e_y: Tensor, rate: Tensor
 ) -> None:
     """Add the derivative of q_k in the node positions: through ẋ, through Ω × x and through the tangents."""
     tangent, spread, perp, excess = drag_.of(slice(1, None))

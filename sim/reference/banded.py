@@ -46,13 +46,7 @@ class BlockBanded:
         start = self._offset + 3 * first * self._row + 3 * (first + offset)
         return self._entries.as_strided(
             (self.n - abs(offset), 3, 3, *self.batch),
-            (
-                3 * (self._row + 1) * self.count,
-                self._row * self.count,
-                self.count,
-                self.batch[1],
-                1,
-            ),
+            (3 * (self._row + 1) * self.count, self._row * self.count, self.count, self.batch[1], 1),
             start * self.count,
         )
 

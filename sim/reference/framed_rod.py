@@ -119,12 +119,7 @@ class FramedRod:
         tangent = edge / length.unsqueeze(-1)
         director = frames.carried(tangent)
         joints = self.joint_energy(
-            torch.roll(tangent, 1, 0),
-            tangent,
-            torch.roll(director, 1, 0),
-            director,
-            torch.roll(theta, 1),
-            theta,
+            torch.roll(tangent, 1, 0), tangent, torch.roll(director, 1, 0), director, torch.roll(theta, 1), theta
         )
         return joints + _stretching(length, self.axial_stiffness)
 

@@ -134,12 +134,7 @@ def test_s3_holds_the_same_files(bucket: str, calm: Path) -> None:
         f"build(design(200), {bucket!r}, jobs=2, title='', simulate=invented)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        env=dict(os.environ),
-        text=True,
-        capture_output=True,
-        timeout=LIMIT,
+        [sys.executable, "-c", code], cwd=ROOT, env=dict(os.environ), text=True, capture_output=True, timeout=LIMIT
     )
     assert done.returncode == 0, done.stderr
     assert read(bucket).equals(read(calm))
