@@ -152,7 +152,7 @@ def clamp_balance(geometry: Geometry, body: Body, m: int, motion: Motion, flow: 
 
 
 @compiled
-def wrench_of(motion: Motion, force: Vector, moment: Vector) -> tuple[float, float, float, float]:
+def body_wrench(motion: Motion, force: Vector, moment: Vector) -> tuple[float, float, float, float]:
     """Compute the wrench (F_x, F_z, M_y, M_z) in the body frame of a force and a moment in a tail's frame."""
     return dot(motion.e_x, force), force[2], dot(motion.e_y, moment), moment[2]
 

@@ -137,10 +137,10 @@ def _add_viscosity(
         kappa = curvatures(binormal, first, second)
         e_1, e_2, f_1, f_2 = curvatures_by_edges(before, after, first, second, kappa)
         spin = spin_before - 0.5 * dot(binormal, plus(rate_before, rate))
-        both = 0.5 * (spin_before + spin)
+        mean_spin = 0.5 * (spin_before + spin)
         scale = viscosity * inverse_voronoi(k, n)
-        moment_1 = scale * (dot(e_1, rate_before) + dot(f_1, rate) + both * kappa[1])
-        moment_2 = scale * (dot(e_2, rate_before) + dot(f_2, rate) - both * kappa[0])
+        moment_1 = scale * (dot(e_1, rate_before) + dot(f_1, rate) + mean_spin * kappa[1])
+        moment_2 = scale * (dot(e_2, rate_before) + dot(f_2, rate) - mean_spin * kappa[0])
         about = 0.5 * (moment_1 * kappa[1] - moment_2 * kappa[0])  # ∂R/∂θ̇ of either edge
         change = plus(times(moment_1, f_1), times(moment_2, f_2))
         add(geometry.force, k, m, times(1 / geometry.length[k, m], change))

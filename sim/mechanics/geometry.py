@@ -67,14 +67,14 @@ def turned_edges(x: Floats, dx: Floats, offset: float) -> Floats:
     for m in range(tails):
         below, below_dx, moved = (offset, 0.0, 0.0), ZERO, (offset, 0.0, 0.0)
         for k in range(n):
-            here, here_dx = vector(x, k, m), vector(dx, k, m)
-            edge, change = minus(here, below), minus(here_dx, below_dx)
+            node, node_dx = vector(x, k, m), vector(dx, k, m)
+            edge, change = minus(node, below), minus(node_dx, below_dx)
             length = np.sqrt(dot(edge, edge))
             turned = plus(edge, change)
             wanted = length + dot(edge, change) / length
             moved = plus(moved, times(wanted / np.sqrt(dot(turned, turned)), turned))
             put(out, k, m, moved)
-            below, below_dx = here, here_dx
+            below, below_dx = node, node_dx
     return out
 
 
@@ -87,8 +87,8 @@ def measure(geometry: Geometry, x: Floats, offset: float, axial_stiffness: float
         put(tangents, 0, m, ROOT_TANGENT)
         below, before, length_before = (offset, 0.0, 0.0), ROOT_TANGENT, 1.0
         for k in range(n):
-            here = vector(x, k, m)
-            edge = minus(here, below)
+            node = vector(x, k, m)
+            edge = minus(node, below)
             length = np.sqrt(dot(edge, edge))
             tangent = times(1 / length, edge)
             c, first, second, by_after, by_before = bend(
@@ -99,7 +99,7 @@ def measure(geometry: Geometry, x: Floats, offset: float, axial_stiffness: float
             put(joints, k, m, (c, first, second))
             put(by_afters, k, m, by_after)
             put(by_befores, k, m, by_before)
-            below, before, length_before = here, tangent, length
+            below, before, length_before = node, tangent, length
         for k in range(n):
             first_next, by_before_next = 0.0, ZERO
             if k < n - 1:

@@ -17,14 +17,14 @@ def stokeslets(at: Vector, start: Vector, end: Vector, force: Vector, spread: fl
     With σ along the segment from the foot of the perpendicular c, and R² = σ² + |c|² + spread²:
     ∫ [(1/R + spread²/R³) f + (r·f) r/R³] dσ/8π, r = c − σ t.
     """
-    piece = minus(end, start)
-    length = np.sqrt(dot(piece, piece))
-    t = times(1 / length, piece)
+    segment = minus(end, start)
+    length = np.sqrt(dot(segment, segment))
+    t = times(1 / length, segment)
     away = minus(at, start)
-    along = dot(away, t)
-    c = minus(away, times(along, t))
+    foot = dot(away, t)
+    c = minus(away, times(foot, t))
     square = dot(c, c) + spread * spread
-    first, last = -along, length - along
+    first, last = -foot, length - foot
     r_first, r_last = np.sqrt(first * first + square), np.sqrt(last * last + square)
     if first > 0:
         log = np.log((last + r_last) / (first + r_first))

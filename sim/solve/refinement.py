@@ -129,9 +129,9 @@ def _from_a_slow_motor(plain: Body, tails: int) -> tuple[Floats, Floats]:
     terms = plain.nonlocal_terms
     soft = plain._replace(nonlocal_terms=terms._replace(tail_contact=_SOFT * terms.tail_contact))
     speed = min(_SLOW / abs(plain.omega), 1.0)
-    factor, before = _FASTER, soft._replace(omega=speed * plain.omega)
-    x, u = straight_start(before, MESHES[0], _fewest_phases(tails), tails)
-    _, size = solve_orbit(before, x, u, _START)
+    factor, slow = _FASTER, soft._replace(omega=speed * plain.omega)
+    x, u = straight_start(slow, MESHES[0], _fewest_phases(tails), tails)
+    _, size = solve_orbit(slow, x, u, _START)
     while size < _START and speed < 1 and factor > _LEAST_FASTER:
         factor = min(factor, 1 / speed)
         x_more, u_more = x.copy(), factor * u
@@ -192,11 +192,11 @@ def _on_finer_meshes(body: Body, error: float, x: Floats, u: Floats) -> Orbit:
         us = (us[0], u, u) if i == 1 else (us[0], us[1], u)
     if not turns_forward(body, u):
         return _unsolved(BACKWARDS, x, u)
-    found = np.empty((3, 5))
+    means = np.empty((3, 5))
     for i in range(3):
-        found[i] = mean_motion(body, us[i])
-    limit = extrapolate(found)
-    error += difference(_without_last_term(found), limit) + _DOUBT * difference(found[2], limit)
+        means[i] = mean_motion(body, us[i])
+    limit = extrapolate(means)
+    error += difference(_without_last_term(means), limit) + _DOUBT * difference(means[2], limit)
     return Orbit(SOLVED, error, limit, xs, us)
 
 
@@ -217,7 +217,7 @@ def _enough_phases(
     fewest phases. Then phases are added, each time from the solution before, until the means stop changing.
     """
     phases = x.shape[1]
-    before, change, robot, wanted = np.zeros(5), np.nan, plain, 1e-2
+    means, change, robot, wanted = np.zeros(5), np.nan, plain, 1e-2
     solved = -1  # numbers of phases that the robot itself was solved on, less one
     while True:
         x_more, u_more = with_phases(x, phases), with_phases(u.reshape(1, -1, 4), phases // tails)[0]
@@ -231,15 +231,15 @@ def _enough_phases(
             x, u, robot, wanted = x_more, u_more, body, ROUGH
             phases = tails * int(np.ceil(least / tails))
             continue
-        after = mean_motion(body, u_more)
+        new_means = mean_motion(body, u_more)
         if solved > 1:
-            last, change = change, difference(before, after)
+            last, change = change, difference(means, new_means)
             if change <= _PHASE_ERROR:
                 return SOLVED, change, x, u
             fall = _SHRINKS if not np.isfinite(last) else min(max(change / last, 0.05), 1.0)
             if change * fall <= _PHASE_ERROR:
                 return SOLVED, change * fall, x_more, u_more
-        x, u, before = x_more, u_more, after
+        x, u, means = x_more, u_more, new_means
         if phases > _MOST_PHASES:
             return MANY_PHASES, np.nan, x, u
         phases = _more_phases(tails, phases)

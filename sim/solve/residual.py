@@ -22,7 +22,7 @@ from sim.arrays import Floats
 from sim.compiling import compiled
 from sim.linear.blocks import put, vector, vector_at
 from sim.linear.vectors import cross, minus, plus
-from sim.mechanics.balance import clamp_balance, head_drag, motion_at, node_balance, wrench_of
+from sim.mechanics.balance import body_wrench, clamp_balance, head_drag, motion_at, node_balance
 from sim.mechanics.contact_line import add_contact_line
 from sim.mechanics.flow import add_flow, has_flow
 from sim.mechanics.frames import add_frames, has_frames
@@ -105,7 +105,7 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
             velocity = minus(plus(motion.linear, cross(motion.spin, root)), flow)
             change = thinned(room.geometry, body, 0, m, velocity)
             force, torque = plus(force, change), plus(torque, cross(root, change))
-        wrench = wrench_of(motion, force, torque)
+        wrench = body_wrench(motion, force, torque)
         for a in range(4):
             t[m % instants, a] += wrench[a]
 

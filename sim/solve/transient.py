@@ -98,7 +98,7 @@ def transient(
         goal = marks[mark] if mark < len(marks) else until
         dt = _towards(goal - now, dt)
         solved = _try_step(body, x, u, twist, x_now, slope_now, lags[count], now, dt, step, work)
-        error = _error_of(step, dt) if solved else np.inf
+        error = _embedded_error(step, dt) if solved else np.inf
         if not error < 2 * tolerance:
             rejected += 1
             dt *= max(0.2, 0.9 * np.sqrt(tolerance / error)) if solved else 0.3
@@ -167,7 +167,7 @@ def _solve_stage(
 
 
 @compiled
-def _error_of(step: _Step, dt: float) -> float:
+def _embedded_error(step: _Step, dt: float) -> float:
     """Compare with the embedded method, (1/2, 1/2) in place of (1 − γ, γ), in the largest entry."""
     _, n, columns, _ = step.slope.shape
     factor, largest = (0.5 - GAMMA) * dt, 0.0
@@ -196,13 +196,13 @@ def _advance_lag(
         right[p, 0] = motion[p, 2] - twist[2] + rate * start[p, 2]
     solve_dense(matrix.copy(), right)
     step.lag[:, 2] = right[:, 0]
-    forward, left = _on_circle(twist, time)
+    forward, leftward = _on_circle(twist, time)
     right = np.empty((fields, 2))
     for p in range(fields):
         lag, heading = step.lag[p, 2], step.lag[p, 2] + twist[2] * time
         surge, sway, turning = motion[p, 0] - twist[0], motion[p, 1] - twist[1], motion[p, 2] - twist[2]
-        z = np.cos(lag) * forward - np.sin(lag) * left
-        x = np.sin(lag) * forward + np.cos(lag) * left
+        z = np.cos(lag) * forward - np.sin(lag) * leftward
+        x = np.sin(lag) * forward + np.cos(lag) * leftward
         right[p, 0] = np.cos(heading) * surge - np.sin(heading) * sway + turning * x + rate * start[p, 0]
         right[p, 1] = np.sin(heading) * surge + np.cos(heading) * sway - turning * z + rate * start[p, 1]
     solve_dense(matrix, right)
@@ -212,32 +212,32 @@ def _advance_lag(
 @compiled
 def _instants(body: Body, u: Floats, fields: int) -> Floats:
     """Compute (v_z, h_x, ω_yr, ω_t) at every instant of a turn, or their mean over time."""
-    found = np.empty((u.shape[0], 4))
+    motion = np.empty((u.shape[0], 4))
     for p in range(u.shape[0]):
-        found[p, 0], found[p, 1] = u[p, 1], u[p, 0] + u[p, 2] * body.head_length / 2
-        found[p, 2], found[p, 3] = u[p, 2], tail_spin(body, u[p])
+        motion[p, 0], motion[p, 1] = u[p, 1], u[p, 0] + u[p, 2] * body.head_length / 2
+        motion[p, 2], motion[p, 3] = u[p, 2], tail_spin(body, u[p])
     if fields == u.shape[0]:
-        return found
+        return motion
     mean, time = np.zeros((1, 4)), 0.0
     for p in range(u.shape[0]):
-        time += 1 / found[p, 3]
-        mean[0] += found[p] / found[p, 3]
+        time += 1 / motion[p, 3]
+        mean[0] += motion[p] / motion[p, 3]
     return mean / time
 
 
 @compiled
-def lag_at(found: Transient, times: Floats) -> Floats:
+def lag_at(solution: Transient, times: Floats) -> Floats:
     """Interpolate the lag (T, Q, 3) to `times` (T,) between the first step and the last (cubic Hermite)."""
-    out = np.empty((len(times), found.lag.shape[1], 3))
+    out = np.empty((len(times), solution.lag.shape[1], 3))
     k = 1
     for i in range(len(times)):
-        while k < len(found.times) - 2 and found.times[k + 1] < times[i]:
+        while k < len(solution.times) - 2 and solution.times[k + 1] < times[i]:
             k += 1
-        span = found.times[k + 1] - found.times[k]
-        s = (times[i] - found.times[k]) / span
-        first, last = found.lag[k], found.lag[k + 1]
+        span = solution.times[k + 1] - solution.times[k]
+        s = (times[i] - solution.times[k]) / span
+        first, last = solution.lag[k], solution.lag[k + 1]
         out[i] = first + s * s * (3 - 2 * s) * (last - first)
-        out[i] += span * s * (1 - s) * ((1 - s) * found.lag_rate[k] - s * found.lag_rate[k + 1])
+        out[i] += span * s * (1 - s) * ((1 - s) * solution.lag_rate[k] - s * solution.lag_rate[k + 1])
     return out
 
 
