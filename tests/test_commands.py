@@ -38,7 +38,7 @@ def done(*words: object) -> None:
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A robot, points, a plan with its replay, and a data set, all made by commands."""
+    """Make a robot, points, a plan with its replay, and a data set, all by commands."""
     folder = tmp_path_factory.mktemp("made")
     done("sim", "robot", "paper-control", "--out", folder / "robot.toml")
     groups = PRESETS["paper-control"].group_values()
@@ -133,7 +133,7 @@ def query(made: Path, out: Path) -> str:
 
 
 def inverse(made: Path, out: Path) -> str:
-    """The coefficient behind a yaw rate that the table gives itself."""
+    """Find the coefficient behind a yaw rate that the table gives itself."""
     robot = {name: np.array([value]) for name, value in PRESETS["paper-control"].group_values().items()}
     found = load().query(robot)
     targets = {**{k: v for k, v in robot.items() if k != "C_yr"}, "omega_yr_bar": found["omega_yr_bar"]}

@@ -58,7 +58,7 @@ class Found:
     claims: tuple[
         frozenset[str], ...
     ]  # sets of effects, each of which may be the truth; the procedure may name several
-    error: float  # on the locked runs, over the noise
+    error: float  # on the held-out runs, over the noise
 
 
 class _Sets:

@@ -45,7 +45,7 @@ class Outcome:
     judgement: str
     verdict: str
     effects: tuple[str, ...]
-    held_out: float  # error on the locked session over the noise of a run
+    held_out: float  # error on the held-out session over the noise of a run
     # Whether intervals contain the truth: those of rightly named effects, or of the coefficients of a null.
     covered: tuple[bool, ...]
 

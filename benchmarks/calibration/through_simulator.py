@@ -52,7 +52,7 @@ class Closed:
     label: str
     said: str
     judgement: str
-    held_out: float  # error on the locked session over the noise of a run
+    held_out: float  # error on the held-out session over the noise of a run
     calibrated: float  # the same of the model without effects
     seconds: float  # of a processor
     unsettled: int  # conditions whose truth is the direct solution

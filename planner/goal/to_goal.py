@@ -2,12 +2,12 @@
 
 The pivot moves like a car that only drives forward and has a least turn radius. Its shortest track between two
 poses is one of Dubins' words, or a chain of them around obstacles (`planner.goal.route`). The schedule follows
-that track like any other path. Its last dwells are then changed so that the robot ends at the goal with the
-heading that was asked for (`planner.goal.final_dwells`).
+that track like any other path. Its last dwells are then adjusted so that the robot ends at the goal with the
+wanted heading (`planner.goal.final_dwells`).
 
-The margin around obstacles is the error that the plan states, which is known only when the plan is made. So the
-track is sought again with a larger margin until the two agree. If there is none, shorter dwells are tried, which
-need less room.
+The margin around obstacles is the stated error of the plan, which is known only when the plan is made. So the
+track is planned again with a larger margin until the two agree. If there is no such track, shorter dwells are
+tried, which need less clearance.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Paths from files: CSV tables and SVG drawings.
 
-SVG is read by svgelements, with transforms, viewBox, curves, basic shapes and <use>. What is in <defs> is left
-out. In SVG y points down; here it points up. Every shape, and every subpath of a shape, is a path of its own. A
-file with several paths is refused, unless one is chosen by its name. Curves become polylines.
+SVG is read by svgelements, with transforms, viewBox, curves, basic shapes and <use>; <defs> is ignored. In SVG y
+points down; here it points up. Every shape, and every subpath of a shape, is a separate path. A file with several
+paths is rejected unless one is chosen by name. Curves become polylines.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ class Drawing:
 
 
 def read_path(source: str | Path, *, closed: bool | None = None, shape: str | None = None) -> Drawing:
-    """A path from a table with columns x, y, or from an SVG file.
+    """Read a path from a table with columns x, y, or from an SVG file.
 
     Args:
         source: the file.
-        closed: join the end to the start; by default what the file says.
+        closed: join the end to the start; by default as in the file.
         shape: name of the path, for an SVG with several; without it the error message lists the names.
 
     Raises:
@@ -64,7 +64,7 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
 
 
 def _read_columns(path: Path) -> Any:
-    """Columns x and y (n, 2) of a table: commas, semicolons, tabs or spaces; without a header the first two."""
+    """Read columns x and y (n, 2), split at commas, semicolons, tabs or spaces; without a header the first two."""
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError):
@@ -97,7 +97,7 @@ def _is_number(word: str) -> bool:
     return True
 
 
-# What svgelements raises at a drawing that is none: a transform without numbers, a path that begins with a curve
+# Raised by svgelements for invalid drawings: a transform without numbers, a path that begins with a curve
 _BROKEN = (
     ParseError, AttributeError, TypeError, UnicodeDecodeError, ValueError, ArithmeticError, LookupError,
 )  # fmt: skip
@@ -115,16 +115,18 @@ def _read_svg(path: Path, closed: bool | None, shape: str | None) -> Drawing:
     except _BROKEN as broken:
         reason = next(iter(str(broken).splitlines()), type(broken).__name__)
         raise InputError(f"{path} is not SVG: {reason}") from None
-    found = _subpaths(elements)
-    if not found:
+    subpaths = _subpaths(elements)
+    if not subpaths:
         raise InputError(f"{path} has no path, line, polyline, polygon, rectangle, circle or ellipse; draw one")
-    if shape is None and len(found) > 1:
-        names = ", ".join(found)
-        raise InputError(f"{path} has {len(found)} paths ({names}); choose one with --shape, or remove the others")
-    name = next(iter(found)) if shape is None else shape
-    if name not in found:
-        raise InputError(f"{path} has no shape {name!r}; there are {', '.join(found)}")
-    points, ends = found[name]
+    if shape is None and len(subpaths) > 1:
+        names = ", ".join(subpaths)
+        raise InputError(
+            f"{path} has {len(subpaths)} paths ({names}); choose one with --shape, or remove the others"
+        )
+    name = next(iter(subpaths)) if shape is None else shape
+    if name not in subpaths:
+        raise InputError(f"{path} has no shape {name!r}; there are {', '.join(subpaths)}")
+    points, ends = subpaths[name]
     physical = bool(_PHYSICAL.match(str(drawing.values.get("width", ""))))
     unit = METRES_PER_PIXEL if physical else None
     upright = points * [1.0, -1.0] + 0.0  # no negative zeros
@@ -132,11 +134,11 @@ def _read_svg(path: Path, closed: bool | None, shape: str | None) -> Drawing:
 
 
 def _subpaths(elements: list[Any]) -> dict[str, tuple[Floats, bool]]:
-    """Points (n, 2) of every subpath by name, and whether it is closed."""
+    """Find the points (n, 2) of every subpath by name, and whether it is closed."""
     from svgelements import Path as SvgPath
     from svgelements import Shape
 
-    found: dict[str, tuple[Floats, bool]] = {}
+    subpaths: dict[str, tuple[Floats, bool]] = {}
     counts: dict[str, int] = {}
     for element in elements:
         if not isinstance(element, Shape):
@@ -147,13 +149,13 @@ def _subpaths(elements: list[Any]) -> dict[str, tuple[Floats, bool]]:
         parts = [_points(SvgPath(part)) for part in SvgPath(element).as_subpaths()]
         parts = [part for part in parts if len(part[0]) > 1]
         for i, part in enumerate(parts):
-            own = name if len(parts) == 1 else f"{name}/{i + 1}"
-            found[own if own not in found else f"{own}-{kind}{counts[kind]}"] = part
-    return found
+            part_name = name if len(parts) == 1 else f"{name}/{i + 1}"
+            subpaths[part_name if part_name not in subpaths else f"{part_name}-{kind}{counts[kind]}"] = part
+    return subpaths
 
 
 def _points(subpath: Any) -> tuple[Floats, bool]:
-    """Points of one subpath, curves as polylines, and whether it is closed."""
+    """Sample the points of one subpath, curves as polylines, and tell whether it is closed."""
     from svgelements import Close, Line, Move
 
     points: list[tuple[float, float]] = []

@@ -237,10 +237,7 @@ def plan(
 
 
 def make_plan(
-    drawn: Path2D,
-    tracked: TrackedVehicle,
-    request: PlanRequest,
-    progress: Callable[[float], object] | None = None,
+    drawn: Path2D, tracked: TrackedVehicle, request: PlanRequest, progress: Callable[[float], object] | None = None
 ) -> Plan:
     """Plan for a path, a vehicle and a request; see `plan`."""
     vehicle = tracked.vehicle

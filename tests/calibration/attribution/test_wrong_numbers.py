@@ -1,4 +1,4 @@
-"""Numbers as given that are off: no physics within their tolerance, a finding of their own beyond it."""
+"""Nuisance parameters that are off: no physics within their tolerance, a finding of their own beyond it."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_a_stiffness_far_off_is_named_with_what_looks_like_it(share: float, sigm
 
 
 def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
-    """By the powers of the groups, against differences of predictions; off the numbers as given."""
+    """By the powers of the groups, against differences of predictions; off the nominal parameters."""
     table = toy_table(6)
     table["v_cm_s"] = (
         table["R_yr_cm"] * table["omega_yr_rad_s"].abs() * np.random.default_rng(0).uniform(0.9, 1.1, len(table))

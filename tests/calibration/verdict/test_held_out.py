@@ -1,4 +1,4 @@
-"""The locked session has no say and judges; results repeat; intervals by profile."""
+"""The held-out session has no say and judges; results repeat; intervals by profile."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.calibration.toy_tables import calibrated, calibrated_toy, shares_verd
 @shares_verdicts
 @pytest.mark.usefixtures("toy_model")
 def test_the_locked_session_has_no_say() -> None:
-    """Ruining the locked session changes the reported errors and nothing else."""
+    """Ruining the held-out session changes the reported errors and nothing else."""
     table = toy_table(5, end_over_end_drag=5.0)
     result = calibrated_toy(5, end_over_end_drag=5.0)
     data = read_measurements(table)

@@ -15,9 +15,7 @@ import pytest
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import _MOVED, plan
 from planner.planning.request import PlanRequest, RequestOptions
-from planner.vehicle.calibration_table import (
-    CalibrationKnowledge,
-)
+from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from tests.processes import LIMIT

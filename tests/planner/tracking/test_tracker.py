@@ -42,8 +42,7 @@ FURTHER = ("5 % faster turns", "3 % asymmetry")
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=pytest.mark.long) if name in FURTHER else name for name in ROBOTS],
+    "name", [pytest.param(name, marks=pytest.mark.long) if name in FURTHER else name for name in ROBOTS]
 )
 def test_robots_that_differ_stay_on_the_path(name: str) -> None:
     cameras = [Camera(rng=np.random.default_rng(seed)) for seed in range(3)]
@@ -85,7 +84,7 @@ def test_it_learns_the_robot() -> None:
 
 
 def alarmed(car: Vehicle, camera: Camera) -> bool:
-    """Whether the alarm came at any pose of a swim."""
+    """Tell whether the alarm came at any pose of a swim."""
     tracker, rang = Tracker(planned()), False
     update = tracker.update
 
