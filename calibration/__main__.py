@@ -36,8 +36,8 @@ def _calibrate(arguments: Namespace) -> None:
     from calibration.report.corrected_robot import check_given, corrected_toml
     from calibration.report.report import write_report
     from calibration.swimmer.head_correction import learn_head_correction
-    from calibration.swimmer.lab_settings import owned
     from calibration.swimmer.measured_table import read_measurements
+    from calibration.swimmer.possible_runs import owned
     from calibration.swimmer.protocols import PROTOCOLS
     from calibration.swimmer.swimmer import SwimmerModel
     from calibration.verdict.calibrate import calibrate

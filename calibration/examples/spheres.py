@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.forward_model import Parameter, Parameters, Runs, by_differences
+from calibration.statistics.statistical_model import Parameter, Parameters, Runs, by_differences
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
 from sim.arrays import Flags, Floats

@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.statistics.forward_model import Parameters
 from calibration.statistics.held_out import FinalRefit
+from calibration.statistics.statistical_model import Parameters
 from calibration.swimmer.candidate_effects import CURRENT
 from calibration.swimmer.head_correction import HeadCorrection
 from calibration.swimmer.nuisance_numbers import LENGTH

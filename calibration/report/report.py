@@ -8,11 +8,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from calibration.attribution.candidate import UNSEEN, Candidate
-from calibration.attribution.imitability import DOUBT
-from calibration.attribution.transfer_test import SURE
-from calibration.statistics.priors import WRONG
-from calibration.statistics.profile_intervals import least_determined
+from calibration.attribution.refits import DOUBT, SURE, UNSEEN, Candidate
+from calibration.statistics.fit import WRONG, least_determined
 from calibration.swimmer.measured_table import Measurements
 from calibration.verdict.next_runs import STOP, Batch
 from calibration.verdict.verdict import Verdict
@@ -310,7 +307,7 @@ def draw_map(result: Verdict, data: Measurements) -> Figure:
 
 def draw_evidence(result: Verdict) -> Figure:
     """Score of every effect as a bar, with the critical score; what explains the residual is filled in green."""
-    named = {name for c in result.explaining for name in (c.effect.name, *(e.name for e in c.beside))}
+    named = {name for c in result.explaining for name in (e.name for e in c.claimed)}
     ranked = sorted(result.evidence.candidates, key=lambda c: abs(c.z))
     figure = Figure(figsize=(9, 0.8 + 0.24 * len(ranked)))
     axes = figure.add_subplot()

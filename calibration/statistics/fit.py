@@ -7,11 +7,15 @@ Steps of Levenberg (1944) with the model's own derivatives:
 D is 1 for ln C and a typical size for ε. λ is 0, unless the step is too long or does not improve the fit. A
 parameter at a bound stays there if the step would lead out. The covariance of the parameters is V = A⁻¹, times a
 factor because S is estimated (`_inflation`). Nuisance parameters have priors, which are rows of their own
-(`calibration.statistics.priors`): they are in A, in the residual and in the deviance. Intervals are 95 %, by
+: they are in A, in the residual and in the deviance. Intervals are 95 %, by
 Student's t. The scatter ρ of a few sessions is uncertain, which limits the degrees of freedom (Satterthwaite
 1946):
 
     ν = 2 V² / (V′² Var ρ),   Var ρ ≈ 2 (ρ + 1/n)² / (k (s − 1)),   n runs in each of s sessions.
+
+The deviance along one parameter, with the others refitted, may differ from a parabola. So `profile_intervals` runs
+the model at both ends of the interval that the covariance gives. Each end moves to where the deviance, as a
+parabola on its side, has risen by t². Here t is the quantile of `Fit.interval`.
 """
 
 from __future__ import annotations
@@ -23,11 +27,25 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
-from calibration.statistics.forward_model import ForwardModel, Parameter, Parameters, parameter, stepped
-from calibration.statistics.noise import Noise, Sums, inverse_root, least_squares, repeat_covariance, sums
-from calibration.statistics.priors import Pull, with_prior
+from calibration.statistics.statistical_model import (
+    ForwardModel,
+    Noise,
+    Parameter,
+    Parameters,
+    Sums,
+    inverse_root,
+    least_squares,
+    moved,
+    parameter,
+    repeat_covariance,
+    stepped,
+    sums,
+    with_prior,
+)
 from sim.arrays import Flags, Floats, Integers
 
+WRONG = 3.0  # pull beyond which a nuisance parameter is taken to be wrong
+_LEARNT = 0.02  # share of the prior's variance that the runs must remove before a pull means anything
 _MOST_STEPS = 25
 _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
 _SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ⁻¹ r by less
@@ -36,6 +54,42 @@ _PASSES = 3  # iterations for the scatter of the sessions
 _DAMPING = (0.0, *(10.0**e for e in range(-3, 9)))  # λ
 _NEARER = 5  # starts that are tried
 _UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce rᵀ Σ⁻¹ r by more
+_FLAT = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
+_STEEP = 5.0  # if it is larger, the others were not refitted along a bent valley, and the end stays
+
+
+@dataclass(frozen=True)
+class Pull:
+    """What the runs say about one nuisance parameter, on its own scale."""
+
+    parameter: Parameter
+    change: float  # fitted, with its prior
+    error: float
+    alone: float  # from the runs alone, with the other nuisance parameters as far as their priors allow
+    alone_error: float
+    z: float
+    freed: bool  # its prior was taken away
+
+    @property
+    def learnt(self) -> bool:
+        """Whether the runs say anything about it."""
+        assert self.parameter.sigma is not None
+        return self.freed or self.error**2 < (1 - _LEARNT) * self.parameter.sigma**2
+
+    @property
+    def wrong(self) -> bool:
+        return self.learnt and abs(self.z) > WRONG
+
+    @property
+    def words(self) -> str:
+        """What the runs alone say, as in "E is 40 % below what was given (3.7 σ)"."""
+        return f"{self.parameter.title} is {self.off(self.alone)} what was given ({abs(self.z):.1f} σ)"
+
+    def off(self, change: float) -> str:
+        """A change in words: "40 % below"."""
+        given = self.parameter
+        size = abs(math.expm1(change)) * 100 if given.logarithmic else abs(change) * given.shown
+        return f"{size:.2g} {'%' if given.logarithmic else given.unit} {'below' if change < 0 else 'above'}"
 
 
 @dataclass(frozen=True)
@@ -44,6 +98,7 @@ class Fit:
 
     parameters: dict[str, float]
     fitted: tuple[Parameter, ...]  # in the order of the covariance
+    names: tuple[str, ...]  # of these
     covariance: Floats  # (p, p) of (ln C, ε)
     inflation: float  # factor in the covariance, because S is estimated
     freedom: Floats  # (p,) degrees of freedom of the intervals
@@ -53,15 +108,6 @@ class Fit:
     deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
     converged: bool  # the fit is at a minimum, or at one within the bounds
     wrong_numbers: tuple[tuple[Pull, ...], ...] = ()  # the first of each has lost its prior; see `fit`
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(p.name for p in self.fitted)
-
-    @property
-    def at_bounds(self) -> tuple[str, ...]:
-        """Parameters at an end of their range."""
-        return tuple(p.name for p in self.fitted if self.parameters[p.name] in p.bounds)
 
     def half_width(self, place: int) -> float:
         """Of the 95 % interval of a parameter, on its own scale."""
@@ -106,6 +152,7 @@ def fit(
     return Fit(
         parameters=point.parameters,
         fitted=fitted,
+        names=names,
         covariance=inflation * linear.covariance,
         inflation=inflation,
         freedom=_freedom(point.products, share, len(names)),
@@ -258,3 +305,74 @@ def _freedom(products: Sums, share: float, count: int) -> Floats:
     sessions = len(products.sizes)
     spread = 2 * (share + 1 / products.sizes.mean()) ** 2 / (products.outputs * max(sessions - 1, 1))
     return np.asarray(np.clip(2 * V**2 / np.maximum(((near - V) / step) ** 2 * spread, 1e-12 * V**2), 1.0, 1e6))
+
+
+def profile_intervals(
+    model: ForwardModel, fitted: Fit, used: Flags, *, title: str = ""
+) -> dict[str, tuple[float, float]]:
+    """Compute the 95 % interval of every fitted parameter, by its profile deviance; of nuisance parameters by the
+    covariance.
+    """
+    data, count = model.runs, len(fitted.names)
+    root = inverse_root(fitted.noise.run)
+    sets, ends = [], []
+    for i, one in enumerate(fitted.fitted):
+        if one.sigma is not None:
+            continue
+        half = fitted.half_width(i)
+        for side in (-1, 1):
+            end = moved(one, fitted.parameters[one.name], side * half)
+            own = (
+                math.log(end / fitted.parameters[one.name])
+                if one.logarithmic
+                else end - fitted.parameters[one.name]
+            )
+            along = fitted.covariance[i] / fitted.covariance[i, i] * own  # how the others change with it
+            sets.append(stepped(fitted.fitted, fitted.parameters, along))
+            ends.append((i, own))
+    found = model.predict(sets, title=title)
+    here = _deviance(
+        fitted, fitted.parameters, root, data.y - fitted.prediction, data.session, used, list(range(count))
+    )
+    intervals: dict[str, list[float]] = {one.name: [] for one in fitted.fitted if one.sigma is None}
+    for (i, own), at, prediction in zip(ends, sets, found, strict=True):
+        others = [j for j in range(count) if j != i]
+        rise = _deviance(fitted, at, root, data.y - prediction, data.session, used, others) - here
+        expected = own**2 / (fitted.covariance[i, i] / fitted.inflation)
+        scale = math.sqrt(expected / rise) if _FLAT * expected < rise < _STEEP * expected else 1.0
+        one = fitted.fitted[i]
+        intervals[one.name].append(moved(one, fitted.parameters[one.name], own * scale))
+    given = {one.name: fitted.interval(one.name) for one in fitted.fitted if one.sigma is not None}
+    return {**{name: (low, high) for name, (low, high) in intervals.items()}, **given}
+
+
+def _deviance(
+    fitted: Fit,
+    at: Parameters,
+    root: Floats,
+    residual: Floats,
+    session: Integers,
+    used: Flags,
+    others: list[int],
+) -> float:
+    """rᵀ Σ⁻¹ r at parameters `at` with those of `others` refitted (linearised), in the noise of the fit."""
+    table = np.concatenate([fitted.jacobian, residual[..., None]], -1)[used]
+    products = with_prior(sums(root @ table, session[used], len(root)), fitted.fitted, at)
+    columns = [*others, len(fitted.fitted)]
+    whole = products.at(np.array(fitted.noise.share))[np.ix_(columns, columns)]
+    p = len(others)
+    absorbed = whole[:p, p] @ np.linalg.pinv(whole[:p, :p], hermitian=True) @ whole[:p, p] if p else 0.0
+    return float(whole[p, p] - absorbed)
+
+
+def least_determined(fitted: Fit) -> tuple[str, float]:
+    """The combination of logarithmic parameters that the runs determine worst, and its standard error (of ln)."""
+    own = [i for i, p in enumerate(fitted.fitted) if p.logarithmic and p.sigma is None]
+    values, vectors = np.linalg.eigh(fitted.covariance[np.ix_(own, own)])
+    vector = vectors[:, -1] * np.sign(vectors[np.argmax(np.abs(vectors[:, -1])), -1])
+    parts = [
+        f"{fitted.fitted[i].name}^{power:.2f}"
+        for i, power in zip(own, vector.tolist(), strict=True)
+        if abs(power) > 0.1
+    ]
+    return " ".join(parts), float(np.sqrt(values[-1]))

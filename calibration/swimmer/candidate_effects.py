@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from calibration.statistics.forward_model import Parameter
+from calibration.statistics.statistical_model import Parameter
 from sim.effects import Effect, catalogue
 
 SLIP, TRACKED_POINT = "motor_slip", "tracked_point"
@@ -26,10 +26,6 @@ class Influence:
     effect: str | None  # of `sim.effects`; None: acts on the observation
     needs: str | None  # column of the table that it needs
     odd: bool  # left and right turns differ with it
-
-    @property
-    def name(self) -> str:
-        return self.parameter.name
 
 
 def influences() -> dict[str, Influence]:
@@ -84,7 +80,7 @@ def reason_untestable(
     influence: Influence, columns: Mapping[str, object], both_directions: bool, outputs: Sequence[str]
 ) -> str:
     """Why a table cannot test an influence; empty if it can."""
-    if influence.name in CURRENT and "v" not in outputs:
+    if influence.parameter.name in CURRENT and "v" not in outputs:
         return "needs v_cm_s"
     if influence.needs is not None and influence.needs not in columns:
         return f"needs {_COLUMNS[influence.needs]}"

@@ -25,8 +25,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.forward_model import Runs
-from calibration.statistics.noise import repeat_covariance
+from calibration.statistics.statistical_model import Runs, repeat_covariance
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, TACHOMETER
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError

@@ -2,7 +2,7 @@
 
 Those of the robot come from robot.toml. Three belong to the way of measuring and come from the table: the camera's
 scale, the zero of the heading and the tachometer. Each is a parameter with a prior
-(`calibration.statistics.priors`).
+(`calibration.statistics.statistical_model`).
 
 A motion depends on the robot through its groups, and on the unit of time μ0 l⁴/EI. Both are products of powers of
 the numbers, so the derivative along a number is a sum over groups with these powers.
@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from calibration.statistics.forward_model import Parameter
+from calibration.statistics.statistical_model import Parameter
 from sim.model.robot import Robot
 
 CAMERA, HEADING, TACHOMETER = "camera_scale", "heading_zero", "tachometer"

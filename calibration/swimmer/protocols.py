@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.statistics.splits import divided, middle_session
+from calibration.statistics.study import divided, middle_session
 from calibration.swimmer.measured_table import Measurements
 from sim.arrays import Flags
 from sim.io.errors import InputError

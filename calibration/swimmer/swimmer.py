@@ -15,8 +15,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from calibration.statistics.forward_model import Parameter, Parameters, by_differences
-from calibration.statistics.noise import Noise, repeat_covariance
+from calibration.statistics.statistical_model import (
+    Noise,
+    Parameter,
+    Parameters,
+    by_differences,
+    repeat_covariance,
+)
 from calibration.swimmer.candidate_effects import (
     CURRENT,
     SLIP,
@@ -25,7 +30,6 @@ from calibration.swimmer.candidate_effects import (
     influences,
     reason_untestable,
 )
-from calibration.swimmer.lab_settings import Owned, check_owned, possible_settings
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.nuisance_numbers import (
     CAMERA,
@@ -38,7 +42,7 @@ from calibration.swimmer.nuisance_numbers import (
     robot_number,
 )
 from calibration.swimmer.observation import Observation
-from calibration.swimmer.unit_checks import check_inputs, check_outputs
+from calibration.swimmer.possible_runs import Owned, check_inputs, check_outputs, check_owned, possible_settings
 from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
 from sim.io.errors import InputError
@@ -110,7 +114,7 @@ class SwimmerModel:
 
     @cached_property
     def untestable(self) -> dict[str, str]:
-        return {i.parameter.title: why for i in influences().values() if (why := self._reason(i))}
+        return {influence.parameter.title: why for influence, why in self._reasons if why}
 
     @cached_property
     def _seconds(self) -> dict[str, Influence]:
@@ -121,11 +125,13 @@ class SwimmerModel:
 
     @cached_property
     def _influences(self) -> dict[str, Influence]:
-        return {name: i for name, i in influences().items() if not self._reason(i)}
+        return {influence.parameter.name: influence for influence, why in self._reasons if not why}
 
-    def _reason(self, influence: Influence) -> str:
+    @cached_property
+    def _reasons(self) -> list[tuple[Influence, str]]:
+        """All influences, and why these runs cannot test them; empty where they can."""
         both = len(np.unique(np.sign(self.runs.omega))) == 2
-        return reason_untestable(influence, self._drivers, both, self.runs.outputs)
+        return [(i, reason_untestable(i, self._drivers, both, self.runs.outputs)) for i in influences().values()]
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "", lookup: NeuralTable | None = None) -> Floats:
         """Predictions (P, n, k) for P parameter sets, all simulated together.
@@ -167,7 +173,7 @@ class SwimmerModel:
         phases = FEW if any(i.effect for i in self._at_work(parameters)) else MANY
         found = self.solver.slopes(columns, wanted, phases=phases, jobs=self.jobs, title=title)
         view = self._observation(runs, np.array(parameters.get(CAMERA, 1.0)))
-        J = np.empty((len(self.runs), len(self.runs.outputs), len(names)))
+        J = np.empty((*self.runs.y.shape, len(names)))
         for j, (name, influence) in enumerate(influences.items()):
             if name in POWERS:
                 J[..., j] = self._slope_of_number(name, runs, columns, found, view)[place]
@@ -181,7 +187,7 @@ class SwimmerModel:
             )
             if name == SLIP:
                 slope = slope * (-columns["omega_bar"] / (1 - parameters[SLIP]))[:, None]
-            scale = self._drivers[influence.needs] if influence and influence.needs else np.ones(len(self.runs))
+            scale = self._drivers[influence.needs] if influence and influence.needs else np.ones(len(place))
             J[..., j] = slope[place] * (scale if influence else parameters[name] * scale)[:, None]
         seen = view.see(found.values)[place] + self._turned(parameters.get(HEADING, 0.0))
         if not quick and not (np.isfinite(J).all() and np.isfinite(seen).all()):
@@ -252,7 +258,7 @@ class SwimmerModel:
         check_outputs(self.runs, prediction)
 
     def possible(self) -> tuple[SwimmerModel, list[dict[str, Any]]]:
-        """Runs that can be made next (`calibration.swimmer.lab_settings`)."""
+        """Runs that can be made next (`calibration.swimmer.possible_runs`)."""
         runs, grid = self.runs, possible_settings(self.runs, self.own)
         count = len(grid)
         noted = np.tile(runs.noted.mean(0), (count, 1))
@@ -283,8 +289,10 @@ class SwimmerModel:
 
     def _at_work(self, parameters: Parameters) -> list[Influence]:
         """Influences that are not at their null."""
-        found = [i for name, i in self._influences.items() if name in parameters]
-        return [i for i in found if parameters[i.name] != i.parameter.start]
+        return [
+            influence for name, influence in self._influences.items()
+            if name in parameters and parameters[name] != influence.parameter.start
+        ]  # fmt: skip
 
     @cached_property
     def _drivers(self) -> dict[str, Floats]:
@@ -310,7 +318,7 @@ class SwimmerModel:
     def _run(self, parameters: Parameters, row: int, omega: float) -> _Run:
         effects, current = dict(self.robot.effects), 0.0
         for influence in self._at_work(parameters):
-            by = parameters[influence.name] - influence.parameter.start
+            by = parameters[influence.parameter.name] - influence.parameter.start
             before = influence.parameter.start
             if influence.needs is not None:
                 by *= float(self._drivers[influence.needs][row])
@@ -319,7 +327,7 @@ class SwimmerModel:
                 effects[influence.effect] = before + by
                 if second := influence.parameter.second:
                     effects[second.name] = parameters.get(second.name, second.start)
-            elif influence.name in CURRENT:
+            elif influence.parameter.name in CURRENT:
                 current += by
         robot = replace(
             self.robot, **robot_numbers(self.robot, parameters), tails=int(self.runs.tails[row]),

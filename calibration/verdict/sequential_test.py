@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.forward_model import ForwardModel, Runs, start_values
-from calibration.statistics.noise import Noise
+from calibration.statistics.statistical_model import ForwardModel, Noise, Runs, start_values
 from calibration.verdict.next_runs import GIVEN_UP
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError

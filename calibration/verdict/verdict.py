@@ -12,16 +12,15 @@ import warnings
 from dataclasses import dataclass
 from typing import Any
 
-from calibration.attribution.candidate import Candidate
-from calibration.statistics.fit import Fit
+from calibration.attribution.refits import Candidate
+from calibration.attribution.wrong_numbers import wrong_number
+from calibration.statistics.fit import Fit, Pull
 from calibration.statistics.held_out import FinalRefit
-from calibration.statistics.priors import Pull
-from calibration.statistics.pulls import wrong_number
+from calibration.statistics.residual_regression import Regression
 from calibration.statistics.residual_tests import Misfit
-from calibration.statistics.splits import Split
+from calibration.statistics.study import Split
 from calibration.verdict.experiment import LearntCorrection
 from calibration.verdict.next_runs import Batch, NextRun
-from calibration.verdict.residual_regression import Regression
 from calibration.verdict.sequential_test import Explanation
 from sim.arrays import Floats
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from calibration.statistics.priors import Pull
+from calibration.statistics.fit import Pull
 from calibration.verdict.verdict import Verdict
 from sim.io.provenance import provenance
 
