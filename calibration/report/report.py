@@ -39,7 +39,7 @@ def write_report(result: Verdict, data: Measurements, out: str | Path, *, title:
 
 
 def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
-    """The sections of the report."""
+    """Add the sections of the report."""
     _add_numbers(page, result)
     _add_data(page, result, data)
     _add_fit(page, result)
@@ -98,15 +98,17 @@ def _add_numbers(page: Page, result: Verdict) -> None:
     )
     rows = []
     for p in result.fits.pulls:
-        one = p.parameter
-        assert one.sigma is not None
-        scale, unit = (100.0, "%") if one.logarithmic else (one.shown, one.unit)
+        nuisance = p.parameter
+        assert nuisance.sigma is not None
+        scale, unit = (100.0, "%") if nuisance.logarithmic else (nuisance.shown, nuisance.unit)
         runs = f"{p.off(p.alone)}, ± {scale * p.alone_error:.2g} {unit}" if p.learnt else "nothing"
         rows.append(
             (
-                one.title,
-                f"{one.start:.4g}" if one.unit != one.title and one.start not in (0.0, 1.0) else "",
-                f"± {scale * one.sigma:.2g} {unit}",
+                nuisance.title,
+                f"{nuisance.start:.4g}"
+                if nuisance.unit != nuisance.title and nuisance.start not in (0.0, 1.0)
+                else "",
+                f"± {scale * nuisance.sigma:.2g} {unit}",
                 f"{p.off(p.change)}, ± {scale * p.error:.2g} {unit}",
                 runs,
                 f"{p.z:+.1f}" if p.learnt else "",
@@ -142,7 +144,7 @@ def _add_fit(page: Page, result: Verdict) -> None:
         (result.base, result.fits.base_intervals, "without effects"),
         (result.final, result.fits.final_intervals, "with the verdict's effects"),
     ):
-        for parameter in (one.name for one in fitted.fitted if one.name not in given):
+        for parameter in (p.name for p in fitted.fitted if p.name not in given):
             low, high = intervals[parameter]
             rows.append(
                 (f"{parameter}, {name}", f"{fitted.parameters[parameter]:.4g}", f"{low:.4g} to {high:.4g}")
@@ -151,11 +153,11 @@ def _add_fit(page: Page, result: Verdict) -> None:
             break
     page.table(("parameter", "value", "95 % interval, by profile deviance"), rows)
     combination, error = least_determined(result.final)
-    delivered = result.fits.final_refit.parameters
+    final = result.fits.final_refit.parameters
     page.text(
         f"The runs determine {combination} worst: {100 * error:.1f} %. corrected.toml has the model fitted once "
         "more to all runs, with the held-out ones: "
-        + ", ".join(f"{name} {delivered[name]:.4g}" for name in result.final.names if name not in given)
+        + ", ".join(f"{name} {final[name]:.4g}" for name in result.final.names if name not in given)
         + "."
     )
 
@@ -252,7 +254,7 @@ def _rpm(data: Measurements) -> Floats:
 
 
 def draw_summary(result: Verdict, data: Measurements) -> Figure:
-    """The residual of each output before and after, as rms over the fitted runs, and the noise of a run."""
+    """Draw the residual of each output before and after, as rms over the fitted runs, and the noise of a run."""
     bars = [
         ("calibrated, without effects", result.base.prediction, "#e08a1e"),
         ("final model", result.final.prediction, "#3d9a5f"),
@@ -276,7 +278,7 @@ def draw_summary(result: Verdict, data: Measurements) -> Figure:
 
 
 def draw_map(result: Verdict, data: Measurements) -> Figure:
-    """z of every output along every feature of the inputs, before and after."""
+    """Draw z of every output along every feature of the inputs, before and after."""
     maps = [("calibrated", result.evidence.misfit)]
     if result.explaining and result.explaining[0].refit_misfit is not None:
         maps.append(("with the verdict's effects", result.explaining[0].refit_misfit))
@@ -306,7 +308,7 @@ def draw_map(result: Verdict, data: Measurements) -> Figure:
 
 
 def draw_evidence(result: Verdict) -> Figure:
-    """Score of every effect as a bar, with the critical score; what explains the residual is filled in green."""
+    """Draw the score of every effect as a bar, with the critical score; what explains the residual is green."""
     named = {name for c in result.explaining for name in (e.name for e in c.claimed)}
     ranked = sorted(result.evidence.candidates, key=lambda c: abs(c.z))
     figure = Figure(figsize=(9, 0.8 + 0.24 * len(ranked)))
@@ -328,7 +330,7 @@ def draw_evidence(result: Verdict) -> Figure:
 
 
 def draw_residuals(result: Verdict, data: Measurements) -> Figure:
-    """Measured minus model in per cent, against tail length, before (left) and after (right)."""
+    """Draw measured minus model in per cent, against tail length, before (left) and after (right)."""
     outputs = data.outputs
     figure = Figure(figsize=(11, 1.9 * len(outputs)))
     colours = {n: c for n, c in zip((2, 3, 4, 5), ("#2a7fba", "#e08a1e", "#3d9a5f", "#8a4fa3"), strict=True)}
@@ -368,5 +370,5 @@ def draw_residuals(result: Verdict, data: Measurements) -> Figure:
 
 
 def _size(value: float) -> str:
-    """A smallest detectable size; a dash where no size shows in these runs."""
+    """Write a smallest detectable size; a dash where no size shows in these runs."""
     return f"{value:.2g}" if value < UNSEEN else "–"

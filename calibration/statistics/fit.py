@@ -86,7 +86,7 @@ class Pull:
         return f"{self.parameter.title} is {self.off(self.alone)} what was given ({abs(self.z):.1f} σ)"
 
     def off(self, change: float) -> str:
-        """A change in words: "40 % below"."""
+        """Put a change into words: "40 % below"."""
         given = self.parameter
         size = abs(math.expm1(change)) * 100 if given.logarithmic else abs(change) * given.shown
         return f"{size:.2g} {'%' if given.logarithmic else given.unit} {'below' if change < 0 else 'above'}"
@@ -110,11 +110,11 @@ class Fit:
     wrong_numbers: tuple[tuple[Pull, ...], ...] = ()  # the first of each has lost its prior; see `fit`
 
     def half_width(self, place: int) -> float:
-        """Of the 95 % interval of a parameter, on its own scale."""
+        """Compute half of the 95 % interval of a parameter, on its own scale."""
         return float(student.ppf(0.975, self.freedom[place])) * math.sqrt(self.covariance[place, place])
 
     def interval(self, name: str) -> tuple[float, float]:
-        """95 % interval of a parameter."""
+        """Compute the 95 % interval of a parameter."""
         value = self.parameters[name]
         place = self.names.index(name)
         half = self.half_width(place)
@@ -147,7 +147,7 @@ def fit(
     point = _descend(problem, problem.first(dict(start)))
     linear = least_squares(point.products, passes=_PASSES)
     share = float(linear.share)
-    whole = point.products.at(linear.share)
+    normal = point.products.at(linear.share)
     inflation = _inflation(data.condition[used], len(run))
     return Fit(
         parameters=point.parameters,
@@ -159,8 +159,8 @@ def fit(
         prediction=point.prediction,
         jacobian=point.derivative,
         noise=Noise(run, share),
-        deviance=float(whole[-1, -1] + len(run) * np.log1p(share * point.products.sizes).sum()),
-        converged=_step(fitted, point.parameters, whole, 0).promise < _UNSETTLED,
+        deviance=float(normal[-1, -1] + len(run) * np.log1p(share * point.products.sizes).sum()),
+        converged=_step(fitted, point.parameters, normal, 0).promise < _UNSETTLED,
         wrong_numbers=wrong_numbers,
     )
 
@@ -190,24 +190,24 @@ class _Problem:
     title: str
 
     def first(self, parameters: dict[str, float]) -> _Point:
-        """The model at the start; effects move towards their null while it cannot be solved quickly there."""
-        effects = [one for one in self.fitted if one.name in {e.name for e in self.model.effects}]
+        """Run the model at the start; effects move towards their null while it cannot be solved quickly there."""
+        effects = [p for p in self.fitted if p.name in {e.name for e in self.model.effects}]
         tried = dict(parameters)
         for _ in range(_NEARER if effects else 1):
             point = self.at(tried, None, 1)
             if point.solved:
                 return point
-            tried.update({one.name: (tried[one.name] + one.start) / 2 for one in effects})
+            tried.update({p.name: (tried[p.name] + p.start) / 2 for p in effects})
         return self.at(parameters, None, 1, quick=False)
 
     def at(
         self, parameters: dict[str, float], derivative: Floats | None, count: int, *, quick: bool = True
     ) -> _Point:
-        """The model at `parameters`; its derivatives are computed if none are given."""
+        """Run the model at `parameters`; its derivatives are computed if none are given."""
         title = f"{self.title}, step {count}" if self.title else ""
         if derivative is None:
             prediction, derivative = self.model.derivatives(
-                parameters, [one.name for one in self.fitted], title=title, quick=quick
+                parameters, [p.name for p in self.fitted], title=title, quick=quick
             )
         else:
             prediction = self.model.predict([parameters], title=title)[0]
@@ -225,7 +225,7 @@ class _Step(NamedTuple):
 
 
 def _descend(problem: _Problem, point: _Point) -> _Point:
-    """The least rᵀ Σ⁻¹ r from `point`; steps to where the model cannot be solved quickly are too long."""
+    """Find the least rᵀ Σ⁻¹ r from `point`; steps to where the model cannot be solved quickly are too long."""
     fitted = problem.fitted
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
     for count in range(1, _MOST_STEPS + 1):
@@ -247,35 +247,35 @@ def _descend(problem: _Problem, point: _Point) -> _Point:
     return point
 
 
-def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: Floats, least: int) -> _Step:
-    """A step from `parameters`.
+def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _Step:
+    """Compute a step from `parameters`.
 
     Args:
         whole: (p + 1, p + 1) products of the derivatives and the residual.
         least: place of the least λ allowed.
     """
     for place in range(least, len(_DAMPING)):
-        change = _damped(fitted, parameters, whole, _DAMPING[place])
-        if all(abs(c) <= _LARGEST for c, one in zip(change, fitted, strict=True) if one.logarithmic):
+        change = _damped(fitted, parameters, normal, _DAMPING[place])
+        if all(abs(c) <= _LARGEST for c, p in zip(change, fitted, strict=True) if p.logarithmic):
             break
     new = stepped(fitted, parameters, change)
-    promise = 2 * change @ whole[:-1, -1] - change @ whole[:-1, :-1] @ change
+    promise = 2 * change @ normal[:-1, -1] - change @ normal[:-1, :-1] @ change
     return _Step(new, float(np.abs(change).max()), float(promise), place)
 
 
-def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: Floats, damping: float) -> Floats:
-    """Change (p,) of the parameters; zero for those that stay at a bound."""
-    at_low = np.array([parameters[one.name] <= one.bounds[0] for one in fitted])
-    at_high = np.array([parameters[one.name] >= one.bounds[1] for one in fitted])
-    typical = np.array([1.0 if one.logarithmic else abs(one.typical) for one in fitted])
+def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, damping: float) -> Floats:
+    """Compute the change (p,) of the parameters; zero for those that stay at a bound."""
+    at_low = np.array([parameters[p.name] <= p.bounds[0] for p in fitted])
+    at_high = np.array([parameters[p.name] >= p.bounds[1] for p in fitted])
+    typical = np.array([1.0 if p.logarithmic else abs(p.typical) for p in fitted])
     change = np.zeros(len(fitted))
     free = np.arange(len(fitted))
     while len(free):
-        own = whole[np.ix_(free, free)] + np.diag(damping / typical[free] ** 2)
-        scale = np.sqrt(np.maximum(np.diag(own), 1e-300))
-        inverse = np.linalg.pinv(own / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        damped = normal[np.ix_(free, free)] + np.diag(damping / typical[free] ** 2)
+        scale = np.sqrt(np.maximum(np.diag(damped), 1e-300))
+        inverse = np.linalg.pinv(damped / np.outer(scale, scale), rcond=1e-12, hermitian=True)
         change[:] = 0.0
-        change[free] = inverse @ (whole[free, -1] / scale) / scale
+        change[free] = inverse @ (normal[free, -1] / scale) / scale
         outward = (at_low & (change < 0)) | (at_high & (change > 0))
         if not outward.any():
             break
@@ -285,7 +285,7 @@ def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: 
 
 
 def _inflation(condition: Integers, outputs: int) -> float:
-    """Factor by which the variance is larger because S is estimated from ν repeats of k outputs.
+    """Compute the factor by which the variance is larger because S is estimated from ν repeats of k outputs.
 
     ν/(ν − k − 1), because 1/S is overestimated, times 1 + (k − 1)/(ν − k), because its weights are not optimal.
     """
@@ -296,7 +296,7 @@ def _inflation(condition: Integers, outputs: int) -> float:
 
 
 def _freedom(products: Sums, share: float, count: int) -> Floats:
-    """Degrees of freedom of the parameters' variances, (p,)."""
+    """Estimate the degrees of freedom of the parameters' variances, (p,)."""
     step = 0.01 * share + 1e-3 / products.sizes.mean()
     inverse = [
         np.linalg.pinv(products.at(np.array(s))[:count, :count], hermitian=True) for s in (share, share + step)
@@ -316,63 +316,61 @@ def profile_intervals(
     data, count = model.runs, len(fitted.names)
     root = inverse_root(fitted.noise.run)
     sets, ends = [], []
-    for i, one in enumerate(fitted.fitted):
-        if one.sigma is not None:
+    for i, p in enumerate(fitted.fitted):
+        if p.sigma is not None:
             continue
         half = fitted.half_width(i)
         for side in (-1, 1):
-            end = moved(one, fitted.parameters[one.name], side * half)
-            own = (
-                math.log(end / fitted.parameters[one.name])
-                if one.logarithmic
-                else end - fitted.parameters[one.name]
+            end = moved(p, fitted.parameters[p.name], side * half)
+            change = (
+                math.log(end / fitted.parameters[p.name]) if p.logarithmic else end - fitted.parameters[p.name]
             )
-            along = fitted.covariance[i] / fitted.covariance[i, i] * own  # how the others change with it
-            sets.append(stepped(fitted.fitted, fitted.parameters, along))
-            ends.append((i, own))
-    found = model.predict(sets, title=title)
-    here = _deviance(
+            step = fitted.covariance[i] / fitted.covariance[i, i] * change  # how the others change with it
+            sets.append(stepped(fitted.fitted, fitted.parameters, step))
+            ends.append((i, change))
+    predictions = model.predict(sets, title=title)
+    least = _deviance(
         fitted, fitted.parameters, root, data.y - fitted.prediction, data.session, used, list(range(count))
     )
-    intervals: dict[str, list[float]] = {one.name: [] for one in fitted.fitted if one.sigma is None}
-    for (i, own), at, prediction in zip(ends, sets, found, strict=True):
+    intervals: dict[str, list[float]] = {p.name: [] for p in fitted.fitted if p.sigma is None}
+    for (i, change), parameters, prediction in zip(ends, sets, predictions, strict=True):
         others = [j for j in range(count) if j != i]
-        rise = _deviance(fitted, at, root, data.y - prediction, data.session, used, others) - here
-        expected = own**2 / (fitted.covariance[i, i] / fitted.inflation)
+        rise = _deviance(fitted, parameters, root, data.y - prediction, data.session, used, others) - least
+        expected = change**2 / (fitted.covariance[i, i] / fitted.inflation)
         scale = math.sqrt(expected / rise) if _FLAT * expected < rise < _STEEP * expected else 1.0
-        one = fitted.fitted[i]
-        intervals[one.name].append(moved(one, fitted.parameters[one.name], own * scale))
-    given = {one.name: fitted.interval(one.name) for one in fitted.fitted if one.sigma is not None}
+        p = fitted.fitted[i]
+        intervals[p.name].append(moved(p, fitted.parameters[p.name], change * scale))
+    given = {p.name: fitted.interval(p.name) for p in fitted.fitted if p.sigma is not None}
     return {**{name: (low, high) for name, (low, high) in intervals.items()}, **given}
 
 
 def _deviance(
     fitted: Fit,
-    at: Parameters,
+    parameters: Parameters,
     root: Floats,
     residual: Floats,
     session: Integers,
     used: Flags,
     others: list[int],
 ) -> float:
-    """rᵀ Σ⁻¹ r at parameters `at` with those of `others` refitted (linearised), in the noise of the fit."""
+    """Compute rᵀ Σ⁻¹ r at `parameters` with those of `others` refitted (linearised), in the noise of the fit."""
     table = np.concatenate([fitted.jacobian, residual[..., None]], -1)[used]
-    products = with_prior(sums(root @ table, session[used], len(root)), fitted.fitted, at)
+    products = with_prior(sums(root @ table, session[used], len(root)), fitted.fitted, parameters)
     columns = [*others, len(fitted.fitted)]
-    whole = products.at(np.array(fitted.noise.share))[np.ix_(columns, columns)]
+    normal = products.at(np.array(fitted.noise.share))[np.ix_(columns, columns)]
     p = len(others)
-    absorbed = whole[:p, p] @ np.linalg.pinv(whole[:p, :p], hermitian=True) @ whole[:p, p] if p else 0.0
-    return float(whole[p, p] - absorbed)
+    absorbed = normal[:p, p] @ np.linalg.pinv(normal[:p, :p], hermitian=True) @ normal[:p, p] if p else 0.0
+    return float(normal[p, p] - absorbed)
 
 
 def least_determined(fitted: Fit) -> tuple[str, float]:
-    """The combination of logarithmic parameters that the runs determine worst, and its standard error (of ln)."""
-    own = [i for i, p in enumerate(fitted.fitted) if p.logarithmic and p.sigma is None]
-    values, vectors = np.linalg.eigh(fitted.covariance[np.ix_(own, own)])
+    """Find the combination of logarithmic parameters that the runs determine worst, and its error (of ln)."""
+    places = [i for i, p in enumerate(fitted.fitted) if p.logarithmic and p.sigma is None]
+    values, vectors = np.linalg.eigh(fitted.covariance[np.ix_(places, places)])
     vector = vectors[:, -1] * np.sign(vectors[np.argmax(np.abs(vectors[:, -1])), -1])
     parts = [
         f"{fitted.fitted[i].name}^{power:.2f}"
-        for i, power in zip(own, vector.tolist(), strict=True)
+        for i, power in zip(places, vector.tolist(), strict=True)
         if abs(power) > 0.1
     ]
     return " ".join(parts), float(np.sqrt(values[-1]))

@@ -76,12 +76,12 @@ class Directions:
 
     @classmethod
     def plain(cls, table: Floats) -> Directions:
-        """One column for each effect."""
+        """Make one column for each effect."""
         count = table.shape[-1]
         return cls(table, np.arange(count), np.full(count, np.nan))
 
     def without(self, place: int) -> Directions:
-        """Without one effect."""
+        """Leave one effect out."""
         kept = self.owner != place
         owner = self.owner[kept]
         return Directions(self.table[..., kept], owner - (owner > place), self.second[kept])
@@ -168,15 +168,15 @@ class FixedColumns:
         weighted = residual @ precision
         means, weighted_means = self.picks @ residual, self.picks @ weighted  # (b, s, k)
         flat = precision.reshape(b, k * k)
-        whole, between = np.empty((b, m + 1, m + 1)), np.empty((b, s, m + 1, m + 1))
-        whole[:, :m, :m] = (flat @ self._whole).reshape(b, m, m)
+        total, between = np.empty((b, m + 1, m + 1)), np.empty((b, s, m + 1, m + 1))
+        total[:, :m, :m] = (flat @ self._whole).reshape(b, m, m)
         between[:, :, :m, :m] = (flat @ self._between).reshape(b, s, m, m)
-        whole[:, m, :m] = whole[:, :m, m] = weighted.reshape(b, n * k) @ self._flat
+        total[:, m, :m] = total[:, :m, m] = weighted.reshape(b, n * k) @ self._flat
         across = np.einsum("bsk,skm->bsm", weighted_means, self.means, optimize=True)
         between[..., m, :m] = between[..., :m, m] = across
-        whole[:, m, m] = (weighted * residual).sum((-1, -2))
+        total[:, m, m] = (weighted * residual).sum((-1, -2))
         between[..., m, m] = (weighted_means * means).sum(-1)
-        return Sums(whole - between.sum(-3), between, self.sizes, k)
+        return Sums(total - between.sum(-3), between, self.sizes, k)
 
 
 class _Tester:
@@ -255,12 +255,12 @@ def projected_scores(products: Sums, p: int) -> tuple[Floats, Floats, Floats]:
     e = products.within.shape[-1] - p - 1
     columns = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
     part = products.take(columns)
-    whole = part.at(session_share(part, passes=_PASSES_OF_A_SCORE))  # (B, e, p + 2, p + 2)
-    weights = solved(whole[..., : p + 1, : p + 1])[0]  # of the first p columns in the one that is scored
-    score = whole[..., p, p + 1] - (weights * whole[..., :p, p + 1]).sum(-1)
-    square = whole[..., p, p] - (weights * whole[..., :p, p]).sum(-1)
+    normal = part.at(session_share(part, passes=_PASSES_OF_A_SCORE))  # (B, e, p + 2, p + 2)
+    weights = solved(normal[..., : p + 1, : p + 1])[0]  # of the first p columns in the one that is scored
+    score = normal[..., p, p + 1] - (weights * normal[..., :p, p + 1]).sum(-1)
+    square = normal[..., p, p] - (weights * normal[..., :p, p]).sum(-1)
     length = np.sqrt(np.maximum(square, 1e-300))
-    survived = length / np.sqrt(np.maximum(whole[..., p, p], 1e-300))
+    survived = length / np.sqrt(np.maximum(normal[..., p, p], 1e-300))
     return np.where(survived > 1e-6, score / length, 0.0), survived, length
 
 

@@ -80,7 +80,7 @@ class Runs:
         return len(self.y)
 
     def subset(self, rows: Flags | Integers) -> Any:
-        """The runs in `rows`: flags (n,), or places."""
+        """Choose the runs in `rows`: flags (n,), or places."""
         arrays: dict[str, Any] = {k: v[rows] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         return replace(self, **arrays)
 
@@ -107,13 +107,13 @@ class ForwardModel(Protocol):
         ...
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
-        """Predictions (P, n, k) for P parameter sets, each with every coefficient and effect."""
+        """Predict (P, n, k) for P parameter sets, each with every coefficient and effect."""
         ...
 
     def derivatives(
         self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
     ) -> tuple[Floats, Floats]:
-        """Prediction (n, k) and its derivatives (n, k, p) on the scales of the parameters `names`.
+        """Compute the prediction (n, k) and its derivatives (n, k, p) on the scales of the parameters `names`.
 
         With `quick` they may be NaN where they would take long.
         """
@@ -229,9 +229,9 @@ class Linear:
     share: Floats  # (...) ρ
 
 
-def root_diagonal(whole: Floats) -> Floats:
+def root_diagonal(normal: Floats) -> Floats:
     """Return roots of the diagonals of (..., p, p), 1 where there is nothing."""
-    diagonal = np.diagonal(whole, axis1=-2, axis2=-1)
+    diagonal = np.diagonal(normal, axis1=-2, axis2=-1)
     return np.where(diagonal > 1e-280, np.sqrt(np.maximum(diagonal, 1e-280)), 1.0)
 
 
@@ -251,11 +251,11 @@ def sums(columns: Floats, session: Labels, outputs: int) -> Sums:
     """Multiply columns (..., n, k, m) that are white in S with each other."""
     *batch, n, k, m = columns.shape
     flat = columns.reshape(*batch, n * k, m)
-    whole = np.swapaxes(flat, -1, -2) @ flat
+    total = np.swapaxes(flat, -1, -2) @ flat
     picks, count = averaging_rows(session)
     means = np.einsum("sn,...nkm->...skm", picks, columns)
     between = np.swapaxes(means, -1, -2) @ means
-    return Sums(whole - between.sum(-3), between, count, outputs)
+    return Sums(total - between.sum(-3), between, count, outputs)
 
 
 def averaging_rows(session: Labels) -> tuple[Floats, Floats]:
@@ -281,25 +281,25 @@ def session_share(products: Sums, *, passes: int) -> Floats:
     if count == 1 and passes:
         return np.full_like(share, SESSION_SHARE)
     for _ in range(passes):
-        whole = products.at(share)
-        step, covariance = solved(whole)
-        left = np.concatenate([-step, np.ones((*share.shape, 1))], -1)
-        each = products.between @ left[..., None, :, None]
-        between = (each[..., 0] * left[..., None, :]).sum((-1, -2))
-        means = whole[..., :p, :p] - products.within[..., :p, :p]
+        normal = products.at(share)
+        step, covariance = solved(normal)
+        combination = np.concatenate([-step, np.ones((*share.shape, 1))], -1)
+        each = products.between @ combination[..., None, :, None]
+        between = (each[..., 0] * combination[..., None, :]).sum((-1, -2))
+        means = normal[..., :p, :p] - products.within[..., :p, :p]
         freedom = products.outputs - (covariance * np.swapaxes(means, -1, -2)).sum((-1, -2)) / count
         excess = between / np.maximum(freedom, 0.1 * products.outputs) - count
         share = np.clip(excess / products.sizes.sum(), 0.0, SESSION_SHARE)
     return share
 
 
-def solved(whole: Floats) -> tuple[Floats, Floats]:
+def solved(normal: Floats) -> tuple[Floats, Floats]:
     """Solve for the coefficients (..., p) of the last of the columns; with their covariance (..., p, p)."""
-    p = whole.shape[-1] - 1
-    scale = root_diagonal(whole[..., :p, :p])
-    scaled = whole[..., :p, :p] / scale[..., :, None] / scale[..., None, :]
+    p = normal.shape[-1] - 1
+    scale = root_diagonal(normal[..., :p, :p])
+    scaled = normal[..., :p, :p] / scale[..., :, None] / scale[..., None, :]
     covariance = inverse(scaled) / scale[..., :, None] / scale[..., None, :]
-    return (covariance @ whole[..., :p, p, None])[..., 0], covariance
+    return (covariance @ normal[..., :p, p, None])[..., 0], covariance
 
 
 def repeat_covariance(y: Floats, condition: Labels) -> Floats:
@@ -341,21 +341,21 @@ def with_prior(products: Sums, fitted: Sequence[Parameter], parameters: Paramete
 
 
 def features(runs: Runs, used: Flags) -> tuple[tuple[str, ...], Floats]:
-    """Names, and the inputs that differ, their squares, products and cubes for all runs, (n, f).
+    """Name and compute the inputs that differ, their squares, products and cubes for all runs, (n, f).
 
     Standardised on the runs in `used` (n,).
     """
     spread = runs.inputs[used].std(0)
-    own = np.flatnonzero(spread > 1e-9).tolist()
-    inputs = (runs.inputs[:, own] - runs.inputs[used][:, own].mean(0)) / spread[own]
-    names, columns = [runs.input_names[i] for i in own], list(inputs.T)
-    for i in range(len(own)):
-        for j in range(i, len(own)):
+    varied = np.flatnonzero(spread > 1e-9).tolist()
+    inputs = (runs.inputs[:, varied] - runs.inputs[used][:, varied].mean(0)) / spread[varied]
+    names, columns = [runs.input_names[i] for i in varied], list(inputs.T)
+    for i in range(len(varied)):
+        for j in range(i, len(varied)):
             product = inputs[:, i] * inputs[:, j]
             if product[used].std() > 1e-9:
                 names.append(f"{names[i]} × {names[j]}" if i != j else f"({names[i]})²")
                 columns.append((product - product[used].mean()) / product[used].std())
-    for i, column in zip(own, inputs.T, strict=True):
+    for i, column in zip(varied, inputs.T, strict=True):
         lower = np.stack([np.ones_like(column), column, column**2], 1)
         weights = np.linalg.lstsq(lower[used], column[used] ** 3, rcond=None)[0]
         cube = column**3 - lower @ weights  # beyond lower powers; little for two or three levels

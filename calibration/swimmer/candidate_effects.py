@@ -29,17 +29,17 @@ class Influence:
 
 
 def influences() -> dict[str, Influence]:
-    """All influences by name."""
-    found = {}
+    """List all influences by name."""
+    known = {}
     for effect in catalogue().values():
         if not effect.drivers and not effect.beside:
-            found[effect.name] = _plain(effect)
+            known[effect.name] = _plain(effect)
         for driver in effect.drivers:
             parameter = Parameter(
                 driver.name, driver.title, 0.0, driver.bounds, driver.typical, unit=driver.unit,
                 plausible=driver.plausible,
             )  # fmt: skip
-            found[driver.name] = Influence(parameter, effect.name, driver.column, effect.symmetry == "odd")
+            known[driver.name] = Influence(parameter, effect.name, driver.column, effect.symmetry == "odd")
     slip = Parameter(
         SLIP, "slip of the motor", 0.0, (-0.3, 0.3), 0.02, unit="share of its speed", plausible=(-0.1, 0.1)
     )
@@ -57,10 +57,10 @@ def influences() -> dict[str, Influence]:
             unit="m/s",
             plausible=(-0.02, 0.02),
         )
-        found[name] = Influence(current, None, f"heading_{axis}", False)
-    found[SLIP] = Influence(slip, None, None, False)
-    found[TRACKED_POINT] = Influence(point, None, None, False)
-    return dict(sorted(found.items()))
+        known[name] = Influence(current, None, f"heading_{axis}", False)
+    known[SLIP] = Influence(slip, None, None, False)
+    known[TRACKED_POINT] = Influence(point, None, None, False)
+    return dict(sorted(known.items()))
 
 
 def _plain(effect: Effect) -> Influence:
@@ -79,7 +79,7 @@ def _parameter(effect: Effect) -> Parameter:
 def reason_untestable(
     influence: Influence, columns: Mapping[str, object], both_directions: bool, outputs: Sequence[str]
 ) -> str:
-    """Why a table cannot test an influence; empty if it can."""
+    """Say why a table cannot test an influence; empty if it can."""
     if influence.parameter.name in CURRENT and "v" not in outputs:
         return "needs v_cm_s"
     if influence.needs is not None and influence.needs not in columns:

@@ -78,7 +78,7 @@ class Measurements(Runs):
 
 
 def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
-    """Measurements from a CSV or a table.
+    """Read measurements from a CSV or a table.
 
     Raises:
         InputError: columns are missing or misspelt, or too few runs remain.
@@ -150,7 +150,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
 def _independent(
     y: Floats, outputs: tuple[str, ...], condition: Integers
 ) -> tuple[Floats, tuple[str, ...], tuple[str, ...]]:
-    """Outputs that were measured: repeats differ, and not just as other outputs do.
+    """Choose outputs that were measured: repeats differ, and not just as other outputs do.
 
     Raises:
         InputError: an output is the same in all repeats.
@@ -164,9 +164,9 @@ def _independent(
             raise InputError(
                 f"{column} does not differ between repeats; give measured values, unrounded, or leave it out"
             )
-        own = run[np.ix_(kept, kept)]
-        left = run[i, i] - run[i, kept] @ np.linalg.solve(own, run[kept, i]) if kept else run[i, i]
-        if left < _OWN * run[i, i]:
+        covariance = run[np.ix_(kept, kept)]
+        remainder = run[i, i] - run[i, kept] @ np.linalg.solve(covariance, run[kept, i]) if kept else run[i, i]
+        if remainder < _OWN * run[i, i]:
             others = ", ".join(OUTPUTS[outputs[j]][0] for j in kept)
             follows.append(f"column {column}: follows from {others}, so it is not counted twice")
         else:
@@ -175,36 +175,36 @@ def _independent(
 
 
 def _sigmas(good: pd.DataFrame) -> dict[str, float]:
-    """Standard deviations of the way of measuring, the same in all rows.
+    """Read standard deviations of the way of measuring, the same in all rows.
 
     Raises:
         InputError: a column has no number, two different ones, or one that is below 0 or too large.
     """
-    found = {}
+    sigmas = {}
     for column, (name, factor) in _SIGMAS.items():
         if column in good:
             values = np.unique(good[column].to_numpy(dtype=float))
             if len(values) != 1 or not 0 <= values[0] * factor <= 0.5:
                 raise InputError(f"{column} must be one number, the same in all rows, at least 0 and not large")
-            found[name] = float(values[0] * factor)
-    return found
+            sigmas[name] = float(values[0] * factor)
+    return sigmas
 
 
 def _caveats(tails: Floats, length: Floats, omega: Floats) -> tuple[str, ...]:
-    """Inputs that are the same in all runs, in words."""
-    found = []
+    """Say which inputs are the same in all runs."""
+    caveats = []
     if np.ptp(tails) == 0:
-        found.append(f"all runs have N = {tails[0]:.0f}: what depends on the number of tails cannot be found")
+        caveats.append(f"all runs have N = {tails[0]:.0f}: what depends on the number of tails cannot be found")
     if np.ptp(length) == 0:
-        found.append("all runs have one tail length: what depends on it cannot be found")
+        caveats.append("all runs have one tail length: what depends on it cannot be found")
     if np.ptp(np.abs(omega)) < 0.01 * np.abs(omega).max():
-        found.append("all runs have one motor speed: what depends on it cannot be found")
-    return tuple(found)
+        caveats.append("all runs have one motor speed: what depends on it cannot be found")
+    return tuple(caveats)
 
 
 def _noted(good: pd.DataFrame) -> dict[str, Floats]:
-    """Notes that every run has and that differ between runs."""
-    found = {}
+    """Read notes that every run has and that differ between runs."""
+    notes = {}
     for column, (name, scale) in {
         "elapsed_min": ("elapsed_h", 1 / 60),
         "temperature_C": ("temperature_K", 1.0),
@@ -213,12 +213,12 @@ def _noted(good: pd.DataFrame) -> dict[str, Floats]:
         if column in good:
             value = good[column].to_numpy(dtype=float) * scale
             if np.isfinite(value).all() and np.ptp(value) > 0:
-                found[name] = value - value.mean() if name == "temperature_K" else value
+                notes[name] = value - value.mean() if name == "temperature_K" else value
     if "heading_deg" in good:
         value = np.radians(good["heading_deg"].to_numpy(dtype=float))
         if np.isfinite(value).all() and np.ptp(value) > 0:
-            found["heading_x"], found["heading_y"] = np.cos(value), np.sin(value)
-    return found
+            notes["heading_x"], notes["heading_y"] = np.cos(value), np.sin(value)
+    return notes
 
 
 def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...]) -> list[str]:

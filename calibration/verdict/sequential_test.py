@@ -90,7 +90,7 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
     if not isinstance(record, dict) or not record.get("explanations"):
         raise InputError(f"{path}: this verdict has no two explanations between which new runs could decide")
     try:
-        return [Explanation.read(one) for one in record["explanations"]], set(record["sessions"])
+        return [Explanation.read(explanation) for explanation in record["explanations"]], set(record["sessions"])
     except (KeyError, TypeError, ValueError):
         raise InputError(f"{path} is no verdict.json of this version: calibrate the table again") from None
 

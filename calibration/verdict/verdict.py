@@ -267,9 +267,9 @@ class Verdict:
                 like = "something in form like " if effect.name in self.in_form_only else ""
                 size = best.refit.parameters[effect.name]
                 sizes.append(f"{like}{effect.title}, size {size:.3g} ({low:.3g} to {high:.3g})")
-            other = "other effect" if len(sizes) == 1 else "single effect or other pair"
+            rivals = "other effect" if len(sizes) == 1 else "single effect or other pair"
             said = " and ".join(sizes) + self._outside
-            return f"The residual ({p}) is consistent with {said}, and with no {other} of the catalogue."
+            return f"The residual ({p}) is consistent with {said}, and with no {rivals} of the catalogue."
         if self.verdict == "ambiguous":
             names = " or ".join(c.title for c in self.explaining)
             names += self._outside
