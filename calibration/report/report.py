@@ -25,6 +25,13 @@ _LABELS = {
     "theta": "θ, slip angle [rad]",
     "v": "v, speed",
 }
+_MODELS = {
+    "uncalibrated": "as given",
+    "before": "calibrated",
+    "after": "calibrated, with effects",
+    "generic": "calibrated, generic correction",
+    "predictive": "correction in corrected.toml, simulated",
+}
 _SETTINGS = {"l_cm": "l [cm]", "omega_rpm": "ω [rpm]"}
 _DISAGREES = 0.01  # p of the held-out runs below which the report says so
 _TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes", "score": "effects"}
@@ -189,10 +196,9 @@ def _add_evidence(page: Page, result: Verdict) -> None:
         ],
     )
     for c in result.explaining:
-        said = " and ".join(e.title for e in c.claimed)
         page.text(
-            f"{said}: {100 * c.imitable:.0f} % of the departures from outside the catalogue that were drawn for "
-            f"comparison would have passed for it; above {100 * DOUBT:.0f} % the verdict says so. {_carried(c)}"
+            f"{c.title}: {100 * c.imitable:.0f} % of the departures from outside the catalogue that were drawn "
+            f"for comparison would have passed for it; above {100 * DOUBT:.0f} % the verdict says so. {_carried(c)}"
         )
     if result.evidence.untestable:
         page.text(
@@ -210,22 +216,13 @@ def _carried(claim: Candidate) -> str:
 
 def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
     page.section("Error on the held-out runs")
-    low, high = result.errors.after_interval
-    corrected: list[tuple[str, float, dict[str, float]]] = []
-    if result.error_predictive is not None:
-        each_output = result.errors.by_output["predictive"]
-        corrected = [("correction in corrected.toml, simulated", result.error_predictive, each_output)]
+    errors = result.errors
+    low, high = errors.after_interval
     page.table(
         ("model", "relative rms", *(_LABELS[o] for o in data.outputs)),
         [
-            (label, f"{100 * value:.2f} %", *(f"{100 * v:.1f} %" for v in each.values()))
-            for label, value, each in (
-                ("as given", result.error_uncalibrated, result.errors.by_output["uncalibrated"]),
-                ("calibrated", result.error_before, result.errors.by_output["before"]),
-                ("calibrated, with effects", result.error_after, result.errors.by_output["after"]),
-                ("calibrated, generic correction", result.error_generic, result.errors.by_output["generic"]),
-                *corrected,
-            )
+            (_MODELS[name], f"{100 * rms:.2f} %", *(f"{100 * v:.1f} %" for v in errors.by_output[name].values()))
+            for name, rms in errors.rms.items()
         ],
     )
     learnt = result.corrections.learnt
@@ -239,11 +236,11 @@ def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
             "the same load."
         )
     features = ", ".join(result.corrections.regression.features) or "no feature"
-    agree = result.errors.p_value >= _DISAGREES
+    agree = errors.p_value >= _DISAGREES
     page.text(
         f"95 % interval with effects: {100 * low:.2f} to {100 * high:.2f} %. "
-        f"Noise of one run from the repeats: {100 * result.noise_ceiling:.2f} %. The held-out runs "
-        f"{'agree' if agree else 'do not agree'} with the final model (p = {result.errors.p_value:.2g}). "
+        f"Noise of one run from the repeats: {100 * errors.noise:.2f} %. The held-out runs "
+        f"{'agree' if agree else 'do not agree'} with the final model (p = {errors.p_value:.2g}). "
         f"Generic correction: {features} (it describes the residual and does not explain it).",
         tone="good" if agree else "bad",
     )

@@ -41,7 +41,6 @@ from scipy.stats import rankdata
 from calibration.statistics.fit import Fit
 from calibration.statistics.statistical_model import (
     ForwardModel,
-    Labels,
     Parameter,
     Parameters,
     Runs,
@@ -143,7 +142,7 @@ class FixedColumns:
     Products of two columns are linear in S⁻¹, so they are made once for every pair of outputs.
     """
 
-    def __init__(self, columns: Floats, session: Labels):
+    def __init__(self, columns: Floats, session: Integers):
         n, k, m = columns.shape
         self.picks, self.sizes = averaging_rows(session)
         self._flat = columns.reshape(n * k, m)

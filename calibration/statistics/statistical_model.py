@@ -34,12 +34,11 @@ import numpy as np
 from sim.arrays import Flags, Floats, Integers
 
 Parameters = Mapping[str, float]
-Labels = Integers
 
 SESSION_SHARE = 1.0  # largest ρ
 _LOG_STEP, _STEP = 0.01, 0.02  # finite-difference steps: in ln C, in units of a typical size
 _LARGEST = 100.0  # change of ln C, so that C stays a number
-_RIDGE = 1e-11
+_RIDGE = 1e-11  # so that columns without any signal get a large variance
 _CUBIC = 0.2  # share of a cube that lower powers must leave
 
 
@@ -171,10 +170,10 @@ class Noise:
     run: Floats
     share: float
 
-    def whitener(self, session: Labels) -> Whitener:
+    def whitener(self, session: Integers) -> Whitener:
         return Whitener(self, session)
 
-    def covariance(self, session: Labels) -> Floats:
+    def covariance(self, session: Integers) -> Floats:
         """Compute Σ of the runs of `session` (n,), (n k, n k)."""
         together = session[:, None] == session
         return np.asarray(np.kron(np.eye(len(session)) + self.share * together, self.run))
@@ -183,7 +182,7 @@ class Noise:
 class Whitener:
     """Σ^−½ for the runs of `session`; applies to residuals (n, k, ...) and flattens them."""
 
-    def __init__(self, noise: Noise, session: Labels):
+    def __init__(self, noise: Noise, session: Integers):
         self._inverse = inverse_root(noise.run)
         self._share = noise.share
         self._groups = [np.flatnonzero(session == s) for s in np.unique(session)]
@@ -229,25 +228,12 @@ class Linear:
     share: Floats  # (...) ρ
 
 
-def root_diagonal(normal: Floats) -> Floats:
-    """Return roots of the diagonals of (..., p, p), 1 where there is nothing."""
-    diagonal = np.diagonal(normal, axis1=-2, axis2=-1)
-    return np.where(diagonal > 1e-280, np.sqrt(np.maximum(diagonal, 1e-280)), 1.0)
-
-
-def inverse(scaled: Floats) -> Floats:
-    """Invert positive semidefinite matrices (..., p, p) with ones on the diagonal; large where there is
-    none.
-    """
-    return np.asarray(np.linalg.inv(scaled + _RIDGE * np.eye(scaled.shape[-1])))
-
-
 def inverse_root(run: Floats) -> Floats:
     """Return L⁻¹ of S = L Lᵀ, (..., k, k)."""
     return np.asarray(np.linalg.inv(np.linalg.cholesky(run)))
 
 
-def sums(columns: Floats, session: Labels, outputs: int) -> Sums:
+def sums(columns: Floats, session: Integers, outputs: int) -> Sums:
     """Multiply columns (..., n, k, m) that are white in S with each other."""
     *batch, n, k, m = columns.shape
     flat = columns.reshape(*batch, n * k, m)
@@ -258,7 +244,7 @@ def sums(columns: Floats, session: Labels, outputs: int) -> Sums:
     return Sums(total - between.sum(-3), between, count, outputs)
 
 
-def averaging_rows(session: Labels) -> tuple[Floats, Floats]:
+def averaging_rows(session: Integers) -> tuple[Floats, Floats]:
     """Make rows (s, n) that take the mean of each session times the root of its size; the sizes (s,)."""
     kinds, place, count = np.unique(session, return_inverse=True, return_counts=True)
     return (np.arange(len(kinds))[:, None] == place.reshape(-1)) / np.sqrt(count)[:, None], count.astype(float)
@@ -296,13 +282,14 @@ def session_share(products: Sums, *, passes: int) -> Floats:
 def solved(normal: Floats) -> tuple[Floats, Floats]:
     """Solve for the coefficients (..., p) of the last of the columns; with their covariance (..., p, p)."""
     p = normal.shape[-1] - 1
-    scale = root_diagonal(normal[..., :p, :p])
+    diagonal = np.diagonal(normal[..., :p, :p], axis1=-2, axis2=-1)
+    scale = np.where(diagonal > 1e-280, np.sqrt(np.maximum(diagonal, 1e-280)), 1.0)
     scaled = normal[..., :p, :p] / scale[..., :, None] / scale[..., None, :]
-    covariance = inverse(scaled) / scale[..., :, None] / scale[..., None, :]
+    covariance = np.linalg.inv(scaled + _RIDGE * np.eye(p)) / scale[..., :, None] / scale[..., None, :]
     return (covariance @ normal[..., :p, p, None])[..., 0], covariance
 
 
-def repeat_covariance(y: Floats, condition: Labels) -> Floats:
+def repeat_covariance(y: Floats, condition: Integers) -> Floats:
     """Estimate S (..., k, k) from the scatter of (..., n, k) about the mean of each condition, pooled."""
     places = np.unique(condition, return_inverse=True)[1].reshape(-1)
     count = np.bincount(places)

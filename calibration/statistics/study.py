@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from calibration.statistics.statistical_model import ForwardModel, Labels, Runs
-from sim.arrays import Flags, Floats
+from calibration.statistics.statistical_model import ForwardModel, Runs
+from sim.arrays import Flags, Floats, Integers
 
 LEVEL = 0.04  # α of every claim; below 0.05, because the noise is estimated and false claims must stay below 5 %
 DRAWS = 1000  # of the bootstrap
@@ -57,7 +57,7 @@ class Study:
         return cls(model, Split(used, ~used, np.ones_like(used)), **settings)
 
 
-def groups(data: Runs) -> tuple[Labels, tuple[str, ...]]:
+def groups(data: Runs) -> tuple[Integers, tuple[str, ...]]:
     """Number the groups that stay together, (n,), and name them."""
     count = len(data.session_names)
     if count >= _FEWEST:
@@ -104,7 +104,7 @@ def split_runs(data: Runs, held_out: Flags | None, outliers: tuple[Flags, tuple[
     return Split(~held_out & ~bad, held_out & ~bad, ~bad, held_out_names, reasons, caveats)
 
 
-def leave_one_group_out(group: Labels, used: Flags) -> Iterator[tuple[Flags, Flags]]:
+def leave_one_group_out(group: Integers, used: Flags) -> Iterator[tuple[Flags, Flags]]:
     """Yield the runs (n,) to learn from and the runs (n,) left out, for every group among those in `used`."""
     for label in np.unique(group[used]):
         yield used & (group != label), used & (group == label)

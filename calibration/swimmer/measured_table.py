@@ -222,25 +222,22 @@ def _noted(good: pd.DataFrame) -> dict[str, Floats]:
 
 
 def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...]) -> list[str]:
+    """Say why each row cannot be used; empty where it can."""
     reasons = [""] * len(table)
-    used = [*_INPUTS, *(OUTPUTS[name][0] for name in outputs)]
-    sign = np.sign(numbers["omega_rpm"].to_numpy(dtype=float))
-    for column in used:
-        value = numbers[column].to_numpy(dtype=float)
-        for i in np.flatnonzero(~np.isfinite(value)):
-            reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is not a finite number"
-    for i in np.flatnonzero(numbers["N"].to_numpy() % 1 != 0):
-        reasons[i] = reasons[i] or f"N = {table['N'].iloc[i]} is not a whole number"
-    for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s"):
-        if column in used:
-            for i in np.flatnonzero(numbers[column].to_numpy(dtype=float) <= 0):
-                reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is not above 0"
+    used = (*_INPUTS, *(OUTPUTS[name][0] for name in outputs))
+    values = {column: numbers[column].to_numpy(dtype=float) for column in used}
+    positive = [column for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s") if column in values]
+    for column, bad, fault in (
+        *((column, ~np.isfinite(value), "is not a finite number") for column, value in values.items()),
+        ("N", values["N"] % 1 != 0, "is not a whole number"),
+        *((column, values[column] <= 0, "is not above 0") for column in positive),
+    ):
+        for i in np.flatnonzero(bad):
+            reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} {fault}"
+    sign = np.sign(values["omega_rpm"])
     for i in np.flatnonzero(sign == 0):
         reasons[i] = reasons[i] or "omega_rpm = 0"
-    for name in outputs:
-        column, _, expected = OUTPUTS[name]
-        if expected:
-            value = numbers[column].to_numpy(dtype=float)
-            for i in np.flatnonzero(value * sign * expected <= 0):
-                reasons[i] = reasons[i] or f"{column} = {value[i]:g} has the wrong sign for its omega_rpm"
+    for column, _, expected in (OUTPUTS[name] for name in outputs if OUTPUTS[name][2]):
+        for i in np.flatnonzero(values[column] * sign * expected <= 0):
+            reasons[i] = reasons[i] or f"{column} = {values[column][i]:g} has the wrong sign for its omega_rpm"
     return reasons

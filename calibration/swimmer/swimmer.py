@@ -119,9 +119,10 @@ class SwimmerModel:
     @cached_property
     def _seconds(self) -> dict[str, Influence]:
         """Second numbers of effects, by name."""
-        owners = [i for i in self._influences.values() if i.parameter.second]
-        return {i.parameter.second.name: Influence(i.parameter.second, i.parameter.second.name, None, i.odd)
-                for i in owners if i.parameter.second}  # fmt: skip
+        return {
+            second.name: Influence(second, second.name, None, influence.odd)
+            for influence in self._influences.values() if (second := influence.parameter.second)
+        }  # fmt: skip
 
     @cached_property
     def _influences(self) -> dict[str, Influence]:

@@ -23,6 +23,7 @@ from calibration.verdict.sequential_test import Explanation
 from sim.arrays import Floats
 from sim.io.deprecated import old_attributes
 
+MODELS = ("uncalibrated", "before", "after", "generic", "predictive")  # whose errors are stated
 _NOTABLE = 2.0  # pull of a nuisance parameter beyond which the sentence says so
 _NEAR = 0.5  # if no effect explains the residual, the best one is named if it removes at least this share
 
