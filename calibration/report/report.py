@@ -198,7 +198,8 @@ def _add_evidence(page: Page, result: Verdict) -> None:
     for c in result.explaining:
         page.text(
             f"{c.title}: {100 * c.imitable:.0f} % of the departures from outside the catalogue that were drawn "
-            f"for comparison would have passed for it; above {100 * DOUBT:.0f} % the verdict says so. {_carried(c)}"
+            f"for comparison would have passed for it; above {100 * DOUBT:.0f} % the verdict says so. "
+            + _carried(c)
         )
     if result.evidence.untestable:
         page.text(
