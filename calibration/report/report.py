@@ -100,7 +100,7 @@ def _add_numbers(page: Page, result: Verdict) -> None:
     page.text(
         "What was given is known to a tolerance only. So these parameters are fitted, too, each with the "
         "tolerance that was stated for it. The pull is how far the runs move a parameter, in standard deviations "
-        f"of what chance would do. Beyond {WRONG:g} the value as given is taken to be wrong: {said}.",
+        f"of what chance would do. Beyond {WRONG:g} the stated value is taken to be wrong: {said}.",
         tone="bad" if wrong else "good",
     )
     rows = []
