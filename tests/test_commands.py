@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.statistics.forward_model import start_values
+from calibration.statistics.statistical_model import start_values
 from dataset.rows.design import load_design
 from planner.files.plan_json import load_plan
 from sim.inputs import load_robot

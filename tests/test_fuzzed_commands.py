@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import calibration.attribution.explain
+import calibration.verdict.calibrate
 from calibration.swimmer.measured_table import OUTPUTS
 from sim.io.errors import run_command
 from sim.model.presets import PRESETS
@@ -184,7 +184,7 @@ def test_any_table_of_runs(
     """Effects are not refitted here: that takes seconds a table, and other tests do it."""
     install_toy(monkeypatch)
     for name in ("examine", "pairs"):
-        monkeypatch.setattr(calibration.attribution.explain, name, lambda *_, **__: [])
+        monkeypatch.setattr(calibration.verdict.calibrate, name, lambda *_, **__: [])
     table = data.draw(changed(runs))
     table.to_csv(tmp_path / "runs.csv", index=False)
     out = tmp_path / "out"

@@ -23,7 +23,7 @@ from benchmarks.calibration.planted import Case, Design, Linear, cases, measured
 from benchmarks.markdown import heading, row
 from benchmarks.parallel import in_parallel
 from benchmarks.proportions import per_cent
-from calibration.statistics.forward_model import start_values
+from calibration.statistics.statistical_model import start_values
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.experiment import Experiment
 from calibration.verdict.verdict import Verdict

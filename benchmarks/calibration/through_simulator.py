@@ -28,9 +28,8 @@ from benchmarks.calibration.planted import ROBOT, Case, Design, Signals, design,
 from benchmarks.markdown import heading, row
 from benchmarks.parallel import in_parallel
 from benchmarks.proportions import per_cent
-from calibration.statistics.forward_model import Parameter, start_values, stepped
-from calibration.statistics.priors import prior_rows
 from calibration.statistics.residual_tests import TESTABLE
+from calibration.statistics.statistical_model import Parameter, prior_rows, start_values, stepped
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from sim.arrays import Floats

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from warnings import warn
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,6 +40,7 @@ from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
+from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.robot import Robot
@@ -82,11 +83,8 @@ class GoalPlan:
         turn = (self.end[2] - self.goal[2] + math.pi) % (2 * math.pi) - math.pi
         return math.dist(self.end[:2], self.goal[:2]), abs(turn)
 
-    @property
-    def room(self) -> FreeSpace:
-        """Return `free_space`, of which this is the old name, for one release."""
-        warn("GoalPlan.room is now GoalPlan.free_space", DeprecationWarning, stacklevel=2)
-        return self.free_space
+    if not TYPE_CHECKING:
+        __getattr__ = old_attributes({"room": "free_space"})
 
 
 def to_goal(

@@ -24,14 +24,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import NamedTuple
-from warnings import warn
+from typing import TYPE_CHECKING, NamedTuple
 
 from scipy.stats import chi2
 
 from planner.planning.line_of_sight import LineOfSight
 from planner.planning.plan import Plan
 from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate
+from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
 
 FALSE_ALARM = 1e-3  # probability of an alarm per WINDOW poses, for a robot of the model
@@ -120,16 +120,8 @@ class Tracker:
             0 if self._finished else self._dwell.sense, self._flip_at, self._finished, self.alarm, error
         )
 
-    def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command:
-        """Call `update`, of which this is the old name, for one release."""
-        warn("Tracker.feed is now Tracker.update", DeprecationWarning, stacklevel=2)
-        return self.update(now, pose, seen_at)
-
-    @property
-    def advice(self) -> Command:
-        """Return `command`, of which this is the old name, for one release."""
-        warn("Tracker.advice is now Tracker.command", DeprecationWarning, stacklevel=2)
-        return self.command
+    if not TYPE_CHECKING:
+        __getattr__ = old_attributes({"feed": "update", "advice": "command"})
 
     @property
     def learned(self) -> dict[str, float]:

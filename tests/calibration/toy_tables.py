@@ -13,8 +13,8 @@ import pytest
 import calibration.swimmer.synthetic_table
 import sim.motion.batches
 from calibration.swimmer.head_correction import learn_head_correction
-from calibration.swimmer.lab_settings import Owned
 from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.possible_runs import Owned
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate

@@ -10,10 +10,10 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
+from calibration.attribution.wrong_numbers import pulls
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import fit
-from calibration.statistics.forward_model import by_differences, start_values
-from calibration.statistics.pulls import pulls
+from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, LENGTH, TACHOMETER
 from calibration.swimmer.swimmer import SwimmerModel

@@ -13,11 +13,9 @@ import pytest
 from calibration.report.corrected_robot import corrected_robot
 from calibration.report.report import write_report
 from calibration.statistics.fit import fit
-from calibration.statistics.forward_model import start_values
-from calibration.statistics.residual_tests import examine_residual
-from calibration.statistics.score_directions import Directions
-from calibration.statistics.splits import middle_session
-from calibration.statistics.study import DRAWS, Study
+from calibration.statistics.residual_tests import Directions, examine_residual
+from calibration.statistics.statistical_model import start_values
+from calibration.statistics.study import DRAWS, Study, middle_session
 from tests.calibration import toy
 from tests.calibration.toy_tables import (
     START,

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibration.statistics.profile_intervals import least_determined
-from calibration.statistics.splits import middle_session
-from calibration.statistics.study import DRAWS
+from calibration.statistics.fit import least_determined
+from calibration.statistics.study import DRAWS, middle_session
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.verdict_json import verdict_record
 from tests.calibration.toy_tables import calibrated, calibrated_toy, shares_verdicts, toy_table

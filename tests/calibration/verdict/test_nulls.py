@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import binom
 
 import sim.motion.batches
-from calibration.statistics.forward_model import start_values
+from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import DRAWS
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import COEFFICIENTS, DIRECT, SwimmerModel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -91,3 +92,4 @@ def test_where_tolerances_are_wide_a_wrong_number_comes_ahead_of_those_rivals() 
     assert result.effects == ()
     assert "tail_spin_drag" in {e.name for c in result.evidence.rival_effects for e in c.claimed}
     assert "If the number is right, " in result.sentence
+    assert re.fullmatch("the stated value of .* is wrong", result.next.explanations[0].title)

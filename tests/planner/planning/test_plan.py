@@ -83,7 +83,7 @@ def test_other_points_of_the_axis() -> None:
 def test_old_attributes_of_a_plan_warn_and_work() -> None:
     result = plan(circle(2.0), CONTROL)
     for name, path in _MOVED.items():
-        with pytest.warns(DeprecationWarning, match=f"Plan.{name} is now Plan.{re.escape(path)}"):
+        with pytest.warns(DeprecationWarning, match=f"Plan.{name} is deprecated; use Plan.{re.escape(path)}"):
             value = getattr(result, name)
         new: Any = result
         for part in path.removesuffix("()").split("."):

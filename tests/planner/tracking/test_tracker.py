@@ -124,9 +124,9 @@ def test_no_flip_just_before_the_end(late: float) -> None:
 
 def test_old_names_warn_and_work() -> None:
     tracker = Tracker(planned())
-    with pytest.warns(DeprecationWarning, match=r"now Tracker\.update"):
+    with pytest.warns(DeprecationWarning, match=r"use Tracker\.update"):
         assert tracker.feed(0.0) == tracker.command
-    with pytest.warns(DeprecationWarning, match=r"now Tracker\.command"):
+    with pytest.warns(DeprecationWarning, match=r"use Tracker\.command"):
         assert tracker.advice == tracker.command
 
 
