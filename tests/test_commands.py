@@ -21,7 +21,7 @@ from sim.io.errors import run_command
 from sim.model.presets import PRESETS
 from softflagella.__main__ import PACKAGES, main
 from surrogate.table.model_file import SHIPPED, load
-from tests.calibration.toy_tables import START, install_toy, toy_swimmer, toy_table
+from tests.calibration.toy_tables import START, install_few_candidates, install_toy, toy_swimmer, toy_table
 from tests.calibration.track import RADIUS, track
 from tests.dataset.sweeps import SMALL
 from tests.processes import LIMIT
@@ -203,6 +203,7 @@ def check(made: Path, out: Path) -> str:
 def calibrate(made: Path, out: Path) -> str:
     with pytest.MonkeyPatch.context() as patch:
         install_toy(patch)
+        install_few_candidates(patch)
         toy_table(5, lengths_cm=(6.0, 9.0)).to_csv(out / "t.csv", index=False)
         done("calibration", "calibrate", out / "t.csv", "--robot", "paper-measured", "--out", out / "out")
         done("calibration", "close", out / "t.csv", "--robot", "paper-measured", "--out", out / "again")

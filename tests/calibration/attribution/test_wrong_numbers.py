@@ -88,10 +88,11 @@ def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
     assert result.error_after < 1.25 * result.noise_ceiling
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("share", "sigmas"),
     [
-        pytest.param(0.6, {}, marks=pytest.mark.long),
+        (0.6, {}),
         (0.8, {"youngs_modulus": Sigma(0.03, True), **EXACT}),
     ],
     ids=["40 %", "20 %"],

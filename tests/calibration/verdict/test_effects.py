@@ -22,6 +22,7 @@ from tests.calibration.toy_tables import (
     TRUTH,
     calibrated,
     calibrated_toy,
+    install_few_candidates,
     shares_verdicts,
     toy_swimmer,
     toy_table,
@@ -126,7 +127,10 @@ def test_fits_arrive_along_a_valley() -> None:
 
 
 @pytest.mark.usefixtures("toy_model")
-def test_two_effects_are_found_as_a_pair() -> None:
+@pytest.mark.parametrize("candidates", ["few", pytest.param("all", marks=pytest.mark.long)])
+def test_two_effects_are_found_as_a_pair(candidates: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if candidates == "few":
+        install_few_candidates(monkeypatch)
     result = calibrated(toy_table(31, end_over_end_drag=5.0, left_right_bias=0.15))
     assert result.verdict == "effect"
     assert set(result.effects) == {"end_over_end_drag", "left_right_bias"}

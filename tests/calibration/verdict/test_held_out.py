@@ -12,12 +12,11 @@ from calibration.verdict.verdict_json import verdict_record
 from tests.calibration.toy_tables import calibrated, calibrated_toy, shares_verdicts, toy_table
 
 
-@shares_verdicts
-@pytest.mark.usefixtures("toy_model")
+@pytest.mark.usefixtures("toy_model", "few_candidates")
 def test_the_locked_session_has_no_say() -> None:
     """Ruining the held-out session changes the reported errors and nothing else."""
     table = toy_table(5, end_over_end_drag=5.0)
-    result = calibrated_toy(5, end_over_end_drag=5.0)
+    result = calibrated(table)
     data = read_measurements(table)
     name = data.session_names[data.session[middle_session(data)][0]]
     ruined = table.copy()
@@ -28,10 +27,10 @@ def test_the_locked_session_has_no_say() -> None:
     assert result_of_ruined.error_after > 1.5 * result.error_after
 
 
-@shares_verdicts
+@pytest.mark.long
 @pytest.mark.usefixtures("toy_model")
 def test_the_result_is_deterministic() -> None:
-    first = calibrated_toy(5, end_over_end_drag=5.0)
+    first = calibrated(toy_table(5, end_over_end_drag=5.0))
     second = calibrated(toy_table(5, end_over_end_drag=5.0))
     assert verdict_record(first, table="t") == verdict_record(second, table="t")
 

@@ -19,6 +19,7 @@ from calibration.verdict.verdict import Verdict
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from sim.model.uncertainty import DEFAULTS, Sigma
+from tests.calibration.toy_tables import install_few_candidates
 from tests.reference.make import GIVEN, HERE, TABLES
 
 pytestmark = pytest.mark.slow
@@ -45,8 +46,13 @@ def test_nothing_is_missing() -> None:
         assert result.final.parameters[name] == pytest.approx(truth, rel=0.1)
 
 
-def test_one_effect_is_named_sized_and_handed_on(tmp_path: Path) -> None:
+@pytest.mark.parametrize("candidates", ["few", pytest.param("all", marks=pytest.mark.long)])
+def test_one_effect_is_named_sized_and_handed_on(
+    candidates: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Through the command. The truth was simulated on a finer mesh; the command is not told of the effect."""
+    if candidates == "few":
+        install_few_candidates(monkeypatch)
     words = ["calibrate", str(HERE / "effect.csv"), "--robot", str(HERE / "robot.toml"), "--out", str(tmp_path)]
     assert run_command(main, words) == 0
     record = json.loads((tmp_path / "verdict.json").read_text())
@@ -60,6 +66,7 @@ def test_one_effect_is_named_sized_and_handed_on(tmp_path: Path) -> None:
     assert "data:image/png" in (tmp_path / "report.html").read_text()
 
 
+@pytest.mark.long
 def test_what_no_effect_does_is_left_unexplained() -> None:
     result = calibrated("unexplained")
     assert result.verdict == "unexplained"
