@@ -37,8 +37,8 @@ def _calibrate(arguments: Namespace) -> None:
     from calibration.report.corrected_robot import check_given, corrected_toml
     from calibration.report.report import write_report
     from calibration.swimmer.head_correction import learn_head_correction
-    from calibration.swimmer.lab_settings import owned
     from calibration.swimmer.measured_table import read_measurements
+    from calibration.swimmer.possible_runs import owned
     from calibration.swimmer.protocols import PROTOCOLS
     from calibration.swimmer.swimmer import SwimmerModel
     from calibration.verdict.calibrate import calibrate
@@ -94,11 +94,11 @@ def _decide(arguments: Namespace) -> None:
     explanations, before = read_explanations(arguments.verdict)
     model = SwimmerModel(load_robot(arguments.robot), read_measurements(arguments.table), arguments.jobs)
     new = new_runs(model.runs, before)
-    found = standings(model, explanations, new)
+    standing = standings(model, explanations, new)
     print(f"{new.sum()} new runs. An explanation that is behind by more than {GIVEN_UP:.1f} is given up.")
-    for one in found:
-        print(f"  {one.title}: {f'behind by {one.behind:.1f}' if one.behind else 'best'}")
-    print(sentence(found))
+    for explanation in standing:
+        print(f"  {explanation.title}: {f'behind by {explanation.behind:.1f}' if explanation.behind else 'best'}")
+    print(sentence(standing))
 
 
 @program.command(

@@ -75,7 +75,7 @@ def _plan(arguments: Namespace) -> None:
 
 
 def _say(result: Plan) -> None:
-    """Warnings, start, dwells and errors."""
+    """Print warnings, start, dwells and errors."""
     for warning in result.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     x, y, heading = result.start
@@ -216,7 +216,7 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
 
 @contextmanager
 def _progress() -> Iterator[Callable[[float], object]]:
-    """A bar on a terminal, for long paths."""
+    """Show a bar on a terminal, for long paths."""
     from tqdm import tqdm
 
     with tqdm(total=100, desc="plan", unit="%", leave=False, delay=1.0, disable=not sys.stderr.isatty()) as bar:
@@ -224,7 +224,7 @@ def _progress() -> Iterator[Callable[[float], object]]:
 
 
 def _path(arguments: Namespace, robot: Robot) -> Path2D:
-    """The path that the command asks for, in tail lengths."""
+    """Make the path that the command asks for, in tail lengths."""
     from planner.paths.path import circle, polygon, smoothed
     from planner.paths.path_files import Drawing, read_path
 

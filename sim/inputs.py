@@ -44,7 +44,7 @@ _SIGMAS = {(table, key + _SIGMA): name for (table, key), name in _TOML.items() i
 
 
 def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
-    """Columns of robots as float64 arrays, with a_over_R filled in. Robots that cannot be simulated are refused.
+    """Convert columns of robots to float64 arrays, a_over_R filled in; reject robots that cannot be simulated.
 
     Args:
         columns: `sim.model.groups.GROUP_COLUMNS`, optionally a_over_R and effect sizes, each (M,).
@@ -66,7 +66,7 @@ def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
 
 
 def load_robot(source: str | Path) -> Robot:
-    """A robot from a preset's name or a robot.toml.
+    """Load a robot from a preset's name or a robot.toml.
 
     Args:
         source: path of a file, or one of `sim.model.presets.PRESETS`.
@@ -99,15 +99,13 @@ def load_robot(source: str | Path) -> Robot:
 
 
 def _sigmas(values: Mapping[str, Any], stated: Mapping[str, tuple[str, object]]) -> dict[str, Sigma]:
-    """Standard deviations by field; that of the disc offset needs no offset, because the head's radius stands
-    in.
-    """
-    own = {**values, "disc_offset": values.get("disc_offset", values["head_radius"])}
-    return {name: read_sigma(given, own[name], entry) for name, (entry, given) in stated.items()}
+    """Read standard deviations by field; a disc offset that is not given has the head's radius in its place."""
+    scales = {**values, "disc_offset": values.get("disc_offset", values["head_radius"])}
+    return {name: read_sigma(given, scales[name], entry) for name, (entry, given) in stated.items()}
 
 
 def _values(path: Path, tables: dict[str, Any], stated: dict[str, tuple[str, object]]) -> dict[str, object]:
-    """Fields of `Robot` by name; entries of standard deviations are collected in `stated`."""
+    """Read the fields of `Robot` by name; entries of standard deviations are collected in `stated`."""
     values: dict[str, object] = {}
     for table, content in tables.items():
         for key, value in content.items() if isinstance(content, dict) else [("", content)]:
@@ -150,7 +148,7 @@ def save_robot(robot: Robot, path: str | Path) -> None:
 
 
 def robot_toml(robot: Robot) -> str:
-    """The text of a robot.toml that `load_robot` reads back to the same robot."""
+    """Write the text of a robot.toml that `load_robot` reads back to the same robot."""
     tables: dict[str, list[str]] = {}
     for (table, key), attribute in _TOML.items():
         value = getattr(robot, attribute)

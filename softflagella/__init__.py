@@ -18,7 +18,6 @@ import ast
 from importlib import import_module
 from pathlib import Path
 from typing import Any
-from warnings import warn
 
 
 def _listed() -> dict[str, tuple[str, str]]:
@@ -43,8 +42,10 @@ __all__ = sorted(_HOMES)
 
 def __getattr__(name: str) -> Any:
     if name in _RENAMED:
+        from sim.io.deprecated import warn_deprecated
+
         module, attribute, instead = _RENAMED[name]
-        warn(f"softflagella.{name} is deprecated; use softflagella.{instead}", DeprecationWarning, stacklevel=2)
+        warn_deprecated(f"softflagella.{name}", f"softflagella.{instead}", callers=1)
         return getattr(import_module(module), attribute)
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -2,8 +2,8 @@
 
 tests/durations.json has the processor seconds of the longer tests; `pytest --write-durations` brings it up to date
 for the tests that it runs. Tests over `SLOW` are marked. The longest run first, so that two processes
-end at about the same time. The quick tests of a file stay in one process; a slow one goes to whichever process is
-free, unless an `xdist_group` keeps it with those that share its fixtures.
+end at about the same time. The quick tests of a file stay in one process, with those that share a fixture of the
+module. Another slow test goes to whichever process is free, unless an `xdist_group` says with which tests it runs.
 """
 
 from __future__ import annotations
@@ -41,6 +41,12 @@ def exists(test: str) -> bool:
     return path.exists() and f"def {name.partition('[')[0]}(" in path.read_text()
 
 
+def shares_fixture(item: pytest.Item) -> bool:
+    """Whether a test uses a fixture that is made once for its module."""
+    fixtures = getattr(item, "_fixtureinfo").name2fixturedefs.values()  # noqa: B009
+    return any(fixture.scope == "module" for fixtures_of_name in fixtures for fixture in fixtures_of_name)
+
+
 def processor_seconds() -> float:
     """Return the processor time of this process and of those that it started and that have ended [s]."""
     usages = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
@@ -60,8 +66,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if durations.get(item.nodeid, 0.0) > SLOW:
             item.add_marker(pytest.mark.slow)
         named = item.get_closest_marker("xdist_group")
-        file = item.nodeid.partition("::")[0]
-        group = named.args[0] if named else item.nodeid if item.get_closest_marker("slow") else file
+        alone = item.get_closest_marker("slow") and not shares_fixture(item)
+        group = named.args[0] if named else item.nodeid if alone else item.nodeid.partition("::")[0]
         item.add_marker(pytest.mark.xdist_group(group))
         groups[item] = group
         seconds[group] += durations.get(item.nodeid, 0.0)

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.statistics.forward_model import start_values
+from calibration.statistics.statistical_model import start_values
 from dataset.rows.design import load_design
 from planner.files.plan_json import load_plan
 from sim.inputs import load_robot
@@ -21,7 +21,7 @@ from sim.io.errors import run_command
 from sim.model.presets import PRESETS
 from softflagella.__main__ import PACKAGES, main
 from surrogate.table.model_file import SHIPPED, load
-from tests.calibration.toy_tables import START, install_toy, toy_swimmer, toy_table
+from tests.calibration.toy_tables import START, install_few_candidates, install_toy, toy_swimmer, toy_table
 from tests.calibration.track import RADIUS, track
 from tests.dataset.sweeps import SMALL
 from tests.processes import LIMIT
@@ -38,7 +38,7 @@ def done(*words: object) -> None:
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A robot, points, a plan with its replay, and a data set, all made by commands."""
+    """Make a robot, points, a plan with its replay, and a data set, all by commands."""
     folder = tmp_path_factory.mktemp("made")
     done("sim", "robot", "paper-control", "--out", folder / "robot.toml")
     groups = PRESETS["paper-control"].group_values()
@@ -133,7 +133,7 @@ def query(made: Path, out: Path) -> str:
 
 
 def inverse(made: Path, out: Path) -> str:
-    """The coefficient behind a yaw rate that the table gives itself."""
+    """Find the coefficient behind a yaw rate that the table gives itself."""
     robot = {name: np.array([value]) for name, value in PRESETS["paper-control"].group_values().items()}
     found = load().query(robot)
     targets = {**{k: v for k, v in robot.items() if k != "C_yr"}, "omega_yr_bar": found["omega_yr_bar"]}
@@ -203,6 +203,7 @@ def check(made: Path, out: Path) -> str:
 def calibrate(made: Path, out: Path) -> str:
     with pytest.MonkeyPatch.context() as patch:
         install_toy(patch)
+        install_few_candidates(patch)
         toy_table(5, lengths_cm=(6.0, 9.0)).to_csv(out / "t.csv", index=False)
         done("calibration", "calibrate", out / "t.csv", "--robot", "paper-measured", "--out", out / "out")
         done("calibration", "close", out / "t.csv", "--robot", "paper-measured", "--out", out / "again")

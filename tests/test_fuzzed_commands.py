@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import calibration.attribution.explain
+import calibration.verdict.calibrate
 from calibration.swimmer.measured_table import OUTPUTS
 from sim.io.errors import run_command
 from sim.model.presets import PRESETS
@@ -34,7 +34,7 @@ few = settings(
 
 
 def answered(words: list[object], capsys: pytest.CaptureFixture[str]) -> bool:
-    """Whether a command worked; where it did not, it must have said why in one line."""
+    """Tell whether a command worked; where it did not, it must have said why in one line."""
     capsys.readouterr()
     status = run_command(main, [str(word) for word in words])
     said = capsys.readouterr().err.splitlines()
@@ -50,33 +50,33 @@ def answered(words: list[object], capsys: pytest.CaptureFixture[str]) -> bool:
 
 @st.composite
 def changed(draw: st.DrawFn, table: pd.DataFrame) -> pd.DataFrame:
-    """A table with some cells, columns or rows replaced by anything."""
-    found = table.copy()
+    """Replace some cells, columns or rows of a table by anything."""
+    altered = table.copy()
     for _ in range(draw(st.integers(1, 3))):
         name = draw(st.sampled_from(list(table.columns)))
-        if name not in found:
+        if name not in altered:
             continue
         kind = draw(st.sampled_from(["cell", "cells", "column", "scale", "lost", "renamed", "rows"]))
-        column = found[name].astype(object)
+        column = altered[name].astype(object)
         if kind == "cell":
             column.iloc[draw(st.integers(0, len(column) - 1))] = draw(cell)
-            found[name] = column
+            altered[name] = column
         elif kind == "cells":
             column.iloc[:: draw(st.integers(2, 9))] = draw(cell)
-            found[name] = column
+            altered[name] = column
         elif kind == "column":
-            found[name] = draw(cell)
-        elif kind == "scale" and pd.api.types.is_numeric_dtype(found[name]):
-            found[name] = found[name] * draw(number)
+            altered[name] = draw(cell)
+        elif kind == "scale" and pd.api.types.is_numeric_dtype(altered[name]):
+            altered[name] = altered[name] * draw(number)
         elif kind == "lost":
-            found = found.drop(columns=name)
+            altered = altered.drop(columns=name)
         elif kind == "renamed":
-            found = found.rename(columns={name: draw(st.sampled_from(["N", "run", "x", f"{name}s", ""]))})
+            altered = altered.rename(columns={name: draw(st.sampled_from(["N", "run", "x", f"{name}s", ""]))})
         elif kind == "rows":
-            found = found.iloc[: draw(st.integers(0, len(found)))]
-        if found.empty or not len(found.columns) or found.columns.duplicated().any():
+            altered = altered.iloc[: draw(st.integers(0, len(altered)))]
+        if altered.empty or not len(altered.columns) or altered.columns.duplicated().any():
             break
-    return found
+    return altered
 
 
 CIRCLE = pd.DataFrame({"x": 2 * np.cos(np.linspace(0, 5, 60)), "y": 2 * np.sin(np.linspace(0, 5, 60))})
@@ -184,7 +184,7 @@ def test_any_table_of_runs(
     """Effects are not refitted here: that takes seconds a table, and other tests do it."""
     install_toy(monkeypatch)
     for name in ("examine", "pairs"):
-        monkeypatch.setattr(calibration.attribution.explain, name, lambda *_, **__: [])
+        monkeypatch.setattr(calibration.verdict.calibrate, name, lambda *_, **__: [])
     table = data.draw(changed(runs))
     table.to_csv(tmp_path / "runs.csv", index=False)
     out = tmp_path / "out"
@@ -213,7 +213,7 @@ def test_any_tracks(
         tmp_path / "out.csv",
     ]
     if answered(words, capsys):
-        found = pd.read_csv(tmp_path / "out.csv")
-        assert len(found) == len(noted)
-        for name in {column for column, _, _ in OUTPUTS.values()} & set(found) - set(noted):
-            assert not np.isinf(found[name]).any()
+        runs = pd.read_csv(tmp_path / "out.csv")
+        assert len(runs) == len(noted)
+        for name in {column for column, _, _ in OUTPUTS.values()} & set(runs) - set(noted):
+            assert not np.isinf(runs[name]).any()

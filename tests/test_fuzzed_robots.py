@@ -1,4 +1,4 @@
-"""Whatever comes in by a door, the answer is a row, a flag with its reason, or one line and exit status 2."""
+"""Whatever the input, the answer is a row, a flag with its reason, or one line and exit status 2."""
 
 from __future__ import annotations
 
@@ -43,20 +43,20 @@ quick = settings(
 
 @pytest.fixture(autouse=True)
 def _little_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Robots that ask for more than a second are flagged, so that the tests stay short."""
+    """Flag robots that ask for more than a second, so that the tests stay short."""
     monkeypatch.setattr(sim.motion.run, "MOST_WORK", 1e5)
 
 
 @st.composite
 def robots(draw: st.DrawFn, *extra: str) -> dict[str, float]:
-    """The control example with one to three columns replaced by anything."""
+    """Replace one to three columns of the control example by anything."""
     values: dict[str, float] = {**CONTROL, **dict.fromkeys(extra, 1.0)}
     for name in draw(st.lists(st.sampled_from((*INPUTS, *extra, *catalogue())), min_size=1, max_size=3)):
         values[name] = draw(anything)
     return values
 
 
-def row_of(values: dict[str, float]) -> dict[str, np.ndarray]:
+def single_row(values: dict[str, float]) -> dict[str, np.ndarray]:
     return {name: np.array([value]) for name, value in values.items()}
 
 
@@ -64,7 +64,7 @@ def row_of(values: dict[str, float]) -> dict[str, np.ndarray]:
 @given(values=robots())
 def test_any_robot_is_solved_flagged_or_refused(values: dict[str, float]) -> None:
     try:
-        found = steady_columns(row_of(values), jobs=1, title="")
+        found = steady_columns(single_row(values), jobs=1, title="")
     except InputError:
         return
     outputs = [found[name][0] for name in ("omega_t_bar", "omega_yr_bar", "v_x", "v_z")]
@@ -77,7 +77,7 @@ def test_any_robot_is_solved_flagged_or_refused(values: dict[str, float]) -> Non
 @given(values=robots())
 def test_any_row_of_a_sweep_is_simulated_flagged_or_refused(values: dict[str, float]) -> None:
     try:
-        found = simulate({**row_of(values), "history": np.array([True])})
+        found = simulate({**single_row(values), "history": np.array([True])})
     except InputError:
         return
     assert found["failed"][0] or np.isfinite(found["net_speed_bar"][0]).all()
@@ -87,7 +87,7 @@ def test_any_row_of_a_sweep_is_simulated_flagged_or_refused(values: dict[str, fl
 @given(values=robots(DWELL))
 def test_the_look_up_table_answers_or_refuses(values: dict[str, float]) -> None:
     try:
-        found = load().query(row_of(values))
+        found = load().query(single_row(values))
     except InputError:
         return
     assert all(np.isfinite(column).all() for column in found.values())
@@ -107,7 +107,7 @@ def test_the_worst_robot_of_a_table_leaves_the_others_alone(tmp_path: Path) -> N
 
 @st.composite
 def plans(draw: st.DrawFn) -> object:
-    """A plan.json with some entries replaced."""
+    """Replace some entries of a plan.json."""
     plan: dict[str, Any] = {
         "format": FORMAT,
         "robot": {"groups": dict(CONTROL), "time_scale_s": 2.0},

@@ -1,4 +1,4 @@
-"""The house: imports run one way, files stay readable, and importing a package loads only what it uses."""
+"""The layout: imports run one way, files stay readable, and importing a package loads only what it uses."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ORDER = list(ROOMS)
 
 
 def modules_imported(file: Path) -> set[str]:
-    """Full names of what a file imports, wherever in the file; `from a import b` counts as a.b."""
+    """List the full names of what a file imports, wherever in the file; `from a import b` counts as a.b."""
     names = set()
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
@@ -45,12 +45,12 @@ def imported(file: Path) -> set[str]:
 
 
 def room(package: str, file: Path) -> str:
-    """The folder of a package that a file is in, or the file's own name."""
+    """Return the folder of a package that a file is in, or the file's own name."""
     return file.relative_to(ROOT / package).parts[0].removesuffix(".py")
 
 
 def rooms_imported(package: str) -> dict[str, set[str]]:
-    """Room -> other rooms that its files import, in functions and under TYPE_CHECKING, too."""
+    """Map each room to the other rooms that its files import, in functions and under TYPE_CHECKING, too."""
     graph: dict[str, set[str]] = {}
     for file in (ROOT / package).rglob("*.py"):
         here = room(package, file)
@@ -61,7 +61,7 @@ def rooms_imported(package: str) -> dict[str, set[str]]:
 
 
 def modules() -> dict[str, Path]:
-    """Every module of the packages by its full name; a package stands for its __init__.py."""
+    """Find every module of the packages by its full name; a package stands for its __init__.py."""
     files = [file for package in ORDER for file in (ROOT / package).rglob("*.py")]
     names = [".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for file in files]
     return dict(zip(names, files, strict=True))
@@ -150,10 +150,7 @@ SIMULATOR = {"sim.linear", "sim.motion", "sim.reference", "sim.solve"}
 
 @pytest.mark.parametrize(
     ("module", "may_load"),
-    [
-        *((package, set()) for package in ORDER),
-        *((f"{package}.__main__", set()) for package in ORDER),
-    ],
+    [*((package, set()) for package in ORDER), *((f"{package}.__main__", set()) for package in ORDER)],
 )
 def test_importing_loads_only_what_is_used(module: str, may_load: set[str]) -> None:
     """Of the large libraries, of the other packages but `sim`, and of the simulator."""

@@ -16,7 +16,7 @@ FILES = sorted(Path(__file__).parent.rglob("*.py"))
 
 
 def without_limit(call: ast.Call) -> bool:
-    """Whether a call waits for a process without saying how long."""
+    """Tell whether a call waits for a process without saying how long."""
     if not isinstance(call.func, ast.Attribute):
         return False
     started = isinstance(call.func.value, ast.Name) and call.func.value.id == "subprocess"

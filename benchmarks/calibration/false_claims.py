@@ -25,9 +25,9 @@ from benchmarks.calibration.planted import Linear, Signals, measured, outside, s
 from benchmarks.markdown import heading, row
 from benchmarks.parallel import in_parallel
 from benchmarks.proportions import per_cent
-from calibration.statistics.forward_model import Parameter
 from calibration.statistics.residual_tests import TESTABLE
-from calibration.statistics.splits import middle_session
+from calibration.statistics.statistical_model import Parameter
+from calibration.statistics.study import middle_session
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
 from sim.arrays import Floats

@@ -32,13 +32,12 @@ from benchmarks.markdown import heading, row
 from benchmarks.parallel import in_parallel
 from benchmarks.proportions import per_cent
 from calibration.statistics.fit import Fit, fit
-from calibration.statistics.forward_model import start_values
 from calibration.statistics.held_out import errors
-from calibration.statistics.noise import repeat_covariance
+from calibration.statistics.residual_regression import regress_residual
 from calibration.statistics.residual_tests import TESTABLE
-from calibration.statistics.splits import middle_session
+from calibration.statistics.statistical_model import repeat_covariance, start_values
+from calibration.statistics.study import middle_session
 from calibration.verdict.calibrate import calibrate
-from calibration.verdict.residual_regression import regress_residual
 from sim.arrays import Floats
 
 KINDS = {
@@ -58,7 +57,7 @@ class Found:
     claims: tuple[
         frozenset[str], ...
     ]  # sets of effects, each of which may be the truth; the procedure may name several
-    error: float  # on the locked runs, over the noise
+    error: float  # on the held-out runs, over the noise
 
 
 class _Sets:

@@ -86,9 +86,9 @@ def compared(model: Linear, effect: int, size: float, seed: int) -> dict[str, st
     """What the new runs say; None if the table is not ambiguous."""
     truth, signal, first_runs = model.effects[effect].name, model.D[..., effect] * size, made(model)
     first = close(model, signal, seed)
-    if first.verdict != "ambiguous" or outcome(first, truth) == "wrong" or first.next_batch is None:
+    if first.verdict != "ambiguous" or outcome(first, truth) == "wrong" or first.next.batch is None:
         return None
-    batch = np.array([s["run"] for s in first.next_batch.settings]) + len(first_runs)
+    batch = np.array([s["run"] for s in first.next.batch.settings]) + len(first_runs)
     results = {"truth": truth, "set": " or ".join("+".join(e.name for e in c.claimed) for c in first.explaining)}
     for name, more in (("8 proposed runs", batch), ("factorial of 16", factorial(model))):
         results[name] = outcome(close(model, signal, seed, more), truth)

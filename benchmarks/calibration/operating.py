@@ -23,7 +23,7 @@ from benchmarks.calibration.planted import Case, Design, Linear, cases, measured
 from benchmarks.markdown import heading, row
 from benchmarks.parallel import in_parallel
 from benchmarks.proportions import per_cent
-from calibration.statistics.forward_model import start_values
+from calibration.statistics.statistical_model import start_values
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.experiment import Experiment
 from calibration.verdict.verdict import Verdict
@@ -45,7 +45,7 @@ class Outcome:
     judgement: str
     verdict: str
     effects: tuple[str, ...]
-    held_out: float  # error on the locked session over the noise of a run
+    held_out: float  # error on the held-out session over the noise of a run
     # Whether intervals contain the truth: those of rightly named effects, or of the coefficients of a null.
     covered: tuple[bool, ...]
 

@@ -20,11 +20,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.forward_model import Parameter, Parameters, Runs, start_values
-from calibration.statistics.noise import Noise
-from calibration.statistics.priors import prior_rows
 from calibration.statistics.residual_tests import TESTABLE
-from calibration.statistics.splits import middle_session
+from calibration.statistics.statistical_model import Noise, Parameter, Parameters, Runs, prior_rows, start_values
+from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Flags, Floats, Integers

@@ -18,10 +18,7 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from benchmarks.calibration.planted import Linear
-from calibration.statistics.forward_model import start_values
-from calibration.statistics.input_features import features
-from calibration.statistics.noise import repeat_covariance
-from calibration.statistics.priors import prior_rows
+from calibration.statistics.statistical_model import features, prior_rows, repeat_covariance, start_values
 from sim.arrays import Flags, Floats
 
 _LEVEL = 0.05

@@ -28,9 +28,8 @@ from benchmarks.calibration.planted import ROBOT, Case, Design, Signals, design,
 from benchmarks.markdown import heading, row
 from benchmarks.parallel import in_parallel
 from benchmarks.proportions import per_cent
-from calibration.statistics.forward_model import Parameter, start_values, stepped
-from calibration.statistics.priors import prior_rows
 from calibration.statistics.residual_tests import TESTABLE
+from calibration.statistics.statistical_model import Parameter, prior_rows, start_values, stepped
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.verdict.calibrate import calibrate
 from sim.arrays import Floats
@@ -52,7 +51,7 @@ class Closed:
     label: str
     said: str
     judgement: str
-    held_out: float  # error on the locked session over the noise of a run
+    held_out: float  # error on the held-out session over the noise of a run
     calibrated: float  # the same of the model without effects
     seconds: float  # of a processor
     unsettled: int  # conditions whose truth is the direct solution

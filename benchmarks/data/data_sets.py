@@ -60,7 +60,7 @@ build(sweeps.design(int(sys.argv[1])), sys.argv[2], title="", simulate=sweeps.in
 
 
 def processor_seconds(code: str, *words: str) -> tuple[float, str]:
-    """Processor time of a process and of all that it starts, however they are related; and what it prints."""
+    """Measure the processor time of a process and its children; return it with what the process prints."""
     with TemporaryDirectory() as folder:
         log = Path(folder, "spent")
         # every process adds its own time to the file when it ends, workers included
@@ -93,7 +93,7 @@ os.register_at_fork(after_in_child=_start)
 
 
 def overhead(rows: int) -> float:
-    """Prints the engine's overhead; returns seconds a row.
+    """Print the engine's overhead; return seconds a row.
 
     The time of a row changes by ten per cent with what else the machine does. So both are compared in what they
     take beside the rows.
@@ -113,7 +113,7 @@ def overhead(rows: int) -> float:
 
 
 def encodings() -> None:
-    """Prints bytes a row of simulated and synthetic rows, by encoding."""
+    """Print bytes a row of simulated and synthetic rows, by encoding."""
     with TemporaryDirectory() as folder:
         build(load_design().with_rows(512), f"{folder}/out", title="")
         rows = pa.Table.from_batches(list(batches(f"{folder}/out")))
@@ -138,7 +138,7 @@ def encodings() -> None:
 
 
 def reading(rows: int) -> None:
-    """Prints times of storing and reading many synthetic rows."""
+    """Print the times of storing and reading many synthetic rows."""
     with TemporaryDirectory() as folder:
         out = f"{folder}/out"
         spent, _ = processor_seconds(_SYNTHETIC, str(rows), out)
@@ -176,7 +176,7 @@ def _joined(out: str, form: pa.Schema) -> None:
 
 
 def projection(cost: float) -> None:
-    """Prints what long sweeps take."""
+    """Print what long sweeps take."""
     print(f"\nProjected from {1e3 * cost:.1f} ms a row")
     for rows in (10**6, 10**8):
         hours = [f"{cost * rows / cores / 3600:.3g} h on {cores}" for cores in (2, 64, 1024)]

@@ -52,7 +52,7 @@ CASES = (
 
 
 def eight(length: float) -> Path2D:
-    """A closed eight of this length."""
+    """Make a closed eight of this length."""
     t = np.linspace(0, 2 * math.pi, 2001)[:-1]
     path = Path2D.of(np.stack([np.sin(t), 0.55 * np.sin(2 * t)], 1), closed=True)
     return path.scaled(length / path.length)
@@ -65,7 +65,7 @@ def both(case: Case, planned: Plan) -> tuple[Swum, Swum]:
 
 
 def draw(planned: Plan, swims: list[tuple[Swum, Swum]]) -> Figure:
-    """Tracks of the hardest case; distances from the path over the way in all cases."""
+    """Draw the tracks of the hardest case, and distances from the path over the way in all cases."""
     figure = Figure(figsize=(10, 6.6), layout="constrained")
     upper, lower = np.asarray(figure.subfigures(2, 1, height_ratios=(1.15, 1)), dtype=object)
     ways = zip(swims[-1], (REPLAYED, FEEDBACK), ("open loop", "with the tracker"), strict=True)
@@ -94,14 +94,14 @@ def draw(planned: Plan, swims: list[tuple[Swum, Swum]]) -> Figure:
 
 
 def smooth(swum: Swum) -> np.ndarray:
-    """Root mean square distance over 1 l of the way."""
+    """Compute the root mean square distance over 1 l of the way."""
     width = max(1, round(len(swum.time) / LENGTH))
     padded = np.pad(swum.distance**2, (width // 2, width - 1 - width // 2), mode="edge")
     return np.asarray(np.sqrt(np.convolve(padded, np.ones(width) / width, mode="valid")))
 
 
 def alarms(planned: Plan, seed: int) -> tuple[int, int]:
-    """Windows, and alarms, of one robot with coefficients that are 1 % uncertain."""
+    """Count windows, and alarms, of one robot with coefficients that are 1 % uncertain."""
     rng = np.random.default_rng(seed)
     C_t, C_r, C_yr = (np.array([ROBOT.C_t, ROBOT.C_r, ROBOT.C_yr]) * np.exp(0.01 * rng.normal(size=3))).tolist()
     robot = replace(ROBOT, C_t=C_t, C_r=C_r, C_yr=C_yr)

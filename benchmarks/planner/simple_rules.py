@@ -33,7 +33,7 @@ Rule = tuple[int, list[float], tuple[float, float, float]]  # first direction, d
 
 
 def paper_circle(result: Plan, radius: float) -> Rule:
-    """Dwells T + d/2 and T − d/2: a pair turns by Ω d and gets ahead by 2 T v_z sinc(Ω T/2)."""
+    """Choose the dwells T + d/2 and T − d/2: a pair turns by Ω d and gets ahead by 2 T v_z sinc(Ω T/2)."""
     rate, speed, dwell = _steady(result)
     ahead = speed * _sinc(rate * dwell / 2)
     less = 2 * dwell * ahead / (radius * rate)
@@ -43,7 +43,7 @@ def paper_circle(result: Plan, radius: float) -> Rule:
 
 
 def paper_polygon(result: Plan, corners: int, side: float) -> Rule:
-    """Sides by equal dwells, corners by one dwell of α/ω_yr. It begins in the middle of the lower side."""
+    """Make sides by equal dwells, corners by one dwell of α/ω_yr, from the middle of the lower side."""
     rate, speed, dwell = _steady(result)
     turn = 2 * math.pi / corners
     ahead = speed * _sinc(rate * dwell / 2) * dwell
@@ -60,7 +60,7 @@ def paper_polygon(result: Plan, corners: int, side: float) -> Rule:
 
 
 def sum_up_rounding(result: Plan) -> Rule:
-    """The turning of the planner's reference, rounded on a grid of steps T; without the predicted pose."""
+    """Round the turning of the planner's reference on a grid of steps T, without the predicted pose."""
     rate, _, dwell = _steady(result)
     guide, surge = result.declared.reference, float(result.tracked.vehicle.twist[0, 0])
     wanted = np.clip(guide.curvature * result.tracked.vehicle.pivot_radius, -1, 1)
@@ -85,7 +85,7 @@ def sum_up_rounding(result: Plan) -> Rule:
 
 
 def _steady(result: Plan) -> tuple[float, float, float]:
-    """Yaw rate, speed along the axis, and dwell."""
+    """Return yaw rate, speed along the axis, and dwell."""
     return result.tracked.vehicle.yaw_rate, float(result.tracked.vehicle.twist[0, 0]), result.minimum_dwell
 
 
@@ -94,7 +94,7 @@ def _sinc(angle: float) -> float:
 
 
 def _errors(result: Plan, rule: Rule) -> tuple[float, float, float]:
-    """Distance from the drawn path, rms and largest [l], and time [s]."""
+    """Compute the distance from the drawn path, rms and largest [l], and time [s]."""
     first, dwells, start = rule
     robot = result.robot
     track = replay([Schedule(robot.group_values(), first, np.array(dwells), start, robot.time_scale)])[0]

@@ -81,7 +81,7 @@ class Swum:
     alarms: tuple[float, ...]
 
     def rms(self, begin: float = 0.0, end: float = 1.0) -> float:
-        """Root mean square distance over a part of the time."""
+        """Compute the root mean square distance over a part of the time."""
         share = self.time / self.time[-1]
         weight = np.gradient(self.time) * ((share >= begin) & (share <= end))
         return float(np.sqrt((weight * self.distance**2).sum() / weight.sum()))
@@ -103,7 +103,7 @@ class Robots:
         return pair if self._sign > 0 else (pair[1], pair[0])
 
     def go(self, duration: float) -> tuple[Floats, Floats]:
-        """Times from now (K,) and poses from the start (K, 3)."""
+        """Advance: return times from now (K,) and poses from the start (K, 3)."""
         times, poses = self._run.go(duration)
         if self._run.failed:
             raise RuntimeError(self._run.failed)

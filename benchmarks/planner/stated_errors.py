@@ -57,7 +57,7 @@ class Swum(NamedTuple):
 
 
 def random_robot(rng: np.random.Generator) -> Robot:
-    """A robot of the look-up table's domain."""
+    """Draw a robot of the look-up table's domain."""
     base = PRESETS["paper-control"]
     length = base.tail_length
     radius = length / rng.uniform(4, 9)
@@ -77,7 +77,7 @@ def random_robot(rng: np.random.Generator) -> Robot:
 
 
 def random_path(rng: np.random.Generator, radius: float) -> Path2D:
-    """A path of 6 to 15 turn radii: a smooth curve, a polygon, a circle or a zigzag."""
+    """Draw a path of 6 to 15 turn radii: a smooth curve, a polygon, a circle or a zigzag."""
     kind = rng.integers(4)
     length = radius * rng.uniform(6, 15)
     if kind == 0:
@@ -118,13 +118,13 @@ def swum(seed: int) -> Swum | str:
 
 
 def _mean_path(result: Plan, track: pd.DataFrame) -> float:
-    """Distance of the mean path from the declared one, rms."""
+    """Compute the distance of the mean path from the declared one, rms."""
     pairs = track.groupby(track["dwell"] // 2)[["x_over_l", "y_over_l"]].mean().to_numpy()
     return float(np.sqrt(np.mean(distance_to(result.reference, pairs[1:-1]) ** 2)))
 
 
 def line(name: str, some: list[Swum]) -> str:
-    """Figures of a class of robots."""
+    """Format the figures of a class of robots."""
     held = sum(result.wrong <= result.stated for result in some)
     low, high = wilson(held, len(some))
 
@@ -141,7 +141,7 @@ def line(name: str, some: list[Swum]) -> str:
 
 
 def draw(swims: list[Swum], path: str) -> None:
-    """Largest error of the robot that differs against the stated error."""
+    """Plot the largest error of the robot that differs against the stated error."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(5.6, 5.2), layout="constrained")

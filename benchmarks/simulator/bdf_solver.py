@@ -35,13 +35,13 @@ class PlainSwimmer:
         self.voronoi[[0, -1]] *= 0.5
 
     def start(self) -> Floats:
-        """Straight tails at rest."""
+        """Return straight tails at rest."""
         arc = np.arange(1, self.n + 1) / self.n
         x = self.root + np.array([0.0, 0.0, -1.0]) * arc[:, None, None]
         return np.concatenate([x.ravel(), np.zeros(4)])
 
     def rates(self, _: float, state: Floats) -> Floats:
-        """d(state)/dt."""
+        """Compute d(state)/dt."""
         x, phase = state[:-4].reshape(self.n, self.tails, 3), state[-4]
         force, moment, resistance, elastic = self._loads(x)
         cos, sin = np.cos(phase), np.sin(phase)
@@ -68,7 +68,7 @@ class PlainSwimmer:
         )
 
     def _loads(self, x: Floats) -> tuple[Any, ...]:
-        """Force, moment (N, 3) of clamps on the disc; resistance (n + 1, N, 3, 3), elastic force of nodes."""
+        """Compute clamp force and moment (N, 3), resistance (n + 1, N, 3, 3) and elastic force of nodes."""
         n = self.n
         nodes = np.concatenate([self.root[None], x])
         edge = np.diff(nodes, axis=0)
@@ -101,7 +101,7 @@ def _components(a: Floats) -> Vector:
 
 
 def settle_plainly(groups: Groups, *, edges: int = 16, tolerance: float = 1e-5) -> Floats:
-    """(ω_t, ω_yr, v_x, v_z) of the head's centre, from rest: means over the last whole turn of the disc.
+    """Settle from rest: (ω_t, ω_yr, v_x, v_z) of the head's centre, means over the last whole turn of the disc.
 
     Runs for three time units, or for two and a turn where that is longer (at 0.4 of the motor's speed).
     """

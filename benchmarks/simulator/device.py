@@ -28,7 +28,7 @@ _STEPS = 20
 
 
 def robots(count: int, device: str) -> Groups:
-    """The paper's control robot, `count` times."""
+    """Repeat the paper's control robot `count` times."""
     values = PRESETS["paper-control"].group_values()
     groups = Groups.from_columns({k: np.full(count, v) for k, v in values.items()})
     moved = {f.name: getattr(groups, f.name).to(device) for f in fields(groups) if f.name not in ("N", "effects")}
@@ -36,7 +36,7 @@ def robots(count: int, device: str) -> Groups:
 
 
 def robot_step(count: int, device: str) -> tuple[float, TensorState]:
-    """Seconds of one robot's time step in a batch, and where the batch is after 2 × 20 steps."""
+    """Time one robot's step in a batch, in seconds; return where the batch is after 2 × 20 steps, too."""
     groups = robots(count, device)
     batch = tensor_robots(groups, edges=EDGES)
     dt = torch.full_like(groups.omega_bar, 0.02)

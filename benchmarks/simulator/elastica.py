@@ -19,7 +19,7 @@ OFFSET, LENGTH, RADIUS, MODULUS, VISCOSITY, DENSITY = 0.016, 0.11, 3.2e-3, 1.2e6
 
 @njit(cache=True)
 def _drag(x: Any, v: Any, parallel: float, perp: float) -> Any:
-    """Resistive force on every node, (3, n + 1): Voronoi lengths and mean tangents."""
+    """Compute the resistive force on every node, (3, n + 1): Voronoi lengths and mean tangents."""
     n = x.shape[1] - 1
     force = np.zeros_like(x)
     for k in range(n + 1):
@@ -31,8 +31,8 @@ def _drag(x: Any, v: Any, parallel: float, perp: float) -> Any:
                 tangent += edge / length
                 voronoi += length / 2
         tangent /= np.sqrt((tangent**2).sum())
-        along = (v[:, k] * tangent).sum()
-        force[:, k] = -voronoi * (perp * v[:, k] + (parallel - perp) * along * tangent)
+        axial_speed = (v[:, k] * tangent).sum()
+        force[:, k] = -voronoi * (perp * v[:, k] + (parallel - perp) * axial_speed * tangent)
     return force
 
 
@@ -70,7 +70,7 @@ class _Simulator(elastica.BaseSystemCollection, elastica.Constraints, elastica.F
 
 
 def filament(omega: float, *, elements: int, step: float, seconds: float) -> tuple[float, float, float]:
-    """|thrust| [N], |moment| [N m] of the fluid at the end, and seconds of work for a simulated second."""
+    """Compute |thrust| [N], |moment| [N m] of the fluid at the end, and seconds of work for a simulated second."""
     slender = np.log(LENGTH / RADIUS)
     parallel, perp = 2 * np.pi * VISCOSITY / (slender - 0.5), 4 * np.pi * VISCOSITY / (slender + 0.5)
     rod = elastica.CosseratRod.straight_rod(

@@ -40,7 +40,7 @@ Change = Callable[[Robot, float], Robot]
 
 
 def effect_change(name: str) -> Change:
-    """Puts a size of an effect into a robot."""
+    """Make a function that puts a size of an effect into a robot."""
 
     def changed(robot: Robot, size: float) -> Robot:
         return replace(robot, effects={**robot.effects, **BESIDE.get(name, {}), name: size})
@@ -59,12 +59,12 @@ def number_change(name: str) -> Change:
 
 
 def head_shares(robots: Sequence[Robot]) -> np.ndarray:
-    """ω_h/ω of robots; NaN where they have no orbit."""
+    """Compute ω_h/ω of robots; NaN where they have no orbit."""
     return motions(robots)[0]
 
 
 def motions(robots: Sequence[Robot]) -> np.ndarray:
-    """ω_h/ω and the yaw rate [rad/s] of orbits, (2, B)."""
+    """Compute ω_h/ω and the yaw rate [rad/s] of orbits, (2, B)."""
     rows = []
     for robot in robots:
         motion = orbits(robot.groups())
@@ -74,7 +74,7 @@ def motions(robots: Sequence[Robot]) -> np.ndarray:
 
 
 def closing_size(change: Change, robot: Robot, null: float, bounds: tuple[float, float]) -> tuple[float, float]:
-    """The smallest change that gives the measured share (NaN: none), and the share nearest to it on the way."""
+    """Find the smallest change that gives the measured share (NaN: none), and the nearest share on the way."""
     best, nearest = np.nan, float(head_shares([change(robot, null)])[0])
     for end in bounds:
         sizes = null + (end - null) * np.linspace(0, 1, STEPS + 1)
@@ -137,11 +137,11 @@ def gaps() -> dict[str, float]:
 def deciding_runs(sizes: dict[str, float]) -> None:
     """Print for each explanation the run that tells it best from all others, in standard deviations of a run."""
     known = candidates()
-    made = [
+    robots = [
         replace(MEASURED, tails=tails, tail_length=length, motor_speed=rpm * np.pi / 30, effects=CONTACT)
         for tails, length, rpm in RUNS
     ]
-    predicted = {name: motions([known[name][0](robot, size) for robot in made]) for name, size in sizes.items()}
+    predicted = {name: motions([known[name][0](robot, size) for robot in robots]) for name, size in sizes.items()}
     print(
         f"\n{'explanation':28}{'size':>7}   deciding run             omega_h/omega    yaw [rad/s]   sd to the next"
     )

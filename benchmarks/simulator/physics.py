@@ -32,7 +32,7 @@ ROBOT = PRESETS["paper-control"]
 
 
 def draw_tails(axes: Any, robot: Robot, title: str) -> None:
-    """One tail over a revolution in the body frame, seen from above; colour runs with the disc's phase."""
+    """Draw one tail over a revolution in the body frame, seen from above; colour runs with the disc's phase."""
     _, tails = tails_over_a_revolution(robot, FRAMES)
     radius, length = robot.head_radius / robot.tail_length, robot.head_length / robot.tail_length
     axes.fill([0, length, length, 0], [-radius, -radius, radius, radius], color="#dfe5ea")
@@ -48,14 +48,14 @@ def draw_tails(axes: Any, robot: Robot, title: str) -> None:
 
 
 def robots(tails: int) -> Groups:
-    """The paper's control robot with N tails at every speed."""
+    """Return the paper's control robot with N tails at every speed."""
     values = replace(ROBOT, tails=tails).group_values()
     columns = {name: np.full(len(SPEEDS), value) for name, value in values.items()}
     return Groups.from_columns({**columns, "omega_bar": SPEEDS})
 
 
 def curves(tails: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], np.ndarray]:
-    """Simulated and linear thrust, torque and yaw rate over SPEEDS, and where tails are apart."""
+    """Compute simulated and linear thrust, torque and yaw rate over SPEEDS, and where tails are apart."""
     groups = robots(tails)
     motion = steady(groups)
     R = 1 / float(groups.l_over_R[0])

@@ -41,7 +41,7 @@ def main(count: str = "128") -> None:
 
 
 def costs(parts: list[Groups], robots: int) -> None:
-    """Milliseconds of processor time a robot."""
+    """Measure milliseconds of processor time a robot."""
     rng = np.random.default_rng(0)
     dwells = [np.exp(rng.uniform(np.log(0.3), np.log(4.0), len(bodies(part)))) for part in parts]
     ways: dict[str, Callable[[], object]] = {
@@ -59,7 +59,7 @@ def costs(parts: list[Groups], robots: int) -> None:
 
 
 def errors(parts: list[Groups]) -> None:
-    """Largest differences from fine time steps over the dwells, for some robots of each N."""
+    """Compute the largest differences from fine time steps over the dwells, for some robots of each N."""
     differences: dict[str, list[float]] = {"lag": [], "memory": [], "rest": []}
     for part in parts:
         curves = responses(part)

@@ -25,7 +25,7 @@ from sim.motion.batches import steady_columns
 
 
 def robots(rows: int, *, seed: int = 0) -> dict[str, np.ndarray]:
-    """Columns of random robots over the wide domain."""
+    """Draw columns of random robots over the wide domain."""
     axes = load_design().axes
     share = qmc.Sobol(len(GROUP_COLUMNS), scramble=True, rng=np.random.default_rng(seed)).random(rows)
     columns = {}

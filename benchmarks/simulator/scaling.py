@@ -33,12 +33,12 @@ STEPS = 200
 
 
 def control(tails: int) -> Body:
-    """The paper's control robot with N tails, for the compiled loops."""
+    """Return the paper's control robot with N tails, for the compiled loops."""
     return bodies(replace(PRESETS["paper-control"], tails=tails).groups())[0]
 
 
 def step_time(tails: int, edges: int) -> float:
-    """Seconds for a time step of a steadily turning robot."""
+    """Measure the seconds of a time step of a steadily turning robot."""
     body, none = control(tails), np.empty((0, edges, tails, 3))
     state, poses = new_state(tails, edges, body.offset), np.empty((STEPS, 6))
 
@@ -50,7 +50,7 @@ def step_time(tails: int, edges: int) -> float:
 
 
 def correction_time(tails: int, phases: int, edges: int) -> float:
-    """Seconds for one Newton correction of the orbit on one mesh."""
+    """Measure the seconds of one Newton correction of the orbit on one mesh."""
     body, rates = control(tails), on_orbit(phases, FIRST_PHASE)
     x, u = straight_start(body, edges, phases, tails)
     work = new_workspace(rates, x, u)
@@ -63,14 +63,14 @@ def correction_time(tails: int, phases: int, edges: int) -> float:
 
 
 def memory(tails: int, phases: int) -> int:
-    """Bytes that the direct route works in for one robot, on its finest mesh."""
+    """Count the bytes that the direct route works in for one robot, on its finest mesh."""
     x, u = straight_start(control(tails), MESHES[-1], phases, tails)
     work = new_workspace(on_orbit(phases, FIRST_PHASE), x, u)
     return _size(work)
 
 
 def _size(part: object) -> int:
-    """Bytes of all arrays in nested tuples."""
+    """Count the bytes of all arrays in nested tuples."""
     return part.nbytes if isinstance(part, np.ndarray) else sum(map(_size, part))  # type: ignore[call-overload]
 
 

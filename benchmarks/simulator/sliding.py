@@ -29,7 +29,7 @@ NEAR = 1.15  # distance over 2 r0 below which tails count as touching
 
 
 def sliding(robot: Robot) -> Floats:
-    """Speed of each touching pair of nodes along each other over ω_t a, at all phases."""
+    """Compute the speed of each touching pair of nodes along each other over ω_t a, at all phases."""
     body, tails = bodies(robot.groups())[0], robot.tails
     orbit = refined_orbit(body, tails, FEW)
     assert orbit.ended == SOLVED

@@ -107,7 +107,7 @@ def _network(
 
 
 def _lbfgs(network: Ensemble, k: int, problem: Problem, iterations: int, *others: object) -> None:
-    """The last 80 steps only, not the whole matrix."""
+    """Minimise with the last 80 steps only, not the whole matrix."""
     alone = network.member(k).requires_grad_(True)
     optimiser = torch.optim.LBFGS(
         alone.parameters(), max_iter=iterations, max_eval=2 * iterations, history_size=80,
@@ -125,7 +125,7 @@ def _lbfgs(network: Ensemble, k: int, problem: Problem, iterations: int, *others
 
 
 def _kernel(name: str, rows: WrenchSamples, tested: WrenchSamples) -> Result:
-    """A Gaussian process with the same prior smoothness, on y from the wrench (y_4 = y_5 = 0)."""
+    """Fit a Gaussian process with the same prior smoothness to y from the wrench (y_4 = y_5 = 0)."""
     began = time.process_time()
     inputs, wanted = tail_inputs(rows.tails, rows.motion), _numbers(rows)
     shift, scale = inputs.mean(0), inputs.std(0) * torch.tensor(SMOOTHNESS)
@@ -157,7 +157,7 @@ def _nearest(name: str, rows: WrenchSamples, tested: WrenchSamples) -> Result:
 
 
 def _numbers(rows: WrenchSamples) -> Tensor:
-    """y (M, 6) of rows with y_4 = y_5 = 0."""
+    """Compute y (M, 6) of rows with y_4 = y_5 = 0."""
     wrench = (rows.heads.resistance @ rows.motion[..., None])[..., 0]
     remainder = wrench - straight_wrench(rows.tails, rows.motion)
     units = wrench_slopes(rows.tails, rows.motion)[:, :, :4].diagonal(dim1=1, dim2=2)

@@ -35,7 +35,7 @@ _SOLVED = 1e-6  # misfit of a solution of the table's equations
 
 
 def targets(lookup: NeuralTable, count: int) -> SimulatedRobots:
-    """Simulated robots inside the table's domain, with two tails and more that do not touch."""
+    """Simulate robots inside the table's domain, with two tails and more that do not touch."""
     rows = as_reached(draw_robots(_DRAWN, _SEED, wide=False))
     inside = ~lookup.query(rows.robots, flag=True)[OUTSIDE]
     good = inside & (rows.robots["N"] > 1) & (rows.motion["tail_gap"] >= 1)
@@ -44,11 +44,11 @@ def targets(lookup: NeuralTable, count: int) -> SimulatedRobots:
 
 def backwards(lookup: NeuralTable, rows: SimulatedRobots, title: str) -> None:
     """Solve for the free inputs, simulate every solution, and print how far it is from its target."""
-    free, given = KINDS[title]
+    free, wanted = KINDS[title]
     truth = with_radius(rows.motion)
     robots = {name: values for name, values in rows.robots.items() if name in ROBOT}
     began = time.process_time()
-    solutions = inverse(lookup, robots, {n: truth[n] for n in given}, {n: BOUNDS[n] for n in free})
+    solutions = inverse(lookup, robots, {n: truth[n] for n in wanted}, {n: BOUNDS[n] for n in free})
     spent = time.process_time() - began
     solved = np.flatnonzero((solutions.misfit < _SOLVED) & ~solutions.outside.astype(bool))
     target = solutions.target[solved]
@@ -56,7 +56,7 @@ def backwards(lookup: NeuralTable, rows: SimulatedRobots, title: str) -> None:
         n: v[solved] for n, v in solutions.inputs.items()
     }
     simulated = steady_columns(robots_found, title="")
-    missed = np.max([np.abs(simulated[n] / truth[n][target] - 1) for n in given], axis=0)
+    missed = np.max([np.abs(simulated[n] / truth[n][target] - 1) for n in wanted], axis=0)
     missed[~np.asarray(simulated["converged"], dtype=bool)] = np.inf
     best = np.full(len(rows), np.inf)
     np.minimum.at(best, target, missed)

@@ -48,7 +48,7 @@ class Found(NamedTuple):
 
 
 def usable(rows: SimulatedRobots) -> tuple[SimulatedRobots, WrenchSamples]:
-    """Robots with two tails and more which a table may learn, as simulated and as rows of tails."""
+    """Select robots with two tails and more which a table may learn, as simulated and as rows of tails."""
     rows = rows.at(rows.robots["N"] > 1)
     samples = wrench_samples(rows.robots, rows.motion)
     good = np.flatnonzero(learnable(samples))
@@ -70,7 +70,7 @@ def test_errors(
 
 
 def draw(curves: list[Found], path: str) -> None:
-    """Error of the yaw rate and of the surge against rows, both logarithmic."""
+    """Plot the error of the yaw rate and of the surge against rows, both logarithmic."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 4.4), layout="constrained")

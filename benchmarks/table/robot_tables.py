@@ -51,7 +51,7 @@ _VIEW = np.stack([np.ones(3), planar.MIRROR])  # a motion in each direction, see
 
 
 def robots() -> dict[str, Robot]:
-    """The control robot, plain and with each effect (beside the one that it needs)."""
+    """Return the control robot, plain and with each effect (beside the one that it needs)."""
     base, named = PRESETS["paper-control"], {"none": PRESETS["paper-control"]}
     for name, effect in catalogue().items():
         partner = {effect.beside: catalogue()[effect.beside].typical} if effect.beside else {}
@@ -60,19 +60,19 @@ def robots() -> dict[str, Robot]:
 
 
 def both(robot: Robot) -> Groups:
-    """The robot with its motor forwards and backwards."""
+    """Return the robot with its motor forwards and backwards."""
     columns = {name: np.array([value, value]) for name, value in robot.group_values().items()}
     return Groups.from_columns(columns | {"omega_bar": columns["omega_bar"] * _SENSES})
 
 
 def pairs(changes: Floats) -> Floats:
-    """Pose changes (2, …, 3) over two dwells, the first in each direction, from those over one dwell."""
+    """Compose pose changes (2, …, 3) over two dwells, the first in each direction, from those over one dwell."""
     real = changes * _VIEW.reshape(2, *[1] * (changes.ndim - 2), 3)
     return planar.compose(real, real[::-1])
 
 
 def tabulated(table: RobotTable, robot: Robot) -> tuple[Floats, Floats]:
-    """Pose changes (2, D, 3) over one of equal dwells as the planner sees them, and steady twists (2, 3)."""
+    """Compute the planner's pose changes (2, D, 3) over one of equal dwells, and steady twists (2, 3)."""
     vehicle = table_vehicle(robot, table)
     dwells = DWELLS[list(AT)]
     changes = np.stack([vehicle.motion(int(sense), dwells, dwells) for sense in _SENSES])
@@ -80,7 +80,7 @@ def tabulated(table: RobotTable, robot: Robot) -> tuple[Floats, Floats]:
 
 
 def stepped(robot: Robot, twist: Floats) -> Floats:
-    """The same pose changes (2, D, 3) by time steps, with the arcs of `twist`."""
+    """Compute the same pose changes (2, D, 3) by time steps, with the arcs of `twist`."""
     groups = both(robot)
     body, reverse = bodies(groups)[0], reversed_bodies(groups)[0]
     meshes = _MESHES_WITH_FLOW if has_flow(body) else _MESHES
@@ -93,7 +93,7 @@ def stepped(robot: Robot, twist: Floats) -> Floats:
 
 
 def _lags(body: Body, reverse: Body, tails: int, dwell: float, mesh: Resolution) -> Floats:
-    """Lags (2, 3) of equal dwells in each direction, mean over phases of the disc."""
+    """Compute the lags (2, 3) of equal dwells in each direction, mean over phases of the disc."""
     runs = [
         Run(forth, tails, mesh, steady_state(forth, tails, mesh), reverse=back, most_work=np.inf)
         for forth, back in ((body, reverse), (reverse, body))

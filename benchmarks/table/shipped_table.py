@@ -48,7 +48,7 @@ _FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated
 
 
 def robots(name: str) -> dict[str, Floats]:
-    """The robots of one set."""
+    """Draw the robots of one set."""
     if name in FLIPS:
         count, seed = FLIPS[name]
         if name != "flips":
@@ -62,7 +62,7 @@ def robots(name: str) -> dict[str, Floats]:
 
 
 def kept(work: Path, name: str) -> SimulatedRobots:
-    """One set, simulated, or read from the folder if it is there."""
+    """Simulate one set, or read it from the folder if it is there."""
     path = work / f"{name}.npz"
     if path.exists():
         with np.load(path) as file:
@@ -79,8 +79,10 @@ def kept(work: Path, name: str) -> SimulatedRobots:
 
 
 def swept(folder: str) -> tuple[SimulatedRobots, SimulatedRobots, SimulatedRobots]:
-    """Rows of a sweep: one tail; with response curves, to learn (with memory and rest, and _SWEPT without); and
-    held out.
+    """Read the rows of a sweep in three parts.
+
+    They are those with one tail; those to learn, with response curves (with memory and rest, and _SWEPT without);
+    and the held-out ones.
     """
     rows, numbers = read_robots(folder)
     part, history = split(numbers), np.isfinite(rows.curves["rest"]).all((1, 2))
@@ -120,7 +122,7 @@ def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> 
 
 
 def draw(lookup: NeuralTable, rows: SimulatedRobots, path: str) -> None:
-    """Error of the yaw rate against motor speed, of robots whose tails do not touch."""
+    """Plot the error of the yaw rate against motor speed, of robots whose tails do not touch."""
     from matplotlib.figure import Figure
 
     answer = lookup.query(rows.robots, flag=True)
@@ -160,23 +162,25 @@ def main(*words: str) -> None:
     parser.add_argument("--sweep", help="data set built from surrogate/shipped/domain.toml")
     parser.add_argument("--test")
     parser.add_argument("--picture", help="with --test: draw the errors of the held-out robots")
-    given = parser.parse_args(words)
-    if given.out:
-        if not given.sweep:
+    arguments = parser.parse_args(words)
+    if arguments.out:
+        if not arguments.sweep:
             parser.error("--out needs --sweep")
-        tails, widths, held_out, flips = (kept(given.work, n) for n in ("tails", "widths", "held_out", "flips"))
-        source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(given.sweep)["config_hash"]}
-        single, learned, others = swept(given.sweep)
+        tails, widths, held_out, flips = (
+            kept(arguments.work, n) for n in ("tails", "widths", "held_out", "flips")
+        )
+        source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(arguments.sweep)["config_hash"]}
+        single, learned, swept_held_out = swept(arguments.sweep)
         tails = join_robots([tails, single])
         lookup = learn(
             tails, widths, held_out, join_robots([flips, learned]), TAILS, CURVES, source=source,
-            flips_held_out=others, work=TrainingContext("train", folder=given.work / "states"),
+            flips_held_out=swept_held_out, work=TrainingContext("train", folder=arguments.work / "states"),
         )  # fmt: skip
-        save(lookup, given.out)
-        remove_states(given.work / "states")
+        save(lookup, arguments.out)
+        remove_states(arguments.work / "states")
         print(error_table(lookup.errors))
-    if given.test:
-        lookup, locked = load(given.test), kept(given.work, "locked")
-        test(lookup, locked, kept(given.work, "locked_flips"))
-        if given.picture:
-            draw(lookup, locked, given.picture)
+    if arguments.test:
+        lookup, locked = load(arguments.test), kept(arguments.work, "locked")
+        test(lookup, locked, kept(arguments.work, "locked_flips"))
+        if arguments.picture:
+            draw(lookup, locked, arguments.picture)

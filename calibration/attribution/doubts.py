@@ -1,4 +1,21 @@
-"""Test a claim: whether something outside the catalogue may look like it, and whether it carries over."""
+"""Doubts about a claim: something outside the catalogue may look like it, or it may not carry over to other runs.
+
+What is outside is not known. It is drawn: the signal of an effect times exp(g), with g a smooth random function of
+the runs' inputs (Gaussian process, correlation length one standard deviation, standard deviation 0.5). So it
+acts on the same outputs, and depends on N, l and ω in another way. The nuisance parameters and the coefficients
+absorb what they can. Of the rest, the claim absorbs a share a (the absorbable share). A departure that passes
+for a claim of strength Λ (standard deviations) leaves Λ √(1/a − 1). Less than `SEEN` is not noticed. The
+*imitability index* of a claim, or of a pair, is the share of draws that it would not notice. The absorbable shares
+depend on the design alone, not on what was measured.
+
+Something outside the catalogue can look like an effect at some runs. It depends on N and l in another way, so that
+the size which fits short tails is wrong for long ones. In the *transfer test* the model with the claim is fitted
+again, by one linear step, to the runs with at most the median tail length and one of the `FEWEST` smallest numbers
+of tails. Then the other runs are judged as the held-out ones are.
+
+Where the index is above `refits.DOUBT`, or the p-value of the test below `refits.SURE`, the verdict says "or
+something outside the catalogue that looks like it".
+"""
 
 from __future__ import annotations
 
@@ -6,11 +23,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from calibration.attribution.candidate import Candidate
-from calibration.attribution.imitability import absorbable_shares, imitability
-from calibration.attribution.transfer_test import transfer_p
+import numpy as np
+
+from calibration.attribution.refits import Candidate
 from calibration.statistics.fit import Fit
+from calibration.statistics.held_out import held_out_p_value, one_step
+from calibration.statistics.statistical_model import Runs, prior_rows, stepped
 from calibration.statistics.study import Study
+from sim.arrays import Flags, Floats
+
+SEEN = 6.0  # standard deviations of a remainder that the tests notice nearly always
+FEWEST = 3  # numbers of tails that are fitted
+_DRAWS = 200
+_SPREAD = 0.5  # of ln of a signal
+_INPUTS = ("N", "ln l")
+_ENOUGH = 2  # values a parameter
 
 
 def with_doubts(study: Study, claims: Sequence[Candidate], base: Fit) -> list[Candidate]:
@@ -25,6 +52,77 @@ def with_doubts(study: Study, claims: Sequence[Candidate], base: Fit) -> list[Ca
         seconds = (e.second.name for e in claim.claimed if e.second)
         names = (*(e.name for e in claim.claimed), *seconds)
         shares = absorbable_shares(study, claim.refit, names)
-        transfer = transfer_p(study.reseeded(4), claim.refit)
+        transfer = transfer_p(replace(study, seed=study.seed + 4), claim.refit)
         doubted.append(replace(claim, imitable=imitability(shares, strength), transfer=transfer))
     return doubted
+
+
+def absorbable_shares(study: Study, fitted: Fit, names: Sequence[str]) -> Floats:
+    """Draw signals from outside, made from each of the effects `names` of a fit in turn, and return their a."""
+    runs, used = study.model.runs, study.split.fitted
+    white = fitted.noise.whitener(runs.session[used])
+    rows = prior_rows(fitted.fitted, fitted.parameters)[0]
+    J = np.concatenate([white(fitted.jacobian[used]), rows])
+    claimed = [fitted.names.index(name) for name in names]
+    others = [i for i in range(J.shape[1]) if i not in claimed]
+    without, with_claim = (np.linalg.qr(_scaled(J[:, columns]))[0] for columns in (others, [*others, *claimed]))
+    factors = deformations(runs, used, _DRAWS, study.seed)
+    signals = np.concatenate([fitted.jacobian[used][..., [p]] * factors[:, None] for p in claimed], -1)
+    signals = np.concatenate([white(signals), np.zeros((len(rows), signals.shape[-1]))])
+    before = signals - without @ (without.T @ signals)
+    after = signals - with_claim @ (with_claim.T @ signals)
+    return np.asarray(1 - (after**2).sum(0) / np.maximum((before**2).sum(0), 1e-300))
+
+
+def imitability(shares: Floats, strength: float) -> float:
+    """Return the share of draws that a claim of this strength (standard deviations) would not notice."""
+    remainder = strength * np.sqrt(np.maximum(1 / np.maximum(shares, 1e-9) - 1, 0.0))
+    return float((remainder < SEEN).mean())
+
+
+def deformations(runs: Runs, used: Flags, count: int, seed: int) -> Floats:
+    """Draw exp(g) at the runs in `used`, (n, count)."""
+    spread = runs.inputs[used].std(0)
+    inputs = runs.inputs[used] / np.where(spread > 0, spread, 1.0)
+    kinds, place = np.unique(inputs.round(9), axis=0, return_inverse=True)
+    distance = ((kinds[:, None] - kinds[None]) ** 2).sum(-1)
+    values, vectors = np.linalg.eigh(np.exp(-distance / 2))
+    drawn = np.random.default_rng(seed).normal(size=(len(kinds), count))
+    g = vectors @ (np.sqrt(np.maximum(values, 0.0))[:, None] * drawn)
+    return np.asarray(np.exp(_SPREAD * g)[place.reshape(-1)])
+
+
+def _scaled(J: Floats) -> Floats:
+    return J / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
+
+
+def transfer_p(study: Study, fitted: Fit) -> float:
+    """Estimate the probability that noise alone puts the other runs as far from a model with the claim.
+
+    It is 1 where runs are too few or too much alike.
+    """
+    runs, used = study.model.runs, study.split.fitted
+    near = fitted_again(runs, used)
+    others = used & ~near
+    values = near.sum() * runs.y.shape[1]
+    if not others.any() or values < _ENOUGH * len(fitted.names):
+        return 1.0
+    refit = one_step(runs, fitted, near)
+    moved = replace(
+        fitted,
+        parameters=stepped(fitted.fitted, fitted.parameters, refit.step),
+        prediction=fitted.prediction + fitted.jacobian @ refit.step,
+        covariance=fitted.inflation * refit.covariance,
+    )
+    return held_out_p_value(moved, runs, others, seed=study.seed)
+
+
+def fitted_again(runs: Runs, used: Flags) -> Flags:
+    """Choose the runs (n,) with short tails and few of them; all of `used` where that is not an input."""
+    near = used.copy()
+    for name in _INPUTS:
+        if name in runs.input_names:
+            values = runs.inputs[:, runs.input_names.index(name)].round(9)
+            kinds = np.unique(values[used])
+            near &= values <= (kinds[min(FEWEST, len(kinds)) - 1] if name == "N" else np.median(kinds))
+    return np.asarray(near)

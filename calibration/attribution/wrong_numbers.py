@@ -1,6 +1,15 @@
-"""Wrong nuisance parameters: fits with their priors taken away, alone and beside an effect.
+"""Wrong nuisance parameters: how far the runs pull them, and fits without the priors of those that are wrong.
 
-If the runs pull a nuisance parameter beyond `priors.WRONG`, the fit is made again without its prior. Of several
+The pull of a nuisance parameter with prior variance σ² is
+
+    z = x / √(σ² − V),   x its change, V the variance of x after the fit,
+
+which is standard normal if its value was drawn from the prior. Parameters that the runs cannot tell apart (E and
+μ0) have the same pull. What the runs alone say of it, with its own prior taken away and the others kept, is
+x σ²/(σ² − V), with variance V σ²/(σ² − V). Source: pulls of nuisance parameters as in particle physics, e.g.
+Demortier and Lyons (2002).
+
+If the runs pull a nuisance parameter beyond `fit.WRONG`, the fit is made again without its prior. Of several
 that the runs cannot tell apart, the one is freed that is off by the fewest of its own standard deviations. If the
 fit then leaves no more than noise, the wrong number explains the residual, and no effect is claimed for it. An
 effect is claimed only if it fits better than the freed number by more than one parameter can gain by chance.
@@ -8,37 +17,74 @@ effect is claimed only if it fits better than the freed number by more than one 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from calibration.attribution.candidate import INDISTINGUISHABLE, Candidate
-from calibration.attribution.judge import judge
-from calibration.statistics.fit import Fit, fit
-from calibration.statistics.pulls import pulls, wrong_number
-from calibration.statistics.residual_tests import Misfit, examine_residual
-from calibration.statistics.score_directions import Directions
+from calibration.attribution.refits import INDISTINGUISHABLE, Candidate, judge
+from calibration.statistics.fit import Fit, Pull, fit
+from calibration.statistics.residual_tests import Directions
+from calibration.statistics.statistical_model import Parameter, change
 from calibration.statistics.study import Study
 
 _MOST = 2  # numbers that may be wrong together
 _TRIED = 3  # effects that are fitted once more beside wrong numbers
 
 
-@dataclass(frozen=True)
-class Freed:
-    """A fit without the priors of the nuisance parameters that the runs contradict."""
+def pulls(fitted: Fit, nuisances: Sequence[Parameter]) -> tuple[Pull, ...]:
+    """Compute the pull of every nuisance parameter, the farthest first.
 
-    fit: Fit
-    misfit: Misfit
-
-
-def free_wrong_numbers(study: Study, base: Fit, directions: Directions) -> Freed | None:
-    """Free the wrong numbers of `base` and test what is left; None if no number is wrong.
-
-    Args:
-        directions: of the effects.
+    A parameter whose prior was taken away has its value from the runs.
     """
-    freed = _without_priors(study, base)
-    return None if freed is base else Freed(freed, examine_residual(study, freed, directions))
+    computed = []
+    for nuisance in nuisances:
+        if nuisance.sigma is None or nuisance.name not in fitted.names:
+            continue
+        place = fitted.names.index(nuisance.name)
+        variance = fitted.covariance[place, place] / fitted.inflation
+        x, prior = change(nuisance, fitted.parameters[nuisance.name]), nuisance.sigma**2
+        if fitted.fitted[place].sigma is None:
+            error = math.sqrt(variance)
+            computed.append(Pull(nuisance, x, error, x, error, x / math.sqrt(prior + variance), True))
+            continue
+        variance = min(variance, prior * (1 - 1e-6))
+        learnt = prior - variance
+        alone, alone_error = x * prior / learnt, math.sqrt(variance * prior / learnt)
+        computed.append(Pull(nuisance, x, math.sqrt(variance), alone, alone_error, x / math.sqrt(learnt), False))
+    return tuple(sorted(computed, key=lambda p: -abs(p.z) * p.learnt))
+
+
+def wrong_number(candidates: Sequence[Pull]) -> tuple[Pull, ...]:
+    """Find the parameter that is most likely wrong, and after it those that may be wrong in its place.
+
+    To take a prior away lowers the deviance by z². Differences below `INDISTINGUISHABLE` are no evidence. So of
+    those as far out as the farthest, the one comes first that is off by the fewest of its own standard deviations.
+
+    Returns:
+        Nothing if no parameter is wrong.
+    """
+    wrong = [p for p in candidates if p.wrong]
+    if not wrong:
+        return ()
+    farthest = wrong[0]
+    likeliest = min((p for p in wrong if farthest.z**2 - p.z**2 < INDISTINGUISHABLE), key=_standardised_change)
+    alike = [p for p in wrong if p is not likeliest and likeliest.z**2 - p.z**2 < INDISTINGUISHABLE]
+    return (likeliest, *sorted(alike, key=_standardised_change))
+
+
+def _standardised_change(pull: Pull) -> float:
+    assert pull.parameter.sigma is not None
+    return abs(pull.alone) / pull.parameter.sigma
+
+
+def without_wrong_priors(study: Study, fitted: Fit) -> Fit:
+    """Fit again without the priors of wrong numbers; the same fit if no number is wrong."""
+    while len(fitted.wrong_numbers) < _MOST:
+        alike = wrong_number([p for p in pulls(fitted, study.model.nuisances) if not p.freed])
+        if not alike:
+            break
+        wrong, used = (*fitted.wrong_numbers, alike), study.split.fitted
+        fitted = fit(study.model, fitted.parameters, fitted.names, used, wrong_numbers=wrong, title="")
+    return fitted
 
 
 def beside_wrong_numbers(
@@ -59,20 +105,9 @@ def beside_wrong_numbers(
     judged = []
     for _, name, candidate in sorted(promising, key=lambda p: p[:2])[:_TRIED]:
         assert candidate.refit is not None
-        refit = _without_priors(study, candidate.refit)
+        refit = without_wrong_priors(study, candidate.refit)
         judged.append(judge(study, candidate, base, refit, directions.without(names.index(name))))
     return judged
-
-
-def _without_priors(study: Study, fitted: Fit) -> Fit:
-    """Fit again without the priors of wrong numbers; the same fit if no number is wrong."""
-    while len(fitted.wrong_numbers) < _MOST:
-        alike = wrong_number([p for p in pulls(fitted, study.model.nuisances) if not p.freed])
-        if not alike:
-            break
-        wrong = (*fitted.wrong_numbers, alike)
-        fitted = fit(study.model, fitted.parameters, fitted.names, study.used, wrong_numbers=wrong, title="")
-    return fitted
 
 
 def beats_number(best: Sequence[Candidate], number: Fit) -> bool:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.forward_model import Parameter, Parameters, Runs, by_differences
+from calibration.statistics.statistical_model import Parameter, Parameters, Runs, by_differences
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
 from sim.arrays import Flags, Floats
@@ -48,11 +48,11 @@ class Spheres:
     untestable: Mapping[str, str] = field(default_factory=dict)
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
-        """ln v, (P, n, 1)."""
+        """Compute ln v, (P, n, 1)."""
         return np.array([np.log(self.speed(p))[:, None] for p in sets])
 
     def speed(self, parameters: Parameters) -> Floats:
-        """Settling speeds [m/s], (n,)."""
+        """Compute settling speeds [m/s], (n,)."""
         d, viscosity = self.diameter, parameters["viscosity"]
         x = d / self.vessel
         stokes = (BEAD - FLUID) * GRAVITY * d**2 / (18 * viscosity)
@@ -63,14 +63,14 @@ class Spheres:
     def derivatives(
         self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
     ) -> tuple[Floats, Floats]:
-        """Prediction and derivatives, by differences."""
+        """Compute the prediction and derivatives, by differences."""
         return by_differences(self, parameters, names)
 
     def check(self, prediction: Floats) -> None:
-        """Any speed is possible: the viscosity is not known beforehand."""
+        """Accept any speed: the viscosity is not known beforehand."""
 
     def possible(self) -> tuple[Spheres, list[dict[str, Any]]]:
-        """Beads of other diameters."""
+        """Return beads of other diameters."""
         diameter = np.linspace(1.0, 12.0, 23) / 1000
         count = len(diameter)
         runs = replace(
@@ -83,12 +83,12 @@ class Spheres:
         ]
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
-        """The start as it is: the fit is linear in ln μ."""
+        """Return the start as it is: the fit is linear in ln μ."""
         return start
 
 
 def read_spheres(source: str | Path, name: str) -> Spheres:
-    """One set of a table of falls.
+    """Read one set of a table of falls.
 
     Raises:
         InputError: the table lacks a column, or the set has too few beads.
@@ -124,7 +124,7 @@ def read_spheres(source: str | Path, name: str) -> Spheres:
 
 
 def median_error(model: Spheres, verdict: Verdict, effects: Parameters) -> float:
-    """Relative rms of the beads' median speeds, the viscosity fitted to them, with `effects` at given sizes."""
+    """Compute the relative rms of the beads' median speeds, the viscosity fitted to them, with given `effects`."""
     at = {**verdict.base.parameters, **effects}
     residual = model.runs.y[:, 0] - model.predict([at])[0, :, 0]
     medians = np.array([np.median(residual[model.runs.condition == c]) for c in np.unique(model.runs.condition)])

@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.statistics.forward_model import Parameters
 from calibration.statistics.held_out import FinalRefit
+from calibration.statistics.statistical_model import Parameters
 from calibration.swimmer.candidate_effects import CURRENT
 from calibration.swimmer.head_correction import HeadCorrection
 from calibration.swimmer.nuisance_numbers import LENGTH
@@ -41,36 +41,34 @@ def check_given(robot: Robot) -> None:
 
 
 def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
-    """`robot` with fitted coefficients, numbers and effects; drift between runs and the observation are left
-    out.
-    """
-    own = robot_numbers(robot, parameters)
-    own["tail_length"] = robot.tail_length + parameters.get(LENGTH, 0.0)
+    """Return `robot` with fitted coefficients, numbers and effects, without drift between runs."""
+    numbers = robot_numbers(robot, parameters)
+    numbers["tail_length"] = robot.tail_length + parameters.get(LENGTH, 0.0)
     sizes = {
         name: float(value)
         for name, value in parameters.items()
         if name in catalogue() and value != catalogue()[name].null
     }
-    return replace(robot, **own, effects={**robot.effects, **sizes})
+    return replace(robot, **numbers, effects={**robot.effects, **sizes})
 
 
-def calibration_knowledge(robot: Robot, delivered: FinalRefit) -> CalibrationKnowledge:
+def calibration_knowledge(robot: Robot, final: FinalRefit) -> CalibrationKnowledge:
     """Collect the covariance of the corrected robot's parameters and effects, and the current in the tank.
 
     Args:
         robot: as it was given; the error of the tail length is one of ln l of this robot.
     """
-    length = robot.tail_length + delivered.parameters.get(LENGTH, 0.0)
+    length = robot.tail_length + final.parameters.get(LENGTH, 0.0)
     kept, names, scales = [], [], []
-    for place, one in enumerate(delivered.fitted):
-        if one.name in (*COEFFICIENTS, *NUMBERS, *catalogue(), LENGTH):
+    for place, parameter in enumerate(final.fitted):
+        if parameter.name in (*COEFFICIENTS, *NUMBERS, *catalogue(), LENGTH):
             kept.append(place)
-            names.append("tail_length" if one.name == LENGTH else one.name)
-            scales.append(1 / length if one.name == LENGTH else 1.0)
-    covariance = delivered.covariance[np.ix_(kept, kept)] * np.outer(scales, scales)
-    places = {one.name: i for i, one in enumerate(delivered.fitted)}
-    current = [(delivered.parameters[n], places[n]) if n in places else (0.0, None) for n in CURRENT]
-    errors = [0.0 if at is None else math.sqrt(delivered.covariance[at, at]) for _, at in current]
+            names.append("tail_length" if parameter.name == LENGTH else parameter.name)
+            scales.append(1 / length if parameter.name == LENGTH else 1.0)
+    covariance = final.covariance[np.ix_(kept, kept)] * np.outer(scales, scales)
+    places = {parameter.name: i for i, parameter in enumerate(final.fitted)}
+    current = [(final.parameters[n], places[n]) if n in places else (0.0, None) for n in CURRENT]
+    errors = [0.0 if at is None else math.sqrt(final.covariance[at, at]) for _, at in current]
     return CalibrationKnowledge(
         names=tuple(names),
         covariance=(covariance + covariance.T) / 2,  # rounding
@@ -90,7 +88,7 @@ def corrected_toml(robot: Robot, final: FinalRefit, learnt: LearntCorrection | N
 
 
 def _with_correction(known: CalibrationKnowledge, learnt: HeadCorrection, robot: Robot) -> CalibrationKnowledge:
-    """With the uncertainty of the correction at this robot; as it is if the robot is outside the runs."""
+    """Add the uncertainty of the correction at this robot; nothing if the robot is outside the runs."""
     values = robot.group_values()
     try:
         learnt.correction.applied(values)

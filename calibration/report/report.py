@@ -8,11 +8,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from calibration.attribution.candidate import UNSEEN, Candidate
-from calibration.attribution.imitability import DOUBT
-from calibration.attribution.transfer_test import SURE
-from calibration.statistics.priors import WRONG
-from calibration.statistics.profile_intervals import least_determined
+from calibration.attribution.refits import DOUBT, SURE, UNSEEN, Candidate
+from calibration.statistics.fit import WRONG, least_determined
 from calibration.swimmer.measured_table import Measurements
 from calibration.verdict.next_runs import STOP, Batch
 from calibration.verdict.verdict import Verdict
@@ -28,6 +25,13 @@ _LABELS = {
     "theta": "θ, slip angle [rad]",
     "v": "v, speed",
 }
+_MODELS = {
+    "uncalibrated": "as given",
+    "before": "calibrated",
+    "after": "calibrated, with effects",
+    "generic": "calibrated, generic correction",
+    "predictive": "correction in corrected.toml, simulated",
+}
 _SETTINGS = {"l_cm": "l [cm]", "omega_rpm": "ω [rpm]"}
 _DISAGREES = 0.01  # p of the held-out runs below which the report says so
 _TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes", "score": "effects"}
@@ -42,7 +46,7 @@ def write_report(result: Verdict, data: Measurements, out: str | Path, *, title:
 
 
 def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
-    """The sections of the report."""
+    """Add the sections of the report."""
     _add_numbers(page, result)
     _add_data(page, result, data)
     _add_fit(page, result)
@@ -96,20 +100,22 @@ def _add_numbers(page: Page, result: Verdict) -> None:
     page.text(
         "What was given is known to a tolerance only. So these parameters are fitted, too, each with the "
         "tolerance that was stated for it. The pull is how far the runs move a parameter, in standard deviations "
-        f"of what chance would do. Beyond {WRONG:g} the value as given is taken to be wrong: {said}.",
+        f"of what chance would do. Beyond {WRONG:g} the stated value is taken to be wrong: {said}.",
         tone="bad" if wrong else "good",
     )
     rows = []
     for p in result.fits.pulls:
-        one = p.parameter
-        assert one.sigma is not None
-        scale, unit = (100.0, "%") if one.logarithmic else (one.shown, one.unit)
+        nuisance = p.parameter
+        assert nuisance.sigma is not None
+        scale, unit = (100.0, "%") if nuisance.logarithmic else (nuisance.shown, nuisance.unit)
         runs = f"{p.off(p.alone)}, ± {scale * p.alone_error:.2g} {unit}" if p.learnt else "nothing"
         rows.append(
             (
-                one.title,
-                f"{one.start:.4g}" if one.unit != one.title and one.start not in (0.0, 1.0) else "",
-                f"± {scale * one.sigma:.2g} {unit}",
+                nuisance.title,
+                f"{nuisance.start:.4g}"
+                if nuisance.unit != nuisance.title and nuisance.start not in (0.0, 1.0)
+                else "",
+                f"± {scale * nuisance.sigma:.2g} {unit}",
                 f"{p.off(p.change)}, ± {scale * p.error:.2g} {unit}",
                 runs,
                 f"{p.z:+.1f}" if p.learnt else "",
@@ -145,7 +151,7 @@ def _add_fit(page: Page, result: Verdict) -> None:
         (result.base, result.fits.base_intervals, "without effects"),
         (result.final, result.fits.final_intervals, "with the verdict's effects"),
     ):
-        for parameter in (one.name for one in fitted.fitted if one.name not in given):
+        for parameter in (p.name for p in fitted.fitted if p.name not in given):
             low, high = intervals[parameter]
             rows.append(
                 (f"{parameter}, {name}", f"{fitted.parameters[parameter]:.4g}", f"{low:.4g} to {high:.4g}")
@@ -154,11 +160,11 @@ def _add_fit(page: Page, result: Verdict) -> None:
             break
     page.table(("parameter", "value", "95 % interval, by profile deviance"), rows)
     combination, error = least_determined(result.final)
-    delivered = result.fits.final_refit.parameters
+    final = result.fits.final_refit.parameters
     page.text(
         f"The runs determine {combination} worst: {100 * error:.1f} %. corrected.toml has the model fitted once "
         "more to all runs, with the held-out ones: "
-        + ", ".join(f"{name} {delivered[name]:.4g}" for name in result.final.names if name not in given)
+        + ", ".join(f"{name} {final[name]:.4g}" for name in result.final.names if name not in given)
         + "."
     )
 
@@ -190,10 +196,10 @@ def _add_evidence(page: Page, result: Verdict) -> None:
         ],
     )
     for c in result.explaining:
-        said = " and ".join(e.title for e in c.claimed)
         page.text(
-            f"{said}: {100 * c.imitable:.0f} % of the departures from outside the catalogue that were drawn for "
-            f"comparison would have passed for it; above {100 * DOUBT:.0f} % the verdict says so. {_carried(c)}"
+            f"{c.title}: {100 * c.imitable:.0f} % of the departures from outside the catalogue that were drawn "
+            f"for comparison would have passed for it; above {100 * DOUBT:.0f} % the verdict says so. "
+            + _carried(c)
         )
     if result.evidence.untestable:
         page.text(
@@ -211,22 +217,13 @@ def _carried(claim: Candidate) -> str:
 
 def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
     page.section("Error on the held-out runs")
-    low, high = result.errors.after_interval
-    corrected: list[tuple[str, float, dict[str, float]]] = []
-    if result.error_predictive is not None:
-        each_output = result.errors.by_output["predictive"]
-        corrected = [("correction in corrected.toml, simulated", result.error_predictive, each_output)]
+    errors = result.errors
+    low, high = errors.after_interval
     page.table(
         ("model", "relative rms", *(_LABELS[o] for o in data.outputs)),
         [
-            (label, f"{100 * value:.2f} %", *(f"{100 * v:.1f} %" for v in each.values()))
-            for label, value, each in (
-                ("as given", result.error_uncalibrated, result.errors.by_output["uncalibrated"]),
-                ("calibrated", result.error_before, result.errors.by_output["before"]),
-                ("calibrated, with effects", result.error_after, result.errors.by_output["after"]),
-                ("calibrated, generic correction", result.error_generic, result.errors.by_output["generic"]),
-                *corrected,
-            )
+            (_MODELS[name], f"{100 * rms:.2f} %", *(f"{100 * v:.1f} %" for v in errors.by_output[name].values()))
+            for name, rms in errors.rms.items()
         ],
     )
     learnt = result.corrections.learnt
@@ -240,11 +237,11 @@ def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
             "the same load."
         )
     features = ", ".join(result.corrections.regression.features) or "no feature"
-    agree = result.errors.p_value >= _DISAGREES
+    agree = errors.p_value >= _DISAGREES
     page.text(
         f"95 % interval with effects: {100 * low:.2f} to {100 * high:.2f} %. "
-        f"Noise of one run from the repeats: {100 * result.noise_ceiling:.2f} %. The held-out runs "
-        f"{'agree' if agree else 'do not agree'} with the final model (p = {result.errors.p_value:.2g}). "
+        f"Noise of one run from the repeats: {100 * errors.noise:.2f} %. The held-out runs "
+        f"{'agree' if agree else 'do not agree'} with the final model (p = {errors.p_value:.2g}). "
         f"Generic correction: {features} (it describes the residual and does not explain it).",
         tone="good" if agree else "bad",
     )
@@ -255,7 +252,7 @@ def _rpm(data: Measurements) -> Floats:
 
 
 def draw_summary(result: Verdict, data: Measurements) -> Figure:
-    """The residual of each output before and after, as rms over the fitted runs, and the noise of a run."""
+    """Draw the residual of each output before and after, as rms over the fitted runs, and the noise of a run."""
     bars = [
         ("calibrated, without effects", result.base.prediction, "#e08a1e"),
         ("final model", result.final.prediction, "#3d9a5f"),
@@ -279,7 +276,7 @@ def draw_summary(result: Verdict, data: Measurements) -> Figure:
 
 
 def draw_map(result: Verdict, data: Measurements) -> Figure:
-    """z of every output along every feature of the inputs, before and after."""
+    """Draw z of every output along every feature of the inputs, before and after."""
     maps = [("calibrated", result.evidence.misfit)]
     if result.explaining and result.explaining[0].refit_misfit is not None:
         maps.append(("with the verdict's effects", result.explaining[0].refit_misfit))
@@ -309,8 +306,8 @@ def draw_map(result: Verdict, data: Measurements) -> Figure:
 
 
 def draw_evidence(result: Verdict) -> Figure:
-    """Score of every effect as a bar, with the critical score; what explains the residual is filled in green."""
-    named = {name for c in result.explaining for name in (c.effect.name, *(e.name for e in c.beside))}
+    """Draw the score of every effect as a bar, with the critical score; what explains the residual is green."""
+    named = {name for c in result.explaining for name in (e.name for e in c.claimed)}
     ranked = sorted(result.evidence.candidates, key=lambda c: abs(c.z))
     figure = Figure(figsize=(9, 0.8 + 0.24 * len(ranked)))
     axes = figure.add_subplot()
@@ -331,7 +328,7 @@ def draw_evidence(result: Verdict) -> Figure:
 
 
 def draw_residuals(result: Verdict, data: Measurements) -> Figure:
-    """Measured minus model in per cent, against tail length, before (left) and after (right)."""
+    """Draw measured minus model in per cent, against tail length, before (left) and after (right)."""
     outputs = data.outputs
     figure = Figure(figsize=(11, 1.9 * len(outputs)))
     colours = {n: c for n, c in zip((2, 3, 4, 5), ("#2a7fba", "#e08a1e", "#3d9a5f", "#8a4fa3"), strict=True)}
@@ -371,5 +368,5 @@ def draw_residuals(result: Verdict, data: Measurements) -> Figure:
 
 
 def _size(value: float) -> str:
-    """A smallest detectable size; a dash where no size shows in these runs."""
+    """Write a smallest detectable size; a dash where no size shows in these runs."""
     return f"{value:.2g}" if value < UNSEEN else "–"

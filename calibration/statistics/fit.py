@@ -7,11 +7,15 @@ Steps of Levenberg (1944) with the model's own derivatives:
 D is 1 for ln C and a typical size for ε. λ is 0, unless the step is too long or does not improve the fit. A
 parameter at a bound stays there if the step would lead out. The covariance of the parameters is V = A⁻¹, times a
 factor because S is estimated (`_inflation`). Nuisance parameters have priors, which are rows of their own
-(`calibration.statistics.priors`): they are in A, in the residual and in the deviance. Intervals are 95 %, by
+: they are in A, in the residual and in the deviance. Intervals are 95 %, by
 Student's t. The scatter ρ of a few sessions is uncertain, which limits the degrees of freedom (Satterthwaite
 1946):
 
     ν = 2 V² / (V′² Var ρ),   Var ρ ≈ 2 (ρ + 1/n)² / (k (s − 1)),   n runs in each of s sessions.
+
+The deviance along one parameter, with the others refitted, may differ from a parabola. So `profile_intervals` runs
+the model at both ends of the interval that the covariance gives. Each end moves to where the deviance, as a
+parabola on its side, has risen by t². Here t is the quantile of `Fit.interval`.
 """
 
 from __future__ import annotations
@@ -23,11 +27,25 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
-from calibration.statistics.forward_model import ForwardModel, Parameter, Parameters, parameter, stepped
-from calibration.statistics.noise import Noise, Sums, inverse_root, least_squares, repeat_covariance, sums
-from calibration.statistics.priors import Pull, with_prior
+from calibration.statistics.statistical_model import (
+    ForwardModel,
+    Noise,
+    Parameter,
+    Parameters,
+    Sums,
+    inverse_root,
+    least_squares,
+    moved,
+    parameter,
+    repeat_covariance,
+    stepped,
+    sums,
+    with_prior,
+)
 from sim.arrays import Flags, Floats, Integers
 
+WRONG = 3.0  # pull beyond which a nuisance parameter is taken to be wrong
+_LEARNT = 0.02  # share of the prior's variance that the runs must remove before a pull means anything
 _MOST_STEPS = 25
 _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
 _SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ⁻¹ r by less
@@ -36,6 +54,42 @@ _PASSES = 3  # iterations for the scatter of the sessions
 _DAMPING = (0.0, *(10.0**e for e in range(-3, 9)))  # λ
 _NEARER = 5  # starts that are tried
 _UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce rᵀ Σ⁻¹ r by more
+_FLAT = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
+_STEEP = 5.0  # if it is larger, the others were not refitted along a bent valley, and the end stays
+
+
+@dataclass(frozen=True)
+class Pull:
+    """What the runs say about one nuisance parameter, on its own scale."""
+
+    parameter: Parameter
+    change: float  # fitted, with its prior
+    error: float
+    alone: float  # from the runs alone, with the other nuisance parameters as far as their priors allow
+    alone_error: float
+    z: float
+    freed: bool  # its prior was taken away
+
+    @property
+    def learnt(self) -> bool:
+        """Whether the runs say anything about it."""
+        assert self.parameter.sigma is not None
+        return self.freed or self.error**2 < (1 - _LEARNT) * self.parameter.sigma**2
+
+    @property
+    def wrong(self) -> bool:
+        return self.learnt and abs(self.z) > WRONG
+
+    @property
+    def words(self) -> str:
+        """What the runs alone say, as in "E is 40 % below what was given (3.7 σ)"."""
+        return f"{self.parameter.title} is {self.off(self.alone)} what was given ({abs(self.z):.1f} σ)"
+
+    def off(self, change: float) -> str:
+        """Put a change into words: "40 % below"."""
+        given = self.parameter
+        size = abs(math.expm1(change)) * 100 if given.logarithmic else abs(change) * given.shown
+        return f"{size:.2g} {'%' if given.logarithmic else given.unit} {'below' if change < 0 else 'above'}"
 
 
 @dataclass(frozen=True)
@@ -44,6 +98,7 @@ class Fit:
 
     parameters: dict[str, float]
     fitted: tuple[Parameter, ...]  # in the order of the covariance
+    names: tuple[str, ...]  # of these
     covariance: Floats  # (p, p) of (ln C, ε)
     inflation: float  # factor in the covariance, because S is estimated
     freedom: Floats  # (p,) degrees of freedom of the intervals
@@ -54,21 +109,12 @@ class Fit:
     converged: bool  # the fit is at a minimum, or at one within the bounds
     wrong_numbers: tuple[tuple[Pull, ...], ...] = ()  # the first of each has lost its prior; see `fit`
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(p.name for p in self.fitted)
-
-    @property
-    def at_bounds(self) -> tuple[str, ...]:
-        """Parameters at an end of their range."""
-        return tuple(p.name for p in self.fitted if self.parameters[p.name] in p.bounds)
-
     def half_width(self, place: int) -> float:
-        """Of the 95 % interval of a parameter, on its own scale."""
+        """Compute half of the 95 % interval of a parameter, on its own scale."""
         return float(student.ppf(0.975, self.freedom[place])) * math.sqrt(self.covariance[place, place])
 
     def interval(self, name: str) -> tuple[float, float]:
-        """95 % interval of a parameter."""
+        """Compute the 95 % interval of a parameter."""
         value = self.parameters[name]
         place = self.names.index(name)
         half = self.half_width(place)
@@ -101,19 +147,20 @@ def fit(
     point = _descend(problem, problem.first(dict(start)))
     linear = least_squares(point.products, passes=_PASSES)
     share = float(linear.share)
-    whole = point.products.at(linear.share)
+    normal = point.products.at(linear.share)
     inflation = _inflation(data.condition[used], len(run))
     return Fit(
         parameters=point.parameters,
         fitted=fitted,
+        names=names,
         covariance=inflation * linear.covariance,
         inflation=inflation,
         freedom=_freedom(point.products, share, len(names)),
         prediction=point.prediction,
         jacobian=point.derivative,
         noise=Noise(run, share),
-        deviance=float(whole[-1, -1] + len(run) * np.log1p(share * point.products.sizes).sum()),
-        converged=_step(fitted, point.parameters, whole, 0).promise < _UNSETTLED,
+        deviance=float(normal[-1, -1] + len(run) * np.log1p(share * point.products.sizes).sum()),
+        converged=_step(fitted, point.parameters, normal, 0).promise < _UNSETTLED,
         wrong_numbers=wrong_numbers,
     )
 
@@ -143,24 +190,24 @@ class _Problem:
     title: str
 
     def first(self, parameters: dict[str, float]) -> _Point:
-        """The model at the start; effects move towards their null while it cannot be solved quickly there."""
-        effects = [one for one in self.fitted if one.name in {e.name for e in self.model.effects}]
+        """Run the model at the start; effects move towards their null while it cannot be solved quickly there."""
+        effects = [p for p in self.fitted if p.name in {e.name for e in self.model.effects}]
         tried = dict(parameters)
         for _ in range(_NEARER if effects else 1):
             point = self.at(tried, None, 1)
             if point.solved:
                 return point
-            tried.update({one.name: (tried[one.name] + one.start) / 2 for one in effects})
+            tried.update({p.name: (tried[p.name] + p.start) / 2 for p in effects})
         return self.at(parameters, None, 1, quick=False)
 
     def at(
         self, parameters: dict[str, float], derivative: Floats | None, count: int, *, quick: bool = True
     ) -> _Point:
-        """The model at `parameters`; its derivatives are computed if none are given."""
+        """Run the model at `parameters`; its derivatives are computed if none are given."""
         title = f"{self.title}, step {count}" if self.title else ""
         if derivative is None:
             prediction, derivative = self.model.derivatives(
-                parameters, [one.name for one in self.fitted], title=title, quick=quick
+                parameters, [p.name for p in self.fitted], title=title, quick=quick
             )
         else:
             prediction = self.model.predict([parameters], title=title)[0]
@@ -178,7 +225,7 @@ class _Step(NamedTuple):
 
 
 def _descend(problem: _Problem, point: _Point) -> _Point:
-    """The least rᵀ Σ⁻¹ r from `point`; steps to where the model cannot be solved quickly are too long."""
+    """Find the least rᵀ Σ⁻¹ r from `point`; steps to where the model cannot be solved quickly are too long."""
     fitted = problem.fitted
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
     for count in range(1, _MOST_STEPS + 1):
@@ -200,35 +247,35 @@ def _descend(problem: _Problem, point: _Point) -> _Point:
     return point
 
 
-def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: Floats, least: int) -> _Step:
-    """A step from `parameters`.
+def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _Step:
+    """Compute a step from `parameters`.
 
     Args:
         whole: (p + 1, p + 1) products of the derivatives and the residual.
         least: place of the least λ allowed.
     """
     for place in range(least, len(_DAMPING)):
-        change = _damped(fitted, parameters, whole, _DAMPING[place])
-        if all(abs(c) <= _LARGEST for c, one in zip(change, fitted, strict=True) if one.logarithmic):
+        change = _damped(fitted, parameters, normal, _DAMPING[place])
+        if all(abs(c) <= _LARGEST for c, p in zip(change, fitted, strict=True) if p.logarithmic):
             break
     new = stepped(fitted, parameters, change)
-    promise = 2 * change @ whole[:-1, -1] - change @ whole[:-1, :-1] @ change
+    promise = 2 * change @ normal[:-1, -1] - change @ normal[:-1, :-1] @ change
     return _Step(new, float(np.abs(change).max()), float(promise), place)
 
 
-def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: Floats, damping: float) -> Floats:
-    """Change (p,) of the parameters; zero for those that stay at a bound."""
-    at_low = np.array([parameters[one.name] <= one.bounds[0] for one in fitted])
-    at_high = np.array([parameters[one.name] >= one.bounds[1] for one in fitted])
-    typical = np.array([1.0 if one.logarithmic else abs(one.typical) for one in fitted])
+def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, damping: float) -> Floats:
+    """Compute the change (p,) of the parameters; zero for those that stay at a bound."""
+    at_low = np.array([parameters[p.name] <= p.bounds[0] for p in fitted])
+    at_high = np.array([parameters[p.name] >= p.bounds[1] for p in fitted])
+    typical = np.array([1.0 if p.logarithmic else abs(p.typical) for p in fitted])
     change = np.zeros(len(fitted))
     free = np.arange(len(fitted))
     while len(free):
-        own = whole[np.ix_(free, free)] + np.diag(damping / typical[free] ** 2)
-        scale = np.sqrt(np.maximum(np.diag(own), 1e-300))
-        inverse = np.linalg.pinv(own / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        damped = normal[np.ix_(free, free)] + np.diag(damping / typical[free] ** 2)
+        scale = np.sqrt(np.maximum(np.diag(damped), 1e-300))
+        inverse = np.linalg.pinv(damped / np.outer(scale, scale), rcond=1e-12, hermitian=True)
         change[:] = 0.0
-        change[free] = inverse @ (whole[free, -1] / scale) / scale
+        change[free] = inverse @ (normal[free, -1] / scale) / scale
         outward = (at_low & (change < 0)) | (at_high & (change > 0))
         if not outward.any():
             break
@@ -238,7 +285,7 @@ def _damped(fitted: tuple[Parameter, ...], parameters: dict[str, float], whole: 
 
 
 def _inflation(condition: Integers, outputs: int) -> float:
-    """Factor by which the variance is larger because S is estimated from ν repeats of k outputs.
+    """Compute the factor by which the variance is larger because S is estimated from ν repeats of k outputs.
 
     ν/(ν − k − 1), because 1/S is overestimated, times 1 + (k − 1)/(ν − k), because its weights are not optimal.
     """
@@ -249,7 +296,7 @@ def _inflation(condition: Integers, outputs: int) -> float:
 
 
 def _freedom(products: Sums, share: float, count: int) -> Floats:
-    """Degrees of freedom of the parameters' variances, (p,)."""
+    """Estimate the degrees of freedom of the parameters' variances, (p,)."""
     step = 0.01 * share + 1e-3 / products.sizes.mean()
     inverse = [
         np.linalg.pinv(products.at(np.array(s))[:count, :count], hermitian=True) for s in (share, share + step)
@@ -258,3 +305,72 @@ def _freedom(products: Sums, share: float, count: int) -> Floats:
     sessions = len(products.sizes)
     spread = 2 * (share + 1 / products.sizes.mean()) ** 2 / (products.outputs * max(sessions - 1, 1))
     return np.asarray(np.clip(2 * V**2 / np.maximum(((near - V) / step) ** 2 * spread, 1e-12 * V**2), 1.0, 1e6))
+
+
+def profile_intervals(
+    model: ForwardModel, fitted: Fit, used: Flags, *, title: str = ""
+) -> dict[str, tuple[float, float]]:
+    """Compute the 95 % interval of every fitted parameter, by its profile deviance; of nuisance parameters by the
+    covariance.
+    """
+    data, count = model.runs, len(fitted.names)
+    root = inverse_root(fitted.noise.run)
+    sets, ends = [], []
+    for i, p in enumerate(fitted.fitted):
+        if p.sigma is not None:
+            continue
+        half = fitted.half_width(i)
+        for side in (-1, 1):
+            end = moved(p, fitted.parameters[p.name], side * half)
+            change = (
+                math.log(end / fitted.parameters[p.name]) if p.logarithmic else end - fitted.parameters[p.name]
+            )
+            step = fitted.covariance[i] / fitted.covariance[i, i] * change  # how the others change with it
+            sets.append(stepped(fitted.fitted, fitted.parameters, step))
+            ends.append((i, change))
+    predictions = model.predict(sets, title=title)
+    least = _deviance(
+        fitted, fitted.parameters, root, data.y - fitted.prediction, data.session, used, list(range(count))
+    )
+    intervals: dict[str, list[float]] = {p.name: [] for p in fitted.fitted if p.sigma is None}
+    for (i, change), parameters, prediction in zip(ends, sets, predictions, strict=True):
+        others = [j for j in range(count) if j != i]
+        rise = _deviance(fitted, parameters, root, data.y - prediction, data.session, used, others) - least
+        expected = change**2 / (fitted.covariance[i, i] / fitted.inflation)
+        scale = math.sqrt(expected / rise) if _FLAT * expected < rise < _STEEP * expected else 1.0
+        p = fitted.fitted[i]
+        intervals[p.name].append(moved(p, fitted.parameters[p.name], change * scale))
+    given = {p.name: fitted.interval(p.name) for p in fitted.fitted if p.sigma is not None}
+    return {**{name: (low, high) for name, (low, high) in intervals.items()}, **given}
+
+
+def _deviance(
+    fitted: Fit,
+    parameters: Parameters,
+    root: Floats,
+    residual: Floats,
+    session: Integers,
+    used: Flags,
+    others: list[int],
+) -> float:
+    """Compute rᵀ Σ⁻¹ r at `parameters` with those of `others` refitted (linearised), in the noise of the fit."""
+    table = np.concatenate([fitted.jacobian, residual[..., None]], -1)[used]
+    products = with_prior(sums(root @ table, session[used], len(root)), fitted.fitted, parameters)
+    columns = [*others, len(fitted.fitted)]
+    normal = products.at(np.array(fitted.noise.share))[np.ix_(columns, columns)]
+    p = len(others)
+    absorbed = normal[:p, p] @ np.linalg.pinv(normal[:p, :p], hermitian=True) @ normal[:p, p] if p else 0.0
+    return float(normal[p, p] - absorbed)
+
+
+def least_determined(fitted: Fit) -> tuple[str, float]:
+    """Find the combination of logarithmic parameters that the runs determine worst, and its error (of ln)."""
+    places = [i for i, p in enumerate(fitted.fitted) if p.logarithmic and p.sigma is None]
+    values, vectors = np.linalg.eigh(fitted.covariance[np.ix_(places, places)])
+    vector = vectors[:, -1] * np.sign(vectors[np.argmax(np.abs(vectors[:, -1])), -1])
+    parts = [
+        f"{fitted.fitted[i].name}^{power:.2f}"
+        for i, power in zip(places, vector.tolist(), strict=True)
+        if abs(power) > 0.1
+    ]
+    return " ".join(parts), float(np.sqrt(values[-1]))

@@ -9,9 +9,17 @@ from scipy.stats import norm as normal
 from scipy.stats import t as student
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.forward_model import ForwardModel, Parameter, Runs, stepped
-from calibration.statistics.noise import Linear, inverse_root, least_squares, sums
-from calibration.statistics.priors import with_prior
+from calibration.statistics.statistical_model import (
+    ForwardModel,
+    Linear,
+    Parameter,
+    Runs,
+    inverse_root,
+    least_squares,
+    stepped,
+    sums,
+    with_prior,
+)
 from sim.arrays import Flags, Floats
 
 _DRAWS = 2000

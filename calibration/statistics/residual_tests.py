@@ -11,10 +11,9 @@ Four statistics:
     shape    max |z| over directions in which one output follows an input, a square or a product of two;
     score    max |z_j| over the catalogue. The scatter of the sessions is estimated with effect j in the model,
              because otherwise a shift of all runs would look like scatter. An effect with a second number has
-             one score at each of several values of it, and the largest counts
-             (`calibration.statistics.score_directions`).
+             one score at each of several values of it, and the largest counts.
 
-Nuisance parameters have priors of covariance P (`calibration.statistics.priors`), so Σ is Σ + J P Jᵀ in all of
+Nuisance parameters have priors of covariance P, so Σ is Σ + J P Jᵀ in all of
 them.
 
 Their null distribution comes from data drawn with the fitted noise (repeats and sessions) and with nuisance
@@ -23,35 +22,92 @@ coefficients are refitted (linearised). So the p-values take into account the fi
 correlated candidates. Several statistics are judged together by the smallest of their p-values. Its null
 distribution comes from the same draws (Westfall and Young 1993).
 
+An effect with a second number (a time, say) has no such number at its null: the prediction does not depend on it
+there. So it cannot be estimated without the effect, and a score must be taken at each of several values. The test
+takes the largest, and its bootstrap takes the largest, too (Davies 1987, a nuisance parameter that is present only
+under the alternative).
+
 Source: score tests after projection, Rao (1948); kernel score, e.g. Liu, Lin, Ghosh (2007).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import rankdata
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.forward_model import Runs
-from calibration.statistics.input_features import features
-from calibration.statistics.noise import (
-    FixedColumns,
+from calibration.statistics.statistical_model import (
+    ForwardModel,
+    Parameter,
+    Parameters,
+    Runs,
+    Sums,
+    averaging_rows,
+    changes,
+    features,
     inverse_root,
     least_squares,
-    projected_scores,
+    precisions,
     repeat_covariance,
+    session_share,
+    solved,
 )
-from calibration.statistics.priors import changes, precisions
-from calibration.statistics.score_directions import Directions
 from calibration.statistics.study import Study
 from sim.arrays import Flags, Floats, Integers
 
 TESTABLE = 0.03  # an effect cannot be tested if less than this share of its signal survives the projection
 GENERAL = ("lack", "kernel", "shape")
-_PASSES = 3
+_PASSES = 3  # iterations for the scatter of the sessions
+_PASSES_OF_A_SCORE = 2
 _AT_ONCE = 50  # draws
+
+
+@dataclass(frozen=True)
+class Directions:
+    """∂f/∂ε of e effects in m columns; an effect with a second number has several."""
+
+    table: Floats  # (n, k, m)
+    owner: Integers  # (m,) place of each column's effect, 0 to e − 1, in order
+    second: Floats  # (m,) value of the second number; NaN where there is none
+
+    @classmethod
+    def plain(cls, table: Floats) -> Directions:
+        """Make one column for each effect."""
+        count = table.shape[-1]
+        return cls(table, np.arange(count), np.full(count, np.nan))
+
+    def without(self, place: int) -> Directions:
+        """Leave one effect out."""
+        kept = self.owner != place
+        owner = self.owner[kept]
+        return Directions(self.table[..., kept], owner - (owner > place), self.second[kept])
+
+
+def directions(
+    model: ForwardModel, parameters: Parameters, effects: Sequence[Parameter], *, title: str = ""
+) -> Directions:
+    """Compute the directions of effects that are at their null in `parameters`, (n, k, m)."""
+    at_null = model.derivatives(parameters, [e.name for e in effects], title=title)[1]
+    columns, owner, second = [], [], []
+    for place, effect in enumerate(effects):
+        values: dict[float, Floats] = {}
+        if effect.second is None:
+            values[np.nan] = at_null[..., place]
+        else:
+            name = effect.second.name
+            for value in effect.second.grid:
+                if value == parameters[name]:
+                    values[value] = at_null[..., place]
+                else:
+                    values[value] = model.derivatives({**parameters, name: value}, [effect.name])[1][..., 0]
+        columns += list(values.values())
+        owner += [place] * len(values)
+        second += list(values)
+    table = np.stack(columns, -1) if columns else at_null
+    return Directions(table, np.array(owner, dtype=np.int64), np.array(second, dtype=float))
 
 
 @dataclass(frozen=True)
@@ -78,6 +134,48 @@ class Misfit:
     features: tuple[str, ...]
     exact_length: Floats  # (e,) `Scores.length` if the nuisance parameters were exact
     second: Floats  # (e,) value of each effect's second number at its largest score; NaN where there is none
+
+
+class FixedColumns:
+    """Columns (n, k, m) that stay the same for many residuals, each of which has its own S.
+
+    Products of two columns are linear in S⁻¹, so they are made once for every pair of outputs.
+    """
+
+    def __init__(self, columns: Floats, session: Integers):
+        n, k, m = columns.shape
+        self.picks, self.sizes = averaging_rows(session)
+        self._flat = columns.reshape(n * k, m)
+        self.means = self.average(columns)  # (s, k, m)
+        self._whole = np.einsum("nim,njl->ijml", columns, columns, optimize=True).reshape(k * k, m * m)
+        between = np.einsum("sim,sjl->ijsml", self.means, self.means, optimize=True)
+        self._between = between.reshape(k * k, -1)
+
+    def average(self, table: Floats) -> Floats:
+        """Average each session, times the root of its size, (s, ...), of (n, ...)."""
+        return np.asarray(np.tensordot(self.picks, table, 1))
+
+    def sums(self, precision: Floats, residual: Floats) -> Sums:
+        """Compute the same as `sums` of these columns and a residual behind them.
+
+        Args:
+            precision: S⁻¹, (b, k, k).
+            residual: (b, n, k).
+        """
+        b, n, k = residual.shape
+        s, _, m = self.means.shape
+        weighted = residual @ precision
+        means, weighted_means = self.picks @ residual, self.picks @ weighted  # (b, s, k)
+        flat = precision.reshape(b, k * k)
+        total, between = np.empty((b, m + 1, m + 1)), np.empty((b, s, m + 1, m + 1))
+        total[:, :m, :m] = (flat @ self._whole).reshape(b, m, m)
+        between[:, :, :m, :m] = (flat @ self._between).reshape(b, s, m, m)
+        total[:, m, :m] = total[:, :m, m] = weighted.reshape(b, n * k) @ self._flat
+        across = np.einsum("bsk,skm->bsm", weighted_means, self.means, optimize=True)
+        between[..., m, :m] = between[..., :m, m] = across
+        total[:, m, m] = (weighted * residual).sum((-1, -2))
+        between[..., m, m] = (weighted_means * means).sum(-1)
+        return Sums(total - between.sum(-3), between, self.sizes, k)
 
 
 class _Tester:
@@ -145,6 +243,26 @@ class _Tester:
         return np.asarray(table + picks.T @ (less[..., None] * (picks @ table)))
 
 
+def projected_scores(products: Sums, p: int) -> tuple[Floats, Floats, Floats]:
+    """Score each column after the first `p`, and before the last, without the part that the first `p` can absorb.
+
+    Each column has the scatter of sessions that remains with it in the fit.
+
+    Returns:
+        z of the last column along it, the share of it that survives the projection, and the length of the rest.
+    """
+    e = products.within.shape[-1] - p - 1
+    columns = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
+    part = products.take(columns)
+    normal = part.at(session_share(part, passes=_PASSES_OF_A_SCORE))  # (B, e, p + 2, p + 2)
+    weights = solved(normal[..., : p + 1, : p + 1])[0]  # of the first p columns in the one that is scored
+    score = normal[..., p, p + 1] - (weights * normal[..., :p, p + 1]).sum(-1)
+    square = normal[..., p, p] - (weights * normal[..., :p, p]).sum(-1)
+    length = np.sqrt(np.maximum(square, 1e-300))
+    survived = length / np.sqrt(np.maximum(normal[..., p, p], 1e-300))
+    return np.where(survived > 1e-6, score / length, 0.0), survived, length
+
+
 def examine_residual(
     study: Study, fitted: Fit, directions: Directions, *, draws: int | None = None, decide: float | None = None
 ) -> Misfit:
@@ -158,7 +276,7 @@ def examine_residual(
         draws: of the bootstrap, if not as many as the study says.
         decide: stop drawing as soon as it is clear whether the p-value is below this.
     """
-    data, used = study.runs, study.used
+    data, used = study.model.runs, study.split.fitted
     precision = precisions(fitted.fitted)
     tester = _Tester(data, used, fitted.jacobian[used], directions.table[used], precision)
     residual = (data.y - fitted.prediction)[used]

@@ -1,19 +1,43 @@
-"""A study: a model, its divided runs, and the settings of every test, all fixed before the runs are looked at."""
+"""A study: a model, its divided runs, and the settings of every test, all fixed before the runs are looked at.
+
+**Groups.** Sessions, or blocks of conditions if sessions are few, are held out or left out together. Blocks are
+drawn from the conditions within a session; repeats stay together. The shift of a single session cannot be
+estimated. Its variance is taken to be `SESSION_SHARE`, so a shift of all its runs is no evidence.
+
+**Outliers** are runs that are far from their own repeats, for example because of a misplaced decimal point. If, in
+one output, the runs of a condition are more than `FAR` robust standard deviations apart, the run that is farthest
+from the model as given is excluded. A missing effect does not cause this: it changes all repeats alike.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from calibration.statistics.forward_model import ForwardModel, Runs, start_values
-from calibration.statistics.splits import Split
-from sim.arrays import Flags
-from sim.io.provenance import fingerprint
+from calibration.statistics.statistical_model import ForwardModel, Runs
+from sim.arrays import Flags, Floats, Integers
 
 LEVEL = 0.04  # α of every claim; below 0.05, because the noise is estimated and false claims must stay below 5 %
 DRAWS = 1000  # of the bootstrap
+FAR = 12.0  # robust standard deviations between repeats
+_MAD = 1.4826  # median absolute deviation to standard deviation
+_FEWEST = 3  # sessions that are held out as a whole
+_BLOCKS = 4  # in all
+
+
+@dataclass(frozen=True)
+class Split:
+    """Which runs are fitted, and which are kept for the test."""
+
+    fitted: Flags  # (n,) runs from which everything is learnt
+    test: Flags  # (n,) runs on which errors are stated: whole sessions or blocks
+    kept: Flags  # (n,) both, for the final refit: all runs but outliers
+    names: str = ""  # of the held-out groups
+    reasons: tuple[str, ...] = ()  # for each outlier
+    caveats: tuple[str, ...] = ()  # what the split weakens
 
 
 @dataclass(frozen=True)
@@ -30,34 +54,90 @@ class Study:
     @classmethod
     def fitted_to(cls, model: ForwardModel, used: Flags, **settings: Any) -> Study:
         """Study a model on the runs in `used` (n,); all others are held out."""
-        return cls(model, Split(~used, np.zeros_like(used)), **settings)
+        return cls(model, Split(used, ~used, np.ones_like(used)), **settings)
 
-    @property
-    def runs(self) -> Runs:
-        return self.model.runs
 
-    @property
-    def used(self) -> Flags:
-        """(n,) runs that are fitted."""
-        return self.split.fitted
+def groups(data: Runs) -> tuple[Integers, tuple[str, ...]]:
+    """Number the groups that stay together, (n,), and name them."""
+    count = len(data.session_names)
+    if count >= _FEWEST:
+        return data.session, data.session_names
+    parts = _BLOCKS // count
+    block = np.empty_like(data.session)
+    rng = np.random.default_rng(0)
+    for session in range(count):
+        members = data.session == session
+        condition = np.unique(data.condition[members], return_inverse=True)[1].reshape(-1)
+        block[members] = session * parts + rng.permutation(condition.max() + 1)[condition] % parts
+    names = (f"{name}, block {i + 1} of its conditions" for name in data.session_names for i in range(parts))
+    return block, tuple(names)
 
-    @property
-    def start(self) -> dict[str, float]:
-        """The model as given."""
-        return start_values(self.model)
 
-    def title(self, words: str) -> str:
-        """Return the title of a progress bar, or none if no progress is shown."""
-        return words if self.progress else ""
+def middle_session(data: Runs) -> Flags:
+    """Choose the middle session by name, which needs no extrapolation, or a block if sessions are few; (n,)."""
+    group, names = groups(data)
+    return np.asarray(group == len(names) // 2)
 
-    def reseeded(self, by: int) -> Study:
-        """Return the same study with other random numbers."""
-        return replace(self, seed=self.seed + by)
 
-    @property
-    def fixed(self) -> str:
-        """Hash of everything that was fixed beforehand."""
-        catalogue = [effect.name for effect in self.model.effects]
-        return fingerprint(
-            {"level": self.level, "seed": self.seed, "catalogue": catalogue, "locked": self.split.names}
+def split_runs(data: Runs, held_out: Flags | None, outliers: tuple[Flags, tuple[str, ...]]) -> Split:
+    """Divide the runs, and say what is weaker if the held-out ones are not whole sessions.
+
+    Args:
+        held_out: (n,); the middle session if not given.
+        outliers: which they are (n,), and why; neither fitted nor tested.
+    """
+    held_out = middle_session(data) if held_out is None else held_out
+    count = len(data.session_names)
+    parted = divided(data, held_out)
+    group, names = groups(data) if parted else (data.session, data.session_names)
+    caveats: tuple[str, ...] = ()
+    if count < _FEWEST and parted:
+        caveat = (
+            f"{count} session{'s' * (count > 1)} only: the held-out runs are a quarter of the conditions, not a "
+            "session of their own, so the error on them does not contain the differences between sessions"
         )
+        if count == 1:
+            caveat += ", and a shift that is equal in all runs is no evidence for an effect"
+        caveats = (caveat,)
+    bad, reasons = outliers
+    held_out_names = ", ".join(names[g] for g in np.unique(group[held_out]))
+    return Split(~held_out & ~bad, held_out & ~bad, ~bad, held_out_names, reasons, caveats)
+
+
+def leave_one_group_out(group: Integers, used: Flags) -> Iterator[tuple[Flags, Flags]]:
+    """Yield the runs (n,) to learn from and the runs (n,) left out, for every group among those in `used`."""
+    for label in np.unique(group[used]):
+        yield used & (group != label), used & (group == label)
+
+
+def divided(data: Runs, held_out: Flags) -> bool:
+    """Tell whether some runs of a session are held out and others are not."""
+    return bool(set(data.session[held_out]) & set(data.session[~held_out]))
+
+
+def find_outliers(data: Runs, prediction: Floats) -> tuple[Flags, tuple[str, ...]]:
+    """Find the runs (n,) to exclude, and say why; `prediction` (n, k) of the model as given."""
+    bad = np.zeros(len(data.y), dtype=bool)
+    residual = data.y - prediction
+    residual -= np.median(residual, 0)
+    groups = [np.flatnonzero(data.condition == c) for c in np.unique(data.condition)]
+    groups = [g for g in groups if len(g) > 1]
+    if not groups:
+        return bad, ()
+    centred = np.concatenate([data.y[g] - np.median(data.y[g], 0) for g in groups])
+    # The deviation of two repeats from their median is half their difference.
+    pairs = np.sqrt(np.mean([(len(g) - 1) / len(g) for g in groups]))
+    scatter = _MAD * np.median(np.abs(centred), 0) / pairs
+    reasons = []
+    for group in groups:
+        while len(group) > 1:
+            spread = np.ptp(data.y[group], axis=0) / np.maximum(scatter, 1e-300)
+            worst = int(np.argmax(spread))
+            if spread[worst] < FAR or scatter[worst] == 0:
+                break
+            out = group[np.argmax(np.abs(residual[group, worst]))]
+            bad[out] = True
+            far = f"{spread[worst]:.0f} standard deviations from its repeat"
+            reasons.append(f"row {data.rows[out]}: {data.outputs[worst]} is {far}")
+            group = group[group != out]
+    return bad, tuple(reasons)

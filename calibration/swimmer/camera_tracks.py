@@ -54,7 +54,7 @@ class TrackedRun:
 def measure_tracks(
     tracks: str | Path | pd.DataFrame, runs: str | Path | pd.DataFrame
 ) -> tuple[pd.DataFrame, list[str]]:
-    """A table for `calibration.swimmer.measured_table` from tracks and the settings of each run.
+    """Make a table for `calibration.swimmer.measured_table` from tracks and the settings of each run.
 
     Args:
         tracks: run, time_s, x_cm, y_cm, heading_deg; one row for each sample.
@@ -73,25 +73,25 @@ def measure_tracks(
             raise InputError(f"the tracks have no column {name!r}; they need {', '.join(COLUMNS)}")
     if "run" not in table:
         raise InputError("the runs have no column 'run' that says which track is theirs")
-    aside, found = [], []
+    aside, tracked = [], []
     for run in table["run"]:
-        own = samples[samples["run"] == run][list(COLUMNS[1:])].apply(pd.to_numeric, errors="coerce")
-        bad = int((~np.isfinite(own.to_numpy())).any(axis=1).sum())
+        track = samples[samples["run"] == run][list(COLUMNS[1:])].apply(pd.to_numeric, errors="coerce")
+        bad = int((~np.isfinite(track.to_numpy())).any(axis=1).sum())
         if bad:
             aside.append(f"run {run}: {bad} samples with a value that is not a number")
-        own = own[np.isfinite(own.to_numpy()).all(axis=1)].sort_values("time_s")
-        if len(own) < _FEWEST:
-            aside.append(f"run {run}: {len(own)} samples; a track needs at least {_FEWEST}")
-            found.append(TrackedRun())
+        track = track[np.isfinite(track.to_numpy()).all(axis=1)].sort_values("time_s")
+        if len(track) < _FEWEST:
+            aside.append(f"run {run}: {len(track)} samples; a track needs at least {_FEWEST}")
+            tracked.append(TrackedRun())
             continue
-        found.append(measure_track(*(own[c].to_numpy(dtype=float) for c in COLUMNS[1:])))
-    columns = pd.DataFrame([asdict(p) for p in found], index=table.index)
+        tracked.append(measure_track(*(track[c].to_numpy(dtype=float) for c in COLUMNS[1:])))
+    columns = pd.DataFrame([asdict(p) for p in tracked], index=table.index)
     known = [c for c in columns if columns[c].notna().any()]
     return pd.concat([table, columns[known]], axis=1), aside
 
 
 def measure_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> TrackedRun:
-    """Circle or line through one track; arrays (m,)."""
+    """Fit a circle or a line to one track; arrays (m,)."""
     time = time - time.mean()
     heading = np.unwrap(np.radians(heading_deg))
     rate, middle = np.polyfit(time, heading, 1)
@@ -102,18 +102,18 @@ def measure_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> Tr
     drifts = abs(rate) * np.ptp(time) >= 2 * math.pi
     turn = np.exp(1j * rate * time)
     design = np.stack([np.ones_like(turn), turn, *([time] if drifts else [])], 1)
-    found = np.linalg.lstsq(design, x + 1j * y, rcond=None)[0]
-    centre, arm, *drift = found
-    scatter = max(float(np.abs(x + 1j * y - design @ found).std() / math.sqrt(2)), 1e-9)
+    weights = np.linalg.lstsq(design, x + 1j * y, rcond=None)[0]
+    centre, arm, *drift = weights
+    scatter = max(float(np.abs(x + 1j * y - design @ weights).std() / math.sqrt(2)), 1e-9)
     start = [centre.real, centre.imag, abs(arm), np.angle(arm), rate, middle]
     start += [part for u in drift for part in (u.real, u.imag)]
 
     def residual(p: Floats) -> Floats:
         angle = p[3] + p[4] * time
         u, w = (p[6], p[7]) if drifts else (0.0, 0.0)
-        along = (x - p[0] - u * time - p[2] * np.cos(angle)) / scatter
-        across = (y - p[1] - w * time - p[2] * np.sin(angle)) / scatter
-        return np.concatenate([along, across, (heading - p[5] - p[4] * time) / scatter_h])
+        off_x = (x - p[0] - u * time - p[2] * np.cos(angle)) / scatter
+        off_y = (y - p[1] - w * time - p[2] * np.sin(angle)) / scatter
+        return np.concatenate([off_x, off_y, (heading - p[5] - p[4] * time) / scatter_h])
 
     fitted = least_squares(residual, start, x_scale=np.maximum(np.abs(start), 1e-3))
     covariance = _covariance(np.asarray(fitted.jac), fitted.fun, 3)
@@ -137,9 +137,9 @@ def _line(time: Floats, x: Floats, y: Floats, heading: Floats) -> TrackedRun:
     design = np.stack([np.ones_like(time), time], 1)
     fits, variances = [], []
     for values in (x, y, heading):
-        own = np.linalg.lstsq(design, values, rcond=None)[0]
-        fits.append(own)
-        variances.append(_covariance(design, values - design @ own, 1))
+        line = np.linalg.lstsq(design, values, rcond=None)[0]
+        fits.append(line)
+        variances.append(_covariance(design, values - design @ line, 1))
     v_x, v_y = fits[0][1], fits[1][1]
     speed = math.hypot(v_x, v_y)
     error = math.sqrt((v_x**2 * variances[0][1, 1] + v_y**2 * variances[1][1, 1]) / speed**2)
@@ -151,17 +151,17 @@ def _line(time: Floats, x: Floats, y: Floats, heading: Floats) -> TrackedRun:
 
 
 def _covariance(J: Floats, residual: Floats, parts: int) -> Floats:
-    """Covariance of a least-squares fit to `parts` series in time, each with its own scatter and correlation."""
+    """Estimate the covariance of a fit to `parts` series in time, each with its own scatter and correlation."""
     inverse = np.linalg.pinv(J.T @ J)
     middle = np.zeros_like(inverse)
-    for rows, own in zip(np.split(J, parts), np.split(residual, parts), strict=True):
-        variance = float(own @ own) / max(len(own) - J.shape[1] / parts, 1)
-        middle += variance * _correlation_time(own) * rows.T @ rows
+    for rows, series in zip(np.split(J, parts), np.split(residual, parts), strict=True):
+        variance = float(series @ series) / max(len(series) - J.shape[1] / parts, 1)
+        middle += variance * _correlation_time(series) * rows.T @ rows
     return np.asarray(inverse @ middle @ inverse)
 
 
 def _correlation_time(residual: Floats) -> float:
-    """Integrated autocorrelation time in samples, at least 1 (summed up to its first zero)."""
+    """Compute the integrated autocorrelation time in samples, at least 1 (summed up to its first zero)."""
     centred = residual - residual.mean()
     power = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
     correlation = np.fft.irfft(power)[: len(centred)]

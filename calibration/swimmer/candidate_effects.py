@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from calibration.statistics.forward_model import Parameter
+from calibration.statistics.statistical_model import Parameter
 from sim.effects import Effect, catalogue
 
 SLIP, TRACKED_POINT = "motor_slip", "tracked_point"
@@ -27,23 +27,19 @@ class Influence:
     needs: str | None  # column of the table that it needs
     odd: bool  # left and right turns differ with it
 
-    @property
-    def name(self) -> str:
-        return self.parameter.name
-
 
 def influences() -> dict[str, Influence]:
-    """All influences by name."""
-    found = {}
+    """List all influences by name."""
+    known = {}
     for effect in catalogue().values():
         if not effect.drivers and not effect.beside:
-            found[effect.name] = _plain(effect)
+            known[effect.name] = _plain(effect)
         for driver in effect.drivers:
             parameter = Parameter(
                 driver.name, driver.title, 0.0, driver.bounds, driver.typical, unit=driver.unit,
                 plausible=driver.plausible,
             )  # fmt: skip
-            found[driver.name] = Influence(parameter, effect.name, driver.column, effect.symmetry == "odd")
+            known[driver.name] = Influence(parameter, effect.name, driver.column, effect.symmetry == "odd")
     slip = Parameter(
         SLIP, "slip of the motor", 0.0, (-0.3, 0.3), 0.02, unit="share of its speed", plausible=(-0.1, 0.1)
     )
@@ -61,10 +57,10 @@ def influences() -> dict[str, Influence]:
             unit="m/s",
             plausible=(-0.02, 0.02),
         )
-        found[name] = Influence(current, None, f"heading_{axis}", False)
-    found[SLIP] = Influence(slip, None, None, False)
-    found[TRACKED_POINT] = Influence(point, None, None, False)
-    return dict(sorted(found.items()))
+        known[name] = Influence(current, None, f"heading_{axis}", False)
+    known[SLIP] = Influence(slip, None, None, False)
+    known[TRACKED_POINT] = Influence(point, None, None, False)
+    return dict(sorted(known.items()))
 
 
 def _plain(effect: Effect) -> Influence:
@@ -83,8 +79,8 @@ def _parameter(effect: Effect) -> Parameter:
 def reason_untestable(
     influence: Influence, columns: Mapping[str, object], both_directions: bool, outputs: Sequence[str]
 ) -> str:
-    """Why a table cannot test an influence; empty if it can."""
-    if influence.name in CURRENT and "v" not in outputs:
+    """Say why a table cannot test an influence; empty if it can."""
+    if influence.parameter.name in CURRENT and "v" not in outputs:
         return "needs v_cm_s"
     if influence.needs is not None and influence.needs not in columns:
         return f"needs {_COLUMNS[influence.needs]}"

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.forward_selection import select_forward
-from calibration.statistics.noise import inverse_root
-from calibration.statistics.splits import Split, groups, leave_one_group_out
+from calibration.statistics.residual_regression import select_forward
+from calibration.statistics.statistical_model import inverse_root
+from calibration.statistics.study import Split, groups, leave_one_group_out
 from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Flags, Floats, Integers
 from sim.io.errors import InputError

@@ -25,8 +25,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from calibration.statistics.forward_model import Runs
-from calibration.statistics.noise import repeat_covariance
+from calibration.statistics.statistical_model import Runs, repeat_covariance
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, TACHOMETER
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
@@ -79,7 +78,7 @@ class Measurements(Runs):
 
 
 def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
-    """Measurements from a CSV or a table.
+    """Read measurements from a CSV or a table.
 
     Raises:
         InputError: columns are missing or misspelt, or too few runs remain.
@@ -151,7 +150,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
 def _independent(
     y: Floats, outputs: tuple[str, ...], condition: Integers
 ) -> tuple[Floats, tuple[str, ...], tuple[str, ...]]:
-    """Outputs that were measured: repeats differ, and not just as other outputs do.
+    """Choose outputs that were measured: repeats differ, and not just as other outputs do.
 
     Raises:
         InputError: an output is the same in all repeats.
@@ -165,9 +164,9 @@ def _independent(
             raise InputError(
                 f"{column} does not differ between repeats; give measured values, unrounded, or leave it out"
             )
-        own = run[np.ix_(kept, kept)]
-        left = run[i, i] - run[i, kept] @ np.linalg.solve(own, run[kept, i]) if kept else run[i, i]
-        if left < _OWN * run[i, i]:
+        covariance = run[np.ix_(kept, kept)]
+        remainder = run[i, i] - run[i, kept] @ np.linalg.solve(covariance, run[kept, i]) if kept else run[i, i]
+        if remainder < _OWN * run[i, i]:
             others = ", ".join(OUTPUTS[outputs[j]][0] for j in kept)
             follows.append(f"column {column}: follows from {others}, so it is not counted twice")
         else:
@@ -176,36 +175,36 @@ def _independent(
 
 
 def _sigmas(good: pd.DataFrame) -> dict[str, float]:
-    """Standard deviations of the way of measuring, the same in all rows.
+    """Read standard deviations of the way of measuring, the same in all rows.
 
     Raises:
         InputError: a column has no number, two different ones, or one that is below 0 or too large.
     """
-    found = {}
+    sigmas = {}
     for column, (name, factor) in _SIGMAS.items():
         if column in good:
             values = np.unique(good[column].to_numpy(dtype=float))
             if len(values) != 1 or not 0 <= values[0] * factor <= 0.5:
                 raise InputError(f"{column} must be one number, the same in all rows, at least 0 and not large")
-            found[name] = float(values[0] * factor)
-    return found
+            sigmas[name] = float(values[0] * factor)
+    return sigmas
 
 
 def _caveats(tails: Floats, length: Floats, omega: Floats) -> tuple[str, ...]:
-    """Inputs that are the same in all runs, in words."""
-    found = []
+    """Say which inputs are the same in all runs."""
+    caveats = []
     if np.ptp(tails) == 0:
-        found.append(f"all runs have N = {tails[0]:.0f}: what depends on the number of tails cannot be found")
+        caveats.append(f"all runs have N = {tails[0]:.0f}: what depends on the number of tails cannot be found")
     if np.ptp(length) == 0:
-        found.append("all runs have one tail length: what depends on it cannot be found")
+        caveats.append("all runs have one tail length: what depends on it cannot be found")
     if np.ptp(np.abs(omega)) < 0.01 * np.abs(omega).max():
-        found.append("all runs have one motor speed: what depends on it cannot be found")
-    return tuple(found)
+        caveats.append("all runs have one motor speed: what depends on it cannot be found")
+    return tuple(caveats)
 
 
 def _noted(good: pd.DataFrame) -> dict[str, Floats]:
-    """Notes that every run has and that differ between runs."""
-    found = {}
+    """Read notes that every run has and that differ between runs."""
+    notes = {}
     for column, (name, scale) in {
         "elapsed_min": ("elapsed_h", 1 / 60),
         "temperature_C": ("temperature_K", 1.0),
@@ -214,34 +213,31 @@ def _noted(good: pd.DataFrame) -> dict[str, Floats]:
         if column in good:
             value = good[column].to_numpy(dtype=float) * scale
             if np.isfinite(value).all() and np.ptp(value) > 0:
-                found[name] = value - value.mean() if name == "temperature_K" else value
+                notes[name] = value - value.mean() if name == "temperature_K" else value
     if "heading_deg" in good:
         value = np.radians(good["heading_deg"].to_numpy(dtype=float))
         if np.isfinite(value).all() and np.ptp(value) > 0:
-            found["heading_x"], found["heading_y"] = np.cos(value), np.sin(value)
-    return found
+            notes["heading_x"], notes["heading_y"] = np.cos(value), np.sin(value)
+    return notes
 
 
 def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...]) -> list[str]:
+    """Say why each row cannot be used; empty where it can."""
     reasons = [""] * len(table)
-    used = [*_INPUTS, *(OUTPUTS[name][0] for name in outputs)]
-    sign = np.sign(numbers["omega_rpm"].to_numpy(dtype=float))
-    for column in used:
-        value = numbers[column].to_numpy(dtype=float)
-        for i in np.flatnonzero(~np.isfinite(value)):
-            reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is not a finite number"
-    for i in np.flatnonzero(numbers["N"].to_numpy() % 1 != 0):
-        reasons[i] = reasons[i] or f"N = {table['N'].iloc[i]} is not a whole number"
-    for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s"):
-        if column in used:
-            for i in np.flatnonzero(numbers[column].to_numpy(dtype=float) <= 0):
-                reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} is not above 0"
+    used = (*_INPUTS, *(OUTPUTS[name][0] for name in outputs))
+    values = {column: numbers[column].to_numpy(dtype=float) for column in used}
+    positive = [column for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s") if column in values]
+    for column, bad, fault in (
+        *((column, ~np.isfinite(value), "is not a finite number") for column, value in values.items()),
+        ("N", values["N"] % 1 != 0, "is not a whole number"),
+        *((column, values[column] <= 0, "is not above 0") for column in positive),
+    ):
+        for i in np.flatnonzero(bad):
+            reasons[i] = reasons[i] or f"{column} = {table[column].iloc[i]} {fault}"
+    sign = np.sign(values["omega_rpm"])
     for i in np.flatnonzero(sign == 0):
         reasons[i] = reasons[i] or "omega_rpm = 0"
-    for name in outputs:
-        column, _, expected = OUTPUTS[name]
-        if expected:
-            value = numbers[column].to_numpy(dtype=float)
-            for i in np.flatnonzero(value * sign * expected <= 0):
-                reasons[i] = reasons[i] or f"{column} = {value[i]:g} has the wrong sign for its omega_rpm"
+    for column, _, expected in (OUTPUTS[name] for name in outputs if OUTPUTS[name][2]):
+        for i in np.flatnonzero(values[column] * sign * expected <= 0):
+            reasons[i] = reasons[i] or f"{column} = {values[column][i]:g} has the wrong sign for its omega_rpm"
     return reasons

@@ -2,7 +2,7 @@
 
 Those of the robot come from robot.toml. Three belong to the way of measuring and come from the table: the camera's
 scale, the zero of the heading and the tachometer. Each is a parameter with a prior
-(`calibration.statistics.priors`).
+(`calibration.statistics.statistical_model`).
 
 A motion depends on the robot through its groups, and on the unit of time μ0 l⁴/EI. Both are products of powers of
 the numbers, so the derivative along a number is a sum over groups with these powers.
@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from calibration.statistics.forward_model import Parameter
+from calibration.statistics.statistical_model import Parameter
 from sim.model.robot import Robot
 
 CAMERA, HEADING, TACHOMETER = "camera_scale", "heading_zero", "tachometer"
@@ -64,24 +64,26 @@ def nuisance_parameters(robot: Robot, table: Mapping[str, float], outputs: Seque
         table: σ of CAMERA, HEADING [rad] and TACHOMETER.
         outputs: of the table; what no output shows is left out.
     """
-    found = []
+    parameters = []
     for name, title in _TITLES.items():
         value = robot_number(robot, name)
         sigma = robot.sigma(name).of(value) / value
         bounds = (value / _FACTOR, value * _FACTOR)
-        found.append(Parameter(name, title, value, bounds, 1.0, True, _UNITS[name], sigma))
+        parameters.append(Parameter(name, title, value, bounds, 1.0, True, _UNITS[name], sigma))
     length = robot.sigma("tail_length")
     size = length.of(robot.tail_length)
-    found.append(
+    parameters.append(
         Parameter(
             LENGTH, "l (tail length, all tails alike)", 0.0, (-0.02, 0.02), 1e-3, False, "mm", size, shown=1e3
         )
     )
-    own = {**TABLE_DEFAULTS, **table}
+    sigmas = {**TABLE_DEFAULTS, **table}
     if {"R_yr", "v"} & set(outputs):
-        found.append(Parameter(CAMERA, "scale of the camera", 1.0, (0.5, 2.0), 1.0, True, "1", own[CAMERA]))
+        parameters.append(
+            Parameter(CAMERA, "scale of the camera", 1.0, (0.5, 2.0), 1.0, True, "1", sigmas[CAMERA])
+        )
     if "theta" in outputs:
-        found.append(
+        parameters.append(
             Parameter(
                 HEADING,
                 "zero of the heading",
@@ -90,9 +92,9 @@ def nuisance_parameters(robot: Robot, table: Mapping[str, float], outputs: Seque
                 0.02,
                 False,
                 "°",
-                own[HEADING],
+                sigmas[HEADING],
                 shown=180 / math.pi,
             )
         )
-    found.append(Parameter(TACHOMETER, "ω (tachometer)", 1.0, (0.5, 2.0), 1.0, True, "1", own[TACHOMETER]))
-    return tuple(one for one in found if one.sigma)
+    parameters.append(Parameter(TACHOMETER, "ω (tachometer)", 1.0, (0.5, 2.0), 1.0, True, "1", sigmas[TACHOMETER]))
+    return tuple(p for p in parameters if p.sigma)

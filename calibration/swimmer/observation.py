@@ -29,7 +29,7 @@ class Observation:
     camera: Floats  # (m,) lengths and speeds as seen over the true ones
 
     def see(self, motion: Mapping[str, Floats]) -> Floats:
-        """Outputs (m, k) of motions (m,) in the simulator's units."""
+        """Compute outputs (m, k) of motions (m,) in the simulator's units."""
         yaw, surge = motion["omega_yr_bar"], motion["v_z"]
         sway = motion["v_x"] + yaw * self.point * self.ahead
         speed = np.hypot(sway, surge)
@@ -54,7 +54,7 @@ class Observation:
         camera: float = 0.0,
         scales: Mapping[str, Floats] | None = None,
     ) -> Floats:
-        """Derivatives (m, k) along a change of the motion, of the tracked point, of the current and of the scales.
+        """Compute derivatives (m, k) along a change of motion, tracked point, current and scales.
 
         Args:
             camera: change of ln of the camera's scale.

@@ -12,19 +12,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.statistics.splits import divided, middle_session
+from calibration.statistics.study import divided, middle_session
 from calibration.swimmer.measured_table import Measurements
 from sim.arrays import Flags
 from sim.io.errors import InputError
 
-Rows = Flags
 
-
-def _session(data: Measurements) -> tuple[Measurements, Rows]:
+def _session(data: Measurements) -> tuple[Measurements, Flags]:
     return data, middle_session(data)
 
 
-def _paper(data: Measurements) -> tuple[Measurements, Rows]:
+def _paper(data: Measurements) -> tuple[Measurements, Flags]:
     outputs = ("omega_h", "omega_yr")
     missing = [n for n in outputs if n not in data.outputs]
     if missing or not {2.0, 3.0, 4.0, 5.0} <= set(data.tails.tolist()):
@@ -38,4 +36,4 @@ def _paper(data: Measurements) -> tuple[Measurements, Rows]:
     return replace(data, outputs=outputs, y=y), np.asarray(held_out)
 
 
-PROTOCOLS: dict[str, Callable[[Measurements], tuple[Measurements, Rows]]] = {"session": _session, "paper": _paper}
+PROTOCOLS: dict[str, Callable[[Measurements], tuple[Measurements, Flags]]] = {"session": _session, "paper": _paper}

@@ -15,8 +15,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from calibration.statistics.forward_model import Parameter, Parameters, by_differences
-from calibration.statistics.noise import Noise, repeat_covariance
+from calibration.statistics.statistical_model import (
+    Noise,
+    Parameter,
+    Parameters,
+    by_differences,
+    repeat_covariance,
+)
 from calibration.swimmer.candidate_effects import (
     CURRENT,
     SLIP,
@@ -25,7 +30,6 @@ from calibration.swimmer.candidate_effects import (
     influences,
     reason_untestable,
 )
-from calibration.swimmer.lab_settings import Owned, check_owned, possible_settings
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.nuisance_numbers import (
     CAMERA,
@@ -38,7 +42,7 @@ from calibration.swimmer.nuisance_numbers import (
     robot_number,
 )
 from calibration.swimmer.observation import Observation
-from calibration.swimmer.unit_checks import check_inputs, check_outputs
+from calibration.swimmer.possible_runs import Owned, check_inputs, check_outputs, check_owned, possible_settings
 from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
 from sim.io.errors import InputError
@@ -102,56 +106,61 @@ class SwimmerModel:
 
     @cached_property
     def effects(self) -> tuple[Parameter, ...]:
-        own = self.robot.effects
+        sizes = self.robot.effects
         return tuple(
-            replace(i.parameter, start=own.get(name, i.parameter.start)) if i.effect == name else i.parameter
+            replace(i.parameter, start=sizes.get(name, i.parameter.start)) if i.effect == name else i.parameter
             for name, i in self._influences.items()
         )
 
     @cached_property
     def untestable(self) -> dict[str, str]:
-        return {i.parameter.title: why for i in influences().values() if (why := self._reason(i))}
+        return {influence.parameter.title: why for influence, why in self._reasons if why}
 
     @cached_property
     def _seconds(self) -> dict[str, Influence]:
         """Second numbers of effects, by name."""
-        owners = [i for i in self._influences.values() if i.parameter.second]
-        return {i.parameter.second.name: Influence(i.parameter.second, i.parameter.second.name, None, i.odd)
-                for i in owners if i.parameter.second}  # fmt: skip
+        return {
+            second.name: Influence(second, second.name, None, influence.odd)
+            for influence in self._influences.values() if (second := influence.parameter.second)
+        }  # fmt: skip
 
     @cached_property
     def _influences(self) -> dict[str, Influence]:
-        return {name: i for name, i in influences().items() if not self._reason(i)}
+        return {influence.parameter.name: influence for influence, why in self._reasons if not why}
 
-    def _reason(self, influence: Influence) -> str:
+    @cached_property
+    def _reasons(self) -> list[tuple[Influence, str]]:
+        """All influences, and why these runs cannot test them; empty where they can."""
         both = len(np.unique(np.sign(self.runs.omega))) == 2
-        return reason_untestable(influence, self._drivers, both, self.runs.outputs)
+        return [(i, reason_untestable(i, self._drivers, both, self.runs.outputs)) for i in influences().values()]
 
     def predict(self, sets: Sequence[Parameters], *, title: str = "", lookup: NeuralTable | None = None) -> Floats:
-        """Predictions (P, n, k) for P parameter sets, all simulated together.
+        """Predict (P, n, k) for P parameter sets, all simulated together.
 
         With `lookup` the look-up table is used, not the simulator. That is good for a first guess only, because
         the errors of the table would look like physics.
         """
         parts = [self._conditions(parameters) for parameters in sets]
-        runs = [run for own, _ in parts for run in own]
+        runs = [run for conditions, _ in parts for run in conditions]
         columns = self._columns(runs, sets)
-        camera = np.repeat([p.get(CAMERA, 1.0) for p in sets], [len(own) for own, _ in parts])
+        camera = np.repeat([p.get(CAMERA, 1.0) for p in sets], [len(conditions) for conditions, _ in parts])
         if lookup is not None:
-            found: Mapping[str, Floats] = lookup.query(columns)
+            motion: Mapping[str, Floats] = lookup.query(columns)
         else:
-            found = self.solver.steady(columns, jobs=self.jobs, title=title)
-        table = self._observation(runs, camera).see(found)
+            motion = self.solver.steady(columns, jobs=self.jobs, title=title)
+        table = self._observation(runs, camera).see(motion)
         if not np.isfinite(table).all():
             raise InputError("the simulation of a run broke down; check the robot and the run's motor speed")
-        ends = np.cumsum([len(own) for own, _ in parts])
-        whole = np.array([table[end - len(own) + place] for end, (own, place) in zip(ends, parts, strict=True)])
-        return whole + np.array([self._turned(parameters.get(HEADING, 0.0)) for parameters in sets])
+        ends = np.cumsum([len(conditions) for conditions, _ in parts])
+        predictions = np.array(
+            [table[end - len(conditions) + place] for end, (conditions, place) in zip(ends, parts, strict=True)]
+        )
+        return predictions + np.array([self._turned(parameters.get(HEADING, 0.0)) for parameters in sets])
 
     def derivatives(
         self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
     ) -> tuple[Floats, Floats]:
-        """Prediction (n, k) and derivatives (n, k, p), by the simulator's own sensitivities.
+        """Compute the prediction (n, k) and derivatives (n, k, p), by the simulator's own sensitivities.
 
         If a run has no direct solution: by differences of motions that are stepped in time, or NaN if `quick`.
         """
@@ -165,54 +174,59 @@ class SwimmerModel:
         wanted = tuple(dict.fromkeys(move for group in moves.values() for move in group))
         # Effects at their null may need more phases than the motion; effects that are present have them already.
         phases = FEW if any(i.effect for i in self._at_work(parameters)) else MANY
-        found = self.solver.slopes(columns, wanted, phases=phases, jobs=self.jobs, title=title)
+        sensitivities = self.solver.slopes(columns, wanted, phases=phases, jobs=self.jobs, title=title)
         view = self._observation(runs, np.array(parameters.get(CAMERA, 1.0)))
-        J = np.empty((len(self.runs), len(self.runs.outputs), len(names)))
+        J = np.empty((*self.runs.y.shape, len(names)))
         for j, (name, influence) in enumerate(influences.items()):
             if name in POWERS:
-                J[..., j] = self._slope_of_number(name, runs, columns, found, view)[place]
+                J[..., j] = self._slope_of_number(name, runs, columns, sensitivities, view)[place]
                 if name == HEADING:
                     J[..., j] += self._turned(1.0)
                 continue
             at = wanted.index(moves[name][0]) if moves[name] else None
-            motion = {} if at is None else {key: table[:, at] for key, table in found.derivatives.items()}
+            motion = {} if at is None else {key: table[:, at] for key, table in sensitivities.derivatives.items()}
             slope = view.slopes(
-                found.values, motion, point=float(name == TRACKED_POINT), current=float(name in CURRENT)
+                sensitivities.values, motion, point=float(name == TRACKED_POINT), current=float(name in CURRENT)
             )
             if name == SLIP:
                 slope = slope * (-columns["omega_bar"] / (1 - parameters[SLIP]))[:, None]
-            scale = self._drivers[influence.needs] if influence and influence.needs else np.ones(len(self.runs))
+            scale = self._drivers[influence.needs] if influence and influence.needs else np.ones(len(place))
             J[..., j] = slope[place] * (scale if influence else parameters[name] * scale)[:, None]
-        seen = view.see(found.values)[place] + self._turned(parameters.get(HEADING, 0.0))
+        seen = view.see(sensitivities.values)[place] + self._turned(parameters.get(HEADING, 0.0))
         if not quick and not (np.isfinite(J).all() and np.isfinite(seen).all()):
             return by_differences(self, parameters, names, title=title)
         return seen, J
 
     def _slope_of_number(
-        self, name: str, runs: list[_Run], columns: dict[str, Floats], found: Sensitivities, view: Observation
+        self,
+        name: str,
+        runs: list[_Run],
+        columns: dict[str, Floats],
+        sensitivities: Sensitivities,
+        view: Observation,
     ) -> Floats:
         """Compute the derivatives (m, k) along a nuisance parameter, on its own scale."""
         by = np.array([1 / run.robot.tail_length if name == LENGTH else 1.0 for run in runs])
         powers = POWERS[name]
-        motion = {key: np.zeros(len(runs)) for key in found.derivatives}
+        motion = {key: np.zeros(len(runs)) for key in sensitivities.derivatives}
         for group in (group for group in powers if group in GROUPS):
-            at = found.parameters.index(group)
-            for key, table in found.derivatives.items():
+            at = sensitivities.parameters.index(group)
+            for key, table in sensitivities.derivatives.items():
                 motion[key] += powers[group] * by * columns[group] * table[:, at]
         scales: dict[str, Floats] = {k: powers[k] * by for k in ("time", "length", "ahead") if k in powers}
-        return view.slopes(found.values, motion, camera=float(name == CAMERA), scales=scales)
+        return view.slopes(sensitivities.values, motion, camera=float(name == CAMERA), scales=scales)
 
     def _turned(self, zero: float) -> Floats:
         """Change (n, k) of the outputs if the zero of the heading is off: θ grows in one direction of the
         motor.
         """
-        found = np.zeros(self.runs.y.shape)
+        change = np.zeros(self.runs.y.shape)
         if "theta" in self.runs.outputs:
-            found[:, self.runs.outputs.index("theta")] = zero * np.sign(self.runs.omega)
-        return found
+            change[:, self.runs.outputs.index("theta")] = zero * np.sign(self.runs.omega)
+        return change
 
     def guess(self, start: dict[str, float], used: Flags) -> dict[str, float]:
-        """Coefficients fitted with the look-up table to the runs that it covers; `start` if those are too few.
+        """Fit coefficients with the look-up table to the runs that it covers; `start` if those are too few.
 
         Of several starts, the one that ends nearest to the runs is taken.
         """
@@ -221,58 +235,58 @@ class SwimmerModel:
         if covered.sum() < _FEWEST_COVERED:
             return dict(start)
         part = replace(self, runs=self.runs.subset(covered))
-        found = [
+        fits = [
             part._fit_lookup(lookup, {**start, **{n: factor * start[n] for n in COEFFICIENTS}})
             for factor in _STARTS
         ]
-        return min(found, key=lambda pair: pair[1])[0]
+        return min(fits, key=lambda pair: pair[1])[0]
 
     def _fit_lookup(self, lookup: NeuralTable, start: dict[str, float]) -> tuple[dict[str, float], float]:
-        """Coefficients from one start, and the sum of squares that they leave; infinite off the table."""
-        data, parameters, left = self.runs, dict(start), math.inf
+        """Fit coefficients from one start; with the sum of squares that they leave, infinite off the table."""
+        data, parameters, remainder = self.runs, dict(start), math.inf
         whiten = Noise(repeat_covariance(data.y, data.condition), 0.0).whitener(data.session)
         for _ in range(_MOST_GUESSES):
             moved = [{**parameters, name: parameters[name] * math.exp(_STEP)} for name in COEFFICIENTS]
             try:
-                found = self.predict([parameters, *moved], lookup=lookup)
+                predictions = self.predict([parameters, *moved], lookup=lookup)
             except InputError:  # a coefficient left the table's domain on the way
                 return start, math.inf
-            J = whiten(np.moveaxis(found[1:] - found[0], 0, -1) / _STEP)
-            residual = whiten(data.y - found[0])
-            left = float(residual @ residual)
+            J = whiten(np.moveaxis(predictions[1:] - predictions[0], 0, -1) / _STEP)
+            residual = whiten(data.y - predictions[0])
+            remainder = float(residual @ residual)
             step: Floats = np.asarray(np.linalg.lstsq(J, residual, rcond=None)[0])
             if np.abs(step).max() < 1e-3:
                 break
             for name, change in zip(COEFFICIENTS, np.clip(step, -0.7, 0.7).tolist(), strict=True):
                 parameters[name] = min(max(parameters[name] * math.exp(change), SANE[0]), SANE[1])
-        return parameters, left
+        return parameters, remainder
 
     def check(self, prediction: Floats) -> None:
         """Refuse a table whose units cannot be those that its columns name."""
         check_outputs(self.runs, prediction)
 
     def possible(self) -> tuple[SwimmerModel, list[dict[str, Any]]]:
-        """Runs that can be made next (`calibration.swimmer.lab_settings`)."""
+        """Return runs that can be made next (`calibration.swimmer.possible_runs`)."""
         runs, grid = self.runs, possible_settings(self.runs, self.own)
         count = len(grid)
         noted = np.tile(runs.noted.mean(0), (count, 1))
         settings = [{"N": int(n), "l_cm": length, "omega_rpm": speed} for n, length, speed in grid.tolist()]
-        own = replace(
+        possible_runs = replace(
             runs, y=np.zeros((count, len(runs.outputs))),
             condition=np.arange(count), session=np.zeros(count, int),
             session_names=("next",), inputs=np.zeros((count, runs.inputs.shape[1])), excluded=(),
             rows=np.arange(count), caveats=(), tails=grid[:, 0], length=grid[:, 1] / 100,
             omega=grid[:, 2] * math.pi / 30, noted=noted,
         )  # fmt: skip
-        return replace(self, runs=own), settings
+        return replace(self, runs=possible_runs), settings
 
     def robots(self, parameters: Parameters) -> tuple[list[Robot], Integers]:
-        """The robots that are simulated for the runs at `parameters`, and the place of each run among them."""
+        """Return the robots that are simulated for the runs at `parameters`, and each run's place among them."""
         runs, place = self._conditions(parameters)
         return [run.robot for run in runs], place
 
     def _inside(self, lookup: NeuralTable, parameters: Parameters) -> Flags:
-        """Which runs (n,) the look-up table covers at `parameters`."""
+        """Tell which runs (n,) the look-up table covers at `parameters`."""
         runs, place = self._conditions(parameters)
         good = np.ones(len(runs), dtype=bool)
         for i, run in enumerate(runs):
@@ -282,20 +296,22 @@ class SwimmerModel:
         return np.asarray(good[place])
 
     def _at_work(self, parameters: Parameters) -> list[Influence]:
-        """Influences that are not at their null."""
-        found = [i for name, i in self._influences.items() if name in parameters]
-        return [i for i in found if parameters[i.name] != i.parameter.start]
+        """List influences that are not at their null."""
+        return [
+            influence for name, influence in self._influences.items()
+            if name in parameters and parameters[name] != influence.parameter.start
+        ]  # fmt: skip
 
     @cached_property
     def _drivers(self) -> dict[str, Floats]:
         """What drives influences, of every run (n,)."""
-        found = dict(zip(self.runs.noted_names, self.runs.noted.T, strict=True))
-        if "tank_diameter" in found:
-            found["head_over_tank"] = 2 * self.robot.head_radius / found["tank_diameter"]
-        return found
+        drivers = dict(zip(self.runs.noted_names, self.runs.noted.T, strict=True))
+        if "tank_diameter" in drivers:
+            drivers["head_over_tank"] = 2 * self.robot.head_radius / drivers["tank_diameter"]
+        return drivers
 
     def _conditions(self, parameters: Parameters, *, signed: bool = False) -> tuple[list[_Run], Integers]:
-        """Runs that must be simulated at `parameters`, without duplicates, and the place of each run among them.
+        """List runs to simulate at `parameters`, without duplicates, and the place of each run among them.
 
         The motor's direction matters if something odd is present, or if `signed`.
         """
@@ -310,7 +326,7 @@ class SwimmerModel:
     def _run(self, parameters: Parameters, row: int, omega: float) -> _Run:
         effects, current = dict(self.robot.effects), 0.0
         for influence in self._at_work(parameters):
-            by = parameters[influence.name] - influence.parameter.start
+            by = parameters[influence.parameter.name] - influence.parameter.start
             before = influence.parameter.start
             if influence.needs is not None:
                 by *= float(self._drivers[influence.needs][row])
@@ -319,7 +335,7 @@ class SwimmerModel:
                 effects[influence.effect] = before + by
                 if second := influence.parameter.second:
                     effects[second.name] = parameters.get(second.name, second.start)
-            elif influence.name in CURRENT:
+            elif influence.parameter.name in CURRENT:
                 current += by
         robot = replace(
             self.robot, **robot_numbers(self.robot, parameters), tails=int(self.runs.tails[row]),
@@ -330,7 +346,7 @@ class SwimmerModel:
         return _Run(robot, math.copysign(1.0, omega), parameters.get(TRACKED_POINT, 0.0), current)
 
     def _columns(self, runs: list[_Run], sets: Sequence[Parameters]) -> dict[str, Floats]:
-        """Runs as columns for the simulator, with every effect that is present in any of the sets."""
+        """Write runs as columns for the simulator, with every effect that is present in any of the sets."""
         work = [i for parameters in sets for i in self._at_work(parameters)]
         names = {i.effect for i in work if i.effect} | {
             i.parameter.second.name for i in work if i.parameter.second
@@ -354,7 +370,7 @@ class SwimmerModel:
 
 
 def _moves(name: str, influence: Influence | None) -> tuple[str, ...]:
-    """The simulator's parameters that a parameter of the calibration changes; none if it acts on what is seen."""
+    """Name the simulator's parameters that a parameter changes; none if it acts on what is seen."""
     if name in POWERS:
         return tuple(group for group in POWERS[name] if group in GROUPS)
     if influence is None:
@@ -365,9 +381,9 @@ def _moves(name: str, influence: Influence | None) -> tuple[str, ...]:
 
 
 def robot_numbers(robot: Robot, parameters: Parameters) -> dict[str, Any]:
-    """Fitted coefficients and numbers of the robot, by field; a is kept where R changes."""
-    own: dict[str, Any] = {name: float(parameters[name]) for name in COEFFICIENTS}
+    """Collect fitted coefficients and numbers of the robot, by field; a is kept where R changes."""
+    numbers: dict[str, Any] = {name: float(parameters[name]) for name in COEFFICIENTS}
     for name in POWERS:
         if hasattr(robot, name):
-            own[name] = float(parameters.get(name, robot_number(robot, name)))
-    return own
+            numbers[name] = float(parameters.get(name, robot_number(robot, name)))
+    return numbers

@@ -35,7 +35,7 @@ def make_table(
     jobs: int | None = None,
     title: str = "table",
 ) -> pd.DataFrame:
-    """A table of runs of `robot` (its effects are the truth), with the columns of `measured_table`.
+    """Simulate a table of runs of `robot` (its effects are the truth), with the columns of `measured_table`.
 
     Args:
         robot: the truth; its tail count, tail length and motor speed are replaced by those of the design.
@@ -62,7 +62,7 @@ def make_table(
     odd = any(catalogue()[name].symmetry == "odd" for name in robot.effects)
     directions = (1, -1) if odd else (1,)  # else a reversed motor mirrors the motion
     both = {k: np.concatenate([d * v if k == "omega_bar" else v for d in directions]) for k, v in columns.items()}
-    found = stepped_columns(both, finer=2, jobs=jobs, title=title)
+    motion = stepped_columns(both, finer=2, jobs=jobs, title=title)
     rng = np.random.default_rng(seed)
     shift = {n: rng.normal(scale=session_noise, size=4) for n in tails}
     rows = []
@@ -80,11 +80,11 @@ def make_table(
                         "trial": trial,
                         "session": f"N={n}",
                         "omega_rpm": direction * rpm,
-                        "omega_h_rpm": sense * found["omega_h_bar"][at] * spin * factor[0],
-                        "omega_t_rpm": sense * found["omega_t_bar"][at] * spin * factor[1],
-                        "omega_yr_rad_s": sense * found["omega_yr_bar"][at] / runs[i].time_scale * factor[2],
-                        "R_yr_cm": found["R_yr_over_l"][at] * length * factor[3],
-                        "theta_deg": found["theta_deg"][at] + rng.normal(scale=math.degrees(noise)),
+                        "omega_h_rpm": sense * motion["omega_h_bar"][at] * spin * factor[0],
+                        "omega_t_rpm": sense * motion["omega_t_bar"][at] * spin * factor[1],
+                        "omega_yr_rad_s": sense * motion["omega_yr_bar"][at] / runs[i].time_scale * factor[2],
+                        "R_yr_cm": motion["R_yr_over_l"][at] * length * factor[3],
+                        "theta_deg": motion["theta_deg"][at] + rng.normal(scale=math.degrees(noise)),
                     }
                 )
     table = pd.DataFrame(rows)

@@ -1,38 +1,57 @@
 """The whole calibration: split, fit, test, attribute, refit, and open the held-out test once.
 
 1. Whole sessions are held out before anything is looked at (by default the middle one).
-   Outliers are excluded (`calibration.statistics.outliers`).
-2. Covariance from the repeats and the sessions (`calibration.statistics.noise`).
-3. Fit to the other sessions, tests of the residual, and what explains it (`calibration.attribution.explain`).
+   Outliers are excluded (`calibration.statistics.study`).
+2. The coefficients and the nuisance parameters are fitted to the other sessions, and the residual is tested.
+3. What explains it is looked for (`explain`). A nuisance parameter that leaves its prior is freed, and comes ahead
+   of every effect (`calibration.attribution.wrong_numbers`). Single effects (`calibration.attribution.refits`),
+   effects beside a wrong number, and pairs follow, each only if nothing before explains the residual.
 4. The verdict (`calibration.verdict.verdict.reach_verdict`).
 5. If several explanations are left, next runs that would tell them apart (`calibration.verdict.next_runs`).
    If nothing explains the residual, a correction that is handed on for steering, where there is one.
 6. Errors on the held-out runs: as given, calibrated, with the effect, with a regression of the residual
-   (`calibration.verdict.residual_regression`), and from noise alone. Whether the held-out runs agree with the
+   (`calibration.statistics.residual_regression`), and from noise alone. Whether the held-out runs agree with the
    final model (`calibration.statistics.held_out`).
 7. For use, the model is fitted once more to all runs, the held-out ones included.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 
-from calibration.attribution.explain import Explained, explain
-from calibration.attribution.single_effects import coefficients_within_range
-from calibration.statistics.fit import Fit
-from calibration.statistics.forward_model import ForwardModel, start_values
+from calibration.attribution.doubts import with_doubts
+from calibration.attribution.refits import (
+    FIRST,
+    INDISTINGUISHABLE,
+    Candidate,
+    coefficients_within_range,
+    examine,
+    explaining,
+    pairs,
+    unexamined,
+)
+from calibration.attribution.wrong_numbers import (
+    as_good_as_number,
+    beats_number,
+    beside_wrong_numbers,
+    pulls,
+    without_wrong_priors,
+)
+from calibration.statistics.fit import Fit, fit, profile_intervals
 from calibration.statistics.held_out import error_interval, errors, held_out_p_value, refit_to_all
-from calibration.statistics.outliers import find_outliers
-from calibration.statistics.profile_intervals import profile_intervals
-from calibration.statistics.pulls import pulls
-from calibration.statistics.splits import Split, split_runs
-from calibration.statistics.study import DRAWS, LEVEL, Study
+from calibration.statistics.residual_regression import regress_residual
+from calibration.statistics.residual_tests import TESTABLE, Misfit, directions, examine_residual
+from calibration.statistics.statistical_model import ForwardModel, start_values
+from calibration.statistics.study import DRAWS, LEVEL, Split, Study, find_outliers, split_runs
 from calibration.verdict.experiment import Experiment, LearntCorrection
 from calibration.verdict.next_runs import next_runs
-from calibration.verdict.residual_regression import regress_residual
 from calibration.verdict.sequential_test import Explanation
 from calibration.verdict.verdict import (
     Conditions,
@@ -45,6 +64,7 @@ from calibration.verdict.verdict import (
     reach_verdict,
 )
 from sim.arrays import Flags, Floats
+from sim.io.provenance import fingerprint
 
 Subject = TypeVar("Subject", bound=Experiment)
 
@@ -63,7 +83,7 @@ def calibrate(
 
     Args:
         model: its parameters' starts are the model "as given" (uncalibrated).
-        held_out: (n,) runs kept for the test, whole sessions; default `splits.middle_session`.
+        held_out: (n,) runs kept for the test, whole sessions; default `study.middle_session`.
         correction: learns a correction of the calibrated model where nothing explains the residual, such as
             `calibration.swimmer.head_correction.learn_head_correction`.
         level: α of every claim.
@@ -71,11 +91,12 @@ def calibrate(
         draws: of the bootstrap. It resolves no smaller p-value than 2/(draws + 1).
         progress: show progress bars.
     """
-    uncalibrated = model.predict([start_values(model)], title="as given" if progress else "")[0]
+    start = start_values(model)
+    uncalibrated = model.predict([start], title="as given" if progress else "")[0]
     model.check(uncalibrated)
     split = split_runs(model.runs, held_out, find_outliers(model.runs, uncalibrated))
     study = Study(model, split, level, seed, draws, progress)
-    explained = explain(study, model.guess(study.start, study.used))
+    explained = explain(study, model.guess(start, split.fitted))
     evidence = Evidence(
         misfit=explained.misfit,
         draws=draws,
@@ -86,6 +107,7 @@ def calibrate(
     )
     verdict = reach_verdict(evidence, level, number_explains=explained.number is not None)
     learnt = correction(model, explained.base, split) if correction and verdict == "unexplained" else None
+    fixed = {"level": level, "seed": seed, "catalogue": [e.name for e in model.effects], "locked": split.names}
     corrections = Corrections(regress_residual(model.runs, explained.base.prediction, split.fitted), learnt)
     return Verdict(
         verdict=verdict,
@@ -93,24 +115,110 @@ def calibrate(
         fits=_fits(study, explained, uncalibrated, moved=learnt is None),
         errors=_errors(study, explained, uncalibrated, corrections),
         corrections=corrections,
-        next=_next_runs(model, explained.rivals, seed),
         conditions=Conditions(
             split=split,
             sessions=model.runs.session_names,
-            hash=study.fixed,
+            hash=fingerprint(fixed),
             excluded=(*model.runs.excluded, *split.reasons),
             caveats=(*model.runs.caveats, *split.caveats, *_caveats(model, explained)),
         ),
+        next=_next_runs(model, explained.rivals, seed),
     )
+
+
+@dataclass(frozen=True)
+class Explained:
+    """The fit without effects, its residual, and what explains the residual."""
+
+    base: Fit
+    misfit: Misfit  # of the base
+    candidates: tuple[Candidate, ...]
+    best: tuple[Candidate, ...] = ()  # what explains the residual, best first; more than one: not told apart
+    number: Fit | None = None  # the fit with a wrong nuisance parameter freed, if that explains the residual
+    rival_effects: tuple[Candidate, ...] = ()  # effects that explain as much as the wrong number does
+
+    @property
+    def final(self) -> Fit:
+        """The model with the effects of the verdict, or without any."""
+        if self.best and self.best[0].refit:
+            return self.best[0].refit
+        return self.number or self.base
+
+    @property
+    def rivals(self) -> tuple[tuple[str, Fit], ...]:
+        """Explanations that the runs cannot tell apart, in words, best first; none if there are not two."""
+        known = [(c.title, c.refit) for c in (*self.best, *self.rival_effects) if c.refit]
+        if self.number and self.rival_effects:
+            wrong = ", ".join(alike[0].parameter.title for alike in self.number.wrong_numbers)
+            known = [(f"the stated value of {wrong} is wrong", self.number), *known]
+        return tuple(known) if len(known) > 1 else ()
+
+
+def explain(study: Study, guess: Mapping[str, float]) -> Explained:
+    """Fit the model, test the residual, and look for what explains it, from the simplest to the least simple.
+
+    Args:
+        guess: where the fit starts.
+    """
+    model, level = study.model, study.level
+    began = time.monotonic()
+    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
+    base = fit(model, guess, names, study.split.fitted, title="fit" if study.progress else "")
+    fitted = time.monotonic()
+    title = "derivatives" if study.progress else ""
+    tangents = directions(model, base.parameters, model.effects, title=title)
+    derived = time.monotonic()
+    misfit = examine_residual(study, base, tangents)
+    freed = without_wrong_priors(study, base)
+    number_is_wrong = freed is not base
+    number_explains = number_is_wrong and (
+        misfit.p_value >= level or examine_residual(study, freed, tangents).p_value >= level
+    )
+    if misfit.p_value >= level and not number_is_wrong:
+        return Explained(base, misfit, tuple(unexamined(misfit, model.effects, misfit.critical_z)))
+    threshold = misfit.critical_z
+    if number_is_wrong:  # every effect that may explain as much as the wrong number does
+        gain = base.deviance - freed.deviance
+        threshold = min(threshold, math.sqrt(max(gain - INDISTINGUISHABLE, 1.0)))
+    if study.progress:
+        print(_forecast(misfit, threshold, fitted - began, derived - fitted), file=sys.stderr)
+    candidates = examine(study, base, misfit, tangents, threshold=threshold)
+    best = explaining(candidates)
+    if number_explains and not beats_number(best, freed):
+        rival_effects = tuple(as_good_as_number(candidates, freed, level))
+        return Explained(base, misfit, tuple(candidates), (), freed, rival_effects)
+    best = (
+        best
+        or explaining(beside_wrong_numbers(study, base, candidates, tangents))
+        or explaining(pairs(study, candidates))
+    )
+    return Explained(base, misfit, tuple(candidates), tuple(with_doubts(study, best, base)))
+
+
+def _forecast(misfit: Misfit, threshold: float, seconds_of_fit: float, seconds_of_directions: float) -> str:
+    """Say how long the effects will take, by how long the first fit and the derivatives took."""
+    scores = misfit.scores
+    count = int(((np.abs(scores.z) >= threshold) & (scores.survived >= TESTABLE)).sum())
+    single = count * seconds_of_fit
+    pairs_at_most = FIRST * (seconds_of_directions + single)
+    return (
+        f"there is more than noise: {count} effects to fit, about {_duration(single)}; if none of them explains "
+        f"the runs, pairs follow, {_duration(pairs_at_most)} at most, mostly much less"
+    )
+
+
+def _duration(seconds: float) -> str:
+    return f"{max(seconds, 1):.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
 def _fits(study: Study, explained: Explained, uncalibrated: Floats, *, moved: bool) -> Fits:
     """Add intervals to the fits, and fit the final model once more to all runs if it may be `moved`."""
-    base, final = explained.base, explained.final
-    base_intervals = profile_intervals(study.model, base, study.used, title=study.title("intervals"))
+    base, final, used = explained.base, explained.final, study.split.fitted
+    title = "intervals" if study.progress else ""
+    base_intervals = profile_intervals(study.model, base, used, title=title)
     final_intervals = base_intervals
     if final is not base:
-        final_intervals = profile_intervals(study.model, final, study.used, title=study.title("intervals"))
+        final_intervals = profile_intervals(study.model, final, used, title=title)
     return Fits(
         uncalibrated=uncalibrated,
         base=base,
@@ -133,7 +241,8 @@ def _next_runs(model: Experiment, rivals: tuple[tuple[str, Fit], ...], seed: int
 
 def _errors(study: Study, explained: Explained, uncalibrated: Floats, corrections: Corrections) -> HeldOutErrors:
     """State the errors of every model on the held-out runs."""
-    base, final, test = explained.base, explained.final, study.split.test
+    base, final = explained.base, explained.final
+    runs, test = study.model.runs, study.split.test
     predictions = {
         "uncalibrated": uncalibrated,
         "before": base.prediction,
@@ -142,21 +251,22 @@ def _errors(study: Study, explained: Explained, uncalibrated: Floats, correction
     }
     if corrections.learnt is not None:
         predictions["predictive"] = corrections.learnt.prediction
-    stated = {name: errors(study.runs, prediction, test) for name, prediction in predictions.items()}
+    stated = {name: errors(runs, prediction, test) for name, prediction in predictions.items()}
     noise = base.noise.run
     return HeldOutErrors(
         rms={name: rms for name, (rms, _) in stated.items()},
         by_output={name: each for name, (_, each) in stated.items()},
-        after_interval=error_interval(study.runs, final.prediction, test, study.seed),
+        after_interval=error_interval(runs, final.prediction, test, study.seed),
         noise=float(np.sqrt(np.trace(noise) / len(noise))),
-        p_value=held_out_p_value(final, study.runs, test, seed=study.seed + 3),
+        p_value=held_out_p_value(final, runs, test, seed=study.seed + 3),
     )
 
 
 def _caveats(model: ForwardModel, explained: Explained) -> tuple[str, ...]:
     """Say why a fit may not be the best one."""
     base, final = explained.base, explained.final
-    caveats = [f"{name} is at the end of its range: these runs do not determine it" for name in final.at_bounds]
+    at_bounds = [p.name for p in final.fitted if final.parameters[p.name] in p.bounds]
+    caveats = [f"{name} is at the end of its range: these runs do not determine it" for name in at_bounds]
     if not coefficients_within_range(model, base.parameters):
         caveats.append(
             "without effects the coefficients run to the end of their range, so every effect was refitted from "

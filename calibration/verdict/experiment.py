@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from calibration.statistics.forward_model import ForwardModel
+from calibration.statistics.statistical_model import ForwardModel
 from sim.arrays import Flags, Floats
 
 

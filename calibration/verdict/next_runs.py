@@ -6,9 +6,10 @@ runs add
     λ_AB = dᵀ (Σ + J Cov Jᵀ)⁻¹ d,   d = f_A − f_B
 
 to the difference of χ² between B and A. Σ is the covariance of the new runs, which are one session
-(`calibration.statistics.noise`). J and Cov are the derivatives of B and the covariance of its fit, because B can
-be fitted again (T-optimal design, linearised). There is a λ for every two rivals, both ways; for single runs the
-smallest counts. How often the runs decide is found by drawing them at random. Source: Atkinson and Fedorov (1975).
+(`calibration.statistics.statistical_model`). J and Cov are the derivatives of B and the covariance of its fit,
+because B can be fitted again (T-optimal design, linearised). There is a λ for every two rivals, both ways; for
+single runs the smallest counts. How often the runs decide is found by drawing them at random. Source: Atkinson
+and Fedorov (1975).
 
 A batch is chosen one run after the other. With equal odds the wrong one of two is chosen with the probability
 Φ(−√λ/2); the run is taken that makes the sum of these over all pairs least. `calibration.verdict.sequential_test`
@@ -27,7 +28,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.noise import Noise
+from calibration.statistics.statistical_model import Noise
 from calibration.verdict.experiment import Experiment
 from sim.arrays import Floats
 

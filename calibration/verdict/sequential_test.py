@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from calibration.statistics.fit import Fit
-from calibration.statistics.forward_model import ForwardModel, Runs, start_values
-from calibration.statistics.noise import Noise
+from calibration.statistics.statistical_model import ForwardModel, Noise, Runs, start_values
 from calibration.verdict.next_runs import GIVEN_UP
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
@@ -86,7 +85,7 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
     if not isinstance(record, dict) or not record.get("explanations"):
         raise InputError(f"{path}: this verdict has no two explanations between which new runs could decide")
     try:
-        return [Explanation.read(one) for one in record["explanations"]], set(record["sessions"])
+        return [Explanation.read(explanation) for explanation in record["explanations"]], set(record["sessions"])
     except (KeyError, TypeError, ValueError):
         raise InputError(f"{path} is no verdict.json of this version: calibrate the table again") from None
 

@@ -7,26 +7,51 @@ departure, and nothing in the catalogue explains it.
 
 from __future__ import annotations
 
-import operator
-import warnings
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
-from calibration.attribution.candidate import Candidate
-from calibration.statistics.fit import Fit
+from calibration.attribution.refits import Candidate
+from calibration.attribution.wrong_numbers import wrong_number
+from calibration.statistics.fit import Fit, Pull
 from calibration.statistics.held_out import FinalRefit
-from calibration.statistics.priors import Pull
-from calibration.statistics.pulls import wrong_number
+from calibration.statistics.residual_regression import Regression
 from calibration.statistics.residual_tests import Misfit
-from calibration.statistics.splits import Split
+from calibration.statistics.study import Split
 from calibration.verdict.experiment import LearntCorrection
 from calibration.verdict.next_runs import Batch, NextRun
-from calibration.verdict.residual_regression import Regression
 from calibration.verdict.sequential_test import Explanation
 from sim.arrays import Floats
+from sim.io.deprecated import old_attributes
 
+MODELS = ("uncalibrated", "before", "after", "generic", "predictive")  # whose errors are stated
 _NOTABLE = 2.0  # pull of a nuisance parameter beyond which the sentence says so
 _NEAR = 0.5  # if no effect explains the residual, the best one is named if it removes at least this share
+
+_OLD_NAMES = {  # of attributes -> where they are now
+    "base_intervals": "fits.base_intervals",
+    "final_intervals": "fits.final_intervals",
+    "misfit": "evidence.misfit",
+    "draws": "evidence.draws",
+    "candidates": "evidence.candidates",
+    "numbers": "fits.pulls",
+    "instead": "evidence.rival_effects",
+    "generic": "corrections.regression",
+    "predictive": "corrections.learnt",
+    "explanations": "next.explanations",
+    "next_batch": "next.batch",
+    "error_after_interval": "errors.after_interval",
+    "locked_p": "errors.p_value",
+    "delivered": "fits.final_refit",
+    "errors_by_output": "errors.by_output",
+    "locked": "conditions.split.names",
+    "sessions": "conditions.sessions",
+    "used": "conditions.split.fitted",
+    "uncalibrated": "fits.uncalibrated",
+    "untestable": "evidence.untestable",
+    "plan_hash": "conditions.hash",
+    "set_aside": "conditions.excluded",
+    "limits": "conditions.caveats",
+}
 
 
 @dataclass(frozen=True)
@@ -188,12 +213,8 @@ class Verdict:
         """Runs that would tell several explanations apart."""
         return self.next.runs
 
-    def __getattr__(self, name: str) -> Any:
-        """Find an old name of a part, with a warning."""
-        if name not in _OLD_NAMES:  # dunder methods of copying among them
-            raise AttributeError(f"'Verdict' has no attribute {name!r}")
-        warnings.warn(f"Verdict.{name} is now Verdict.{_OLD_NAMES[name]}", DeprecationWarning, stacklevel=2)
-        return operator.attrgetter(_OLD_NAMES[name])(self)
+    if not TYPE_CHECKING:
+        __getattr__ = old_attributes(_OLD_NAMES)
 
     @property
     def wrong_numbers(self) -> tuple[tuple[Pull, ...], ...]:
@@ -247,9 +268,9 @@ class Verdict:
                 like = "something in form like " if effect.name in self.in_form_only else ""
                 size = best.refit.parameters[effect.name]
                 sizes.append(f"{like}{effect.title}, size {size:.3g} ({low:.3g} to {high:.3g})")
-            other = "other effect" if len(sizes) == 1 else "single effect or other pair"
+            rivals = "other effect" if len(sizes) == 1 else "single effect or other pair"
             said = " and ".join(sizes) + self._outside
-            return f"The residual ({p}) is consistent with {said}, and with no {other} of the catalogue."
+            return f"The residual ({p}) is consistent with {said}, and with no {rivals} of the catalogue."
         if self.verdict == "ambiguous":
             names = " or ".join(c.title for c in self.explaining)
             names += self._outside
@@ -297,30 +318,3 @@ class Verdict:
         if share < _NEAR:
             return ""
         return f"; the nearest, {title}, removes {100 * min(share, 1.0):.0f} % of it and leaves more than noise"
-
-
-_OLD_NAMES = {
-    "base_intervals": "fits.base_intervals",
-    "final_intervals": "fits.final_intervals",
-    "misfit": "evidence.misfit",
-    "draws": "evidence.draws",
-    "candidates": "evidence.candidates",
-    "numbers": "fits.pulls",
-    "instead": "evidence.rival_effects",
-    "generic": "corrections.regression",
-    "predictive": "corrections.learnt",
-    "explanations": "next.explanations",
-    "next_batch": "next.batch",
-    "error_after_interval": "errors.after_interval",
-    "locked_p": "errors.p_value",
-    "delivered": "fits.final_refit",
-    "errors_by_output": "errors.by_output",
-    "locked": "conditions.split.names",
-    "sessions": "conditions.sessions",
-    "used": "conditions.split.fitted",
-    "uncalibrated": "fits.uncalibrated",
-    "untestable": "evidence.untestable",
-    "plan_hash": "conditions.hash",
-    "set_aside": "conditions.excluded",
-    "limits": "conditions.caveats",
-}

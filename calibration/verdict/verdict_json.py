@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from calibration.statistics.priors import Pull
-from calibration.verdict.verdict import Verdict
+from calibration.statistics.fit import Pull
+from calibration.verdict.verdict import MODELS, Verdict
 from sim.io.provenance import provenance
 
 
 def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
     """Write a verdict as verdict.json has it; its keys are a format, and older than the names here."""
-    final, misfit, learnt = result.final, result.evidence.misfit, result.corrections.learnt
+    final, misfit, learnt, errors = result.final, result.evidence.misfit, result.corrections.learnt, result.errors
     parameters = {
         name: {
             "value": final.parameters[name],
@@ -32,14 +32,10 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "effects_instead": [[e.name for e in c.claimed] for c in result.evidence.rival_effects],
         "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
         "numbers_as_given": [_number_record(p) for p in result.fits.pulls],
-        "error_uncalibrated": result.error_uncalibrated,
-        "error_before": result.error_before,
-        "error_after": result.error_after,
-        "error_generic": result.error_generic,
-        "error_predictive": result.error_predictive,
-        "error_after_interval": list(result.errors.after_interval),
-        "noise_ceiling": result.noise_ceiling,
-        "errors_by_output": result.errors.by_output,
+        **{f"error_{name}": errors.rms.get(name) for name in MODELS},
+        "error_after_interval": list(errors.after_interval),
+        "noise_ceiling": errors.noise,
+        "errors_by_output": errors.by_output,
         "p_value": misfit.p_value,
         "p_general": misfit.general_p,
         "p_of_each_test": misfit.p,
@@ -66,7 +62,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "next_runs": [run.record() for run in result.next.runs],
         "next_batch": result.next.batch.record() if result.next.batch else None,
         "locked_test": result.conditions.split.names,
-        "locked_p_value": result.errors.p_value,
+        "locked_p_value": errors.p_value,
         "fixed_before": result.conditions.hash,
         "rows_set_aside": list(result.conditions.excluded),
         "limits": list(result.conditions.caveats),

@@ -113,9 +113,9 @@ def mend(
         before = storage.read(MANIFEST).to_pybytes() if storage.size(MANIFEST) is not None else b""
         manifest = _build(design, storage, simulate, message, workers, title, mending=True)
     progress = message.progress
-    again = f"{progress.simulated} rows simulated again, " if progress else "no row simulated again, "
+    simulated_again = f"{progress.simulated} rows simulated again, " if progress else "no row simulated again, "
     same = json.dumps(manifest, indent=1).encode() == before.strip()
-    return f"{manifest['rows']} rows are whole: {again}manifest {'kept' if same else 'written anew'}"
+    return f"{manifest['rows']} rows are whole: {simulated_again}manifest {'kept' if same else 'written anew'}"
 
 
 class _Message:

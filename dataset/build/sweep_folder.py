@@ -107,8 +107,8 @@ class SweepFolder:
         for name in sorted({*theirs["inputs"], *ours["inputs"]}):
             axes = theirs["inputs"].get(name), ours["inputs"].get(name)
             if axes[0] != axes[1]:
-                there, here = map(_describe, axes)
-                raise self._refusal(f"rows of another configuration: {name} {there} there, {here} here")
+                their_axis, our_axis = map(_describe, axes)
+                raise self._refusal(f"rows of another configuration: {name} {their_axis} there, {our_axis} here")
         for name in ("history_every", "sensitivities"):
             if theirs.get(name) != ours[name]:
                 raise self._refusal(
@@ -136,7 +136,7 @@ class SweepFolder:
         be as it lists it.
         """
         listed = self._listed(mending)
-        whole: Stored = {}
+        sound: Stored = {}
         for shard in [*shards_in(self.storage, ROWS), *shards_in(self.storage, PENDING)]:
             try:
                 contents = check_shard(self.storage, shard, self._form, self.key)
@@ -145,12 +145,12 @@ class SweepFolder:
             except BadShardError:
                 self.storage.delete(shard.name)
             else:
-                whole[shard] = contents
+                sound[shard] = contents
         kept: Stored = {}
         end = 0
-        for shard in sorted(whole, key=lambda s: (s.start, -s.stop, s.name not in listed)):
+        for shard in sorted(sound, key=lambda s: (s.start, -s.stop, s.name not in listed)):
             if shard.start >= end:
-                kept[shard] = whole[shard]
+                kept[shard] = sound[shard]
                 end = shard.stop
             elif shard.name not in listed:  # a listed file stays until the manifest no longer lists it
                 self.storage.delete(shard.name)

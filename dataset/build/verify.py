@@ -77,8 +77,7 @@ def _check_again(address: str, design: SweepDesign, stored: pa.Table, chosen: np
     points[HISTORY] = stored[HISTORY].to_numpy()
     again_columns = call_in_worker(simulate_in_worker, points, design.sensitivities)
     again = arrow_table(
-        {**again_columns, "row": design.indices()[chosen]},
-        schema(design.effects, design.sensitivities),
+        {**again_columns, "row": design.indices()[chosen]}, schema(design.effects, design.sensitivities)
     )
     for name in stored.schema.names:
         if name != COST and _bits(stored[name]) != _bits(again[name]):

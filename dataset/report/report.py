@@ -10,14 +10,7 @@ import pandas as pd
 import pyarrow as pa
 from scipy.stats import qmc
 
-from dataset.report.figures import (
-    RESPONSES,
-    draw_collapse,
-    draw_indices,
-    draw_responses,
-    draw_trends,
-    draw_where,
-)
+from dataset.report.figures import RESPONSES, draw_collapse, draw_indices, draw_responses, draw_trends, draw_where
 from dataset.report.power_laws import exponents, linear_rows
 from dataset.report.sobol_indices import sobol_indices
 from dataset.rows.schema import COST, INPUTS, Column, schema, shown_outputs

@@ -23,7 +23,7 @@ LOCK = ".lock"
 
 @contextmanager
 def locked(storage: Storage, *, force: bool = False) -> Iterator[None]:
-    """Be the only writer of a storage for as long as the block lasts.
+    """Hold the lock of a storage for as long as the block lasts: its holder is the only writer.
 
     Args:
         force: take over the lock file of another writer behind a URL.

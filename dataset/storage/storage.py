@@ -47,7 +47,7 @@ class Sink:
         self._file.flush()
 
     def tell(self) -> int:
-        """Bytes so far."""
+        """Count the bytes so far."""
         return self.size
 
     def close(self) -> None:

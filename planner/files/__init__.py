@@ -1,1 +1,1 @@
-"""What a plan is written to and read from."""
+"""Files of plans: written and read."""

@@ -2,10 +2,10 @@
 
 They appear together, and each has the identity of the plan, so files of two plans cannot be taken for one.
 
-schedule.h has dwell times in whole milliseconds as 16-bit numbers. The motor flips after each. The rounding error
-of a dwell is carried over to the next one, so no flip is more than half a millisecond early or late. A dwell that
-does not fit 16 bits is split by entries of 0 ms: two flips at once, so the direction stays. A dwell that rounds to
-0 ms is refused, because 0 has this other meaning.
+schedule.h lists dwell times in whole milliseconds as 16-bit integers. The motor flips after each. The rounding
+error of a dwell is carried over to the next one, so no flip is more than half a millisecond early or late. A dwell
+that does not fit 16 bits is split by entries of 0 ms: two flips at once, so the direction stays. A dwell that
+rounds to 0 ms is rejected, because 0 has this other meaning.
 """
 
 from __future__ import annotations
@@ -100,16 +100,16 @@ def milliseconds(seconds: np.ndarray) -> list[int]:
     """
     edges = np.round(1000 * np.cumsum(seconds)).astype(np.int64)
     entries: list[int] = []
-    for index, whole in enumerate(np.diff(edges, prepend=0).tolist()):
-        if whole < 1:
+    for index, count in enumerate(np.diff(edges, prepend=0).tolist()):
+        if count < 1:
             raise InputError(
                 f"dwell {index + 1} is {1000 * seconds[index]:.3g} ms; the header counts whole milliseconds: "
                 "use a longer minimum dwell"
             )
-        while whole > _MOST_MS:
+        while count > _MOST_MS:
             entries += [_MOST_MS, 0]
-            whole -= _MOST_MS
-        entries.append(whole)
+            count -= _MOST_MS
+        entries.append(count)
     return entries
 
 

@@ -63,8 +63,9 @@ def _intro(result: Plan, identity: str) -> str:
     name, model = safe_name(result), result.tracked.model
     return f"""/* Plan {identity}.
  * Tracker for robot "{name}", look-up table {model}: keeps the robot on its plan
- * with poses from a camera, and learns the robot. It is planner.Tracker in C99, with the same formulas in the same
- * order. It needs <math.h> and <stdint.h>, and no heap. Tables: {table_bytes(result)} bytes in single precision.
+ * with poses from a camera, and learns the robot. It is softflagella.Tracker in C99, with the same formulas in
+ * the same order. It needs <math.h> and <stdint.h>, and no heap.
+ * Tables: {table_bytes(result)} bytes in single precision.
  *
  *     static tracker keeper;
  *     tracker_begin(&keeper, 0.01, 0.01, now);          noise of a pose, the time at which the motor starts

@@ -1,7 +1,7 @@
 """The trade-off that the dwell decides: error against time and number of flips, for one robot and path.
 
-A longer dwell loses less speed at the flips and flips less often, but swings further. One plan is made for each of
-some dwells.
+A longer dwell loses less speed at the flips and flips less often, but the heading swings further. One plan is made
+for each of several dwells.
 """
 
 from __future__ import annotations

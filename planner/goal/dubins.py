@@ -24,23 +24,23 @@ class DubinsPaths(NamedTuple):
 
     start: Floats
     turns: Integers
-    pieces: Floats
+    lengths: Floats
 
     @property
     def length(self) -> Floats:
-        return np.asarray(self.pieces.sum(-1))
+        return np.asarray(self.lengths.sum(-1))
 
     def take(self, rows: Integers) -> DubinsPaths:
-        return DubinsPaths(self.start[rows], self.turns[rows], self.pieces[rows])
+        return DubinsPaths(self.start[rows], self.turns[rows], self.lengths[rows])
 
     def poses(self, way: Floats, radius: float) -> Floats:
         """Compute poses (M, K, 3) after ways (M, K) along the tracks; beyond the end, that of the end."""
         pose = np.repeat(self.start[:, None], way.shape[1], 1)
         remaining = way
         for i in range(3):
-            piece = self.pieces[:, i, None]
-            part = np.clip(remaining, 0.0, piece)
-            remaining = remaining - piece
+            length = self.lengths[:, i, None]
+            part = np.clip(remaining, 0.0, length)
+            remaining = remaining - length
             pose = _moved(pose, self.turns[:, i, None] / radius, part)
         return pose
 
@@ -78,9 +78,9 @@ def words(start: Floats, goal: Floats, radius: float) -> Floats:
 
 def shortest_paths(start: Floats, goal: Floats, radius: float) -> DubinsPaths:
     """Find the shortest paths between M pairs of poses (M, 3)."""
-    pieces = words(start, goal, radius)
-    best = pieces.sum(-1).argmin(-1)
-    return DubinsPaths(start, TURNS[best], pieces[np.arange(len(best)), best])
+    lengths = words(start, goal, radius)
+    best = lengths.sum(-1).argmin(-1)
+    return DubinsPaths(start, TURNS[best], lengths[np.arange(len(best)), best])
 
 
 def _turn(angle: Floats) -> Floats:

@@ -1,8 +1,7 @@
-"""The last dwells of a schedule are changed so that the motion ends at a given pose.
+"""Adjust the last dwells of a schedule so that the motion ends at a given pose.
 
-Of all last dwells that end there, those are sought that take the least time and keep the pivot near its track.
-Three numbers must be met, so a few dwells are enough, and some may be left out. The cost is a sum of squares:
-time, distances from the track beyond those of the schedule, and the distance from the goal.
+The dwells minimise a sum of squares: time, distances of the pivot from its track beyond those of the schedule, and
+the distance from the goal. A pose has three coordinates, so a few dwells are enough, and some may be dropped.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Ways around obstacles: Dijkstra's algorithm on a lattice of poses that are joined by Dubins tracks.
+"""Routes around obstacles: Dijkstra's algorithm on a lattice of poses that are joined by Dubins tracks.
 
-The lattice has poses at equal distances, with equal steps of the course. Each is joined to those near it by the
-shortest track of bounded curvature, if the robot's body is free along it. Start and goal are joined to the poses
-near them in the same way. The search is complete for its resolution: a way that leaves some room is found on a
-lattice that is fine enough. Lengths in l.
+The lattice has poses at equal distances, with equal steps of the course. Each is joined to its neighbours by the
+shortest track of bounded curvature, if the robot's body is free along it. Start and goal are joined to nearby
+poses in the same way. The search is resolution-complete: a route with some clearance is found on a sufficiently
+fine lattice. Lengths in l.
 """
 
 from __future__ import annotations
@@ -171,8 +171,10 @@ class Lattice:
         radius = self.limits.radius
         reach = max(_LINK * radius, 2 * self.spacing)
         near = np.flatnonzero(np.hypot(*(self.poses[:, :2] - pose[:2]).T) <= reach)
-        here, there = np.repeat(pose[None], len(near), 0), self.poses[near]
-        tracks = shortest_paths(here, there, radius) if onward else shortest_paths(there, here, radius)
+        origin, neighbours = np.repeat(pose[None], len(near), 0), self.poses[near]
+        tracks = (
+            shortest_paths(origin, neighbours, radius) if onward else shortest_paths(neighbours, origin, radius)
+        )
         rows = np.flatnonzero(tracks.length <= _LONGEST_LINK * radius + self.spacing)
         rows = rows[self.limits.free(tracks.take(rows), margin, self.map)]
         return near[rows], tracks.length[rows]

@@ -1,4 +1,4 @@
-"""Where the robot must not go: circles, polygons and the tank's walls; and the clearance of its body.
+"""Obstacles (circles, polygons and the tank's walls), and the clearance of the robot's body from them.
 
 The body of the robot is a row of discs along its axis: head and straight tails. Its clearance is the smallest
 distance of any disc from any region, negative inside. Lengths in l.

@@ -1,9 +1,9 @@
 """The shortest track of bounded curvature through a few poses, around obstacles.
 
-Every stop is a choice of poses: one place with several courses, or just one pose. The courses are chosen for the
-shortest total length, first among some at equal steps, then more finely. Two poses are joined by Dubins' words.
-Where obstacles are in the way, a lattice (`planner.goal.lattice`) finds the way, and shorter joints are then
-sought between places on it. Lengths in l.
+Every stop offers one pose, or one place with several courses. The courses are chosen to minimise the total
+length, first among equally spaced ones, then among finer ones. Two poses are joined by Dubins' words. Where
+obstacles block the direct track, a lattice (`planner.goal.lattice`) finds a route, which is then shortened by
+direct joints between places on it. Lengths in l.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from planner.goal.obstacles import FreeSpace
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
-COURSES = 24  # tried at a stop without one
+COURSES = 24  # tried at a stop whose course is free
 LEVELS = ((0.6, 16), (0.3, 32))  # spacing of the lattice, in radii, and number of courses
-_FINER = 4  # times that the courses of stops are chosen again, among finer ones
-_ROUNDS = 3  # of looking for shorter joints
-_PLACES = 40  # on a way, between which shorter joints are sought
-_ENOUGH = 1.005  # a chain of words that is so near the shortest one without obstacles needs no lattice
+_FINER = 4  # refinements of the courses of stops
+_ROUNDS = 3  # of shortening
+_PLACES = 40  # on a leg, between which shorter joints are sought
+_ENOUGH = 1.005  # a chain at most this much longer than the shortest one without obstacles needs no lattice
 _THIN = 3  # of the courses at a stop, every third one is joined to the lattice
 _MOST_CHECKS = 300  # chains of words
 _AROUND = 6.0  # radii that the lattice reaches beyond stops and obstacles
@@ -68,9 +68,9 @@ def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lat
 
     Args:
         stops: poses (c, 3) to choose from at the start, at each place on the way, and at the goal.
-        limits: what the track must keep to.
-        margin: the room around the body.
-        lattices: those of this limits and these stops that were made before; new ones are added.
+        limits: least radius and free space.
+        margin: clearance of the body.
+        lattices: cache of the lattices of these limits and stops; new ones are added.
 
     Raises:
         NoWayError: a stop is not free, or no way was found on the finest lattice.
@@ -86,10 +86,10 @@ def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lat
     for spacing, courses in LEVELS:
         if (spacing, courses) not in lattices:
             lattices[spacing, courses] = _lattice(stops, limits, spacing * limits.radius, courses)
-        found = _around(stops, lattices[spacing, courses], margin)
-        both = [one for one in (direct, found) if one is not None]
-        if both:
-            return min(both, key=lambda one: one.length)
+        around = _around(stops, lattices[spacing, courses], margin)
+        candidates = [candidate for candidate in (direct, around) if candidate is not None]
+        if candidates:
+            return min(candidates, key=lambda candidate: candidate.length)
     raise NoWayError(
         f"there is no way to the goal that leaves {margin:.3g} l around the robot and turns with a radius of "
         f"{limits.radius:.3g} l, on a lattice with steps of {LEVELS[-1][0] * limits.radius:.2g} l and "
@@ -115,16 +115,16 @@ def _check(stop: Floats, number: int, count: int, limits: RouteLimits, margin: f
 
 
 def _direct(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | None:
-    """Join each two stops by one word; choose the courses of the stops again among finer ones."""
+    """Join successive stops by one word each, and refine the courses of the stops."""
     chosen, best = stops, None
     for finer in range(_FINER + 1):
-        found = _chosen(chosen, limits, margin)
-        if found is None:
+        shortest = _chosen(chosen, limits, margin)
+        if shortest is None:
             return best
-        if best is None or found.length < best.length:
-            best = found
+        if best is None or shortest.length < best.length:
+            best = shortest
         chosen = [_finer(stop, pose, finer) for stop, pose in zip(stops, _ends(best), strict=True)]
-        if all(len(stop) == len(own) for stop, own in zip(stops, chosen, strict=True)):
+        if all(len(stop) == len(poses) for stop, poses in zip(stops, chosen, strict=True)):
             break
     return best
 
@@ -139,18 +139,18 @@ def _finer(stop: Floats, pose: Floats, level: int) -> Floats:
     return poses
 
 
-def _ends(found: Route) -> list[Floats]:
+def _ends(track: Route) -> list[Floats]:
     """Return the poses at the starts of the tracks and at the end of the last one."""
-    last = found.tracks.take(np.array([-1]))
-    return [*found.tracks.start, last.poses(last.length[:, None], found.radius)[0, 0]]
+    last = track.tracks.take(np.array([-1]))
+    return [*track.tracks.start, last.poses(last.length[:, None], track.radius)[0, 0]]
 
 
 def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | None:
-    """Find the shortest chain of one word between each two stops, among all their poses.
+    """Find the shortest chain of one word between successive stops, among all their poses.
 
-    Words are checked when they are on the shortest chain. Those that are not free are taken out.
+    Words are checked only when they are on the shortest chain. Those that are not free are excluded.
     """
-    legs = [words(one[:, None], other[None], limits.radius) for one, other in pairwise(stops)]
+    legs = [words(starts[:, None], ends[None], limits.radius) for starts, ends in pairwise(stops)]
     lengths = [leg.sum(-1) for leg in legs]
     for _ in range(_MOST_CHECKS):
         costs, back = np.zeros(len(stops[0])), []
@@ -162,17 +162,17 @@ def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | 
         if not np.isfinite(costs[at]):
             return None
         chain = []
-        for leg, length, before, one in zip(reversed(legs), reversed(lengths), reversed(back), stops[-2::-1],
+        for leg, length, before, starts in zip(reversed(legs), reversed(lengths), reversed(back), stops[-2::-1],
                                             strict=True):  # fmt: skip
             came = int(before[at])
             word = int(length[came, at].argmin())
-            track = DubinsPaths(one[came : came + 1], TURNS[word : word + 1], leg[came, at, word][None])
+            track = DubinsPaths(starts[came : came + 1], TURNS[word : word + 1], leg[came, at, word][None])
             chain.append((track, length, (came, at, word)))
             at = came
-        found = _chain([track for track, _, _ in chain[::-1]], limits.radius)
-        free = np.ones(len(chain), dtype=bool) if limits.space.empty else limits.free(found.tracks, margin)[::-1]
+        joined = _chain([track for track, _, _ in chain[::-1]], limits.radius)
+        free = np.ones(len(chain), dtype=bool) if limits.space.empty else limits.free(joined.tracks, margin)[::-1]
         if free.all():
-            return found
+            return joined
         for (_, length, place), good in zip(chain, free.tolist(), strict=True):
             if not good:
                 length[place] = np.inf
@@ -199,32 +199,34 @@ def _around(stops: list[Floats], lattice: Lattice, margin: float) -> Route | Non
     limits = lattice.limits
     stops = [stop[::_THIN] if len(stop) == COURSES else stop for stop in stops]
     costs, chains = np.zeros(len(stops[0])), []
-    for one, other in pairwise(stops):
-        costs, found = lattice.ways(one, costs, other, margin)
+    for starts, ends in pairwise(stops):
+        costs, ways = lattice.ways(starts, costs, ends, margin)
         if not np.isfinite(costs).any():
             return None
-        chains.append(found)
+        chains.append(ways)
     at = int(costs.argmin())
     parts: list[DubinsPaths] = []
-    for own, stop in zip(reversed(chains), reversed(stops[:-1]), strict=True):
-        leg = own[at]
+    for ways, stop in zip(reversed(chains), reversed(stops[:-1]), strict=True):
+        leg = ways[at]
         parts.insert(0, _shorter(shortest_paths(leg[:-1], leg[1:], limits.radius), lattice, margin))
         at = int(np.abs(stop - leg[0]).sum(1).argmin())
     return _chain(parts, limits.radius)
 
 
 def _shorter(leg: DubinsPaths, lattice: Lattice, margin: float) -> DubinsPaths:
-    """Shorten a leg by joints between places on it, wherever one is free and shorter than the way along it."""
+    """Shorten a leg by joints between places on it, where one is free and shorter than that part of the leg."""
     limits = lattice.limits
-    for again in range(_ROUNDS):
-        places = _cut(leg, max(float(leg.length.sum()) / _PLACES, limits.radius / 4) / (1 + again), limits.radius)
+    for round_number in range(_ROUNDS):
+        places = _cut(
+            leg, max(float(leg.length.sum()) / _PLACES, limits.radius / 4) / (1 + round_number), limits.radius
+        )
         starts = places.start
         last = places.take(np.array([-1]))
         poses = np.concatenate([starts, last.poses(last.length[:, None], limits.radius)[:, 0]])
-        along = np.concatenate([[0.0], np.cumsum(places.length)])
+        way = np.concatenate([[0.0], np.cumsum(places.length)])
         i, j = np.triu_indices(len(poses), 2)
         tracks = shortest_paths(poses[i], poses[j], limits.radius)
-        rows = np.flatnonzero(tracks.length < along[j] - along[i] - 1e-6)
+        rows = np.flatnonzero(tracks.length < way[j] - way[i] - 1e-6)
         rows = rows[limits.free(tracks.take(rows), margin, lattice.map)]
         best, choice = np.full(len(poses), np.inf), np.full(len(poses), -1)
         best[0] = 0.0
@@ -250,10 +252,10 @@ def _cut(leg: DubinsPaths, spacing: float, radius: float) -> DubinsPaths:
         if length == 0:
             continue
         edges = np.linspace(0, length, math.ceil(length / spacing) + 1)
-        ends = np.cumsum(leg.pieces[row])
+        ends = np.cumsum(leg.lengths[row])
         before = np.concatenate([[0.0], ends[:-1]])
-        pieces = np.maximum(np.minimum(ends, edges[1:, None]) - np.maximum(before, edges[:-1, None]), 0.0)
-        own = leg.take(np.full(len(edges) - 1, row))
+        lengths = np.maximum(np.minimum(ends, edges[1:, None]) - np.maximum(before, edges[:-1, None]), 0.0)
+        turns = leg.take(np.full(len(edges) - 1, row)).turns
         poses = leg.take(np.array([row])).poses(edges[None, :-1], radius)[0]
-        parts.append(DubinsPaths(poses, own.turns, pieces))
+        parts.append(DubinsPaths(poses, turns, lengths))
     return DubinsPaths(*(np.concatenate([part[i] for part in parts]) for i in range(3)))

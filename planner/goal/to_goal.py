@@ -2,12 +2,12 @@
 
 The pivot moves like a car that only drives forward and has a least turn radius. Its shortest track between two
 poses is one of Dubins' words, or a chain of them around obstacles (`planner.goal.route`). The schedule follows
-that track like any other path. Its last dwells are then changed so that the robot ends at the goal with the
-heading that was asked for (`planner.goal.final_dwells`).
+that track like any other path. Its last dwells are then adjusted so that the robot ends at the goal with the
+wanted heading (`planner.goal.final_dwells`).
 
-The margin around obstacles is the error that the plan states, which is known only when the plan is made. So the
-track is sought again with a larger margin until the two agree. If there is none, shorter dwells are tried, which
-need less room.
+The margin around obstacles is the stated error of the plan, which is known only when the plan is made. So the
+track is planned again with a larger margin until the two agree. If there is no such track, shorter dwells are
+tried, which need less clearance.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from warnings import warn
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,6 +40,7 @@ from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
+from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.robot import Robot
@@ -82,11 +83,8 @@ class GoalPlan:
         turn = (self.end[2] - self.goal[2] + math.pi) % (2 * math.pi) - math.pi
         return math.dist(self.end[:2], self.goal[:2]), abs(turn)
 
-    @property
-    def room(self) -> FreeSpace:
-        """Return `free_space`, of which this is the old name, for one release."""
-        warn("GoalPlan.room is now GoalPlan.free_space", DeprecationWarning, stacklevel=2)
-        return self.free_space
+    if not TYPE_CHECKING:
+        __getattr__ = old_attributes({"room": "free_space"})
 
 
 def to_goal(

@@ -45,8 +45,8 @@ def nearest(polyline: Floats, points: Floats) -> tuple[Floats, Integers, Floats]
     for i in unsure.tolist():
         reach = math.hypot(float(distance[i]), half) * (1 + 1e-9)
         near = tree.query_ball_point(points[i], reach)
-        both = np.unique(np.concatenate([owner[near], previous[near]]))
-        closest = _closest(start, direction, points[i : i + 1], both[None])
+        close = np.unique(np.concatenate([owner[near], previous[near]]))
+        closest = _closest(start, direction, points[i : i + 1], close[None])
         distance[i], segment[i], place[i] = (float(part[0]) for part in closest)
     return distance, segment, place
 

@@ -51,8 +51,8 @@ def fillet(path: Path2D, radius: float) -> Path2D:
             continue
         into = edges[i - 1] / lengths[i - 1]
         start = points[i] - reach[i] * into
-        left = math.copysign(1.0, angle[i]) * np.array([-into[1], into[0]])
-        centre = start + radius * left
+        inward = math.copysign(1.0, angle[i]) * np.array([-into[1], into[0]])
+        centre = start + radius * inward
         steps = np.linspace(0, angle[i], max(8, math.ceil(abs(angle[i]) / math.radians(2))))
         spoke = start - centre
         c, s = np.cos(steps), np.sin(steps)

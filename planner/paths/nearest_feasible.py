@@ -1,17 +1,17 @@
-"""The path that the robot can follow and that stays nearest to the path as drawn.
+"""The feasible path nearest to the path as drawn.
 
 A corner cannot be followed. Rounding it cuts it. It is better to swing out before the corner and to cut a little
-inside. So the pivot's poses (x_i, y_i, φ_i) are found that minimise
+inside. So the pivot's poses (x_i, y_i, φ_i) minimise
 
     Σ across_i² + (0.6 along_i)²,   p_i = q_i + a e(φ_i),
 
-with r_i points at equal distances on the path as drawn, and p_i − r_i in parts along that path and across it. Two
-things hold the poses to what the robot can do: a step has no sideways part, except for the drift; and it turns by
-at most κ times its length. Both enter as least squares with large weights; the second only where it is broken. The
+with r_i points at equal distances on the path as drawn, and p_i − r_i in components along that path and across it.
+Two constraints make the poses feasible: a step has no sideways component, except for the drift; and it turns by at
+most κ times its length. Both enter as least squares with large weights; the second only where it is violated. The
 tractrix of the result is checked afterwards.
 
-For the smallest largest distance (minimax), the distances get weights, and those of far points grow from round to
-round in proportion to their distance. Source: Lawson (1961), thesis, UCLA.
+For the minimax distance, the distances are weighted, and the weights of far points grow from iteration to
+iteration in proportion to their distance. Source: Lawson (1961), thesis, UCLA.
 
 A swing around a corner takes time. The pivot moves at about one speed, so time is the length of its track. With a
 time weight w, in l², the cost is the mean squared distance plus w times the track's length over that of the drawn
@@ -41,7 +41,7 @@ _ITERATIONS = 20  # in each stage
 _EVEN = 0.01  # weight of equal steps
 _ALONG = 0.6  # of distances along the path beside those across: a robot that is late is still on it
 _SHORTEST_STEP = 0.25  # of the steps, as a share of the spacing
-_PIECES = 4  # points of the path for each pose
+_POINTS_A_POSE = 4  # points of the path for each pose
 _ROUNDS = 12  # of growing weights
 _LEAST = 0.01  # share of the mean weight that every point keeps
 
@@ -80,11 +80,11 @@ def nearest_path(
         poses = _minimax(poses, task)
     if turn is not None:
         poses = _whole_lap(poses, turn)
-    at = np.arange(_PIECES * (len(poses) - 1) + 1) / _PIECES
+    at = np.arange(_POINTS_A_POSE * (len(poses) - 1) + 1) / _POINTS_A_POSE
     x, y, heading = (np.interp(at, np.arange(len(poses)), column) for column in poses.T)
     # Between two poses the pivot moves on an arc, which lies off its chord.
-    turned = np.append(np.repeat(np.diff(poses[:, 2]), _PIECES), 0.0)
-    chord = np.append(np.repeat(np.hypot(*np.diff(poses[:, :2], axis=0).T), _PIECES), 0.0)
+    turned = np.append(np.repeat(np.diff(poses[:, 2]), _POINTS_A_POSE), 0.0)
+    chord = np.append(np.repeat(np.hypot(*np.diff(poses[:, :2], axis=0).T), _POINTS_A_POSE), 0.0)
     off = -turned * chord * (at % 1) * (1 - at % 1) / 2
     points = np.stack([x - off * np.sin(heading), y + off * np.cos(heading)], 1)
     points += pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
@@ -215,31 +215,31 @@ def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Fl
     slip = (drift.sideways - cx * s + cy * c) / way
     steps, pair = np.zeros((len(move), 5)), np.zeros((len(move), 5, 6))
 
-    def put(row: int, along: Floats, across: Floats, turning: Floats) -> None:
+    def put(row: int, forward_part: Floats, sideways_part: Floats, turning: Floats) -> None:
         """Store a residual's derivatives by forward part, sideways part and turn of the step."""
-        dx, dy = along * c - across * s, along * s + across * c
-        swing = (along * aside - across * forward) / 2
+        dx, dy = forward_part * c - sideways_part * s, forward_part * s + sideways_part * c
+        swing = (forward_part * aside - sideways_part * forward) / 2
         pair[:, row, 0], pair[:, row, 1], pair[:, row, 2] = -dx, -dy, swing - turning
         pair[:, row, 3], pair[:, row, 4], pair[:, row, 5] = dx, dy, swing + turning
 
-    one, none = np.ones(len(move)), np.zeros(len(move))
+    ones, zeros = np.ones(len(move)), np.zeros(len(move))
     broken: Floats
     steps[:, 0] = weight * (aside - slip * forward)
-    put(0, np.asarray(-weight * slip, dtype=np.float64), weight * one, none)
+    put(0, np.asarray(-weight * slip, dtype=np.float64), weight * ones, zeros)
     sense = np.sign(turn)
     over = sense * turn * radius - forward
     broken = np.asarray(weight * (over > 0), dtype=np.float64)
     steps[:, 1] = broken * over
-    put(1, -broken, none, np.asarray(broken * sense * radius, dtype=np.float64))
+    put(1, -broken, zeros, np.asarray(broken * sense * radius, dtype=np.float64))
     short = _SHORTEST_STEP * spacing - forward
     broken = np.asarray(10.0 * (short > 0), dtype=np.float64)
     steps[:, 2] = broken * short
-    put(2, -broken * one, none, none)
+    put(2, -broken * ones, zeros, zeros)
     steps[:, 3] = _EVEN * (forward - spacing)
-    put(3, _EVEN * one, none, none)
+    put(3, _EVEN * ones, zeros, zeros)
     length = np.maximum(forward, _SHORTEST_STEP * spacing)
     steps[:, 4] = np.sqrt(time_weight / spacing * length)
-    put(4, np.asarray(steps[:, 4] / (2 * length) * (length == forward), dtype=np.float64), none, none)
+    put(4, np.asarray(steps[:, 4] / (2 * length) * (length == forward), dtype=np.float64), zeros, zeros)
     return (pose_residual, steps), single, pair
 
 

@@ -1,10 +1,9 @@
-"""The declared path: what the robot can follow of the path as drawn.
+"""The declared path: the drawn path made feasible for the robot.
 
-A path that the pivot can follow with some room is declared as it is. Otherwise the nearest path that it can
-follow is declared (`planner.paths.nearest_feasible`), by root mean square or by the largest distance; or corners
-are rounded by arcs (`planner.paths.fillets`); or the path is refused. The distance between the declared and the
-drawn path is reported from both sides: a missed corner is a point of the drawn path that is far from the
-declared one.
+A path that the pivot can follow with some margin is declared as it is. Otherwise the nearest feasible path is
+declared (`planner.paths.nearest_feasible`), by root mean square or by the largest distance; or corners are rounded
+by arcs (`planner.paths.fillets`); or the path is rejected. The distance between the declared and the drawn path is
+reported in both directions: a missed corner is a point of the drawn path that is far from the declared one.
 """
 
 from __future__ import annotations

@@ -18,9 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Unpack
-from warnings import warn
+from typing import TYPE_CHECKING, Unpack
 
 from numpy.typing import ArrayLike
 
@@ -41,6 +39,7 @@ from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
+from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
@@ -179,13 +178,7 @@ class Plan:
         return Schedule(swims.group_values(), self.first_direction, self.dwells * time, start, swims.time_scale)
 
     if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            if name not in _MOVED:
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            warn(f"Plan.{name} is now Plan.{_MOVED[name]}", DeprecationWarning, stacklevel=2)
-            value = attrgetter(_MOVED[name].removesuffix("()"))(self)
-            return value() if _MOVED[name].endswith("()") else value
+        __getattr__ = old_attributes(_MOVED)
 
 
 def plan(
@@ -237,10 +230,7 @@ def plan(
 
 
 def make_plan(
-    drawn: Path2D,
-    tracked: TrackedVehicle,
-    request: PlanRequest,
-    progress: Callable[[float], object] | None = None,
+    drawn: Path2D, tracked: TrackedVehicle, request: PlanRequest, progress: Callable[[float], object] | None = None
 ) -> Plan:
     """Plan for a path, a vehicle and a request; see `plan`."""
     vehicle = tracked.vehicle

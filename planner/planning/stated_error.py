@@ -1,13 +1,13 @@
-"""The error of a plan: what is predicted, what is uncertain on top, and a guarantee that does not grow.
+"""The error of a plan: predicted, stated with its uncertainty, and guaranteed for paths of any length.
 
-*Stated error*: of vehicles drawn at random from what is uncertain, 95 % stay within this distance of the declared
-path when they carry out this very schedule. Uncertain are the modes of the vehicle (held-out errors of the look-up
-table, covariance of a calibration, current) and the phase of the disc at each flip, which adds a new random part
-with every dwell. Deviations are of first order in all of them.
+*Stated error*: 95 % of vehicles drawn at random within the uncertainty stay within this distance of the declared
+path when they carry out the schedule open-loop. Uncertain are the modes of the vehicle (held-out errors of the
+look-up table, covariance of a calibration, current) and the phase of the disc at each flip, which adds independent
+noise with every dwell. Deviations are of first order in all of them.
 
-*With feedback*: the same, if every k flips the pose is measured and the rest is planned again.
+*With feedback*: the same, if every k flips the pose is measured and the remaining path is planned again.
 
-*Guaranteed error*: a bound for a vehicle without errors, however long the path is. With the swing β of the
+*Guaranteed error*: a bound for a vehicle without errors on a path of any length. With the swing β of the
 heading (Ω T without lags) and the look-ahead Δ ≥ R′/(1 − κ̄ R′), R′ = R cos θ, and κ̄ the largest curvature of
 the reference,
 
@@ -34,11 +34,11 @@ LEVEL = 0.95
 _DRAWS = 400
 _BLOCKS = 300  # places along the schedule where deviations are drawn
 _TIGHTEST = 0.97
-_PAIRS_AHEAD = 4.0
+_PAIRS_AHEAD = 4.0  # pairs of dwells
 
 
 def look_ahead(vehicle: Vehicle, curvature: float, straight: Zigzag | None = None) -> float:
-    """Δ = R′/(1 − κ̄ R′), and not below the way that the robot makes in some pairs of dwells."""
+    """Compute Δ = R′/(1 − κ̄ R′), at least the way that the robot makes in some pairs of dwells."""
     least = vehicle.pivot_radius / (1 - min(curvature * vehicle.pivot_radius, _TIGHTEST))
     return least if straight is None else max(least, _PAIRS_AHEAD * straight.net_speed * sum(straight.dwells))
 
@@ -73,10 +73,10 @@ def rms_in_time(distance: Floats, dwells: Floats) -> float:
 def predicted_error(declared: Floats, track: Floats, *, closed: bool) -> Predicted:
     """Compute the distances of a track (K, 2) from the declared path (m, 2)."""
     distance, segment, share = nearest(declared, track)
-    along = np.diff(declared, axis=0)[segment]
-    tangent = along / np.maximum(np.hypot(*along.T), 1e-300)[:, None]
+    edge = np.diff(declared, axis=0)[segment]
+    tangent = edge / np.maximum(np.hypot(*edge.T), 1e-300)[:, None]
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], 1)
-    foot = declared[segment] + share[:, None] * along
+    foot = declared[segment] + share[:, None] * edge
     signed = ((track - foot) * normal).sum(1)
     return Predicted(distance, signed, normal, closed)
 
@@ -84,14 +84,14 @@ def predicted_error(declared: Floats, track: Floats, *, closed: bool) -> Predict
 def stated_error(
     vehicle: Vehicle, switches: Switches, track: Floats, predicted: Predicted, *, every: int = 0, seed: int = 0
 ) -> float:
-    """Compute the quantile LEVEL of the largest distance from the declared path [l], over what is uncertain.
+    """Compute the quantile LEVEL of the largest distance from the declared path [l], over random vehicles.
 
     Args:
         vehicle: with its modes and its spread.
         switches: the schedule.
         track: predicted track (M s + 1, 2), s samples a dwell.
         predicted: its distances from the path.
-        every: number of flips after which the pose is known again; 0: never.
+        every: number of flips between measured poses; 0: none is measured.
         seed: of the random draws.
     """
     count = len(switches.dwells)
@@ -127,20 +127,20 @@ def stated_error(
 
 
 def _deviations(vehicle: Vehicle, switches: Switches, edges: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """At the flips `edges` (E,): position (E, 2), deviation (E, P, 2) and turn (E, P) by mode, and
+    """Propagate the modes to the flips `edges` (E,): position (E, 2), deviation (E, P, 2) and turn (E, P).
 
-    noise (E − 1, 3) of the blocks between: x and y in the lab, and heading.
+    The last array is the noise (E − 1, 3) of the blocks between: x and y in the lab, and heading.
     """
     poses = poses_at_flips(vehicle, switches)
     dwells, first = switches.dwells, switches.first_direction
-    own = pose_changes(vehicle, first, dwells, dwells[:, None])[:, 0]
+    moves_predicted = pose_changes(vehicle, first, dwells, dwells[:, None])[:, 0]
     count, modes = len(dwells), vehicle.modes
     side = (np.arange(count) + (first < 0)) % 2
-    lag = planar.compose(own, planar.inverse(planar.arc(vehicle.twist[side], dwells)))
+    lag = planar.compose(moves_predicted, planar.inverse(planar.arc(vehicle.twist[side], dwells)))
     deviation, turned = np.zeros((len(edges), len(modes), 2)), np.zeros((len(edges), len(modes)))
     for p, mode in enumerate(modes):
         arc = planar.arc((vehicle.twist + mode.twist)[side], dwells)
-        change = planar.compose(lag + mode.lag[side], arc) - own
+        change = planar.compose(lag + mode.lag[side], arc) - moves_predicted
         heading = np.concatenate([[0.0], np.cumsum(change[:, 2])])
         moves = planar.turn(change[:, :2], poses[:-1, 2]) + mode.current * dwells[:, None]
         moves += heading[:-1, None] * _left(np.diff(poses[:, :2], axis=0))

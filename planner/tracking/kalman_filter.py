@@ -1,4 +1,4 @@
-"""What a tracker knows of the robot: ten numbers and their covariance, from poses (a Kalman filter).
+"""Kalman filter of the tracker: ten numbers of the robot and their covariance, estimated from poses.
 
     x, y, heading    of the head's centre at the last flip
     yaw rates        relative errors of the plan's, left and right
@@ -6,9 +6,9 @@
     lag angle        error of the angle that a flip adds to the heading
     current x, y     beside the plan's
 
-A dwell moves the pose by lag and arc of the robot as it is learned so far. The learned numbers walk at random, a
-little in each dwell, so that changes are followed. All derivatives are exact, and nothing but arithmetic, sin, cos
-and sqrt is used: `planner/c/estimate.h` does the same in C. Lengths in l, times in μ0 l⁴/EI.
+A dwell moves the pose by lag and arc of the robot as estimated so far. The estimates follow a random walk, a small
+step in each dwell, so that changes are tracked. All derivatives are exact, and only arithmetic, sin, cos and sqrt
+are used: `planner/c/estimate.h` does the same in C. Lengths in l, times in μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ NAMES = ("x", "y", "heading", "yaw rate, left", "yaw rate, right", "surge", "swa
          "current x", "current y")  # fmt: skip
 STATES = len(NAMES)
 DOUBT = (0.03, 0.03, 0.03, 0.03)  # standard deviations beside the plan's own: yaw rates, surge, sway
-CHANGES = (1.5e-3, 1.5e-3, 5e-4, 5e-4)  # what a dwell adds to them
-WALK = 3e-4  # l and rad that a dwell adds to what is unknown of the pose
-MOST = (0.5, 0.5, 0.5, 0.5, 0.3)  # largest yaw rates, surge, sway, lag angle that are learned
+CHANGES = (1.5e-3, 1.5e-3, 5e-4, 5e-4)  # their process noise, standard deviation per dwell
+WALK = 3e-4  # process noise of the pose per dwell [l, rad]
+MOST = (0.5, 0.5, 0.5, 0.5, 0.3)  # bounds of the estimated yaw rates, surge, sway, lag angle
 MOST_CURRENT = 0.5  # of the net speed
 
 
@@ -49,7 +49,7 @@ class Estimate:
 
     Args:
         plan: gives the robot and where it starts.
-        law: guidance of the same plan; its vehicle follows what is learned.
+        law: guidance of the same plan; its vehicle is updated with the estimates.
         noise: standard deviations of a pose: of x and y [l], of the heading [rad].
     """
 
@@ -85,12 +85,12 @@ class Estimate:
             self.state[i] += change.move[i]
 
     def seen_from(self, when: float, now: Dwell, past: Sequence[Dwell]) -> tuple[POSE, ROWS] | None:
-        """Predict the pose at `when`, and its derivatives (3, 10) by the state; None if it is too long ago.
+        """Predict the pose at `when`, and its derivatives (3, 10) in the state; None if it is too long ago.
 
         Args:
             when: the time.
-            now: the dwell that goes on; its length does not count.
-            past: dwells before, the latest last.
+            now: the present dwell; its length does not count.
+            past: the dwells before it, the latest last.
         """
         x, y, heading = self.pose
         D, dwell, back = _identity(), now, len(past)
@@ -106,16 +106,16 @@ class Estimate:
         change = self._change(heading, dwell, when - dwell.start)
         return (x + change.move[0], y + change.move[1], heading + change.move[2]), _after(D, change)
 
-    def update(self, left: POSE, H: ROWS, largest: float) -> float:
-        """Learn from what a pose differs from the expected one, unless its size is above `largest`.
+    def update(self, residual: POSE, H: ROWS, largest: float) -> float:
+        """Update the state with a measured pose, unless its squared residual exceeds `largest`.
 
         Args:
-            left: measured pose less the expected one.
+            residual: measured pose less the expected one.
             H: derivatives (3, 10) of the expected pose.
-            largest: squared size from which the pose is left out.
+            largest: squared size above which the pose is rejected.
 
         Returns:
-            The squared size of `left`, in its standard deviations: χ² with three degrees of freedom.
+            The squared size of the residual in its standard deviations: χ² with three degrees of freedom.
         """
         P, size = [row[:] for row in self.covariance], 0.0
         moved = [0.0] * STATES
@@ -123,10 +123,10 @@ class Estimate:
             h = H[m]
             gain = [_dot(row, h) for row in P]
             spread = _dot(h, gain) + self._noise[m]
-            rest = left[m] - _dot(h, moved)
-            size += rest * rest / spread
+            innovation = residual[m] - _dot(h, moved)
+            size += innovation * innovation / spread
             for i in range(STATES):
-                moved[i] += gain[i] * rest / spread
+                moved[i] += gain[i] * innovation / spread
                 for j in range(STATES):
                     P[i][j] -= gain[i] * gain[j] / spread
         if size <= largest:
@@ -138,19 +138,19 @@ class Estimate:
         return size
 
     def _learned(self, side: int) -> list[float]:
-        """Twist of a direction as it is learned."""
+        """Return the learned twist of a direction."""
         forward, left, rate = self._twist[side]
         return [forward * (1 + self.state[5]), left * (1 + self.state[6]), rate * (1 + self.state[3 + side])]
 
     def _sideways(self) -> float:
-        """Mean speed to the left, beside the plan's, that comes from unequal turns."""
+        """Compute the mean leftward speed, beside the plan's, that comes from unequal turns."""
         (_, left, fast), (_, right, slow) = self._twist
         a, b = fast * (1 + self.state[3]), -slow * (1 + self.state[4])
-        own = (b * left + a * right) * (1 + self.state[6]) / (a + b)
-        return own - (-slow * left + fast * right) / (fast - slow)
+        learned = (b * left + a * right) * (1 + self.state[6]) / (a + b)
+        return learned - (-slow * left + fast * right) / (fast - slow)
 
     def _change(self, heading: float, dwell: Dwell, time: float) -> _Change:
-        """What a time in a dwell that began with `heading` adds to the pose."""
+        """Compute what a time in a dwell that began with `heading` adds to the pose."""
         state, sense = self.state, dwell.sense
         side = 0 if sense > 0 else 1
         z, x, turned = self._law.lag_after(side, dwell.before, time)
@@ -179,7 +179,7 @@ class Estimate:
 
 
 class _Change(NamedTuple):
-    """What is added to a pose; its derivatives by the heading before (x, y), and by the state (3, 10)."""
+    """What is added to a pose; its derivatives in the heading before (x, y), and in the state (3, 10)."""
 
     move: POSE
     lever: tuple[float, float]
@@ -187,26 +187,26 @@ class _Change(NamedTuple):
 
 
 def prior(plan: Plan) -> ROWS:
-    """Covariance (10, 10) before the first pose: how well the robot was put, and what the plan says."""
+    """Compute the covariance (10, 10) before the first pose, from what is uncertain of the start and the plan."""
     vehicle = plan.tracked.vehicle
     P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in DOUBT), 1e-6, 1e-12, 1e-12])
     speed = np.hypot(vehicle.twist[0, 0], vehicle.twist[0, 1])
     for mode in vehicle.modes:
-        one = np.zeros(STATES)
-        one[3:5] = mode.twist[:, 2] / vehicle.twist[:, 2]
-        one[5:7] = (
+        direction = np.zeros(STATES)
+        direction[3:5] = mode.twist[:, 2] / vehicle.twist[:, 2]
+        direction[5:7] = (
             mode.twist[0, :2] * vehicle.twist[0, :2] / np.maximum(vehicle.twist[0, :2] ** 2, 1e-6 * speed**2)
         )
-        one[7] = mode.lag[0, 2]
-        one[8:] = mode.current
-        P += np.outer(one, one)
+        direction[7] = mode.lag[0, 2]
+        direction[8:] = mode.current
+        P += np.outer(direction, direction)
     P[8, 8] += (0.05 * speed) ** 2 / 4
     P[9, 9] += (0.05 * speed) ** 2 / 4
     return [[float(value) for value in row] for row in P]
 
 
 def most(plan: Plan) -> tuple[float, ...]:
-    """Largest values (7,) of the learned numbers."""
+    """Return the largest absolute values (7,) of the learned numbers."""
     return *MOST, MOST_CURRENT * plan.straight.net_speed, MOST_CURRENT * plan.straight.net_speed
 
 

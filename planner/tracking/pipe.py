@@ -10,9 +10,9 @@ and is answered by one line:
 
     DIRECTION FLIP_AT ERROR ALARM
 
-with the direction of the motor (1, −1, or 0 at the end), the time of the next flip, the error that is now possible
-[l] and 1 if the robot behaves like no robot of the model. A line that cannot be read is answered as if it had no
-pose. After a flip a line must be sent, so that the next flip is announced.
+with the direction of the motor (1, −1, or 0 at the end), the time of the next flip, the present error bound [l],
+and 1 if the robot is incompatible with the model. A line that cannot be parsed counts as one without a pose. After
+a flip a line must be sent, so that the next flip is announced.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from planner.tracking.tracker import Tracker
 
 
 def answers(tracker: Tracker, lines: Iterable[str], time_scale: float) -> Iterator[str]:
-    """One answer for every line, until the path ends.
+    """Answer every line, until the path ends.
 
     Args:
         tracker: at rest at the plan's start.

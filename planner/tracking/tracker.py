@@ -4,18 +4,18 @@
     command = tracker.update(now)                              # no pose
     command = tracker.update(now, (x, y, heading), seen_at)    # a pose, and when it was true
 
-Every call says the direction of the motor and when to flip next. At most one flip can have happened since the
-last call: the one that was announced. The tracker learns ten numbers of the robot
-(`planner.tracking.kalman_filter`). A pose may be late: it is compared with the place where the robot was then,
-counted back from now. Implausible poses, values that are not finite, and timestamps that run
-backwards are ignored. Long gaps between poses only increase the error.
+Every call returns the direction of the motor and the time of the next flip. At most one flip can have happened
+since the last call: the one that was announced. The tracker estimates ten numbers of the robot
+(`planner.tracking.kalman_filter`). A pose may be late: it is compared with the predicted pose at its own time.
+Implausible poses, values that are not finite, and timestamps that run backwards are ignored. Long gaps between
+poses only increase the error.
 
-The alarm says that the robot behaves like no robot of this model. It compares WINDOW accepted poses with what was
-expected: for a robot of the model their sum of squares is below a limit with probability 1 − FALSE_ALARM. It also
-comes when LOST poses in a row were left out.
+The alarm means that the robot is incompatible with the model. It compares WINDOW accepted poses with the predicted
+ones: for a robot of the model the sum of their squared residuals is below a limit with probability 1 −
+FALSE_ALARM. It is also raised when LOST poses in a row were rejected.
 
 The next flip is the root of the same equation as in planning (`planner.planning.schedule`), from the estimated
-pose and with the learned robot. It is never before the shortest dwell, whatever is fed.
+pose and with the estimated robot. It is never before the shortest dwell, whatever the input.
 
 Poses are those of the head's centre in l and rad; times in μ0 l⁴/EI. `planner.tracking.pipe` has seconds.
 """
@@ -24,24 +24,24 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import NamedTuple
-from warnings import warn
+from typing import TYPE_CHECKING, NamedTuple
 
 from scipy.stats import chi2
 
 from planner.planning.line_of_sight import LineOfSight
 from planner.planning.plan import Plan
 from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate
+from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
 
-FALSE_ALARM = 1e-3  # chance of an alarm per WINDOW poses, for a robot of this model
+FALSE_ALARM = 1e-3  # probability of an alarm per WINDOW poses, for a robot of the model
 WINDOW = 40
 ALARM_AT = float(chi2.ppf(1 - FALSE_ALARM, 3 * WINDOW))
 GATE = float(chi2.ppf(0.9999, 3))
 KEPT = 12  # dwells that are remembered for late poses
 SLACK = 1e-6  # time units; a time this close before the announced flip is the flip's own, rounded
 LONGEST_GAP = 1e5  # time units; a clock that jumps further is not believed
-LOST = 10  # poses left out one after another, from which the pose is taken to be unknown
+LOST = 10  # consecutive rejected poses after which the pose counts as unknown
 DISPLACED = 0.3  # standard deviation of the pose then [l, rad]
 QUANTILE = 1.96
 
@@ -52,8 +52,8 @@ class Command(NamedTuple):
     direction: int  # +1 or −1; 0 at the end
     flip_at: float  # time of the next flip, or of the end
     finished: bool
-    alarm: bool  # the robot behaves like no robot of this model: calibrate again
-    error: float  # 95 % of the distance from the path that is now possible, zigzag included [l]
+    alarm: bool  # the robot is incompatible with the model: calibrate again
+    error: float  # 95 % bound on the present distance from the path, zigzag included [l]
 
 
 class Tracker:
@@ -120,16 +120,8 @@ class Tracker:
             0 if self._finished else self._dwell.sense, self._flip_at, self._finished, self.alarm, error
         )
 
-    def feed(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command:
-        """Call `update`, of which this is the old name, for one release."""
-        warn("Tracker.feed is now Tracker.update", DeprecationWarning, stacklevel=2)
-        return self.update(now, pose, seen_at)
-
-    @property
-    def advice(self) -> Command:
-        """Return `command`, of which this is the old name, for one release."""
-        warn("Tracker.advice is now Tracker.command", DeprecationWarning, stacklevel=2)
-        return self.command
+    if not TYPE_CHECKING:
+        __getattr__ = old_attributes({"feed": "update", "advice": "command"})
 
     @property
     def learned(self) -> dict[str, float]:
@@ -163,13 +155,13 @@ class Tracker:
         self._flip_at = max(start + length, self._now, start + (0.0 if self._ends else self.shortest))
 
     def _see(self, pose: POSE, when: float) -> bool:
-        """Learn from a pose; return false if it was left out."""
-        found = self._estimate.seen_from(when, self._dwell, self._past)
-        if found is None:
+        """Update the estimate with a pose; return false if the pose was rejected."""
+        prediction = self._estimate.seen_from(when, self._dwell, self._past)
+        if prediction is None:
             return False
-        expected, H = found
-        left = (pose[0] - expected[0], pose[1] - expected[1], _wrapped(pose[2] - expected[2]))
-        size = self._estimate.update(left, H, GATE)
+        expected, H = prediction
+        residual = (pose[0] - expected[0], pose[1] - expected[1], _wrapped(pose[2] - expected[2]))
+        size = self._estimate.update(residual, H, GATE)
         if size <= GATE:
             self._rejected = 0
             self._judge(size)
@@ -183,7 +175,7 @@ class Tracker:
         return False
 
     def _judge(self, size: float) -> None:
-        """Compare the sum over WINDOW poses with what a robot of this model gives."""
+        """Compare the sum over WINDOW poses with its limit for a robot of the model."""
         self._score += size
         self._scored += 1
         if self._scored == WINDOW:

@@ -16,7 +16,7 @@ __all__ = ["Effect", "catalogue", "check_effects", "check_size", "effect_named"]
 
 @cache
 def catalogue() -> dict[str, Effect]:
-    """Every effect that the base model lacks, by name, in alphabetical order.
+    """Return every effect that the base model lacks, by name, in alphabetical order.
 
     Example:
         >>> from softflagella import effects
@@ -33,7 +33,7 @@ def catalogue() -> dict[str, Effect]:
 
 
 def effect_named(name: str) -> Effect:
-    """The effect of that name.
+    """Return the effect of that name.
 
     Raises:
         InputError: there is no such effect.

@@ -53,7 +53,7 @@ EFFECT = TailContact(
 
 
 def least_gap(size: ArrayLike) -> Floats:
-    """The gap between tails from which on the model holds, for sizes of this effect: 1 without it, else 0.98.
+    """Return the gap between tails down to which the model holds, by size of this effect: 1 without it, else 0.98.
 
     A row of the base model is valid while tails do not touch. With contact it is valid while the gap is kept.
     """

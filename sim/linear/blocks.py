@@ -9,13 +9,13 @@ from sim.linear.vectors import Matrix, Vector
 
 @compiled
 def vector(a: Floats, k: int, m: int) -> Vector:
-    """a[k, m] as components."""
+    """Return a[k, m] as components."""
     return (a[k, m, 0], a[k, m, 1], a[k, m, 2])
 
 
 @compiled
 def put(a: Floats, k: int, m: int, v: Vector) -> None:
-    """a[k, m] = v."""
+    """Set a[k, m] = v."""
     a[k, m, 0] = v[0]
     a[k, m, 1] = v[1]
     a[k, m, 2] = v[2]
@@ -23,7 +23,7 @@ def put(a: Floats, k: int, m: int, v: Vector) -> None:
 
 @compiled
 def add(a: Floats, k: int, m: int, v: Vector) -> None:
-    """a[k, m] += v."""
+    """Add in place: a[k, m] += v."""
     a[k, m, 0] += v[0]
     a[k, m, 1] += v[1]
     a[k, m, 2] += v[2]
@@ -31,19 +31,19 @@ def add(a: Floats, k: int, m: int, v: Vector) -> None:
 
 @compiled
 def vector_at(a: Floats, i: int) -> Vector:
-    """a[i] as components."""
+    """Return a[i] as components."""
     return (a[i, 0], a[i, 1], a[i, 2])
 
 
 @compiled
 def put_at(a: Floats, i: int, v: Vector) -> None:
-    """a[i] = v."""
+    """Set a[i] = v."""
     a[i, 0], a[i, 1], a[i, 2] = v
 
 
 @compiled
 def add_at(a: Floats, i: int, v: Vector) -> None:
-    """a[i] += v."""
+    """Add in place: a[i] += v."""
     a[i, 0] += v[0]
     a[i, 1] += v[1]
     a[i, 2] += v[2]
@@ -51,13 +51,13 @@ def add_at(a: Floats, i: int, v: Vector) -> None:
 
 @compiled
 def block(a: Floats, k: int, m: int) -> Matrix:
-    """a[k, m] as a 3×3 matrix."""
+    """Return a[k, m] as a 3×3 matrix."""
     return block_at(a[k, m], 0, 0)
 
 
 @compiled
 def put_block(a: Floats, k: int, m: int, b: Matrix) -> None:
-    """a[k, m] = b."""
+    """Set a[k, m] = b."""
     c = a[k, m]
     c[0, 0], c[0, 1], c[0, 2] = b[0]
     c[1, 0], c[1, 1], c[1, 2] = b[1]
@@ -66,7 +66,7 @@ def put_block(a: Floats, k: int, m: int, b: Matrix) -> None:
 
 @compiled
 def block_at(a: Floats, row: int, column: int) -> Matrix:
-    """The 3×3 block of `a` at (row, column)."""
+    """Return the 3×3 block of `a` at (row, column)."""
     return (
         (a[row, column], a[row, column + 1], a[row, column + 2]),
         (a[row + 1, column], a[row + 1, column + 1], a[row + 1, column + 2]),

@@ -26,7 +26,7 @@ from sim.linear.vectors import applied, dot, inverse, minus, product, subtracted
 class Chains(NamedTuple):
     """The equations of M chains of n nodes, and of the body at P instants; `factor` overwrites them."""
 
-    own: Floats  # (n, M, 3, 3): A_kk; then its inverse
+    diagonal: Floats  # (n, M, 3, 3): A_kk; then its inverse
     lower: Floats  # A_{k,k−1}
     upper: Floats  # A_{k−1,k}
     lower2: Floats  # A_{k,k−2}
@@ -38,7 +38,7 @@ class Chains(NamedTuple):
 
 @compiled
 def new_chains(n: int, chains: int, instants: int) -> Chains:
-    """Room for M chains of n ≥ 2 nodes and P instants."""
+    """Allocate room for M chains of n ≥ 2 nodes and P instants."""
     return Chains(
         np.zeros((n, chains, 3, 3)),
         np.zeros((n, chains, 3, 3)),
@@ -60,9 +60,9 @@ def factor_and_solve(chains: Chains, s: Floats, t: Floats) -> None:
 
 @compiled
 def factor(chains: Chains) -> None:
-    """Eliminate chains that share one instant: own becomes its inverse, lower and border A⁻¹ of themselves."""
+    """Eliminate chains of one instant: diagonal becomes its inverse, lower and border A⁻¹ of themselves."""
     corner = chains.corner[0]
-    for m in range(chains.own.shape[1]):
+    for m in range(chains.diagonal.shape[1]):
         _eliminate(chains, m)
         lower = block(chains.lower, 1, m)
         for c in range(4):
@@ -75,26 +75,26 @@ def factor(chains: Chains) -> None:
 
 @compiled
 def _eliminate(chains: Chains, m: int) -> None:
-    """Chain m from tip to root."""
-    n = chains.own.shape[0]
+    """Eliminate chain m from tip to root."""
+    n = chains.diagonal.shape[0]
     for k in range(n - 1, -1, -1):
-        inverted = inverse(block(chains.own, k, m))
-        put_block(chains.own, k, m, inverted)
+        inverted = inverse(block(chains.diagonal, k, m))
+        put_block(chains.diagonal, k, m, inverted)
         upper, upper2 = block(chains.upper, k, m), block(chains.upper2, k, m)
         lower = product(inverted, block(chains.lower, k, m))
         lower2 = product(inverted, block(chains.lower2, k, m))
         if k > 0:
             put_block(chains.lower, k, m, lower)
-            own = subtracted(block(chains.own, k - 1, m), product(upper, lower))
-            put_block(chains.own, k - 1, m, own)
+            diagonal = subtracted(block(chains.diagonal, k - 1, m), product(upper, lower))
+            put_block(chains.diagonal, k - 1, m, diagonal)
         if k > 1:
             put_block(chains.lower2, k, m, lower2)
             below = subtracted(block(chains.lower, k - 1, m), product(upper, lower2))
             put_block(chains.lower, k - 1, m, below)
             above = subtracted(block(chains.upper, k - 1, m), product(upper2, lower))
             put_block(chains.upper, k - 1, m, above)
-            own = subtracted(block(chains.own, k - 2, m), product(upper2, lower2))
-            put_block(chains.own, k - 2, m, own)
+            diagonal = subtracted(block(chains.diagonal, k - 2, m), product(upper2, lower2))
+            put_block(chains.diagonal, k - 2, m, diagonal)
         for c in range(4):
             column = applied(inverted, vector(chains.border[k], m, c))
             put(chains.border[k], m, c, column)
@@ -112,7 +112,7 @@ def solve(chains: Chains, s: Floats, t: Floats) -> None:
     n, count, _ = s.shape
     for m in range(count):
         for k in range(n - 1, -1, -1):
-            value = applied(block(chains.own, k, m), vector(s, k, m))
+            value = applied(block(chains.diagonal, k, m), vector(s, k, m))
             put(s, k, m, value)
             if k > 0:
                 put(s, k - 1, m, minus(vector(s, k - 1, m), applied(block(chains.upper, k, m), value)))

@@ -34,8 +34,8 @@ from sim.linear.dense import invert, solve_dense
 class Coupled(NamedTuple):
     """Room for the equations and their factors; m = 3 M rows a node, u = 4 P unknowns of the body."""
 
-    own: Floats  # (n, m, m): A_kk, then its inverse
-    others: Floats  # (n, m, 2 m + u + 1): A_{k,k−1} | A_{k,k−2} | B_k | s_k
+    diagonal: Floats  # (n, m, m): A_kk, then its inverse
+    columns: Floats  # (n, m, 2 m + u + 1): A_{k,k−1} | A_{k,k−2} | B_k | s_k
     upper: Floats  # (n, m, m): A_{k−1,k}
     folded: Floats  # (n, m, 2 m + u + 1): Z
     product: Floats  # (m, 2 m + u + 1)
@@ -44,7 +44,7 @@ class Coupled(NamedTuple):
 
 @compiled
 def new_coupled(n: int, chains: int, instants: int) -> Coupled:
-    """Room for n ≥ 2 nodes in M chains, and a body with four unknowns at each of P instants."""
+    """Allocate room for n ≥ 2 nodes in M chains, and a body with four unknowns at each of P instants."""
     m, unknowns = 3 * chains, 4 * instants
     width = 2 * m + unknowns + 1
     return Coupled(
@@ -69,10 +69,10 @@ def couple(system: Coupled, chains: Chains, resistance: Floats, speed: Floats, d
     n, count, _, _ = resistance.shape
     instants = chains.corner.shape[0]
     m = 3 * count
-    system.others[:] = 0.0
+    system.columns[:] = 0.0
     system.upper[:] = 0.0
     for k in range(n):
-        own, others, upper = system.own[k], system.others[k], system.upper[k]
+        diagonal, columns, upper = system.diagonal[k], system.columns[k], system.upper[k]
         for i in range(count):
             column = 2 * m + 4 * (i % instants)
             for a in range(3):
@@ -80,27 +80,27 @@ def couple(system: Coupled, chains: Chains, resistance: Floats, speed: Floats, d
                 for b in range(3):
                     drag = speed[i] * resistance[k, i, a, b]
                     for j in range(count):
-                        own[row, 3 * j + b] = -drag * differentiation[i, j]
-                    own[row, 3 * i + b] += chains.own[k, i, a, b]
+                        diagonal[row, 3 * j + b] = -drag * differentiation[i, j]
+                    diagonal[row, 3 * i + b] += chains.diagonal[k, i, a, b]
                     if k > 0:
-                        others[row, 3 * i + b] = chains.lower[k, i, a, b]
+                        columns[row, 3 * i + b] = chains.lower[k, i, a, b]
                         upper[row, 3 * i + b] = chains.upper[k, i, a, b]
                     if k > 1:
-                        others[row, m + 3 * i + b] = chains.lower2[k, i, a, b]
+                        columns[row, m + 3 * i + b] = chains.lower2[k, i, a, b]
                 for c in range(4):
-                    others[row, column + c] = chains.border[k, i, c, a]
+                    columns[row, column + c] = chains.border[k, i, c, a]
 
 
 @compiled
 def factor_and_solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
     """Factor the equations and solve them: s (n, m) becomes δx, t (u,) becomes δu."""
-    n, m, width = system.others.shape
+    n, m, width = system.columns.shape
     for i in range(n):
         for a in range(m):
-            system.others[i, a, width - 1] = s[i, a]
+            system.columns[i, a, width - 1] = s[i, a]
     for i in range(n - 1, -1, -1):
-        invert(system.own[i])
-        np.dot(system.own[i], system.others[i], system.folded[i])
+        invert(system.diagonal[i])
+        np.dot(system.diagonal[i], system.columns[i], system.folded[i])
         if i > 0:
             np.dot(system.upper[i], system.folded[i], system.product)
             _fold_up(system, i)
@@ -114,21 +114,22 @@ def factor_and_solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> N
 
 @compiled
 def _fold_up(system: Coupled, i: int) -> None:
-    """Rows i − 1 −= A_{i−1,i} Z_i, whose columns belong to nodes i − 1 and i − 2, body and right-hand side."""
-    own, others, product = system.own[i - 1], system.others[i - 1], system.product
+    """Subtract A_{i−1,i} Z_i from row i − 1: columns of nodes i − 1 and i − 2, body and right-hand side."""
+    diagonal, columns, product = system.diagonal[i - 1], system.columns[i - 1], system.product
     m, width = product.shape
     for a in range(m):
         for j in range(m):
-            own[a, j] -= product[a, j]
-            others[a, j] -= product[a, m + j]
+            diagonal[a, j] -= product[a, j]
+            columns[a, j] -= product[a, m + j]
         for j in range(2 * m, width):
-            others[a, j] -= product[a, j]
+            columns[a, j] -= product[a, j]
 
 
 @compiled
 def _fold_two_up(system: Coupled, chains: Chains, i: int) -> None:
-    """Rows i − 2 −= A_{i−2,i} Z_i, whose first columns belong to node i − 1."""
-    own, others, upper, folded = system.own[i - 2], system.others[i - 2], system.upper[i - 1], system.folded[i]
+    """Subtract A_{i−2,i} Z_i, whose first columns belong to node i − 1, from row i − 2."""
+    diagonal, columns = system.diagonal[i - 2], system.columns[i - 2]
+    upper, folded = system.upper[i - 1], system.folded[i]
     m, width = folded.shape
     for chain in range(m // 3):
         for a in range(3):
@@ -137,15 +138,15 @@ def _fold_two_up(system: Coupled, chains: Chains, i: int) -> None:
                 share, source = chains.upper2[i, chain, a, b], 3 * chain + b
                 for j in range(m):
                     upper[row, j] -= share * folded[source, j]
-                    own[row, j] -= share * folded[source, m + j]
+                    diagonal[row, j] -= share * folded[source, m + j]
                 for j in range(2 * m, width):
-                    others[row, j] -= share * folded[source, j]
+                    columns[row, j] -= share * folded[source, j]
 
 
 @compiled
 def _reduce_body(system: Coupled, chains: Chains) -> None:
-    """The body's equations with all nodes eliminated."""
-    instants, count = chains.corner.shape[0], chains.own.shape[1]
+    """Form the body's equations with all nodes eliminated."""
+    instants, count = chains.corner.shape[0], chains.diagonal.shape[1]
     m, unknowns = 3 * count, 4 * instants
     first = np.ascontiguousarray(system.folded[0][:, 2 * m : 2 * m + unknowns])
     second = np.dot(np.ascontiguousarray(system.folded[1][:, :m]), first)
@@ -169,7 +170,7 @@ def solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
     n, m = s.shape
     image = np.empty(m)
     for i in range(n - 1, -1, -1):
-        np.dot(system.own[i], s[i], image)
+        np.dot(system.diagonal[i], s[i], image)
         s[i] = image
         if i > 0:
             np.dot(system.upper[i], s[i], image)

@@ -32,7 +32,7 @@ def invert(a: Floats) -> None:
 
 @compiled
 def solve_dense(a: Floats, b: Floats) -> None:
-    """b = a⁻¹ b (n, K) in place by Gaussian elimination with row exchanges; a is overwritten. NaN in, NaN out."""
+    """Solve b = a⁻¹ b (n, K) in place by Gaussian elimination with pivoting; a is overwritten. NaN in, NaN out."""
     n, columns = b.shape
     for k in range(n):
         best = k

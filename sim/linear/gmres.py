@@ -30,7 +30,7 @@ class Krylov(NamedTuple):
 
 @compiled
 def new_krylov(size: int, most: int) -> Krylov:
-    """Room for `most` steps on vectors of `size` entries."""
+    """Allocate room for `most` steps on vectors of `size` entries."""
     return Krylov(np.zeros((most + 1, size)), np.zeros((most, most)), np.zeros((most, 2)), np.zeros(most + 1))
 
 
@@ -71,7 +71,7 @@ def extend(krylov: Krylov, i: int, w: Floats) -> float:
 
 @compiled
 def combine(krylov: Krylov, count: int) -> Floats:
-    """The solution out of the first `count` basis vectors."""
+    """Combine the first `count` basis vectors to the solution."""
     y = np.zeros(count)
     for i in range(count - 1, -1, -1):
         total = krylov.right[i]

@@ -14,7 +14,7 @@ from sim.compiling import compiled
 
 @compiled
 def differentiation(phases: int) -> Floats:
-    """d/dφ of the interpolant, (M, M)."""
+    """Differentiate the interpolant: the matrix d/dφ, (M, M)."""
     matrix = np.zeros((phases, phases))
     for i in range(phases):
         for j in range(phases):
@@ -27,7 +27,7 @@ def differentiation(phases: int) -> Floats:
 
 @compiled
 def interpolation(phases: int, at: Floats) -> Floats:
-    """Values of the interpolant at angles `at` (F,) from the first phase, (F, M)."""
+    """Interpolate to angles `at` (F,) from the first phase: the matrix (F, M)."""
     matrix = np.zeros((len(at), phases))
     for i in range(len(at)):
         for j in range(phases):
@@ -43,7 +43,7 @@ def interpolation(phases: int, at: Floats) -> Floats:
 
 @compiled
 def with_phases(a: Floats, wanted: int) -> Floats:
-    """A periodic array (K, M, c) at `wanted` phases."""
+    """Resample a periodic array (K, M, c) at `wanted` phases."""
     matrix = interpolation(a.shape[1], 2 * np.pi * np.arange(wanted) / wanted)
     out = np.zeros((a.shape[0], wanted, a.shape[2]))
     for k in range(a.shape[0]):

@@ -25,62 +25,62 @@ E_Z: Vector = (0.0, 0.0, 1.0)
 
 
 def formula(function: F) -> F:
-    """Decorator of a formula: the same source for numbers in compiled loops and for tensors."""
+    """Decorate a formula: the same source for numbers in compiled loops and for tensors."""
     marked: F = register_jitable(function)
     return marked
 
 
 @formula
 def dot(a: Vector, b: Vector) -> Any:
-    """a·b."""
+    """Compute a·b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @formula
 def cross(a: Vector, b: Vector) -> Vector:
-    """a × b."""
+    """Compute a × b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @formula
 def plus(a: Vector, b: Vector) -> Vector:
-    """a + b."""
+    """Compute a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @formula
 def minus(a: Vector, b: Vector) -> Vector:
-    """a − b."""
+    """Compute a − b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @formula
 def times(s: Any, a: Vector) -> Vector:
-    """s a."""
+    """Compute s a."""
     return (s * a[0], s * a[1], s * a[2])
 
 
 @formula
 def outer(a: Vector, b: Vector) -> Matrix:
-    """a ⊗ b."""
+    """Compute a ⊗ b."""
     return (times(a[0], b), times(a[1], b), times(a[2], b))
 
 
 @formula
 def added(a: Matrix, b: Matrix) -> Matrix:
-    """a + b."""
+    """Compute a + b."""
     return (plus(a[0], b[0]), plus(a[1], b[1]), plus(a[2], b[2]))
 
 
 @formula
 def subtracted(a: Matrix, b: Matrix) -> Matrix:
-    """a − b."""
+    """Compute a − b."""
     return (minus(a[0], b[0]), minus(a[1], b[1]), minus(a[2], b[2]))
 
 
 @formula
 def plus_identity(a: Matrix, s: Any) -> Matrix:
-    """a + s I."""
+    """Compute a + s I."""
     return (
         (a[0][0] + s, a[0][1], a[0][2]),
         (a[1][0], a[1][1] + s, a[1][2]),
@@ -90,7 +90,7 @@ def plus_identity(a: Matrix, s: Any) -> Matrix:
 
 @formula
 def transposed(a: Matrix) -> Matrix:
-    """aᵀ."""
+    """Compute aᵀ."""
     return (
         (a[0][0], a[1][0], a[2][0]),
         (a[0][1], a[1][1], a[2][1]),
@@ -100,13 +100,13 @@ def transposed(a: Matrix) -> Matrix:
 
 @formula
 def applied(a: Matrix, b: Vector) -> Vector:
-    """a b."""
+    """Compute a b."""
     return (dot(a[0], b), dot(a[1], b), dot(a[2], b))
 
 
 @formula
 def projected(a: Matrix, t: Vector, s: Any) -> Matrix:
-    """s a (I − t⊗t): chain rule from the unit vector t to a vector along it of length 1/s."""
+    """Compute s a (I − t⊗t): chain rule from the unit vector t to a vector along it of length 1/s."""
     along = applied(a, t)
     return (
         times(s, minus(a[0], times(along[0], t))),
@@ -117,7 +117,7 @@ def projected(a: Matrix, t: Vector, s: Any) -> Matrix:
 
 @formula
 def crossed(a: Vector, b: Matrix) -> Matrix:
-    """[a×] b: the columns of b under a ×."""
+    """Compute [a×] b: the columns of b under a ×."""
     return (
         minus(times(a[1], b[2]), times(a[2], b[1])),
         minus(times(a[2], b[0]), times(a[0], b[2])),
@@ -127,13 +127,13 @@ def crossed(a: Vector, b: Matrix) -> Matrix:
 
 @formula
 def turned(b: Matrix, a: Vector) -> Matrix:
-    """b [a×]: the rows of b under × a."""
+    """Compute b [a×]: the rows of b under × a."""
     return (cross(b[0], a), cross(b[1], a), cross(b[2], a))
 
 
 @formula
 def product(a: Matrix, b: Matrix) -> Matrix:
-    """a b."""
+    """Compute a b."""
     return (
         plus(plus(times(a[0][0], b[0]), times(a[0][1], b[1])), times(a[0][2], b[2])),
         plus(plus(times(a[1][0], b[0]), times(a[1][1], b[1])), times(a[1][2], b[2])),
@@ -143,7 +143,7 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 
 @formula
 def inverse(a: Matrix) -> Matrix:
-    """a⁻¹."""
+    """Compute a⁻¹."""
     p, q, r = transposed(a)
     first = cross(q, r)
     scale = 1.0 / dot(p, first)

@@ -49,13 +49,13 @@ from sim.model.body import Body
 
 @formula
 def motor_gain(body: Body) -> Any:
-    """∂ω_t/∂ω_h."""
+    """Compute ∂ω_t/∂ω_h."""
     return 1.0 + body.droop * body.resistance[3, 3]
 
 
 @compiled
 def tail_spin(body: Body, u: Floats) -> float:
-    """ω_t for the velocities u = (v_x, v_z, ω_yr, ω_h)."""
+    """Compute ω_t for the velocities u = (v_x, v_z, ω_yr, ω_h)."""
     return body.omega + motor_gain(body) * u[3]
 
 
@@ -71,7 +71,7 @@ class Motion(NamedTuple):
 
 @compiled
 def motion_at(body: Body, u: Floats, phase: float) -> Motion:
-    """Motion for the velocities u = (v_x, v_z, ω_yr, ω_h) at a phase."""
+    """Compute the motion for the velocities u = (v_x, v_z, ω_yr, ω_h) at a phase."""
     e_x, e_y = (np.cos(phase), -np.sin(phase), 0.0), (np.sin(phase), np.cos(phase), 0.0)
     linear = plus(times(u[0], e_x), times(u[1], E_Z))
     load = plus(plus(times(body.tail_load[0], e_x), times(body.tail_load[1], e_y)), times(body.tail_load[2], E_Z))
@@ -152,14 +152,14 @@ def clamp_balance(geometry: Geometry, body: Body, m: int, motion: Motion, flow: 
 
 
 @compiled
-def wrench_of(motion: Motion, force: Vector, moment: Vector) -> tuple[float, float, float, float]:
-    """(F_x, F_z, M_y, M_z) in the body frame of a force and a moment in a tail's frame."""
+def body_wrench(motion: Motion, force: Vector, moment: Vector) -> tuple[float, float, float, float]:
+    """Compute the wrench (F_x, F_z, M_y, M_z) in the body frame of a force and a moment in a tail's frame."""
     return dot(motion.e_x, force), force[2], dot(motion.e_y, moment), moment[2]
 
 
 @compiled
 def head_drag(body: Body, u: Floats, a: int) -> float:
-    """Entry a of R (v_x, v_z, ω_yr, ω_h, ω_t): the resistance of the fluid to head and disc, about J."""
+    """Compute entry a of R (v_x, v_z, ω_yr, ω_h, ω_t): the resistance of the fluid to head and disc, about J."""
     total = body.resistance[a, 4] * tail_spin(body, u)
     for c in range(4):
         total += body.resistance[a, c] * u[c]

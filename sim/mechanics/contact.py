@@ -16,7 +16,7 @@ from sim.compiling import compiled
 
 @compiled
 def tail_gap(x: Floats, offset: float, radius: float) -> float:
-    """Smallest distance between two tails over 2 r0; infinite for one tail.
+    """Compute the smallest distance between two tails over 2 r0; infinite for one tail.
 
     Args:
         x: free nodes at one instant, (n, N, 3), every tail turned so that its clamp lies at (offset, 0, 0).

@@ -29,13 +29,13 @@ from sim.linear.vectors import Matrix, Vector, dot, formula, minus, outer, plus,
 
 
 def tail_coefficients(l_over_r0: Tensor) -> tuple[Tensor, Tensor]:
-    """Drag coefficients per length (ζ∥, ζ⊥) in units of μ0; same shape as `l_over_r0`."""
+    """Compute the drag coefficients per length (ζ∥, ζ⊥) in units of μ0; same shape as `l_over_r0`."""
     log_slenderness = torch.log(l_over_r0)
     return 2 * math.pi / (log_slenderness - 0.5), 4 * math.pi / (log_slenderness + 0.5)
 
 
 def head_resistance(C_t: Tensor, C_r: Tensor, C_yr: Tensor, head_radius: Tensor, head_length: Tensor) -> Tensor:
-    """R of the head about J in the paper's model, (4, 5, B).
+    """Compute R of the head about J in the paper's model, (4, 5, B).
 
     Args:
         C_t, C_r, C_yr: drag, spin and side-force coefficients, (B,).
@@ -58,19 +58,19 @@ def head_resistance(C_t: Tensor, C_r: Tensor, C_yr: Tensor, head_radius: Tensor,
 
 @formula
 def node_drag(tangent: Vector, velocity: Vector, perp: Any, excess: Any) -> Vector:
-    """q = −[perp v + excess (t·v) t], with perp = l_k ζ⊥ and excess = l_k (ζ∥ − ζ⊥)."""
+    """Compute q = −[perp v + excess (t·v) t], with perp = l_k ζ⊥ and excess = l_k (ζ∥ − ζ⊥)."""
     return times(-1, plus(times(perp, velocity), times(excess * dot(tangent, velocity), tangent)))
 
 
 @formula
 def node_resistance(tangent: Vector, perp: Any, excess: Any) -> Matrix:
-    """−∂q/∂v = perp I + excess t⊗t."""
+    """Compute −∂q/∂v = perp I + excess t⊗t."""
     return plus_identity(outer(times(excess, tangent), tangent), perp)
 
 
 @formula
 def drag_by_tangents(tangent: Vector, spread: Any, velocity: Vector, excess: Any) -> Matrix:
-    """−∂q/∂S for a node tangent t = S/|S| (S: sum of the adjacent edge tangents, |S| = spread).
+    """Compute −∂q/∂S for a node tangent t = S/|S| (S: sum of the adjacent edge tangents, |S| = spread).
 
     excess/|S| [t⊗v + (t·v) I] (I − t⊗t).
     """

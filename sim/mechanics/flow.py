@@ -45,7 +45,7 @@ from sim.mechanics.stokeslets import rotlet, stokeslets
 from sim.model.body import Body
 
 HEIGHT = 1.25  # of the surface above the axis, in the larger of R and a
-_PIECES = 4  # of the head's axis
+_SEGMENTS = 4  # of the head's axis
 _ROUNDS = 3
 
 
@@ -66,20 +66,20 @@ class Scene(NamedTuple):
 
 @compiled
 def _new_scene(n: int, tails: int) -> Scene:
-    places, pieces = (n + 1) * tails + _PIECES, (n + 1) * tails + _PIECES
+    places, segments = (n + 1) * tails + _SEGMENTS, (n + 1) * tails + _SEGMENTS
     return Scene(
         np.zeros((places, 3)),
         np.full(places, tails),
-        np.zeros((pieces, 3)),
-        np.zeros((pieces, 3)),
-        np.zeros((pieces, 3)),
-        np.full(pieces, tails),
+        np.zeros((segments, 3)),
+        np.zeros((segments, 3)),
+        np.zeros((segments, 3)),
+        np.full(segments, tails),
     )
 
 
 @compiled
 def has_flow(body: Body) -> bool:
-    """Whether any part of the robot is in the flow of another part."""
+    """Tell whether any part of the robot is in the flow of another part."""
     terms = body.nonlocal_terms
     return bool(terms.tail_interaction != 0 or terms.head_flow != 0 or terms.free_surface != 0)
 
@@ -115,21 +115,21 @@ def add_flow(
         motion = motion_at(body, u, phase + 2 * np.pi * j / tails)
         for k in range(n + 1):
             add(flow, k, instant + j * instants, _in_tail(motion, vector_at(moved, j * (n + 1) + k)))
-    across, along = _head_resistance(body)
-    for i in range(nodes, nodes + _PIECES):
-        wrench[0] += across * moved[i, 0] / _PIECES
-        wrench[1] += along * moved[i, 2] / _PIECES
-        wrench[2] += across * moved[i, 0] / _PIECES * body.head_length / 2
+    drag_across, drag_along = _head_resistance(body)
+    for i in range(nodes, nodes + _SEGMENTS):
+        wrench[0] += drag_across * moved[i, 0] / _SEGMENTS
+        wrench[1] += drag_along * moved[i, 2] / _SEGMENTS
+        wrench[2] += drag_across * moved[i, 0] / _SEGMENTS * body.head_length / 2
 
 
 @compiled
 def _place_tail(
     scene: Scene, body: Body, geometry: Geometry, motion: Motion, x: Floats, j: int, column: int
 ) -> None:
-    """Nodes of tail j, and its edges under the forces of its free nodes."""
+    """Place the nodes of tail j, and its edges under the forces of its free nodes."""
     n = x.shape[0]
     cell = 1.0 / n
-    first_clamp = n * ((len(scene.by) - _PIECES) // (n + 1))
+    first_clamp = n * ((len(scene.by) - _SEGMENTS) // (n + 1))
     place = _in_body(motion, (body.offset, 0.0, 0.0))
     put_at(scene.place, j * (n + 1), place)
     scene.of[j * (n + 1) : (j + 1) * (n + 1)] = j
@@ -156,29 +156,29 @@ def _place_tail(
 @compiled
 def _place_head(scene: Scene, body: Body, n: int, tails: int) -> None:
     """Add the head's segments, which follow the nodes and edges of the tails."""
-    first, piece = (n + 1) * tails, body.head_length / _PIECES
-    for i in range(_PIECES):
-        scene.place[first + i, 2] = (i + 0.5) * piece
-        scene.start[first + i, 2] = i * piece
-        scene.end[first + i, 2] = (i + 1) * piece
+    first, length = (n + 1) * tails, body.head_length / _SEGMENTS
+    for i in range(_SEGMENTS):
+        scene.place[first + i, 2] = (i + 0.5) * length
+        scene.start[first + i, 2] = i * length
+        scene.end[first + i, 2] = (i + 1) * length
 
 
 @compiled
 def _answer(
     scene: Scene, body: Body, geometry: Geometry, u: Floats, phase: float, instant: int, tails: int, moved: Floats
 ) -> None:
-    """Forces on the fluid of clamps and head, which have given velocities, in a fluid with the velocities `moved`.
+    """Find the forces on the fluid of clamps and head, whose velocities are given, in a fluid moving by `moved`.
 
     The forces depend on each other's flow. They are found in a few rounds; each change is smaller than the last
     one.
     """
     n, columns = geometry.length.shape
     nodes, first_clamp, cell = (n + 1) * tails, n * tails, 1.0 / n
-    across, along = _head_resistance(body)
-    share_x, share_z = across / body.resistance[0, 0], along / body.resistance[1, 1]
+    drag_across, drag_along = _head_resistance(body)
+    share_x, share_z = drag_across / body.resistance[0, 0], drag_along / body.resistance[1, 1]
     push_x, push_z = share_x * head_drag(body, u, 0), share_z * head_drag(body, u, 1)  # if the fluid were at rest
-    given = np.arange(first_clamp, len(scene.by))
-    fixed = np.concatenate((np.arange(tails) * (n + 1), np.arange(nodes, nodes + _PIECES)))
+    answering = np.arange(first_clamp, len(scene.by))
+    fixed = np.concatenate((np.arange(tails) * (n + 1), np.arange(nodes, nodes + _SEGMENTS)))
     answer = np.zeros_like(moved)
     perp, excess = 0.5 * cell * body.zeta_perp, 0.5 * cell * (body.zeta_parallel - body.zeta_perp)
     for _ in range(_ROUNDS):
@@ -190,34 +190,34 @@ def _answer(
             velocity = minus(velocity, _in_tail(motion, plus(vector_at(moved, i), vector_at(answer, i))))
             drag = node_drag(tangent, velocity, perp, excess)
             put_at(scene.force, first_clamp + j, _in_body(motion, times(-1.0, drag)))
-        for i in range(nodes, nodes + _PIECES):
-            scene.force[i, 0] = (push_x - across * (moved[i, 0] + answer[i, 0])) / _PIECES
-            scene.force[i, 2] = (push_z - along * (moved[i, 2] + answer[i, 2])) / _PIECES
+        for i in range(nodes, nodes + _SEGMENTS):
+            scene.force[i, 0] = (push_x - drag_across * (moved[i, 0] + answer[i, 0])) / _SEGMENTS
+            scene.force[i, 2] = (push_z - drag_along * (moved[i, 2] + answer[i, 2])) / _SEGMENTS
         answer[:] = 0.0
-        _add_stokeslets(body, scene, fixed, given, answer)
+        _add_stokeslets(body, scene, fixed, answering, answer)
 
 
 @compiled
 def _in_body(motion: Motion, v: Vector) -> Vector:
-    """Components in the body frame of a vector in a tail's frame."""
+    """Convert a vector from a tail's frame to the body frame."""
     return dot(motion.e_x, v), dot(motion.e_y, v), v[2]
 
 
 @compiled
 def _in_tail(motion: Motion, v: Vector) -> Vector:
-    """Components in a tail's frame of a vector in the body frame."""
+    """Convert a vector from the body frame to a tail's frame."""
     return plus(plus(times(v[0], motion.e_x), times(v[1], motion.e_y)), times(v[2], E_Z))
 
 
 @compiled
-def _add_stokeslets(body: Body, scene: Scene, places: Integers, pieces: Integers, flow: Floats) -> None:
+def _add_stokeslets(body: Body, scene: Scene, places: Integers, segments: Integers, flow: Floats) -> None:
     """Add to `flow` (K, 3), at some places, the flow of the forces of some segments."""
     height = HEIGHT * max(body.offset, body.head_radius)
     head = scene.of[len(scene.of) - 1]
     for i in places:
         at = vector_at(scene.place, i)
         total = ZERO
-        for j in pieces:
+        for j in segments:
             spread = body.head_radius if scene.by[j] == head else body.tail_radius
             share, mirrored = _shares(body, scene.of[i], scene.by[j], head)
             start, end, force = vector_at(scene.start, j), vector_at(scene.end, j), vector_at(scene.force, j)
@@ -233,7 +233,7 @@ def _add_stokeslets(body: Body, scene: Scene, places: Integers, pieces: Integers
 
 @compiled
 def _shares(body: Body, on: int, by: int, head: int) -> tuple[float, float]:
-    """Factors on the flow of one part at another part: on the direct flow, and on that of the image."""
+    """Return the factors on the flow of one part at another part: on the direct flow, and on that of the image."""
     terms = body.nonlocal_terms
     if on == by:
         return 0.0, 0.0 if on == head else terms.free_surface
@@ -243,17 +243,17 @@ def _shares(body: Body, on: int, by: int, head: int) -> tuple[float, float]:
 
 @compiled
 def _head_resistance(body: Body) -> tuple[float, float]:
-    """The part of the head's drag that moves the fluid, across and along the axis.
+    """Compute the part of the head's drag that moves the fluid, across and along the axis.
 
     It is at most the drag with which the head's segments would move with the flow that they produce.
     """
     end, across, along = (0.0, 0.0, body.head_length), 0.0, 0.0
-    for i in range(_PIECES):
-        at = (0.0, 0.0, (i + 0.5) / _PIECES * body.head_length)
+    for i in range(_SEGMENTS):
+        at = (0.0, 0.0, (i + 0.5) / _SEGMENTS * body.head_length)
         across += stokeslets(at, ZERO, end, (1.0, 0.0, 0.0), body.head_radius)[0]
         along += stokeslets(at, ZERO, end, E_Z, body.head_radius)[2]
-    pieces = _PIECES * body.viscosity
-    return min(pieces / across, body.resistance[0, 0]), min(pieces / along, body.resistance[1, 1])
+    scale = _SEGMENTS * body.viscosity
+    return min(scale / across, body.resistance[0, 0]), min(scale / along, body.resistance[1, 1])
 
 
 @compiled
@@ -262,11 +262,11 @@ def _add_rotlets(body: Body, scene: Scene, nodes: int, torque: float, flow: Floa
     terms = body.nonlocal_terms
     height = HEIGHT * max(body.offset, body.head_radius)
     for i in range(nodes):
-        for j in range(_PIECES):
+        for j in range(_SEGMENTS):
             middle = vector_at(scene.place, nodes + j)
             away = minus(vector_at(scene.place, i), middle)
             mirrored = (away[0], away[1] + 2 * middle[1] - 2 * height, away[2])
-            direct = rotlet(away, (0.0, 0.0, torque / _PIECES), body.head_radius)
-            back = rotlet(mirrored, (0.0, 0.0, -torque / _PIECES), body.head_radius)
+            direct = rotlet(away, (0.0, 0.0, torque / _SEGMENTS), body.head_radius)
+            back = rotlet(mirrored, (0.0, 0.0, -torque / _SEGMENTS), body.head_radius)
             total = times(terms.head_flow / body.viscosity, plus(direct, times(terms.free_surface, back)))
             add_at(flow, i, total)

@@ -38,7 +38,7 @@ _MOST_CORRECTIONS = 30
 
 @formula
 def transported(director: Vector, before: Vector, after: Vector) -> Vector:
-    """Parallel transport of a vector from unit tangent `before` to `after`."""
+    """Transport a vector in parallel from unit tangent `before` to `after`."""
     axis = cross(before, after)
     cosine = dot(before, after)
     return plus(
@@ -48,13 +48,13 @@ def transported(director: Vector, before: Vector, after: Vector) -> Vector:
 
 @formula
 def curvature_binormal(before: Vector, after: Vector) -> Vector:
-    """κb of a joint."""
+    """Compute κb of a joint."""
     return times(2 / (1 + dot(before, after)), cross(before, after))
 
 
 @formula
 def curvatures(binormal: Vector, first: Vector, second: Vector) -> tuple[float, float]:
-    """κ1, κ2 from κb and the joint's summed directors m1_e + m1_f and m2_e + m2_f."""
+    """Compute κ1, κ2 from κb and the joint's summed directors m1_e + m1_f and m2_e + m2_f."""
     return 0.5 * dot(binormal, second), -0.5 * dot(binormal, first)
 
 
@@ -62,7 +62,7 @@ def curvatures(binormal: Vector, first: Vector, second: Vector) -> tuple[float, 
 def curvatures_by_edges(
     before: Vector, after: Vector, first: Vector, second: Vector, kappa: tuple[float, float]
 ) -> tuple[Vector, Vector, Vector, Vector]:
-    """|e| ∂κ1/∂e, |e| ∂κ2/∂e, |f| ∂κ1/∂f, |f| ∂κ2/∂f; frames follow by parallel transport."""
+    """Compute |e| ∂κ1/∂e, |e| ∂κ2/∂e, |f| ∂κ1/∂f, |f| ∂κ2/∂f; frames follow by parallel transport."""
     share = 1 / (1 + dot(before, after))
     t, m1, m2 = times(share, plus(before, after)), times(share, first), times(share, second)
     return (
@@ -75,7 +75,7 @@ def curvatures_by_edges(
 
 @compiled
 def _twist(a: Floats, b: Floats, torque: Floats, natural_twist: float) -> Floats:
-    """Angles θ (n,) in balance; the torque of joint k on both its edges is ½ (a_k sin θ + b_k cos θ)."""
+    """Solve for the balanced angles θ (n,); the torque of joint k on its edges is ½ (a_k sin θ + b_k cos θ)."""
     n = len(torque)
     theta, change = np.zeros(n), np.zeros(n)
     slope, right = np.zeros(n), np.zeros(n)
@@ -110,7 +110,7 @@ def _twist(a: Floats, b: Floats, torque: Floats, natural_twist: float) -> Floats
 
 @compiled
 def _rate(geometry: Geometry, x_dot: Floats, k: int, m: int) -> Vector:
-    """ė/|e| of edge k."""
+    """Compute ė/|e| of edge k."""
     rate = vector(x_dot, k, m)
     if k > 0:
         rate = minus(rate, vector(x_dot, k - 1, m))
@@ -137,10 +137,10 @@ def _add_viscosity(
         kappa = curvatures(binormal, first, second)
         e_1, e_2, f_1, f_2 = curvatures_by_edges(before, after, first, second, kappa)
         spin = spin_before - 0.5 * dot(binormal, plus(rate_before, rate))
-        both = 0.5 * (spin_before + spin)
+        mean_spin = 0.5 * (spin_before + spin)
         scale = viscosity * inverse_voronoi(k, n)
-        moment_1 = scale * (dot(e_1, rate_before) + dot(f_1, rate) + both * kappa[1])
-        moment_2 = scale * (dot(e_2, rate_before) + dot(f_2, rate) - both * kappa[0])
+        moment_1 = scale * (dot(e_1, rate_before) + dot(f_1, rate) + mean_spin * kappa[1])
+        moment_2 = scale * (dot(e_2, rate_before) + dot(f_2, rate) - mean_spin * kappa[0])
         about = 0.5 * (moment_1 * kappa[1] - moment_2 * kappa[0])  # ∂R/∂θ̇ of either edge
         change = plus(times(moment_1, f_1), times(moment_2, f_2))
         add(geometry.force, k, m, times(1 / geometry.length[k, m], change))
@@ -157,7 +157,7 @@ def _add_viscosity(
 
 @compiled
 def has_frames(body: Body) -> bool:
-    """Whether the tails are anything but straight, untwisted and elastic."""
+    """Tell whether the tails are anything but straight, untwisted and elastic."""
     terms = body.nonlocal_terms
     curved = terms.natural_splay != 0 or terms.natural_curvature != 0 or terms.natural_twist != 0
     return bool(curved or terms.tail_spin_drag != 0 or terms.rate_dependent_modulus != 0)
@@ -233,7 +233,7 @@ def _untwisted(
 
 @compiled
 def _turned(director: Vector, tangent: Vector, angle: float) -> tuple[Vector, Vector]:
-    """Material directors of an edge."""
+    """Compute the material directors of an edge."""
     other = cross(tangent, director)
     sin, cos = np.sin(angle), np.cos(angle)
     return plus(times(cos, director), times(sin, other)), minus(times(cos, other), times(sin, director))

@@ -34,7 +34,7 @@ class Geometry(NamedTuple):
 
 @compiled
 def new_geometry(n: int, tails: int) -> Geometry:
-    """Room for M tails of n edges."""
+    """Allocate room for M tails of n edges."""
     return Geometry(
         np.zeros((n + 1, tails, 3)),
         np.zeros((n, tails)),
@@ -47,7 +47,7 @@ def new_geometry(n: int, tails: int) -> Geometry:
 
 @compiled
 def straight(n: int, tails: int, offset: float) -> Floats:
-    """Free nodes (n, M, 3) of straight tails."""
+    """Return the free nodes (n, M, 3) of straight tails."""
     x = np.zeros((n, tails, 3))
     x[:, :, 0] = offset
     for k in range(n):
@@ -57,7 +57,7 @@ def straight(n: int, tails: int, offset: float) -> Floats:
 
 @compiled
 def turned_edges(x: Floats, dx: Floats, offset: float) -> Floats:
-    """Free nodes (n, M, 3) after a correction dx that turns the edges.
+    """Compute the free nodes (n, M, 3) after a correction dx that turns the edges.
 
     If dx were added to the positions, edges that turn would also become longer, by a term of second order. Here
     every edge gets its new direction, and its length changes only by the first-order term of dx.
@@ -67,14 +67,14 @@ def turned_edges(x: Floats, dx: Floats, offset: float) -> Floats:
     for m in range(tails):
         below, below_dx, moved = (offset, 0.0, 0.0), ZERO, (offset, 0.0, 0.0)
         for k in range(n):
-            here, here_dx = vector(x, k, m), vector(dx, k, m)
-            edge, change = minus(here, below), minus(here_dx, below_dx)
+            node, node_dx = vector(x, k, m), vector(dx, k, m)
+            edge, change = minus(node, below), minus(node_dx, below_dx)
             length = np.sqrt(dot(edge, edge))
             turned = plus(edge, change)
             wanted = length + dot(edge, change) / length
             moved = plus(moved, times(wanted / np.sqrt(dot(turned, turned)), turned))
             put(out, k, m, moved)
-            below, below_dx = here, here_dx
+            below, below_dx = node, node_dx
     return out
 
 
@@ -87,8 +87,8 @@ def measure(geometry: Geometry, x: Floats, offset: float, axial_stiffness: float
         put(tangents, 0, m, ROOT_TANGENT)
         below, before, length_before = (offset, 0.0, 0.0), ROOT_TANGENT, 1.0
         for k in range(n):
-            here = vector(x, k, m)
-            edge = minus(here, below)
+            node = vector(x, k, m)
+            edge = minus(node, below)
             length = np.sqrt(dot(edge, edge))
             tangent = times(1 / length, edge)
             c, first, second, by_after, by_before = bend(
@@ -99,7 +99,7 @@ def measure(geometry: Geometry, x: Floats, offset: float, axial_stiffness: float
             put(joints, k, m, (c, first, second))
             put(by_afters, k, m, by_after)
             put(by_befores, k, m, by_before)
-            below, before, length_before = here, tangent, length
+            below, before, length_before = node, tangent, length
         for k in range(n):
             first_next, by_before_next = 0.0, ZERO
             if k < n - 1:
@@ -113,13 +113,13 @@ def measure(geometry: Geometry, x: Floats, offset: float, axial_stiffness: float
 
 @compiled
 def inverse_voronoi(k: int, n: int) -> float:
-    """1/l_k of the bending energy of joint k: 2n at the clamp, n elsewhere."""
+    """Compute 1/l_k of the bending energy of joint k: 2n at the clamp, n elsewhere."""
     return 2.0 * n if k == 0 else 1.0 * n
 
 
 @compiled
 def edge_block(geometry: Geometry, k: int, m: int, axial_stiffness: float) -> Matrix:
-    """∂²E/∂e_k²."""
+    """Compute ∂²E/∂e_k²."""
     n = geometry.length.shape[0]
     c, first, second = vector(geometry.joint, k, m)
     c_next, first_next, second_next, by_before_next = 1.0, 0.0, 0.0, ZERO
@@ -135,7 +135,7 @@ def edge_block(geometry: Geometry, k: int, m: int, axial_stiffness: float) -> Ma
 
 @compiled
 def joint_block(geometry: Geometry, k: int, m: int) -> Matrix:
-    """∂²E/∂e_{k−1} ∂e_k of joint k."""
+    """Compute ∂²E/∂e_{k−1} ∂e_k of joint k."""
     c, first, second = vector(geometry.joint, k, m)
     return joint_stiffness(
         vector(geometry.tangent, k, m), vector(geometry.tangent, k + 1, m),
@@ -146,7 +146,7 @@ def joint_block(geometry: Geometry, k: int, m: int) -> Matrix:
 
 @compiled
 def node_tangent(geometry: Geometry, k: int, m: int) -> tuple[Vector, float]:
-    """Unit tangent of node k (0: the clamp), the mean of the adjacent edges', and |S| of their sum S."""
+    """Compute the unit tangent of node k (0: clamp), the mean of the adjacent edges', and |S| of their sum S."""
     total = vector(geometry.tangent, k, m)
     if k < geometry.length.shape[0]:
         total = plus(total, vector(geometry.tangent, k + 1, m))

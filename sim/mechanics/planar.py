@@ -29,25 +29,25 @@ def turn(vector: Floats, angle: ArrayLike) -> Floats:
 
 
 def compose(first: Poses, then: Poses) -> Poses:
-    """Pose reached by `then`, given in the frame of `first`."""
+    """Compute the pose reached by `then`, given in the frame of `first`."""
     first, then = np.broadcast_arrays(first, then)
     moved = first[..., :2] + turn(then[..., :2], first[..., 2])
     return np.concatenate([moved, first[..., 2:] + then[..., 2:]], -1)
 
 
 def inverse(pose: Poses) -> Poses:
-    """The pose that undoes `pose`."""
+    """Invert `pose`: compose(pose, inverse(pose)) is no motion."""
     back = -turn(pose[..., :2], -pose[..., 2])
     return np.concatenate([back, -pose[..., 2:]], -1)
 
 
 def between(start: Poses, end: Poses) -> Poses:
-    """`end` seen from `start`: compose(start, between(start, end)) = end."""
+    """Return `end` seen from `start`: compose(start, between(start, end)) = end."""
     return compose(inverse(start), end)
 
 
 def arc(twist: Poses, time: ArrayLike) -> Poses:
-    """Pose after holding `twist` (..., 3) for `time` (...)."""
+    """Compute the pose after holding `twist` (..., 3) for `time` (...)."""
     time = np.asarray(time, dtype=float)
     angle = twist[..., 2] * time
     half = angle / 2
@@ -59,7 +59,7 @@ def arc(twist: Poses, time: ArrayLike) -> Poses:
 
 
 def net_speed(twist: Poses, lag: Poses, dwell: ArrayLike) -> Floats:
-    """Net speed of a zigzag with equal dwells (...), each a `lag` (..., 3) and then an arc of `twist`.
+    """Compute the net speed of a zigzag with equal dwells (...), each a `lag` (..., 3) and then an arc of `twist`.
 
     The second dwell is the mirror image of the first, since a reversed motor mirrors the motion.
     """

@@ -45,7 +45,7 @@ from sim.linear.vectors import (
 
 @formula
 def bending_energy(c: Any, inverse_voronoi: Any) -> Any:
-    """g(c) of one joint, with 1/l_k."""
+    """Compute g(c) of one joint, with 1/l_k."""
     return 2 * inverse_voronoi * (1 - c) / (1 + c)
 
 
@@ -53,7 +53,7 @@ def bending_energy(c: Any, inverse_voronoi: Any) -> Any:
 def bend(
     before: Vector, after: Vector, length_before: Any, length_after: Any, inverse_voronoi: Any
 ) -> tuple[Any, Any, Any, Vector, Vector]:
-    """Joint between two edges with tangents `before` and `after`: c, g', g'', ∂c/∂e_after, ∂c/∂e_before."""
+    """Bend two edges with tangents `before` and `after`: compute c, g', g'', ∂c/∂e_after, ∂c/∂e_before."""
     c = dot(before, after)
     inverse = 1 / (1 + c)
     first = -4 * inverse_voronoi * inverse * inverse
@@ -67,7 +67,7 @@ def edge_force(
     tangent: Vector, length: Any, n: Any, axial_stiffness: Any,
     first: Any, by_after: Vector, first_next: Any, by_before_next: Vector,
 ) -> Vector:  # fmt: skip
-    """∂E/∂e_j, the force that edge j carries: stretching, the joint before it and the joint after it."""
+    """Compute ∂E/∂e_j, the force that edge j carries: stretching, the joint before it and the joint after it."""
     bending = plus(times(first, by_after), times(first_next, by_before_next))
     return plus(times(axial_stiffness * (length * n - 1), tangent), bending)
 
@@ -78,7 +78,7 @@ def edge_stiffness(
     c: Any, first: Any, second: Any, by_after: Vector,
     c_next: Any, first_next: Any, second_next: Any, by_before_next: Vector,
 ) -> Matrix:  # fmt: skip
-    """∂²E/∂e_j²: α I + t⊗(β t + q) + q⊗t + g'' p⊗p + g''_next m⊗m."""
+    """Compute ∂²E/∂e_j²: α I + t⊗(β t + q) + q⊗t + g'' p⊗p + g''_next m⊗m."""
     turning = (first * c + first_next * c_next) / (length * length)
     q = times(-1 / length, plus(times(first, by_after), times(first_next, by_before_next)))
     beta = axial_stiffness / length + turning
@@ -93,7 +93,7 @@ def joint_stiffness(
     before: Vector, after: Vector, length_before: Any, length_after: Any,
     c: Any, first: Any, second: Any, by_after: Vector, by_before: Vector,
 ) -> Matrix:  # fmt: skip
-    """∂²E/∂e_before ∂e_after of the joint between them: g'' m⊗p + g' P_before P_after/(|e||e|)."""
+    """Compute ∂²E/∂e_before ∂e_after of the joint between them: g'' m⊗p + g' P_before P_after/(|e||e|)."""
     scale = first / (length_before * length_after)
     block = outer(by_before, times(second, by_after))
     block = added(block, outer(times(scale, before), minus(times(c, after), before)))
@@ -103,7 +103,7 @@ def joint_stiffness(
 
 @formula
 def clamp_moment(root_tangent: Vector, tangent: Vector, first: Any) -> Vector:
-    """Moment of the bending spring at the clamp on the disc: −g' t_{−1} × t_0."""
+    """Compute the moment of the bending spring at the clamp on the disc: −g' t_{−1} × t_0."""
     return times(-first, cross(root_tangent, tangent))
 
 
@@ -111,7 +111,7 @@ def clamp_moment(root_tangent: Vector, tangent: Vector, first: Any) -> Vector:
 def clamp_moment_by_edge(
     root_tangent: Vector, tangent: Vector, length: Any, first: Any, second: Any, by_after: Vector
 ) -> Matrix:
-    """Derivative of the clamp's moment in edge 0."""
+    """Compute the derivative of the clamp's moment in edge 0."""
     zero = 0 * length
     cross_matrix = crossed(root_tangent, ((1 + zero, zero, zero), (zero, 1 + zero, zero), (zero, zero, 1 + zero)))
     turned = projected(cross_matrix, tangent, -first / length)

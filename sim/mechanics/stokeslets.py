@@ -12,19 +12,19 @@ from sim.linear.vectors import Vector, cross, dot, formula, minus, plus, times
 
 @formula
 def stokeslets(at: Vector, start: Vector, end: Vector, force: Vector, spread: float) -> Vector:
-    """Velocity at a point, from a force on the fluid that is constant on a straight segment, spread over a length.
+    """Compute the velocity at a point from a force that is constant on a straight segment, spread over a length.
 
     With σ along the segment from the foot of the perpendicular c, and R² = σ² + |c|² + spread²:
     ∫ [(1/R + spread²/R³) f + (r·f) r/R³] dσ/8π, r = c − σ t.
     """
-    piece = minus(end, start)
-    length = np.sqrt(dot(piece, piece))
-    t = times(1 / length, piece)
+    segment = minus(end, start)
+    length = np.sqrt(dot(segment, segment))
+    t = times(1 / length, segment)
     away = minus(at, start)
-    along = dot(away, t)
-    c = minus(away, times(along, t))
+    foot = dot(away, t)
+    c = minus(away, times(foot, t))
     square = dot(c, c) + spread * spread
-    first, last = -along, length - along
+    first, last = -foot, length - foot
     r_first, r_last = np.sqrt(first * first + square), np.sqrt(last * last + square)
     if first > 0:
         log = np.log((last + r_last) / (first + r_first))
@@ -44,7 +44,7 @@ def stokeslets(at: Vector, start: Vector, end: Vector, force: Vector, spread: fl
 
 @formula
 def rotlet(away: Vector, torque: Vector, spread: float) -> Vector:
-    """Velocity at a distance `away` from a torque on the fluid that is spread over a length."""
+    """Compute the velocity at a distance `away` from a torque on the fluid that is spread over a length."""
     square = dot(away, away) + spread * spread
     scale = (square + 1.5 * spread * spread) / (8 * np.pi * square * square * np.sqrt(square))
     return times(scale, cross(torque, away))

@@ -31,7 +31,7 @@ from sim.arrays import Floats, Integers
 from sim.compiling import compiled
 from sim.linear.blocks import add, add_at, put, put_at, vector, vector_at
 from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus, times
-from sim.mechanics.balance import motion_at, wrench_of
+from sim.mechanics.balance import body_wrench, motion_at
 from sim.mechanics.geometry import Geometry
 from sim.model.body import Body
 
@@ -46,7 +46,7 @@ _EDGES = 24  # of the smooth tail, or more
 
 @compiled
 def has_contact(body: Body) -> bool:
-    """Whether the tails feel each other's touch."""
+    """Tell whether the tails feel each other's touch."""
     return bool(body.nonlocal_terms.tail_contact != 0)
 
 
@@ -76,14 +76,14 @@ def add_contact(
             add(geometry.force, k - 1, instant + j * (columns // tails), times(-1.0, total))
         total = plus(total, vector(force, 0, j))
         motion = motion_at(body, u, phase + 2 * np.pi * j / tails)
-        more = wrench_of(motion, total, cross(root, total))
+        more = body_wrench(motion, total, cross(root, total))
         for a in range(4):
             wrench[a] += more[a]
 
 
 @compiled
 def contact_forces(body: Body, x: Floats, instant: int, tails: int, force: Floats) -> None:
-    """Forces of contact on the tails at one instant.
+    """Compute the forces of contact on the tails at one instant.
 
     Args:
         x: free nodes, (n, M, 3); tail j at instant p of P is column p + j P.
@@ -115,7 +115,7 @@ def contact_forces(body: Body, x: Floats, instant: int, tails: int, force: Float
 
 @compiled
 def _smooth_chain(n: int) -> Floats:
-    """Weights (E + 1, n + 1) of the nodes 0..n in the nodes of a finer chain: a cubic (Catmull-Rom) through them.
+    """Compute the weights (E + 1, n + 1) of the nodes 0..n in a finer chain: a cubic (Catmull-Rom) through them.
 
     Forces go back to the nodes by the same weights, which keeps their sum and their moment.
     """
@@ -141,19 +141,19 @@ def _smooth_chain(n: int) -> Floats:
 
 @compiled
 def _turned(v: Vector, share: float) -> Vector:
-    """A vector turned about e_z by a share of a whole turn."""
+    """Turn a vector about e_z by a share of a whole turn."""
     cos, sin = np.cos(2 * np.pi * share), np.sin(2 * np.pi * share)
     return cos * v[0] - sin * v[1], sin * v[0] + cos * v[1], v[2]
 
 
 @compiled
-def _edges_near(body: Body, one: Floats, k: int, other: Floats, near: Integers) -> int:
-    """Number of edges of the other tail that may touch edge k of this one; `near` gets them."""
-    n, count, j = len(one) - 1, 0, 0
+def _edges_near(body: Body, tail: Floats, k: int, neighbour: Floats, near: Integers) -> int:
+    """Count the edges of the other tail that may touch edge k of this one, and list them in `near`."""
+    n, count, j = len(tail) - 1, 0, 0
     within = 1.1 / n + 2 * 1.2 * body.tail_radius  # half an edge each; edges hardly stretch
-    middle = times(0.5, plus(vector_at(one, k), vector_at(one, k + 1)))
+    middle = times(0.5, plus(vector_at(tail, k), vector_at(tail, k + 1)))
     while j < n:
-        apart = minus(middle, times(0.5, plus(vector_at(other, j), vector_at(other, j + 1))))
+        apart = minus(middle, times(0.5, plus(vector_at(neighbour, j), vector_at(neighbour, j + 1))))
         too_far = np.sqrt(dot(apart, apart)) - within
         if too_far < 0:
             near[count] = j
@@ -164,23 +164,23 @@ def _edges_near(body: Body, one: Floats, k: int, other: Floats, near: Integers) 
 
 @compiled
 def _push(
-    body: Body, one: Floats, k: int, other: Floats, near: Integers, on_one: Floats, on_other: Floats
+    body: Body, tail: Floats, k: int, neighbour: Floats, near: Integers, on_tail: Floats, on_neighbour: Floats
 ) -> None:
     """Add the forces between the points of edge k of one tail and the edges `near` of the other."""
-    n = len(one) - 1
+    n = len(tail) - 1
     diameter = 2 * body.tail_radius
     width = WIDTH * diameter
     points = -(-POINTS // n)
     line = body.nonlocal_terms.tail_contact * SOFTNESS / FIRM
     stiffness = 0.5 * line / (points * n)  # each pair counts twice
-    start, edge = vector_at(one, k), minus(vector_at(one, k + 1), vector_at(one, k))
+    start, edge = vector_at(tail, k), minus(vector_at(tail, k + 1), vector_at(tail, k))
     on_ends, square = np.empty((len(near), 2, 3)), np.empty(len(near))
     for i in range(points):
         share = (i + 0.5) / points
         at = plus(start, times(share, edge))
         nearest = np.inf
         for c in range(len(near)):
-            square[c] = _squared_distance(at, vector_at(other, near[c]), vector_at(other, near[c] + 1))
+            square[c] = _squared_distance(at, vector_at(neighbour, near[c]), vector_at(neighbour, near[c] + 1))
             nearest = min(nearest, square[c])
         if nearest > (_REACH * diameter) ** 2:
             continue
@@ -189,7 +189,9 @@ def _push(
             if square[c] > nearest + _BESIDE * diameter**2:
                 on_ends[c] = 0.0
                 continue
-            weight, first, second = _closeness(at, vector_at(other, near[c]), vector_at(other, near[c] + 1), width)
+            weight, first, second = _closeness(
+                at, vector_at(neighbour, near[c]), vector_at(neighbour, near[c] + 1), width
+            )
             closeness += weight
             away = plus(away, plus(first, second))
             put_at(on_ends[c], 0, first)
@@ -198,16 +200,16 @@ def _push(
         depth = (diameter - distance) / (SOFTNESS * diameter)
         ramp = max(depth, 0.0) + np.log1p(np.exp(-abs(depth)))
         scale = stiffness * ramp / (distance * closeness)
-        add_at(on_one, k, times((1 - share) * scale, away))
-        add_at(on_one, k + 1, times(share * scale, away))
+        add_at(on_tail, k, times((1 - share) * scale, away))
+        add_at(on_tail, k + 1, times(share * scale, away))
         for c in range(len(near)):
-            add_at(on_other, near[c], times(-scale, vector_at(on_ends[c], 0)))
-            add_at(on_other, near[c] + 1, times(-scale, vector_at(on_ends[c], 1)))
+            add_at(on_neighbour, near[c], times(-scale, vector_at(on_ends[c], 0)))
+            add_at(on_neighbour, near[c] + 1, times(-scale, vector_at(on_ends[c], 1)))
 
 
 @compiled
 def _squared_distance(at: Vector, start: Vector, end: Vector) -> float:
-    """Squared distance of a point from an edge."""
+    """Compute the squared distance of a point from an edge."""
     edge, away = minus(end, start), minus(at, start)
     foot = min(max(dot(away, edge) / dot(edge, edge), 0.0), 1.0)
     away = minus(away, times(foot, edge))
@@ -216,7 +218,7 @@ def _squared_distance(at: Vector, start: Vector, end: Vector) -> float:
 
 @compiled
 def _closeness(at: Vector, start: Vector, end: Vector, width: float) -> tuple[float, Vector, Vector]:
-    """∫ g dσ over an edge y = start + σ e, g = exp(−|x − y|²/2w²)/√(2π) w; and the parts of ∫ (x − y) g dσ.
+    """Integrate g over an edge y = start + σ e, g = exp(−|x − y|²/2w²)/√(2π) w; and the parts of ∫ (x − y) g dσ.
 
     Returns:
         The integral; the part with 1 − σ, of the edge's start; the part with σ, of its end.

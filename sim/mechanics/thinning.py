@@ -24,13 +24,13 @@ UNIT_OF_TIME = _SLENDERNESS**4 / _RATE  # λ_1 (l/r0)⁴
 
 @compiled
 def thins(body: Body) -> bool:
-    """Whether the fluid thins."""
+    """Tell whether the fluid thins."""
     return bool(body.nonlocal_terms.shear_thinning != 0)
 
 
 @compiled
 def thinned(geometry: Geometry, body: Body, k: int, m: int, velocity: Vector) -> Vector:
-    """What thinning changes in the drag on node k of tail m (0: the half cell at the clamp).
+    """Compute what thinning changes in the drag on node k of tail m (0: the half cell at the clamp).
 
     Args:
         velocity: of the node through the fluid.

@@ -39,11 +39,11 @@ class Body(NamedTuple):
     nonlocal_terms: Annotated[Any, Meaning("", "numbers of the effects that reach further than one node")]
 
     def plus(self, **parts: Any) -> Body:
-        """With `parts` added to the fields of their names."""
+        """Add `parts` to the fields of their names."""
         return self._replace(**{name: getattr(self, name) + value for name, value in parts.items()})
 
     def with_resistance(self, entries: Mapping[tuple[int, int], Any]) -> Body:
-        """With `entries` (row, column) added to the resistance of head and disc."""
+        """Add `entries` (row, column) to the resistance of head and disc."""
         resistance = self.resistance.clone()
         for place, value in entries.items():
             resistance[place] = resistance[place] + value

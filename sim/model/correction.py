@@ -63,7 +63,7 @@ class Correction:
             raise InputError("correction: powers are 0, 1, 2 or 3")
 
     def applied(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Groups and effects of a robot by column name, with the correction.
+        """Correct the groups and effects of a robot, by column name.
 
         Raises:
             InputError: the robot is outside the runs that the correction was learnt from.
@@ -76,30 +76,30 @@ class Correction:
                     f"({low:.3g} to {high:.3g}): make runs there, or leave out the table [correction]"
                 )
         terms = self.terms(np.array([x]))[0]
-        found = dict(values)
+        corrected = dict(values)
         for name, weights in self.weights.items():
             g = MOST[name] * math.tanh(float(terms @ np.array(weights)) / MOST[name])
-            found[name] = found[name] * math.exp(g) if name in _FACTORS else found.get(name, 0.0) + g
-        return found
+            corrected[name] = corrected[name] * math.exp(g) if name in _FACTORS else corrected.get(name, 0.0) + g
+        return corrected
 
     def terms(self, inputs: Floats) -> Floats:
-        """φ of inputs (m, 3), (m, t)."""
+        """Compute φ of inputs (m, 3), (m, t)."""
         return monomials((inputs - np.array(self.centre)) / np.array(self.scale), self.powers)
 
 
 def monomials(x: Floats, powers: tuple[tuple[int, ...], ...]) -> Floats:
-    """Products of powers of the columns of x (m, 3), (m, t)."""
+    """Compute products of powers of the columns of x (m, 3), (m, t)."""
     return np.stack([(x ** np.array(term)).prod(1) for term in powers], 1)
 
 
 def inputs_of(values: Mapping[str, float]) -> tuple[float, float, float]:
-    """INPUTS of a robot."""
+    """Compute INPUTS of a robot."""
     slender = math.log(values["l_over_R"])
     return float(values["N"]), slender, math.log(abs(values["omega_bar"])) - 4 * slender
 
 
 def correction_tables(correction: Correction) -> dict[str, Any]:
-    """The table [correction] of a robot.toml, as plain content."""
+    """Write the table [correction] of a robot.toml, as plain content."""
     names = [f.name for f in fields(Correction) if f.name not in ("weights", "powers")]
     found: dict[str, Any] = {}
     for name in names:
@@ -110,7 +110,7 @@ def correction_tables(correction: Correction) -> dict[str, Any]:
 
 
 def read_correction(table: Any, place: str) -> Correction:
-    """The correction from its table in a robot.toml.
+    """Read the correction from its table in a robot.toml.
 
     Raises:
         InputError: the table is no correction.

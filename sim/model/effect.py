@@ -80,13 +80,13 @@ class Effect:
     grid: tuple[float, ...] = ()  # sizes at which a calibration looks for `beside`, whose second number this is
 
     def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
-        """The body with this effect's terms added."""
+        """Add this effect's terms to the body."""
         return body
 
     def scales(self, size: Tensor, groups: Groups) -> Factors:
-        """What this effect multiplies."""
+        """Return what this effect multiplies."""
         return Factors()
 
     def number(self, size: Tensor, groups: Groups) -> Tensor:
-        """The number of a non-local effect in `Body.nonlocal_terms`, in the simulator's units."""
+        """Return the number of a non-local effect in `Body.nonlocal_terms`, in the simulator's units."""
         return size

@@ -53,7 +53,7 @@ class Groups:
 
     @staticmethod
     def from_columns(columns: Mapping[str, Any]) -> Groups:
-        """Robots from columns of numbers, checked; all rows must have one N.
+        """Make robots from columns of numbers, checked; all rows must have one N.
 
         Args:
             columns: GROUP_COLUMNS, optionally a_over_R, each (B,). Every other column is the size of an effect.
@@ -68,18 +68,18 @@ class Groups:
         if len(counts) != 1:
             raise InputError(f"a batch has one N; these rows have {counts.astype(int).tolist()}: split them")
         tensors = {name: torch.tensor(array, dtype=torch.float64) for name, array in values.items() if name != "N"}
-        own = {name: tensors.pop(name) for name in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS) if name != "N"}
-        return Groups(**own, N=int(counts[0]), effects=tensors)
+        groups = {name: tensors.pop(name) for name in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS) if name != "N"}
+        return Groups(**groups, N=int(counts[0]), effects=tensors)
 
     def select(self, rows: Tensor) -> Groups:
-        """The robots at `rows`."""
-        own = {f.name: getattr(self, f.name) for f in fields(self)}
-        picked: dict[str, Any] = {k: v[rows] for k, v in own.items() if k not in ("N", "effects")}
+        """Select the robots at `rows`."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        picked: dict[str, Any] = {k: v[rows] for k, v in values.items() if k not in ("N", "effects")}
         return replace(self, **picked, effects={name: size[rows] for name, size in self.effects.items()})
 
 
 def checked_values(columns: Mapping[str, Any]) -> dict[str, Floats]:
-    """Columns of robots as float64 arrays, with a_over_R filled in; rejects numbers that no robot has.
+    """Convert columns of robots to float64 arrays, with a_over_R filled in; reject numbers that no robot has.
 
     Names that are no group are taken for effects here; `sim.inputs.check_columns` knows which there are.
     """

@@ -17,7 +17,7 @@ FASTEST = 1e4  # ω̄ above which the file is taken for edited
 
 
 def read_plan_file(path: str | Path) -> dict[str, Any]:
-    """The content of a plan.json.
+    """Read the content of a plan.json.
 
     Raises:
         InputError: the file cannot be read, is no plan.json of this format, has a number that is not finite, or

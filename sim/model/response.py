@@ -49,12 +49,12 @@ class Responses:
 
 
 def at_equal_dwells(memory: Floats, knots: Floats = BEFORE) -> Floats:
-    """Memory (..., K, D, 3) where the dwell before is as long as the dwell, (..., D, 3)."""
+    """Interpolate memory (..., K, D, 3) where the dwell before is as long as the dwell, (..., D, 3)."""
     return np.stack([memory_after(memory, dwell, knots)[..., i, :] for i, dwell in enumerate(DWELLS)], -2)
 
 
 def memory_after(memory: Floats, before: float, knots: Floats = BEFORE) -> Floats:
-    """Memory (..., K, D, 3) after a dwell `before`, (..., D, 3): linear between `knots` and FORGOTTEN."""
+    """Interpolate memory (..., K, D, 3) to a dwell `before`, (..., D, 3): linear between `knots` and FORGOTTEN."""
     if before >= FORGOTTEN:
         return np.zeros_like(memory[..., 0, :, :])
     k = max(int(np.searchsorted(knots, before, side="right")) - 1, 0)

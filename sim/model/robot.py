@@ -62,7 +62,7 @@ class Robot:
         check_slenderness(self.tail_length / self.tail_radius)
 
     def sigma(self, name: str) -> Sigma:
-        """One standard deviation of a field, as stated or by default (`sim.model.uncertainty`)."""
+        """Return one standard deviation of a field, as stated or by default (`sim.model.uncertainty`)."""
         return self.sigmas.get(name, DEFAULTS[name])
 
     @property
@@ -81,7 +81,7 @@ class Robot:
         return self.motor_speed * self.time_scale
 
     def group_values(self) -> dict[str, float]:
-        """The dimensionless groups of this robot by column name, for the positive direction of the motor.
+        """Compute the dimensionless groups of this robot by column name, for the positive direction of the motor.
 
         Raises:
             InputError: the robot has a correction, and is outside its range.
@@ -101,9 +101,9 @@ class Robot:
         return values if self.correction is None else self.correction.applied(values)
 
     def groups(self) -> Groups:
-        """This robot as a batch of one."""
+        """Return this robot as a batch of one."""
         return Groups.from_columns({name: np.array([value]) for name, value in self.group_values().items()})
 
     def with_motor(self, omega_bar: float) -> Robot:
-        """The same robot with the motor speed that gives `omega_bar`."""
+        """Return the same robot with the motor speed that gives `omega_bar`."""
         return replace(self, motor_speed=abs(omega_bar) / self.time_scale)

@@ -56,7 +56,7 @@ class Schedule:
 
 
 def load_schedule(path: str | Path) -> Schedule:
-    """The schedule in a plan.json.
+    """Load the schedule in a plan.json.
 
     Raises:
         InputError: the file is not a plan.

@@ -19,7 +19,7 @@ class Sigma(NamedTuple):
     relative: bool
 
     def of(self, value: float) -> float:
-        """σ in the unit of `value`."""
+        """Compute σ in the unit of `value`."""
         return self.size * abs(value) if self.relative else self.size
 
 
@@ -36,7 +36,7 @@ _LARGEST = 0.5  # share of the number itself
 
 
 def read_sigma(given: object, value: float, entry: str) -> Sigma:
-    """σ from an entry of a robot.toml: a number in the unit of its key, or a text like "10 %".
+    """Read σ from an entry of a robot.toml: a number in the unit of its key, or a text like "10 %".
 
     Raises:
         InputError: neither of them, below 0, or more than half of the number.
@@ -58,5 +58,5 @@ def read_sigma(given: object, value: float, entry: str) -> Sigma:
 
 
 def sigma_text(sigma: Sigma) -> str:
-    """The entry that `read_sigma` reads back."""
+    """Write the entry that `read_sigma` reads back."""
     return f'"{100 * sigma.size:.12g} %"' if sigma.relative else repr(sigma.size)

@@ -27,7 +27,7 @@ _STEP = 1e-7  # in l, and of 1 + |ω|
 
 
 def growth(body: Body, tails: int, x: Floats, u: Floats) -> float:
-    """The largest real part of λ over |ω|, on an orbit x (n, M, 3), u (P, 4) of N tails.
+    """Compute the largest real part of λ over |ω|, on an orbit x (n, M, 3), u (P, 4) of N tails.
 
     Above 0 the tails leave the motion in which they move alike. The error of the mesh is a few hundredths.
     """
@@ -45,12 +45,12 @@ def growth(body: Body, tails: int, x: Floats, u: Floats) -> float:
 
 
 def _slopes(body: Body, x: Floats, x_dot: Floats, u: Floats, rate: float) -> Floats:
-    """Derivatives of (r, t) in (x, u) where ẋ = rate (x − x*), (3 n N + 4, 3 n N + 4)."""
+    """Compute the derivatives of (r, t) in (x, u) where ẋ = rate (x − x*), (3 n N + 4, 3 n N + 4)."""
     rates = in_stage(rate, FIRST_PHASE - tail_spin(body, u) / rate, x - x_dot / rate)
     at = np.concatenate([x.reshape(-1), u])
     steps = np.where(np.arange(len(at)) < x.size, _STEP, _STEP * (1 + abs(body.omega)))
     room, r, t = new_room(x, u[None]), np.empty_like(x), np.empty((1, 4))
-    found = np.empty((len(at), len(at)))
+    jacobian = np.empty((len(at), len(at)))
     for i, step in enumerate(steps):
         ends = []
         for sign in (-1, 1):
@@ -58,5 +58,5 @@ def _slopes(body: Body, x: Floats, x_dot: Floats, u: Floats, rate: float) -> Flo
             moved[i] += sign * step
             fill_residual(body, rates, moved[: x.size].reshape(x.shape), moved[None, x.size :], room, r, t)
             ends.append(np.concatenate([r.reshape(-1), t[0]]))
-        found[:, i] = (ends[1] - ends[0]) / (2 * step)
-    return found
+        jacobian[:, i] = (ends[1] - ends[0]) / (2 * step)
+    return jacobian

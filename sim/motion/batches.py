@@ -35,14 +35,14 @@ Result = TypeVar("Result")
 
 
 def split(tails: Floats, rows: int) -> list[Integers]:
-    """Row numbers of batches of one N with at most `rows` rows."""
+    """Split rows into batches of one N with at most `rows` rows; yield their row numbers."""
     order = np.argsort(tails, kind="stable")
     ends = np.flatnonzero(np.diff(tails[order])) + 1
     return [part for same in np.split(order, ends) for part in np.array_split(same, -(-len(same) // rows))]
 
 
 def available_jobs() -> int:
-    """Number of processes to use by default: the processors that this process may run on."""
+    """Count the processes to use by default: the processors that this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -63,15 +63,15 @@ def run_batches(
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs = {jobs}; give at least 1, or nothing for all processors")
     count = min(jobs or available_jobs(), len(jobs_to_do))
-    here = (
+    in_this_process = (
         threads or count <= 1
     )  # the number of threads is a setting of the process: set it once, not in each worker
-    task = work if here else partial(_single_threaded, work)
+    task = work if in_this_process else partial(_single_threaded, work)
     results: list[Result] = []
-    if not here:
+    if not in_this_process:
         compile_once()
     with (
-        one_thread() if here else nullcontext(),
+        one_thread() if in_this_process else nullcontext(),
         tqdm(total=sum(sizes), desc=title, unit="row", delay=1.0, disable=not title) as bar,
     ):
         if count <= 1:
@@ -89,7 +89,7 @@ def run_batches(
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Tensor and matrix operations of this process use one thread each."""
+    """Let tensor and matrix operations of this process use one thread each."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -107,7 +107,7 @@ def _single_threaded(work: Callable[[Job], Result], job: Job) -> Result:
 def steady_columns(
     columns: Mapping[str, Floats], *, jobs: int | None = None, title: str = "steady"
 ) -> dict[str, Any]:
-    """Steady motion of any robots, in parallel (`sim.motion.steady`).
+    """Simulate the steady motion of any robots, in parallel (`sim.motion.steady`).
 
     Args:
         columns: robots by column name, see `sim.inputs.check_columns`, each (M,).
@@ -129,7 +129,7 @@ def sensitivity_columns(
     jobs: int | None = None,
     title: str = "sensitivities",
 ) -> Sensitivities:
-    """Steady motion of any robots and its derivatives, in parallel (`sim.motion.sensitivity`).
+    """Simulate the steady motion of any robots and its derivatives, in parallel (`sim.motion.sensitivity`).
 
     Args:
         columns: robots by column name, each (M,).
@@ -141,7 +141,7 @@ def sensitivity_columns(
     values = check_columns(columns)
     batches = split(values["N"], _SLOPE_ROWS)
     parts = [Groups.from_columns({name: array[rows] for name, array in values.items()}) for rows in batches]
-    work = partial(_slopes_batch, parameters=tuple(parameters), phases=phases)
+    work = partial(sensitivities, parameters=tuple(parameters), phases=phases)
     done = run_batches(work, parts, sizes=[len(b) for b in batches], jobs=jobs, title=title, threads=True)
     order = np.argsort(np.concatenate(batches))
     return Sensitivities(
@@ -159,7 +159,7 @@ def stepped_columns(
     jobs: int | None = None,
     title: str = "time stepping",
 ) -> dict[str, Any]:
-    """The same by time stepping from rest (`sim.motion.settling`): the reference for the direct solution.
+    """Simulate by time stepping from rest (`sim.motion.settling`): the reference for the direct solution.
 
     Args:
         columns: robots by column name, each (M,).
@@ -186,10 +186,6 @@ def _in_batches(
     done = run_batches(work, parts, sizes=sizes, jobs=jobs, title=title, threads=True)
     order = np.argsort(np.concatenate(batches))
     return {name: np.concatenate([d[name] for d in done])[order] for name in done[0]}
-
-
-def _slopes_batch(groups: Groups, *, parameters: tuple[str, ...], phases: int) -> Sensitivities:
-    return sensitivities(groups, parameters, phases=phases)
 
 
 def _steady_batch(columns: dict[str, Floats]) -> dict[str, Any]:

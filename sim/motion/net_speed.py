@@ -13,7 +13,7 @@ from sim.model.response import BEFORE, DWELLS, at_equal_dwells
 
 
 def twists(surge: Floats, sway: Floats, yaw_rate: Floats, sense: Floats) -> Floats:
-    """Steady twists (B, 3), forward, left and yaw rate, seen as for a positive motor.
+    """Compute the steady twists (B, 3), forward, left and yaw rate, seen as for a positive motor.
 
     Args:
         surge, sway, yaw_rate: v_z, v_x and ω_yr, (B,) each.
@@ -23,7 +23,7 @@ def twists(surge: Floats, sway: Floats, yaw_rate: Floats, sense: Floats) -> Floa
 
 
 def net_speeds(twist: Floats, lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
-    """Net speed (B, D) of equal dwells of DWELLS.
+    """Compute the net speed (B, D) of equal dwells of DWELLS.
 
     Args:
         twist: (B, 3), see `twists`.

@@ -35,7 +35,7 @@ class Orbits(NamedTuple):
 def solve_orbits(
     rows: Floats, tails: int, directions: Floats | None = None, *, phases: int = FEW, stability: bool = False
 ) -> Orbits:
-    """Orbits of robots with N tails.
+    """Solve for the orbits of robots with N tails.
 
     Args:
         rows: (B, K'), the robots' numbers (`sim.solve.assembly.numbers`, transposed).
@@ -68,7 +68,7 @@ def solve_orbits(
 
 
 def _slopes(body: Body, row: Floats, directions: Floats, orbit: Orbit) -> Floats:
-    """Derivatives of the extrapolated means along `directions` (K, K'), (K, 5)."""
+    """Compute the derivatives of the extrapolated means along `directions` (K, K'), (K, 5)."""
     moved = list(zip(unpacked(row - WIDTH * directions), unpacked(row + WIDTH * directions), strict=True))
     slopes = np.empty((3, len(directions), 5))
     for i, (x, u) in enumerate(zip(orbit.x, orbit.u, strict=True)):

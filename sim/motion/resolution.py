@@ -33,7 +33,7 @@ class Resolution:
 
     @staticmethod
     def fitting(omega_bar: float) -> Resolution:
-        """The default for a motor speed: within 1 % of the limit up to ω̄ = 110."""
+        """Choose the default for a motor speed: within 1 % of the limit up to ω̄ = 110."""
         speed = abs(omega_bar)
         if speed < 20:
             return Resolution(16, 24)
@@ -43,38 +43,38 @@ class Resolution:
 
     @staticmethod
     def for_settling(omega_bar: float) -> Resolution:
-        """The default for a steady motion reached in time steps: the error of its yaw rate is about 0.2 %."""
+        """Choose the default for steady motion reached in time steps: the error of its yaw rate is about 0.2 %."""
         plain = Resolution.fitting(omega_bar)
         return Resolution(plain.edges + 8, 2 * plain.steps)
 
     @staticmethod
     def for_tracks(omega_bar: float) -> Resolution:
-        """The default for tracks, where an error of the yaw rate accumulates: its error is about 0.05 %."""
+        """Choose the default for tracks, where an error of the yaw rate accumulates: its error is about 0.05 %."""
         plain = Resolution.fitting(omega_bar)
         return Resolution(plain.edges + 32, 2 * plain.steps)
 
     def refined(self) -> Resolution:
-        """The same mesh with half the step."""
+        """Return the same mesh with half the step."""
         return Resolution(self.edges, 2 * self.steps)
 
     def finer(self, factor: int) -> Resolution:
-        """Edges and steps `factor` times as many."""
+        """Multiply edges and steps by `factor`."""
         return Resolution(factor * self.edges, factor * self.steps)
 
     def work_of_a_step(self, body: Body, tails: int) -> float:
-        """Work of one step, with the work for flow and contact."""
+        """Estimate the work of one step, with the work for flow and contact."""
         nodes = self.edges * tails
         work = nodes * (1 + _FLOW * nodes) if has_flow(body) else float(nodes)
         return work + _CONTACT * tails * (tails - 1) if has_contact(body) else work
 
 
 def time_step(omega_bar: float, resolution: Resolution) -> float:
-    """dt for a motor speed: a part of a motor revolution, at most _LONGEST_STEP."""
+    """Choose dt for a motor speed: a part of a motor revolution, at most _LONGEST_STEP."""
     with np.errstate(over="ignore"):
         return min(float(2 * math.pi / (resolution.steps * np.float64(abs(omega_bar)))), _LONGEST_STEP)
 
 
 def steps_in(duration: float, dt: float) -> float:
-    """Number of steps of at most dt in a duration; a float, since it may be too large for an integer type."""
+    """Count steps of at most dt in a duration; a float, since the number may be too large for an integer type."""
     with np.errstate(over="ignore", divide="ignore"):
         return max(1.0, float(np.ceil(np.float64(duration) / dt - 1e-9)))

@@ -48,7 +48,7 @@ class Curves(NamedTuple):
 def responses(
     groups: Groups, motion: Steady | None = None, *, history: bool = True, before: Floats = BEFORE
 ) -> Responses:
-    """Response of B robots of one N to a flip of the motor.
+    """Simulate the response of B robots of one N to a flip of the motor.
 
     Args:
         groups: robots; the sign of ω̄ is the direction of the motor after the flip.
@@ -84,7 +84,7 @@ def responses(
 
 
 def _solved(body: Body, reverse: Body, tails: int, even: bool, history: bool, before: Floats) -> Curves | None:
-    """Curves of one robot by transients; None where its motion, or a transient, cannot be solved for."""
+    """Solve for the curves of one robot by transients; None where its motion or a transient has no solution."""
     coarse = _on_mesh(body, reverse, tails, even, _MESHES[0], before, history=False)
     if coarse is None:
         return None
@@ -100,7 +100,7 @@ def _solved(body: Body, reverse: Body, tails: int, even: bool, history: bool, be
 def _on_mesh(
     body: Body, reverse: Body, tails: int, even: bool, edges: int, before: Floats, *, history: bool
 ) -> Curves | None:
-    """Curves on one mesh; memory and rest only with `history`."""
+    """Solve for the curves on one mesh; memory and rest only with `history`."""
     after = _orbit(body, tails, edges)
     if after is None:
         return None
@@ -108,11 +108,11 @@ def _on_mesh(
     if even:
         start, first = _mirrored(x), u
     else:
-        came = _orbit(reverse, tails, edges, instants=u.shape[0])
-        if came is None:
+        before_flip = _orbit(reverse, tails, edges, instants=u.shape[0])
+        if before_flip is None:
             return None
-        other = came[2]
-        start, first = came[0], came[1] * REVERSED
+        reverse_twist = before_flip[2]
+        start, first = before_flip[0], before_flip[1] * REVERSED
     main = transient(body, start.copy(), first.copy(), twist, SETTLED, before, _TOLERANCE)
     if not main.solved:
         return None
@@ -126,7 +126,7 @@ def _on_mesh(
     if even:
         shapes = np.array([_mirrored(shape) for shape in shapes])
     else:
-        back = transient(reverse, x.copy(), u * REVERSED, other, float(before[-1]), before, _TOLERANCE)
+        back = transient(reverse, x.copy(), u * REVERSED, reverse_twist, float(before[-1]), before, _TOLERANCE)
         if not back.solved:
             return None
         shapes = back.shapes
@@ -143,7 +143,7 @@ def _on_mesh(
 
 
 def _orbit(body: Body, tails: int, edges: int, instants: int = 0) -> tuple[Floats, Floats, Floats] | None:
-    """Steady x (n, M, 3), u (P, 4) and (v_z, h_x, ω_yr) on as many instants a turn as the response needs."""
+    """Solve for x (n, M, 3), u (P, 4) and (v_z, h_x, ω_yr) on as many instants a turn as the response needs."""
     solved, x, u = orbit_on_mesh(body, tails, edges)
     if not solved:
         return None
@@ -160,5 +160,5 @@ def _orbit(body: Body, tails: int, edges: int, instants: int = 0) -> tuple[Float
 
 
 def _mirrored(x: Floats) -> Floats:
-    """The mirror image of a robot's shape (n, M, 3): what a reversed motor makes of it."""
+    """Mirror a robot's shape (n, M, 3), as a reversed motor does."""
     return np.ascontiguousarray(x[:, -np.arange(x.shape[1])] * np.array([1.0, -1.0, 1.0]))

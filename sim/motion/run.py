@@ -44,14 +44,14 @@ class Run:
         self._work_left = MOST_WORK if most_work is None else most_work
 
     def copy(self) -> Run:
-        """An independent copy of this run."""
-        other = object.__new__(Run)
-        other.__dict__ |= vars(self)
-        other.state = State(*(array.copy() for array in self.state))
-        return other
+        """Return an independent copy of this run."""
+        duplicate = object.__new__(Run)
+        duplicate.__dict__ |= vars(self)
+        duplicate.state = State(*(array.copy() for array in self.state))
+        return duplicate
 
     def can_afford(self, duration: float, *, flips: float = 0) -> bool:
-        """Whether the work that is left is enough for this time and these flips; sets `failed` if not."""
+        """Tell whether the work that is left is enough for this time and these flips; sets `failed` if not."""
         steps = steps_in(duration, self.time_step) + flips * 2 * len(_GRADES)
         if not self.failed and not steps * self._work_of_a_step <= self._work_left:
             self.failed = TOO_MUCH
@@ -69,8 +69,8 @@ class Run:
         if self._jumped:
             share = min(self.time_step, duration / 2 / (2 * sum(_GRADES)))
             parts = [(2, 2 * share * grade) for grade in _GRADES]
-        left = duration - sum(part for _, part in parts)
-        parts.append((int(steps_in(left, self.time_step)), left))
+        remaining = duration - sum(part for _, part in parts)
+        parts.append((int(steps_in(remaining, self.time_step)), remaining))
         times, poses, now = [], [], 0.0
         for count, part in parts:
             times.append(now + part * np.arange(1, count + 1) / count)

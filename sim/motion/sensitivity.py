@@ -37,7 +37,7 @@ class Sensitivities:
 
 
 def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MANY) -> Sensitivities:
-    """Steady motion and its derivatives.
+    """Simulate steady motion and its derivatives.
 
     Args:
         groups: robots of one N.
@@ -74,7 +74,7 @@ def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MA
 
 
 def _direction(groups: Groups, name: str) -> tuple[Floats, Floats]:
-    """Derivative of the robots' numbers in parameter/scale, (B, K'), and the scale, (B,)."""
+    """Compute the derivative of the robots' numbers in parameter/scale, (B, K'), and the scale, (B,)."""
     if name in SLOPE_INPUTS:
         value = getattr(groups, name)
         size = value.abs()

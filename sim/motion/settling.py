@@ -68,8 +68,8 @@ def settle(
     for body in robots:
         chosen = resolution if isinstance(resolution, Resolution) else resolution(body.omega)
         settled = settle_one(body, groups.N, chosen)
-        again = settled.failed == BROKE_DOWN
-        ended.append(settle_one(body, groups.N, chosen.refined()) if again else settled)
+        broke_down = settled.failed == BROKE_DOWN
+        ended.append(settle_one(body, groups.N, chosen.refined()) if broke_down else settled)
     means = np.array([e.means for e in ended]).T
     return Steady(
         omega_t=means[0],
@@ -122,7 +122,7 @@ def settle_one(body: Body, tails: int, resolution: Resolution) -> Settled:
 
 
 def steady_state(body: Body, tails: int, resolution: Resolution) -> State | None:
-    """A state of the steady motion: on the orbit, or settled from rest; None where the robot breaks down."""
+    """Find a state of the steady motion: on the orbit, or settled from rest; None where the robot breaks down."""
     state = state_on_orbit(body, tails, resolution.edges, 0.0)
     if state is not None:
         return state
@@ -131,7 +131,7 @@ def steady_state(body: Body, tails: int, resolution: Resolution) -> State | None
 
 
 def _smallest_gap(run: Run, revolution: float) -> float:
-    """Smallest gap between tails at some instants of the next revolution."""
+    """Compute the smallest gap between tails at some instants of the next revolution."""
     part = revolution / _GAP_SHAPES
     smallest = np.inf
     for _ in range(_GAP_SHAPES):
@@ -143,7 +143,7 @@ def _smallest_gap(run: Run, revolution: float) -> float:
 
 
 def _means(time: Floats, poses: Floats, omega: float, tails: int) -> tuple[Floats, float, bool]:
-    """Rates (4,) over the last whole revolutions, their drift, and whether they are known.
+    """Average the rates (4,) over the last whole revolutions; return their drift, and whether they are known.
 
     The drift compares the last window with the one before it. Where one revolution is longer than the transient,
     it compares with the same window an N-th of a revolution earlier, scaled up to a whole window.

@@ -20,7 +20,7 @@ from sim.solve.refinement import FEW, REASONS, SOLVED, orbit_on_mesh, refined_or
 
 
 def tails_over_a_revolution(robot: Robot, frames: int) -> tuple[Floats, Floats]:
-    """Disc phases (F,) and tails (F, N, n + 1, 3), clamp to tip, with the motor in its positive direction.
+    """Return disc phases (F,) and tails (F, N, n + 1, 3), clamp to tip, with the motor in its positive direction.
 
     Raises:
         InputError: the robot has no steady motion in which its tails move alike.
@@ -47,12 +47,12 @@ def tails_over_a_revolution(robot: Robot, frames: int) -> tuple[Floats, Floats]:
 
 
 def at_phases(periodic: Floats, at: Floats) -> Floats:
-    """A function on the orbit's phases, (K, M, c), at disc phases `at` (F,) by its interpolant, (F, K, c)."""
+    """Interpolate a function on the orbit's phases, (K, M, c), at disc phases `at` (F,), (F, K, c)."""
     return np.einsum("fm,kmc->fkc", interpolation(periodic.shape[1], at - FIRST_PHASE), periodic)
 
 
 def state_on_orbit(body: Body, tails: int, edges: int, phase: float) -> State | None:
-    """The state of a steadily swimming robot at a disc phase; None where there is no orbit."""
+    """Return the state of a steadily swimming robot at a disc phase; None where there is no orbit."""
     solved, x, u = orbit_on_mesh(body, tails, edges)
     if not solved:
         return None
@@ -66,5 +66,5 @@ def state_on_orbit(body: Body, tails: int, edges: int, phase: float) -> State | 
 
 
 def _in_one_period(u: Floats, phase: float, tails: int) -> Floats:
-    """Velocities (P, 4) of period 2π/N at a disc phase, (4,)."""
+    """Interpolate velocities (P, 4) of period 2π/N at a disc phase, (4,)."""
     return at_phases(np.tile(u, (tails, 1))[None], np.array([phase]))[0, 0]

@@ -32,7 +32,7 @@ _OTHER_MOTION = "straight tails reach another motion than the one in which they 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
 def steady(groups: Groups) -> Steady:
-    """Steady motion of robots of one N, as reached from rest.
+    """Simulate the steady motion of robots of one N, as reached from rest.
 
     Args:
         groups: B robots; ω̄ may have either sign.
@@ -55,8 +55,8 @@ def steady(groups: Groups) -> Steady:
     doubtful = np.flatnonzero(~motion.failed & (quick | (growth > GROWS)))
     if len(doubtful):
         reached = settle(_rows(groups, doubtful), resolution=Resolution.for_settling)
-        other = doubtful[_difference(motion.at(doubtful), reached) > SAME]
-        motion = _with_stepped(motion, groups, other, np.full(len(groups), _OTHER_MOTION))
+        changed = doubtful[_difference(motion.at(doubtful), reached) > SAME]
+        motion = _with_stepped(motion, groups, changed, np.full(len(groups), _OTHER_MOTION))
     lost = np.flatnonzero(motion.failed & (motion.method == DIRECT))
     return _with_stepped(motion, groups, lost, motion.note)
 
@@ -69,7 +69,7 @@ def check_groups(groups: Groups) -> None:
 
 
 def _with_stepped(motion: Steady, groups: Groups, rows: Integers, notes: Words) -> Steady:
-    """This motion with `rows` stepped instead; notes (B,) say why."""
+    """Step `rows` of this motion in time instead; notes (B,) say why."""
     if not len(rows):
         return motion
     return motion.with_rows(rows, stepped(_rows(groups, rows), notes[rows].tolist()))
@@ -80,12 +80,12 @@ def _rows(groups: Groups, rows: Integers) -> Groups:
 
 
 def orbits(groups: Groups, *, phases: int = FEW) -> Steady:
-    """The direct solution alone, with `phases` phases to begin with; `failed` where there is no orbit."""
+    """Solve directly, with `phases` phases to begin with; `failed` where there is no orbit."""
     return _orbits(groups, phases, stability=False)[0]
 
 
 def _orbits(groups: Groups, phases: int, *, stability: bool) -> tuple[Steady, Floats]:
-    """The direct solution, and how fast tails in contact leave it, (B,)."""
+    """Solve directly, and compute how fast tails in contact leave the solution, (B,)."""
     rows = np.ascontiguousarray(numbers(groups).detach().cpu().numpy().T)
     solution = solve_orbits(rows, groups.N, phases=phases, stability=stability)
     means = solution.means.T
@@ -120,7 +120,7 @@ def stepped(groups: Groups, notes: list[str]) -> Steady:
 
 
 def _difference(motion: Steady, other: Steady) -> Floats:
-    """Largest relative difference of the means; velocities relative to the speed."""
+    """Compute the largest relative difference of the means; velocities relative to the speed."""
     speed = np.hypot(other.v_x, other.v_z)
     rates = [np.abs(getattr(motion, k) / getattr(other, k) - 1) for k in ("omega_t", "omega_h", "omega_yr")]
     velocities = [np.abs(getattr(motion, k) - getattr(other, k)) / speed for k in ("v_x", "v_z")]

@@ -55,7 +55,7 @@ class Steady:
 
     @np.errstate(all="ignore")  # robots that do not turn have no radius
     def columns(self) -> dict[str, Any]:
-        """Columns of the command `softflagella sim steady`."""
+        """Return the columns of the command `softflagella sim steady`."""
         values = (
             self.omega_t, self.omega_h, self.omega_yr, self.v_x, self.v_z,
             self.turn_radius, np.degrees(self.slip_angle), self.converged, self.tail_gap,
@@ -64,11 +64,11 @@ class Steady:
         return dict(zip((*STEADY_COLUMNS, *QUALITY_COLUMNS), values, strict=True))
 
     def at(self, rows: Integers) -> Steady:
-        """The rows at `rows`."""
+        """Return the rows at `rows`."""
         return Steady(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
     def with_rows(self, rows: Integers, other: Steady) -> Steady:
-        """This motion with `rows` taken from `other`."""
+        """Replace `rows` of this motion by those of `other`."""
         changed = {}
         for field in fields(self):
             values = getattr(self, field.name)

@@ -29,7 +29,7 @@ def stepped_response(
     history: bool = True,
     settled: float = np.inf,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Lag (D, 3), memory (K, D, 3), lag from rest (D, 3) and spread (D, 3) as in `sim.motion.response.Responses`.
+    """Step lag (D, 3), memory (K, D, 3), lag from rest (D, 3) and spread (D, 3) of `sim.model.response.Responses`.
 
     Args:
         body: with the motor's speed after the flip.
@@ -84,7 +84,7 @@ def stepped_response(
 
 
 def _after_short_dwells(run: Run, before: Floats, dwells: Floats, sense: float) -> Floats:
-    """Pose changes (K, D, 3) from a steady run: back for each of `before`, then forth."""
+    """Compute the pose changes (K, D, 3) from a steady run: back for each of `before`, then forth."""
     back = run.copy()
     back.flip()
     lags, now = np.full((len(before), len(dwells), 3), np.nan), 0.0
@@ -101,7 +101,7 @@ def _flipped_poses(run: Run, dwells: Floats, sense: float) -> Floats:
 
 
 def _poses(run: Run, dwells: Floats, sense: float) -> Floats:
-    """Pose changes after each dwell (D, 3), seen as for a positive motor; NaN where the run breaks down."""
+    """Step to each dwell: pose changes (D, 3), seen as for a positive motor; NaN where the run breaks down."""
     start, now = run.pose, 0.0
     poses = np.full((len(dwells), 3), np.nan)
     for i, time in enumerate(dwells):

@@ -83,8 +83,8 @@ def switch_response(
     motion = steady(groups) if motion is None else motion
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
     robots = bodies(groups)
-    both = zip(robots, reversed_bodies(groups), dwell, strict=True)
-    lag = np.array([_lag(body, reverse, groups.N, T, even, resolution) for body, reverse, T in both])
+    pairs = zip(robots, reversed_bodies(groups), dwell, strict=True)
+    lag = np.array([_lag(body, reverse, groups.N, T, even, resolution) for body, reverse, T in pairs])
     sense = np.sign([body.omega for body in robots])
     twist = twists(motion.v_z, motion.v_x, motion.omega_yr, sense)
     speed = planar.net_speed(twist, lag, dwell)
@@ -94,7 +94,7 @@ def switch_response(
 
 
 def _lag(body: Body, reverse: Body, tails: int, dwell: float, even: bool, resolution: Resolution | None) -> Floats:
-    """(Δz, Δx, Δψ) of one robot; NaN where it breaks down."""
+    """Step the lag (Δz, Δx, Δψ) of one robot; NaN where it breaks down."""
     chosen = resolution or Resolution.fitting(body.omega)
     state = steady_state(body, tails, chosen)
     if state is None:
@@ -117,7 +117,7 @@ def _lag(body: Body, reverse: Body, tails: int, dwell: float, even: bool, resolu
 def steady_twist(
     run: Run, tails: int, sense: float, *, adapts: float = _ADAPTS, window: float = _WINDOW
 ) -> tuple[Floats, float]:
-    """Forward, leftward and yaw rate for a positive motor, and the time in which the disc turns by one spacing.
+    """Average forward, leftward and yaw rate for a positive motor; return the time of a turn by one spacing, too.
 
     Velocities repeat with the spacing of the tails: means over a whole number of spacings. The spin may change
     within a turn (near a free surface, say), so the end is approached by the angle of the disc.
@@ -130,8 +130,8 @@ def steady_twist(
     before, spacing, time = run.state.pose.copy(), 2 * np.pi / tails, 0.0
     angle = spacing * max(1, math.ceil(window * abs(run.omega_t) / spacing))
     for share in (_APPROACH, _APPROACH, 1.0):
-        left = angle - abs(run.state.pose[PHASE] - before[PHASE])
-        step = share * max(left, 0.0) / max(abs(run.omega_t), 1e-300)
+        remaining = angle - abs(run.state.pose[PHASE] - before[PHASE])
+        step = share * max(remaining, 0.0) / max(abs(run.omega_t), 1e-300)
         run.go(step)
         time += step
     change = (run.state.pose - before) / time
@@ -140,7 +140,7 @@ def steady_twist(
 
 
 def _change(run: Run, dwell: float, even: bool, sense: float) -> Floats:
-    """Pose change over a dwell, seen in the direction of a positive motor."""
+    """Compute the pose change over a dwell, seen in the direction of a positive motor."""
     flips = 1 + MEMORY / dwell
     if not run.can_afford(MEMORY + dwell, flips=flips):
         return np.full(3, np.nan)

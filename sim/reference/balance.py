@@ -65,22 +65,22 @@ class TensorRobots:
         return self.root.shape[3]
 
     def omega_t(self, u: Tensor, omega: Tensor) -> Tensor:
-        """Spin of the tails, (B,), for velocities u (4, B) and motor speeds (B,)."""
+        """Compute the spin of the tails, (B,), for velocities u (4, B) and motor speeds (B,)."""
         return omega + motor_gain(self.body) * u[3]
 
     def voronoi(self) -> Tensor:
-        """Lengths l_k that belong to nodes 0..n, (n + 1, 1, 1)."""
+        """Return the lengths l_k that belong to nodes 0..n, (n + 1, 1, 1)."""
         lengths = torch.full((self.n + 1, 1, 1), 1 / self.n, dtype=self.root.dtype, device=self.root.device)
         lengths[0] = lengths[-1] = 0.5 / self.n
         return lengths
 
     def straight(self) -> Tensor:
-        """Free nodes 1..n of straight tails, (n, 3, N, B)."""
+        """Return the free nodes 1..n of straight tails, (n, 3, N, B)."""
         arc = torch.arange(1, self.n + 1, dtype=self.root.dtype, device=self.root.device) / self.n
         return self.root + arc.reshape(-1, 1, 1, 1) * self.root_tangent
 
     def select(self, robots: Tensor) -> TensorRobots:
-        """The robots at `robots`, (K,) indices."""
+        """Return the robots at `robots`, (K,) indices."""
         terms = self.body.nonlocal_terms
         picked = {name: getattr(self.body, name)[..., robots] for name in Body._fields[:-1]}
         body = Body(**picked, nonlocal_terms=terms._make(value[..., robots] for value in terms))
@@ -88,7 +88,7 @@ class TensorRobots:
 
 
 def tensor_robots(groups: Groups, *, edges: int) -> TensorRobots:
-    """The robots of `groups` (B of one N) with `edges` edges a tail."""
+    """Describe the robots of `groups` (B of one N) with `edges` edges a tail."""
     body = assemble(groups)
     like = body.offset
     angle = 2 * math.pi * torch.arange(groups.N, dtype=like.dtype, device=like.device) / groups.N
@@ -100,13 +100,13 @@ def tensor_robots(groups: Groups, *, edges: int) -> TensorRobots:
 
 
 def body_axes(phase: Tensor) -> tuple[Tensor, Tensor]:
-    """e_x and e_y in the disc frame, each (3, 1, B), for phases (B,)."""
+    """Compute e_x and e_y in the disc frame, each (3, 1, B), for phases (B,)."""
     c, s, none = torch.cos(phase), torch.sin(phase), torch.zeros_like(phase)
     return torch.stack([c, -s, none]).unsqueeze(1), torch.stack([s, c, none]).unsqueeze(1)
 
 
 def _directions(nodes: Tensor, e_x: Tensor, e_y: Tensor) -> Tensor:
-    """G as (4, n + 1, 3, N, B)."""
+    """Assemble G as (4, n + 1, 3, N, B)."""
     G = torch.zeros(4, *nodes.shape, dtype=nodes.dtype, device=nodes.device)
     G[0] = e_x
     G[1, :, 2] = 1.0
@@ -127,12 +127,12 @@ class _Drag:
     force: Tensor  # q, (n + 1, 3, N, B)
 
     def on(self, directions: Tensor) -> Tensor:
-        """Drag for velocities (4, n + 1, 3, N, B)."""
+        """Compute the drag for velocities (4, n + 1, 3, N, B)."""
         x, y, z = directions.unbind(2)
         return torch.stack(node_drag(self.tangent, (x, y, z), self.perp, self.excess), 2)
 
     def of(self, nodes: slice) -> tuple[Vector, Tensor, Tensor, Tensor]:
-        """Tangent, spread, perp and excess of some nodes."""
+        """Return tangent, spread, perp and excess of some nodes."""
         x, y, z = (t[nodes] for t in self.tangent)
         return (x, y, z), self.spread[nodes], self.perp[nodes], self.excess[nodes]
 
@@ -148,33 +148,27 @@ def _node_drag(robots: TensorRobots, shape: Shape, velocity: Tensor) -> _Drag:
 
 
 def _body_velocity(robots: TensorRobots, u: Tensor, omega: Tensor) -> Tensor:
-    """w = (v_x, v_z, ω_yr, ω_t), (4, B)."""
+    """Compute w = (v_x, v_z, ω_yr, ω_t), (4, B)."""
     return torch.cat([u[:3], robots.omega_t(u, omega).unsqueeze(0)])
 
 
 def _node_load(robots: TensorRobots, e_x: Tensor, e_y: Tensor) -> Tensor:
-    """Force of the load on every node, (n + 1, 3, N, B)."""
+    """Compute the force of the load on every node, (n + 1, 3, N, B)."""
     load = robots.body.tail_load[0] * e_x + robots.body.tail_load[1] * e_y
     load[2] = load[2] + robots.body.tail_load[2]
     return robots.voronoi().unsqueeze(1) * load.expand(3, *robots.root.shape[2:])
 
 
 def _body_load(robots: TensorRobots, u: Tensor, omega: Tensor) -> Tensor:
-    """Wrench (4, B) about J of the fluid on head and disc."""
+    """Compute the wrench (4, B) about J of the fluid on head and disc."""
     all_five = torch.cat([u, robots.omega_t(u, omega).unsqueeze(0)])
     return -(robots.body.resistance * all_five).sum(1)
 
 
 def newton_correction(
-    robots: TensorRobots,
-    x: Tensor,
-    x_dot: Tensor,
-    phase: Tensor,
-    u: Tensor,
-    omega: Tensor,
-    rate: Tensor,
+    robots: TensorRobots, x: Tensor, x_dot: Tensor, phase: Tensor, u: Tensor, omega: Tensor, rate: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """One Newton correction (δx, δu) of the balance.
+    """Compute one Newton correction (δx, δu) of the balance.
 
     Args:
         x, x_dot: free nodes and their velocity in the disc frame, (n, 3, N, B).
@@ -217,7 +211,7 @@ def newton_correction(
 
 
 def _add_elastic(matrix: BlockBanded, stiffness: EdgeStiffness) -> None:
-    """Derivative of f_k = E_{e_k} − E_{e_{k−1}} in the node positions."""
+    """Add the derivative of f_k = E_{e_k} − E_{e_{k−1}} in the node positions."""
     H, U = stiffness
     L = U.transpose(1, 2)
     diagonal = matrix.diagonal(0)
@@ -233,15 +227,9 @@ def _add_elastic(matrix: BlockBanded, stiffness: EdgeStiffness) -> None:
 
 
 def _add_drag(
-    matrix: BlockBanded,
-    shape: Shape,
-    drag_: _Drag,
-    velocity: Tensor,
-    w: Tensor,
-    e_y: Tensor,
-    rate: Tensor,
+    matrix: BlockBanded, shape: Shape, drag_: _Drag, velocity: Tensor, w: Tensor, e_y: Tensor, rate: Tensor
 ) -> None:
-    """Derivative of q_k in the node positions: through ẋ, through Ω × x and through the tangents."""
+    """Add the derivative of q_k in the node positions: through ẋ, through Ω × x and through the tangents."""
     tangent, spread, perp, excess = drag_.of(slice(1, None))
     resistance = node_resistance(tangent, perp, excess)
     spin = (w[2] * e_y[0], w[2] * e_y[1], w[3])
@@ -259,7 +247,7 @@ def _add_drag(
 
 
 def _drag_by_first_edge(shape: Shape, drag_: _Drag, velocity: Tensor) -> Tensor:
-    """−∂q_0/∂e_0 through the clamp's node tangent, (3, 3, N, B)."""
+    """Compute −∂q_0/∂e_0 through the clamp's node tangent, (3, 3, N, B)."""
     tangent, spread, _, excess = drag_.of(slice(1))
     tilt = drag_by_tangents(tangent, spread, components(velocity[:1]), excess)
     return stacked_matrix(projected(tilt, components(shape.tangent[1:2]), 1 / shape.length[:1]))[0]
@@ -279,7 +267,7 @@ def _body_rows(
     u: Tensor,
     omega: Tensor,
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Rows of the body: foot C (4, 6, N, B), corner D (4, 4, B) and the wrench T (4, B)."""
+    """Assemble the rows of the body: foot C (4, 6, N, B), corner D (4, 4, B) and the wrench T (4, B)."""
     root = robots.root[0]
     through = response.edge_force[0] + drag_.force[0] + load  # force that each tail puts on the disc
     force = through.sum(1)
@@ -313,7 +301,7 @@ def _body_rows(
 def fluid_wrench(
     robots: TensorRobots, x: Tensor, x_dot: Tensor, phase: Tensor, u: Tensor, omega: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Wrench (F_x, F_z, M_y, M_z) about J of the fluid on the tails and on the head, each (4, B).
+    """Compute the wrench (F_x, F_z, M_y, M_z) about J of the fluid on the tails and on the head, each (4, B).
 
     Their sum is zero at every instant for a robot in balance.
     """

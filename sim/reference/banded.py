@@ -31,7 +31,7 @@ class BlockBanded:
     """A batch of square matrices of n × n blocks of 3×3, block bandwidth 2, filled by block diagonals."""
 
     def __init__(self, n: int, batch: tuple[int, int], like: Tensor, *, dense: bool | None = None):
-        """n nodes; batch = (N, B) tails and robots; `dense` overrides the choice of storage."""
+        """Allocate n nodes; batch = (N, B) tails and robots; `dense` overrides the choice of storage."""
         self.n, self.batch, self.count = n, batch, batch[0] * batch[1]
         self.dense = self.count < _DENSE_BELOW if dense is None else dense
         size = 3 * n
@@ -46,13 +46,7 @@ class BlockBanded:
         start = self._offset + 3 * first * self._row + 3 * (first + offset)
         return self._entries.as_strided(
             (self.n - abs(offset), 3, 3, *self.batch),
-            (
-                3 * (self._row + 1) * self.count,
-                self._row * self.count,
-                self.count,
-                self.batch[1],
-                1,
-            ),
+            (3 * (self._row + 1) * self.count, self._row * self.count, self.count, self.batch[1], 1),
             start * self.count,
         )
 

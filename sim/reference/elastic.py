@@ -39,37 +39,37 @@ class ElasticResponse(NamedTuple):
 
 
 def components(a: Tensor) -> Vector:
-    """(n, 3, N, B) -> its three components, (n, N, B) each."""
+    """Split (n, 3, N, B) into its three components, (n, N, B) each."""
     x, y, z = a.unbind(1)
     return x, y, z
 
 
 def stacked(a: Vector) -> Tensor:
-    """The inverse of `components`."""
+    """Stack three components, the inverse of `components`."""
     return torch.stack(a, 1)
 
 
 def stacked_matrix(a: Matrix) -> Tensor:
-    """Nine entries (n, N, B) -> (n, 3, 3, N, B)."""
+    """Stack nine entries (n, N, B) to (n, 3, 3, N, B)."""
     return torch.stack([torch.stack(row, 1) for row in a], 1)
 
 
 def geometry(nodes: Tensor, root_tangent: Tensor) -> Shape:
-    """Edges of tails with nodes (n + 1, 3, N, B) clamped along root_tangent (1, 3, N, B)."""
+    """Compute the edges of tails with nodes (n + 1, 3, N, B) clamped along root_tangent (1, 3, N, B)."""
     edge = nodes[1:] - nodes[:-1]
     length = edge.square().sum(1).sqrt()
     return Shape(length, torch.cat([root_tangent, edge / length.unsqueeze(1)]))
 
 
 def inverse_voronoi(n: int, like: Tensor) -> Tensor:
-    """1/l_k of the bending energies at nodes 0..n−1, (n, 1, 1): 2n at the clamp, n elsewhere."""
+    """Compute 1/l_k of the bending energies at nodes 0..n−1, (n, 1, 1): 2n at the clamp, n elsewhere."""
     weight = torch.full((n, 1, 1), float(n), dtype=like.dtype, device=like.device)
     weight[0] = 2.0 * n
     return weight
 
 
 def energy(shape: Shape, axial_stiffness: Tensor) -> Tensor:
-    """Elastic energy of each tail, (N, B), in EI/l; `axial_stiffness` is EA l²/EI, (B,)."""
+    """Compute the elastic energy of each tail, (N, B), in EI/l; `axial_stiffness` is EA l²/EI, (B,)."""
     n = shape.length.shape[0]
     stretch = 0.5 * axial_stiffness * (shape.length * n - 1) ** 2 / n
     cosine = (shape.tangent[:-1] * shape.tangent[1:]).sum(1)
@@ -102,12 +102,12 @@ def _joints(shape: Shape) -> _Joints:
 
 
 def _next(a: Tensor) -> Tensor:
-    """a_{k+1} at place k, zero at the last place."""
+    """Shift a_{k+1} to place k, with zero at the last place."""
     return torch.cat([a[1:], torch.zeros_like(a[:1])])
 
 
 def edge_forces(shape: Shape, axial_stiffness: Tensor) -> Tensor:
-    """∂E/∂e_j, (n, 3, N, B): the internal force carried by edge j, in EI/l²."""
+    """Compute ∂E/∂e_j, (n, 3, N, B): the internal force carried by edge j, in EI/l²."""
     return _edge_forces(shape, _joints(shape), axial_stiffness)
 
 
@@ -122,7 +122,7 @@ def _edge_forces(shape: Shape, joints: _Joints, axial_stiffness: Tensor) -> Tens
 
 
 def respond(shape: Shape, axial_stiffness: Tensor) -> ElasticResponse:
-    """Internal forces, their derivatives in the edges, and the clamp's moment.
+    """Compute internal forces, their derivatives in the edges, and the clamp's moment.
 
     Args:
         shape: geometry of tails with n edges.
@@ -161,7 +161,7 @@ def _part(a: Vector, where: slice) -> Vector:
 
 
 def node_forces(edge_force: Tensor) -> Tensor:
-    """Elastic force on the free nodes 1..n from the edge forces, (n, 3, N, B)."""
+    """Compute the elastic force on the free nodes 1..n from the edge forces, (n, 3, N, B)."""
     force = -edge_force.clone()
     force[:-1] += edge_force[1:]
     return force

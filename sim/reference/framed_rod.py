@@ -30,7 +30,7 @@ TWIST_STIFFNESS = 2 / 3  # GJ/EI for ν = ½
 
 
 def transport(vector: Tensor, start: Tensor, end: Tensor) -> Tensor:
-    """Parallel transport of vectors (..., 3) from unit tangents `start` to `end`."""
+    """Transport vectors (..., 3) in parallel from unit tangents `start` to `end`."""
     axis = torch.linalg.cross(start, end)
     cosine = (start * end).sum(-1, keepdim=True)
     along = (axis * vector).sum(-1, keepdim=True) / (1 + cosine)
@@ -38,7 +38,7 @@ def transport(vector: Tensor, start: Tensor, end: Tensor) -> Tensor:
 
 
 def signed_angle(start: Tensor, end: Tensor, axis: Tensor) -> Tensor:
-    """Angle [rad] from `start` to `end` about unit `axis`, in (−π, π]."""
+    """Compute the angle [rad] from `start` to `end` about unit `axis`, in (−π, π]."""
     return torch.atan2((torch.linalg.cross(start, end) * axis).sum(-1), (start * end).sum(-1))
 
 
@@ -51,14 +51,14 @@ class Frames:
 
     @staticmethod
     def along(tangent: Tensor, first: Tensor) -> Frames:
-        """Frames without twist: `first` (3,) carried along the edges by parallel transport."""
+        """Make frames without twist: `first` (3,) carried along the edges by parallel transport."""
         directors = [first]
         for k in range(1, len(tangent)):
             directors.append(transport(directors[-1], tangent[k - 1], tangent[k]))
         return Frames(tangent, torch.stack(directors))
 
     def carried(self, tangent: Tensor) -> Tensor:
-        """Directors at new tangents (m, 3): parallel transport in time."""
+        """Carry directors to new tangents (m, 3): parallel transport in time."""
         return transport(self.director, self.tangent, tangent)
 
 
@@ -74,7 +74,7 @@ class FramedRod:
 
     def joint_energy(self, before: Tensor, after: Tensor, d_before: Tensor, d_after: Tensor,
                      theta_before: Tensor, theta_after: Tensor) -> Tensor:  # fmt: skip
-        """Bending and twisting energy of K joints: tangents and directors (K, 3), angles (K,)."""
+        """Compute the bending and twisting energy of K joints: tangents and directors (K, 3), angles (K,)."""
         cosine = (before * after).sum(-1)
         binormal = 2 * torch.linalg.cross(before, after) / (1 + cosine).unsqueeze(-1)
         m1 = _turned(d_before, before, theta_before) + _turned(d_after, after, theta_after)
@@ -89,7 +89,7 @@ class FramedRod:
         return (0.5 * (square + self.twist_stiffness * twist**2) / self.voronoi).sum()
 
     def clamped_energy(self, nodes: Tensor, theta: Tensor, root: Frames, frames: Frames) -> Tensor:
-        """Energy of a rod clamped at node 0 along `root` (one frame, angle 0) with a free end.
+        """Compute the energy of a rod clamped at node 0 along `root` (one frame, angle 0) with a free end.
 
         Args:
             nodes: (n + 1, 3).
@@ -113,24 +113,19 @@ class FramedRod:
         return joints + _stretching(length, self.axial_stiffness)
 
     def ring_energy(self, nodes: Tensor, theta: Tensor, frames: Frames) -> Tensor:
-        """Energy of a closed ring: nodes (n, 3), joint k between edges k − 1 and k, joint 0 welded."""
+        """Compute the energy of a closed ring: nodes (n, 3), joint k between edges k − 1 and k, joint 0 welded."""
         edge = torch.roll(nodes, -1, 0) - nodes
         length = edge.norm(dim=-1)
         tangent = edge / length.unsqueeze(-1)
         director = frames.carried(tangent)
         joints = self.joint_energy(
-            torch.roll(tangent, 1, 0),
-            tangent,
-            torch.roll(director, 1, 0),
-            director,
-            torch.roll(theta, 1),
-            theta,
+            torch.roll(tangent, 1, 0), tangent, torch.roll(director, 1, 0), director, torch.roll(theta, 1), theta
         )
         return joints + _stretching(length, self.axial_stiffness)
 
 
 def _turned(director: Tensor, tangent: Tensor, theta: Tensor) -> Tensor:
-    """m1 = cos θ d1 + sin θ t × d1."""
+    """Turn the director: m1 = cos θ d1 + sin θ t × d1."""
     c, s = torch.cos(theta).unsqueeze(-1), torch.sin(theta).unsqueeze(-1)
     return c * director + s * torch.linalg.cross(tangent, director)
 

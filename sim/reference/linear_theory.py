@@ -40,7 +40,7 @@ class LinearMotion:
 
 
 def linear_filament(S: float) -> tuple[float, float, float]:
-    """Thrust/[(ζ⊥ − ζ∥) ω_t a²], torque/[ζ⊥ ω_t a² l] and tip offset/a of one tail at a drag number S."""
+    """Compute thrust/[(ζ⊥ − ζ∥) ω_t a²], torque/[ζ⊥ ω_t a² l] and tip offset/a of one tail at a drag number S."""
     if abs(S) < 1e-9:
         return 0.0, 1.0, 1.0
     roots = (-1j * S) ** 0.25 * np.array([1, 1j, -1, -1j])
@@ -55,7 +55,7 @@ def linear_filament(S: float) -> tuple[float, float, float]:
 
 
 def linear_motion(groups: Groups) -> LinearMotion:
-    """Linear theory for the one robot in `groups` (effects are left out)."""
+    """Apply linear theory to the one robot in `groups` (effects are left out)."""
     parallel, perp = (float(c) for c in tail_coefficients(groups.l_over_r0))
     R, omega, tails = 1 / float(groups.l_over_R), float(groups.omega_bar), groups.N
     length, a = float(groups.L_over_R) * R, float(groups.a_over_R) * R

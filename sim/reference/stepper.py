@@ -53,7 +53,7 @@ class TensorState:
 
 
 def at_rest(robots: TensorRobots, phase: float = 0.0) -> TensorState:
-    """Straight tails parallel to the axis, at time 0, heading along X.
+    """Return straight tails parallel to the axis, at time 0, heading along X.
 
     Raises:
         InputError: the robots have non-local effects, which these steps do not have.

@@ -26,7 +26,7 @@ _SHAPES = {"resistance": (4, 5), "tail_load": (3,)}  # of the entries that are n
 
 
 def assemble(groups: Groups) -> Body:
-    """The numbers of B robots as tensors, effects included; single ones are (B,).
+    """Assemble the numbers of B robots as tensors, effects included; single ones are (B,).
 
     Raises:
         InputError: an unknown effect.
@@ -54,7 +54,7 @@ def assemble(groups: Groups) -> Body:
 
 
 def with_effects(body: Body, groups: Groups) -> Body:
-    """The body with the effects of `groups`: first all terms are added, then all factors multiply.
+    """Add the effects of `groups` to the body: first all terms are added, then all factors multiply.
 
     Raises:
         InputError: an unknown effect.
@@ -80,24 +80,24 @@ def with_effects(body: Body, groups: Groups) -> Body:
 
 
 def numbers(groups: Groups) -> Tensor:
-    """The numbers of B robots as rows, (K, B), in the order of `Body`; differentiable."""
+    """Return the numbers of B robots as rows, (K, B), in the order of `Body`; differentiable."""
     body = assemble(groups)
     parts = [getattr(body, name) for name in body._fields[:-1]] + list(body.nonlocal_terms)
     return torch.cat([part.reshape(-1, len(groups)) for part in parts])
 
 
 def bodies(groups: Groups) -> list[Body]:
-    """The robots for the compiled loops, one by one."""
+    """Return the robots for the compiled loops, one by one."""
     return unpacked(numbers(groups).detach().cpu().numpy().T)
 
 
 def reversed_bodies(groups: Groups) -> list[Body]:
-    """The same robots with their motors reversed; an odd effect changes more than the sign of ω̄."""
+    """Return the same robots with their motors reversed; an odd effect changes more than the sign of ω̄."""
     return bodies(replace(groups, omega_bar=-groups.omega_bar))
 
 
 def unpacked(rows: Floats) -> list[Body]:
-    """Robots for the compiled loops from their `numbers`, transposed: (B, K)."""
+    """Return robots for the compiled loops from their `numbers`, transposed: (B, K)."""
     columns: list[Any] = []
     at = 0
     for name in Body._fields[:-1]:

@@ -23,7 +23,7 @@ _TOLERANCE = 1e-6  # of GMRES
 
 @compiled
 def orbit_slopes(body: Body, r: Floats, t: Floats, x: Floats, u: Floats) -> Floats:
-    """du/dp at the orbit x (n, M, 3), u (P, 4), for K parameters, (K, P, 4).
+    """Compute du/dp at the orbit x (n, M, 3), u (P, 4), for K parameters, (K, P, 4).
 
     Args:
         r, t: derivatives of `sim.solve.orbit.residual_on_orbit` in the parameters, (K, n, M, 3) and (K, P, 4).

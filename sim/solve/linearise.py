@@ -36,12 +36,12 @@ from sim.linear.vectors import (
 )
 from sim.mechanics.balance import (
     Motion,
+    body_wrench,
     clamp_balance,
     head_drag,
     motion_at,
     motor_gain,
     node_balance,
-    wrench_of,
 )
 from sim.mechanics.geometry import edge_block, joint_block, measure
 from sim.model.body import Body
@@ -60,7 +60,7 @@ class Equations(NamedTuple):
 
 @compiled
 def new_equations(x: Floats, u: Floats) -> Equations:
-    """Room for unknowns like x (n, M, 3) and u (P, 4)."""
+    """Allocate room for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, _ = x.shape
     chains = new_chains(n, columns, u.shape[0])
     return Equations(chains, np.zeros((n, columns, 3, 3)), np.zeros_like(x), np.zeros_like(u))
@@ -83,7 +83,7 @@ def linearise(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, equati
 
 @compiled
 def _head(body: Body, u: Floats, corner: Floats, t: Floats) -> None:
-    """The drag on head and disc, and its derivative in u."""
+    """Compute the drag on head and disc, and its derivative in u."""
     gain = motor_gain(body)
     for a in range(4):
         for c in range(4):
@@ -111,10 +111,12 @@ def _tail(body: Body, motion: Motion, rates: Rates, x: Floats, room: Room, equat
         put(equations.r, k, m, residual)
         put_block(equations.resistance, k, m, resistance)
 
-        own = subtracted(added(joint_next, transposed(joint_next)), added(edge, edge_next))
-        own = subtracted(added(own, subtracted(after, before)), turned(resistance, motion.spin))
-        own = subtracted(own, (times(rate, resistance[0]), times(rate, resistance[1]), times(rate, resistance[2])))
-        put_block(chains.own, k, m, own)
+        diagonal = subtracted(added(joint_next, transposed(joint_next)), added(edge, edge_next))
+        diagonal = subtracted(added(diagonal, subtracted(after, before)), turned(resistance, motion.spin))
+        diagonal = subtracted(
+            diagonal, (times(rate, resistance[0]), times(rate, resistance[1]), times(rate, resistance[2]))
+        )
+        put_block(chains.diagonal, k, m, diagonal)
         if k > 0:
             lower = subtracted(added(edge, before), transposed(added(joint, joint_next)))
             put_block(chains.lower, k, m, lower)
@@ -135,10 +137,10 @@ def _tail(body: Body, motion: Motion, rates: Rates, x: Floats, room: Room, equat
 
 @compiled
 def _clamp(body: Body, motion: Motion, rates: Rates, room: Room, equations: Equations, m: int, p: int) -> None:
-    """Force and moment of column m on the disc at instant p."""
+    """Compute the force and moment of column m on the disc at instant p."""
     clamp = clamp_balance(room.geometry, body, m, motion, ZERO, ZERO)
     chains, root = equations.chains, (body.offset, 0.0, 0.0)
-    wrench = wrench_of(motion, clamp.force, clamp.moment)
+    wrench = body_wrench(motion, clamp.force, clamp.moment)
     for a in range(4):
         equations.t[p, a] += wrench[a]
     _put_foot(chains.foot[0], m, motion, clamp.force_by_first, clamp.moment_by_first)
@@ -147,7 +149,7 @@ def _clamp(body: Body, motion: Motion, rates: Rates, room: Room, equations: Equa
     directions = (motion.e_x, E_Z, cross(motion.e_y, root), times(motor_gain(body), cross(E_Z, root)))
     for c in range(4):
         drag = applied(clamp.resistance, directions[c])  # the half cell at the clamp moves with the disc
-        by_velocity = wrench_of(motion, drag, cross(root, drag))
+        by_velocity = body_wrench(motion, drag, cross(root, drag))
         for a in range(4):
             corner[a, c] -= by_velocity[a]
     # Body axes and load turn with the phase: ∂e_x/∂φ = −e_y, ∂e_y/∂φ = e_x.
@@ -155,20 +157,20 @@ def _clamp(body: Body, motion: Motion, rates: Rates, room: Room, equations: Equa
     corner[0, 3] -= dot(motion.e_y, clamp.force) * turning
     corner[2, 3] += dot(motion.e_x, clamp.moment) * turning
     load = times(0.5 * turning / room.geometry.length.shape[0], _load_by_phase(body, motion))
-    by_load = wrench_of(motion, load, cross(root, load))
+    by_load = body_wrench(motion, load, cross(root, load))
     for a in range(4):
         corner[a, 3] += by_load[a]
 
 
 @compiled
 def _load_by_phase(body: Body, motion: Motion) -> Vector:
-    """Derivative of the load on a tail, force per length, in the phase."""
+    """Compute the derivative of the load on a tail, force per length, in the phase."""
     return minus(times(body.tail_load[1], motion.e_x), times(body.tail_load[0], motion.e_y))
 
 
 @compiled
 def _put_foot(foot: Floats, m: int, motion: Motion, force: Matrix, moment: Matrix) -> None:
-    """Rows of the robot's equations for one node of column m."""
+    """Put the rows of the robot's equations for one node of column m."""
     put(foot, m, 0, applied(transposed(force), motion.e_x))
     put(foot, m, 1, force[2])
     put(foot, m, 2, applied(transposed(moment), motion.e_y))

@@ -46,7 +46,7 @@ class State(NamedTuple):
 
 @compiled
 def new_state(tails: int, edges: int, offset: float) -> State:
-    """Straight tails at rest."""
+    """Start from straight tails at rest."""
     x = straight(edges, tails, offset)
     return State(x, np.zeros_like(x), np.zeros(6), np.zeros(4))
 
@@ -100,7 +100,7 @@ def _store(state: State, into: State) -> None:
 
 @compiled
 def _combine(out: Floats, a: float, x: Floats, b: float, y: Floats) -> None:
-    """out = a x + b y, (n, N, 3)."""
+    """Set out = a x + b y, (n, N, 3)."""
     for k in range(x.shape[0]):
         for m in range(x.shape[1]):
             for c in range(3):
@@ -134,7 +134,7 @@ def _begin_stage(state: State, star: State, now: State, before: State, dt: float
 
 @compiled
 def _pose_rates(body: Body, yaw: float, u: Floats) -> Floats:
-    """d(pose)/dt."""
+    """Compute d(pose)/dt."""
     sway, surge = u[0] + u[2] * body.head_length / 2, u[1]
     cos, sin = np.cos(yaw), np.sin(yaw)
     return np.array([tail_spin(body, u), u[2], surge * cos - sway * sin, surge * sin + sway * cos, sway, surge])

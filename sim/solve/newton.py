@@ -43,7 +43,7 @@ class Workspace(NamedTuple):
 
 @compiled
 def new_workspace(rates: Rates, x: Floats, u: Floats) -> Workspace:
-    """Room for unknowns like x (n, M, 3) and u (P, 4)."""
+    """Allocate room for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, instants = x.shape[0], x.shape[1], u.shape[0]
     joined = 1 if is_joined(rates) else 0
     system = new_coupled(n, joined * columns, joined * instants)
@@ -76,7 +76,7 @@ def newton(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tole
 
 @compiled
 def correct(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, anew: bool) -> tuple[Floats, Floats]:
-    """One correction dx (n, M, 3), du (P, 4); `anew`: with a new factorisation, else with the stored factors."""
+    """Compute one correction dx (n, M, 3), du (P, 4), with a new factorisation (`anew`) or the stored factors."""
     local = is_local(body)
     dx, du = np.empty_like(x), np.empty_like(u)
     if anew:
@@ -95,7 +95,7 @@ def correct(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, ane
 
 @compiled
 def largest_move(body: Body) -> float:
-    """The largest move of a node in one correction, in l; tails in contact must not pass through each other."""
+    """Bound the move of a node in one correction, in l; tails in contact must not pass through each other."""
     return body.tail_radius if has_contact(body) else _LARGEST_MOVE
 
 
@@ -110,7 +110,7 @@ def move(body: Body, x: Floats, dx: Floats) -> None:
 
 @compiled
 def _negate(equations: Equations, dx: Floats, du: Floats) -> None:
-    """The right-hand sides of Newton's equations."""
+    """Negate the residual: the right-hand sides of Newton's equations."""
     n, columns, _ = dx.shape
     for k in range(n):
         for m in range(columns):

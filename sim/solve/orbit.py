@@ -38,7 +38,7 @@ _HEAD_SHARE = 0.3  # of the motor's speed, in the first guess
 
 @compiled
 def straight_start(body: Body, n: int, phases: int, tails: int) -> tuple[Floats, Floats]:
-    """First guess: x (n, M, 3) and u (P, 4) of straight tails, with a part of the motor's speed in the head."""
+    """Guess x (n, M, 3) and u (P, 4): straight tails, with a part of the motor's speed in the head."""
     u = np.zeros((phases // tails, 4))
     u[:, 3] = -_HEAD_SHARE * body.omega
     return straight(n, phases, body.offset), u
@@ -53,7 +53,7 @@ def solve_orbit(body: Body, x: Floats, u: Floats, tolerance: float) -> tuple[int
 
 @compiled
 def residual_on_orbit(body: Body, x: Floats, u: Floats) -> tuple[Floats, Floats]:
-    """The residual at x (n, M, 3), u (P, 4): r (n, M, 3) on the nodes and t (P, 4) on the robot."""
+    """Compute the residual at x (n, M, 3), u (P, 4): r (n, M, 3) on the nodes and t (P, 4) on the robot."""
     room = new_room(x, u)
     r, t = np.empty_like(x), np.empty_like(u)
     fill_residual(body, on_orbit(x.shape[1], FIRST_PHASE), x, u, room, r, t)
@@ -62,7 +62,7 @@ def residual_on_orbit(body: Body, x: Floats, u: Floats) -> tuple[Floats, Floats]
 
 @compiled
 def largest_force(body: Body, x: Floats) -> float:
-    """The largest force that an edge of the tails x (n, M, 3) carries."""
+    """Find the largest force that an edge of the tails x (n, M, 3) carries."""
     geometry = new_geometry(x.shape[0], x.shape[1])
     measure(geometry, x, body.offset, body.axial_stiffness)
     return float(np.max(np.abs(geometry.force)))
@@ -70,7 +70,7 @@ def largest_force(body: Body, x: Floats) -> float:
 
 @compiled
 def mean_motion(body: Body, u: Floats) -> Floats:
-    """(ω_t, ω_h, ω_yr, v_x, v_z) of the head's centre, means over time: ∫ u dφ/ω_t over ∫ dφ/ω_t."""
+    """Average (ω_t, ω_h, ω_yr, v_x, v_z) of the head's centre over time: ∫ u dφ/ω_t over ∫ dφ/ω_t."""
     total, time = np.zeros(5), 0.0
     for p in range(u.shape[0]):
         omega_t = tail_spin(body, u[p])
@@ -85,7 +85,7 @@ def mean_motion(body: Body, u: Floats) -> Floats:
 
 @compiled
 def turns_forward(body: Body, u: Floats) -> bool:
-    """Whether the tails turn with the motor at all phases."""
+    """Tell whether the tails turn with the motor at all phases."""
     smallest = np.inf
     for p in range(u.shape[0]):
         smallest = min(smallest, tail_spin(body, u[p]) * body.omega)
@@ -94,7 +94,7 @@ def turns_forward(body: Body, u: Floats) -> bool:
 
 @compiled
 def smallest_gap(body: Body, x: Floats, tails: int) -> float:
-    """Smallest gap between tails in a revolution, over 2 r0."""
+    """Find the smallest gap between tails in a revolution, over 2 r0."""
     x = with_phases(x, 2 * x.shape[1])
     spacing = x.shape[1] // tails
     shape, smallest = np.empty((x.shape[0], tails, 3)), np.inf

@@ -35,37 +35,37 @@ class Rates(NamedTuple):
 
 @compiled
 def on_orbit(phases: int, first_phase: float) -> Rates:
-    """Collocation at M equal phases."""
+    """Collocate at M equal phases."""
     return Rates(0.0, first_phase, differentiation(phases), np.zeros((0, 0, 0)))
 
 
 @compiled
 def in_stage(rate: float, phase: float, start: Floats) -> Rates:
-    """A stage with ẋ = rate (x − start) and φ = phase + ω_t/rate."""
+    """Describe a stage with ẋ = rate (x − start) and φ = phase + ω_t/rate."""
     return Rates(rate, phase, np.zeros((0, 0)), start)
 
 
 @compiled
 def in_transient(rate: float, first_phase: float, start: Floats) -> Rates:
-    """A stage with ẋ = ω_t ∂x/∂φ + rate (x − start), at M equal phases."""
+    """Describe a stage with ẋ = ω_t ∂x/∂φ + rate (x − start), at M equal phases."""
     return Rates(rate, first_phase, differentiation(start.shape[1]), start)
 
 
 @compiled
 def is_joined(rates: Rates) -> bool:
-    """Whether the columns are phases, joined to each other by ∂x/∂φ."""
+    """Tell whether the columns are phases, joined to each other by ∂x/∂φ."""
     return rates.differentiation.shape[0] > 0
 
 
 @compiled
 def base_phase(rates: Rates, body: Body, u: Floats) -> float:
-    """Phase of column 0, for velocities u (P, 4); column m is 2π m/M later."""
+    """Return the phase of column 0, for velocities u (P, 4); column m is 2π m/M later."""
     return rates.phase + (0.0 if is_joined(rates) else tail_spin(body, u[0]) / rates.rate)
 
 
 @compiled
 def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by_spin: Floats) -> None:
-    """Velocities of the free nodes in the disc frame and what a faster spin changes in them.
+    """Compute the velocities of the free nodes in the disc frame and what a faster spin changes in them.
 
     Args:
         x, u: free nodes (n, M, 3) and the robot's velocities (P, 4).
@@ -98,5 +98,5 @@ def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by
 
 @compiled
 def phase_gain(rates: Rates, body: Body) -> float:
-    """∂φ/∂ω_h."""
+    """Compute ∂φ/∂ω_h."""
     return 0.0 if is_joined(rates) else motor_gain(body) / rates.rate

@@ -67,7 +67,7 @@ class Orbit(NamedTuple):
 
 
 def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
-    """One robot with N tails, on `least` phases or more.
+    """Solve for one robot with N tails, on `least` phases or more.
 
     Returns:
         The orbit; `ended` says why it could not be solved, if so.
@@ -82,7 +82,7 @@ def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
 
 
 def _by_softer_contact(body: Body, tails: int, least: int, lost: Orbit) -> Orbit:
-    """The orbit from that of the same robot with softer contact, on the same meshes and phases; else `lost`."""
+    """Solve from the robot's orbit with softer contact, on the same meshes and phases; else return `lost`."""
     terms = body.nonlocal_terms
     soft = body._replace(nonlocal_terms=terms._replace(tail_contact=terms.tail_contact / _SOFTER))
     found = refined_orbit(soft, tails, least)
@@ -99,7 +99,7 @@ def _by_softer_contact(body: Body, tails: int, least: int, lost: Orbit) -> Orbit
 
 
 def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Floats]:
-    """The orbit on a given mesh: whether there is one, x (n, M, 3) and u (P, 4)."""
+    """Solve for the orbit on a given mesh: whether there is one, x (n, M, 3) and u (P, 4)."""
     if tails > _MOST_PHASES:
         return False, np.zeros((edges, tails, 3)), np.zeros((1, 4))
     ended, _, x, u = _on_coarsest_mesh(body, tails, FEW)
@@ -111,7 +111,7 @@ def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Flo
 
 
 def _on_coarsest_mesh(body: Body, tails: int, least: int) -> tuple[int, float, Floats, Floats]:
-    """On the coarsest mesh, with `least` phases or more: SOLVED or why not, the error of the phases, x and u."""
+    """Solve on the coarsest mesh, with `least` phases or more: SOLVED or why not, error of the phases, x and u."""
     terms = body.nonlocal_terms
     plain = body._replace(nonlocal_terms=terms._make([0.0] * len(terms)))
     if terms.tail_contact == 0:
@@ -121,7 +121,7 @@ def _on_coarsest_mesh(body: Body, tails: int, least: int) -> tuple[int, float, F
 
 
 def _from_a_slow_motor(plain: Body, tails: int) -> tuple[Floats, Floats]:
-    """A guess of the orbit on the coarsest mesh, for a robot without other non-local effects than contact.
+    """Guess the orbit on the coarsest mesh, for a robot without other non-local effects than contact.
 
     Contact decides on which side of each other the tails lie. So the guess comes from a slow motor, at which the
     tails are apart. The motor is made faster step by step, with a softer contact.
@@ -129,9 +129,9 @@ def _from_a_slow_motor(plain: Body, tails: int) -> tuple[Floats, Floats]:
     terms = plain.nonlocal_terms
     soft = plain._replace(nonlocal_terms=terms._replace(tail_contact=_SOFT * terms.tail_contact))
     speed = min(_SLOW / abs(plain.omega), 1.0)
-    factor, before = _FASTER, soft._replace(omega=speed * plain.omega)
-    x, u = straight_start(before, MESHES[0], _fewest_phases(tails), tails)
-    _, size = solve_orbit(before, x, u, _START)
+    factor, slow = _FASTER, soft._replace(omega=speed * plain.omega)
+    x, u = straight_start(slow, MESHES[0], _fewest_phases(tails), tails)
+    _, size = solve_orbit(slow, x, u, _START)
     while size < _START and speed < 1 and factor > _LEAST_FASTER:
         factor = min(factor, 1 / speed)
         x_more, u_more = x.copy(), factor * u
@@ -145,13 +145,13 @@ def _from_a_slow_motor(plain: Body, tails: int) -> tuple[Floats, Floats]:
 
 @compiled
 def _fewest_phases(tails: int) -> int:
-    """Two phases or more, a multiple of N."""
+    """Choose two phases or more, a multiple of N."""
     return tails * int(np.ceil(2 / tails))
 
 
 @compiled
 def _from_straight_tails(body: Body, plain: Body, tails: int, least: int) -> tuple[int, float, Floats, Floats]:
-    """The same as `_enough_phases`, from straight tails."""
+    """Solve as `_enough_phases` does, from straight tails."""
     x, u = straight_start(plain, MESHES[0], _fewest_phases(tails), tails)
     return _enough_phases(body, plain, x, u, tails, least)
 
@@ -163,7 +163,7 @@ def _unsolved(ended: int, x: Floats, u: Floats) -> Orbit:
 
 @compiled
 def _on_finer_meshes(body: Body, error: float, x: Floats, u: Floats) -> Orbit:
-    """The orbit on all MESHES, from that on the coarsest, and its means; `error` is that of the phases."""
+    """Solve on all MESHES, from the orbit on the coarsest, and extrapolate; `error` is that of the phases."""
     xs, us = (x, x, x), (u, u, u)
     rates = on_orbit(x.shape[1], FIRST_PHASE)
     for i in (1, 2):
@@ -192,17 +192,17 @@ def _on_finer_meshes(body: Body, error: float, x: Floats, u: Floats) -> Orbit:
         us = (us[0], u, u) if i == 1 else (us[0], us[1], u)
     if not turns_forward(body, u):
         return _unsolved(BACKWARDS, x, u)
-    found = np.empty((3, 5))
+    means = np.empty((3, 5))
     for i in range(3):
-        found[i] = mean_motion(body, us[i])
-    limit = extrapolate(found)
-    error += difference(_without_last_term(found), limit) + _DOUBT * difference(found[2], limit)
+        means[i] = mean_motion(body, us[i])
+    limit = extrapolate(means)
+    error += difference(_without_last_term(means), limit) + _DOUBT * difference(means[2], limit)
     return Orbit(SOLVED, error, limit, xs, us)
 
 
 @compiled
 def _is_balanced(body: Body, x: Floats, u: Floats) -> bool:
-    """Whether the unbalanced forces are small compared with the forces in the edges."""
+    """Tell whether the unbalanced forces are small compared with the forces in the edges."""
     r, t = residual_on_orbit(body, x, u)
     return bool(max(np.max(np.abs(r)), np.max(np.abs(t))) < BALANCED * largest_force(body, x))
 
@@ -211,13 +211,13 @@ def _is_balanced(body: Body, x: Floats, u: Floats) -> bool:
 def _enough_phases(
     body: Body, plain: Body, x: Floats, u: Floats, tails: int, least: int
 ) -> tuple[int, float, Floats, Floats]:
-    """On the coarsest mesh, with `least` phases or more: SOLVED or why not, the error of the phases, x and u.
+    """Solve on the coarsest mesh, with `least` phases or more: SOLVED or why not, error of the phases, x and u.
 
     The first solution, from x and u, is a rough one for the robot without its non-local effects (`plain`), on the
     fewest phases. Then phases are added, each time from the solution before, until the means stop changing.
     """
     phases = x.shape[1]
-    before, change, robot, wanted = np.zeros(5), np.nan, plain, 1e-2
+    means, change, robot, wanted = np.zeros(5), np.nan, plain, 1e-2
     solved = -1  # numbers of phases that the robot itself was solved on, less one
     while True:
         x_more, u_more = with_phases(x, phases), with_phases(u.reshape(1, -1, 4), phases // tails)[0]
@@ -231,15 +231,15 @@ def _enough_phases(
             x, u, robot, wanted = x_more, u_more, body, ROUGH
             phases = tails * int(np.ceil(least / tails))
             continue
-        after = mean_motion(body, u_more)
+        new_means = mean_motion(body, u_more)
         if solved > 1:
-            last, change = change, difference(before, after)
+            last, change = change, difference(means, new_means)
             if change <= _PHASE_ERROR:
                 return SOLVED, change, x, u
             fall = _SHRINKS if not np.isfinite(last) else min(max(change / last, 0.05), 1.0)
             if change * fall <= _PHASE_ERROR:
                 return SOLVED, change * fall, x_more, u_more
-        x, u, before = x_more, u_more, after
+        x, u, means = x_more, u_more, new_means
         if phases > _MOST_PHASES:
             return MANY_PHASES, np.nan, x, u
         phases = _more_phases(tails, phases)
@@ -247,13 +247,13 @@ def _enough_phases(
 
 @compiled
 def _more_phases(tails: int, phases: int) -> int:
-    """The next number of phases to try: a multiple of N, about half as many again."""
+    """Choose the next number of phases to try: a multiple of N, about half as many again."""
     return tails * max(phases // tails + 1, int(np.ceil(1.4 * phases / tails)))
 
 
 @compiled
 def with_edges(x: Floats, offset: float, wanted: int) -> Floats:
-    """Free nodes (n, M, 3) moved to a mesh of `wanted` edges: cubic interpolation in the arc length."""
+    """Move free nodes (n, M, 3) to a mesh of `wanted` edges: cubic interpolation in the arc length."""
     n, phases, _ = x.shape
     out = np.zeros((wanted, phases, 3))
     for k in range(wanted):
@@ -273,7 +273,7 @@ def with_edges(x: Floats, offset: float, wanted: int) -> Floats:
 
 @compiled
 def difference(a: Floats, b: Floats) -> float:
-    """Largest relative difference of two sets of means (5,); velocities relative to the speed."""
+    """Compute the largest relative difference of two sets of means (5,); velocities relative to the speed."""
     speed = np.hypot(b[3], b[4])
     change = np.abs(a - b)
     rates = max(change[0] / abs(b[0]), change[1] / abs(b[1]), change[2] / abs(b[2]))
@@ -293,6 +293,6 @@ def extrapolate(found: Floats) -> Floats:
 
 @compiled
 def _without_last_term(found: Floats) -> Floats:
-    """The same from the two finer meshes, with c₂/n² alone."""
+    """Extrapolate from the two finer meshes, with c₂/n² alone."""
     b, c = 1.0 / MESHES[1] ** 2, 1.0 / MESHES[2] ** 2
     return (found[2] * b - found[1] * c) / (b - c)

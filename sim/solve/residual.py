@@ -22,7 +22,7 @@ from sim.arrays import Floats
 from sim.compiling import compiled
 from sim.linear.blocks import put, vector, vector_at
 from sim.linear.vectors import cross, minus, plus
-from sim.mechanics.balance import clamp_balance, head_drag, motion_at, node_balance, wrench_of
+from sim.mechanics.balance import body_wrench, clamp_balance, head_drag, motion_at, node_balance
 from sim.mechanics.contact_line import add_contact_line
 from sim.mechanics.flow import add_flow, has_flow
 from sim.mechanics.frames import add_frames, has_frames
@@ -52,7 +52,7 @@ class Room(NamedTuple):
 
 @compiled
 def new_room(x: Floats, u: Floats) -> Room:
-    """Room for unknowns like x (n, M, 3) and u (P, 4)."""
+    """Allocate room for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, _ = x.shape
     around = Surroundings(np.zeros((n + 1, columns, 3)), np.zeros((columns, 3)), np.zeros_like(u))
     return Room(new_geometry(n, columns), around, np.zeros_like(x), np.zeros_like(x))
@@ -60,7 +60,7 @@ def new_room(x: Floats, u: Floats) -> Room:
 
 @compiled
 def is_local(body: Body) -> bool:
-    """Whether no effect reaches further than one node."""
+    """Tell whether no effect reaches further than one node."""
     total = 0.0
     for value in body.nonlocal_terms:
         total += abs(value)
@@ -69,7 +69,7 @@ def is_local(body: Body) -> bool:
 
 @compiled
 def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r: Floats, t: Floats) -> None:
-    """The residual at x (n, M, 3), u (P, 4).
+    """Compute the residual at x (n, M, 3), u (P, 4).
 
     Args:
         r: (n, M, 3), filled.
@@ -105,14 +105,14 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
             velocity = minus(plus(motion.linear, cross(motion.spin, root)), flow)
             change = thinned(room.geometry, body, 0, m, velocity)
             force, torque = plus(force, change), plus(torque, cross(root, change))
-        wrench = wrench_of(motion, force, torque)
+        wrench = body_wrench(motion, force, torque)
         for a in range(4):
             t[m % instants, a] += wrench[a]
 
 
 @compiled
 def _surround(body: Body, x: Floats, u: Floats, phase: float, p: int, tails: int, room: Room) -> None:
-    """All non-local effects at instant p. The forces in the tails come first, because the flow depends on them."""
+    """Add all non-local effects at instant p; forces in the tails come first, because the flow depends on them."""
     if is_local(body):
         return
     geometry, around, columns = room.geometry, room.around, x.shape[1]

@@ -98,7 +98,7 @@ def transient(
         goal = marks[mark] if mark < len(marks) else until
         dt = _towards(goal - now, dt)
         solved = _try_step(body, x, u, twist, x_now, slope_now, lags[count], now, dt, step, work)
-        error = _error_of(step, dt) if solved else np.inf
+        error = _embedded_error(step, dt) if solved else np.inf
         if not error < 2 * tolerance:
             rejected += 1
             dt *= max(0.2, 0.9 * np.sqrt(tolerance / error)) if solved else 0.3
@@ -118,7 +118,7 @@ def transient(
 
 @compiled
 def _towards(left: float, dt: float) -> float:
-    """The next step, so that steps end on a goal without a tiny last one."""
+    """Choose the next step, so that steps end on a goal without a tiny last one."""
     if 1.2 * dt > left:
         return left
     return min(dt, 0.5 * left) if 2 * dt > left else dt
@@ -129,7 +129,7 @@ def _try_step(
     body: Body, x: Floats, u: Floats, twist: Floats, x_now: Floats, slope_now: Floats, lag_now: Floats,
     now: float, dt: float, step: _Step, work: Workspace,
 ) -> bool:  # fmt: skip
-    """Both stages; x, u and `step` hold the end of the step. Whether Newton's method converged."""
+    """Solve both stages; x, u and `step` hold the end of the step. Return whether Newton's method converged."""
     tau = GAMMA * dt
     for stage in range(2):
         step.start[:] = x_now
@@ -150,7 +150,7 @@ def _try_step(
 def _solve_stage(
     body: Body, x: Floats, u: Floats, rate: float, start: Floats, anew: bool, work: Workspace
 ) -> bool:
-    """Newton's method with ẋ = ω_t ∂x/∂φ + rate (x − start); `anew`: factorise once, else with stored factors."""
+    """Solve with ẋ = ω_t ∂x/∂φ + rate (x − start); `anew`: factorise once, else with stored factors."""
     rates = in_transient(rate, FIRST_PHASE, start)
     before = np.inf
     for count in range(_MOST_CORRECTIONS):
@@ -167,8 +167,8 @@ def _solve_stage(
 
 
 @compiled
-def _error_of(step: _Step, dt: float) -> float:
-    """Difference to the embedded method, (1/2, 1/2) in place of (1 − γ, γ), in the largest entry."""
+def _embedded_error(step: _Step, dt: float) -> float:
+    """Compare with the embedded method, (1/2, 1/2) in place of (1 − γ, γ), in the largest entry."""
     _, n, columns, _ = step.slope.shape
     factor, largest = (0.5 - GAMMA) * dt, 0.0
     for k in range(n):
@@ -196,13 +196,13 @@ def _advance_lag(
         right[p, 0] = motion[p, 2] - twist[2] + rate * start[p, 2]
     solve_dense(matrix.copy(), right)
     step.lag[:, 2] = right[:, 0]
-    forward, left = _on_circle(twist, time)
+    forward, leftward = _on_circle(twist, time)
     right = np.empty((fields, 2))
     for p in range(fields):
         lag, heading = step.lag[p, 2], step.lag[p, 2] + twist[2] * time
         surge, sway, turning = motion[p, 0] - twist[0], motion[p, 1] - twist[1], motion[p, 2] - twist[2]
-        z = np.cos(lag) * forward - np.sin(lag) * left
-        x = np.sin(lag) * forward + np.cos(lag) * left
+        z = np.cos(lag) * forward - np.sin(lag) * leftward
+        x = np.sin(lag) * forward + np.cos(lag) * leftward
         right[p, 0] = np.cos(heading) * surge - np.sin(heading) * sway + turning * x + rate * start[p, 0]
         right[p, 1] = np.sin(heading) * surge + np.cos(heading) * sway - turning * z + rate * start[p, 1]
     solve_dense(matrix, right)
@@ -211,39 +211,39 @@ def _advance_lag(
 
 @compiled
 def _instants(body: Body, u: Floats, fields: int) -> Floats:
-    """(v_z, h_x, ω_yr, ω_t) at every instant of a turn, or their mean over time where only that is followed."""
-    found = np.empty((u.shape[0], 4))
+    """Compute (v_z, h_x, ω_yr, ω_t) at every instant of a turn, or their mean over time."""
+    motion = np.empty((u.shape[0], 4))
     for p in range(u.shape[0]):
-        found[p, 0], found[p, 1] = u[p, 1], u[p, 0] + u[p, 2] * body.head_length / 2
-        found[p, 2], found[p, 3] = u[p, 2], tail_spin(body, u[p])
+        motion[p, 0], motion[p, 1] = u[p, 1], u[p, 0] + u[p, 2] * body.head_length / 2
+        motion[p, 2], motion[p, 3] = u[p, 2], tail_spin(body, u[p])
     if fields == u.shape[0]:
-        return found
+        return motion
     mean, time = np.zeros((1, 4)), 0.0
     for p in range(u.shape[0]):
-        time += 1 / found[p, 3]
-        mean[0] += found[p] / found[p, 3]
+        time += 1 / motion[p, 3]
+        mean[0] += motion[p] / motion[p, 3]
     return mean / time
 
 
 @compiled
-def lag_at(found: Transient, times: Floats) -> Floats:
-    """The lag (T, Q, 3) at `times` (T,) between the first step and the last: cubic Hermite interpolation."""
-    out = np.empty((len(times), found.lag.shape[1], 3))
+def lag_at(solution: Transient, times: Floats) -> Floats:
+    """Interpolate the lag (T, Q, 3) to `times` (T,) between the first step and the last (cubic Hermite)."""
+    out = np.empty((len(times), solution.lag.shape[1], 3))
     k = 1
     for i in range(len(times)):
-        while k < len(found.times) - 2 and found.times[k + 1] < times[i]:
+        while k < len(solution.times) - 2 and solution.times[k + 1] < times[i]:
             k += 1
-        span = found.times[k + 1] - found.times[k]
-        s = (times[i] - found.times[k]) / span
-        first, last = found.lag[k], found.lag[k + 1]
+        span = solution.times[k + 1] - solution.times[k]
+        s = (times[i] - solution.times[k]) / span
+        first, last = solution.lag[k], solution.lag[k + 1]
         out[i] = first + s * s * (3 - 2 * s) * (last - first)
-        out[i] += span * s * (1 - s) * ((1 - s) * found.lag_rate[k] - s * found.lag_rate[k + 1])
+        out[i] += span * s * (1 - s) * ((1 - s) * solution.lag_rate[k] - s * solution.lag_rate[k + 1])
     return out
 
 
 @compiled
 def _on_circle(twist: Floats, time: float) -> tuple[float, float]:
-    """Where the steady circle is after a time: forward and to the left."""
+    """Return where the steady circle is after a time: forward and to the left."""
     angle = twist[2] * time
     along = time * (np.sin(angle) / angle if abs(angle) > 1e-6 else 1.0)
     half = angle / 2

@@ -8,8 +8,8 @@ import pandas as pd
 
 from calibration.report.corrected_robot import check_given
 from calibration.swimmer.head_correction import learn_head_correction
-from calibration.swimmer.lab_settings import Owned
 from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.possible_runs import Owned
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate as close_loop
 from calibration.verdict.verdict import Verdict

@@ -140,7 +140,7 @@ def measure_losses(table: NeuralTable, small: SmallCopy) -> dict[str, dict[str, 
 
 
 def make_vectors(table: NeuralTable, small: SmallCopy) -> dict[str, Floats]:
-    """Robots of the domain with both directions and every N, and the answers of the small copy; NaN: no answer."""
+    """Draw robots of the domain with both directions and every N; let the small copy answer; NaN: no answer."""
     robots = {
         name: np.array([float(f"{v:.5g}") for v in values]) for name, values in _robots(4 * _VECTORS, 21).items()
     }

@@ -43,13 +43,13 @@ class Minimiser:
         return {name: getattr(self, name) for name in _STATE}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Go on from a state of the same function."""
+        """Resume from a state of the same function."""
         for name in _STATE:
             value = state[name]
             setattr(self, name, value.to(self.x.device) if isinstance(value, Tensor) else value)
 
     def step(self) -> bool:
-        """Do one iteration; return False where no step along the gradient makes the value smaller."""
+        """Perform one iteration; return False where no step along the gradient makes the value smaller."""
         line = self._search()
         if line is None and self._matrix is not None:
             self._forget()

@@ -1,6 +1,6 @@
-"""Fit networks: Adam in small batches, then BFGS on all rows, with a loss that few bad rows do not rule.
+"""Fit networks: Adam in small batches, then BFGS on all rows, with a loss that is robust against outliers.
 
-    loss = mean over rows of (w² |r|² + ε²)^¼,   r = residual of a row, in units of what is asked for, w = weight
+    loss = mean over rows of (w² |r|² + ε²)^¼,   r = residual of a row, in units of the target, w = weight
 
 The error of a network is a hundred times larger in some corners than in the middle. Least squares would serve only
 those corners: with it the median error is five times as large. ε falls from 0.1 to 0.0005 while Adam runs. The
@@ -59,7 +59,7 @@ class Problem:
     residual: Residual
 
     def errors(self, network: Ensemble, rows: Tensor) -> Tensor:
-        """|r| of rows (m,), (K, m)."""
+        """Compute |r| of rows (m,), (K, m)."""
         return self._residuals(network, rows).norm(dim=-1)
 
     def loss(self, network: Ensemble, rows: Tensor, soft: float) -> Tensor:

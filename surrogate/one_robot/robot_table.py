@@ -84,7 +84,7 @@ class RobotTable:
         return Responses(lag, memory, rest, spread, speed, none, none, before)
 
     def _side(self, columns: Mapping[str, Floats]) -> Any:
-        """0 or 1 for every row, by the direction of its motor."""
+        """Return 0 or 1 for every row, by the direction of its motor."""
         count = len(next(iter(columns.values())))
         for name, values in columns.items():
             expected = self.robot.get(name, 0.0)
@@ -124,7 +124,8 @@ def load_robot_table(path: str | Path) -> RobotTable:
         raise InputError(f"{path} was changed after it was written; {remedy}")
     lacking = [field.name for field in fields(RobotTable) if field.name not in content]
     if lacking or len(content) != len(fields(RobotTable)):
-        raise InputError(f"{path} is no complete table of a robot{_listed(lacking)}; {remedy}")
+        first = f": it has no {lacking[0]!r}" if lacking else ""
+        raise InputError(f"{path} is no complete table of a robot{first}; {remedy}")
     try:
         wrong = _wrong(RobotTable(**content))
     except (KeyError, TypeError, ValueError, AttributeError):
@@ -136,10 +137,6 @@ def load_robot_table(path: str | Path) -> RobotTable:
 
 def _digest(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def _listed(lacking: list[str]) -> str:
-    return f": it has no {lacking[0]!r}" if lacking else ""
 
 
 def _wrong(table: RobotTable) -> str:

@@ -49,9 +49,9 @@ def tabulate(robot: Robot) -> RobotTable:
         True
     """
     values = robot.group_values()
-    both = {name: np.array([value, value]) for name, value in values.items()}
-    both["omega_bar"] = both["omega_bar"] * [1.0, -1.0]
-    groups = Groups.from_columns(both)
+    directions = {name: np.array([value, value]) for name, value in values.items()}
+    directions["omega_bar"] = directions["omega_bar"] * [1.0, -1.0]
+    groups = Groups.from_columns(directions)
     motion = steady(groups)
     if not motion.converged.all():
         raise InputError(f"{robot.name} has no steady motion to tabulate: {motion.note[0]}")
@@ -81,7 +81,7 @@ def tabulate(robot: Robot) -> RobotTable:
 
 
 def _slopes(values: dict[str, float]) -> dict[str, Any]:
-    """Derivatives (2, 3) of the twists in ln of each group, and in the size of each effect, by differences."""
+    """Difference the twists: derivatives (2, 3) in ln of each group and in the size of each effect."""
     names = [name for name in values if name != "N"]
     rows, widths = [], []
     for name in names:
@@ -98,7 +98,7 @@ def _slopes(values: dict[str, float]) -> dict[str, Any]:
 
 
 def _ends(name: str, value: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Two values beside `value`, each with its place on the scale of the derivative; within an effect's bounds."""
+    """Choose two values beside `value`, within an effect's bounds, with their places on the derivative's scale."""
     if name not in catalogue():
         return (value * math.exp(_STEP), _STEP), (value * math.exp(-_STEP), -_STEP)
     effect = catalogue()[name]
@@ -108,7 +108,7 @@ def _ends(name: str, value: float) -> tuple[tuple[float, float], tuple[float, fl
 
 
 def _missed(table: RobotTable) -> Floats:
-    """Differences (M, 3) of lags between a replay in time steps and the table, seen as for a positive motor."""
+    """Subtract the table's lags (M, 3) from those of a replay in time steps, seen as for a positive motor."""
     dwells = np.exp(np.random.default_rng(0).uniform(math.log(_RANGE[0]), math.log(_RANGE[1]), _CHECKED))
     track = replay([Schedule(table.robot, 1, dwells, (0.0, 0.0, 0.0), 1.0)])[0]
     flips = track.groupby("dwell").last()[["x_over_l", "y_over_l", "heading_rad"]].to_numpy()

@@ -1,4 +1,4 @@
-"""Certify answers of the look-up table with the simulator: the error that an answer has, not one to expect.
+"""Certify answers of the look-up table with the simulator: the actual error of an answer, not the expected one.
 
     certified error = largest relative difference between table and simulator + the simulator's own error
 

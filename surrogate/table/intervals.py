@@ -1,16 +1,15 @@
-"""Intervals for the answers of the table: split-conformal, each output for itself, wider where the table is less
-sure.
+"""Split-conformal prediction intervals for each output of the table, wider where the table is less certain.
 
     answer ± q s(x),   s(x) = exp(c · features(x)),   q: quantile of |error|/s over robots that training did not
     see
 
 s is fitted to the logarithm of errors by least squares. Its features are the inputs of the tails and their
-squares, how far the robot is from the middle of what was learned, how much the members differ, and N. q makes
-the intervals cover 90 % whether or not s is any good. There is one q for robots with one tail, and one for each
-octant of the others: low or high drag number, deflection and forward motion. So the intervals cover 90 % in each
-of these parts. s makes them cover about 90 % in smaller parts as well. Robots for s and robots for q are different
-ones. Sources: Lei et al., J. Am. Stat. Assoc. 113, 1094 (2018), section 5.2; Vovk, Gammerman and Shafer,
-Algorithmic Learning in a Random World (2005), section 4.5, for the parts.
+squares, the robot's distance from the middle of the training data, the spread of the ensemble, and N. q makes the
+intervals cover 90 % however well s fits. There is one q for robots with one tail, and one for each octant of the
+others: low or high drag number, deflection and forward motion. So the intervals cover 90 % in each of these parts.
+s makes them cover about 90 % in smaller parts as well. s and q are fitted to different robots. Sources: Lei et
+al., J. Am. Stat. Assoc. 113, 1094 (2018), section 5.2; Vovk, Gammerman and Shafer, Algorithmic Learning in a
+Random World (2005), section 4.5, for the parts.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ COVERAGE = 0.90
 _TINY = 1e-9  # of the scale of an output
 _RIDGE = 1e-3
 _HALVED = (0, 3, 5)  # features whose halves make the octants: drag number, deflection, forward motion
-_ONE_TAIL = -1  # the hint that is 1 for one tail
+_ONE_TAIL = -1  # the width feature that is 1 for one tail
 PARTS = 2 ** len(_HALVED) + 1
 _FEWEST = 40  # robots in a part, for a q of its own
 _FIRMEST, _SOFTEST = 0.002, 0.998  # s is held between these quantiles of itself
@@ -100,7 +99,7 @@ class Intervals:
 
 
 def _design(x: Tensor) -> Tensor:
-    """1, x and all products of two, (M, P), with x held to five standard deviations."""
+    """Assemble 1, x and all products of two, (M, P), with x held to five standard deviations."""
     x = x.clamp(-5, 5)
     first, second = torch.triu_indices(x.shape[1], x.shape[1]).unbind(0)
     return torch.cat([torch.ones_like(x[:, :1]), x, x[:, first] * x[:, second]], 1)

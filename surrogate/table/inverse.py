@@ -1,4 +1,4 @@
-"""The table backwards: which robots have a wanted motion.
+"""Inverse design with the table: robots that have a desired motion.
 
 The free inputs are solved for by damped least squares (Levenberg and Marquardt) from many starts at once, with the
 derivatives of the table. Several solutions are all returned.
@@ -63,12 +63,12 @@ def inverse(
     starts = low + (high - low) * qmc.Sobol(len(names), rng=np.random.default_rng(0)).random(_STARTS)
     p = np.tile(starts, (count, 1))  # (M starts, F)
     row = np.repeat(np.arange(count), _STARTS)
-    given = {name: np.asarray(array, dtype=float)[row] for name, array in robots.items() if name not in names}
+    fixed = {name: np.asarray(array, dtype=float)[row] for name, array in robots.items() if name not in names}
     target_values = {name: np.asarray(array, dtype=float)[row] for name, array in targets.items()}
     size = _sizes(target_values)
 
     def misfits(p: Floats) -> tuple[Floats, Floats, Floats]:
-        columns = {**given, **{name: np.exp(p[:, i]) for i, name in enumerate(names)}}
+        columns = {**fixed, **{name: np.exp(p[:, i]) for i, name in enumerate(names)}}
         outputs = lookup.query(columns, flag=True)
         slopes = lookup.jacobian(columns, names, flag=True)
         residual = np.stack([(outputs[name] - target_values[name]) / size[name] for name in wanted], -1)

@@ -1,13 +1,13 @@
-"""The look-up table: the tails' wrench is learned, the head's balance is solved for at each query.
+"""The look-up table: the tails' wrench is learned, and the head's balance is solved at each query.
 
 A query finds the motion in which the tails' mean wrench (`surrogate.table.wrench_table`) is in balance with head,
 disc and motor (`surrogate.wrench.heads`). So it answers for every head, every number of tails and every effect on
 head, disc and motor. Its response to a flip comes from learned curves (`surrogate.table.response_table`). Every
 output can have an interval (`surrogate.table.intervals`).
 
-Refused, or flagged on request: robots whose tails move as none of the learned ones do (`surrogate.table.support`),
-and robots that yaw more than BRANCHES times as fast as their tails turn, which may have several motions. Refused
-always: effects on the tails themselves. The table does not extrapolate.
+Rejected, or flagged on request: robots outside the joint support of the training data (`surrogate.table.support`),
+and robots that yaw more than BRANCHES times as fast as their tails turn, which may have several motions. Effects
+on the tails themselves are always rejected. The table does not extrapolate.
 """
 
 from __future__ import annotations

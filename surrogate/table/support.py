@@ -1,4 +1,4 @@
-"""The domain of the table: the joint support of the rows that it learned, as a smooth measure.
+"""The domain of the table: the joint support of its training data, as a smooth measure.
 
     q(x) = φ(x)ᵀ M⁻¹ φ(x)/F,   M = mean of φ φᵀ over the rows,   φ: the F monomials up to degree 3
 
@@ -55,8 +55,9 @@ class Support:
 
 @cache
 def _products(inputs: int) -> tuple[Integers, Integers]:
-    """Monomials up to DEGREE of some inputs, the constant first: monomial p is that of parents[p] times the input
-    last[p]; both (P,).
+    """List the monomials up to DEGREE of some inputs, the constant first: `parents` and `last`, both (P,).
+
+    Monomial p is monomial parents[p] times the input last[p].
     """
     parents, last = [0], [0]
     index: dict[tuple[int, ...], int] = {(): 0}

@@ -37,7 +37,7 @@ class WrenchTable:
     gap: Ensemble
 
     def solve(self, heads: Heads, tails: Tails) -> tuple[Floats, Flags]:
-        """(v_x, v_z, ω_yr, ω_h, ω_t) in balance for a positive motor, (M, 5); and which robots converged, (M,)."""
+        """Solve for (v_x, v_z, ω_yr, ω_h, ω_t), (M, 5), of a positive motor; tell which robots converged, (M,)."""
         compile_once()
         motion = np.full((len(tails.number), 5), np.nan)
         converged = np.zeros(len(motion), dtype=bool)
@@ -59,7 +59,7 @@ class WrenchTable:
         return packed(self.gap)
 
     def outputs(self, heads: Heads, motion: Tensor, gap: Tensor) -> tuple[Tensor, ...]:
-        """ω_t, ω_h, ω_yr, v_x and v_z of the head's centre, R_yr, θ in degrees, and the gap, each (M,)."""
+        """Compute ω_t, ω_h, ω_yr, v_x and v_z of the head's centre, R_yr, θ in degrees, and the gap, each (M,)."""
         yaw, surge = heads.sense * motion[:, 2], motion[:, 1]
         sway = heads.sense * (motion[:, 0] + motion[:, 2] * heads.length / 2)
         radius = torch.sqrt(sway**2 + surge**2) / yaw.abs()

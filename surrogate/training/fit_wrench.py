@@ -59,12 +59,7 @@ class WrenchSamples(NamedTuple):
 
     def at(self, rows: Tensor) -> WrenchSamples:
         """Return the rows at indices or flags (M',)."""
-        return WrenchSamples(
-            self.heads.at(rows),
-            self.tails.at(rows),
-            self.motion[rows],
-            self.gap[rows],
-        )
+        return WrenchSamples(self.heads.at(rows), self.tails.at(rows), self.motion[rows], self.gap[rows])
 
 
 def wrench_samples(robots: Mapping[str, Floats], motion: Mapping[str, Floats]) -> WrenchSamples:

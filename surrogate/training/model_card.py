@@ -1,7 +1,7 @@
-"""The model card: one page of Markdown beside a look-up table, for whoever finds the file.
+"""The model card: one page of Markdown beside a look-up table.
 
-What it learned, how far off it is on robots that it did not learn, by region, whether its intervals cover, the
-worst robots with the reason, and where not to trust it.
+It describes the training data, the held-out errors by region, the coverage of the intervals, the worst robots with
+the reason, and the limits of validity.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Train a look-up table: networks, domain, intervals and held-out errors.
 
-Rows of a data set are put into three sets by a fixed hash of their number: 80 % are learned, on 10 % the local
-widths of the intervals are fitted, and 10 % are held out. The held-out rows give the stated errors and the last
-factor of the intervals. Rows that failed or did not converge are left out. Rows whose tails touch are used.
+Rows of a data set are split into three sets by a fixed hash of their number: 80 % for training, 10 % for the local
+widths of the intervals, and 10 % held out. The held-out rows give the stated errors and the last factor of the
+intervals. Rows that failed or did not converge are excluded. Rows whose tails touch are used.
 
 A data set need not have response curves. Then the flips of a part of its robots are simulated here.
 """
@@ -40,7 +40,7 @@ _QUIET = TrainingContext()
 
 
 def split(rows: Integers) -> Integers:
-    """0 learned, 1 for the widths of intervals, 2 held out: a fixed pseudo-random split by row number."""
+    """Split rows pseudo-randomly, fixed by row number: 0 learned, 1 for the widths of intervals, 2 held out."""
     mixed = (rows.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(40)
     tenth = mixed % np.uint64(10)
     return np.where(tenth == 8, 1, np.where(tenth == 9, 2, 0))
@@ -159,7 +159,7 @@ def learn(
         "held_out": len(held_out),
         "flips": len(usable),
     }
-    made = provenance(
+    created = provenance(
         {"tails": asdict(wrench_settings), "curves": asdict(response_settings), "device": work.device}
     )
     lookup = NeuralTable(
@@ -171,7 +171,7 @@ def learn(
         intervals=None,
         ranges={name: _range(learned.robots[name]) for name in learned.robots if name in ROBOT},
         errors={},
-        provenance={**made, **(source or {}), "rows": counts},
+        provenance={**created, **(source or {}), "rows": counts},
     )
     return _judged(lookup, width_rows, held_out, flips_held_out)
 

@@ -26,7 +26,7 @@ _LONGEST = 0.5  # largest relative change of ω_t in one step
 
 @compiled
 def solve_rows(network: Packed, heads: Floats, resistances: Floats, tails: Floats) -> tuple[Floats, Flags]:
-    """(v_x, v_z, ω_yr, ω_h, ω_t) in balance, (M, 5), for a positive motor; and which robots converged, (M,).
+    """Solve for (v_x, v_z, ω_yr, ω_h, ω_t), (M, 5), of a positive motor; tell which robots converged, (M,).
 
     Args:
         network: of the tails.

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from tests.calibration.toy_tables import install_toy
+from tests.calibration.toy_tables import install_few_candidates, install_toy
 
 
 @pytest.fixture
 def toy_model(monkeypatch: pytest.MonkeyPatch) -> None:
     install_toy(monkeypatch)
+
+
+@pytest.fixture
+def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
+    install_few_candidates(monkeypatch)

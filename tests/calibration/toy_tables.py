@@ -10,11 +10,13 @@ from typing import TypeVar
 import pandas as pd
 import pytest
 
+import calibration.swimmer.swimmer
 import calibration.swimmer.synthetic_table
 import sim.motion.batches
+from calibration.swimmer.candidate_effects import influences
 from calibration.swimmer.head_correction import learn_head_correction
-from calibration.swimmer.lab_settings import Owned
 from calibration.swimmer.measured_table import read_measurements
+from calibration.swimmer.possible_runs import Owned
 from calibration.swimmer.swimmer import DIRECT, SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
@@ -29,6 +31,7 @@ TRUTH = replace(START, C_t=3.1, C_r=2.4, C_yr=4.4)
 Test = TypeVar("Test", bound=Callable[..., None])
 LENGTHS_CM = (5.0, 8.0, 11.0)
 FEW_DRAWS = 200  # of the bootstrap, where no rate is asserted
+FEW_CANDIDATES = ("end_over_end_drag", "left_right_bias", "natural_curvature", "tail_spin_drag")
 
 
 def shares_verdicts(test: Test) -> Test:
@@ -44,6 +47,12 @@ def install_toy(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(SwimmerModel, "guess", lambda model, start, used: start)
     for name in ("steady", "sensitivities", "settle"):  # what all of the simulator's batches call
         patch.setattr(sim.motion.batches, name, refuse_to_simulate)
+
+
+def install_few_candidates(patch: pytest.MonkeyPatch) -> None:
+    """Let every SwimmerModel search a few effects only, where the number of candidates is not the subject."""
+    few = {name: influence for name, influence in influences().items() if name in FEW_CANDIDATES}
+    patch.setattr(calibration.swimmer.swimmer, "influences", lambda: few)
 
 
 def refuse_to_simulate(*_: object, **__: object) -> None:

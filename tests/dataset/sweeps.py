@@ -61,7 +61,7 @@ class InThisProcess:
 
 
 def design(rows: int, seed: int = 5) -> SweepDesign:
-    """A sweep for invented rows."""
+    """Design a sweep for synthetic rows."""
     axes = {
         "C_t": Axis(2, 5, "linear"), "C_r": Axis(1.5, 3.5, "linear"), "C_yr": Axis(1, 7, "linear"),
         "l_over_R": Axis(4, 9, "linear"), "L_over_R": Axis(3, 5, "linear"), "l_over_r0": Axis(20, 45, "linear"),
@@ -71,7 +71,7 @@ def design(rows: int, seed: int = 5) -> SweepDesign:
 
 
 def invented(p: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Rows in closed form: every column of the schema, some robots failed."""
+    """Make synthetic rows in closed form: every column of the schema, some robots failed."""
     rows = len(p["N"])
     share = 1 / (1 + p["C_r"] / p["N"])
     yaw = 0.05 * p["C_yr"] * share * p["omega_bar"] / 10
@@ -106,14 +106,14 @@ def _mark(p: dict[str, np.ndarray], word: str) -> int:
 
 
 def killing_once(p: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Rows that kill their worker the first time."""
+    """Make rows that kill their worker the first time."""
     if _mark(p, "once") == 1:
         os.kill(os.getpid(), 9)
     return invented(p)
 
 
 def poisonous(p: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Rows of which some kill their worker every time: the chunk with the robot of row 100 of seed 5."""
+    """Make rows of which some kill their worker every time: the chunk with the robot of row 100 of seed 5."""
     if (p["C_t"] == design(101).points(100, 101)["C_t"][0]).any():
         _mark(p, "poison")
         os.kill(os.getpid(), 9)
@@ -121,21 +121,21 @@ def poisonous(p: dict[str, np.ndarray]) -> dict[str, Any]:
 
 
 def raising(p: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Rows of which some are a bug: the chunk with the robot of row 100 of seed 5."""
+    """Make rows of which some raise an error: the chunk with the robot of row 100 of seed 5."""
     if (p["C_t"] == design(101).points(100, 101)["C_t"][0]).any():
         raise ZeroDivisionError("a robot that nobody foresaw")
     return invented(p)
 
 
 def slow(p: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Rows that take their time: a tenth of a second a chunk, and a mark."""
+    """Make rows slowly: a tenth of a second a chunk, and a mark."""
     _mark(p, "slow")
     time.sleep(0.1)
     return invented(p)
 
 
 def endless(p: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Rows that never come."""
+    """Wait for ever."""
     _mark(p, "endless")
     time.sleep(600)
     return invented(p)
@@ -151,12 +151,12 @@ def write_rows(folder: Path, manifest: dict[str, Any], columns: dict[str, Any]) 
 
 
 def without_cost(rows: pd.DataFrame) -> pd.DataFrame:
-    """All columns that are the same whenever a row is simulated."""
+    """Return all columns that are the same whenever a row is simulated."""
     return rows.drop(columns=COST)
 
 
 def dying_in_the_write(p: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Rows whose worker dies as it writes them: first where it synchronises the file, then when it renames it."""
+    """Make rows whose worker dies as it writes them: first at the fsync of the file, then at its renaming."""
     attempt = _mark(p, "write")
 
     def kill(*_: Any, **__: Any) -> None:

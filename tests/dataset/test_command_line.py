@@ -101,9 +101,9 @@ def make(target: str, *words: str) -> subprocess.CompletedProcess[str]:
 def test_make_dataset_knows_its_sources(tmp_path: Path) -> None:
     if not (ROOT / ".venv" / ".installed").exists():
         pytest.skip("there is no .venv made by make setup")
-    config, other, data = tmp_path / "a.toml", tmp_path / "b.toml", tmp_path / "data"
+    config, other_config, data = tmp_path / "a.toml", tmp_path / "b.toml", tmp_path / "data"
     config.write_text(SMALL)
-    other.write_text(SMALL.replace("seed = 3", "seed = 4"))
+    other_config.write_text(SMALL.replace("seed = 3", "seed = 4"))
     assert make("dataset", f"CONFIG={config}", f"DATA={data}").returncode == 0
     before = (data / "manifest.json").stat().st_mtime_ns
     time.sleep(0.01)
@@ -111,8 +111,8 @@ def test_make_dataset_knows_its_sources(tmp_path: Path) -> None:
     assert again.returncode == 0
     assert (data / "manifest.json").stat().st_mtime_ns == before
     for time_of_change in (1, before + 10**10):  # older and newer than the data
-        os.utime(other, ns=(time_of_change, time_of_change))
-        refused = make("dataset", f"CONFIG={other}", f"DATA={data}")
+        os.utime(other_config, ns=(time_of_change, time_of_change))
+        refused = make("dataset", f"CONFIG={other_config}", f"DATA={data}")
         assert refused.returncode != 0
         assert "seed 3 there, 4 here" in refused.stderr
     model = tmp_path / "model.safetensors"

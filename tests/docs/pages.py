@@ -24,13 +24,13 @@ class Block(NamedTuple):
     reason: str
 
 
-def name_of(page: Path) -> str:
+def page_name(page: Path) -> str:
     """Return the path of a page in the folder of the documentation."""
     return page.relative_to(DOCS).as_posix()
 
 
 def blocks(page: Path) -> list[Block]:
-    """The blocks of code on a page, in order."""
+    """Find the blocks of code on a page, in order."""
     matches = _BLOCK.finditer(page.read_text())
     return [Block(match["language"], match["code"], match["reason"] or "") for match in matches]
 

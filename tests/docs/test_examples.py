@@ -15,7 +15,7 @@ import softflagella as sf
 from sim.inputs import load_robot
 from surrogate.export.small_copy_files import save_small_copy
 from surrogate.table.model_file import load
-from tests.docs.pages import DOCS, PAGES, ROOT, blocks, name_of
+from tests.docs.pages import DOCS, PAGES, ROOT, blocks, page_name
 from tests.planner.compiled import compile_c
 from tests.processes import LIMIT
 
@@ -27,11 +27,13 @@ SHOWN = {*RUN, "toml", "text", "c", "js"}
 def marked() -> list[Any]:
     """Return the pages with something to run."""
     pages = [p for p in PAGES if any(b.language in RUN and not b.reason for b in blocks(p))]
-    return [pytest.param(p, id=name_of(p), marks=[pytest.mark.long] if name_of(p) in LONG else []) for p in pages]
+    return [
+        pytest.param(p, id=page_name(p), marks=[pytest.mark.long] if page_name(p) in LONG else []) for p in pages
+    ]
 
 
 def environment(folder: Path) -> dict[str, str]:
-    """An environment in which `softflagella` is the command of this source tree."""
+    """Make an environment in which `softflagella` is the command of this source tree."""
     command = folder / "softflagella"
     command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m softflagella "$@"\n')
     command.chmod(0o755)
@@ -52,7 +54,7 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytes
         if block.reason or block.language not in RUN:
             continue
         if block.language == "python":
-            exec(compile(block.code, name_of(page), "exec"), names)
+            exec(compile(block.code, page_name(page), "exec"), names)
         else:
             done = subprocess.run(
                 ["sh", "-e", "-c", block.code],
@@ -83,8 +85,8 @@ def test_every_block_is_of_a_known_language() -> None:
         fences = [line for line in page.read_text().splitlines() if line.startswith("```") and line != "```"]
         directives = [line for line in fences if line.startswith("```{")]
         page_blocks = blocks(page)
-        assert len(page_blocks) == len(fences) - len(directives), name_of(page)
-        assert {block.language for block in page_blocks} <= SHOWN, name_of(page)
+        assert len(page_blocks) == len(fences) - len(directives), page_name(page)
+        assert {block.language for block in page_blocks} <= SHOWN, page_name(page)
 
 
 def test_the_robot_on_the_page_of_files_is_one(tmp_path: Path) -> None:

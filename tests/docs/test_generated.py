@@ -12,7 +12,7 @@ import pytest
 from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
 from softflagella.__main__ import PACKAGES, WORDS
-from tests.docs.pages import DOCS, PAGES, ROOT, generator, name_of
+from tests.docs.pages import DOCS, PAGES, ROOT, generator, page_name
 
 TOP = (*PACKAGES, "softflagella", "benchmarks", "tests")
 _MODULE = re.compile(rf"`((?:{'|'.join(TOP)})(?:\.\w+)+)`")
@@ -57,7 +57,7 @@ def test_generated_pages_are_written_once(tmp_path: Path) -> None:
 
 
 def exists(name: str) -> bool:
-    """Whether a dotted name is a module, or something in one."""
+    """Tell whether a dotted name is a module, or something in one."""
     parts = name.split(".")
     for count in range(len(parts), 0, -1):
         module = ".".join(parts[:count])
@@ -89,6 +89,6 @@ def test_what_is_named_exists(file: Path) -> None:
 def test_every_page_is_in_the_table_of_contents() -> None:
     entries = (DOCS / "index.md").read_text().splitlines()
     for page in PAGES:
-        name = name_of(page).removesuffix(".md")
+        name = page_name(page).removesuffix(".md")
         if not name.startswith("decisions/0"):  # found by their numbers
             assert name == "index" or name in entries

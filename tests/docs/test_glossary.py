@@ -6,6 +6,7 @@ import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from tokenize import COMMENT, tokenize
 from typing import get_type_hints
 
 import numpy as np
@@ -27,11 +28,11 @@ from tests.docs.pages import DOCS, PAGES, ROOT, glossary, replaced_words
 PACKAGES = ("sim", "dataset", "surrogate", "planner", "calibration", "softflagella", "benchmarks")
 TEXTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES]
 HISTORY = {DOCS / "log.md", DOCS / "reference" / "glossary.md"}
-SOURCES = sorted(file for top in PACKAGES for file in (ROOT / top).rglob("*.py"))
+SOURCES = sorted(file for top in (*PACKAGES, "tests") for file in (ROOT / top).rglob("*.py"))
 
 
 def plan_names() -> set[str]:
-    """Keys of plan.json, and columns of plan.csv and of a track."""
+    """Collect the keys of plan.json, and the columns of plan.csv and of a track."""
     robot = sf.load_robot("paper-control")
     result = sf.plan(sf.circle(2.0), robot)
     record = plan_record(result)
@@ -79,10 +80,12 @@ def prose(text: str) -> str:
 
 
 def literals(file: Path) -> Iterator[str]:
-    """Yield the docstrings and messages of a module: all literals with a space in them."""
+    """Yield the docstrings, messages and comments of a module; messages are all literals with a space in them."""
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
             yield prose(node.value)
+    with file.open("rb") as stream:
+        yield from (prose(token.string) for token in tokenize(stream.readline) if token.type == COMMENT)
 
 
 def replaced(text: str) -> set[str]:
@@ -101,6 +104,8 @@ def test_pages_use_the_terms_of_the_glossary(page: Path) -> None:
     assert replaced(prose(page.read_text())) == set()
 
 
-@pytest.mark.parametrize("file", SOURCES, ids=lambda f: f.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize(
+    "file", [file for file in SOURCES if file != Path(__file__)], ids=lambda f: f.relative_to(ROOT).as_posix()
+)
 def test_docstrings_and_messages_use_the_terms_of_the_glossary(file: Path) -> None:
     assert {word for text in literals(file) for word in replaced(text)} == set()

@@ -12,13 +12,13 @@ import pytest
 
 from sim.mechanics.geometry import inverse_voronoi, measure, new_geometry, straight
 from tests.docs.pages import DOCS
-from tests.sim.robots import body_of, control
+from tests.sim.robots import control, first_body
 
 EDGES, SIZE, STEP = 6, 0.4, 1e-6
 
 
 def example(name: str) -> ModuleType:
-    """The module that the page tells its reader to write."""
+    """Import the module that the page tells its reader to write."""
     spec = spec_from_file_location(name, DOCS / "howto" / "taper" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
@@ -28,12 +28,12 @@ def example(name: str) -> ModuleType:
 
 
 def tapered() -> Any:
-    """The control robot, as if the effect were in the catalogue."""
-    return body_of(control())._replace(nonlocal_terms=namedtuple("Nonlocal", ["tail_taper"])(SIZE))
+    """Make the control robot, as if the effect were in the catalogue."""
+    return first_body(control())._replace(nonlocal_terms=namedtuple("Nonlocal", ["tail_taper"])(SIZE))
 
 
 def energy(x: np.ndarray, offset: float) -> float:
-    """What the taper adds to the bending energy Σ ½ |κ|²/l, with |κ|² = 4 (1 − c)/(1 + c)."""
+    """Compute what the taper adds to the bending energy Σ ½ |κ|²/l, with |κ|² = 4 (1 − c)/(1 + c)."""
     nodes = np.concatenate([[[offset, 0.0, 1.0], [offset, 0.0, 0.0]], x[:, 0]])  # the first edge is the clamp
     tangents = np.diff(nodes, axis=0)
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)

@@ -20,7 +20,7 @@ _LONGEST = 0.5  # relative change of ω_t in one step
 
 
 def solve(heads: Heads, tails: Tails, numbers: Numbers, start: Tensor | None = None) -> tuple[Tensor, Tensor]:
-    """Velocities in balance.
+    """Solve for the velocities in balance.
 
     Args:
         numbers: the table of the tails.
@@ -65,7 +65,7 @@ def _residual_and_inverse(heads: Heads, tails: Tails, u: Tensor, numbers: Number
 
 
 def _updated(inverse: Tensor, step: Tensor, change: Tensor) -> Tensor:
-    """The inverse after a step that changed the balance so (Broyden's good update)."""
+    """Update the inverse after a step that changed the balance by `change` (Broyden's good update)."""
     predicted = (inverse @ change[..., None])[..., 0]
     direction = (step[:, None, :] @ inverse)[:, 0]
     size = (direction * change).sum(1)[:, None, None]
@@ -74,7 +74,7 @@ def _updated(inverse: Tensor, step: Tensor, change: Tensor) -> Tensor:
 
 
 def _shortened(heads: Heads, tails: Tails, u: Tensor, step: Tensor) -> Tensor:
-    """The step, shortened where ω_t would change by more than _LONGEST of itself."""
+    """Shorten the step where ω_t would change by more than _LONGEST of itself."""
     change = (heads.gain * step[:, 3]).abs() / (heads.speed + heads.gain * u[:, 3])
     return step * torch.clamp(_LONGEST / change, max=1.0)[:, None]
 
@@ -86,7 +86,7 @@ def _relative(step: Tensor, u: Tensor) -> Tensor:
 
 
 def linear_guess(heads: Heads, tails: Tails) -> Tensor:
-    """Velocities u (M, 4) with the torque of linear theory and the side forces of straight tails."""
+    """Guess velocities u (M, 4) with the torque of linear theory and the side forces of straight tails."""
     spin = _FIRST_SPIN * heads.speed
     for _ in range(3):
         torque = tails.number * tails.zeta_perp * tails.offset**2 * linear_torque(tails.zeta_perp * spin)

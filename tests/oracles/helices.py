@@ -32,7 +32,7 @@ PIECES = 480
 
 
 def resistive(pitch: Floats, *, lighthill: bool = False) -> Floats:
-    """Thrust, torque, drag of helices of pitch λ/R (m,), (m, 3), by resistive force theory."""
+    """Compute thrust, torque, drag of helices of pitch λ/R (m,), (m, 3), by resistive force theory."""
     angle = np.arctan(2 * np.pi / pitch)
     wire, length = WIRE / RADIUS, LENGTH / RADIUS / np.cos(angle)
     if lighthill:
@@ -47,7 +47,7 @@ def resistive(pitch: Floats, *, lighthill: bool = False) -> Floats:
 
 
 def with_flow(pitch: Floats, *, pieces: int = PIECES) -> Floats:
-    """The same with the flow of every piece of the wire at every other."""
+    """Compute the same with the flow of every segment of the wire at every other."""
     return np.array([_forces(float(p), pieces) for p in pitch])
 
 
@@ -72,7 +72,7 @@ def _helix(along: Floats, pitch: float) -> Floats:
 
 @compiled
 def _mobility(nodes: Floats, at: Floats, spread: float) -> Floats:
-    """Velocity at the middles of pieces per force on each, (3 m, 3 m)."""
+    """Compute the velocity at the middles of segments per force on each, (3 m, 3 m)."""
     m = len(at)
     matrix = np.empty((3 * m, 3 * m))
     for j in range(m):
@@ -92,7 +92,7 @@ def _mobility(nodes: Floats, at: Floats, spread: float) -> Floats:
 
 
 def read_helices(source: str | Path) -> tuple[Floats, Floats]:
-    """Pitch λ/R (m,) and measured thrust, torque, drag (m, 3).
+    """Read pitch λ/R (m,) and measured thrust, torque, drag (m, 3).
 
     Raises:
         InputError: a column is missing.

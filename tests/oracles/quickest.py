@@ -1,7 +1,7 @@
 """The quickest motion from rest to a pose by brute force, without obstacles: an oracle for `planner.goal.to_goal`.
 
 The optimum: the sum of all dwells is minimised with the end pose as a constraint (SLSQP). It starts from every one
-of Dubins' words, with short and long dwells on its straight pieces, in both directions. The best of all is taken.
+of Dubins' words, with short and long dwells on its straight segments, in both directions. The best is taken.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from sim.arrays import Floats
 
 _STEP = 1e-4
 _LONGER = 1.6  # words longer than this, beside the shortest, are not tried
-_DWELLS = (3.0, 6.0)  # on straight pieces, time units
+_DWELLS = (3.0, 6.0)  # on straight segments, time units
 
 
 def brute_force(vehicle: Vehicle, goal: tuple[float, float, float]) -> float:
-    """The least time from rest at the origin to the goal, over all starts of the optimisation."""
+    """Find the least time from rest at the origin to the goal, over all starts of the optimisation."""
     a = vehicle.pivot_distance
     start = np.array([-a, 0.0, 0.0])
     end = np.array([goal[0] - a * np.cos(goal[2]), goal[1] - a * np.sin(goal[2]), goal[2]])
@@ -44,7 +44,7 @@ def brute_force(vehicle: Vehicle, goal: tuple[float, float, float]) -> float:
 
 
 def _schedules(vehicle: Vehicle, turns: Floats, pieces: Floats, dwell: float) -> list[tuple[int, Floats]]:
-    """Dwells that carry out a word: arcs in one go, straight pieces by zigzags of an odd or an even number."""
+    """List dwells that carry out a word: arcs in one go, straight segments by zigzags of odd or even numbers."""
     schedules: list[tuple[int, list[float]]] = [(1, []), (-1, [])]
     speed = float(vehicle.twist[0, 0])
     for turn, piece in zip(turns.tolist(), pieces.tolist(), strict=True):
@@ -64,7 +64,7 @@ def _schedules(vehicle: Vehicle, turns: Floats, pieces: Floats, dwell: float) ->
 
 
 def _optimum(vehicle: Vehicle, first: int, dwells: Floats, target: Floats) -> float:
-    """Least sum of dwells whose motion ends at the target; infinite where none was found."""
+    """Minimise the sum of dwells whose motion ends at the target; infinite where none was found."""
     none = Switches(first, dwells, np.zeros((1, 3)))
 
     def end(x: Floats) -> Floats:

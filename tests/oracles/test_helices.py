@@ -14,7 +14,7 @@ MEASURED = Path(__file__).parents[3] / "shared" / "measured"
 
 
 def test_a_helix_with_the_flow_of_its_parts() -> None:
-    """Converged in the number of pieces; a straight wire drags as Tirado and Garcia de la Torre (1979) say."""
+    """Converged in the number of segments; a straight wire drags as Tirado and Garcia de la Torre (1979) say."""
     pitch = np.array([2.226, 9.811])
     assert with_flow(pitch, pieces=240) == pytest.approx(with_flow(pitch, pieces=480), rel=0.01)
     wire = with_flow(np.array([1e3]))[0]

@@ -1,4 +1,4 @@
-"""tracker.h compiled as a library: a tracker that is fed like `planner.Tracker`, in the plan's time units."""
+"""tracker.h compiled as a library: a tracker that is fed like `softflagella.Tracker`, in the plan's time units."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def compile_c(source: Path, out: Path, *flags: str) -> None:
 
 
 class CompiledTracker:
-    """tracker.h behind the methods of `planner.Tracker`; one plan in one library."""
+    """tracker.h behind the methods of `softflagella.Tracker`; one plan in one library."""
 
     def __init__(
         self, plan: Plan, folder: Path, *, single: bool = False, noise: tuple[float, float] = (0.01, 0.01)

@@ -1,4 +1,4 @@
-"""A made-up robot that swims under a tracker's orders, watched by a camera with delays, gaps and wrong poses."""
+"""A vehicle that swims under a tracker's orders, watched by a camera with delays, gaps and wrong poses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sim.mechanics import planar
 
 
 class Tracks(Protocol):
-    """`planner.Tracker`, or what is fed like it."""
+    """`softflagella.Tracker`, or what is fed like it."""
 
     def update(
         self, now: float, pose: tuple[float, float, float] | None = None, seen_at: float | None = None
@@ -50,29 +50,29 @@ def _moved(car: Vehicle, pose: np.ndarray, sense: int, before: float | None, sta
 
 def swim(tracker: Tracks, plan: Plan, truth: Vehicle, camera: Camera, *, changes_to: Vehicle | None = None,
          most: int = 5000) -> tuple[np.ndarray, list[float]]:  # fmt: skip
-    """Distances from the declared path at many instants, and the dwells that were ordered."""
-    pose, before, start, seen, waiting = np.array(plan.start), None, 0.0, 0.0, []
+    """Swim; return distances from the declared path at many instants, and the dwells that were ordered."""
+    pose, last_dwell, start, seen, waiting = np.array(plan.start), None, 0.0, 0.0, []
     command, dwells, track = tracker.update(0.0), [], []
     half = len(plan.dwells) // 2
     while not command.finished and len(dwells) < most:
         sense, known = command.direction, command.flip_at
         car = changes_to if changes_to is not None and len(dwells) > half else truth
 
-        at = partial(_moved, car, pose, sense, before, start)
+        at = partial(_moved, car, pose, sense, last_dwell, start)
         while seen + camera.every <= known or (waiting and waiting[0][0] <= known):
             if waiting and waiting[0][0] <= min(known, seen + camera.every):
-                when, found, taken = waiting.pop(0)
-                command = tracker.update(when, found, taken)
+                when, measured, taken_at = waiting.pop(0)
+                command = tracker.update(when, measured, taken_at)
             else:
                 seen += camera.every
-                found = camera.sees(at(seen))
-                if found is not None:
-                    waiting.append((seen + camera.delay, found, seen))
+                measured = camera.sees(at(seen))
+                if measured is not None:
+                    waiting.append((seen + camera.delay, measured, seen))
                     waiting.sort(key=lambda item: item[0])
             known = command.flip_at
         track += [at(start + share * (known - start)) for share in np.linspace(0.2, 1, 5)]
         dwells.append(known - start)
-        pose, before, start = at(known), known - start, known
+        pose, last_dwell, start = at(known), known - start, known
         command = tracker.update(known)
     followed = planar.compose(np.array(track), np.array([plan.tracked.offset, 0.0, 0.0]))
     return distance_to(plan.reference, followed[:, :2]), dwells

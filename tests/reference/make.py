@@ -22,18 +22,18 @@ TRUTH = replace(GIVEN, C_t=3.1, C_r=2.4, C_yr=4.4)  # behind every table
 
 
 def none() -> pd.DataFrame:
-    """Nothing is missing."""
+    """Simulate with nothing missing."""
     return make_table(TRUTH, seed=1, lengths_cm=(6.0, 9.0), title="")
 
 
 def effect() -> pd.DataFrame:
-    """The head turns end over end against five times more drag than the model has."""
+    """Turn the head end over end against five times more drag than the model has."""
     hidden = replace(TRUTH, effects={"end_over_end_drag": 5.0})
     return make_table(hidden, seed=21, lengths_cm=(6.0, 9.0), title="")
 
 
 def unexplained() -> pd.DataFrame:
-    """A yaw rate that departs by up to 12 %, in a way that no effect has: it waves along the tail length."""
+    """Change the yaw rate by up to 12 % as no effect does: it waves along the tail length."""
     table = make_table(TRUTH, seed=7, lengths_cm=(5.0, 8.0, 11.0), title="")
     sign = np.where(table["omega_rpm"].abs() > 120, 1, -1)
     table["omega_yr_rad_s"] *= np.exp(0.12 * np.sin(1.1 * table["l_cm"]) * sign)
@@ -41,7 +41,7 @@ def unexplained() -> pd.DataFrame:
 
 
 def ambiguous() -> pd.DataFrame:
-    """Drag on the tails' own spin, on robots of two kinds with tails of one length: too few to tell its rivals."""
+    """Add drag on the tails' own spin, to robots of two kinds with one tail length: too few to tell its rivals."""
     hidden = replace(TRUTH, effects={"tail_spin_drag": 1.0})
     return make_table(hidden, seed=5, tails=(3, 4), lengths_cm=(8.0,), trials=4, title="")
 

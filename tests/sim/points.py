@@ -8,5 +8,5 @@ from dataset.rows.design import load_design
 
 
 def sweep_points(count: int) -> dict[str, np.ndarray]:
-    """Columns of the first `count` robots of sweep.toml."""
+    """Return the columns of the first `count` robots of sweep.toml."""
     return load_design().with_rows(count).points()

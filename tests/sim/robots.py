@@ -20,18 +20,18 @@ CONTROL_VALUES = PRESETS["paper-control"].group_values()
 
 
 def control(count: int = 1, **changes: object) -> Groups:
-    """`count` copies of the paper's control robot with changed columns (numbers or arrays)."""
+    """Make `count` copies of the paper's control robot with changed columns (numbers or arrays)."""
     values = {**CONTROL_VALUES, **changes}
     return Groups.from_columns({k: np.broadcast_to(np.asarray(v, float), count).copy() for k, v in values.items()})
 
 
-def body_of(groups: Groups) -> Body:
-    """The first robot for the compiled loops."""
+def first_body(groups: Groups) -> Body:
+    """Assemble the first robot for the compiled loops."""
     return bodies(groups)[0]
 
 
 def held(robots: TensorRobots) -> TensorRobots:
-    """The same tails on a disc that nothing moves: the motor alone turns it."""
+    """Return the same tails on a disc that nothing moves: the motor alone turns it."""
     resistance = 1e12 * torch.eye(4, 5, dtype=torch.float64).unsqueeze(-1).expand(4, 5, robots.robots)
     return replace(robots, body=robots.body._replace(resistance=resistance))
 
@@ -46,9 +46,9 @@ def mean_tail_wrench(body: Body, x: np.ndarray, u: np.ndarray) -> np.ndarray:
 def held_loads(
     omega_bar: float, l_over_r0: float, offset: float, *, edges: int, **effects: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean wrench (F_x, F_z, M_y, M_z) of the fluid on one filament whose disc is held, and its nodes (n, 3)."""
+    """Average the wrench (F_x, F_z, M_y, M_z) of the fluid on a filament whose disc is held; nodes (n, 3), too."""
     _, groups = single_filament(2, omega_bar, l_over_r0, offset, **effects)
-    body = body_of(groups)
+    body = first_body(groups)
     body.resistance[:, :4] += 1e9 * np.eye(4)
     x, u = straight_start(body, edges, 2, 1)
     u[:] = 0.0
@@ -58,7 +58,7 @@ def held_loads(
 
 
 def extrapolated_loads(omega_bar: float, l_over_r0: float, offset: float, **effects: float) -> np.ndarray:
-    """The same at the default resolution: the direct route's meshes, extrapolated."""
+    """Compute the same at the default resolution: the direct route's meshes, extrapolated."""
     values = [held_loads(omega_bar, l_over_r0, offset, edges=n, **effects)[0] for n in MESHES]
     return extrapolate(np.array(values))
 
@@ -66,7 +66,7 @@ def extrapolated_loads(omega_bar: float, l_over_r0: float, offset: float, **effe
 def single_filament(
     edges: int, omega_bar: float, l_over_r0: float, offset: float, **effects: float
 ) -> tuple[TensorRobots, Groups]:
-    """One filament at distance `offset` [l] from the axis, turned at `omega_bar`."""
+    """Make one filament at distance `offset` [l] from the axis, turned at `omega_bar`."""
     offset *= CONTROL_VALUES["l_over_R"]
     groups = control(1, N=1, omega_bar=omega_bar, l_over_r0=l_over_r0, a_over_R=offset, **effects)
     return held(tensor_robots(groups, edges=edges)), groups

@@ -31,13 +31,13 @@ def test_only_the_newest_versions_are_kept(tmp_path: Path) -> None:
 
 
 def has_loops(file: Path) -> bool:
-    """Whether a function of the file is compiled, or inlined in functions that are."""
+    """Tell whether a function of the file is compiled, or inlined in functions that are."""
     functions = (node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.FunctionDef))
     return any(isinstance(mark, ast.Name) and mark.id in MARKS for f in functions for mark in f.decorator_list)
 
 
 def imported(file: Path) -> set[Path]:
-    """Files of the simulator that a file imports."""
+    """Return files of the simulator that a file imports."""
     found = set()
     for node in ast.walk(ast.parse(file.read_text())):
         names = []
@@ -50,7 +50,7 @@ def imported(file: Path) -> set[Path]:
 
 
 def with_imports(files: set[Path]) -> set[Path]:
-    """`files`, what they import, and so on."""
+    """Collect `files`, what they import, and so on."""
     whole: set[Path] = set()
     while files - whole:
         whole |= files
@@ -73,7 +73,7 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def digest_with_a_change(root: Path, name: str) -> str:
-    """The digest while a file has one line more."""
+    """Compute the digest while a file has one line more."""
     text = (root / name).read_bytes()
     (root / name).write_bytes(text + b"CHANGED = 1\n")
     digest = code_digest(root)

@@ -18,7 +18,7 @@ CODE = (".py", ".pyc", ".nbi", ".nbc")
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel of the tracked files, unpacked."""
+    """Build the wheel of the tracked files, and unpack it."""
     source, unpacked = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("installed")
     ignored = shutil.ignore_patterns("__pycache__")
     for package in PACKAGES:
@@ -34,7 +34,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def data_files(root: Path) -> set[str]:
-    """Files of the packages that are no code."""
+    """List files of the packages that are no code."""
     files = (file for package in PACKAGES for file in (root / package).rglob("*") if file.is_file())
     return {str(f.relative_to(root)) for f in files if f.suffix not in CODE and "__pycache__" not in f.parts}
 

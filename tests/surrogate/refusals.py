@@ -16,7 +16,7 @@ NO_PYTHON = re.compile(r"Error|Exception|Traceback|object|__|<class")
 
 
 def refusal(path: Path, read: Callable[[Path], Any] = load) -> str:
-    """The one plain line with which a file is refused."""
+    """Return the one plain line with which a file is refused."""
     with pytest.raises(InputError) as caught:
         read(path)
     words = str(caught.value)

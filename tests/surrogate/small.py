@@ -17,27 +17,27 @@ CURVES = Settings(width=16, depth=1, members=1, epochs=30, iterations=20)
 
 @cache
 def rows(count: int = 512, seed: int = 11, *, wide: bool = True) -> SimulatedRobots:
-    """Simulated robots with three or four tails."""
+    """Simulate robots with three or four tails."""
     robots = draw_robots(count, seed, wide=wide)
     return simulate_robots(robots | {"N": 3.0 + robots["N"] % 2})
 
 
 @cache
 def flips() -> SimulatedRobots:
-    """Simulated robots with response curves."""
+    """Simulate robots with response curves."""
     robots = draw_robots(32, 12, wide=False)
     return simulate_robots(robots | {"N": np.full(32, 3.0)}, curves=True)
 
 
 @cache
 def table() -> NeuralTable:
-    """A table that learned them; its errors are some per cent."""
+    """Train a table on them; its errors are some per cent."""
     held = rows(256, 13, wide=False)
     return learn(rows(), held.at(np.arange(len(held)) % 2 == 0), held, flips(), TAILS, CURVES)
 
 
 def robots_inside(count: int = 6) -> dict[str, np.ndarray]:
-    """Robots inside the small table's domain."""
+    """Draw robots inside the small table's domain."""
     robots = rows(256, 13, wide=False).robots
     inside = np.flatnonzero(~table().query(robots, flag=True)["outside"])[:count]
     return {name: values[inside] for name, values in robots.items()}

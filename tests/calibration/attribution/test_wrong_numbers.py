@@ -1,4 +1,4 @@
-"""Numbers as given that are off: no physics within their tolerance, a finding of their own beyond it."""
+"""Nuisance parameters that are off: no physics within their tolerance, a finding of their own beyond it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
+from calibration.attribution.wrong_numbers import pulls
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import fit
-from calibration.statistics.forward_model import by_differences, start_values
-from calibration.statistics.pulls import pulls
+from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, LENGTH, TACHOMETER
 from calibration.swimmer.swimmer import SwimmerModel
@@ -88,10 +88,11 @@ def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
     assert result.error_after < 1.25 * result.noise_ceiling
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("share", "sigmas"),
     [
-        pytest.param(0.6, {}, marks=pytest.mark.long),
+        (0.6, {}),
         (0.8, {"youngs_modulus": Sigma(0.03, True), **EXACT}),
     ],
     ids=["40 %", "20 %"],
@@ -110,7 +111,7 @@ def test_a_stiffness_far_off_is_named_with_what_looks_like_it(share: float, sigm
 
 
 def test_derivatives_along_numbers_are_those_of_the_prediction() -> None:
-    """By the powers of the groups, against differences of predictions; off the numbers as given."""
+    """By the powers of the groups, against differences of predictions; off the nominal parameters."""
     table = toy_table(6)
     table["v_cm_s"] = (
         table["R_yr_cm"] * table["omega_yr_rad_s"].abs() * np.random.default_rng(0).uniform(0.9, 1.1, len(table))

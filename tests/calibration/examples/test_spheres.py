@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from calibration.examples.spheres import Spheres
-from calibration.statistics.fit import fit
-from calibration.statistics.forward_model import Runs, start_values
-from calibration.statistics.noise import Noise
-from calibration.statistics.profile_intervals import profile_intervals
+from calibration.statistics.fit import fit, profile_intervals
+from calibration.statistics.statistical_model import Noise, Runs, start_values
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
 from calibration.verdict.verdict_json import verdict_record
@@ -73,7 +71,7 @@ def twins(truth: dict[str, float], seed: int) -> Verdict:
     result = calibrate(small_beads(truth, seed), progress=False)
     assert result.verdict == "ambiguous"
     assert set(result.effects) == {"wall", "inertia"}
-    assert [len(c.beside) for c in result.explaining] == [0, 0]
+    assert [len(c.claimed) for c in result.explaining] == [1, 1]
     assert "wall of the vessel" in result.sentence
     assert "inertia of the fluid" in result.sentence
     wanted = result.next_runs

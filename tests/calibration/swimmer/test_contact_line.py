@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibration.statistics.forward_model import by_differences, start_values
+from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.swimmer.candidate_effects import influences
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel

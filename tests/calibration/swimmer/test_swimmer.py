@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.statistics.forward_model import by_differences, start_values
+from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table

@@ -13,17 +13,16 @@ import pytest
 from calibration.report.corrected_robot import corrected_robot
 from calibration.report.report import write_report
 from calibration.statistics.fit import fit
-from calibration.statistics.forward_model import start_values
-from calibration.statistics.residual_tests import examine_residual
-from calibration.statistics.score_directions import Directions
-from calibration.statistics.splits import middle_session
-from calibration.statistics.study import DRAWS, Study
+from calibration.statistics.residual_tests import Directions, examine_residual
+from calibration.statistics.statistical_model import start_values
+from calibration.statistics.study import DRAWS, Study, middle_session
 from tests.calibration import toy
 from tests.calibration.toy_tables import (
     START,
     TRUTH,
     calibrated,
     calibrated_toy,
+    install_few_candidates,
     shares_verdicts,
     toy_swimmer,
     toy_table,
@@ -128,7 +127,10 @@ def test_fits_arrive_along_a_valley() -> None:
 
 
 @pytest.mark.usefixtures("toy_model")
-def test_two_effects_are_found_as_a_pair() -> None:
+@pytest.mark.parametrize("candidates", ["few", pytest.param("all", marks=pytest.mark.long)])
+def test_two_effects_are_found_as_a_pair(candidates: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if candidates == "few":
+        install_few_candidates(monkeypatch)
     result = calibrated(toy_table(31, end_over_end_drag=5.0, left_right_bias=0.15))
     assert result.verdict == "effect"
     assert set(result.effects) == {"end_over_end_drag", "left_right_bias"}

@@ -1,24 +1,22 @@
-"""The locked session has no say and judges; results repeat; intervals by profile."""
+"""The held-out session has no say and judges; results repeat; intervals by profile."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from calibration.statistics.profile_intervals import least_determined
-from calibration.statistics.splits import middle_session
-from calibration.statistics.study import DRAWS
+from calibration.statistics.fit import least_determined
+from calibration.statistics.study import DRAWS, middle_session
 from calibration.swimmer.measured_table import read_measurements
 from calibration.verdict.verdict_json import verdict_record
 from tests.calibration.toy_tables import calibrated, calibrated_toy, shares_verdicts, toy_table
 
 
-@shares_verdicts
-@pytest.mark.usefixtures("toy_model")
+@pytest.mark.usefixtures("toy_model", "few_candidates")
 def test_the_locked_session_has_no_say() -> None:
-    """Ruining the locked session changes the reported errors and nothing else."""
+    """Ruining the held-out session changes the reported errors and nothing else."""
     table = toy_table(5, end_over_end_drag=5.0)
-    result = calibrated_toy(5, end_over_end_drag=5.0)
+    result = calibrated(table)
     data = read_measurements(table)
     name = data.session_names[data.session[middle_session(data)][0]]
     ruined = table.copy()
@@ -29,10 +27,10 @@ def test_the_locked_session_has_no_say() -> None:
     assert result_of_ruined.error_after > 1.5 * result.error_after
 
 
-@shares_verdicts
+@pytest.mark.long
 @pytest.mark.usefixtures("toy_model")
 def test_the_result_is_deterministic() -> None:
-    first = calibrated_toy(5, end_over_end_drag=5.0)
+    first = calibrated(toy_table(5, end_over_end_drag=5.0))
     second = calibrated(toy_table(5, end_over_end_drag=5.0))
     assert verdict_record(first, table="t") == verdict_record(second, table="t")
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from calibration.examples.spheres import median_error, read_spheres
-from calibration.statistics.noise import repeat_covariance
+from calibration.statistics.statistical_model import repeat_covariance
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
 from calibration.verdict.calibrate import calibrate
@@ -41,12 +41,13 @@ def test_spheres_in_glycerine_need_the_wall() -> None:
     assert calibrate(read_spheres(source, "ZK2026"), progress=False).verdict == "unexplained"
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured tables are not on this machine")
 @pytest.mark.parametrize(
     ("name", "effect", "size"),
     [
         ("run04.csv", "natural_curvature", -0.295),
-        pytest.param("run05.csv", "viscosity_with_time", 0.0444, marks=pytest.mark.long),
+        ("run05.csv", "viscosity_with_time", 0.0444),
     ],
 )
 def test_what_came_out_of_the_measured_tables(name: str, effect: str, size: float) -> None:

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from calibration.statistics.fit import fit
-from calibration.statistics.forward_model import start_values
-from calibration.statistics.noise import Noise
+from calibration.statistics.statistical_model import Noise, start_values
 from calibration.verdict.next_runs import BATCH, STOP, Pair, _greedy, _together, next_runs
 from tests.calibration.toy_tables import TRUTH, toy_swimmer, toy_table
 

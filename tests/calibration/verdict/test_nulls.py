@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import binom
 
 import sim.motion.batches
-from calibration.statistics.forward_model import start_values
+from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import DRAWS
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.swimmer import COEFFICIENTS, DIRECT, SwimmerModel
@@ -57,7 +57,7 @@ def test_no_effect_is_claimed_where_there_is_none(nulls: list[Verdict]) -> None:
 def test_intervals_of_coefficients_cover(name: str, nulls: list[Verdict]) -> None:
     """As often as 95 % intervals may miss (binomial, once in a hundred times), and they are not too wide.
 
-    Stated errors allow for the tolerances of the numbers as given. Here these numbers are exact.
+    Stated errors allow for the tolerances of the nuisance parameters. Here these are exact.
     """
     ends = [null.fits.base_intervals[name] for null in nulls]
     missed = sum(not low < getattr(TRUTH, name) < high for low, high in ends)

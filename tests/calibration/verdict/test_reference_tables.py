@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from calibration.verdict.verdict import Verdict
 from sim.inputs import load_robot
 from sim.io.errors import run_command
 from sim.model.uncertainty import DEFAULTS, Sigma
+from tests.calibration.toy_tables import install_few_candidates
 from tests.reference.make import GIVEN, HERE, TABLES
 
 pytestmark = pytest.mark.slow
@@ -44,8 +46,13 @@ def test_nothing_is_missing() -> None:
         assert result.final.parameters[name] == pytest.approx(truth, rel=0.1)
 
 
-def test_one_effect_is_named_sized_and_handed_on(tmp_path: Path) -> None:
+@pytest.mark.parametrize("candidates", ["few", pytest.param("all", marks=pytest.mark.long)])
+def test_one_effect_is_named_sized_and_handed_on(
+    candidates: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Through the command. The truth was simulated on a finer mesh; the command is not told of the effect."""
+    if candidates == "few":
+        install_few_candidates(monkeypatch)
     words = ["calibrate", str(HERE / "effect.csv"), "--robot", str(HERE / "robot.toml"), "--out", str(tmp_path)]
     assert run_command(main, words) == 0
     record = json.loads((tmp_path / "verdict.json").read_text())
@@ -59,6 +66,7 @@ def test_one_effect_is_named_sized_and_handed_on(tmp_path: Path) -> None:
     assert "data:image/png" in (tmp_path / "report.html").read_text()
 
 
+@pytest.mark.long
 def test_what_no_effect_does_is_left_unexplained() -> None:
     result = calibrated("unexplained")
     assert result.verdict == "unexplained"
@@ -91,3 +99,4 @@ def test_where_tolerances_are_wide_a_wrong_number_comes_ahead_of_those_rivals() 
     assert result.effects == ()
     assert "tail_spin_drag" in {e.name for c in result.evidence.rival_effects for e in c.claimed}
     assert "If the number is right, " in result.sentence
+    assert re.fullmatch("the stated value of .* is wrong", result.next.explanations[0].title)

@@ -9,9 +9,8 @@ import pytest
 
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import Fit, fit
-from calibration.statistics.forward_model import by_differences, start_values
-from calibration.statistics.residual_tests import examine_residual
-from calibration.statistics.score_directions import Directions, directions
+from calibration.statistics.residual_tests import Directions, directions, examine_residual
+from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.statistics.study import Study
 from calibration.swimmer.candidate_effects import influences
 from calibration.swimmer.measured_table import read_measurements

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
-from calibration.statistics.noise import Noise
+from calibration.statistics.statistical_model import Noise
 from calibration.verdict.next_runs import GIVEN_UP, STOP
 from calibration.verdict.sequential_test import (
     Explanation,

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.statistics.noise import SESSION_SHARE
-from calibration.statistics.splits import middle_session
+from calibration.statistics.statistical_model import SESSION_SHARE
+from calibration.statistics.study import middle_session
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.protocols import PROTOCOLS
 from calibration.swimmer.swimmer import SwimmerModel

@@ -44,7 +44,7 @@ def test_old_names_warn_and_find_their_part() -> None:
     assert set(parts) <= {field.name for field in fields(Verdict)}
     verdict = Verdict(**{"verdict": "none", "errors": None, **parts})
     for old, new in _OLD_NAMES.items():
-        with pytest.warns(DeprecationWarning, match=f"Verdict.{old} is now Verdict.{new}"):
+        with pytest.warns(DeprecationWarning, match=f"Verdict.{old} is deprecated; use Verdict.{new}"):
             assert getattr(verdict, old) == new
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         verdict.nothing  # noqa: B018

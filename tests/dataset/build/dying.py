@@ -33,7 +33,7 @@ def build(folder: Path, rows: int) -> None:
 
 
 def in_a_child(work: Callable[[], None]) -> int:
-    """The signal that ended a child which did the work; 0 where it came to its end."""
+    """Run the work in a child; return the signal that ended it, 0 where it came to its end."""
     child = os.fork()
     if child == 0:
         try:
@@ -49,14 +49,14 @@ def in_a_child(work: Callable[[], None]) -> int:
 
 def dying(folder: Path, step: int) -> None:
     """Extend, and kill this process before its operation number `step`."""
-    left = step
+    remaining = step
 
     def wrapped(operation: Any) -> Any:
         def run(*words: Any, **options: Any) -> Any:
-            nonlocal left
-            if left == 0:
+            nonlocal remaining
+            if remaining == 0:
                 os.kill(os.getpid(), signal.SIGKILL)
-            left -= 1
+            remaining -= 1
             return operation(*words, **options)
 
         return run
@@ -98,15 +98,15 @@ def main(place: Path) -> None:
             break
         assert killed == signal.SIGKILL
         try:
-            found = read(folder)
-            assert found.equals(old) or found.equals(new), step
+            stored = read(folder)
+            assert stored.equals(old) or stored.equals(new), step
         except InputError:
             refused += 1
         assert in_a_child(lambda: build(folder, MORE)) == 0
         assert read(folder).equals(new), step
-        found_files = files(folder)
-        assert calm.name not in found_files.pop("card.md").decode()
-        assert found_files == wanted, (step, sorted(found_files))
+        stored_files = files(folder)
+        assert calm.name not in stored_files.pop("card.md").decode()
+        assert stored_files == wanted, (step, sorted(stored_files))
         shutil.rmtree(folder)
         step += 1
     print(f"{step} operations, {refused} clear refusals")

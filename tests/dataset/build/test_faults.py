@@ -35,7 +35,7 @@ def _no_marks() -> None:
 
 
 def started(code: str, *, limit: int | None = None) -> subprocess.Popen[str]:
-    """A Python process that builds; `limit`: bytes of its largest file, and of its workers'."""
+    """Start a Python process that builds; `limit`: bytes of its largest file, and of its workers'."""
 
     def limited() -> None:
         if limit is not None:
@@ -52,7 +52,7 @@ def started(code: str, *, limit: int | None = None) -> subprocess.Popen[str]:
 
 
 def building(folder: Path, rows: int, rows_by: str, jobs: int = 2) -> str:
-    """Code that builds as the command line does."""
+    """Write code that builds as the command line does."""
     return (
         "import sys; from dataset.build.signals import run_long_command; "
         "from sim.io.errors import run_command; "
@@ -181,7 +181,7 @@ def goes_on_to_the_same_rows(folder: Path, rows: int, calm: Path) -> None:
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A disk of 400 kB."""
+    """Mount a disk of 400 kB."""
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(disk)]

@@ -63,7 +63,7 @@ def test_a_declared_output_is_empty_in_failed_rows(monkeypatch: pytest.MonkeyPat
 
 @pytest.fixture
 def older(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A data set of another version of the code, which has one column less."""
+    """Make a data set of another version of the code, which has one column less."""
     monkeypatch.setattr(dataset.build.build, "open_backend", lambda *_, **__: InThisProcess())
     build(design(60), tmp_path / "older", title="", simulate=invented)
     monkeypatch.setattr(schema, "OUTPUTS", (*schema.OUTPUTS, TIP_SPEED))

@@ -32,15 +32,15 @@ def test_any_batch_and_any_order_give_the_same_bits(rows: int) -> None:
              "omega_bar": 117.0, "N": 6.0}  # fmt: skip
     points = {name: np.append(values, quick[name]) for name, values in points.items()}
     points["history"] = np.arange(rows + 1) % 8 == 0
-    whole = simulate(points)
-    assert whole["reason"][-1]  # it is stepped in time
+    together = simulate(points)
+    assert together["reason"][-1]  # it is stepped in time
     order = np.random.default_rng(2).permutation(rows + 1)
     mixed = simulate({name: values[order] for name, values in points.items()})
     for place, row in enumerate(order.tolist()):
-        assert bits(mixed, place) == bits(whole, row), row
+        assert bits(mixed, place) == bits(together, row), row
     for row in (0, rows // 3, rows):
         alone = simulate({name: values[row : row + 1] for name, values in points.items()})
-        assert bits(alone, 0) == bits(whole, row), row
+        assert bits(alone, 0) == bits(together, row), row
 
 
 def test_rows_beyond_their_budget_say_so() -> None:

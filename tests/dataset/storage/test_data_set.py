@@ -53,7 +53,7 @@ def assert_refused_then_mended(built: Path, original: Path, words: str) -> None:
 
 
 def without_parts(folder: Path) -> dict[str, object]:
-    """The manifest without what a new file of the same rows changes."""
+    """Return the manifest without what a new file of the same rows changes."""
     return {k: v for k, v in read_manifest(folder).items() if k not in ("parts", "digest")}
 
 
@@ -101,22 +101,22 @@ def test_one_flipped_bit_is_never_silent(built: Path, original: Path) -> None:
 
 def test_a_flipped_bit_in_a_page_is_found_without_the_manifest(original: Path) -> None:
     """Shards that wait to be joined have no digest yet: their pages have checksums."""
-    there, key = open_storage(original), read_manifest(original)["config_hash"]
-    (piece,) = shards_in(there, "rows")
-    whole = part(original).read_bytes()
-    end = len(whole) - 8 - int.from_bytes(whole[-8:-4], "little")  # of the pages
+    storage, key = open_storage(original), read_manifest(original)["config_hash"]
+    (shard,) = shards_in(storage, "rows")
+    contents = part(original).read_bytes()
+    end = len(contents) - 8 - int.from_bytes(contents[-8:-4], "little")  # of the pages
     silent = 0
     for at in np.random.default_rng(1).integers(4, end, 200).tolist():
-        bad = bytearray(whole)
+        bad = bytearray(contents)
         bad[at] ^= 1 << (at % 8)
         (original.parent / "p").mkdir(exist_ok=True)
         (original.parent / "p" / part(original).name).write_bytes(bad)
         try:
-            other = open_storage(original.parent)
-            found = check_shard(other, Shard(f"p/{part(original).name}", 0, ROWS), schema([]), key)
-            silent += found._replace(sha256="", bytes=0) != check_shard(there, piece, schema([]), key)._replace(
-                sha256="", bytes=0
-            )
+            copies = open_storage(original.parent)
+            checked = check_shard(copies, Shard(f"p/{part(original).name}", 0, ROWS), schema([]), key)
+            silent += checked._replace(sha256="", bytes=0) != check_shard(
+                storage, shard, schema([]), key
+            )._replace(sha256="", bytes=0)
         except BadShardError:
             pass
     assert silent == 0
@@ -221,14 +221,14 @@ def test_lists_on_a_grid_are_stored_and_joined(tmp_path: Path) -> None:
     form = pa.schema(map(parquet_field, [*plain, Column("lag", pa.list_(pa.float32(), 5), "l", "offset", grid)]))
     values = np.arange(50, dtype=np.float32).reshape(10, 5) / 7
     flags = {"converged": np.ones(5, bool), "failed": np.zeros(5, bool), "touching": np.zeros(5, bool)}
-    there = open_storage(tmp_path)
+    storage = open_storage(tmp_path)
     for start in (0, 5):
         rows = {"row": np.arange(start, start + 5), "lag": values[start : start + 5], "cost_s": np.ones(5)}
         table = arrow_table({**rows, **flags, "reason": [""] * 5}, form)
-        write_shard(there, f"p/rows-{start:010d}-{start + 5:010d}.parquet", table, "key")
+        write_shard(storage, f"p/rows-{start:010d}-{start + 5:010d}.parquet", table, "key")
     name = "p/rows-0000000000-0000000010.parquet"
-    joined = join(there, shards_in(there, "p"), name, form, "key")
-    assert check_shard(there, Shard(name, 0, 10), form, "key") == joined
+    joined = join(storage, shards_in(storage, "p"), name, form, "key")
+    assert check_shard(storage, Shard(name, 0, 10), form, "key") == joined
     stored = pq.read_table(tmp_path / name)
     assert np.stack(stored.to_pandas()["lag"].to_list()).tobytes() == values.tobytes()
     assert json.loads(stored.schema.field("lag").metadata[b"grid"]) == list(grid)

@@ -40,7 +40,7 @@ def calm(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def memory(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> str:
-    """A folder in the memory of this process, and workers in it."""
+    """Provide a folder in the memory of this process, and workers in it."""
     monkeypatch.setattr(dataset.build.build, "open_backend", lambda *_, **__: InThisProcess())
     return f"memory://{re.sub(r'[^a-z_]', '', request.node.name)}"
 
@@ -57,14 +57,14 @@ def test_damage_behind_a_url_is_refused_and_mended(
     memory: str, calm: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     build(design(200), memory, title="", simulate=invented)
-    there = open_storage(memory)
-    (name,) = there.names("rows")
-    whole = bytes(there.read(f"rows/{name}"))
-    with there.writer(f"rows/{name}") as sink:
-        sink.write(whole[:5000] + bytes([whole[5000] ^ 4]) + whole[5001:])
+    storage = open_storage(memory)
+    (name,) = storage.names("rows")
+    contents = bytes(storage.read(f"rows/{name}"))
+    with storage.writer(f"rows/{name}") as sink:
+        sink.write(contents[:5000] + bytes([contents[5000] ^ 4]) + contents[5001:])
     with pytest.raises(InputError, match="digest"):
         read(memory)
-    there.delete(f"rows/{name}")
+    storage.delete(f"rows/{name}")
     with pytest.raises(InputError, match="missing"):
         read(memory)
     mend(memory, title="", simulate=invented)
@@ -72,16 +72,16 @@ def test_damage_behind_a_url_is_refused_and_mended(
 
 
 def test_one_writer_behind_a_url(memory: str) -> None:
-    there = open_storage(memory)
-    with locked(there), pytest.raises(InputError, match="is being written by process"):
+    storage = open_storage(memory)
+    with locked(storage), pytest.raises(InputError, match="is being written by process"):
         build(design(9), memory, title="", simulate=invented)
     killed = {"host": "elsewhere", "pid": 1, "since": time.time() - 7200}
-    there.write(lock.LOCK, json.dumps(killed))
+    storage.write(lock.LOCK, json.dumps(killed))
     with pytest.raises(InputError, match=r"process 1 on elsewhere, for 120 min; .* take over with --force"):
         build(design(9), memory, title="", simulate=invented)
-    assert json.loads(bytes(there.read(lock.LOCK))) == killed
+    assert json.loads(bytes(storage.read(lock.LOCK))) == killed
     build(design(9), memory, title="", simulate=invented, force=True)
-    assert there.size(lock.LOCK) is None
+    assert storage.size(lock.LOCK) is None
 
 
 def test_unknown_urls_are_refused(tmp_path: Path) -> None:
@@ -91,12 +91,12 @@ def test_unknown_urls_are_refused(tmp_path: Path) -> None:
 
 @pytest.fixture
 def bucket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
-    """A bucket of an S3 server of this machine."""
+    """Provide a bucket of an S3 server of this machine."""
     pytest.importorskip("s3fs", reason="the extra s3 is not installed")
     pytest.importorskip("moto", reason="moto is not installed")
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        port = one.getsockname()[1]
+    with socket.socket() as connection:
+        connection.bind(("127.0.0.1", 0))
+        port = connection.getsockname()[1]
     for name, value in {
         "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}", "AWS_ACCESS_KEY_ID": "test",
         "AWS_SECRET_ACCESS_KEY": "test", "AWS_DEFAULT_REGION": "us-east-1",
@@ -106,8 +106,8 @@ def bucket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
         words = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
         server = subprocess.Popen(words, stdout=log, stderr=log)
     while True:
-        with socket.socket() as one:
-            if one.connect_ex(("127.0.0.1", port)) == 0:
+        with socket.socket() as connection:
+            if connection.connect_ex(("127.0.0.1", port)) == 0:
                 break
         assert server.poll() is None, (tmp_path / "moto.log").read_text()
         time.sleep(0.05)
@@ -120,8 +120,8 @@ def bucket(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
     server.wait(timeout=LIMIT)
 
 
-def break_off(there: RemoteStorage) -> None:
-    with there.writer("rows/x") as sink:
+def break_off(storage: RemoteStorage) -> None:
+    with storage.writer("rows/x") as sink:
         sink.write(b"half")
         raise ZeroDivisionError
 
@@ -134,24 +134,19 @@ def test_s3_holds_the_same_files(bucket: str, calm: Path) -> None:
         f"build(design(200), {bucket!r}, jobs=2, title='', simulate=invented)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        env=dict(os.environ),
-        text=True,
-        capture_output=True,
-        timeout=LIMIT,
+        [sys.executable, "-c", code], cwd=ROOT, env=dict(os.environ), text=True, capture_output=True, timeout=LIMIT
     )
     assert done.returncode == 0, done.stderr
     assert read(bucket).equals(read(calm))
     assert files(bucket) == files(str(calm))
     assert read_manifest(bucket) == read_manifest(calm)
-    there = open_storage(bucket)
-    assert isinstance(there, RemoteStorage)
-    with locked(there):
-        assert not there.create(lock.LOCK, "{}")
+    storage = open_storage(bucket)
+    assert isinstance(storage, RemoteStorage)
+    with locked(storage):
+        assert not storage.create(lock.LOCK, "{}")
     with pytest.raises(ZeroDivisionError):
-        break_off(there)
-    assert there.size("rows/x") is None
-    there.delete("manifest.json")
+        break_off(storage)
+    assert storage.size("rows/x") is None
+    storage.delete("manifest.json")
     with pytest.raises(InputError, match="no finished data set"):
         read(bucket)

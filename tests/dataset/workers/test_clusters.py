@@ -69,7 +69,7 @@ class Dask:
             )
 
     def add_worker(self, *words: str) -> subprocess.Popen[bytes]:
-        """A worker under a nanny, which starts it again where it dies."""
+        """Start a worker under a nanny, which starts it again where it dies."""
         return self._start("worker", self.address, "--nthreads", "1", "--no-dashboard", *words)
 
     def stop(self) -> None:
@@ -175,7 +175,7 @@ def build_apart(
 
 @pytest.fixture
 def ray(tmp_path: Path) -> Iterator[Head]:
-    """Address of a ray head with two processors, and how to kill it with all that it has started."""
+    """Start a ray head with two processors; return its address and how to kill it with its children."""
     pytest.importorskip("ray", reason="the extra ray is not installed")
     port, log = free_port(), tmp_path / "ray.log"
     words = ["start", "--head", "--block", "--port", str(port), "--num-cpus", "2", "--include-dashboard", "false"]

@@ -25,7 +25,7 @@ SHORT, ROUNDING = 60.0, 1e-11
 
 @cache
 def planned() -> Plan:
-    """A short path: see ROUNDING."""
+    """Plan a short path: see ROUNDING."""
     share = np.linspace(0, 1, 200)
     path = np.stack([2.4 * share, 0.3 * np.sin(np.pi * share)], 1)
     return rounded(plan(path, PRESETS["paper-control"], minimum_dwell=0.6, point="head_tip"))
@@ -47,22 +47,26 @@ class Both:
     def update(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command:
         seen = now if seen_at is None else seen_at
         flips = now >= self.last.flip_at - SLACK
-        one = self.one.update(now, pose, seen)
+        expected = self.one.update(now, pose, seen)
         if self.one._now > SHORT:
-            self.last = one
-            return one
-        other = self.other.update(max(now, self.told.flip_at) if flips else now, pose, seen)
-        assert (one.direction, one.finished, one.alarm) == (other.direction, other.finished, other.alarm)
-        assert other.flip_at == pytest.approx(one.flip_at, rel=ROUNDING)
-        assert other.error == pytest.approx(one.error, rel=ROUNDING)
+            self.last = expected
+            return expected
+        answer = self.other.update(max(now, self.told.flip_at) if flips else now, pose, seen)
+        assert (expected.direction, expected.finished, expected.alarm) == (
+            answer.direction,
+            answer.finished,
+            answer.alarm,
+        )
+        assert answer.flip_at == pytest.approx(expected.flip_at, rel=ROUNDING)
+        assert answer.error == pytest.approx(expected.error, rel=ROUNDING)
         assert list(self.one.learned.values()) == pytest.approx(
             self.other.state.tolist(), rel=ROUNDING, abs=ROUNDING
         )
-        if one.direction == -self.last.direction != 0:  # the flip that was announced has happened
+        if expected.direction == -self.last.direction != 0:  # the flip that was announced has happened
             assert self.last.flip_at - self.flipped_at >= planned().minimum_dwell * (1 - 1e-12)
             self.flipped_at = self.last.flip_at
-        self.calls, self.last, self.told = self.calls + 1, one, other
-        return one
+        self.calls, self.last, self.told = self.calls + 1, expected, answer
+        return expected
 
 
 @pytest.mark.parametrize(

@@ -29,8 +29,8 @@ CONTROL = PRESETS["paper-control"]
 BOX = [[-2, -4], [9, -4], [9, 4], [-2, 4]]
 
 
-def end_of(goal_plan: GoalPlan) -> np.ndarray:
-    """The end of the schedule from the start that was asked for, computed anew."""
+def final_pose(goal_plan: GoalPlan) -> np.ndarray:
+    """Compute the end of the schedule from the start that was asked for, anew."""
     plan = goal_plan.plan
     return poses_at_flips(
         plan.tracked.vehicle, Switches(plan.first_direction, plan.dwells, np.array([plan.start]))
@@ -43,7 +43,7 @@ def test_the_motion_begins_and_ends_as_asked(seed: int) -> None:
     start, goal = (rng.uniform([-2, -2, -3], [2, 2, 3]).tolist() for _ in range(2))
     goal_plan = to_goal(start, goal, CONTROL, objective=("time", "error")[seed % 2])
     assert goal_plan.plan.start == pytest.approx(tuple(start))
-    end = end_of(goal_plan)
+    end = final_pose(goal_plan)
     assert end[:2] == pytest.approx(goal[:2], abs=1e-3)
     assert math.cos(end[2] - goal[2]) > 1 - 1e-6
     assert max(goal_plan.end_error) < 1e-3
@@ -80,7 +80,7 @@ def test_a_robot_that_turns_unequally_in_a_current_arrives() -> None:
     drifting = CalibrationKnowledge(current=(2e-5, -1e-5))
     goal_plan = to_goal((0, 0, 0.3), (3, 2, -1), robot, lookup=tabulate(robot), knowledge=drifting)
     assert np.abs(goal_plan.plan.tracked.vehicle.current).max() > 0
-    assert end_of(goal_plan)[:2] == pytest.approx([3, 2], abs=1e-3)
+    assert final_pose(goal_plan)[:2] == pytest.approx([3, 2], abs=1e-3)
 
 
 def test_a_shortest_dwell_in_seconds_holds_to_the_end() -> None:

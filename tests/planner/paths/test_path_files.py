@@ -21,25 +21,25 @@ def drawn(folder: Path, body: str, *, root: str = "", shape: str | None = None) 
     return read_path(file, shape=shape)
 
 
-def path_of(folder: Path, body: str) -> Path2D:
+def drawn_path(folder: Path, body: str) -> Path2D:
     return drawn(folder, body).path
 
 
 def test_lines_and_basic_shapes(tmp_path: Path) -> None:
-    assert path_of(tmp_path, "<polyline points='0,0 3,0 3,-4'/>").length == pytest.approx(7)
-    triangle = path_of(tmp_path, "<polygon points='0,0 3,0 3,-4'/>")
+    assert drawn_path(tmp_path, "<polyline points='0,0 3,0 3,-4'/>").length == pytest.approx(7)
+    triangle = drawn_path(tmp_path, "<polygon points='0,0 3,0 3,-4'/>")
     assert triangle.closed
     assert triangle.length == pytest.approx(12)
-    assert path_of(tmp_path, "<path d='M 0 0 h 3 v -4 Z'/>").points.tolist() == [[0, 0], [3, 0], [3, 4]]
-    assert path_of(tmp_path, "<path d='M 1 1 L 4 1 l 0 -4'/>").points.tolist() == [[1, -1], [4, -1], [4, 3]]
-    assert path_of(tmp_path, "<line x1='1' y1='1' x2='4' y2='-3'/>").length == pytest.approx(5)
-    box = path_of(tmp_path, "<rect x='1' y='1' width='3' height='2'/>")
+    assert drawn_path(tmp_path, "<path d='M 0 0 h 3 v -4 Z'/>").points.tolist() == [[0, 0], [3, 0], [3, 4]]
+    assert drawn_path(tmp_path, "<path d='M 1 1 L 4 1 l 0 -4'/>").points.tolist() == [[1, -1], [4, -1], [4, 3]]
+    assert drawn_path(tmp_path, "<line x1='1' y1='1' x2='4' y2='-3'/>").length == pytest.approx(5)
+    box = drawn_path(tmp_path, "<rect x='1' y='1' width='3' height='2'/>")
     assert box.closed
     assert box.length == pytest.approx(10)
 
 
 def test_circles_and_ellipses_are_smooth(tmp_path: Path) -> None:
-    ring = path_of(tmp_path, "<circle cx='2' cy='1' r='3'/>")
+    ring = drawn_path(tmp_path, "<circle cx='2' cy='1' r='3'/>")
     assert ring.closed
     assert np.linalg.norm(ring.points - [2, -1], axis=1) == pytest.approx(np.full(len(ring.points), 3.0))
     assert ring.length == pytest.approx(6 * math.pi, rel=1e-4)
@@ -48,12 +48,12 @@ def test_circles_and_ellipses_are_smooth(tmp_path: Path) -> None:
         "<path d='M 0 0 A 3 1 0 0 1 6 0'/>",
         "<path d='M 0 0 C 1 2 3 2 4 0'/>",
     ):
-        assert np.abs(kinks(path_of(tmp_path, body))).max() < CORNER, body
+        assert np.abs(kinks(drawn_path(tmp_path, body))).max() < CORNER, body
 
 
 def test_a_bezier_curve_is_followed(tmp_path: Path) -> None:
     """Points of the curve by de Casteljau's definition."""
-    points = path_of(tmp_path, "<path d='M 0 0 C 1 -2 3 -2 4 0'/>").points
+    points = drawn_path(tmp_path, "<path d='M 0 0 C 1 -2 3 -2 4 0'/>").points
     t = np.linspace(0, 1, 2001)[:, None]
     corners = np.array([[0, 0], [1, 2], [3, 2], [4, 0]], float)
     curve = sum(math.comb(3, k) * t**k * (1 - t) ** (3 - k) * corners[k] for k in range(4))
@@ -63,7 +63,7 @@ def test_a_bezier_curve_is_followed(tmp_path: Path) -> None:
 
 def test_transforms_of_shapes_and_groups_apply(tmp_path: Path) -> None:
     body = "<g transform='translate(10,0) rotate(90)'><path d='M 0 0 L 2 0' transform='scale(3)'/></g>"
-    assert path_of(tmp_path, body).points == pytest.approx(np.array([[10, 0], [10, -6]]), abs=1e-9)
+    assert drawn_path(tmp_path, body).points == pytest.approx(np.array([[10, 0], [10, -6]]), abs=1e-9)
 
 
 def test_view_box_and_physical_units(tmp_path: Path) -> None:

@@ -15,9 +15,7 @@ import pytest
 from planner.paths.path import Path2D, circle, polygon
 from planner.planning.plan import _MOVED, plan
 from planner.planning.request import PlanRequest, RequestOptions
-from planner.vehicle.calibration_table import (
-    CalibrationKnowledge,
-)
+from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from tests.processes import LIMIT
@@ -85,7 +83,7 @@ def test_other_points_of_the_axis() -> None:
 def test_old_attributes_of_a_plan_warn_and_work() -> None:
     result = plan(circle(2.0), CONTROL)
     for name, path in _MOVED.items():
-        with pytest.warns(DeprecationWarning, match=f"Plan.{name} is now Plan.{re.escape(path)}"):
+        with pytest.warns(DeprecationWarning, match=f"Plan.{name} is deprecated; use Plan.{re.escape(path)}"):
             value = getattr(result, name)
         new: Any = result
         for part in path.removesuffix("()").split("."):

@@ -18,7 +18,7 @@ from tests.planner.vehicles import plain_guidance, vehicle
 
 
 def random_smooth_path(seed: int, length: float, sharpest: float) -> Path2D:
-    """A path of given length with curvature within ±sharpest, varying over lengths of about one."""
+    """Draw a path of given length with curvature within ±sharpest, varying over lengths of about one."""
     rng = np.random.default_rng(seed)
     s = np.arange(0, length, 0.02)
     waves = rng.normal(size=(6, 1)) * np.sin(rng.uniform(0.3, 2.0, (6, 1)) * s + rng.uniform(0, 6.3, (6, 1)))

@@ -34,7 +34,7 @@ def estimate(planned: Plan) -> Estimate:
 
 
 def differences(estimate: Estimate, seen: Callable[[], np.ndarray]) -> np.ndarray:
-    """Derivatives (3, 10) by central differences."""
+    """Compute the derivatives (3, 10) by central differences."""
     columns = []
     for k in range(STATES):
         ends = []
@@ -49,21 +49,21 @@ def differences(estimate: Estimate, seen: Callable[[], np.ndarray]) -> np.ndarra
 
 @pytest.mark.parametrize("when", [3.4, 2.8, 2.1, 1.0, 0.2])
 def test_derivatives_of_an_expected_pose(estimate: Estimate, when: float) -> None:
-    found = estimate.seen_from(when, NOW, PAST)
-    assert found is not None
+    expected = estimate.seen_from(when, NOW, PAST)
+    assert expected is not None
 
     def seen() -> np.ndarray:
         again = estimate.seen_from(when, NOW, PAST)
         assert again is not None
         return np.array(again[0])
 
-    assert np.array(found[1]) == pytest.approx(differences(estimate, seen), abs=1e-8)
+    assert np.array(expected[1]) == pytest.approx(differences(estimate, seen), abs=1e-8)
 
 
 def test_counting_back_and_going_forward_end_at_the_same_pose(estimate: Estimate, planned: Plan) -> None:
     """The other side: the vehicle of the plan with the learned numbers, composed forward."""
-    found = estimate.seen_from(0.2, NOW, PAST)
-    assert found is not None
+    expected = estimate.seen_from(0.2, NOW, PAST)
+    assert expected is not None
     state = np.array(STATE)
     car = planned.tracked.vehicle
     twist = car.twist * np.array([[1.04, 0.95, 1.03], [1.04, 0.95, 0.98]])
@@ -75,7 +75,7 @@ def test_counting_back_and_going_forward_end_at_the_same_pose(estimate: Estimate
     def drift(time: float) -> np.ndarray:
         return np.append(state[8:] * time, 0.0)  # the current moves the robot in the lab
 
-    pose = planar.compose(np.array(found[0]) - drift(0.2), planar.inverse(change(PAST[0], 0.2)))
+    pose = planar.compose(np.array(expected[0]) - drift(0.2), planar.inverse(change(PAST[0], 0.2)))
     for dwell in PAST:
         pose = planar.compose(pose, change(dwell, dwell.length)) + drift(dwell.length)
     assert pose == pytest.approx(state[:3], abs=1e-9)

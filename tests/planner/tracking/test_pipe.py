@@ -16,7 +16,7 @@ from sim.model.presets import PRESETS
 def test_it_answers_like_the_tracker_in_seconds() -> None:
     result = plan(circle(2.0), PRESETS["paper-control"])
     scale = result.robot.time_scale
-    one, other = Tracker(result), Tracker(result)
+    piped, direct = Tracker(result), Tracker(result)
     lines = [
         "0",
         f"1.0 {result.start[0]} {result.start[1]} {result.start[2]}",
@@ -25,16 +25,16 @@ def test_it_answers_like_the_tracker_in_seconds() -> None:
         "2.5 nan 0 0",
         "3 1",
     ]
-    found = [line.split() for line in answers(one, lines, scale)]
-    expected = [other.update(0.0), other.update(1.0 / scale, result.start)]
+    answered = [line.split() for line in answers(piped, lines, scale)]
+    expected = [direct.update(0.0), direct.update(1.0 / scale, result.start)]
     expected += [
-        other.update(other._now),
-        other.update(other._now),
-        other.update(2.5 / scale),
-        other.update(3 / scale),
+        direct.update(direct._now),
+        direct.update(direct._now),
+        direct.update(2.5 / scale),
+        direct.update(3 / scale),
     ]
-    assert len(found) == len(lines)
-    for words, command in zip(found, expected, strict=True):
+    assert len(answered) == len(lines)
+    for words, command in zip(answered, expected, strict=True):
         assert int(words[0]) == command.direction
         assert float(words[1]) == pytest.approx(command.flip_at * scale, abs=1e-5)
 

@@ -42,8 +42,7 @@ FURTHER = ("5 % faster turns", "3 % asymmetry")
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=pytest.mark.long) if name in FURTHER else name for name in ROBOTS],
+    "name", [pytest.param(name, marks=pytest.mark.long) if name in FURTHER else name for name in ROBOTS]
 )
 def test_robots_that_differ_stay_on_the_path(name: str) -> None:
     cameras = [Camera(rng=np.random.default_rng(seed)) for seed in range(3)]
@@ -85,7 +84,7 @@ def test_it_learns_the_robot() -> None:
 
 
 def alarmed(car: Vehicle, camera: Camera) -> bool:
-    """Whether the alarm came at any pose of a swim."""
+    """Tell whether the alarm came at any pose of a swim."""
     tracker, rang = Tracker(planned()), False
     update = tracker.update
 
@@ -125,9 +124,9 @@ def test_no_flip_just_before_the_end(late: float) -> None:
 
 def test_old_names_warn_and_work() -> None:
     tracker = Tracker(planned())
-    with pytest.warns(DeprecationWarning, match=r"now Tracker\.update"):
+    with pytest.warns(DeprecationWarning, match=r"use Tracker\.update"):
         assert tracker.feed(0.0) == tracker.command
-    with pytest.warns(DeprecationWarning, match=r"now Tracker\.command"):
+    with pytest.warns(DeprecationWarning, match=r"use Tracker\.command"):
         assert tracker.advice == tracker.command
 
 

@@ -7,12 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.vehicle.calibration_table import (
-    COEFFICIENTS,
-    CalibrationKnowledge,
-    knowledge_toml,
-    read_knowledge,
-)
+from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge, knowledge_toml, read_knowledge
 from sim.inputs import load_robot, robot_toml
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS

@@ -10,10 +10,7 @@ import pytest
 
 from planner.paths.path import circle
 from planner.planning.plan import plan
-from planner.vehicle.calibration_table import (
-    NUMBERS,
-    CalibrationKnowledge,
-)
+from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge
 from planner.vehicle.from_table import table_vehicle
 from planner.vehicle.zigzag import zigzag
 from sim.model.presets import PRESETS

@@ -39,7 +39,7 @@ class Stickiness(Effect):
 
 
 EFFECT = Stickiness(
-    name="stickiness", title="stickiness", equation="drag × (1 + ε)", source="made up", unit="1", null=0.0,
+    name="stickiness", title="stickiness", equation="drag × (1 + ε)", source="none", unit="1", null=0.0,
     bounds=(0.0, 1.0), typical=0.1, symmetry="even", dissipative=True, reach={reach!r},
 )
 """

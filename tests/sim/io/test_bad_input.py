@@ -59,15 +59,7 @@ def test_steady_refuses(case: str, tmp_path: Path, capsys: pytest.CaptureFixture
 
 def test_the_command_itself_exits_with_2(tmp_path: Path) -> None:
     """Through the interpreter, as a user meets it."""
-    words = [
-        sys.executable,
-        "-m",
-        "sim",
-        "steady",
-        str(tmp_path / "none.csv"),
-        "--out",
-        str(tmp_path / "o.csv"),
-    ]
+    words = [sys.executable, "-m", "sim", "steady", str(tmp_path / "none.csv"), "--out", str(tmp_path / "o.csv")]
     done = subprocess.run(words, capture_output=True, text=True, cwd=Path(__file__).parents[3], timeout=LIMIT)
     assert done.returncode == 2
     assert "none.csv" in done.stderr

@@ -8,19 +8,19 @@ from sim.linear.chains import Chains, new_chains
 
 
 def random_chains(n: int, count: int, instants: int, seed: int) -> Chains:
-    """Chains with dominant diagonal blocks."""
+    """Draw chains with dominant diagonal blocks."""
     rng = np.random.default_rng(seed)
     chains = new_chains(n, count, instants)
     for part in chains:
         part[:] = rng.normal(size=part.shape)
-    chains.own[:] += 20 * np.eye(3)
+    chains.diagonal[:] += 20 * np.eye(3)
     chains.corner[:] += 40 * np.eye(4)
     return chains
 
 
 def dense_matrix(chains: Chains) -> np.ndarray:
-    """The matrix in the unknowns (n, M, 3) and (P, 4), both flattened; column m belongs to instant m mod P."""
-    n, count = chains.own.shape[:2]
+    """Assemble the matrix in the unknowns (n, M, 3) and (P, 4), flattened; column m belongs to instant m mod P."""
+    n, count = chains.diagonal.shape[:2]
     instants = len(chains.corner)
     nodes = 3 * n * count
     matrix = np.zeros((nodes + 4 * instants, nodes + 4 * instants))
@@ -31,7 +31,7 @@ def dense_matrix(chains: Chains) -> np.ndarray:
     for m in range(count):
         body = slice(nodes + 4 * (m % instants), nodes + 4 * (m % instants) + 4)
         for k in range(n):
-            matrix[place(k, m), place(k, m)] = chains.own[k, m]
+            matrix[place(k, m), place(k, m)] = chains.diagonal[k, m]
             matrix[place(k, m), body] = chains.border[k, m].T
             if k > 0:
                 matrix[place(k, m), place(k - 1, m)] = chains.lower[k, m]
@@ -50,9 +50,9 @@ def dense_matrix(chains: Chains) -> np.ndarray:
 def joined_matrix(
     chains: Chains, resistance: np.ndarray, speed: np.ndarray, differentiation: np.ndarray
 ) -> np.ndarray:
-    """The same with the chains joined in time by −ω_m D_mj R_m."""
+    """Assemble the same with the chains joined in time by −ω_m D_mj R_m."""
     matrix = dense_matrix(chains)
-    n, count = chains.own.shape[:2]
+    n, count = chains.diagonal.shape[:2]
     for k in range(n):
         for m in range(count):
             for j in range(count):

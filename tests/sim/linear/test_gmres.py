@@ -11,7 +11,7 @@ from sim.linear.gmres import combine, extend, new_krylov, start
 
 
 def solved(matrix: np.ndarray, right: np.ndarray, most: int, tolerance: float) -> tuple[np.ndarray, list[float]]:
-    """The solution and the relative residuals that GMRES states on the way."""
+    """Solve; return the solution and the relative residuals that GMRES states on the way."""
     krylov = new_krylov(len(right), most)
     assert start(krylov, right) == pytest.approx(np.linalg.norm(right))
     left: list[float] = []

@@ -7,13 +7,13 @@ import pytest
 
 from sim.mechanics.contact_line import CREEP, add_contact_line
 from sim.motion.steady import steady
-from tests.sim.robots import body_of, control
+from tests.sim.robots import control, first_body
 
 
 def force(speed: float, **effects: float) -> np.ndarray:
-    """On a head that surges."""
+    """Compute the force on a head that surges."""
     wrench = np.zeros(4)
-    add_contact_line(body_of(control(contact_line=0.5, **effects)), np.array([0.0, speed, 0.0, 0.0]), wrench)
+    add_contact_line(first_body(control(contact_line=0.5, **effects)), np.array([0.0, speed, 0.0, 0.0]), wrench)
     return wrench
 
 

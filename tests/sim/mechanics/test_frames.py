@@ -12,7 +12,7 @@ from sim.mechanics.frames import add_frames
 from sim.mechanics.geometry import measure, new_geometry
 from sim.model.presets import PRESETS
 from sim.reference.framed_rod import FramedRod, Frames
-from tests.sim.robots import body_of, control, extrapolated_loads, held_loads
+from tests.sim.robots import control, extrapolated_loads, first_body, held_loads
 
 ROBOT = PRESETS["paper-control"]
 SLENDERNESS, OFFSET = ROBOT.tail_length / ROBOT.tail_radius, 0.016 / 0.11
@@ -21,7 +21,7 @@ SLENDERNESS, OFFSET = ROBOT.tail_length / ROBOT.tail_radius, 0.016 / 0.11
 def kirchhoff_loads(
     omega_bar: float, spin_drag: float, across: float, out: float, natural_twist: float
 ) -> np.ndarray:
-    """Wrench of one filament on its held disc: Kirchhoff's rod as a boundary-value problem (arc length in l).
+    """Solve for the wrench of one filament on its held disc: Kirchhoff's rod as a boundary-value problem.
 
     r' = t (1 + F·t/EA),  frame' = κ × frame,  F' = −f,  M' = −r' × F − m,  M = (κ − κ⁰) + ⅔ twist;
     κ⁰ = out d2 − across d1 with d1 away from the axis at the clamp.
@@ -29,32 +29,34 @@ def kirchhoff_loads(
     parallel = 2 * np.pi / (np.log(SLENDERNESS) - 0.5)
     perp = 4 * np.pi / (np.log(SLENDERNESS) + 0.5)
     roll = spin_drag * 4 * np.pi / SLENDERNESS**2
-    found = None
+    solution = None
     for share in (0.25, 0.5, 0.75, 1.0):
         spin = np.array([0, 0, share * omega_bar])[:, None]
 
         def slope(_: np.ndarray, y: np.ndarray, spin: np.ndarray = spin) -> np.ndarray:
             r, t, d, F, M = y[:3], y[3:6], y[6:9], y[9:12], y[12:15]
-            other = np.cross(t, d, axis=0)
+            second_director = np.cross(t, d, axis=0)
             velocity = np.cross(spin, r, axis=0)
             f = -(parallel - perp) * (t * velocity).sum(0) * t - perp * velocity
             m = -roll * (spin * t).sum(0) * t
             twist = natural_twist + 1.5 * (M * t).sum(0)
-            turn = ((M * d).sum(0) - across) * d + ((M * other).sum(0) + out) * other + twist * t
-            along = t * (1 + (F * t).sum(0) * 0.25 / SLENDERNESS**2)
+            turn = (
+                ((M * d).sum(0) - across) * d + ((M * second_director).sum(0) + out) * second_director + twist * t
+            )
+            tangent = t * (1 + (F * t).sum(0) * 0.25 / SLENDERNESS**2)
             turned = [np.cross(turn, t, axis=0), np.cross(turn, d, axis=0)]
-            return np.vstack([along, *turned, -f, -np.cross(along, F, axis=0) - m])
+            return np.vstack([tangent, *turned, -f, -np.cross(tangent, F, axis=0) - m])
 
         def ends(a: np.ndarray, b: np.ndarray) -> np.ndarray:
             return np.concatenate([a[:3] - [OFFSET, 0, 0], a[3:6] - [0, 0, -1], a[6:9] - [1, 0, 0], b[9:]])
 
-        arc = np.linspace(0, 1, 101) if found is None else found.x
-        start = np.zeros((15, len(arc))) if found is None else found.y
-        if found is None:
+        arc = np.linspace(0, 1, 101) if solution is None else solution.x
+        start = np.zeros((15, len(arc))) if solution is None else solution.y
+        if solution is None:
             start[0], start[2], start[5], start[6] = OFFSET, -arc, -1, 1
-        found = solve_bvp(slope, ends, arc, start, tol=1e-6, max_nodes=5000)
-        assert found.success
-    force, moment = found.y[9:12, 0], found.y[12:15, 0]
+        solution = solve_bvp(slope, ends, arc, start, tol=1e-6, max_nodes=5000)
+        assert solution.success
+    force, moment = solution.y[9:12, 0], solution.y[12:15, 0]
     return np.array([force[2], (np.cross([OFFSET, 0, 0], force) + moment)[2]])
 
 
@@ -88,8 +90,8 @@ def test_spin_drag_grows_the_moment_by_a_third() -> None:
 def tail_forces(
     effects: dict[str, float], x: np.ndarray, x_dot: np.ndarray, natural_twist: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Edge forces (n, 3) and further clamp moment (3,) of one tail whose disc stands still."""
-    body = body_of(control(1, N=1, natural_twist=natural_twist, **effects))
+    """Compute edge forces (n, 3) and further clamp moment (3,) of one tail whose disc stands still."""
+    body = first_body(control(1, N=1, natural_twist=natural_twist, **effects))
     n = len(x)
     geometry, moments = new_geometry(n, 1), np.zeros((1, 3))
     measure(geometry, x[:, None], body.offset, body.axial_stiffness)
@@ -99,7 +101,7 @@ def tail_forces(
 
 
 def bent(n: int, seed: int = 0) -> np.ndarray:
-    """Free nodes (n, 3) of a tail bent out of a plane."""
+    """Bend a tail out of a plane: free nodes (n, 3)."""
     rng = np.random.default_rng(seed)
     edges = np.array([0.0, 0.0, -1.0]) + np.cumsum(0.25 * rng.normal(size=(n, 3)), 0)
     lengths = (1 + 0.01 * rng.normal(size=(n, 1))) / n

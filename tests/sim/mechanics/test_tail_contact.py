@@ -8,14 +8,14 @@ import pytest
 from sim.mechanics.geometry import straight
 from sim.mechanics.tail_contact import FIRM, SOFTNESS, contact_forces
 from sim.model.body import Body
-from tests.sim.robots import body_of, control
+from tests.sim.robots import control, first_body
 
 EDGES = 8
 
 
 def bundle(tails: int, seed: int) -> tuple[Body, np.ndarray]:
-    """A robot whose tails lean towards the axis and twist about each other; free nodes (n, N, 3)."""
-    body = body_of(control(N=tails, tail_contact=0.5))
+    """Make a robot whose tails lean towards the axis and twist about each other; free nodes (n, N, 3)."""
+    body = first_body(control(N=tails, tail_contact=0.5))
     random = np.random.default_rng(seed)
     x = straight(EDGES, tails, body.offset)
     along = -x[:, :, 2]
@@ -26,14 +26,14 @@ def bundle(tails: int, seed: int) -> tuple[Body, np.ndarray]:
 
 
 def forces(body: Body, x: np.ndarray) -> np.ndarray:
-    """Contact forces on nodes 0..n of tails x (n, N, 3), each in the frame of its tail, (n + 1, N, 3)."""
+    """Compute contact forces on nodes 0..n of tails x (n, N, 3), in the frame of each tail, (n + 1, N, 3)."""
     out = np.full((len(x) + 1, *x.shape[1:]), np.nan)
     contact_forces(body, x, 0, x.shape[1], out)
     return out
 
 
 def together(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (K, N, 3) in the frames of their tails, seen in the frame of tail 0."""
+    """Turn vectors (K, N, 3) from the frames of their tails into the frame of tail 0."""
     turn = 2 * np.pi * np.arange(vectors.shape[1]) / vectors.shape[1]
     out = vectors.copy()
     out[:, :, 0] = np.cos(turn) * vectors[:, :, 0] - np.sin(turn) * vectors[:, :, 1]
@@ -72,7 +72,7 @@ def test_forces_come_from_an_energy() -> None:
 @pytest.mark.parametrize("gap", [0.97, 0.99, 1.0, 1.01])
 def test_parallel_tails_repel_by_the_law(gap: float) -> None:
     """Straight tails at a distance: the force per length, away from each other; nothing beyond a tenth more."""
-    body = body_of(control(N=2, tail_contact=0.5))
+    body = first_body(control(N=2, tail_contact=0.5))
     body = body._replace(offset=gap * body.tail_radius)
     force = forces(body, straight(EDGES, 2, body.offset))
     law = body.nonlocal_terms.tail_contact * SOFTNESS / FIRM * np.log1p(np.exp((1 - gap) / SOFTNESS))
@@ -88,7 +88,7 @@ def test_the_force_hardly_depends_on_the_mesh() -> None:
     """Tails are smooth curves through their nodes: 8 edges and 24. A thousandth of 2 r0 changes it by a tenth."""
     total = []
     for edges in (8, 24):
-        body = body_of(control(N=4, tail_contact=0.5))
+        body = first_body(control(N=4, tail_contact=0.5))
         x = straight(edges, 4, body.offset)
         along = -x[:, :, 2]
         near = 1 - (1 - along) ** 4

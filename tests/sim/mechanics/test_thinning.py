@@ -8,7 +8,7 @@ import pytest
 from sim.model.presets import CONTROL
 from sim.motion.steady import steady
 from sim.solve.orbit import residual_on_orbit, straight_start
-from tests.sim.robots import body_of, control
+from tests.sim.robots import control, first_body
 
 EDGES, PHASES = 10, 4
 
@@ -16,8 +16,8 @@ EDGES, PHASES = 10, 4
 def test_each_node_loses_the_share_that_its_own_speed_says() -> None:
     rng = np.random.default_rng(2)
     n, time = 0.6, 0.8
-    plain = body_of(control())
-    thinning = body_of(control(shear_thinning=1 - n, shear_thinning_time=time))
+    plain = first_body(control())
+    thinning = first_body(control(shear_thinning=1 - n, shear_thinning_time=time))
     x, u = straight_start(plain, EDGES, PHASES, 2)
     x += 0.01 * rng.normal(size=x.shape)
     u += rng.normal(size=u.shape)
@@ -36,12 +36,12 @@ def test_each_node_loses_the_share_that_its_own_speed_says() -> None:
 
 
 def _thicker(body):  # type: ignore[no-untyped-def]
-    """Twice the drag on the tails."""
+    """Double the drag on the tails."""
     return body._replace(zeta_parallel=2 * body.zeta_parallel, zeta_perp=2 * body.zeta_perp)
 
 
 def _speeds(body, x, u):  # type: ignore[no-untyped-def]
-    """|v| of the free nodes in the lab, (n, M)."""
+    """Compute |v| of the free nodes in the lab, (n, M)."""
     from sim.linear.spectral import differentiation
     from sim.mechanics.balance import motion_at
     from sim.solve.orbit import FIRST_PHASE

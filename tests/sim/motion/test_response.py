@@ -18,7 +18,7 @@ from sim.motion.steady import steady
 from sim.motion.stepped_response import stepped_response
 from sim.motion.switching import switch_response
 from sim.solve.assembly import reversed_bodies
-from tests.sim.robots import CONTROL_VALUES, body_of, control
+from tests.sim.robots import CONTROL_VALUES, control, first_body
 
 FINE = Resolution(24, 72)
 FEW = np.array([0, 6, 12, 18, 24])  # of the dwells
@@ -30,15 +30,20 @@ FEW = np.array([0, 6, 12, 18, 24])  # of the dwells
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_curves_agree_with_time_steps(omega_bar: float, changes: dict[str, float], sense: float) -> None:
     groups = control(omega_bar=sense * omega_bar, **changes)
-    found = responses(groups)
-    assert not found.stepped.any()
+    curves = responses(groups)
+    assert not curves.stepped.any()
     lag, memory, rest, spread = stepped_response(
-        body_of(groups), groups.N, DWELLS[FEW], BEFORE[[1, 3]], reverse=reversed_bodies(groups)[0], resolution=FINE
+        first_body(groups),
+        groups.N,
+        DWELLS[FEW],
+        BEFORE[[1, 3]],
+        reverse=reversed_bodies(groups)[0],
+        resolution=FINE,
     )
-    assert found.lag[0, FEW] == pytest.approx(lag, abs=2.5e-4)
-    assert found.memory[0][[1, 3]][:, FEW] == pytest.approx(memory, abs=5e-4)
-    assert found.rest[0, FEW] == pytest.approx(rest, abs=6e-4)
-    assert found.spread[0, FEW] == pytest.approx(spread, abs=4e-4)
+    assert curves.lag[0, FEW] == pytest.approx(lag, abs=2.5e-4)
+    assert curves.memory[0][[1, 3]][:, FEW] == pytest.approx(memory, abs=5e-4)
+    assert curves.rest[0, FEW] == pytest.approx(rest, abs=6e-4)
+    assert curves.spread[0, FEW] == pytest.approx(spread, abs=4e-4)
 
 
 @pytest.mark.parametrize("tails", [2.0, 4.0])
@@ -56,7 +61,7 @@ def test_a_random_schedule_is_the_product_of_its_responses(tails: float, ends: t
 
 
 def composed(found: Responses, groups: Groups, dwells: np.ndarray) -> np.ndarray:
-    """Poses at the ends of the dwells of a schedule from rest, the first dwell with a positive motor."""
+    """Compose poses at the ends of the dwells of a schedule from rest, the first dwell with a positive motor."""
     motion = steady(groups)
     twist = np.array([motion.v_z[0], motion.v_x[0], motion.omega_yr[0]])
     pose, poses = np.zeros(3), []

@@ -21,7 +21,7 @@ from tests.sim.robots import control
 LOCAL = {name: effect for name, effect in catalogue().items() if effect.reach == "local"}
 
 
-def values_of(groups: Groups) -> dict[str, np.ndarray]:
+def steady_values(groups: Groups) -> dict[str, np.ndarray]:
     motion = orbits(groups, phases=MANY)
     assert motion.converged.all()
     values = (motion.omega_t, motion.omega_h, motion.omega_yr, motion.v_x, motion.v_z, motion.turn_radius)
@@ -39,27 +39,27 @@ def moved(groups: Groups, name: str, by: float) -> Groups:
 def test_derivatives_equal_differences_of_solutions(tails: int) -> None:
     """In every input and local effect, for robots of the sweep; both motor directions. (Others: test_nonlocal.)"""
     points = sweep_points(48)
-    own = np.flatnonzero(points["N"] == tails)[:3]
-    columns = {name: values[own].copy() for name, values in points.items()}
+    rows = np.flatnonzero(points["N"] == tails)[:3]
+    columns = {name: values[rows].copy() for name, values in points.items()}
     columns["omega_bar"][1] *= -1
-    effects = {name: np.full(len(own), 0.5 * effect.typical) for name, effect in LOCAL.items()}
+    effects = {name: np.full(len(rows), 0.5 * effect.typical) for name, effect in LOCAL.items()}
     groups = Groups.from_columns({**columns, **effects})
     names = (*SLOPE_INPUTS, *LOCAL)
-    found = sensitivities(groups, names)
-    plain = values_of(groups)
+    derivatives = sensitivities(groups, names)
+    plain = steady_values(groups)
     for output in SLOPE_OUTPUTS:
-        assert found.values[output] == pytest.approx(plain[output], rel=1e-12)
+        assert derivatives.values[output] == pytest.approx(plain[output], rel=1e-12)
     for k, name in enumerate(names):
         size = (
             float(getattr(groups, name).abs().mean()) if name in SLOPE_INPUTS else abs(catalogue()[name].typical)
         )
         width = 1e-3 * size
-        before, after = values_of(moved(groups, name, -width)), values_of(moved(groups, name, width))
+        before, after = steady_values(moved(groups, name, -width)), steady_values(moved(groups, name, width))
         for output in SLOPE_OUTPUTS:
             slope = (after[output] - before[output]) / (2 * width)
             # The differences carry the error of Newton's tolerance and of their own width.
             close = 3e-5 * np.abs(plain[output]) / size + 2e-3 * np.abs(slope)
-            assert (np.abs(found.derivatives[output][:, k] - slope) < close).all(), (name, output)
+            assert (np.abs(derivatives.derivatives[output][:, k] - slope) < close).all(), (name, output)
 
 
 def test_an_unknown_parameter_is_refused() -> None:

@@ -31,7 +31,7 @@ OUTPUTS = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_ove
 
 
 def check_against(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray]) -> None:
-    """Spins within 0.2 %, yaw rate, velocity and radius within 0.5 %, θ within 0.2 degrees."""
+    """Check spins within 0.2 %, yaw rate, velocity and radius within 0.5 %, θ within 0.2 degrees."""
     for name in OUTPUTS[:2]:
         assert np.abs(found[name] / wanted[name] - 1).max() < 2e-3, name
     for name in OUTPUTS[2:6]:
@@ -108,10 +108,10 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
     plain = steady(groups)
 
     def lose_the_first(rows: np.ndarray, tails: int, *, phases: int, stability: bool) -> Orbits:
-        found = solve_orbits(rows, tails, phases=phases, stability=stability)
-        found.ended[0] = LOST
-        found.means[0] = np.nan
-        return found
+        solution = solve_orbits(rows, tails, phases=phases, stability=stability)
+        solution.ended[0] = LOST
+        solution.means[0] = np.nan
+        return solution
 
     solve_orbits = sim.motion.steady.solve_orbits
     monkeypatch.setattr(sim.motion.steady, "solve_orbits", lose_the_first)

@@ -14,14 +14,14 @@ from sim.reference.balance import TensorRobots, fluid_wrench
 from sim.reference.stepper import PHASE, TensorState, at_rest, step
 from sim.solve.orbit import FIRST_PHASE, solve_orbit, straight_start
 from tests.reference.cases import BEAM_K4, FILAMENT, FILAMENT_TIP, LINEAR_FILAMENT
-from tests.sim.robots import body_of, extrapolated_loads, held_loads, single_filament
+from tests.sim.robots import extrapolated_loads, first_body, held_loads, single_filament
 
 ROBOT = PRESETS["paper-control"]
 EDGES = 16
 
 
 def relaxed(robots: TensorRobots, omega_bar: float, *, time: float = 6.0) -> TensorState:
-    """The shape at rest in the disc frame."""
+    """Relax to the shape at rest in the disc frame."""
     omega = torch.tensor([omega_bar], dtype=torch.float64)
     state = at_rest(robots)
     dt = torch.tensor([min(0.05, 0.25 / omega_bar)], dtype=torch.float64)
@@ -31,7 +31,7 @@ def relaxed(robots: TensorRobots, omega_bar: float, *, time: float = 6.0) -> Ten
 
 
 def loads(edges: int, omega: float) -> tuple[float, float, TensorState, TensorRobots]:
-    """|F_z| [N] and |M_z| [N m] of the fluid on the filament at ω [rad/s]."""
+    """Compute |F_z| [N] and |M_z| [N m] of the fluid on the filament at ω [rad/s]."""
     omega_bar = omega * ROBOT.time_scale
     robots, _ = single_filament(edges, omega_bar, ROBOT.tail_length / ROBOT.tail_radius, 0.016 / 0.11)
     state = relaxed(robots, omega_bar)
@@ -59,7 +59,7 @@ def test_the_filament_s_tip() -> None:
 def test_a_slow_tail_sags_like_a_cantilever_at_every_phase() -> None:
     """q l⁴/(8 EI), downwards in the body frame, while the tail turns with the disc."""
     _, groups = single_filament(2, 1e-5, ROBOT.tail_length / ROBOT.tail_radius, 0.1)
-    body = body_of(groups)
+    body = first_body(groups)
     body.resistance[:, :4] += 1e9 * np.eye(4)
     body = body._replace(tail_load=(0.0, -0.08, 0.0))
     x, u = straight_start(body, 32, 6, 1)

@@ -16,7 +16,7 @@ N_EDGES = 16
 
 
 def random_tail(seed: int, n: int = 8) -> tuple[torch.Tensor, torch.Tensor]:
-    """A bent, slightly stretched tail (n, 3, 1, 1) and its root tangent."""
+    """Draw a bent, slightly stretched tail (n, 3, 1, 1) and its root tangent."""
     generator = torch.Generator().manual_seed(seed)
     steps = torch.randn(n, 3, generator=generator, dtype=torch.float64) * 0.35
     steps[:, 2] -= 1.0
@@ -27,7 +27,7 @@ def random_tail(seed: int, n: int = 8) -> tuple[torch.Tensor, torch.Tensor]:
     return x, down
 
 
-def energy_of(x: torch.Tensor, down: torch.Tensor, stiffness: torch.Tensor) -> torch.Tensor:
+def elastic_energy(x: torch.Tensor, down: torch.Tensor, stiffness: torch.Tensor) -> torch.Tensor:
     return elastic.energy(elastic.geometry(torch.cat([torch.zeros_like(down), x]), down), stiffness).sum()
 
 
@@ -36,13 +36,13 @@ def test_forces_and_stiffness_are_the_derivatives_of_the_energy(seed: int) -> No
     x, down = random_tail(seed)
     n = x.shape[0]
     stiffness = torch.tensor([4 * 34.375**2], dtype=torch.float64)
-    exact = -torch.func.grad(energy_of)(x, down, stiffness)
+    exact = -torch.func.grad(elastic_energy)(x, down, stiffness)
     response = elastic.respond(elastic.geometry(torch.cat([torch.zeros_like(down), x]), down), stiffness)
     forces = elastic.node_forces(response.edge_force)
     assert torch.allclose(forces, exact, rtol=1e-10, atol=1e-8)
 
     def edge_energy(edges: torch.Tensor) -> torch.Tensor:
-        return energy_of(torch.cumsum(edges, 0), down, stiffness)
+        return elastic_energy(torch.cumsum(edges, 0), down, stiffness)
 
     edges = torch.diff(torch.cat([torch.zeros_like(down), x]), dim=0)
     hessian = torch.func.hessian(edge_energy)(edges).reshape(n, 3, n, 3)
@@ -64,7 +64,7 @@ def test_clamp_moment_balances_the_tail() -> None:
 
 
 def cantilever(alpha: float, n: int) -> tuple[float, float]:
-    """Deflection and shortening of a cantilever under a dead tip load."""
+    """Compute deflection and shortening of a cantilever under a dead tip load."""
     stiffness = torch.tensor([4 * 500.0**2], dtype=torch.float64)
     down = torch.tensor([0.0, 0.0, -1.0], dtype=torch.float64).reshape(1, 3, 1, 1)
     straight = torch.zeros(n, 3, 1, 1, dtype=torch.float64)
@@ -79,7 +79,7 @@ def cantilever(alpha: float, n: int) -> tuple[float, float]:
 
     def slope(flat: np.ndarray) -> np.ndarray:
         x = torch.tensor(flat).reshape(n, 3, 1, 1)
-        hessian = torch.func.hessian(energy_of)(x, down, stiffness)
+        hessian = torch.func.hessian(elastic_energy)(x, down, stiffness)
         return -hessian.reshape(3 * n, 3 * n).numpy()
 
     flat = straight.reshape(-1).numpy()
@@ -129,23 +129,23 @@ def test_twist_of_a_straight_tail_is_inert(seed: int) -> None:
     nodes = x.reshape(n, 3)
 
     def energy(free: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
-        whole = torch.cat([torch.zeros(1, 3, dtype=free.dtype), free])
-        return material.clamped_energy(whole, theta, root_frame, frames)
+        nodes = torch.cat([torch.zeros(1, 3, dtype=free.dtype), free])
+        return material.clamped_energy(nodes, theta, root_frame, frames)
 
     theta = torch.linspace(0.1, 1.5, n, dtype=torch.float64)
-    assert float(energy(nodes, theta)) > float(energy_of(x, down, torch.tensor([axial]))) + 0.1
+    assert float(energy(nodes, theta)) > float(elastic_energy(x, down, torch.tensor([axial]))) + 0.1
     for _ in range(2):  # quadratic in θ: one Newton step is exact
         slope = torch.func.grad(energy, 1)(nodes, theta)
         theta = theta - torch.linalg.solve(torch.func.hessian(energy, 1)(nodes, theta), slope)
     stiffness = torch.tensor([axial], dtype=torch.float64)
     forces = -torch.func.grad(energy)(nodes, theta)
-    exact = -torch.func.grad(energy_of)(x, down, stiffness).reshape(n, 3)
-    assert float(energy(nodes, theta)) == pytest.approx(float(energy_of(x, down, stiffness)), rel=1e-12)
+    exact = -torch.func.grad(elastic_energy)(x, down, stiffness).reshape(n, 3)
+    assert float(energy(nodes, theta)) == pytest.approx(float(elastic_energy(x, down, stiffness)), rel=1e-12)
     assert torch.allclose(forces, exact, atol=1e-8)
 
 
 def ring_stability(twist: float, n: int) -> float:
-    """Smallest stiffness of a twisted ring against shapes out of its plane (beyond rigid motions)."""
+    """Compute the smallest stiffness of a twisted ring against shapes out of its plane (beyond rigid motions)."""
     angle = 2 * math.pi * torch.arange(n, dtype=torch.float64) / n
     radius = 1 / n / (2 * math.sin(math.pi / n))
     nodes = radius * torch.stack([torch.cos(angle), torch.sin(angle), torch.zeros_like(angle)], 1)

@@ -19,7 +19,7 @@ from sim.motion.settling import settle
 from sim.motion.steady import GROWS, orbits
 from sim.solve.orbit import mean_motion
 from sim.solve.refinement import FEW, MANY, SOLVED, difference, orbit_on_mesh, refined_orbit
-from tests.sim.robots import body_of, control
+from tests.sim.robots import control, first_body
 
 MEANS = ("omega_t", "omega_h", "omega_yr", "v_x", "v_z")
 ROBOTS = {
@@ -36,7 +36,7 @@ def with_contact(groups: Groups, size: float = 1.0) -> Groups:
 
 
 def axes(x: np.ndarray, offset: float, tails: int) -> np.ndarray:
-    """The tails of an orbit x (n, M, 3) as smooth curves in space, (phases, N, points, 3)."""
+    """Interpolate the tails of an orbit x (n, M, 3) as smooth curves in space, (phases, N, points, 3)."""
     x = with_phases(x, tails * (24 // tails))
     n, columns, _ = x.shape
     root = np.zeros((1, columns, 3))
@@ -50,7 +50,7 @@ def axes(x: np.ndarray, offset: float, tails: int) -> np.ndarray:
 
 
 def true_gap(x: np.ndarray, offset: float, radius: float, tails: int) -> float:
-    """Smallest distance between the axes of two tails over 2 r0, from points on one to pieces of the other."""
+    """Measure the gap of two tails' axes over 2 r0, from points on one to segments of the other."""
     smallest = np.inf
     for shapes in axes(x, offset, tails):
         for i in range(tails):
@@ -66,8 +66,8 @@ def true_gap(x: np.ndarray, offset: float, radius: float, tails: int) -> float:
 def test_gaps_are_kept_to_two_per_cent(name: str) -> None:
     """Of the axes as smooth curves, over the whole revolution; without contact the tails overlap."""
     groups = ROBOTS[name]
-    body = body_of(with_contact(groups))
-    plain, found = (refined_orbit(b, groups.N, FEW) for b in (body_of(groups), body))
+    body = first_body(with_contact(groups))
+    plain, found = (refined_orbit(b, groups.N, FEW) for b in (first_body(groups), body))
     assert plain.ended == found.ended == SOLVED
     assert true_gap(plain.x[2], body.offset, body.tail_radius, groups.N) < 0.9
     assert true_gap(found.x[2], body.offset, body.tail_radius, groups.N) == pytest.approx(1, abs=0.02)
@@ -78,7 +78,7 @@ def test_gaps_are_kept_to_two_per_cent(name: str) -> None:
 def test_meshes_converge(name: str) -> None:
     """The means on 8, 12 and 16 edges come nearer and nearer to those on 32, which the stated error covers."""
     groups = with_contact(ROBOTS[name])
-    body = body_of(groups)
+    body = first_body(groups)
     means = {}
     for edges in (8, 12, 16, 32):
         solved, _, u = orbit_on_mesh(body, groups.N, edges)
@@ -135,13 +135,13 @@ def test_sensitivities_are_differences(size: float) -> None:
 def test_tails_that_push_a_little_keep_moving_alike(tails: int) -> None:
     """Their differences decay, with contact and without."""
     for groups in (control(N=tails, omega_bar=25.0), with_contact(control(N=tails, omega_bar=25.0))):
-        body = body_of(groups)
+        body = first_body(groups)
         found = refined_orbit(body, tails, FEW)
         assert growth(body, tails, found.x[0], found.u[0]) < -0.1
 
 
 def test_a_ring_of_five_stout_tails_buckles() -> None:
     """Its tails leave the motion in which they move alike, which a little noise in their shape shows."""
-    body = body_of(with_contact(control(N=5, omega_bar=58.8, l_over_r0=19.0)))
+    body = first_body(with_contact(control(N=5, omega_bar=58.8, l_over_r0=19.0)))
     found = refined_orbit(body, 5, FEW)
     assert growth(body, 5, found.x[0], found.u[0]) > GROWS

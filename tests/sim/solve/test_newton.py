@@ -16,20 +16,20 @@ from sim.solve.orbit import FIRST_PHASE, straight_start
 from sim.solve.rates import Rates, in_stage, in_transient, is_joined, on_orbit
 from sim.solve.residual import fill_residual, new_room
 from tests.sim.linear.systems import dense_matrix, joined_matrix
-from tests.sim.robots import body_of, control
+from tests.sim.robots import control, first_body
 
 Unknowns = tuple[np.ndarray, np.ndarray]
 
 
 def strange(tails: int) -> Body:
-    """A robot with every local number in play: motor droop, drag on the disc, loads, odd resistances."""
-    body = body_of(control(N=tails, omega_bar=12.0, C_yr=6.0))
+    """Make a robot with every local number in play: motor droop, drag on the disc, loads, odd resistances."""
+    body = first_body(control(N=tails, omega_bar=12.0, C_yr=6.0))
     body.resistance[:] += 0.3 * np.random.default_rng(0).normal(size=(4, 5))
     return body._replace(droop=0.3 / body.resistance[3, 3], tail_load=(0.2, -0.5, 0.1))
 
 
 def somewhere(body: Body, tails: int, phases: int, n: int) -> Unknowns:
-    """Bent tails and unsteady velocities."""
+    """Return bent tails and unsteady velocities."""
     rng = np.random.default_rng(1)
     x, u = straight_start(body, n, phases, tails)
     return x + 0.02 * rng.normal(size=x.shape), u + rng.normal(size=u.shape)
@@ -101,7 +101,7 @@ def test_a_correction_solves_the_linear_system(case: object) -> None:
 @pytest.mark.parametrize(("tails", "omega", "most"), [(2, 10.0, 5), (3, 10.0, 5), (2, 60.0, 7), (5, -100.0, 8)])
 def test_orbits_from_straight_tails_take_few_corrections(tails: int, omega: float, most: int) -> None:
     """Quadratic convergence: one correction more takes the last one from 1e-4 to below 1e-8."""
-    body = body_of(control(N=tails, omega_bar=omega))
+    body = first_body(control(N=tails, omega_bar=omega))
     phases = tails * -(-4 // tails)
     rates = on_orbit(phases, FIRST_PHASE)
     x, u = straight_start(body, 8, phases, tails)
@@ -118,7 +118,7 @@ def test_orbits_from_straight_tails_take_few_corrections(tails: int, omega: floa
 def test_time_steps_take_one_or_two_corrections(omega: float) -> None:
     """A step of a twenty-fourth of a revolution from a settled state, and its last correction."""
     tails, n = 3, 10
-    body = body_of(control(N=tails, omega_bar=omega))
+    body = first_body(control(N=tails, omega_bar=omega))
     dt = 2 * np.pi / 36 / abs(omega)
     x, u = straight_start(body, n, tails, tails)
     phase, x_before = 0.0, x.copy()
@@ -139,7 +139,7 @@ def test_time_steps_take_one_or_two_corrections(omega: float) -> None:
 @pytest.mark.parametrize("name", [e.name for e in catalogue().values() if e.reach == "nonlocal" and not e.beside])
 def test_nonlocal_effects_do_not_slow_newton_down(name: str) -> None:
     """GMRES brings their part of the matrix in: hardly more corrections than without."""
-    body = body_of(control(N=3, **{name: catalogue()[name].typical}))
+    body = first_body(control(N=3, **{name: catalogue()[name].typical}))
     rates = on_orbit(6, FIRST_PHASE)
     x, u = straight_start(body, 8, 6, 3)
     count, size = newton(body, rates, x, u, new_workspace(rates, x, u), 1e-6)
@@ -148,7 +148,7 @@ def test_nonlocal_effects_do_not_slow_newton_down(name: str) -> None:
 
 
 def test_a_robot_that_is_no_number_ends_at_once() -> None:
-    body = body_of(control())._replace(zeta_perp=np.nan)
+    body = first_body(control())._replace(zeta_perp=np.nan)
     rates = on_orbit(4, FIRST_PHASE)
     x, u = straight_start(body, 6, 4, 2)
     count, size = newton(body, rates, x, u, new_workspace(rates, x, u), 1e-6)

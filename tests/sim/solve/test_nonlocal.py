@@ -39,7 +39,7 @@ def test_orbits_are_what_time_steps_settle_to(name: str) -> None:
 
 
 def yaw_rates(groups: Groups) -> np.ndarray:
-    """ω_yr on the phases that derivatives are taken on."""
+    """Compute ω_yr on the phases that derivatives are taken on."""
     return orbits(groups, phases=MANY).omega_yr
 
 

@@ -13,21 +13,21 @@ from sim.mechanics.geometry import measure, new_geometry
 from sim.solve.orbit import FIRST_PHASE, straight_start
 from sim.solve.rates import on_orbit
 from sim.solve.residual import Room, fill_residual, new_room
-from tests.sim.robots import body_of, control
+from tests.sim.robots import control, first_body
 
 NONLOCAL = tuple(name for name, effect in catalogue().items() if effect.reach == "nonlocal")
 
 
 def bent(effects: dict[str, float]) -> tuple:  # type: ignore[type-arg]
-    """A robot with bent tails: its numbers, x (n, M, 3) and u (P, 4)."""
-    body = body_of(control(N=2, **effects))
+    """Make a robot with bent tails: its numbers, x (n, M, 3) and u (P, 4)."""
+    body = first_body(control(N=2, **effects))
     x, u = straight_start(body, 5, 6, 2)
     rng = np.random.default_rng(4)
     return body, x + 0.02 * rng.normal(size=x.shape), u + 0.1 * rng.normal(size=u.shape)
 
 
 def residual_in(room: Room, body: object, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """All entries of the residual on an orbit, evaluated in `room`."""
+    """Return all entries of the residual on an orbit, evaluated in `room`."""
     r, t = np.empty_like(x), np.empty_like(u)
     fill_residual(body, on_orbit(x.shape[1], FIRST_PHASE), x, u, room, r, t)  # type: ignore[arg-type]
     return np.concatenate([r.ravel(), t.ravel()])

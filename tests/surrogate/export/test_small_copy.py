@@ -62,7 +62,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
-def robots_of(count: int, seed: int) -> dict[str, np.ndarray]:
+def random_robots(count: int, seed: int) -> dict[str, np.ndarray]:
     robots = {
         name: np.array(values) for name, values in draw_robots(count, seed, wide=False).items() if name in ROBOT
     }
@@ -79,7 +79,7 @@ def library(folder: Path, *flags: str) -> ctypes.CDLL:
 
 
 def answers(made: ctypes.CDLL, robots: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """What C answers, and its states."""
+    """Return what C answers, and its states."""
     rows = np.ascontiguousarray(np.stack([robots[name] for name in (*ROBOT, DWELL)], 1))
     found, states = np.zeros((len(rows), len(OUTPUTS))), []
     for row, out in zip(rows, found, strict=True):
@@ -89,7 +89,7 @@ def answers(made: ctypes.CDLL, robots: dict[str, np.ndarray]) -> tuple[dict[str,
 
 
 def apart(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Differences over the scales of the outputs; 0 where neither has an answer."""
+    """Compute differences over the scales of the outputs; 0 where neither has an answer."""
     result = {}
     for name in OUTPUTS:
         same = (found[name] == wanted[name]) | (np.isnan(found[name]) & np.isnan(wanted[name]))
@@ -126,12 +126,12 @@ def test_it_is_small_and_states_its_loss(folder: Path) -> None:
 def test_the_stated_loss_holds_for_other_robots(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("surrogate.export.small_copy._SEED", 91)
     small = make_small_copy(load())
-    stated = json.loads(manifest_of(folder))["loss"]
+    stated = json.loads(stored_manifest(folder))["loss"]
     for name, figures in measure_losses(load(), small).items():
         assert figures["p95"] < 2 * stated[name]["p95"], name
 
 
-def manifest_of(folder: Path) -> str:
+def stored_manifest(folder: Path) -> str:
     data = (folder / "lookup.safetensors").read_bytes()
     header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
     return str(header["__metadata__"]["manifest"])
@@ -149,7 +149,7 @@ def test_the_reader_in_c_gives_the_vectors(folder: Path) -> None:
 
 def test_the_reader_in_c_answers_for_all_robots(folder: Path) -> None:
     """In double precision as the table of the same numbers, in single precision nearly."""
-    robots = robots_of(1024, 92)
+    robots = random_robots(1024, 92)
     wanted = make_small_copy(load()).query(robots)
     inside = ~load().query({name: robots[name] for name in ROBOT}, flag=True)["outside"]
     found, states = answers(library(folder), robots)
@@ -190,9 +190,9 @@ def test_the_reader_in_javascript_gives_the_same(folder: Path) -> None:
     steady = pd.DataFrame([part[0] for part in told])
     response = pd.DataFrame([part[1] or {} for part in told]).drop(columns="outside")
     assert not steady["outside"].any()
-    both = pd.concat([steady, response], axis=1).replace("inf", np.inf)
-    found = {str(name): both[name].to_numpy(dtype=float) for name in OUTPUTS}
-    for name, error in apart(found, wanted).items():
+    columns = pd.concat([steady, response], axis=1).replace("inf", np.inf)
+    answered = {str(name): columns[name].to_numpy(dtype=float) for name in OUTPUTS}
+    for name, error in apart(answered, wanted).items():
         assert error.max() < 1e-9, name
     assert far[0]["outside"]
     assert still == [None, None]
@@ -210,11 +210,11 @@ def test_a_table_that_learned_some_tails_only(tmp_path: Path) -> None:
 
 
 def test_where_the_response_does_not_fit_it_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole: SmallCopy = make_small_copy(load())
+    complete: SmallCopy = make_small_copy(load())
     monkeypatch.setattr("surrogate.export.small_copy.MOST_BYTES", 120_000)
     save_small_copy(load(), tmp_path)
     less = make_small_copy(load())
-    assert whole.has_response
+    assert complete.has_response
     assert not less.has_response
     lines = (
         '#include "lookup.h"',

@@ -128,11 +128,11 @@ def test_every_state_leads_to_the_same_numbers(stop: int, tmp_path: Path, monkey
     with pytest.raises(KeyboardInterrupt):
         trained(TrainingContext(folder=tmp_path))
     monkeypatch.setattr(Checkpoint, "write", write)
-    resumed, whole = (
+    resumed, uninterrupted = (
         trained(TrainingContext(folder=tmp_path)).state_dict(),
         trained(TrainingContext()).state_dict(),
     )
-    for name, part in whole.items():
+    for name, part in uninterrupted.items():
         assert torch.equal(resumed[name], part), name
 
 

@@ -33,23 +33,23 @@ def test_damaged_tables_of_one_robot_are_refused(single: RobotTable, tmp_path: P
     """Or hold the same numbers, as where 1e-5 has become 1E-5."""
     path = tmp_path / "robot.json"
     save_robot_table(single, path)
-    whole = path.read_bytes()
+    contents = path.read_bytes()
     random = np.random.default_rng(6)
     same = 0
-    for place in [*range(40), *random.integers(len(whole), size=160)]:
-        broken = bytearray(whole)
+    for place in [*range(40), *random.integers(len(contents), size=160)]:
+        broken = bytearray(contents)
         broken[place] ^= 1 << int(random.integers(8))
         path.write_bytes(broken)
         try:
-            found = load_robot_table(path)
+            loaded = load_robot_table(path)
         except InputError:
             refusal(path, load_robot_table)
         else:
             same += 1
-            assert found == single
+            assert loaded == single
     assert same < 4
-    for size in [0, 1, len(whole) // 2, len(whole) - 3]:
-        path.write_bytes(whole[:size])
+    for size in [0, 1, len(contents) // 2, len(contents) - 3]:
+        path.write_bytes(contents[:size])
         refusal(path, load_robot_table)
     for content in (b"\xff\xfe", b"[" * 100_000, b"[1]", b"9" * 10_000):
         path.write_bytes(content)

@@ -13,14 +13,14 @@ from tests.surrogate.small import rows, table
 
 
 def sampled(count: int, generator: torch.Generator, size: Callable[[Tensor], Tensor]) -> tuple[Tensor, Tensor]:
-    """Features with values from 0 to 1, a fifth of them with one tail, and errors of that size."""
+    """Draw features with values from 0 to 1, a fifth of them with one tail, and errors of that size."""
     features = torch.rand(count, 8, generator=generator).double()
     features[:, -1] = (features[:, -1] < 0.2).double()
     return features, size(features) * torch.randn(count, generator=generator).double()
 
 
 def covered(size: Callable[[Tensor], Tensor]) -> tuple[Intervals, Tensor, Tensor]:
-    """Intervals learned from such errors, fresh features, and which of their errors are inside."""
+    """Learn intervals from such errors; return fresh features, and which of their errors are inside."""
     generator = torch.Generator().manual_seed(2)
     (x, error), (more, other), (test, last) = (sampled(n, generator, size) for n in (3000, 3000, 20000))
     found = Intervals.learned(x, {"v": error}, more, {"v": other})

@@ -18,13 +18,13 @@ from surrogate.training.train import train, with_radius
 from tests.reference.cases import CONTROL, STEADY_INPUTS, STEADY_POINTS
 
 
-def columns_of(points: tuple[tuple[float, ...], ...]) -> dict[str, np.ndarray]:
+def input_columns(points: tuple[tuple[float, ...], ...]) -> dict[str, np.ndarray]:
     return dict(zip(STEADY_INPUTS, np.array(points).T, strict=True))
 
 
 def test_the_shipped_table_matches_the_independent_solver() -> None:
     table = load()
-    found = table.query(columns_of(tuple(p[0] for p in STEADY_POINTS)))
+    found = table.query(input_columns(tuple(p[0] for p in STEADY_POINTS)))
     truth = np.array([p[1] for p in STEADY_POINTS]).T
     names = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l")
     for name, values in zip(names, truth, strict=False):
@@ -78,7 +78,7 @@ def test_fresh_robots_are_near_the_simulator_and_inside_their_intervals() -> Non
 def test_the_command_refuses_and_writes_nothing(
     change: dict[str, float], expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    values = {k: v[0] for k, v in columns_of(tuple(p[0] for p in STEADY_POINTS)).items()} | change
+    values = {k: v[0] for k, v in input_columns(tuple(p[0] for p in STEADY_POINTS)).items()} | change
     pd.DataFrame([values]).to_csv(tmp_path / "p.csv", index=False)
     assert run_command(main, ["query", str(tmp_path / "p.csv"), "--out", str(tmp_path / "o.csv")]) == 2
     error = capsys.readouterr().err
@@ -89,7 +89,7 @@ def test_the_command_refuses_and_writes_nothing(
 
 def test_query_and_inverse_commands(tmp_path: Path) -> None:
     """What `query` answers, `inverse` leads back to the coefficients."""
-    robots = pd.DataFrame(columns_of(tuple(p[0] for p in STEADY_POINTS[:2])))
+    robots = pd.DataFrame(input_columns(tuple(p[0] for p in STEADY_POINTS[:2])))
     robots.to_csv(tmp_path / "p.csv", index=False)
     assert run_command(main, ["query", str(tmp_path / "p.csv"), "--out", str(tmp_path / "o.csv")]) == 0
     found = pd.read_csv(tmp_path / "o.csv")

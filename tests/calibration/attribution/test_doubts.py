@@ -1,4 +1,4 @@
-"""A claim must carry over from short tails and few of them to the other runs; what only looks like it does not."""
+"""Doubts: the imitability index is high where a claim is weak, and a claim must carry over to the other runs."""
 
 from __future__ import annotations
 
@@ -8,11 +8,18 @@ import numpy as np
 import pytest
 
 import calibration.attribution.doubts
-from calibration.attribution.candidate import Candidate
-from calibration.attribution.transfer_test import SURE, fitted_again, transfer_p
+from calibration.attribution.doubts import (
+    SEEN,
+    absorbable_shares,
+    deformations,
+    fitted_again,
+    imitability,
+    transfer_p,
+)
+from calibration.attribution.refits import DOUBT, SURE, Candidate
+from calibration.attribution.wrong_numbers import pulls
 from calibration.statistics.fit import Fit, fit
-from calibration.statistics.forward_model import parameter, start_values
-from calibration.statistics.pulls import pulls
+from calibration.statistics.statistical_model import parameter, start_values
 from calibration.statistics.study import Study
 from calibration.swimmer.swimmer import COEFFICIENTS, SwimmerModel
 from calibration.verdict.calibrate import calibrate
@@ -22,6 +29,32 @@ from tests.calibration.toy_tables import FEW_DRAWS, TRUTH, toy_swimmer, toy_tabl
 
 EFFECT = "end_over_end_drag"
 SIZE = 3.0
+
+
+def test_a_strong_claim_is_hard_to_imitate_and_a_weak_one_is_not() -> None:
+    model = toy_swimmer(toy_table(2, **{EFFECT: 5.0}), TRUTH)
+    names = (*(p.name for p in (*model.coefficients, *model.nuisances)), EFFECT)
+    used = np.ones(len(model.runs), bool)
+    refit = fit(model, {**start_values(model), EFFECT: 5.0}, names, used, title="")
+    shares = absorbable_shares(Study.fitted_to(model, used, seed=1), refit, (EFFECT,))
+    assert ((shares > -1e-9) & (shares < 1)).all()
+    strengths = [imitability(shares, strength) for strength in (SEEN / 2, 2 * SEEN, 20 * SEEN)]
+    assert strengths == sorted(strengths, reverse=True)
+    assert strengths[0] > DOUBT > strengths[-1]
+
+
+def test_what_is_absorbed_whole_leaves_nothing_to_notice() -> None:
+    assert imitability(np.array([1.0, 0.5]), 10.0) == 0.5
+    assert imitability(np.array([0.5]), SEEN - 0.1) == 1.0
+
+
+def test_departures_are_smooth_in_the_inputs_and_equal_in_repeats() -> None:
+    model = toy_swimmer(toy_table(3))
+    used = np.ones(len(model.runs), bool)
+    drawn = np.log(deformations(model.runs, used, 2000, seed=0))
+    assert drawn.std() == pytest.approx(0.5, rel=0.05)
+    for condition in np.unique(model.runs.condition):
+        assert np.ptp(drawn[model.runs.condition == condition], axis=0).max() < 1e-9
 
 
 def model() -> SwimmerModel:
@@ -91,7 +124,7 @@ def test_an_effect_beside_a_wrong_number_is_in_doubt() -> None:
     refit = claimed(planted(model(), np.ones(len(model().runs))))
     swimmer = model()
     effect = parameter(swimmer, EFFECT)
-    sure = Candidate(effect, (), 8.0, 1.0, 1.0, 1.0, "kept", refit, None, 1.0, 0.1)
+    sure = Candidate(effect, (effect,), 8.0, 1.0, 1.0, 1.0, "kept", refit, None, 1.0, 0.1)
     assert not sure.doubted
     pull = pulls(
         fit(swimmer, start_values(swimmer), names(swimmer), everywhere(swimmer), title=""), swimmer.nuisances

@@ -1,4 +1,4 @@
-"""Noise from repeats and sessions, and tests of fit on it."""
+"""The tests of the residual: their products, their scores, and their p-values."""
 
 from __future__ import annotations
 
@@ -8,43 +8,18 @@ import numpy as np
 import pytest
 
 from calibration.statistics.fit import fit
-from calibration.statistics.forward_model import start_values
-from calibration.statistics.input_features import features
-from calibration.statistics.noise import FixedColumns, Noise, inverse_root, least_squares, repeat_covariance, sums
-from calibration.statistics.priors import changes, precisions
-from calibration.statistics.residual_tests import examine_residual
-from calibration.statistics.score_directions import Directions
-from calibration.statistics.splits import middle_session
-from calibration.statistics.study import DRAWS, Study
+from calibration.statistics.residual_tests import Directions, FixedColumns, examine_residual
+from calibration.statistics.statistical_model import (
+    Noise,
+    changes,
+    features,
+    precisions,
+    repeat_covariance,
+    start_values,
+    sums,
+)
+from calibration.statistics.study import DRAWS, Study, middle_session
 from tests.calibration.toy_tables import calibrated, toy_swimmer, toy_table
-
-
-def test_whitener_is_the_inverse_root_of_the_block_covariance() -> None:
-    rng = np.random.default_rng(0)
-    root = rng.normal(size=(3, 3))
-    noise = Noise(root @ root.T + np.eye(3), 0.7)
-    session = np.array([0, 0, 1, 1, 1])
-    same = (session[:, None] == session[None]).astype(float)
-    covariance = np.kron(np.eye(5) + noise.share * same, noise.run)
-    whiten = noise.whitener(session)
-    W = whiten(np.eye(15).reshape(5, 3, 15))
-    assert W @ covariance @ W.T == pytest.approx(np.eye(15), abs=1e-10)
-
-
-def test_products_of_columns_are_those_of_white_columns() -> None:
-    """The sums that hold for any ρ against whitening for one."""
-    rng = np.random.default_rng(2)
-    session = np.array([0, 0, 1, 1, 1, 2])
-    table = rng.normal(size=(6, 3, 4))
-    noise = Noise(np.eye(3), 0.4)
-    flat = noise.whitener(session)(table)
-    products = sums(table, session, 3)
-    assert products.at(np.array(0.4)) == pytest.approx(flat.T @ flat)
-    picked = products.take(np.array([[0, 3], [2, 1]]))
-    assert picked.at(np.array([0.4, 0.4]))[1] == pytest.approx((flat.T @ flat)[np.ix_([2, 1], [2, 1])])
-    fitted = least_squares(products, passes=0)
-    plain = table.reshape(18, 4)
-    assert fitted.step == pytest.approx(np.linalg.lstsq(plain[:, :3], plain[:, 3], rcond=None)[0])
 
 
 def test_a_design_makes_the_same_products_for_many_residuals() -> None:
@@ -84,25 +59,6 @@ def test_scores_along_features_are_those_of_least_squares() -> None:
         step = np.linalg.lstsq(rows, values, rcond=None)[0]
         error = np.sqrt(np.linalg.inv(rows.T @ rows)[-1, -1])
         assert scores.shapes[output, feature] == pytest.approx(step[-1] / error, rel=1e-6)
-
-
-def test_noise_is_recovered_from_repeats_and_sessions() -> None:
-    """Without bias, though the fit takes degrees of freedom from the means of the sessions."""
-    rng = np.random.default_rng(1)
-    session = np.repeat(np.arange(4), 30)
-    condition = np.arange(120) // 2
-    J = rng.normal(size=(120, 2, 1)) + 1.0
-    shares, covariances = [], []
-    for _ in range(300):
-        scatter = rng.normal(scale=[0.03, 0.05], size=(120, 2))
-        shift = np.sqrt(0.1) * rng.normal(scale=[0.03, 0.05], size=(4, 2))[session]
-        y = rng.normal(size=(60, 2))[condition] + scatter + shift
-        covariances.append(repeat_covariance(y, condition))
-        root = inverse_root(covariances[-1])
-        columns = root @ np.concatenate([J, (scatter + shift)[..., None]], -1)
-        shares.append(least_squares(sums(columns, session, 2), passes=3).share)
-    assert np.sqrt(np.diag(np.mean(covariances, 0))) == pytest.approx([0.03, 0.05], rel=0.02)
-    assert np.mean(shares) == pytest.approx(0.1, rel=0.1)
 
 
 @pytest.mark.rates

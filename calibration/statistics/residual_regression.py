@@ -1,4 +1,4 @@
-"""A small regression of the residual on the runs' inputs, for comparison.
+"""A small regression of the residual on the runs' inputs, for comparison; and forward selection of its terms.
 
 Features are the inputs, their squares and their products, standardised. They are added one at a time, as long as
 left-out sessions are predicted better. Each output has its own weights. There may be no feature at all. The
@@ -7,16 +7,17 @@ regression describes the residual and does not explain it. It holds only between
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
-from calibration.statistics.forward_model import Runs
-from calibration.statistics.forward_selection import select_forward
-from calibration.statistics.input_features import features
-from calibration.statistics.noise import repeat_covariance
-from calibration.statistics.splits import groups, leave_one_group_out
+from calibration.statistics.statistical_model import Runs, features, repeat_covariance
+from calibration.statistics.study import groups, leave_one_group_out
 from sim.arrays import Flags, Floats, Integers
+
+Terms = TypeVar("Terms", bound=tuple[object, ...])
 
 _MOST = 6
 _GAIN = 0.02  # share of the left-out error that a feature must save
@@ -67,3 +68,30 @@ def _left_out_error(table: Floats, residual: Floats, group: Integers, used: Flag
         for learn, out in leave_one_group_out(group, used)
     ]
     return float((np.concatenate(errors) ** 2).mean())
+
+
+def select_forward(
+    start: Terms,
+    larger: Callable[[Terms], Sequence[Terms]],
+    left_out_error: Callable[[Terms], float],
+    *,
+    most: int,
+    gain: float,
+) -> Terms:
+    """Choose terms, in the order in which they were added.
+
+    Args:
+        start: terms to begin with.
+        larger: all choices that have one term more.
+        left_out_error: of a choice, on runs that it has not seen.
+        most: terms.
+        gain: share of the error that a term must save.
+    """
+    chosen, least = start, left_out_error(start)
+    while len(chosen) < most and (choices := larger(chosen)):
+        tried = [left_out_error(choice) for choice in choices]
+        best = int(np.argmin(tried))
+        if tried[best] > (1 - gain) * least:
+            break
+        chosen, least = choices[best], tried[best]
+    return chosen

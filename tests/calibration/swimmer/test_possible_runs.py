@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from calibration.swimmer.lab_settings import owned, possible_settings
+from calibration.swimmer.possible_runs import owned, possible_settings
 from sim.io.errors import InputError
 from tests.calibration.toy_tables import START, toy_swimmer, toy_table
 

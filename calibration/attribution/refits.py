@@ -1,0 +1,279 @@
+"""Which effects explain the residual: candidates, their refits, and the judgement on these.
+
+Every effect that the runs can test is a candidate. If its score exceeds the critical |z|
+(`calibration.statistics.residual_tests`), with a sign that its bounds allow, the effect is fitted together with
+the coefficients. It is kept if
+
+- the fit converged,
+- the residual that it leaves passes the general tests and the scores of all other effects (at half of the level,
+  so that a true effect is not lost too often),
+- its interval excludes the null, and
+- it predicts left-out sessions better, by more than the uncertainty of that gain.
+
+Scores hold near the fit only. If a coefficient ran to an end of its range because an effect is missing, scores say
+nothing. Then every effect is fitted, starting from the model as given.
+
+Kept effects cannot be told apart if their deviances differ by less than one parameter can gain by chance (6.63).
+If no single effect is kept, a second one is looked for beside each of the best few.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from tqdm import tqdm
+
+from calibration.statistics.fit import Fit, fit
+from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
+from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, prior_rows, start_values
+from calibration.statistics.study import Study, groups, leave_one_group_out
+from sim.arrays import Flags, Floats
+
+DOUBT = 0.05  # imitability index above which a claim is doubted
+SURE = 0.01  # p-value of the transfer test below which it is
+INDISTINGUISHABLE = 6.63  # χ² with one degree of freedom, 99 %
+UNSEEN = 1e9  # smallest detectable size of an effect that changes nothing
+FIRST = 3  # number of single effects to which a second one is added
+_CURVED = 0.3  # share of the best score's z² below which an effect is not refitted if it leaves too much
+_FAR = 6.0  # standard deviations of χ²
+_DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """What was found about one effect; what only a refit tells is left at its default if there was none."""
+
+    effect: Parameter
+    claimed: tuple[Parameter, ...]  # all effects of its refit: those that were in the model before, and this one
+    z: float
+    survived: float
+    detectable: float  # size that is found half of the time: critical |z| / signal per unit
+    detectable_exact: float  # the same if every nuisance parameter were exact
+    verdict: str  # why it was kept or not
+    refit: Fit | None = None
+    refit_misfit: Misfit | None = None
+    gain: float = 0.0  # predictive gain summed over left-out sessions, in log likelihood
+    gain_error: float = 0.0
+    imitable: float = 0.0  # imitability index of the claim (`calibration.attribution.doubts`), if it is kept
+    transfer: float = 1.0  # p-value that it carries over to other runs, if it is kept
+
+    @property
+    def kept(self) -> bool:
+        return self.verdict == "kept"
+
+    @property
+    def doubted(self) -> bool:
+        """Whether the claim may be something outside the catalogue that looks like it.
+
+        An effect that explains the runs only beside a wrong nuisance parameter counts as a pair, and is always
+        uncertain.
+        """
+        return self.imitable > DOUBT or self.transfer < SURE or bool(self.refit and self.refit.wrong_numbers)
+
+    @property
+    def title(self) -> str:
+        """Titles of all effects of its refit."""
+        return " and ".join(e.title for e in self.claimed)
+
+
+def unexamined(
+    misfit: Misfit, effects: Sequence[Parameter], threshold: float, beside: tuple[Parameter, ...] = ()
+) -> list[Candidate]:
+    """Describe every effect by its score alone.
+
+    Args:
+        threshold: |z| that a claim needs.
+    """
+    scores = misfit.scores
+    return [
+        Candidate(
+            effect=effect,
+            claimed=(*beside, effect),
+            z=float(scores.z[j]),
+            survived=float(scores.survived[j]),
+            detectable=threshold / max(float(scores.length[j]), 1e-300),
+            detectable_exact=threshold / max(float(misfit.exact_length[j]), 1e-300),
+            verdict="not needed",
+        )
+        for j, effect in enumerate(effects)
+    ]
+
+
+def explaining(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Return the kept effects that the runs cannot tell from the best one, best first."""
+    kept = sorted((c for c in candidates if c.kept and c.refit), key=penalised_deviance)
+    return [c for c in kept if penalised_deviance(c) - penalised_deviance(kept[0]) < INDISTINGUISHABLE]
+
+
+def penalised_deviance(candidate: Candidate) -> float:
+    """Return the deviance of a refit plus what second numbers cost, because each may gain as much by chance."""
+    assert candidate.refit is not None
+    seconds = sum(e.second is not None for e in candidate.claimed)
+    return candidate.refit.deviance + INDISTINGUISHABLE * seconds
+
+
+def examine(
+    study: Study,
+    base: Fit,
+    misfit: Misfit,
+    directions: Directions,
+    *,
+    threshold: float | None = None,
+    beside: tuple[Parameter, ...] = (),
+) -> list[Candidate]:
+    """Refit and judge every effect that is not in the model yet, best score first.
+
+    Args:
+        base: the fit without them.
+        misfit: of its residual.
+        directions: of the effects there.
+        threshold: |z| that a refit needs; the critical one of `misfit` if not given.
+        beside: effects that `base` has already.
+    """
+    needed = misfit.critical_z if threshold is None else threshold
+    effects = [e for e in study.model.effects if e not in beside]
+    local = coefficients_within_range(study.model, base.parameters)
+    scored = unexamined(misfit, effects, needed, beside)
+    examined = []
+    title = " ".join(("effects", *(f"beside {e.title}" for e in beside)))
+    order = np.argsort(-np.abs(misfit.scores.z)).tolist()
+    for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not study.progress):
+        effect, candidate = effects[j], scored[j]
+        guess = effect.start
+        if local:
+            guess = base.parameters[effect.name] + candidate.z / max(float(misfit.scores.length[j]), 1e-300)
+            reason = _reason_not_to_refit(study, candidate, base, misfit, guess, needed)
+            if reason:
+                examined.append(replace(candidate, verdict=reason))
+                continue
+        size = {effect.name: min(max(guess, effect.bounds[0]), effect.bounds[1])}
+        if effect.second is not None:
+            size[effect.second.name] = float(misfit.second[j]) if local else effect.second.start
+        start = {**(base.parameters if local else start_values(study.model)), **size}
+        refit = fit(study.model, start, (*base.names, *size), study.split.fitted, title="")
+        examined.append(judge(study, candidate, base, refit, directions.without(j)))
+    return examined
+
+
+def _reason_not_to_refit(
+    study: Study, candidate: Candidate, base: Fit, misfit: Misfit, guess: float, needed: float
+) -> str:
+    """Say why an effect with this score and the size `guess` is not worth a refit; empty if it is."""
+    effect, z = candidate.effect, candidate.z
+    low, high = effect.bounds
+    if candidate.detectable > UNSEEN:
+        return "it changes nothing in these runs"
+    if candidate.survived < TESTABLE:
+        return "the coefficients absorb it: not testable with these runs"
+    if abs(z) < needed:
+        return "score within the noise"
+    if not low <= guess <= high and (guess < low) == (effect.start == low):
+        return "its score has a sign that the effect cannot have"
+    # A refit takes z² from the deviance if the model is linear. `_CURVED` allows for its curvature.
+    freedom = int(study.split.fitted.sum()) * base.prediction.shape[1] - len(base.names)
+    remainder = base.deviance - z**2 / _CURVED - freedom
+    best = float(np.max(np.where(misfit.scores.survived >= TESTABLE, misfit.scores.z**2, 0.0)))
+    if z**2 < _CURVED * best and remainder > _FAR * math.sqrt(2 * freedom):
+        return "leaves far more than noise, by its score"
+    return ""
+
+
+def coefficients_within_range(model: ForwardModel, fitted: Parameters) -> bool:
+    """Tell whether no coefficient ran to an end of its range."""
+    return all(1.5 * p.bounds[0] < fitted[p.name] < p.bounds[1] / 1.5 for p in model.coefficients)
+
+
+def pairs(study: Study, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Add second effects to the best fits with a single one, and return the pairs that are kept."""
+    refitted = sorted((c for c in candidates if c.refit), key=penalised_deviance)
+    again = replace(study, seed=study.seed + 2)
+    title = "second effects" if study.progress else ""
+    second: list[Candidate] = []
+    for first in refitted[:FIRST]:
+        assert first.refit is not None
+        others = [e for e in study.model.effects if e.name != first.effect.name]
+        tangents = directions(study.model, first.refit.parameters, others, title=title)
+        misfit = examine_residual(again, first.refit, tangents)
+        second += examine(again, first.refit, misfit, tangents, beside=(first.effect,))
+    single = min((ebic(study, c.refit, 1) for c in refitted if c.refit), default=math.inf)
+    kept: dict[frozenset[str], Candidate] = {}
+    for pair in second:
+        if pair.kept and pair.refit is not None and ebic(study, pair.refit, 2) < single:
+            kept.setdefault(frozenset(e.name for e in pair.claimed), pair)
+    return list(kept.values())
+
+
+def ebic(study: Study, refit: Fit, count: int) -> float:
+    """Add to the deviance of a fit with `count` effects what they cost: k ln n + 2 ln (number of such sets).
+
+    Source: Chen and Chen (2008), γ = 1.
+    """
+    values = int(study.split.fitted.sum()) * refit.prediction.shape[1]
+    sets = math.comb(len(study.model.effects), count)
+    return refit.deviance + len(refit.names) * math.log(values) + 2 * math.log(sets)
+
+
+def judge(study: Study, candidate: Candidate, base: Fit, refit: Fit, others: Directions) -> Candidate:
+    """Add to a candidate its refit, and the reason why that is kept or not.
+
+    Args:
+        base: the fit without the effect.
+        others: directions of all other effects.
+    """
+    after = examine_residual(
+        replace(study, seed=study.seed + 1), refit, others, draws=_DRAWS, decide=study.level / 2
+    )
+    gain, error = _session_gain(study, base, refit)
+    low, high = interval_at_second(refit, candidate.effect)
+    verdict = "kept"
+    if not refit.converged:
+        verdict = "its fit did not converge"
+    elif after.p_value < study.level / 2:
+        verdict = f"leaves a residual (p ≤ {after.p_value:.1g})"
+    elif low <= candidate.effect.start <= high:
+        verdict = "its interval includes the null"
+    elif gain <= error:
+        verdict = "does not predict left-out sessions better"
+    return replace(candidate, refit=refit, refit_misfit=after, gain=gain, gain_error=error, verdict=verdict)
+
+
+def interval_at_second(refit: Fit, effect: Parameter) -> tuple[float, float]:
+    """Compute the 95 % interval of an effect, with its second number as it was fitted.
+
+    A weak effect's size and second number cannot be told apart, and the interval over both would hold the null.
+    """
+    if effect.second is None:
+        return refit.interval(effect.name)
+    i, j = refit.names.index(effect.name), refit.names.index(effect.second.name)
+    V = refit.covariance
+    share = 1 - V[i, j] ** 2 / (V[i, i] * V[j, j])
+    half = refit.half_width(i) * math.sqrt(max(share, 0.0))
+    return refit.parameters[effect.name] - half, refit.parameters[effect.name] + half
+
+
+def _session_gain(study: Study, base: Fit, refit: Fit) -> tuple[float, float]:
+    """Sum the gain in log likelihood over left-out sessions, with its standard error (linearised refits).
+
+    With whitened residuals r of the refit and r + d of the base, a session gains ½|d|² + d·r, |d| of it by noise.
+    """
+    gain, variance = 0.0, 0.0
+    for learn, out in leave_one_group_out(groups(study.model.runs)[0], study.split.fitted):
+        before, after = (_left_out_residual(study, fitted, refit, learn, out) for fitted in (base, refit))
+        gain += 0.5 * float(before @ before - after @ after)
+        variance += float(((before - after) ** 2).sum())
+    return gain, float(np.sqrt(variance))
+
+
+def _left_out_residual(study: Study, fitted: Fit, refit: Fit, learn: Flags, out: Flags) -> Floats:
+    """Whiten the residuals of a left-out session, for a model fitted to the others, in the noise of `refit`."""
+    data = study.model.runs
+    white = refit.noise.whitener(data.session[learn])
+    residual = data.y - fitted.prediction
+    rows, prior = prior_rows(fitted.fitted, fitted.parameters)
+    derivative = np.concatenate([white(fitted.jacobian[learn]), rows])
+    step = np.linalg.lstsq(derivative, np.concatenate([white(residual[learn]), prior]), rcond=None)[0]
+    predicted = residual[out] - fitted.jacobian[out] @ step
+    return np.asarray(refit.noise.whitener(data.session[out])(predicted))

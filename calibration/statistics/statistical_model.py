@@ -1,0 +1,352 @@
+"""The statistical model of a table: its runs, a forward model with parameters and priors, and the noise.
+
+**Forward model.** Nothing in this room knows robots. The swimmer (`calibration.swimmer.swimmer`) is one forward
+model; a sphere that settles in a vessel is another one (`calibration/examples/spheres.py`).
+
+**Noise.** Runs under the same condition give the covariance S (k, k) of the outputs of one run. All outputs
+together are needed, because R_yr and θ are not independent of the spins and the yaw rate. A session may shift all
+its runs together, with a variance that is a share ρ of that of a run. Repeats within a session do not average this
+shift out. So the covariance of a session's n runs is
+
+    Σ = (I_n + ρ 1 1ᵀ) ⊗ S.
+
+There is one ρ for all outputs. With three sessions and five outputs it has about a dozen degrees of freedom; a ρ
+for each output would have two. ρ comes from the residuals of the fitted model, so a missing effect makes it
+larger. Therefore it is at most `SESSION_SHARE`: sessions are assumed to scatter no more than single runs do, and a
+larger shift of a whole session must be explained by the model. With a single session nothing is known about ρ.
+Then ρ is that limit, and a shift that is equal in all runs has almost no weight.
+
+**Priors.** A nuisance parameter with σ was given before the runs were made. It counts as one more measurement of
+itself: a row with derivative 1/σ and residual −x/σ, where x is its change from the value as given, on its own
+scale. With such rows in every least-squares fit, the covariance of the runs is Σ + J P Jᵀ in every test
+(P = diag σ²), without being formed. Source: priors as rows, e.g. Gelman et al. (2013), section 14.8.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from sim.arrays import Flags, Floats, Integers
+
+Parameters = Mapping[str, float]
+
+SESSION_SHARE = 1.0  # largest ρ
+_LOG_STEP, _STEP = 0.01, 0.02  # finite-difference steps: in ln C, in units of a typical size
+_LARGEST = 100.0  # change of ln C, so that C stays a number
+_RIDGE = 1e-11  # so that columns without any signal get a large variance
+_CUBIC = 0.2  # share of a cube that lower powers must leave
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number to fit: a coefficient, a nuisance parameter, or the size of an effect, which the model may lack."""
+
+    name: str
+    title: str
+    start: float  # the value as given; for an effect its null
+    bounds: tuple[float, float]
+    typical: float  # a typical size; it sets the finite-difference step
+    logarithmic: bool = False  # fitted as its logarithm
+    unit: str = "1"
+    sigma: float | None = None  # of a nuisance parameter's prior, on its own scale; None: free
+    plausible: tuple[float, float] | None = None  # sizes of an effect that its source allows; None: all
+    shown: float = 1.0  # factor to the unit in which a change is shown
+    second: Parameter | None = None  # of an effect: its second number, which shows only with the effect
+    grid: tuple[float, ...] = ()  # of a second number: values at which the effect is looked for
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Measured runs, ready to be compared: n runs of k outputs."""
+
+    outputs: tuple[str, ...]
+    y: Floats  # (n, k), scaled so that errors are relative
+    condition: Integers  # (n,) repeats share a number
+    session: Integers  # (n,) 0, 1, …: runs made together
+    session_names: tuple[str, ...]
+    inputs: Floats  # (n, q) what was set or noted, scaled (some by logarithm)
+    input_names: tuple[str, ...]
+    rows: Integers  # (n,) numbers in the table, from 1
+    excluded: tuple[str, ...]  # "row 7: …"
+    caveats: tuple[str, ...]  # what these runs cannot show, in words
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+    def subset(self, rows: Flags | Integers) -> Any:
+        """Choose the runs in `rows`: flags (n,), or places."""
+        arrays: dict[str, Any] = {k: v[rows] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
+        return replace(self, **arrays)
+
+
+class ForwardModel(Protocol):
+    """A model that predicts some runs from its parameters."""
+
+    @property
+    def runs(self) -> Runs: ...
+
+    @property
+    def coefficients(self) -> tuple[Parameter, ...]:
+        """Always fitted, without a prior."""
+        ...
+
+    @property
+    def nuisances(self) -> tuple[Parameter, ...]:
+        """Nuisance parameters: numbers that were given with a tolerance; always fitted, with their priors."""
+        ...
+
+    @property
+    def effects(self) -> tuple[Parameter, ...]:
+        """What the model may lack and these runs can test."""
+        ...
+
+    def predict(self, sets: Sequence[Parameters], *, title: str = "") -> Floats:
+        """Predict (P, n, k) for P parameter sets, each with every coefficient and effect."""
+        ...
+
+    def derivatives(
+        self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
+    ) -> tuple[Floats, Floats]:
+        """Compute the prediction (n, k) and its derivatives (n, k, p) on the scales of the parameters `names`.
+
+        With `quick` they may be NaN where they would take long.
+        """
+        ...
+
+
+def start_values(model: ForwardModel) -> dict[str, float]:
+    """Return every parameter as given: effects at their null."""
+    return {p.name: p.start for p in _every(model)}
+
+
+def parameter(model: ForwardModel, name: str) -> Parameter:
+    """Find the coefficient, nuisance parameter or effect called `name`."""
+    return next(p for p in _every(model) if p.name == name)
+
+
+def _every(model: ForwardModel) -> tuple[Parameter, ...]:
+    seconds = (e.second for e in model.effects if e.second)
+    return (*model.coefficients, *model.nuisances, *model.effects, *seconds)
+
+
+def moved(changed: Parameter, value: float, by: float) -> float:
+    """Change `value` by `by`, on the parameter's own scale, within its bounds."""
+    new = value * float(np.exp(min(by, _LARGEST))) if changed.logarithmic else value + by
+    return max(changed.bounds[0], min(changed.bounds[1], new))
+
+
+def stepped(fitted: Sequence[Parameter], parameters: Parameters, step: Floats) -> dict[str, float]:
+    """Change those `parameters` that are in `fitted` (p,) by `step` (p,), see `moved`."""
+    changes = zip(fitted, step.tolist(), strict=True)
+    return {**parameters, **{p.name: moved(p, parameters[p.name], by) for p, by in changes}}
+
+
+def by_differences(
+    model: ForwardModel, parameters: Parameters, names: Sequence[str], *, title: str = ""
+) -> tuple[Floats, Floats]:
+    """Compute `ForwardModel.derivatives` by finite differences; all changed models are computed together."""
+    sets, widths = [dict(parameters)], []
+    for name in names:
+        changed = parameter(model, name)
+        width = _LOG_STEP if changed.logarithmic else _STEP * abs(changed.typical)
+        if moved(changed, parameters[name], 2 * width) == changed.bounds[1]:  # downwards where the bound is near
+            width = -width
+        sets.append({**parameters, name: moved(changed, parameters[name], width)})
+        widths.append(width)
+    predictions = model.predict(sets, title=title)
+    slopes = (predictions[1:] - predictions[0]) / np.array(widths)[:, None, None]
+    return predictions[0], np.moveaxis(slopes, 0, -1)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """S (k, k) of a run and ρ of a session."""
+
+    run: Floats
+    share: float
+
+    def whitener(self, session: Integers) -> Whitener:
+        return Whitener(self, session)
+
+    def covariance(self, session: Integers) -> Floats:
+        """Compute Σ of the runs of `session` (n,), (n k, n k)."""
+        together = session[:, None] == session
+        return np.asarray(np.kron(np.eye(len(session)) + self.share * together, self.run))
+
+
+class Whitener:
+    """Σ^−½ for the runs of `session`; applies to residuals (n, k, ...) and flattens them."""
+
+    def __init__(self, noise: Noise, session: Integers):
+        self._inverse = inverse_root(noise.run)
+        self._share = noise.share
+        self._groups = [np.flatnonzero(session == s) for s in np.unique(session)]
+
+    def __call__(self, table: Floats) -> Floats:
+        """Whiten (n, k, ...) to (n k, ...)."""
+        white = np.einsum("ab,nb...->na...", self._inverse, table)
+        for rows in self._groups:
+            white[rows] += (1 / np.sqrt(1 + len(rows) * self._share) - 1) * white[rows].mean(0)
+        return np.asarray(white.reshape(-1, *table.shape[2:]))
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Products of columns, within sessions and of the sessions' means, for any ρ; `...` stands for batches."""
+
+    within: Floats  # (..., m, m)
+    between: Floats  # (..., s, m, m)
+    sizes: Floats  # (s,) runs of a session
+    outputs: int
+
+    def at(self, share: Floats) -> Floats:
+        """Compute columnᵀ Σ⁻¹ column, (..., m, m), for ρ (...)."""
+        weight = 1 / (1 + share[..., None] * self.sizes)
+        columns = self.between.shape[-1]
+        flat = self.between.reshape(*self.between.shape[:-2], columns * columns)
+        between = (weight[..., None, :] @ flat).reshape(*weight.shape[:-1], *self.between.shape[-2:])
+        return np.asarray(self.within + between)
+
+    def take(self, columns: Integers) -> Sums:
+        """Choose columns (c, q), (..., c, q, q)."""
+        rows, cols = columns[:, :, None], columns[:, None, :]
+        between = np.swapaxes(self.between[..., rows, cols], -4, -3)
+        return Sums(self.within[..., rows, cols], between, self.sizes, self.outputs)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Generalised least squares of the last column by the others; `...` stands for batches."""
+
+    step: Floats  # (..., p)
+    covariance: Floats  # (..., p, p)
+    share: Floats  # (...) ρ
+
+
+def inverse_root(run: Floats) -> Floats:
+    """Return L⁻¹ of S = L Lᵀ, (..., k, k)."""
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(run)))
+
+
+def sums(columns: Floats, session: Integers, outputs: int) -> Sums:
+    """Multiply columns (..., n, k, m) that are white in S with each other."""
+    *batch, n, k, m = columns.shape
+    flat = columns.reshape(*batch, n * k, m)
+    total = np.swapaxes(flat, -1, -2) @ flat
+    picks, count = averaging_rows(session)
+    means = np.einsum("sn,...nkm->...skm", picks, columns)
+    between = np.swapaxes(means, -1, -2) @ means
+    return Sums(total - between.sum(-3), between, count, outputs)
+
+
+def averaging_rows(session: Integers) -> tuple[Floats, Floats]:
+    """Make rows (s, n) that take the mean of each session times the root of its size; the sizes (s,)."""
+    kinds, place, count = np.unique(session, return_inverse=True, return_counts=True)
+    return (np.arange(len(kinds))[:, None] == place.reshape(-1)) / np.sqrt(count)[:, None], count.astype(float)
+
+
+def least_squares(products: Sums, *, passes: int) -> Linear:
+    """Fit the last of the columns, with ρ from its own residuals after `passes` iterations (0: ρ = 0)."""
+    share = session_share(products, passes=passes)
+    return Linear(*solved(products.at(share)), share)
+
+
+def session_share(products: Sums, *, passes: int) -> Floats:
+    """Estimate ρ (...) from the residuals of a fit of the last of the columns, after `passes` iterations from 0.
+
+    The expected scatter of the sessions' means is Σ_s n_s |m_s|² = (k − h/s) Σ_s (1 + ρ n_s), where h of their k s
+    degrees of freedom are used by the fit.
+    """
+    count, p = len(products.sizes), products.within.shape[-1] - 1
+    share = np.zeros(products.within.shape[:-2])
+    if count == 1 and passes:
+        return np.full_like(share, SESSION_SHARE)
+    for _ in range(passes):
+        normal = products.at(share)
+        step, covariance = solved(normal)
+        combination = np.concatenate([-step, np.ones((*share.shape, 1))], -1)
+        each = products.between @ combination[..., None, :, None]
+        between = (each[..., 0] * combination[..., None, :]).sum((-1, -2))
+        means = normal[..., :p, :p] - products.within[..., :p, :p]
+        freedom = products.outputs - (covariance * np.swapaxes(means, -1, -2)).sum((-1, -2)) / count
+        excess = between / np.maximum(freedom, 0.1 * products.outputs) - count
+        share = np.clip(excess / products.sizes.sum(), 0.0, SESSION_SHARE)
+    return share
+
+
+def solved(normal: Floats) -> tuple[Floats, Floats]:
+    """Solve for the coefficients (..., p) of the last of the columns; with their covariance (..., p, p)."""
+    p = normal.shape[-1] - 1
+    diagonal = np.diagonal(normal[..., :p, :p], axis1=-2, axis2=-1)
+    scale = np.where(diagonal > 1e-280, np.sqrt(np.maximum(diagonal, 1e-280)), 1.0)
+    scaled = normal[..., :p, :p] / scale[..., :, None] / scale[..., None, :]
+    covariance = np.linalg.inv(scaled + _RIDGE * np.eye(p)) / scale[..., :, None] / scale[..., None, :]
+    return (covariance @ normal[..., :p, p, None])[..., 0], covariance
+
+
+def repeat_covariance(y: Floats, condition: Integers) -> Floats:
+    """Estimate S (..., k, k) from the scatter of (..., n, k) about the mean of each condition, pooled."""
+    places = np.unique(condition, return_inverse=True)[1].reshape(-1)
+    count = np.bincount(places)
+    picks = (np.arange(len(count))[:, None] == places) / count[:, None]
+    centred = y - (picks @ y)[..., places, :]
+    return np.asarray(np.swapaxes(centred, -1, -2) @ centred / (len(places) - len(count)))
+
+
+def precisions(fitted: Sequence[Parameter]) -> Floats:
+    """Return 1/σ² of each parameter, 0 for those that are free, (p,)."""
+    return np.array([0.0 if p.sigma is None else p.sigma**-2 for p in fitted])
+
+
+def changes(fitted: Sequence[Parameter], parameters: Parameters) -> Floats:
+    """Return the change of each parameter from its value as given; 0 for those that are free, (p,)."""
+    return np.array([0.0 if p.sigma is None else change(p, parameters[p.name]) for p in fitted])
+
+
+def change(given: Parameter, value: float) -> float:
+    """Return the change from a parameter's value as given, on its own scale."""
+    return math.log(value / given.start) if given.logarithmic else value - given.start
+
+
+def prior_rows(fitted: Sequence[Parameter], parameters: Parameters) -> tuple[Floats, Floats]:
+    """Write the priors as measurements: derivatives (q, p) and residuals (q,)."""
+    root = np.sqrt(precisions(fitted))
+    rows = np.flatnonzero(root)
+    return np.diag(root)[rows], -(root * changes(fitted, parameters))[rows]
+
+
+def with_prior(products: Sums, fitted: Sequence[Parameter], parameters: Parameters) -> Sums:
+    """Add the priors to `products` of the derivatives and the residual (p + 1 columns)."""
+    rows, residual = prior_rows(fitted, parameters)
+    table = np.column_stack([rows, residual])
+    return replace(products, within=products.within + table.T @ table)
+
+
+def features(runs: Runs, used: Flags) -> tuple[tuple[str, ...], Floats]:
+    """Name and compute the inputs that differ, their squares, products and cubes for all runs, (n, f).
+
+    Standardised on the runs in `used` (n,).
+    """
+    spread = runs.inputs[used].std(0)
+    varied = np.flatnonzero(spread > 1e-9).tolist()
+    inputs = (runs.inputs[:, varied] - runs.inputs[used][:, varied].mean(0)) / spread[varied]
+    names, columns = [runs.input_names[i] for i in varied], list(inputs.T)
+    for i in range(len(varied)):
+        for j in range(i, len(varied)):
+            product = inputs[:, i] * inputs[:, j]
+            if product[used].std() > 1e-9:
+                names.append(f"{names[i]} × {names[j]}" if i != j else f"({names[i]})²")
+                columns.append((product - product[used].mean()) / product[used].std())
+    for i, column in zip(varied, inputs.T, strict=True):
+        lower = np.stack([np.ones_like(column), column, column**2], 1)
+        weights = np.linalg.lstsq(lower[used], column[used] ** 3, rcond=None)[0]
+        cube = column**3 - lower @ weights  # beyond lower powers; little for two or three levels
+        if cube[used].std() > _CUBIC * (column[used] ** 3).std():
+            names.append(f"({runs.input_names[i]})³")
+            columns.append(cube / cube[used].std())
+    return tuple(names), np.stack(columns, 1) if columns else np.empty((len(runs), 0))

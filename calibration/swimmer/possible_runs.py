@@ -1,0 +1,127 @@
+"""Which runs are possible: units of a table that cannot be right, and what a lab can set in its next runs.
+
+Columns that are wrong by a factor that is not possible are refused. Inputs are checked before anything is
+simulated. Outputs are compared with the model as given.
+
+Without a word from the lab, the next runs have the table's range of lengths, its numbers of tails and one more,
+and its fastest speed and slower ones. A lab says what it has as "N=2,3,4", "l_cm=5,7,9" and "omega_rpm=60,120".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from calibration.swimmer.measured_table import OUTPUTS, Measurements
+from sim.arrays import Floats
+from sim.io.errors import InputError
+from sim.model.groups import MOST_TAILS
+from sim.model.robot import Robot
+
+SHORTEST, LONGEST, FASTEST = 0.5, 50, 1000  # tails in head radii, ω̄
+OFF, SLIPS = 20.0, 3.0  # factors: of an output, of the spins' sum
+SETTINGS = ("N", "l_cm", "omega_rpm")
+_LENGTHS = 6
+_SPEEDS = (0.4, 0.7, 1.0)  # of the fastest
+
+Owned = Mapping[str, tuple[float, ...]]
+
+
+def check_inputs(robot: Robot, runs: Measurements) -> None:
+    """Check tail lengths and motor speeds.
+
+    Raises:
+        InputError: l_cm or omega_rpm seems to be in another unit.
+    """
+    longest = float(runs.length.max())
+    for length in (longest, float(runs.length.min())):
+        if not SHORTEST < length / robot.head_radius < LONGEST:
+            raise InputError(
+                f"l_cm = {100 * length:.3g} is {length / robot.head_radius:.3g} head radii "
+                f"({SHORTEST} to {LONGEST} are possible); check its unit and head_radius in robot.toml"
+            )
+    fastest = float(np.abs(runs.omega).max())
+    speed = fastest * replace(robot, tail_length=longest, motor_speed=fastest).time_scale
+    if not speed < FASTEST:
+        raise InputError(
+            f"omega_rpm = {fastest * 30 / math.pi:.4g} with l_cm = {100 * longest:.3g} gives ω̄ = {speed:.3g} "
+            f"(below {FASTEST} is possible); check the units of both, and robot.toml"
+        )
+
+
+def check_outputs(runs: Measurements, prediction: Floats) -> None:
+    """Compare outputs with the prediction (n, k) of the model as given.
+
+    Raises:
+        InputError: an output seems to be in another unit.
+    """
+    y = {name: runs.y[:, i] for i, name in enumerate(runs.outputs)}
+    if "omega_h" in y and "omega_t" in y:
+        share = float(np.median((np.exp(y["omega_h"]) + np.exp(y["omega_t"])) / np.abs(runs.omega)))
+        if not 1 / SLIPS < share < SLIPS:
+            raise InputError(
+                f"omega_h_rpm and omega_t_rpm add up to {share:.3g} times omega_rpm; the motor turns the head "
+                "against the tails, so all three must be in rpm"
+            )
+    for i, name in enumerate(runs.outputs):
+        theirs, ours = np.median(runs.y[:, i]), np.median(prediction[:, i])
+        factor = float(theirs / ours if name == "theta" else math.exp(theirs - ours))
+        if not 1 / OFF < factor < OFF:
+            raise InputError(
+                f"{OUTPUTS[name][0]} is {factor:.3g} times what the robot as given does; "
+                "check its unit, those of l_cm and omega_rpm, and robot.toml"
+            )
+
+
+def owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    """Read the settings that a lab has, by the columns of a table.
+
+    Args:
+        entries: "COLUMN=VALUE,VALUE,…" each.
+
+    Raises:
+        InputError: a column or a value that cannot be set.
+    """
+    settings: dict[str, tuple[float, ...]] = {}
+    for entry in entries:
+        name, _, values = entry.partition("=")
+        try:
+            settings[name] = tuple(float(v) for v in values.split(","))
+        except ValueError:
+            raise InputError(f"--own {entry!r}; write COLUMN=VALUE,VALUE,… such as l_cm=5,7,9") from None
+    check_owned(settings)
+    return settings
+
+
+def check_owned(own: Owned) -> None:
+    """Refuse settings that no run can have.
+
+    Raises:
+        InputError: see `owned`.
+    """
+    for name, values in own.items():
+        if name not in SETTINGS:
+            raise InputError(f"settings of the next runs: {name!r} is none of {', '.join(SETTINGS)}")
+        for value in values:
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"settings of the next runs: {name} = {value:g}; it must be positive")
+            if name == "N" and not (value == int(value) and value <= MOST_TAILS):
+                raise InputError(
+                    f"settings of the next runs: N = {value:g}; the number of tails is an integer from 1 to "
+                    f"{MOST_TAILS}"
+                )
+
+
+def possible_settings(runs: Measurements, own: Owned) -> Floats:
+    """List N, l_cm and omega_rpm of every run that can be made next, (m, 3); both directions."""
+    cm, rpm = 100 * runs.length, np.abs(runs.omega).max() * 30 / math.pi
+    default = {
+        "N": np.arange(runs.tails.min(), runs.tails.max() + 2),
+        "l_cm": np.unique(np.linspace(cm.min(), cm.max(), _LENGTHS).round(1)),
+        "omega_rpm": (rpm * np.array(_SPEEDS)).round(1),
+    }
+    tails, lengths, speeds = (np.unique(own.get(name, default[name])).astype(float) for name in SETTINGS)
+    return np.array([(n, a, w) for n in tails for a in lengths for w in (*speeds, *-speeds)])
