@@ -155,4 +155,4 @@ def test_a_drawing_that_would_take_minutes_is_rejected(body: str, words: str, tm
 
 def test_uses_within_the_limits_are_drawn(tmp_path: Path) -> None:
     body = "<defs><g id='a'><path d='M 0 0 L 3 4'/></g></defs><use href='#a' transform='scale(2)'/>"
-    assert path_of(tmp_path, body).length == pytest.approx(10)
+    assert drawn_path(tmp_path, body).length == pytest.approx(10)
