@@ -1,4 +1,4 @@
-"""Checks of claims: the imitability index is high where a claim is weak, and a claim must carry over to the other runs."""
+"""Checks of claims: the imitability index is high for a weak claim, and a claim must carry over to other runs."""
 
 from __future__ import annotations
 
