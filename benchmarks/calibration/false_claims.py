@@ -56,11 +56,11 @@ class Case:
 def claims(verdict: Verdict, case: Case) -> dict[str, bool]:
     """Every question that can be asked of a verdict."""
     sets = [{e.name for e in c.claimed} for c in verdict.explaining]
-    doubted = any(c.doubted for c in verdict.explaining)
+    uncertain = any(c.uncertain for c in verdict.explaining)
     beside = [{e.name for e in c.claimed} for c in verdict.evidence.rival_effects]
     answers = {
         "an effect is claimed": bool(sets),
-        "claimed without the words": bool(sets) and not doubted,
+        "claimed without the words": bool(sets) and not uncertain,
         "a number is wrong": verdict.verdict == "number",
         _NAMED: {case.truth} in (*sets, *beside),
         _OTHER: bool(sets) and {case.truth} not in sets,

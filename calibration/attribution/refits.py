@@ -32,7 +32,7 @@ from calibration.statistics.statistical_model import ForwardModel, Parameter, Pa
 from calibration.statistics.study import Study, groups, leave_one_group_out
 from sim.arrays import Flags, Floats
 
-DOUBT = 0.05  # imitability index above which a claim is doubted
+IMITABLE = 0.05  # imitability index above which a claim needs a reservation
 SURE = 0.01  # p-value of the transfer test below which it is
 INDISTINGUISHABLE = 6.63  # χ² with one degree of freedom, 99 %
 UNSEEN = 1e9  # smallest detectable size of an effect that changes nothing
@@ -57,7 +57,7 @@ class Candidate:
     refit_misfit: Misfit | None = None
     gain: float = 0.0  # predictive gain summed over left-out sessions, in log likelihood
     gain_error: float = 0.0
-    imitable: float = 0.0  # imitability index of the claim (`calibration.attribution.doubts`), if it is kept
+    imitable: float = 0.0  # imitability index of the claim (`calibration.attribution.claim_checks`), if it is kept
     transfer: float = 1.0  # p-value that it carries over to other runs, if it is kept
 
     @property
@@ -65,13 +65,13 @@ class Candidate:
         return self.verdict == "kept"
 
     @property
-    def doubted(self) -> bool:
+    def uncertain(self) -> bool:
         """Whether the claim may be something outside the catalogue that looks like it.
 
         An effect that explains the runs only beside a wrong nuisance parameter counts as a pair, and is always
         uncertain.
         """
-        return self.imitable > DOUBT or self.transfer < SURE or bool(self.refit and self.refit.wrong_numbers)
+        return self.imitable > IMITABLE or self.transfer < SURE or bool(self.refit and self.refit.wrong_numbers)
 
     @property
     def title(self) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from calibration.attribution.refits import DOUBT, SURE, UNSEEN, Candidate
+from calibration.attribution.refits import IMITABLE, SURE, UNSEEN, Candidate
 from calibration.statistics.fit import WRONG, least_determined
 from calibration.swimmer.measured_table import Measurements
 from calibration.verdict.next_runs import STOP, Batch
@@ -198,7 +198,7 @@ def _add_evidence(page: Page, result: Verdict) -> None:
     for c in result.explaining:
         page.text(
             f"{c.title}: {100 * c.imitable:.0f} % of the departures from outside the catalogue that were drawn "
-            f"for comparison would have passed for it; above {100 * DOUBT:.0f} % the verdict says so. "
+            f"for comparison would have passed for it; above {100 * IMITABLE:.0f} % the verdict says so. "
             + _carried(c)
         )
     if result.evidence.untestable:

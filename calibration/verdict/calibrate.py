@@ -26,7 +26,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from calibration.attribution.doubts import with_doubts
+from calibration.attribution.claim_checks import with_checks
 from calibration.attribution.refits import (
     FIRST,
     INDISTINGUISHABLE,
@@ -192,7 +192,7 @@ def explain(study: Study, guess: Mapping[str, float]) -> Explained:
         or explaining(beside_wrong_numbers(study, base, candidates, tangents))
         or explaining(pairs(study, candidates))
     )
-    return Explained(base, misfit, tuple(candidates), tuple(with_doubts(study, best, base)))
+    return Explained(base, misfit, tuple(candidates), tuple(with_checks(study, best, base)))
 
 
 def _forecast(misfit: Misfit, threshold: float, seconds_of_fit: float, seconds_of_directions: float) -> str:

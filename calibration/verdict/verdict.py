@@ -301,7 +301,7 @@ class Verdict:
     @property
     def _outside(self) -> str:
         """The words for a claim that something outside the catalogue could imitate."""
-        if not any(c.doubted for c in self.explaining):
+        if not any(c.uncertain for c in self.explaining):
             return ""
         many = len(self.explaining) > 1 or len(self.explaining[0].claimed) > 1
         return f", or something outside the catalogue that looks like {'them' if many else 'it'}"

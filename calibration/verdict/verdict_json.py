@@ -28,7 +28,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "in_form_only": list(result.in_form_only),
         "imitability": [c.imitable for c in result.explaining],
         "transfer_p": [c.transfer for c in result.explaining],
-        "imitable": any(c.doubted for c in result.explaining),
+        "imitable": any(c.uncertain for c in result.explaining),
         "effects_instead": [[e.name for e in c.claimed] for c in result.evidence.rival_effects],
         "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
         "numbers_as_given": [_number_record(p) for p in result.fits.pulls],

@@ -28,7 +28,7 @@ ROWS = list[list[float]]
 NAMES = ("x", "y", "heading", "yaw rate, left", "yaw rate, right", "surge", "sway", "lag angle",
          "current x", "current y")  # fmt: skip
 STATES = len(NAMES)
-DOUBT = (0.03, 0.03, 0.03, 0.03)  # standard deviations beside the plan's own: yaw rates, surge, sway
+PRIOR = (0.03, 0.03, 0.03, 0.03)  # standard deviations beside the plan's own: yaw rates, surge, sway
 CHANGES = (1.5e-3, 1.5e-3, 5e-4, 5e-4)  # their process noise, standard deviation per dwell
 WALK = 3e-4  # process noise of the pose per dwell [l, rad]
 MOST = (0.5, 0.5, 0.5, 0.5, 0.3)  # bounds of the estimated yaw rates, surge, sway, lag angle
@@ -189,7 +189,7 @@ class _Change(NamedTuple):
 def prior(plan: Plan) -> ROWS:
     """Compute the covariance (10, 10) before the first pose, from what is uncertain of the start and the plan."""
     vehicle = plan.tracked.vehicle
-    P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in DOUBT), 1e-6, 1e-12, 1e-12])
+    P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in PRIOR), 1e-6, 1e-12, 1e-12])
     speed = np.hypot(vehicle.twist[0, 0], vehicle.twist[0, 1])
     for mode in vehicle.modes:
         direction = np.zeros(STATES)

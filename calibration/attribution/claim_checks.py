@@ -1,4 +1,4 @@
-"""Doubts about a claim: something outside the catalogue may look like it, or it may not carry over to other runs.
+"""Checks of a claim: could something outside the catalogue look like it, and does it carry over to other runs?
 
 What is outside is not known. It is drawn: the signal of an effect times exp(g), with g a smooth random function of
 the runs' inputs (Gaussian process, correlation length one standard deviation, standard deviation 0.5). So it
@@ -13,7 +13,7 @@ the size which fits short tails is wrong for long ones. In the *transfer test* t
 again, by one linear step, to the runs with at most the median tail length and one of the `FEWEST` smallest numbers
 of tails. Then the other runs are judged as the held-out ones are.
 
-Where the index is above `refits.DOUBT`, or the p-value of the test below `refits.SURE`, the verdict says "or
+Where the index is above `refits.IMITABLE`, or the p-value of the test below `refits.SURE`, the verdict says "or
 something outside the catalogue that looks like it".
 """
 
@@ -40,12 +40,12 @@ _INPUTS = ("N", "ln l")
 _ENOUGH = 2  # values a parameter
 
 
-def with_doubts(study: Study, claims: Sequence[Candidate], base: Fit) -> list[Candidate]:
+def with_checks(study: Study, claims: Sequence[Candidate], base: Fit) -> list[Candidate]:
     """Add to each claim its imitability index and its transfer test.
 
     The strength of a claim is what it takes from the deviance of `base`.
     """
-    doubted = []
+    checked = []
     for claim in claims:
         assert claim.refit is not None
         strength = math.sqrt(max(base.deviance - claim.refit.deviance, 0.0))
@@ -53,8 +53,8 @@ def with_doubts(study: Study, claims: Sequence[Candidate], base: Fit) -> list[Ca
         names = (*(e.name for e in claim.claimed), *seconds)
         shares = absorbable_shares(study, claim.refit, names)
         transfer = transfer_p(replace(study, seed=study.seed + 4), claim.refit)
-        doubted.append(replace(claim, imitable=imitability(shares, strength), transfer=transfer))
-    return doubted
+        checked.append(replace(claim, imitable=imitability(shares, strength), transfer=transfer))
+    return checked
 
 
 def absorbable_shares(study: Study, fitted: Fit, names: Sequence[str]) -> Floats:

@@ -1,4 +1,4 @@
-"""Doubts: the imitability index is high where a claim is weak, and a claim must carry over to the other runs."""
+"""Checks of claims: the imitability index is high for a weak claim, and a claim must carry over to other runs."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import calibration.attribution.doubts
-from calibration.attribution.doubts import (
+import calibration.attribution.claim_checks
+from calibration.attribution.claim_checks import (
     SEEN,
     absorbable_shares,
     deformations,
@@ -16,7 +16,7 @@ from calibration.attribution.doubts import (
     imitability,
     transfer_p,
 )
-from calibration.attribution.refits import DOUBT, SURE, Candidate
+from calibration.attribution.refits import IMITABLE, SURE, Candidate
 from calibration.attribution.wrong_numbers import pulls
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.statistical_model import parameter, start_values
@@ -40,7 +40,7 @@ def test_a_strong_claim_is_hard_to_imitate_and_a_weak_one_is_not() -> None:
     assert ((shares > -1e-9) & (shares < 1)).all()
     strengths = [imitability(shares, strength) for strength in (SEEN / 2, 2 * SEEN, 20 * SEEN)]
     assert strengths == sorted(strengths, reverse=True)
-    assert strengths[0] > DOUBT > strengths[-1]
+    assert strengths[0] > IMITABLE > strengths[-1]
 
 
 def test_what_is_absorbed_whole_leaves_nothing_to_notice() -> None:
@@ -111,11 +111,11 @@ def test_runs_that_are_all_alike_say_nothing() -> None:
 @pytest.mark.usefixtures("toy_model")
 def test_a_claim_that_does_not_carry_over_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     swimmer = planted(model(), np.full(len(model().runs), 2.0))
-    monkeypatch.setattr(calibration.attribution.doubts, "transfer_p", lambda *_, **__: 0.001)
-    doubted = calibrate(swimmer, draws=FEW_DRAWS, progress=False)
-    assert doubted.effects == (EFFECT,)
-    assert "or something outside the catalogue" in doubted.sentence
-    assert verdict_record(doubted, table="")["transfer_p"] == [0.001]
+    monkeypatch.setattr(calibration.attribution.claim_checks, "transfer_p", lambda *_, **__: 0.001)
+    uncertain = calibrate(swimmer, draws=FEW_DRAWS, progress=False)
+    assert uncertain.effects == (EFFECT,)
+    assert "or something outside the catalogue" in uncertain.sentence
+    assert verdict_record(uncertain, table="")["transfer_p"] == [0.001]
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -125,8 +125,8 @@ def test_an_effect_beside_a_wrong_number_is_in_doubt() -> None:
     swimmer = model()
     effect = parameter(swimmer, EFFECT)
     sure = Candidate(effect, (effect,), 8.0, 1.0, 1.0, 1.0, "kept", refit, None, 1.0, 0.1)
-    assert not sure.doubted
+    assert not sure.uncertain
     pull = pulls(
         fit(swimmer, start_values(swimmer), names(swimmer), everywhere(swimmer), title=""), swimmer.nuisances
     )[0]
-    assert replace(sure, refit=replace(refit, wrong_numbers=((pull,),))).doubted
+    assert replace(sure, refit=replace(refit, wrong_numbers=((pull,),))).uncertain
