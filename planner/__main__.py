@@ -126,7 +126,8 @@ def _goal(arguments: Namespace) -> None:
     robot, unit = load_robot(arguments.robot), arguments.unit
     scale = in_tails(unit, robot)
     start, goal = (
-        (scale * x, scale * y, math.radians(angle)) for x, y, angle in (arguments.start, arguments.goal)
+        (scale * x, scale * y, math.radians(math.fmod(angle, 360)))
+        for x, y, angle in (arguments.start, arguments.goal)
     )
     walls = None if arguments.walls is None else read_region(arguments.walls, unit, robot)
     if walls is not None and not isinstance(walls, Polygon):

@@ -21,6 +21,7 @@ import numpy as np
 import pyarrow as pa
 
 from sim.effects import catalogue
+from sim.model.groups import MOTOR_SPEED
 from sim.model.response import BEFORE, DWELLS
 from sim.model.slopes import SLOPE_INPUTS, SLOPE_OUTPUTS
 
@@ -74,7 +75,7 @@ INPUTS = (
     Column("l_over_R", _real, "1", "tail length over head radius", label="$l/R$"),
     Column("L_over_R", _real, "1", "head length over head radius", label="$L/R$"),
     Column("l_over_r0", _real, "1", "tail length over tail section radius", label="$l/r_0$"),
-    Column("omega_bar", _real, "EI/(mu0 l^4)", "motor speed, head relative to tails", label="$\\bar\\omega$",
+    Column("omega_bar", _real, "EI/(mu0 l^4)", MOTOR_SPEED, label="$\\bar\\omega$",
            logarithmic=True),
     Column("N", _whole, "1", "number of tails", label="$N$"),
     Column("a_over_R", _real, "1", "radius of the circle of clamps over head radius", label="$a/R$"),

@@ -167,6 +167,11 @@ def to_goal(
 def _pose(values: Sequence[float], name: str) -> Pose:
     """Check a pose that the user gave."""
     x, y, heading = _finite(values, 3, f"{name}: give x, y and heading")
+    if abs(heading) > math.tau:
+        raise InputError(
+            f"{name}: a heading of {heading:g} is more than one turn; headings are in radians here, so give "
+            f"math.radians({heading:g}) if you mean degrees"
+        )
     return x, y, heading
 
 

@@ -34,6 +34,7 @@ _SPACING = 0.02  # of points on the reference, in l
 _MOST_POINTS = 150_000
 _SCALES = (1.5, 2.0, 2.5, 3.5, 5.0, 7.5, 12.0, 20.0)  # that a message may suggest
 _NOISY = 1.5  # ratio of a path's length to that of the smoothed path
+_SMALL = 0.1  # of the path's extent: what smoothing may move a path that is noisy
 
 
 class Feasibility(NamedTuple):
@@ -189,12 +190,15 @@ def _working_scale(raw: Path2D, feasibility: Feasibility) -> float | None:
 
 
 def _smoothing_advice(raw: Path2D, radius: float) -> str:
-    """Advise to smooth a path that is much longer than after smoothing: it is noisy, and no scale helps."""
+    """Advise to smooth a path that is much longer than after smoothing: it is noisy, and no scale helps.
+
+    A path that smoothing changes as a whole is small, not noisy.
+    """
     length = float(f"{2 * radius:.2g}")
     if not length < raw.length / 2:
         return ""
     smooth, moved = smoothed(raw, length)
-    if raw.length < _NOISY * smooth.length:
+    if raw.length < _NOISY * smooth.length or moved > _SMALL * max(extent(raw)):
         return ""
     return (
         f"it looks noisy: smoothed over {length:g} l it is {smooth.length:.3g} l long, not {raw.length:.3g} l, "

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Unpack
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from planner.paths.path import Path2D
@@ -294,7 +295,11 @@ def zigzag_drift(vehicle: Vehicle, straight: Zigzag, dwell: float) -> Drift:
         InputError: with such dwells the robot does not get ahead.
     """
     if straight.speed <= 0:
-        raise InputError(f"with dwells of {dwell:.2g} time units the robot does not get ahead; allow longer ones")
+        turn = dwell * float(np.abs(vehicle.twist[:, 2]).max())
+        remedy = "shorter ones: it turns too far" if turn > 1.0 else "longer ones: it is still accelerating"
+        raise InputError(
+            f"with dwells of {dwell:.2g} time units the robot does not get ahead; allow {remedy} in each dwell"
+        )
     sideways = straight.drift / straight.speed
     x, y = (vehicle.current / straight.speed).tolist()
     # A mirror-symmetric robot has no drift: what is left is rounding.

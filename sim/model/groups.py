@@ -25,6 +25,7 @@ from sim.io.errors import InputError
 if TYPE_CHECKING:
     from torch import Tensor
 
+MOTOR_SPEED = "motor speed, tails relative to head"  # what omega_bar is
 GROUP_COLUMNS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "N")
 OPTIONAL_COLUMNS = ("a_over_R",)
 DWELL = "dwell_bar"  # switching half-period, beside the robot in sweeps and look-ups

@@ -134,3 +134,11 @@ def test_refusals() -> None:
         to_goal((0, 0, 0), (3, 0, 0), CONTROL, tolerance=0.001)
     with pytest.raises(InputError, match="radius above 0"):
         Circle(0, 0, -1)
+
+
+def test_a_heading_in_degrees_is_not_taken_as_radians() -> None:
+    """90 used to be taken as 90 rad, which is 117 degrees, without a word."""
+    with pytest.raises(InputError, match=r"goal: a heading of 90 is more than one turn; .* math\.radians\(90\)"):
+        to_goal((0, 0, 0), (4, 1, 90), CONTROL)
+    with pytest.raises(InputError, match="start: a heading of -30"):
+        to_goal((0, 0, -30), (4, 1, 0), CONTROL)

@@ -163,3 +163,16 @@ def test_a_current_is_steered_against() -> None:
     assert middle == pytest.approx(-math.asin(0.004 / result.straight.net_speed), abs=0.01)
     with pytest.raises(InputError, match="as fast as the robot"):
         plan(circle(3.0), CONTROL, knowledge=CalibrationKnowledge(current=(0.0, 0.5 * unit)))
+
+
+def test_a_dwell_that_is_too_long_is_to_be_shorter() -> None:
+    """The advice used to be "allow longer ones"."""
+    with pytest.raises(InputError, match="allow shorter ones: it turns too far"):
+        plan(circle(3.0), CONTROL, minimum_seconds=400.0)
+
+
+def test_a_small_circle_is_small_not_noisy() -> None:
+    with pytest.raises(InputError) as refusal:
+        plan(circle(0.2), CONTROL)
+    assert "noisy" not in str(refusal.value)
+    assert "small" in str(refusal.value) or "tight" in str(refusal.value)
