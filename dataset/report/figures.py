@@ -53,9 +53,11 @@ def draw_trends(rows: pd.DataFrame, output: str, inputs: Sequence[str]) -> Figur
 
 
 def _draw_band(axes: Axes, x: Floats, y: Floats, shade: str, *, line: bool = True, band: bool = True) -> None:
-    """Draw median (line) and quartiles (band) of y in bins of equally many rows."""
+    """Draw median (line) and quartiles (band) of y in bins of equally many rows; few rows are drawn as points."""
     good = np.isfinite(x) & np.isfinite(y)
     if good.sum() < 2 * _FEWEST:
+        if line:
+            axes.plot(x[good], y[good], ".", ms=4, color=shade)
         return
     x, y = x[good], y[good]
     bins = min(_BINS, good.sum() // _FEWEST)

@@ -19,6 +19,7 @@ from sim.model.groups import Groups
 from sim.reference.linear_theory import linear_motion
 
 _ERRORS = 1.96  # standard errors in an interval of 95 %
+_ROWS_PER_INPUT = 3  # in each third
 _MOST_LINEAR_ROWS = 2000  # linear theory takes about a millisecond a robot
 
 
@@ -46,6 +47,11 @@ def exponents(inputs: Mapping[str, Floats], output: str, values: Floats) -> list
     return [Exponents(output, name, *_by_third(logs, y, k)) for k, name in enumerate(names)]
 
 
+def rows_for_exponents(inputs: int) -> int:
+    """Return how many rows exponents of so many inputs need."""
+    return 3 * _ROWS_PER_INPUT * inputs
+
+
 def _by_third(logs: Floats, y: Floats, k: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Fit exponents and half-widths of intervals in the thirds of input k."""
     edges = np.quantile(logs[:, k], [0, 1 / 3, 2 / 3, 1])
@@ -53,7 +59,7 @@ def _by_third(logs: Floats, y: Floats, k: int) -> tuple[tuple[float, float, floa
     for low, high in pairwise(edges):
         third = (logs[:, k] >= low) & (logs[:, k] <= high)
         x = logs[third] - logs[third].mean(0)
-        if np.ptp(x[:, k]) == 0 or third.sum() < 3 * logs.shape[1]:
+        if np.ptp(x[:, k]) == 0 or third.sum() < _ROWS_PER_INPUT * logs.shape[1]:
             slopes.append(np.nan)
             errors.append(np.nan)
             continue

@@ -11,7 +11,7 @@ import pyarrow as pa
 from scipy.stats import qmc
 
 from dataset.report.figures import RESPONSES, draw_collapse, draw_indices, draw_responses, draw_trends, draw_where
-from dataset.report.power_laws import exponents, linear_rows
+from dataset.report.power_laws import exponents, linear_rows, rows_for_exponents
 from dataset.report.sobol_indices import sobol_indices
 from dataset.rows.schema import COST, INPUTS, Column, schema, shown_outputs
 from dataset.storage.data_set import read, read_manifest
@@ -119,7 +119,8 @@ def _add_dependence(page: Page, usable: pd.DataFrame, names: list[str]) -> None:
             f"{output.words} against each input, by number of tails",
         )
     page.text(
-        "Lines: medians by number of tails. Bands: the middle half of the rows, of all tails if N has many values."
+        "Lines: medians by number of tails. Bands: the middle half of the rows, of all tails if N has many "
+        "values. Points: the rows of a number of tails that has too few for a line."
     )
 
 
@@ -129,15 +130,15 @@ def _add_linear_theory(page: Page, usable: pd.DataFrame, names: list[str]) -> No
     sample = usable.iloc[rows]
     inputs = {name: sample[name].to_numpy(float) for name in names}
     page.section("Scaling laws")
-    page.text(
-        "Exponents: by how many per cent an output grows when an input grows by one per cent and all others are "
-        "held, in the lower, middle and upper third of the input. Where the three agree to 0.1, a power law holds "
-        "over the sweep. The last three columns are those of linear theory, for the same robots. Inputs that "
-        f"change an output by less than the power {_SMALL:g} are left out."
-    )
     table = [line for output in shown_outputs() for line in _exponent_lines(output, sample, inputs, linear)]
-    thirds = ("lower", "middle", "upper")
-    page.table(("output", "input", *thirds, "", *(f"linear: {third}" for third in thirds)), table)
+    if not table:
+        page.text(
+            f"{len(sample)} usable rows are too few for exponents of {len(inputs)} inputs: they need "
+            f"{rows_for_exponents(len(inputs))} or more.",
+            tone="bad",
+        )
+    else:
+        _add_exponents(page, table)
     page.section("Against linear theory")
     page.text(
         "Each point is a robot. S is the drag number of a tail: viscous against elastic forces. For small S the "
@@ -145,6 +146,17 @@ def _add_linear_theory(page: Page, usable: pd.DataFrame, names: list[str]) -> No
     )
     outputs = [output.name for output in shown_outputs() if output.name in linear]
     page.figure(draw_collapse(sample, linear, outputs), "outputs over linear theory against the drag number")
+
+
+def _add_exponents(page: Page, table: list[tuple[str, ...]]) -> None:
+    page.text(
+        "Exponents: by how many per cent an output grows when an input grows by one per cent and all others are "
+        "held, in the lower, middle and upper third of the input. Where the three agree to 0.1, a power law holds "
+        "over the sweep. The last three columns are those of linear theory, for the same robots. Inputs that "
+        f"change an output by less than the power {_SMALL:g} are left out."
+    )
+    thirds = ("lower", "middle", "upper")
+    page.table(("output", "input", *thirds, "", *(f"linear: {third}" for third in thirds)), table)
 
 
 def _exponent_lines(
@@ -155,10 +167,16 @@ def _exponent_lines(
     known = output.name in linear
     theory = exponents(inputs, output.name, linear[output.name]) if known else [None] * len(simulated)
     for law, linear_law in zip(simulated, theory, strict=True):
-        if np.nanmax(np.abs(law.value)) > _SMALL:
-            thirds = (f"{v:.2f} ± {w:.2f}" for v, w in zip(law.value, law.half_width, strict=True))
-            linear_thirds = (f"{v:.2f}" for v in linear_law.value) if linear_law else ("–",) * 3
+        if np.abs(law.value).max(initial=0.0, where=np.isfinite(law.value)) > _SMALL:
+            thirds = map(_number, law.value, law.half_width)
+            linear_thirds = map(_number, linear_law.value) if linear_law else ("–",) * 3
             yield output.words, law.input, *thirds, "power law" if law.holds else "changes", *linear_thirds
+
+
+def _number(value: float, half_width: float | None = None) -> str:
+    if not np.isfinite(value):
+        return "–"
+    return f"{value:.2f}" if half_width is None else f"{value:.2f} ± {half_width:.2f}"
 
 
 def _add_limits(page: Page, rows: pd.DataFrame) -> None:

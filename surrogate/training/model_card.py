@@ -43,6 +43,19 @@ the shipped table the picture is in docs/figures.md, under "Error against rows".
 """
 
 
+def _about_errors(inside: int, outside: int) -> str:
+    if not inside:
+        return (
+            f"Not known: all {outside} held-out robots are outside its domain, so it was trained on too few rows. "
+            "Simulate more of them, and train again."
+        )
+    return (
+        f"On {inside} held-out robots, in per cent where no unit is given. {outside} more were outside its "
+        "domain. Coverage is the share of intervals that hold the simulator's value; they are made for "
+        f"{100 * COVERAGE:.0f} %."
+    )
+
+
 def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
     """Write the card of a table, from robots that it did not learn."""
     answer = lookup.query(held_out.robots, intervals=True, flag=True)
@@ -63,9 +76,7 @@ def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
         "The domain is not this box but the joint support of what was learned. Effects on head, disc and motor "
         "need no learning.",
         "## Errors",
-        f"On {np.count_nonzero(known)} robots that it did not learn, in per cent where no unit is given. "
-        f"{np.count_nonzero(~known)} more were outside its domain. Coverage is the share of intervals that hold "
-        f"the simulator's value; they are made for {100 * COVERAGE:.0f} %.",
+        _about_errors(np.count_nonzero(known), np.count_nonzero(~known)),
     ]
     kinds = (
         ("Two tails and more, which do not touch:", (tails > 1) & apart),

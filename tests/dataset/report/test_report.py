@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
+from dataset.build.build import build
 from dataset.report.figures import RESPONSES, draw_responses
 from dataset.report.power_laws import exponents, linear_rows
+from dataset.report.report import write_report
 from dataset.report.sobol_indices import sobol_indices
+from sim.io.pages import Page
 from sim.model.response import DWELLS
 from sim.motion.batches import steady_columns
+from tests.dataset.sweeps import design, invented
 from tests.sim.points import sweep_points
 
 
@@ -77,3 +83,23 @@ def test_motors_of_which_nothing_is_known_have_no_median() -> None:
         warnings.simplefilter("error")
         figure = draw_responses(rows)
     assert [len(axes.get_lines()) for axes in figure.axes] == [3, 3, 2]
+
+
+@pytest.mark.parametrize("count", [64, 96])
+def test_a_report_of_few_rows_says_what_is_missing(
+    count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It used to have empty panels, an empty table, and a warning of NumPy."""
+    build(design(count), tmp_path / "data", jobs=1, title="", simulate=invented)
+    drawn: list[Figure] = []
+    monkeypatch.setattr(Page, "figure", lambda _, figure, __: drawn.append(figure))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        write_report(str(tmp_path / "data"), tmp_path / "page.html")
+    for figure in drawn:
+        for axes in figure.axes:
+            artists = [*axes.get_lines(), *axes.collections, *axes.patches]
+            assert any(len(getattr(artist, "get_xdata", lambda: [0])()) for artist in artists), axes.get_title()
+    text = (tmp_path / "page.html").read_text()
+    assert "are too few for exponents of 8 inputs: they need 72 or more" in text or count > 90
+    assert "<tr></tr>" not in text

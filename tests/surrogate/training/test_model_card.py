@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,3 +31,12 @@ def test_the_worst_robot_is_first() -> None:
     sizes = [float(line.split("|")[1]) for line in lines if re.match(r"\| [\d.]", line)]
     assert len(sizes) == 10
     assert sizes == sorted(sizes, reverse=True)
+
+
+def test_a_card_without_known_errors_says_why() -> None:
+    """It used to state errors "on 0 robots"."""
+    held = rows(64, 13, wide=False)
+    beyond = {name: 50 * values if name == "omega_bar" else values for name, values in held.robots.items()}
+    card = model_card(table(), replace(held, robots=beyond))
+    assert "Not known: all 64 held-out robots are outside its domain" in card
+    assert "On 0" not in card
