@@ -23,6 +23,18 @@ from sim.model.robot import Robot
 
 SHORTEST, LONGEST, FASTEST = 0.5, 50, 1000  # tails in head radii, ω̄
 OFF, SLIPS = 20.0, 3.0  # factors: of an output, of the spins' sum
+_NEAR = 1.6  # factor between an output in another unit and what the robot does
+_RPM = {"rad/s": math.pi / 30, "degrees per second": 6.0, "turns per second": 1 / 60}
+_LENGTH = {"mm": 10.0, "m": 0.01}
+# What an output's numbers are multiplied by if they are in another unit than the column's.
+UNITS = {
+    "omega_h": _RPM,
+    "omega_t": _RPM,
+    "omega_yr": {"degrees per second": 180 / math.pi, "rpm": 30 / math.pi, "turns per second": 0.5 / math.pi},
+    "R_yr": _LENGTH,
+    "theta": {"radians": math.pi / 180},
+    "v": {"mm/s": 10.0, "m/s": 0.01, "cm/min": 60.0},
+}
 SETTINGS = ("N", "l_cm", "omega_rpm")
 _LENGTHS = 6
 _SPEEDS = (0.4, 0.7, 1.0)  # of the fastest
@@ -69,6 +81,12 @@ def check_outputs(runs: Measurements, prediction: Floats) -> None:
     for i, name in enumerate(runs.outputs):
         theirs, ours = np.median(runs.y[:, i]), np.median(prediction[:, i])
         factor = float(theirs / ours if name == "theta" else math.exp(theirs - ours))
+        for unit, wrong in UNITS[name].items():
+            if 1 / _NEAR < factor / wrong < _NEAR:
+                raise InputError(
+                    f"{OUTPUTS[name][0]} is {factor:.3g} times what the robot as given does: it seems to be in {unit}; "
+                    "convert it, or correct the coefficients in robot.toml if its unit is right"
+                )
         if not 1 / OFF < factor < OFF:
             raise InputError(
                 f"{OUTPUTS[name][0]} is {factor:.3g} times what the robot as given does; "

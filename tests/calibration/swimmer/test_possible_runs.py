@@ -8,9 +8,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from calibration.swimmer.possible_runs import owned, possible_settings
+from calibration.swimmer.measured_table import OUTPUTS, read_measurements
+from calibration.swimmer.possible_runs import UNITS, owned, possible_settings
 from sim.io.errors import InputError
-from tests.calibration.toy_tables import START, toy_swimmer, toy_table
+from tests.calibration.toy_tables import START, calibrated, toy_swimmer, toy_table
 
 
 def test_without_a_word_it_is_the_range_of_the_table() -> None:
@@ -56,3 +57,32 @@ def test_settings_are_those_of_the_lab_to_the_last_digit() -> None:
 def test_what_cannot_be_set_is_refused(entry: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         owned([entry])
+
+
+OFF_BY = [(name, unit) for name, units in UNITS.items() for unit in units]
+
+
+@pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize(("name", "unit"), OFF_BY, ids=[f"{name} in {unit}" for name, unit in OFF_BY])
+def test_an_output_in_another_unit_is_refused_with_that_unit(name: str, unit: str) -> None:
+    """R_yr in mm, ten times too large, used to be searched for effects; only a factor of 20 was refused."""
+    table = toy_table(4)
+    column = OUTPUTS[name][0]
+    if column not in table:
+        table[column] = np.abs(table["omega_yr_rad_s"]) * table["R_yr_cm"]
+    table[column] *= UNITS[name][unit]
+    if name.startswith("omega_") and name != "omega_yr":  # the other spin alone would be refused as their sum
+        table = table.drop(columns={"omega_h": "omega_t_rpm", "omega_t": "omega_h_rpm"}[name])
+    words = f"{column} is .* times what the robot as given does: it seems to be in {unit}"
+    with pytest.raises(InputError, match=words):
+        calibrated(table)
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [("R_yr_mm", "R_yr_cm"), ("omega_yr_deg_s", "omega_yr_rad_s"), ("l_m", "l_cm"), ("omega_Hz", "omega_rpm")],
+)
+def test_a_column_in_another_unit_is_to_be_converted_not_renamed(given: str, meant: str) -> None:
+    """The advice used to be to rename it, which made its numbers wrong without a word."""
+    with pytest.raises(InputError, match=f"unknown column '{given}': convert its values to the unit of '{meant}'"):
+        read_measurements(toy_table(4).rename(columns={meant: given}).assign(**{meant: 1.0}))
