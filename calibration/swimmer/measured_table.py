@@ -43,7 +43,8 @@ OUTPUTS = {
 }
 _QUANTITIES = {**{name: column for name, (column, _, _) in OUTPUTS.items()}, "l": "l_cm", "omega": "omega_rpm"}
 _UNIT_SUFFIXES = {
-    "mm", "cm", "m", "in", "rad", "deg", "rpm", "rps", "Hz", "hz", "rad_s", "deg_s", "mm_s", "cm_s", "m_s", "cm_min",
+    "mm", "cm", "m", "in", "rad", "deg", "rpm", "rps", "Hz", "hz", "rad_s", "deg_s", "mm_s", "cm_s", "m_s",
+    "cm_min",
 }  # fmt: skip
 _ERRORS = (  # of `calibration.swimmer.camera_tracks`; not used, since repeats give the noise
     "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
@@ -96,9 +97,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         quantity = next((q for q in _QUANTITIES if name.removeprefix(f"{q}_") in _UNIT_SUFFIXES), None)
         if quantity:
             column = _QUANTITIES[quantity]
-            raise InputError(
-                f"unknown column {name!r}: convert its values to the unit of {column!r} and rename it"
-            )
+            raise InputError(f"unknown column {name!r}: convert it to the unit of {column!r} and rename it")
         near = difflib.get_close_matches(name, KNOWN_COLUMNS, n=1)
         if near:
             raise InputError(f"unknown column {name!r}: is it {near[0]!r}? rename or drop it")

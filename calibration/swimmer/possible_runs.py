@@ -84,8 +84,8 @@ def check_outputs(runs: Measurements, prediction: Floats) -> None:
         for unit, wrong in UNITS[name].items():
             if 1 / _NEAR < factor / wrong < _NEAR:
                 raise InputError(
-                    f"{OUTPUTS[name][0]} is {factor:.3g} times what the robot as given does: it seems to be in {unit}; "
-                    "convert it, or correct the coefficients in robot.toml if its unit is right"
+                    f"{OUTPUTS[name][0]} is {factor:.3g} times what the robot as given does: it seems to be in "
+                    f"{unit}; convert it, or correct the coefficients in robot.toml if its unit is right"
                 )
         if not 1 / OFF < factor < OFF:
             raise InputError(

@@ -70,6 +70,7 @@ def test_an_output_in_another_unit_is_refused_with_that_unit(name: str, unit: st
     column = OUTPUTS[name][0]
     if column not in table:
         table[column] = np.abs(table["omega_yr_rad_s"]) * table["R_yr_cm"]
+        table[column] *= np.exp(0.02 * np.random.default_rng(0).normal(size=len(table)))
     table[column] *= UNITS[name][unit]
     if name.startswith("omega_") and name != "omega_yr":  # the other spin alone would be refused as their sum
         table = table.drop(columns={"omega_h": "omega_t_rpm", "omega_t": "omega_h_rpm"}[name])
@@ -84,5 +85,5 @@ def test_an_output_in_another_unit_is_refused_with_that_unit(name: str, unit: st
 )
 def test_a_column_in_another_unit_is_to_be_converted_not_renamed(given: str, meant: str) -> None:
     """The advice used to be to rename it, which made its numbers wrong without a word."""
-    with pytest.raises(InputError, match=f"unknown column '{given}': convert its values to the unit of '{meant}'"):
+    with pytest.raises(InputError, match=f"unknown column '{given}': convert it to the unit of '{meant}'"):
         read_measurements(toy_table(4).rename(columns={meant: given}).assign(**{meant: 1.0}))
