@@ -76,7 +76,7 @@ def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
         "The domain is not this box but the joint support of what was learned. Effects on head, disc and motor "
         "need no learning.",
         "## Errors",
-        _about_errors(np.count_nonzero(known), np.count_nonzero(~known)),
+        _about_errors(int(known.sum()), int((~known).sum())),
     ]
     kinds = (
         ("Two tails and more, which do not touch:", (tails > 1) & apart),
