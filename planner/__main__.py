@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from planner.paths.path import Path2D
     from planner.planning.plan import Plan
     from planner.planning.request import PlanRequest
+    from planner.vehicle.calibration_table import CalibrationKnowledge
     from sim.model.robot import Robot
+    from surrogate.interface import LookupTable
 
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
 main = program.main
@@ -121,7 +123,6 @@ def _goal(arguments: Namespace) -> None:
     from planner.goal.to_goal import to_goal
     from planner.vehicle.calibration_table import read_knowledge
     from sim.inputs import load_robot
-    from surrogate.table.model_file import load_table
 
     robot, unit = load_robot(arguments.robot), arguments.unit
     scale = in_tails(unit, robot)
@@ -132,6 +133,7 @@ def _goal(arguments: Namespace) -> None:
     walls = None if arguments.walls is None else read_region(arguments.walls, unit, robot)
     if walls is not None and not isinstance(walls, Polygon):
         raise InputError(f"--walls {arguments.walls!r}; give a box or an outline")
+    knowledge = read_knowledge(arguments.robot)
     goal_plan = to_goal(
         start,
         goal,
@@ -139,13 +141,13 @@ def _goal(arguments: Namespace) -> None:
         via=[(scale * x, scale * y) for x, y in arguments.via],
         keep_out=[read_region(words, unit, robot) for words in arguments.keep_out],
         walls=walls,
-        lookup=load_table(arguments.model),
+        lookup=_table(arguments, robot, knowledge),
         objective=arguments.objective,
         minimum_dwell=arguments.min_dwell,
         minimum_seconds=arguments.min_dwell_s,
         tolerance=arguments.tolerance,
         feedback=arguments.feedback,
-        knowledge=read_knowledge(arguments.robot),
+        knowledge=knowledge,
     )
     paths = write_goal_plan(goal_plan, arguments.out)
     _say(goal_plan.plan)
@@ -195,7 +197,6 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     from planner.vehicle.calibration_table import read_knowledge
     from planner.vehicle.tracked_point import tracked_vehicle
     from sim.inputs import load_robot
-    from surrogate.table.model_file import load_table
 
     robot = load_robot(arguments.robot)
     path = _path(arguments, robot)
@@ -209,10 +210,18 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
         minimum_seconds=arguments.min_dwell_s,
         tolerance=arguments.tolerance,
     )
-    table, knowledge = load_table(arguments.model), read_knowledge(arguments.robot)
-    tracked = tracked_vehicle(robot, table, request.point, knowledge)
+    knowledge = read_knowledge(arguments.robot)
+    tracked = tracked_vehicle(robot, _table(arguments, robot, knowledge), request.point, knowledge)
     with _progress() as progress:
         return make_plan(path, tracked, request, progress), request
+
+
+def _table(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge) -> LookupTable:
+    """Load the table that the command names, or the one that fits the robot."""
+    from planner.files.own_table import table_for
+    from surrogate.table.model_file import load_table
+
+    return load_table(arguments.model) if arguments.model else table_for(robot, arguments.robot, knowledge)
 
 
 @contextmanager

@@ -72,6 +72,18 @@ def table_vehicle(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowl
     )
 
 
+def check_known(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowledge) -> None:
+    """Ask a look-up table everything that a vehicle needs.
+
+    Raises:
+        InputError: the robot is outside the table's domain, or the table lacks what the calibration is unsure of.
+    """
+    columns = _both_directions(robot.group_values())
+    twist = _twists(lookup.query(columns))
+    lookup.response(columns)
+    _coefficient_modes(robot, lookup, twist, knowledge)
+
+
 def _both_directions(values: dict[str, float]) -> dict[str, Floats]:
     """Return the robot's groups twice: with its motor forward, and reversed."""
     columns: dict[str, Floats] = {name: np.array([value, value]) for name, value in values.items()}
