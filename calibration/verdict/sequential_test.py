@@ -81,7 +81,10 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
     Raises:
         InputError: no such file, or its verdict has nothing to decide.
     """
-    record = read_json(path)
+    try:
+        record = read_json(path)
+    except InputError as unreadable:
+        raise InputError(f"{path} is not a verdict.json ({str(unreadable).removeprefix(f'{path} ')})") from None
     if not isinstance(record, dict) or not record.get("explanations"):
         raise InputError(f"{path}: this verdict has no two explanations between which new runs could decide")
     try:

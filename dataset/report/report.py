@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -130,15 +131,15 @@ def _add_linear_theory(page: Page, usable: pd.DataFrame, names: list[str]) -> No
     sample = usable.iloc[rows]
     inputs = {name: sample[name].to_numpy(float) for name in names}
     page.section("Scaling laws")
-    table = [line for output in shown_outputs() for line in _exponent_lines(output, sample, inputs, linear)]
-    if not table:
+    if len(sample) < rows_for_exponents(len(inputs)):
         page.text(
             f"{len(sample)} usable rows are too few for exponents of {len(inputs)} inputs: they need "
             f"{rows_for_exponents(len(inputs))} or more.",
             tone="bad",
         )
     else:
-        _add_exponents(page, table)
+        lines = (_exponent_lines(output, sample, inputs, linear) for output in shown_outputs())
+        _add_exponents(page, list(chain.from_iterable(lines)))
     page.section("Against linear theory")
     page.text(
         "Each point is a robot. S is the drag number of a tail: viscous against elastic forces. For small S the "

@@ -26,7 +26,8 @@ def read_plan_file(path: str | Path) -> dict[str, Any]:
     try:
         content = read_json(path, parse_constant=_finite, parse_float=_finite)
     except InputError as unreadable:
-        raise InputError(f"{unreadable}; give a plan.json of the planner") from None
+        reason = str(unreadable).removeprefix(f"{path} ")
+        raise InputError(f"{path} is not a plan.json of the planner ({reason}); plan again") from None
     if not isinstance(content, dict) or "format" not in content:
         raise InputError(f"{path} is not a plan.json of the planner (it has no format); plan again")
     if content["format"] != FORMAT:

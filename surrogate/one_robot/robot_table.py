@@ -114,7 +114,8 @@ def load_robot_table(path: str | Path) -> RobotTable:
     try:
         content = read_json(path)
     except InputError as unreadable:
-        raise InputError(f"{unreadable}; {remedy}") from None
+        reason = str(unreadable).removeprefix(f"{path} ")
+        raise InputError(f"{path} is no table of a robot, or is damaged ({reason}); {remedy}") from None
     if not isinstance(content, dict):
         raise InputError(f"{path} is no table of a robot, or is damaged; {remedy}")
     version = content.pop("format", 1)

@@ -112,7 +112,7 @@ def test_a_verdict_without_rivals_is_refused(tmp_path: Path) -> None:
         ("[1]", "no two explanations"),
         ("{", "is not a verdict"),
         ('{"explanations": [{"title": "A"}]}', "no verdict.json of this version"),
-        (None, "No such file"),
+        (None, "no such file"),
     ):
         if text is not None:
             path.write_text(text)

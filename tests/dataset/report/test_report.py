@@ -86,9 +86,7 @@ def test_motors_of_which_nothing_is_known_have_no_median() -> None:
 
 
 @pytest.mark.parametrize("count", [64, 96])
-def test_a_report_of_few_rows_says_what_is_missing(
-    count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_small_report_says_what_is_missing(count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It used to have empty panels, an empty table, and a warning of NumPy."""
     build(design(count), tmp_path / "data", jobs=1, title="", simulate=invented)
     drawn: list[Figure] = []

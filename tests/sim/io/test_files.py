@@ -156,5 +156,5 @@ def test_a_reader_that_goes_ends_the_command_without_a_word() -> None:
     assert process.stdout.readline() == "0\n"
     process.stdout.close()
     assert process.stderr.read() == ""
-    assert process.wait(LIMIT) == CLOSED_PIPE == 141
+    assert process.wait(timeout=LIMIT) == CLOSED_PIPE == 141
     process.stderr.close()
