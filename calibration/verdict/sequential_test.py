@@ -21,7 +21,7 @@ from calibration.statistics.statistical_model import ForwardModel, Noise, Runs, 
 from calibration.verdict.next_runs import GIVEN_UP
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
-from sim.io.reading import read_json
+from sim.io.reading import ContentError, read_json
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
     """
     try:
         record = read_json(path)
-    except InputError as unreadable:
+    except ContentError as unreadable:
         raise InputError(f"{path} is not a verdict.json ({str(unreadable).removeprefix(f'{path} ')})") from None
     if not isinstance(record, dict) or not record.get("explanations"):
         raise InputError(f"{path}: this verdict has no two explanations between which new runs could decide")

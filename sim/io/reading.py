@@ -24,6 +24,10 @@ _PART = r"""(?:"[^"\n]*"|'[^'\n]*'|(?<![\w-])[\w-]++)"""
 _LONG_KEY = re.compile(rf"(?:{_PART}[ \t]*+\.[ \t]*+){{{_MOST_PARTS}}}")
 
 
+class ContentError(InputError):
+    """A file can be read, but its content is not what it should be."""
+
+
 def read_bytes(path: str | Path, most: int = MOST_TEXT) -> bytes:
     """Read a file.
 
@@ -38,11 +42,11 @@ def read_bytes(path: str | Path, most: int = MOST_TEXT) -> bytes:
         with open(path, "rb") as file:
             data = file.read(most + 1)
     except FileNotFoundError:
-        raise InputError(f"no such file: {path}; check the path") from None
+        raise InputError(f"{path}: no such file; check the path") from None
     except IsADirectoryError:
         raise InputError(f"{path} is a folder; give a file") from None
     except (OSError, ValueError) as refusal:
-        raise InputError(f"cannot read {path}: {getattr(refusal, 'strerror', refusal)}") from None
+        raise InputError(f"{path} cannot be read: {getattr(refusal, 'strerror', refusal)}") from None
     if len(data) > most:
         raise InputError(f"{path} has more than {most / 2**20:.0f} MiB; such a file is not read")
     return data
@@ -58,7 +62,7 @@ def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
     try:
         return decode(data)
     except UnicodeDecodeError as broken:
-        raise InputError(f"{path} is no text in UTF-8 ({broken.reason} at byte {broken.start})") from None
+        raise ContentError(f"{path} is no text in UTF-8 ({broken.reason} at byte {broken.start})") from None
 
 
 def decode(data: bytes) -> str:
@@ -83,7 +87,7 @@ def read_json(path: str | Path, **options: Any) -> Any:
     """Read a JSON file; `options` are those of `json.loads`.
 
     Raises:
-        InputError: the file cannot be read, or is not JSON.
+        InputError: the file cannot be read; `ContentError` if it is not JSON.
     """
     text = read_text(path, MOST_JSON)
     return _parsed(path, "JSON", lambda: json.loads(text, **options))
@@ -93,6 +97,6 @@ def _parsed(path: str | Path, kind: str, parse: Callable[[], Any]) -> Any:
     try:
         return parse()
     except ValueError as broken:
-        raise InputError(f"{path} is not {kind}: {broken}") from None
+        raise ContentError(f"{path} is not {kind}: {broken}") from None
     except RecursionError:
-        raise InputError(f"{path} is not {kind} that is read here: its tables are nested too deeply") from None
+        raise ContentError(f"{path} is not {kind} that is read here: its tables are nested too deeply") from None

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sim.io.errors import InputError
-from sim.io.reading import read_json
+from sim.io.reading import ContentError, read_json
 
 FORMAT = 2
 FASTEST = 1e4  # ω̄ above which the file is taken for edited
@@ -25,7 +25,7 @@ def read_plan_file(path: str | Path) -> dict[str, Any]:
     """
     try:
         content = read_json(path, parse_constant=_finite, parse_float=_finite)
-    except InputError as unreadable:
+    except ContentError as unreadable:
         reason = str(unreadable).removeprefix(f"{path} ")
         raise InputError(f"{path} is not a plan.json of the planner ({reason}); plan again") from None
     if not isinstance(content, dict) or "format" not in content:

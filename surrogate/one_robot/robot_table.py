@@ -20,7 +20,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.files import write_text
-from sim.io.reading import read_json
+from sim.io.reading import ContentError, read_json
 from sim.model.response import DWELLS, Responses
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
@@ -113,7 +113,7 @@ def load_robot_table(path: str | Path) -> RobotTable:
     remedy = "make one with softflagella surrogate robot"
     try:
         content = read_json(path)
-    except InputError as unreadable:
+    except ContentError as unreadable:
         reason = str(unreadable).removeprefix(f"{path} ")
         raise InputError(f"{path} is no table of a robot, or is damaged ({reason}); {remedy}") from None
     if not isinstance(content, dict):

@@ -54,7 +54,7 @@ def test_damaged_tables_of_one_robot_are_refused(single: RobotTable, tmp_path: P
     for content in (b"\xff\xfe", b"[" * 100_000, b"[1]", b"9" * 10_000):
         path.write_bytes(content)
         assert "no table of a robot" in refusal(path, load_robot_table)
-    assert "cannot be read" in refusal(tmp_path / "absent.json", load_robot_table)
+    assert "no such file" in refusal(tmp_path / "absent.json", load_robot_table)
     path.write_text('{"robot": {}, "dwells": [1.0]}')
     assert "has format 1, this version reads 3" in refusal(path, load_robot_table)
 

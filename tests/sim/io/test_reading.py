@@ -1,0 +1,102 @@
+"""Readers of files that people bring: whatever a file holds, they end soon, with its content or with one line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from dataset.rows.design import load_design
+from sim.inputs import load_robot, robot_toml
+from sim.io import tables
+from sim.io.errors import InputError
+from sim.io.reading import ContentError, decode, read_bytes, read_json, read_toml
+from sim.io.tables import read_table
+from sim.model.presets import PRESETS
+
+DEEP = [
+    ("x = " + "[" * 100_000, "nested too deeply"),
+    ("x = " + "{a = " * 10_000, "nested too deeply"),
+    ("a." * 100_000 + "a = 1", "a key has more than 50 parts"),
+    ('"a" . ' * 60 + "b = 1", "a key has more than 50 parts"),
+    ("[" + "a." * 60 + "a]", "a key has more than 50 parts"),
+    ("x = 1\nx = 2", "is not TOML"),
+]
+
+
+@pytest.mark.parametrize(("text", "words"), DEEP, ids=range(len(DEEP)))
+@pytest.mark.parametrize("load", [load_robot, load_design])
+def test_settings_that_would_take_minutes_are_rejected(
+    load: Callable[[Path], object], text: str, words: str, tmp_path: Path
+) -> None:
+    """A key of 100,000 parts took a minute and 5.7 GB; nested arrays were a RecursionError."""
+    path = tmp_path / "settings.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        load(path)
+
+
+def test_keys_and_numbers_with_dots_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text("a.b.c = 1\nnumbers = [" + "1.5, " * 1000 + "]\n" + 'text = "' + "A robot. " * 1000 + '"\n')
+    content = read_toml(path)
+    assert content["a"] == {"b": {"c": 1}}
+    assert len(content["numbers"]) == 1000
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_a_robot_is_read_in_any_usual_encoding(encoding: str, tmp_path: Path) -> None:
+    """A byte order mark, as some editors write it, was an error."""
+    path = tmp_path / "robot.toml"
+    path.write_bytes(robot_toml(PRESETS["paper-control"]).encode(encoding))
+    assert load_robot(path) == PRESETS["paper-control"]
+
+
+def test_a_file_beyond_the_limit_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "large"
+    with open(path, "wb") as file:
+        file.truncate(2**40)  # a sparse file
+    with pytest.raises(InputError, match="has more than 1 MiB"):
+        read_bytes(path, 2**20)
+    with pytest.raises(InputError, match="has more than"):
+        read_table(path)
+
+
+def test_a_small_parquet_file_with_many_rows_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "rows.parquet"
+    pq.write_table(pa.table({"a": pa.array([0.0] * 5000)}), path)
+    assert len(read_table(path)) == 5000
+    monkeypatch.setattr(tables, "MOST_VALUES", 4999)
+    with pytest.raises(InputError, match="5000 rows and 1 columns; give a smaller table"):
+        read_table(path)
+
+
+@pytest.mark.parametrize("data", [b"\xff\xfe\x00", b"\x80abc", b"{", b"[" * 100_000])
+def test_what_is_no_json_is_said_so(data: bytes, tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_bytes(data)
+    with pytest.raises(ContentError, match=r"a\.json is no"):
+        read_json(tmp_path / "a.json")
+
+
+def test_missing_files_and_folders_are_one_line(tmp_path: Path) -> None:
+    for path, words in (
+        (tmp_path / "none", "no such file"),
+        (tmp_path, "is a folder"),
+        (Path("a\0b"), "cannot be"),
+    ):
+        with pytest.raises(InputError, match=words):
+            read_bytes(path)
+
+
+def test_marks_of_the_byte_order_are_left_out() -> None:
+    assert [decode(text) for text in (b"a", b"\xef\xbb\xbfa", b"\xff\xfea\0", b"\xfe\xff\0a")] == ["a"] * 4
+
+
+def test_a_table_of_nothing_is_no_table(tmp_path: Path) -> None:
+    pd.DataFrame({"a": []}).to_csv(tmp_path / "a.csv", index=False)
+    with pytest.raises(InputError, match="has no rows"):
+        read_table(tmp_path / "a.csv")
