@@ -26,7 +26,8 @@ def plan_record(result: Plan) -> dict[str, Any]:
     `id` is a digest of all the rest. The other files of the plan have it, too.
     """
     content = _content(result)
-    return {"id": sha256(json.dumps(content).encode()).hexdigest()[:12], **content}
+    digest = sha256(json.dumps(content).encode()).hexdigest()
+    return {"id": f"p{digest[:11]}", **content}  # a letter first: no reader of plan.csv takes it for a number
 
 
 def _content(result: Plan) -> dict[str, Any]:

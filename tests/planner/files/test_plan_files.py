@@ -81,7 +81,7 @@ def test_milliseconds_carry_rounding_and_split_long_dwells() -> None:
 def identities(folder: Path) -> set[str]:
     """What the files of a plan say which plan they belong to."""
     header, tracker = ((folder / name).read_text().split("Plan ")[1][:12] for name in ("schedule.h", "tracker.h"))
-    (column,) = set(pd.read_csv(folder / "plan.csv", dtype={"plan_id": str})["plan_id"])
+    (column,) = set(pd.read_csv(folder / "plan.csv")["plan_id"])
     named = (folder / "plan.svg").read_text().split("<dc:identifier>")[1].split("<")[0].strip()
     return {json.loads((folder / "plan.json").read_text())["id"], column, header, tracker, named}
 
