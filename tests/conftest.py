@@ -24,7 +24,7 @@ import torch  # noqa: E402
 torch.set_num_threads(1)
 
 DURATIONS = Path(__file__).parent / "durations.json"
-NOTED, SLOW = 0.2, 0.3  # s of processor time
+NOTED, SLOW = 0.1, 0.15  # s of processor time
 _measured: dict[str, float] = defaultdict(float)
 _last = 0.0
 
@@ -96,6 +96,6 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     if session.config.getoption("--write-durations") and not hasattr(session.config, "workerinput"):
-        durations = {**noted_durations(), **{test: round(seconds, 1) for test, seconds in _measured.items()}}
+        durations = {**noted_durations(), **{test: round(seconds, 2) for test, seconds in _measured.items()}}
         kept = {test: durations[test] for test in sorted(durations) if durations[test] >= NOTED and exists(test)}
         DURATIONS.write_text(json.dumps(kept, indent=0, ensure_ascii=False) + "\n")
