@@ -52,7 +52,7 @@ $(VENV)/.extras: $(STAMP)
 	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[clusters]'
 	touch $@
 
-quick: $(STAMP) ## run the quick tests, a minute or two
+quick: $(STAMP) ## run the quick tests, a minute and a half
 	$(RUN) -m pytest $(TWO) -m "not (slow or page or $(REST))"
 
 lint: $(STAMP) ## style and types
