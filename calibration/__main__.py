@@ -137,13 +137,14 @@ def _simulate(arguments: Namespace) -> None:
     "turn camera tracks into a table of runs",
     argument("tracks", help="CSV: run, time_s, x_cm, y_cm, heading_deg"),
     argument("runs", help="CSV: run, N, l_cm, omega_rpm and other columns of a measured table"),
+    argument("--y-down", action="store_true", help="y and headings are those of a picture, with y downwards"),
     out("CSV"),
 )
 def _tracks(arguments: Namespace) -> None:
     from calibration.swimmer.camera_tracks import measure_tracks
     from sim.io.files import write_csv
 
-    table, aside = measure_tracks(arguments.tracks, arguments.runs)
+    table, aside = measure_tracks(arguments.tracks, arguments.runs, y_down=arguments.y_down)
     for line in aside:
         print(f"excluded: {line}", file=sys.stderr)
     write_csv(table, arguments.out, digits=6)

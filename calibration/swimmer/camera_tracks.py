@@ -32,6 +32,7 @@ from sim.io.tables import read_table
 COLUMNS = ("run", "time_s", "x_cm", "y_cm", "heading_deg")
 LEAST_TURN = math.radians(20)  # smallest turn of a run to which a circle is fitted
 _FEWEST = 12  # samples that a run needs
+_ALIKE = 1.3  # ratio of the angles by which path and heading turn
 
 
 @dataclass(frozen=True)
@@ -52,19 +53,21 @@ class TrackedRun:
 
 
 def measure_tracks(
-    tracks: str | Path | pd.DataFrame, runs: str | Path | pd.DataFrame
+    tracks: str | Path | pd.DataFrame, runs: str | Path | pd.DataFrame, *, y_down: bool = False
 ) -> tuple[pd.DataFrame, list[str]]:
     """Make a table for `calibration.swimmer.measured_table` from tracks and the settings of each run.
 
     Args:
         tracks: run, time_s, x_cm, y_cm, heading_deg; one row for each sample.
         runs: run, N, l_cm, omega_rpm and other notes; one row for each run.
+        y_down: y and headings are those of a picture, whose y axis points down.
 
     Returns:
         The runs with omega_yr_rad_s, R_yr_cm, theta_deg, v_cm_s and their errors; what was excluded, and why.
 
     Raises:
-        InputError: a column is missing.
+        InputError: a column is missing, headings are in radians, all runs turn to the wrong side, or no track
+            gives a number.
     """
     samples = tracks if isinstance(tracks, pd.DataFrame) else read_table(tracks)
     table = runs if isinstance(runs, pd.DataFrame) else read_table(runs)
@@ -84,10 +87,51 @@ def measure_tracks(
             aside.append(f"run {run}: {len(track)} samples; a track needs at least {_FEWEST}")
             tracked.append(TrackedRun())
             continue
-        tracked.append(measure_track(*(track[c].to_numpy(dtype=float) for c in COLUMNS[1:])))
+        time, x, y, heading = (track[c].to_numpy(dtype=float) for c in COLUMNS[1:])
+        _check_radians(run, x, y, heading)
+        side = -1.0 if y_down else 1.0
+        tracked.append(measure_track(time, x, side * y, side * heading))
     columns = pd.DataFrame([asdict(p) for p in tracked], index=table.index)
     known = [c for c in columns if columns[c].notna().any()]
+    if not known:
+        raise InputError(f"no track gives a number{f' ({aside[0]})' if aside else ''}; check the tracks")
+    _check_sides(table, columns, y_down)
     return pd.concat([table, columns[known]], axis=1), aside
+
+
+def _check_radians(run: object, x: Floats, y: Floats, heading_deg: Floats) -> None:
+    """Refuse headings that follow the path if they are taken as radians, and hardly turn as degrees.
+
+    Raises:
+        InputError: they seem to be in radians.
+    """
+    if np.abs(heading_deg).max() > math.tau:
+        return
+    stride = max(len(x) // _FEWEST, 1)
+    path = np.ptp(np.unwrap(np.arctan2(y[stride:] - y[:-stride], x[stride:] - x[:-stride])))
+    heading = np.ptp(np.unwrap(heading_deg))
+    if path > math.radians(60) and 1 / _ALIKE < path / max(heading, 1e-9) < _ALIKE:
+        raise InputError(
+            f"run {run}: heading_deg turns by {heading:.2f}, the path by {math.degrees(path):.0f} degrees: "
+            "the headings seem to be in radians; convert them"
+        )
+
+
+def _check_sides(runs: pd.DataFrame, measured: pd.DataFrame, y_down: bool) -> None:
+    """Compare the side to which each run turns with the direction of its motor.
+
+    Raises:
+        InputError: all runs turn to the wrong side.
+    """
+    if "omega_rpm" not in runs:
+        return
+    sides = np.sign(pd.to_numeric(runs["omega_rpm"], errors="coerce") * measured["omega_yr_rad_s"])
+    if (sides < 0).any() and not (sides > 0).any():
+        remedy = "leave out --y-down" if y_down else "give --y-down if the camera's y axis points down"
+        raise InputError(
+            "all runs turn to the other side than their motors make them (seen from above, a positive omega_rpm turns "
+            f"to the left): {remedy}, or change the sign of omega_rpm"
+        )
 
 
 def measure_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> TrackedRun:

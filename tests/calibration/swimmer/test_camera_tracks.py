@@ -55,10 +55,38 @@ def test_a_run_that_hardly_turns_gives_a_speed_alone() -> None:
 def test_bad_samples_and_short_tracks_are_named() -> None:
     samples = pd.concat([track(0), track(1).assign(run=2).head(5)]).astype({"x_cm": object})
     samples.iloc[3, 2] = "lost"
-    runs = pd.DataFrame({"run": [1, 2], "N": 2, "l_cm": 11.0, "omega_rpm": 150.0})
+    runs = pd.DataFrame({"run": [1, 2], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0})
     table, aside = measure_tracks(samples, runs)
     assert table["R_yr_cm"][0] == pytest.approx(RADIUS, rel=5e-3)
     assert np.isnan(table["R_yr_cm"][1])
     assert [line.split(":")[0] for line in aside] == ["run 1", "run 2"]
     with pytest.raises(InputError, match="heading_deg"):
         measure_tracks(samples.drop(columns="heading_deg"), runs)
+
+
+RUNS = pd.DataFrame({"run": [1], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0})
+
+
+def test_headings_in_radians_are_refused() -> None:
+    """They used to give a slow straight run, without a word."""
+    with pytest.raises(InputError, match=r"run 1: heading_deg turns by .* the headings seem to be in radians"):
+        measure_tracks(track(0).assign(heading_deg=lambda t: np.radians(t["heading_deg"])), RUNS)
+    straight = track(1, rate=0.002, wobble=0.0).assign(heading_deg=lambda t: 0.5 + 0.02 * t["time_s"])
+    measure_tracks(straight, RUNS.assign(omega_rpm=150.0))
+
+
+def test_a_picture_s_y_axis_is_noticed_and_can_be_said() -> None:
+    """Left and right used to be exchanged, without a word."""
+    picture = track(0).assign(y_cm=lambda t: -t["y_cm"], heading_deg=lambda t: -t["heading_deg"])
+    with pytest.raises(InputError, match=r"all runs turn to the other side .*: give --y-down"):
+        measure_tracks(picture, RUNS)
+    seen, expected = measure_tracks(picture, RUNS, y_down=True)[0], measure_tracks(track(0), RUNS)[0]
+    for name in ("omega_yr_rad_s", "R_yr_cm", "theta_deg"):
+        assert seen[name][0] == pytest.approx(expected[name][0], rel=1e-6)
+    with pytest.raises(InputError, match="leave out --y-down"):
+        measure_tracks(track(0), RUNS, y_down=True)
+
+
+def test_tracks_without_any_number_are_an_error() -> None:
+    with pytest.raises(InputError, match=r"no track gives a number \(run 1: 5 samples"):
+        measure_tracks(track(0).head(5), RUNS)
