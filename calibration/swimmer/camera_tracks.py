@@ -129,8 +129,8 @@ def _check_sides(runs: pd.DataFrame, measured: pd.DataFrame, y_down: bool) -> No
     if (sides < 0).any() and not (sides > 0).any():
         remedy = "leave out --y-down" if y_down else "give --y-down if the camera's y axis points down"
         raise InputError(
-            "all runs turn to the other side than their motors make them (seen from above, a positive omega_rpm turns "
-            f"to the left): {remedy}, or change the sign of omega_rpm"
+            "all runs turn to the other side than their motors make them (seen from above, a positive omega_rpm "
+            f"turns to the left): {remedy}, or change the sign of omega_rpm"
         )
 
 
