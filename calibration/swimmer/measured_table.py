@@ -1,6 +1,6 @@
 """Measured tables: one run a row, units in the column names.
 
-Needed: N, l_cm, omega_rpm (tails relative to head, signed) and some of the outputs
+Needed: N, l_cm, omega_rpm (tails relative to head; docs/reference/signs.md has the signs) and some of the outputs
 
     omega_h_rpm, omega_t_rpm, omega_yr_rad_s (signed), R_yr_cm, theta_deg, v_cm_s (of the head's centre).
 
