@@ -3,7 +3,8 @@
     means:  ω_t, ω_h, ω_yr, v_x, v_z (of the head's centre, body frame), over whole revolutions
     R_yr = √(v_x² + v_z²)/|ω_yr|,   θ = atan2(|v_x|, v_z)
 
-docs/reference/signs.md defines the signs. R_yr and θ are those of the head's centre. Those of another point of the axis follow from (v_x, v_z, ω_yr).
+R_yr and θ are those of the head's centre. Those of another point of the axis follow from (v_x, v_z, ω_yr).
+docs/reference/signs.md defines the signs.
 Units: l, μ0 l⁴/EI.
 """
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import softflagella as sf
-from benchmarks.simulator.signs import draw, from_behind, scene
 from calibration.swimmer.camera_tracks import measure_tracks
 from planner.files.plan_files import controller_header
 from planner.files.tracker_header import DIRECTIONS, tracker_header
@@ -21,7 +22,7 @@ from sim.motion.replay import replay
 from sim.motion.shapes import tails_over_a_revolution
 from sim.motion.steady import steady
 from surrogate.input_ranges import BOUNDS
-from tests.docs.pages import DOCS
+from tests.docs.pages import DOCS, module_of_docs
 from tests.sim.robots import CONTROL_VALUES, control
 
 PAGE = (DOCS / "reference" / "signs.md").read_text()
@@ -172,14 +173,25 @@ def test_five_seconds_at_plus_one_turn_left_on_the_bench() -> None:
 
 def test_the_picture_shows_the_simulated_senses() -> None:
     """Its words and arrows follow from the simulation: of a robot with C_yr < 0 it draws a right turn."""
-    shown = scene(ROBOT)
+    drawing = module_of_docs("draw_signs")
+    shown = drawing.scene(ROBOT)
     moved = shown.at(1.0)
     assert moved[2] > shown.at(0.0)[2]
-    right, up = (from_behind(np.array(angle), 1.0) for angle in (math.pi, math.pi / 2))
+    right, up = (drawing.from_behind(np.array(angle), 1.0) for angle in (math.pi, math.pi / 2))
     assert right == pytest.approx([1, 0])
     assert up == pytest.approx([0, 1])
-    words = {text.get_text() for axes in draw(shown).axes for text in axes.texts}
+    words = {text.get_text() for axes in drawing.draw(shown).axes for text in axes.texts}
     assert {"motor at +1:\nit turns left", "tails: clockwise", "head: counter-clockwise"} <= words
     mirrored = shown._replace(twist=shown.twist * [1, -1, -1], spins=(-shown.spins[0], -shown.spins[1]))
-    words = {text.get_text() for axes in draw(mirrored).axes for text in axes.texts}
+    words = {text.get_text() for axes in drawing.draw(mirrored).axes for text in axes.texts}
     assert {"motor at +1:\nit turns right", "tails: counter-clockwise", "head: clockwise"} <= words
+
+
+def test_the_picture_is_what_is_drawn(tmp_path: Path) -> None:
+    module_of_docs("draw_signs").write(tmp_path / "signs.svg")
+    number = re.compile(r"-?\d+\.\d+")
+    kept, drawn = ((folder / "signs.svg").read_text() for folder in (DOCS, tmp_path))
+    assert number.sub("#", kept) == number.sub("#", drawn)
+    assert [float(n) for n in number.findall(kept)] == pytest.approx(
+        [float(n) for n in number.findall(drawn)], abs=0.01
+    )

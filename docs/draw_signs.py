@@ -1,15 +1,16 @@
-"""Signs and frames in one picture, docs/reference/signs.md: the robot from above and from behind, and a camera.
+"""Draw the picture of docs/reference/signs.md: the robot from above and from behind, and a camera's picture.
 
-Arrows, arcs and angles are those of the paper's control robot in the simulator with the motor at +1.
+Arrows, arcs and angles are those of the paper's control robot in the simulator with the motor at +1. A test
+compares docs/signs.svg with what is drawn here.
 
-Usage: python -m benchmarks signs [OUT.svg]
-
-Takes 10 seconds.
+Usage: python docs/draw_signs.py [OUT.svg]
 """
 
 from __future__ import annotations
 
 import math
+import sys
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib
@@ -211,9 +212,11 @@ def draw(shown: Scene) -> Figure:
     return figure
 
 
-def main(out: str = "docs/signs.svg") -> None:
-    """Write the picture."""
-    metadata: Any = {"Date": None} if out.endswith(".svg") else None
+def write(out: Path) -> None:
+    """Write the picture as SVG."""
     with matplotlib.rc_context({"svg.hashsalt": "signs"}):
-        draw(scene(PRESETS["paper-control"])).savefig(out, metadata=metadata)
-    print(f"-> {out}")
+        draw(scene(PRESETS["paper-control"])).savefig(out, format="svg", metadata={"Date": None})
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_name("signs.svg"))
