@@ -4,7 +4,7 @@
 gets wrong: units, the direction of the y axis, the side of the turn, the size of the motion.
 
 The tracked point must be the head's centre; with another point the calibration finds `tracked_point`. Columns in
-other units than COLUMNS are converted. Angles are counter-clockwise, seen from above.
+other units than COLUMNS are converted. Angles are counter-clockwise, seen from above (docs/reference/signs.md).
 """
 
 from __future__ import annotations
