@@ -44,7 +44,6 @@ from dataset.storage.data_set import read
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import TrackingError, draw_overlay, tracking_error
 from planner.paths.path import polygon
-from sim.inputs import robot_toml
 from sim.io.files import whole_file, write_csv, write_text
 from sim.io.pages import Page
 from sim.io.provenance import code_version
@@ -56,6 +55,7 @@ from sim.motion.shapes import tails_over_a_revolution
 from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady
 from sim.motion.warm import compile_once
+from sim.robot_toml import robot_toml
 from softflagella.replanning import Steered, draw_steered, gap_closed, steer
 from surrogate.table.errors import error_scale
 from surrogate.table.lookup import NeuralTable

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from sim.inputs import load_robot, robot_toml, save_robot
+from sim.inputs import load_robot, save_robot
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.uncertainty import DEFAULTS, Sigma
+from sim.robot_toml import robot_toml
 
 ROBOT = PRESETS["paper-measured"]
 
