@@ -115,7 +115,7 @@ def _replay(arguments: Namespace) -> None:
 def _robot(arguments: Namespace) -> None:
     from sim.io.files import write_text
     from sim.model.presets import PRESETS
-    from sim.robot_toml import robot_toml
+    from sim.model.robot_toml import robot_toml
 
     if arguments.preset not in PRESETS:
         raise InputError(f"no preset {arguments.preset!r}; there are {', '.join(PRESETS)}")

@@ -1,6 +1,6 @@
 """Robots as users give them: robot.toml, names of presets, columns of a table. Checked here, with effects.
 
-`sim.robot_toml` has the entries of a robot.toml.
+`sim.model.robot_toml` has the entries of a robot.toml.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sim.model.correction import read_correction
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from sim.robot_toml import read_robot, robot_toml
+from sim.model.robot_toml import read_robot, robot_toml
 
 
 def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:

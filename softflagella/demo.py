@@ -50,12 +50,12 @@ from sim.io.provenance import code_version
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
+from sim.model.robot_toml import robot_toml
 from sim.motion.batches import available_jobs
 from sim.motion.shapes import tails_over_a_revolution
 from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady
 from sim.motion.warm import compile_once
-from sim.robot_toml import robot_toml
 from softflagella.replanning import Steered, draw_steered, gap_closed, steer
 from surrogate.table.errors import error_scale
 from surrogate.table.lookup import NeuralTable

@@ -27,7 +27,7 @@ from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, kno
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.model.robot import Robot
-from sim.robot_toml import robot_toml
+from sim.model.robot_toml import robot_toml
 from surrogate.input_ranges import COEFFICIENTS
 
 

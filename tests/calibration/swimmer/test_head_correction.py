@@ -21,8 +21,8 @@ from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command
 from sim.model.correction import Correction
 from sim.model.presets import PRESETS
+from sim.model.robot_toml import robot_toml
 from sim.motion.steady import steady
-from sim.robot_toml import robot_toml
 from surrogate.table.model_file import load
 from tests.calibration.toy_tables import START, calibrated, install_toy, toy_swimmer, toy_table
 

@@ -11,7 +11,7 @@ from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from sim.inputs import load_robot
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
-from sim.robot_toml import robot_toml
+from sim.model.robot_toml import robot_toml
 
 CONTROL = PRESETS["paper-control"]
 

@@ -14,7 +14,7 @@ from sim.io.files import whole_file
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
-from sim.robot_toml import robot_toml
+from sim.model.robot_toml import robot_toml
 from tests.processes import LIMIT
 from tests.sim.robots import CONTROL_VALUES
 

@@ -17,7 +17,7 @@ from sim.io.errors import InputError
 from sim.io.reading import ContentError, decode, read_bytes, read_json, read_toml
 from sim.io.tables import read_table
 from sim.model.presets import PRESETS
-from sim.robot_toml import robot_toml
+from sim.model.robot_toml import robot_toml
 
 DEEP = [
     ("x = " + "[" * 100_000, "nested too deeply"),

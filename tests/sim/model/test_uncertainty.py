@@ -10,8 +10,8 @@ import pytest
 from sim.inputs import load_robot, save_robot
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
+from sim.model.robot_toml import robot_toml
 from sim.model.uncertainty import DEFAULTS, Sigma
-from sim.robot_toml import robot_toml
 
 ROBOT = PRESETS["paper-measured"]
 

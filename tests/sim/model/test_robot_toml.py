@@ -13,8 +13,8 @@ from sim.inputs import load_robot
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
+from sim.model.robot_toml import ENTRIES, read_robot, robot_toml
 from sim.model.uncertainty import Sigma
-from sim.robot_toml import ENTRIES, read_robot, robot_toml
 
 CONTROL = PRESETS["paper-control"]
 LAB = """\
@@ -53,7 +53,7 @@ def test_a_robot_in_the_units_of_a_laboratory(tmp_path: Path) -> None:
 
 
 def test_a_file_in_si_units_is_read_as_before(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[1] / "reference" / "robot.toml").read_text()
+    text = (Path(__file__).parents[2] / "reference" / "robot.toml").read_text()
     assert "length_m = 0.11" in text
     assert read(text, tmp_path) == PRESETS["paper-measured"]
 
