@@ -159,7 +159,7 @@ def _number(value: object, key: str, entry: str) -> float:
 
 def _read_sigma(value: object, number: float, key: str, entry: str) -> Sigma:
     unit = split(key.removesuffix(_SIGMA)).unit
-    return read_sigma(value, number, entry, to_si(1.0, unit.suffix) if unit else 1.0)
+    return read_sigma(value, number, entry, unit.suffix if unit else "")
 
 
 def _sigma_line(sigma: Sigma, key: str, entry: Entry) -> str:
