@@ -54,8 +54,9 @@ def influences() -> dict[str, Influence]:
             0.0,
             (-0.05, 0.05),
             0.001,
-            unit="m/s",
+            unit="cm/s",
             plausible=(-0.02, 0.02),
+            shown=100.0,
         )
         known[name] = Influence(current, None, f"heading_{axis}", False)
     known[SLIP] = Influence(slip, None, None, False)

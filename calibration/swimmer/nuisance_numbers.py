@@ -43,10 +43,14 @@ _TITLES = {
     "head_length": "L (head length)",
     "disc_offset": "a (radius of the circle of the clamps)",
 }
-_UNITS = {
-    "youngs_modulus": "Pa", "viscosity": "Pa s", "tail_radius": "m", "head_radius": "m", "head_length": "m",
-    "disc_offset": "m",
-}  # fmt: skip
+_UNITS = {  # in which they are shown, and factor to it from SI
+    "youngs_modulus": ("MPa", 1e-6),
+    "viscosity": ("Pa s", 1.0),
+    "tail_radius": ("mm", 1e3),
+    "head_radius": ("cm", 100.0),
+    "head_length": ("cm", 100.0),
+    "disc_offset": ("cm", 100.0),
+}
 _FACTOR = 5.0  # a number may be off by
 
 
@@ -69,7 +73,8 @@ def nuisance_parameters(robot: Robot, table: Mapping[str, float], outputs: Seque
         value = robot_number(robot, name)
         sigma = robot.sigma(name).of(value) / value
         bounds = (value / _FACTOR, value * _FACTOR)
-        parameters.append(Parameter(name, title, value, bounds, 1.0, True, _UNITS[name], sigma))
+        unit, shown = _UNITS[name]
+        parameters.append(Parameter(name, title, value, bounds, 1.0, True, unit, sigma, shown=shown))
     length = robot.sigma("tail_length")
     size = length.of(robot.tail_length)
     parameters.append(
