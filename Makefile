@@ -5,6 +5,12 @@ RUN := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
 SOURCES := $(wildcard sim/*.py sim/*/*.py)
 
+# uv installs what constraints.txt pins and refuses files of other hashes. It reads no settings of pip, so the folder
+# of wheels that pip knows is handed on.
+LINKS = $(or $(PIP_FIND_LINKS),$(shell $(PYTHON) -m pip config get global.find-links 2>/dev/null))
+UV = $(if $(LINKS),UV_FIND_LINKS="$(LINKS)") UV_SYSTEM_CERTS=1 $(VENV)/bin/uv
+INSTALL = $(UV) pip install --quiet --python $(RUN) --constraints constraints.txt --build-constraints constraints.txt
+
 CONFIG ?=
 DATA ?= data/sweep
 MODEL ?= models/model.safetensors
@@ -24,7 +30,7 @@ TWO := -n 2 --dist loadgroup --no-loadscope-reorder
 REST := long or rates or cluster
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rest test-all quick lint docs dataset train plan calibrate report bench clean
+.PHONY: help setup constraints demo test test-rest test-all quick lint docs dataset train plan calibrate report bench clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -32,8 +38,9 @@ help: ## list the targets
 setup: $(STAMP) ## make .venv, install everything, pinned, and compile all loops
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt torch
-	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	sed -n '/^uv==/,/[^\]$$/p' constraints.txt > $(VENV)/uv.txt
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r $(VENV)/uv.txt
+	$(INSTALL) -e '.[dev]'
 	$(RUN) -m sim compile
 	$(RUN) -m surrogate compile
 	touch $@
@@ -49,11 +56,16 @@ test-rest: $(VENV)/.extras ## run what `make test` leaves out: rates over many t
 test-all: $(VENV)/.extras ## run every test
 	$(RUN) -m pytest $(TWO)
 $(VENV)/.extras: $(STAMP)
-	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[clusters]'
+	$(INSTALL) -e '.[clusters]'
 	touch $@
 
 quick: $(STAMP) ## run the quick tests, a minute and a half
 	$(RUN) -m pytest $(TWO) -m "not (slow or page or $(REST))"
+
+constraints: $(STAMP) ## pin what pyproject.toml needs, with hashes (UPGRADE=1: the newest versions)
+	$(RUN) -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"])' \
+	| $(UV) pip compile --quiet pyproject.toml - --extra dev --extra clusters --extra docs --universal --generate-hashes \
+	--no-annotate --custom-compile-command 'make constraints' $(if $(UPGRADE),--upgrade) -o constraints.txt
 
 lint: $(STAMP) ## style and types
 	$(VENV)/bin/ruff check .
@@ -64,7 +76,7 @@ docs: $(VENV)/.docs ## the documentation as pages, docs/_build/html/index.html
 	$(RUN) -m sphinx -q -W --keep-going -b html docs docs/_build/html
 	@echo "-> docs/_build/html/index.html"
 $(VENV)/.docs: $(STAMP)
-	$(VENV)/bin/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	$(INSTALL) -e '.[docs]'
 	touch $@
 
 # Without CONFIG: the sweep that comes with the package. The build itself knows its sources and what is missing, so it

@@ -19,6 +19,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from softflagella.shadowing import check_packages
+
+check_packages()
+
 
 def _listed() -> dict[str, tuple[str, str]]:
     """Read the public names from the stub file: name -> (module, name in it)."""

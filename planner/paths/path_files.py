@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+
+import numpy as np
+import pandas as pd
 
 from planner.paths.path import Path2D
 from planner.paths.svg_drawing import read_svg
+from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.tables import read_table
+from sim.io.units import split, to_si
 
 
 @dataclass(frozen=True)
@@ -21,7 +25,7 @@ class Drawing:
 
 
 def read_path(source: str | Path, *, closed: bool | None = None, shape: str | None = None) -> Drawing:
-    """Read a path from a table with columns x, y, or from an SVG file.
+    """Read a path from a table with columns x, y (or x_mm, y_mm and so on), or from an SVG file.
 
     Args:
         source: the file.
@@ -44,38 +48,44 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
         return Drawing(*read_svg(Path(source), closed, shape))
     if shape is not None:
         raise InputError(f"{source} is no SVG, so it has no shape {shape!r}; leave --shape out")
-    return Drawing(Path2D.of(_read_columns(Path(source)), closed=closed), None)
+    points, unit = _read_columns(source)
+    return Drawing(Path2D.of(points, closed=closed), unit)
 
 
-def _read_columns(path: Path) -> Any:
-    """Read columns x and y (n, 2), split at commas, semicolons, tabs or spaces; without a header the first two."""
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError):
-        lines = []
-    first = next((line for line in lines if line.strip()), "")
-    mark = next((mark for mark in ";\t," if mark in first), None)
-    names = [word.strip().strip('"').lower() for word in first.split(mark)]
-    if not first:
-        read_table(path)  # says what is wrong with the file
-    rows = [line.split(mark) for line in lines if line.strip()]
-    header = not all(map(_is_number, names))
-    if header and not {"x", "y"} <= set(names):
-        raise InputError(f"{path} has columns {', '.join(names)}; give x and y")
-    places = (names.index("x"), names.index("y")) if header else (0, 1)
-    rows = rows[1:] if header else rows
-    if not rows:
-        raise InputError(f"{path} has no rows; give at least two points")
-    decimal = mark == ";" and not any("." in word for row in rows for word in row)
-    try:
-        return [[float(row[i].strip().replace(",", ".") if decimal else row[i]) for i in places] for row in rows]
-    except (ValueError, IndexError):
-        raise InputError(f"{path} has a row whose x or y is no number; correct the file") from None
+def _read_columns(source: str | Path) -> tuple[Floats, float | None]:
+    """Read x and y (n, 2) and the size of their unit in m; without names the first two columns.
+
+    Raises:
+        InputError: the table has no x and y, only one of them has a unit, or a value is no number.
+    """
+    table = read_table(source, names=False)
+    if all(isinstance(column, int) for column in table):
+        names, units = list(table.columns[:2]), []
+    else:
+        names = [_column(source, table, axis) for axis in ("x", "y")]
+        units = [unit for unit in (split(name).unit for name in names) if unit]
+    if len(names) != 2 or len(units) == 1:
+        raise InputError(f"{source}: give x and y, both with a unit (x_mm and y_mm) or both without")
+    points = table[names].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+    broken = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(broken):
+        raise InputError(f"{source}: x or y of point {broken[0] + 1} is no number; correct the file")
+    if not units:
+        return points, None
+    factors = np.array([to_si(1.0, unit.suffix) for unit in units])
+    return points * (factors / factors[0]), float(factors[0])
 
 
-def _is_number(word: str) -> bool:
-    try:
-        float(word.replace(",", "."))
-    except ValueError:
-        return False
-    return True
+def _column(source: str | Path, table: pd.DataFrame, axis: str) -> str:
+    """Choose the column of a coordinate, a bare number or a length."""
+    columns = []
+    for column in map(str, table):
+        quantity, unit = split(column)
+        if quantity.lower() == axis and (unit is None or unit.kind == "length"):
+            columns.append(column)
+    if len(columns) > 1:
+        raise InputError(f"{source}: {' and '.join(columns)} are the same coordinate; drop all but one")
+    if not columns:
+        names = ", ".join(map(str, table))
+        raise InputError(f"{source} has columns {names}; give x and y, or with a unit x_mm, y_mm")
+    return columns[0]

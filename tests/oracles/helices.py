@@ -97,7 +97,7 @@ def read_helices(source: str | Path) -> tuple[Floats, Floats]:
     Raises:
         InputError: a column is missing.
     """
-    table = read_table(source, comment="#")
+    table = read_table(source)
     for column in ("lambda_over_R", *COLUMNS):
         if column not in table:
             raise InputError(f"the table has no column {column!r}")

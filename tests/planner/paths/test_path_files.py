@@ -129,6 +129,39 @@ def test_tables_of_several_kinds_are_the_same_path(text: str, tmp_path: Path) ->
     assert read_path(tmp_path / "path.csv").path.points.tolist() == [[0, 0], [3, 0], [3, 4.5]]
 
 
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("x_mm,y_mm\n0,0\n30,0\n30,45\n", 0.001),
+        ("X [cm];Y [cm]\n0;0\n3;0\n3;4,5\n", 0.01),
+        ("t_s,x,y\ns,cm,cm\n0,0,0\n1,3,0\n2,3,4.5\n", 0.01),
+        ("x_cm,y_mm\n0,0\n3,0\n3,45\n", 0.01),
+    ],
+)
+def test_a_table_says_its_unit(text: str, unit: float, tmp_path: Path) -> None:
+    """A path of 7.5 cm, with its corner at (3, 0) cm."""
+    (tmp_path / "path.csv").write_text(text)
+    path, size = (drawing := read_path(tmp_path / "path.csv")).path, drawing.unit
+    assert size == unit
+    assert path.points * unit == pytest.approx(np.array([[0, 0], [0.03, 0], [0.03, 0.045]]))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x_mm,y\n1,2\n3,4\n", "both with a unit"),
+        ("x_mm,x_cm,y_mm\n1,2,3\n4,5,6\n", "x_mm and x_cm are the same coordinate"),
+        ("x_mm,y_s\n1,2\n3,4\n", "has columns x_mm, y_s; give x and y"),
+        ("1\n2\n", "give x and y"),
+        ("x,y\n1,2\n3,?\n", "x or y of point 2 is no number"),
+    ],
+)
+def test_a_table_whose_coordinates_are_not_clear_is_refused(text: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_path(tmp_path / "path.csv")
+
+
 USES = "".join(f"<g id='g{i + 1}'>" + f"<use href='#g{i}'/>" * 10 + "</g>" for i in range(7))
 CURVES = " ".join(f"C {a} {b} {c} {d} {e} {f}" for a, b, c, d, e, f in np.random.default_rng(1).random((2_000, 6)))
 OWN_GROUP = "a <use> shows a group that it belongs to"

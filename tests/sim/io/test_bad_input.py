@@ -38,7 +38,7 @@ BAD_TABLES = {
     "effect out of bounds": (table(end_over_end_drag=-1), "end_over_end_drag = -1"),
     "missing column": ("C_t,C_r\n1,2\n", "missing column"),
     "no rows": (HEADER + "\n", "no rows"),
-    "empty": ("", "no CSV table"),
+    "empty": ("", "is empty"),
 }
 
 

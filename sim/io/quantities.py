@@ -1,0 +1,97 @@
+"""Columns in the units that a program needs: R_yr_mm or "R_yr [mm]" becomes R_yr_cm.
+
+A program names its columns with their units ("R_yr_cm"). A table may have the same quantity in another unit of
+the same kind, as a suffix or in brackets, in upper or lower case. The notes say what was converted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+import pandas as pd
+
+from sim.io.errors import InputError
+from sim.io.units import Unit, convert, find_unit, of_kind, split
+
+_NONE: Mapping[str, str] = {}
+_CASE_COUNTS = {"l", "r"}  # L and R are the head's
+
+
+class Converted(NamedTuple):
+    """A table with columns in the wanted units, and what was converted, in words."""
+
+    table: pd.DataFrame
+    notes: tuple[str, ...]
+
+
+def convert_columns(
+    table: pd.DataFrame, wanted: Iterable[str], where: str, synonyms: Mapping[str, str] = _NONE
+) -> Converted:
+    """Rename and convert columns to those that are wanted; all others stay as they are.
+
+    Args:
+        table: as read; it is not changed. A value that is no number becomes NaN where its column is converted.
+        wanted: names, with a unit as suffix ("R_yr_cm") or without ("N").
+        where: the table's name, for messages.
+        synonyms: other names of a quantity, in lower case -> its name without unit; a name may be a unit ("rpm").
+
+    Raises:
+        InputError: two columns hold the same quantity, or a column has no unit.
+    """
+    notes = []
+    for name in wanted:
+        if name in table and not _alike(table, name, synonyms):
+            continue
+        candidates = [*([name] if name in table else []), *_alike(table, name, synonyms)]
+        if len(candidates) > 1:
+            raise InputError(f"{where}: {' and '.join(candidates)} are the same quantity; drop all but one")
+        if not candidates:
+            _check_bare(table, name, where, synonyms)
+            continue
+        column, target = candidates[0], split(name).unit
+        given = _unit(column, synonyms)
+        if given is None or target is None or given == target:
+            notes.append(f"column {column} read as {name}")
+        else:
+            numbers = pd.to_numeric(table[column], errors="coerce")
+            table = table.assign(**{column: convert(numbers, given.suffix, target.suffix)})
+            notes.append(f"column {column} converted from {given.text} to {target.text} ({name})")
+        table = table.rename(columns={column: name})
+    return Converted(table, tuple(notes))
+
+
+def _alike(table: pd.DataFrame, wanted: str, synonyms: Mapping[str, str]) -> list[str]:
+    """List columns of another name that hold a quantity, in any unit of its kind."""
+    quantity, target = split(wanted)
+    kind = target.kind if target else None
+    names = []
+    for column in map(str, table):
+        unit = _unit(column, synonyms)
+        if column != wanted and (unit.kind if unit else None) == kind:
+            name = split(column).quantity if target else column
+            if _same(name, quantity, synonyms):
+                names.append(column)
+    return names
+
+
+def _same(name: str, quantity: str, synonyms: Mapping[str, str]) -> bool:
+    name = synonyms.get(name.lower(), name)
+    return name == quantity or (name.lower() == quantity.lower() and name.lower() not in _CASE_COUNTS)
+
+
+def _unit(column: str, synonyms: Mapping[str, str]) -> Unit | None:
+    return split(column).unit or (find_unit(column) if column.lower() in synonyms else None)
+
+
+def _check_bare(table: pd.DataFrame, wanted: str, where: str, synonyms: Mapping[str, str]) -> None:
+    """Refuse a column that has the right name and no unit.
+
+    Raises:
+        InputError: there is one; the message lists the names that it could have.
+    """
+    quantity, target = split(wanted)
+    for column in map(str, table):
+        if target and find_unit(column) is None and _same(column, quantity, synonyms):
+            choices = ", ".join(f"{quantity}_{suffix}" for suffix in of_kind(target.kind))
+            raise InputError(f"{where}: column {column!r} has no unit; name it one of {choices}")
