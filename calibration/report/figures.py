@@ -143,8 +143,7 @@ def draw_evidence(result: Verdict) -> Figure:
         colour = GREEN if candidate.effect.name in named else ORANGE if tested else PALE
         axes.barh(place - 0.2, candidate.z, color=colour, height=0.4)
         axes.text(-limit, place + 0.2, f" {candidate.effect.title}", fontsize=8, va="center")
-    for edge in (-critical, critical):
-        axes.axvline(edge, color=INK, lw=0.8, ls="--")
+        axes.vlines([-critical, critical], place - 0.45, place, color=INK, lw=0.8, ls="--")
     axes.set_xscale("symlog", linthresh=2 * critical)
     axes.set_xlim(-limit, limit)
     axes.set_ylim(-0.7, len(ranked) - 0.3)

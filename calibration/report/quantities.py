@@ -71,10 +71,14 @@ def given(nuisance: Parameter) -> str:
 def tolerance(nuisance: Parameter) -> str:
     """Write the standard deviation that was stated for a nuisance parameter."""
     assert nuisance.sigma is not None
-    scale, unit = (
-        (100.0, " %") if nuisance.logarithmic else (nuisance.shown, f" {nuisance.unit}".replace(" °", "°"))
-    )
-    return f"± {plain(scale * nuisance.sigma, 2)}{unit}"
+    if nuisance.logarithmic:
+        return f"± {plain(100 * nuisance.sigma, 2)} %"
+    return f"± {plain(nuisance.shown * nuisance.sigma, 2)}{_after_number(nuisance.unit)}"
+
+
+def _after_number(unit: str) -> str:
+    """Write a unit as it stands behind a number."""
+    return unit if unit == "°" else f" {unit}"
 
 
 def fitted_value(pull: Pull, *, alone: bool = False) -> str:
@@ -91,8 +95,15 @@ def fitted_value(pull: Pull, *, alone: bool = False) -> str:
 
 def size(effect: Parameter, value: float, digits: int = 3) -> str:
     """Write the size of an effect in its unit."""
-    unit = "" if effect.unit == "1" else f" {effect.unit}"
-    return f"{plain(value * effect.shown, digits)}{unit}"
+    number, unit = plain(value * effect.shown, digits), effect.unit
+    if unit == "1" or unit.startswith("1:"):
+        return number
+    if unit.startswith("1/"):
+        return f"{number} per {unit[2:]}"
+    if unit.startswith("ln "):
+        return f"{number} ({unit})"
+    is_product = unit[0].isdigit() or "μ0" in unit or unit == "d/D" or unit.startswith("time scale")
+    return f"{number} × {unit}" if is_product else f"{number} {unit}"
 
 
 def detectable(effect: Parameter, value: float) -> str:

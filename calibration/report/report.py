@@ -171,10 +171,14 @@ def _add_numbers(page: Page, result: Verdict) -> None:
         "tolerance that was stated for it. The pull is how far the runs move a parameter, in standard deviations "
         f"of what chance would do; beyond {WRONG:g} the stated value is taken to be wrong."
     )
-    page.text(
-        f"Taken to be wrong: {'; and '.join(wrong)}." if wrong else "None is taken to be wrong.",
-        tone="bad" if wrong else "good",
-    )
+    if wrong:
+        page.text(f"Taken to be wrong: {'; and '.join(wrong)}.", tone="bad")
+    elif result.verdict == "unexplained":
+        page.text(
+            "Nothing explains the residual, so none is taken to be wrong: what is missing pulls at them, too."
+        )
+    else:
+        page.text("None is taken to be wrong.", tone="good")
     page.table(
         ("parameter", "given", "tolerance (σ)", "fitted", "by the runs alone", "pull"),
         [

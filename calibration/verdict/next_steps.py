@@ -8,6 +8,7 @@ from __future__ import annotations
 from calibration.verdict.verdict import Verdict
 
 DISAGREES = 0.01  # p of the held-out runs below which they do not agree with the final model
+_SELDOM = 0.5  # share of cases in which runs must decide to be worth making
 _PLAN = "Plan with the corrected robot: `softflagella plan square:3 --robot corrected.toml --out plan`."
 _NEW_SESSION = "add the new runs to the table with a session of their own (column `session`)"
 
@@ -33,7 +34,7 @@ def _contradicted(result: Verdict) -> list[str]:
             f"model (p = {result.errors.p_value:.2g}). Look for a change of the set-up on that day, or make more "
             f"runs: {_NEW_SESSION}, and calibrate again."
         ]
-    if result.held_out_error_falls is False:
+    if result.held_out_error_falls is False and result.effects:
         return [
             f"Do not rely on this claim yet: it does not lower the error on the held-out runs ({held_out}). Make "
             f"more runs: {_NEW_SESSION}, and calibrate again."
@@ -51,9 +52,13 @@ def _after_none(result: Verdict) -> list[str]:
 
 def _after_number(result: Verdict) -> list[str]:
     titles = [" or ".join(pull.parameter.title for pull in alike) for alike in result.wrong_numbers]
+    unconfirmed = (
+        " Do not take over the fitted value without measuring it: it does not lower the error on the held-out "
+        "runs."
+    )
     steps = [
         f"Measure again: {'; and '.join(titles)}. Correct it in the robot's file or in the table, and calibrate "
-        "again.",
+        f"again.{unconfirmed if result.held_out_error_falls is False else ''}",
         *_telling_apart(result),
     ]
     return [*steps, f"Until then, corrected.toml has the fitted value. {_PLAN}"]
@@ -110,10 +115,16 @@ def _telling_apart(result: Verdict) -> list[str]:
     """The runs that tell several explanations apart, and the command that judges them."""
     if result.next.batch is None:
         return []
-    count = len(result.next.batch.settings)
+    count, decides = len(result.next.batch.settings), result.next.batch.decides
+    if decides < _SELDOM:
+        return [
+            "No runs with the settings of this table tell the explanations apart well: the best "
+            f"{count} decide in {100 * decides:.0f} % of cases (table below). Say what else the lab can set, and "
+            "calibrate again, for example with `--own l_cm=5,7,9`."
+        ]
     return [
         f"Make the {count} runs of the table below, which tell the explanations apart in "
-        f"{100 * result.next.batch.decides:.0f} % of cases; {_NEW_SESSION}.",
+        f"{100 * decides:.0f} % of cases; {_NEW_SESSION}.",
         "Ask which explanation they speak for: `softflagella calibration decide TABLE verdict.json --robot "
         "ROBOT`, with the table, the verdict.json beside this report, and the robot as it was given.",
     ]

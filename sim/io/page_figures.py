@@ -66,10 +66,10 @@ def _themed(svg: str, words: str, number: int) -> str:
     assert found, "matplotlib writes a viewBox"
     width = float(found[1].split()[2])
     body = re.sub(r"<metadata>.*?</metadata>", "", svg[found.end() :], flags=re.DOTALL)
-    body = re.sub(r"<!--.*?-->", "", body, flags=re.DOTALL)
+    body = re.sub(r"<!--.*?-->|<style.*?</style>", "", body, flags=re.DOTALL)
     body = re.sub(r'<g id="[^"]*">', "<g>", body)
     body = re.sub(r'\bid="', f'id="f{number}-', body)  # names are unique on the page
-    body = re.sub(r'((?:xlink:)?href="|url\()#', rf"\1#f{number}-", body)
+    body = re.sub(r'(\bhref="|url\()#', rf"\1#f{number}-", body.replace("xlink:href", "href"))
     body = re.sub(r"'DejaVu Sans'[^;\"]*", "system-ui, sans-serif", body)
     for colour, like in _DRAWN_AS.items():
         body = body.replace(colour, like)
@@ -79,5 +79,5 @@ def _themed(svg: str, words: str, number: int) -> str:
     # Elements without a colour of their own are black in SVG: here they have the colour of the text.
     return (
         f'<svg role="img" aria-label="{words}" viewBox="{found[1]}" fill="currentColor" '
-        f'xmlns:xlink="http://www.w3.org/1999/xlink" style="width: {width * 4 / 3:.0f}px">{body.strip()}'
+        f'style="width: {width * 4 / 3:.0f}px">{body.strip()}'
     )

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from sim.io.files import write_text
 from sim.io.page_figures import figure_markup, variables
 
-_WIDE = 3  # columns of a table beyond which it becomes a list on a narrow screen
+_WIDE = 48  # characters of a table's row beyond which the table becomes a list on a narrow screen
 _LONG = 5  # sections beyond which a page begins with a list of them
 _STYLE = f"""
 :root {{ color-scheme: light dark; --page: #f6f8fa; --card: #fff; --good: #1c7c43; --bad: #b3391f;
@@ -43,6 +43,7 @@ pre code {{ font-size: 14px; white-space: pre-wrap; }}
 .figures {{ display: flex; flex-wrap: wrap; gap: 12px 28px; justify-content: center; margin: 12px 0; }}
 figure {{ margin: 0; max-width: 100%; }} figcaption {{ color: var(--soft); font-size: 14px; max-width: 420px;
   text-align: center; margin: 2px auto 0; }}
+svg * {{ stroke-linejoin: round; stroke-linecap: butt; }}
 svg {{ display: block; max-width: 100%; height: auto; margin: 0 auto; }}
 img {{ display: block; max-width: 100%; height: auto; margin: 0 auto; background: #fff; border-radius: 6px; }}
 table {{ border-collapse: collapse; margin: 12px 0; font-size: 14px; }}
@@ -112,7 +113,7 @@ class Page:
             + "</tr>"
             for row in rows
         )
-        kind = ' class="cards"' if len(header) > _WIDE else ""
+        kind = ' class="cards"' if _row_width(header, rows) > _WIDE else ""
         self._parts.append(f'<div class="wide"><table{kind}><tr>{head}</tr>{body}</table></div>')
 
     def figure(self, figure: Figure, description: str) -> None:
@@ -149,6 +150,15 @@ class Page:
             f"<style>{_STYLE}</style></head><body><main>{body}{end}"
             f"<footer><p>{html.escape(footer)}</p></footer></main></body></html>\n",
         )
+
+
+def _row_width(header: Sequence[str], rows: Sequence[Sequence[object]]) -> int:
+    """Estimate the width of a table in characters; headings break between words, what is below them does not."""
+    width = 0
+    for place, heading in enumerate(header):
+        cells = [len(str(row[place])) for row in rows]
+        width += 2 + max([*map(len, heading.split()), *cells], default=0)
+    return width
 
 
 def _inline(words: str) -> str:
