@@ -44,13 +44,13 @@ from dataset.storage.data_set import read
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import TrackingError, draw_overlay, tracking_error
 from planner.paths.path import polygon
-from sim.inputs import robot_toml
 from sim.io.files import whole_file, write_csv, write_text
 from sim.io.pages import Page
 from sim.io.provenance import code_version
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
+from sim.model.robot_toml import robot_toml
 from sim.motion.batches import available_jobs
 from sim.motion.shapes import tails_over_a_revolution
 from sim.motion.steady import steady
