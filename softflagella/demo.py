@@ -30,7 +30,7 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from calibration.report.corrected_robot import corrected_robot, corrected_toml
-from calibration.report.report import draw_residuals
+from calibration.report.figures import draw_residuals
 from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
@@ -263,7 +263,9 @@ def _write_page(
         page.section(f"Calibration with a table: {name}")
         page.text(verdict.sentence, tone="good" if verdict.verdict in ("effect", "none") else "bad")
         if verdict.verdict == "effect":
-            page.figure(draw_residuals(verdict, data), "residuals before and after the effect is added")
+            page.figures(
+                [(figure, f"residuals, {model}", model) for figure, model in draw_residuals(verdict, data)]
+            )
         errors = [
             ("coefficients before calibration", verdict.error_uncalibrated),
             ("calibrated", verdict.error_before),
