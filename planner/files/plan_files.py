@@ -77,13 +77,16 @@ def write_plan_files(result: Plan, folder: Path) -> str:
 
 def dwell_table(result: Plan) -> pd.DataFrame:
     """Tabulate the dwells: start, direction, length and predicted pose."""
-    count = len(result.dwells)
+    count, cm = len(result.dwells), 100 * result.robot.tail_length
     start = np.concatenate([[0.0], np.cumsum(result.dwells)[:-1]])
     return pd.DataFrame(
         {
             "start_s": start * result.robot.time_scale,
             "direction": result.first_direction * (-1) ** np.arange(count),
             "dwell_s": result.seconds,
+            "x_cm": cm * result.poses[:-1, 0],
+            "y_cm": cm * result.poses[:-1, 1],
+            "heading_deg": np.degrees(result.poses[:-1, 2]),
             "dwell_bar": result.dwells,
             "x_over_l": result.poses[:-1, 0],
             "y_over_l": result.poses[:-1, 1],

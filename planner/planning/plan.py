@@ -176,7 +176,14 @@ class Plan:
         time, length = self.robot.time_scale / swims.time_scale, self.robot.tail_length / swims.tail_length
         x, y, heading = self.start
         start = (x * length, y * length, heading)
-        return Schedule(swims.group_values(), self.first_direction, self.dwells * time, start, swims.time_scale)
+        return Schedule(
+            swims.group_values(),
+            self.first_direction,
+            self.dwells * time,
+            start,
+            swims.time_scale,
+            swims.tail_length,
+        )
 
     if not TYPE_CHECKING:
         __getattr__ = old_attributes(_MOVED)
