@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from planner.files.pictures import REPLAYED, draw_tracks
 from planner.paths.distance import distance_to, two_sided
+from planner.planning.picture import REPLAYED, draw_tracks
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.mechanics import planar
