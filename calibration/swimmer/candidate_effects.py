@@ -41,7 +41,7 @@ def influences() -> dict[str, Influence]:
             )  # fmt: skip
             known[driver.name] = Influence(parameter, effect.name, driver.column, effect.symmetry == "odd")
     slip = Parameter(
-        SLIP, "slip of the motor", 0.0, (-0.3, 0.3), 0.02, unit="share of its speed", plausible=(-0.1, 0.1)
+        SLIP, "slip of the motor", 0.0, (-0.3, 0.3), 0.02, unit="%", plausible=(-0.1, 0.1), shown=100.0
     )
     point = Parameter(
         TRACKED_POINT, "tracked point off the head's centre", 0.0, (-2.0, 2.0), 0.1, unit="L, forward",
@@ -54,10 +54,11 @@ def influences() -> dict[str, Influence]:
             0.0,
             (-0.05, 0.05),
             0.001,
-            unit="m/s",
+            unit="cm/s",
             plausible=(-0.02, 0.02),
+            shown=100.0,
         )
-        known[name] = Influence(current, None, f"heading_{axis}", False)
+        known[name] = Influence(current, None, f"course_{axis}", False)
     known[SLIP] = Influence(slip, None, None, False)
     known[TRACKED_POINT] = Influence(point, None, None, False)
     return dict(sorted(known.items()))
@@ -92,7 +93,7 @@ def reason_untestable(
 _COLUMNS = {
     "elapsed_h": "elapsed_min, differing between the runs",
     "temperature_K": "temperature_C, differing between the runs",
-    "heading_x": "heading_deg, differing between the runs",
-    "heading_y": "heading_deg, differing between the runs",
+    "course_x": "course_deg, differing between the runs",
+    "course_y": "course_deg, differing between the runs",
     "head_over_tank": "tank_diameter_cm, differing between the runs",
 }
