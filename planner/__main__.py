@@ -9,14 +9,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from planner.paths.units import UNITS, check_unstated_unit, describe, in_tails, lab_length, lab_place
+from planner.paths.units import UNITS, check_unstated_unit, describe, in_lab, in_tails, place_in_lab
 from sim.io.commands import MODEL, ROBOT, Program, argument, out
 from sim.io.errors import InputError
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
     from planner.paths.path import Path2D
-    from planner.planning.plan import Plan
+    from planner.planning.planned import Plan
     from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import CalibrationKnowledge
     from sim.model.robot import Robot
@@ -72,7 +72,7 @@ def _plan(arguments: Namespace) -> None:
     _say(result)
     robot, errors = result.robot, result.errors
     rms, largest, missed = (
-        lab_length(value, robot) for value in (errors.drawn_rms, errors.drawn_max, result.declared.missed)
+        in_lab(value, robot) for value in (errors.drawn_rms, errors.drawn_max, result.declared.missed)
     )
     print(
         f"from the path as drawn {rms} rms, {largest} at most; every drawn point is within {missed} of the "
@@ -87,17 +87,15 @@ def _say(result: Plan) -> None:
         print(f"warning: {warning}", file=sys.stderr)
     robot = result.robot
     x, y, heading = result.start
-    print(
-        f"start: put the head's centre at {lab_place(x, y, robot)}, heading {math.degrees(heading):.1f} degrees, "
-        "at rest"
-    )
+    place = place_in_lab(x, y, robot)
+    print(f"start: put the head's centre at {place}, heading {math.degrees(heading):.1f} degrees, at rest")
     shortest = format_time(result.minimum_dwell * robot.time_scale)
     print(
         f"{len(result.dwells)} dwells of {shortest} ({result.minimum_dwell:.2f} time units) or more, "
         f"{format_time(float(result.seconds.sum()))} in all"
     )
     rms, largest, stated, feedback = (
-        lab_length(value, robot)
+        in_lab(value, robot)
         for value in (result.predicted_rms, result.predicted_max, result.stated_error, result.feedback_error)
     )
     print(f"predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}")
@@ -161,12 +159,13 @@ def _goal(arguments: Namespace) -> None:
     _say(goal_plan.plan)
     off, turned = goal_plan.end_error
     x, y, heading = goal_plan.end
+    place = place_in_lab(x, y, robot)
     print(
-        f"end: {lab_place(x, y, robot)}, heading {math.degrees(math.remainder(heading, math.tau)):.1f} degrees; "
-        f"from the goal {lab_length(off, robot)} and {math.degrees(turned):.1g} degrees as predicted"
+        f"end: {place}, heading {math.degrees(math.remainder(heading, math.tau)):.1f} degrees; "
+        f"from the goal {in_lab(off, robot)} and {math.degrees(turned):.1g} degrees as predicted"
     )
     if not goal_plan.free_space.empty:
-        margin, clearance = (lab_length(value, robot) for value in (goal_plan.margin, goal_plan.clearance))
+        margin, clearance = (in_lab(value, robot) for value in (goal_plan.margin, goal_plan.clearance))
         print(f"margin {margin} around the body; predicted clearance {clearance}")
     print(f"-> {', '.join(map(str, paths))}")
 
@@ -282,10 +281,7 @@ def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, bool]:
     if arguments.smooth is None:
         return path, unit_known
     smooth, moved = smoothed(path, arguments.smooth)
-    print(
-        f"smoothed over {lab_length(arguments.smooth, robot)}, which moves the path by up to "
-        f"{lab_length(moved, robot)}"
-    )
+    print(f"smoothed over {in_lab(arguments.smooth, robot)}, which moves the path by up to {in_lab(moved, robot)}")
     return smooth, unit_known
 
 

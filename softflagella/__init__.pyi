@@ -2,15 +2,16 @@
 from calibration.swimmer.synthetic_table import make_table as make_table
 from calibration.verdict.verdict import Verdict as Verdict
 from planner.files.plan_files import write_plan as write_plan
+from planner.files.plan_json import load_plan as load_plan
+from planner.goal.goal_plan import GoalPlan as GoalPlan
 from planner.goal.obstacles import Circle as Circle
-from planner.goal.to_goal import GoalPlan as GoalPlan
 from planner.goal.to_goal import to_goal as to_goal
 from planner.paths.path import Path2D as Path2D
 from planner.paths.path import circle as circle
 from planner.paths.path import polygon as polygon
 from planner.paths.path_files import read_path as read_path
-from planner.planning.plan import Plan as Plan
 from planner.planning.plan import plan as plan
+from planner.planning.planned import Plan as Plan
 from planner.tracking.tracker import Tracker as Tracker
 from sim.effects import catalogue
 from sim.inputs import load_robot as load_robot

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from planner.files.plan_json import plan_record
 from planner.files.tracking_error import TrackingError, tracking_error
 from planner.paths.path import Path2D
 from planner.planning.plan import plan
@@ -42,7 +41,7 @@ def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, 
     runs = {}
     for label, model in models.items():
         planned = plan(path, model, lookup=tabulate(model))
-        content = plan_record(planned)
+        content = planned.to_dict()
         track = replay([planned.schedule(truth)])[0]
         track[["x_over_l", "y_over_l"]] *= truth.tail_length / model.tail_length
         runs[label] = Steered(content, tracking_error(content, track), track[["x_over_l", "y_over_l"]].to_numpy())

@@ -33,7 +33,6 @@ def _train(arguments: Namespace) -> None:
     from surrogate.networks.checkpoints import device_named, remove_states
     from surrogate.networks.training_loop import Settings
     from surrogate.table.errors import error_table, shortcomings
-    from surrogate.table.model_file import save
     from surrogate.training.fit_response import SETTINGS
     from surrogate.training.model_card import model_card
     from surrogate.training.train import held_out, train
@@ -46,7 +45,7 @@ def _train(arguments: Namespace) -> None:
             raise InputError(f"--epochs {arguments.epochs}; give a whole number from 1")
         tails, curves = (replace(s, epochs=arguments.epochs, iterations=arguments.epochs) for s in (tails, curves))
     lookup = train(arguments.data, tails, curves, device=device, states=states)
-    save(lookup, arguments.out)
+    lookup.save(arguments.out)
     card = Path(arguments.out).with_suffix(".md")
     write_text(card, model_card(lookup, held_out(arguments.data)))
     remove_states(states)
@@ -188,11 +187,10 @@ def _errors(arguments: Namespace) -> None:
 )
 def _robot(arguments: Namespace) -> None:
     from sim.inputs import load_robot
-    from surrogate.one_robot.robot_table import save_robot_table
     from surrogate.one_robot.tabulate import tabulate
 
     table = tabulate(load_robot(arguments.robot))
-    save_robot_table(table, arguments.out)
+    table.save(arguments.out)
     worst = max(error["rms"] for error in table.errors.values())
     print(f"both directions of the motor, largest error {100 * worst:.2f} % -> {arguments.out}")
 

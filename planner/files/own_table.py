@@ -61,13 +61,12 @@ def _kept_table(robot: Robot, kept: Path | None, knowledge: CalibrationKnowledge
 
 def _simulated_table(robot: Robot, kept: Path | None) -> LookupTable:
     """Simulate the table of a robot, and keep it where that is possible."""
-    from surrogate.one_robot.robot_table import save_robot_table
     from surrogate.one_robot.tabulate import tabulate
 
     table = tabulate(robot)
     if kept is not None:
         try:
-            save_robot_table(table, kept)
+            table.save(kept)
             print(f"-> {kept}", file=sys.stderr)
         except InputError as refusal:  # a folder that cannot be written is no reason not to plan
             print(f"the table is not kept: {refusal}", file=sys.stderr)

@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from planner.files.pictures import REPLAYED, draw_tracks
 from planner.paths.distance import distance_to, two_sided
+from planner.planning.picture import REPLAYED, draw_tracks
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.quantities import convert_columns
@@ -109,7 +109,9 @@ def _in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFrame:
 
 
 def draw_overlay(axes: Axes, plan: dict[str, Any], error: TrackingError, title: str) -> None:
-    """Draw the replayed track over the declared and the raw path."""
-    draw_tracks(axes, np.array(plan["raw_path"]), np.array(plan["reference"]), error.stated)
-    axes.plot(*error.track.T, color=REPLAYED, lw=0.8, label="replayed in the simulator")
-    axes.set_title(f"{title}\n{error.rms:.3f} l rms, {error.largest:.3f} l at most", fontsize=10, parse_math=False)
+    """Draw a track over the declared and the raw path, on axes in cm."""
+    length = error.tail_length
+    draw_tracks(axes, np.array(plan["raw_path"]), np.array(plan["reference"]), error.stated, length)
+    axes.plot(*(100 * length * error.track.T), color=REPLAYED, lw=0.8, label="track")
+    rms, largest = format_length(error.rms * length), format_length(error.largest * length)
+    axes.set_title(f"{title}\n{rms} rms, {largest} at most from the declared path", fontsize=10, parse_math=False)

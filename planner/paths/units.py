@@ -22,12 +22,12 @@ MOST_SECONDS = 4 * 3600.0  # that such a path may take
 _SENSIBLE = (3.0, 300.0)  # length in l
 
 
-def lab_length(value: float, robot: Robot) -> str:
+def in_lab(value: float, robot: Robot) -> str:
     """Write a length given in tail lengths: 3.52 cm (0.32 l)."""
     return f"{format_length(value * robot.tail_length)} ({value:.3g} l)"
 
 
-def lab_place(x: float, y: float, robot: Robot) -> str:
+def place_in_lab(x: float, y: float, robot: Robot) -> str:
     """Write a place given in tail lengths: (3.52, 1.1) cm = (0.32, 0.1) l."""
     cm = 100 * robot.tail_length
     return f"({cm * x:.2f}, {cm * y:.2f}) cm = ({x:.3f}, {y:.3f}) l"
@@ -37,7 +37,7 @@ def describe(path: Path2D, robot: Robot) -> str:
     """Describe length and extent of a path."""
     width, height = extent(path)
     across = [format_length(value * robot.tail_length) for value in (width, height)]
-    return f"{lab_length(path.length, robot)} long, {' by '.join(across)} ({width:.3g} by {height:.3g} l)"
+    return f"{in_lab(path.length, robot)} long, {' by '.join(across)} ({width:.3g} by {height:.3g} l)"
 
 
 def in_tails(unit: str, robot: Robot) -> float:
@@ -63,7 +63,7 @@ def check_size(path: Path2D, robot: Robot, turn_radius: float) -> None:
     if max(extent(path)) < SMALLEST * turn_radius:
         raise InputError(
             f"the path is {describe(path, robot)}: too small, the robot's circle has a radius of "
-            f"{lab_length(turn_radius, robot)}{_hint(path, robot)}"
+            f"{in_lab(turn_radius, robot)}{_hint(path, robot)}"
         )
 
 

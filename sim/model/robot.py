@@ -14,12 +14,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sim.io.notebook import as_html
+from sim.io.units import format_length, from_si
 from sim.model.correction import Correction
 from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
 from sim.model.uncertainty import DEFAULTS, Sigma
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Robot:
     """A robot and its fluid in SI units.
 
@@ -60,6 +62,27 @@ class Robot:
             check_positive("disc_offset", self.disc_offset)
         check_finite("C_yr", self.C_yr)
         check_slenderness(self.tail_length / self.tail_radius)
+
+    def __repr__(self) -> str:
+        length, radius, R, L = map(
+            format_length, (self.tail_length, self.tail_radius, self.head_radius, self.head_length)
+        )
+        modulus, rpm = from_si(self.youngs_modulus, "MPa"), from_si(self.motor_speed, "rpm")
+        tails = "1 tail" if self.tails == 1 else f"{self.tails} tails"
+        lines = [
+            f"Robot {self.name!r}: {tails}, l = {length}, r0 = {radius}, E = {modulus:.4g} MPa",
+            f"  head R = {R}, L = {L}; fluid {self.viscosity:.4g} Pa s; motor {rpm:.4g} rpm",
+            f"  C_t = {self.C_t:.4g}, C_r = {self.C_r:.4g}, C_yr = {self.C_yr:.4g}; "
+            f"ω̄ = {self.omega_bar:.4g}, unit of time {self.time_scale:.4g} s",
+        ]
+        if self.effects:
+            lines.append("  effects: " + ", ".join(f"{name} {size:.4g}" for name, size in self.effects.items()))
+        if self.correction is not None:
+            lines.append("  with the correction of a calibration")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self))
 
     def sigma(self, name: str) -> Sigma:
         """Return one standard deviation of a field, as stated or by default (`sim.model.uncertainty`)."""

@@ -6,8 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from planner.files.plan_files import dwell_table
-from planner.files.plan_json import plan_record
 from planner.files.tracking_error import tracking_error
 from planner.paths.path import circle
 from planner.planning.plan import plan
@@ -24,7 +22,7 @@ def planned() -> tuple[dict[str, object], pd.DataFrame]:
     x, y, heading = result.poses.T
     time = np.concatenate([[0.0], np.cumsum(result.dwells)])
     off = 0.001 / CONTROL.tail_length
-    return plan_record(result), pd.DataFrame(
+    return result.to_dict(), pd.DataFrame(
         {"time_bar": time, "x_over_l": x + off, "y_over_l": y, "heading_rad": heading}
     )
 
@@ -60,7 +58,7 @@ def test_a_track_without_a_column_is_refused(planned: tuple[dict[str, object], p
 
 
 def test_the_table_of_dwells_is_in_centimetres_and_degrees_too() -> None:
-    table = dwell_table(plan(circle(2.0), CONTROL))
+    table = plan(circle(2.0), CONTROL).to_frame()
     assert table["x_cm"].to_numpy() == pytest.approx(11 * table["x_over_l"].to_numpy())
     assert table["y_cm"].to_numpy() == pytest.approx(11 * table["y_over_l"].to_numpy())
     assert np.radians(table["heading_deg"].to_numpy()) == pytest.approx(table["heading_rad"].to_numpy())

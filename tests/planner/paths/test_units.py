@@ -8,7 +8,7 @@ import pytest
 
 from planner.__main__ import main
 from planner.paths.path import circle
-from planner.paths.units import check_unstated_unit, lab_length, lab_place
+from planner.paths.units import check_unstated_unit, in_lab, place_in_lab
 from planner.planning.plan import plan
 from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
@@ -46,5 +46,5 @@ def test_a_stated_unit_is_not_asked_about() -> None:
 
 
 def test_lengths_in_messages_are_in_a_laboratory_s_units_first() -> None:
-    assert lab_length(0.32, CONTROL) == "3.52 cm (0.32 l)"
-    assert lab_place(1.0, -0.5, CONTROL) == "(11.00, -5.50) cm = (1.000, -0.500) l"
+    assert in_lab(0.32, CONTROL) == "3.52 cm (0.32 l)"
+    assert place_in_lab(1.0, -0.5, CONTROL) == "(11.00, -5.50) cm = (1.000, -0.500) l"
