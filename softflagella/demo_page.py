@@ -249,13 +249,13 @@ def _add_schedule(page: Page, results: Results, folder: Path) -> None:
     page.section("The schedule itself")
     page.text(
         f"This is all that the motor needs to know for the {name}: which way to turn, and when to flip. Blue: "
-        "+1, the robot turns left. Orange: −1, it turns right. The shaded piece of the whole schedule is "
+        "+1, the robot turns left. Orange: −1, it turns right. The shaded interval of the whole schedule is "
         "magnified below it, with the heading of the replayed robot. A dwell is the time between two flips. "
         "Longer dwells at +1 turn the robot to the left on average."
     )
     track = pd.read_csv(folder / name / "track.csv")
     page.figures(
-        [(draw_schedule(plan, track), "motor direction over time, a magnified piece of it, and the heading", "")]
+        [(draw_schedule(plan, track), "motor direction over time, a magnified interval, and the heading", "")]
     )  # fmt: skip
     page.text("The same for a microcontroller, from `schedule.h` (milliseconds between flips):")
     page.commands(header_excerpt((folder / name / "schedule.h").read_text()))
