@@ -26,7 +26,7 @@ _WIDTH = 4.4  # inches: two of them stand beside each other
 _NARROW = 3.0  # three
 _TAILS = {1: SOFT, 2: BLUE, 3: ORANGE, 4: GREEN, 5: VIOLET}
 _LEFT, _RIGHT = BLUE, ORANGE  # of the directions of the motor, and of the turns that they make
-_PIECE = 40.0  # s of the schedule that are magnified
+_MAGNIFIED = 40.0  # s of the schedule that are magnified
 _QUANTITIES = {  # column of a motion in lab units -> what it is called, its unit, factor to it
     "omega_yr_rad_s": ("yaw rate", "°/s", 180 / math.pi),
     "R_yr_cm": ("turn radius", "cm", 1.0),
@@ -122,7 +122,7 @@ def _band(line: Floats, width: float) -> Floats:
 
 
 def draw_schedule(plan: dict[str, Any], track: pd.DataFrame) -> Figure:
-    """Draw the direction of the motor over the whole schedule, a magnified piece of it, and the heading there.
+    """Draw the direction of the motor over the whole schedule, a magnified interval, and the heading there.
 
     Args:
         track: of the replay, time_s and heading_rad.
@@ -130,30 +130,30 @@ def draw_schedule(plan: dict[str, Any], track: pd.DataFrame) -> Figure:
     dwells = np.array(plan["dwell_s"])
     starts = np.concatenate([[0.0], np.cumsum(dwells)])
     directions = plan["first_direction"] * (-1.0) ** np.arange(len(dwells))
-    low = max(float(starts[int(np.argmax(dwells[2:-2])) + 2]) - 0.75 * _PIECE, 0.0)  # about the longest dwell
+    low = max(float(starts[int(np.argmax(dwells[2:-2])) + 2]) - 0.75 * _MAGNIFIED, 0.0)  # about the longest dwell
     figure = Figure(figsize=(_WIDTH, 4.2))
     grid = figure.add_gridspec(3, 1, height_ratios=(1, 1, 1.7))
-    whole, piece, answer = (figure.add_subplot(grid[i]) for i in range(3))
-    for axes, scale in ((whole, 60.0), (piece, 1.0)):
+    whole, interval, answer = (figure.add_subplot(grid[i]) for i in range(3))
+    for axes, scale in ((whole, 60.0), (interval, 1.0)):
         for direction, colour in ((1.0, _LEFT), (-1.0, _RIGHT)):
             spans = [
                 (start / scale, dwell / scale)
                 for start, dwell, way in zip(starts, dwells, directions, strict=False)
-                if way == direction and (axes is whole or low - dwell < start < low + _PIECE)
+                if way == direction and (axes is whole or low - dwell < start < low + _MAGNIFIED)
             ]
             axes.broken_barh(spans, (min(direction, 0.0), 1.0), facecolors=colour, lw=0)
         axes.axhline(0, color=INK, lw=0.6)
         axes.set_yticks([-0.5, 0.5], ["−1, right", "+1, left"])
         axes.set_ylim(-1, 1)
-    whole.axvspan(low / 60, (low + _PIECE) / 60, color=INK, alpha=0.35, lw=0)
+    whole.axvspan(low / 60, (low + _MAGNIFIED) / 60, color=INK, alpha=0.35, lw=0)
     whole.set_xlim(0, starts[-1] / 60)
     _label(whole, "time [min]", "motor")
-    piece.set_xlim(low, low + _PIECE)
-    _label(piece, "", "motor")
+    interval.set_xlim(low, low + _MAGNIFIED)
+    _label(interval, "", "motor")
     time, heading = track["time_s"].to_numpy(float), np.degrees(track["heading_rad"].to_numpy(float))
-    shown = (time >= low) & (time <= low + _PIECE)
+    shown = (time >= low) & (time <= low + _MAGNIFIED)
     answer.plot(time[shown], heading[shown], color=INK, lw=1.2)
-    answer.set_xlim(low, low + _PIECE)
+    answer.set_xlim(low, low + _MAGNIFIED)
     _label(answer, "time [s]", "heading [°]")
     figure.align_ylabels()
     return _finished(figure)

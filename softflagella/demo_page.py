@@ -138,7 +138,10 @@ def _add_robot(page: Page, results: Results) -> None:
             ("head radius, length", f"{format_length(robot.head_radius)}, {format_length(robot.head_length)}"),
             ("motor speed, tails relative to the head", f"{robot.motor_speed / RPM:.3g} rpm"),
             ("viscosity of the fluid", f"{robot.viscosity:.3g} Pa s"),
-            ("drag coefficients of the head C_t, C_r, C_yr", f"{robot.C_t:g}, {robot.C_r:g}, {robot.C_yr:g}"),
+            (
+                "head's coefficients of drag, spin drag and side force, C_t, C_r and C_yr",
+                f"{robot.C_t:g}, {robot.C_r:g}, {robot.C_yr:g}",
+            ),
         ],
     )
     page.text(
@@ -246,13 +249,13 @@ def _add_schedule(page: Page, results: Results, folder: Path) -> None:
     page.section("The schedule itself")
     page.text(
         f"This is all that the motor needs to know for the {name}: which way to turn, and when to flip. Blue: "
-        "+1, the robot turns left. Orange: −1, it turns right. The shaded piece of the whole schedule is "
-        "magnified below it, with the heading of the replayed robot. A longer dwell at +1 turns the robot to "
-        "the left on average."
+        "+1, the robot turns left. Orange: −1, it turns right. The shaded interval of the whole schedule is "
+        "magnified below it, with the heading of the replayed robot. A dwell is the time between two flips. "
+        "Longer dwells at +1 turn the robot to the left on average."
     )
     track = pd.read_csv(folder / name / "track.csv")
     page.figures(
-        [(draw_schedule(plan, track), "motor direction over time, a magnified piece of it, and the heading", "")]
+        [(draw_schedule(plan, track), "motor direction over time, a magnified interval, and the heading", "")]
     )  # fmt: skip
     page.text("The same for a microcontroller, from `schedule.h` (milliseconds between flips):")
     page.commands(header_excerpt((folder / name / "schedule.h").read_text()))
@@ -304,8 +307,8 @@ def _add_calibration(page: Page, results: Results, name: str) -> None:
     page.text(
         f"{len(data)} synthetic runs from a finer mesh, with noise, as a lab would measure them. "
         + (
-            "The robot behind them has an effect that the model lacks, end-over-end drag of the head of size 5. "
-            "The calibration is not told."
+            "The robot behind them has an effect that the model lacks, end-over-end drag of the head of size 5 "
+            "in units of 8π μ0 R³. The calibration is not told."
             if name.startswith("hidden")
             else "The robot behind them differs from the model in its coefficients only."
         )

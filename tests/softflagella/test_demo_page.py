@@ -178,7 +178,7 @@ def test_circles_are_drawn_to_scale() -> None:
 
 
 def test_the_schedule_is_drawn_from_its_first_direction() -> None:
-    """Dwells of 2 s at +1 and 1 s at −1, then one long dwell, which the magnified piece shows."""
+    """Dwells of 2 s at +1 and 1 s at −1, then one long dwell, which the magnified interval shows."""
     dwells = [2.0, 1.0] * 20 + [30.0] + [1.0, 2.0] * 20
     track = pd.DataFrame({"time_s": np.arange(150.0), "heading_rad": np.zeros(150)})
     for first in (1, -1):
