@@ -42,9 +42,16 @@ def compared(result: Verdict) -> list[tuple[str, Floats]]:
 
 def draw_summary(result: Verdict, data: Measurements) -> Figure:
     """Draw the residual of each output for each model, as rms over the fitted runs, in units of the noise."""
-    noise = np.sqrt(np.diag(result.base.noise.run))
     figure = Figure(figsize=(_WIDTH, 0.9 + 0.42 * len(data.outputs)))
-    axes = figure.add_subplot()
+    plot_summary(figure.add_subplot(), result, data)
+    figure.legend(fontsize=8, frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    figure.tight_layout()
+    return figure
+
+
+def plot_summary(axes: Axes, result: Verdict, data: Measurements) -> None:
+    """Draw the bars of `draw_summary`, without a legend."""
+    noise = np.sqrt(np.diag(result.base.noise.run))
     place = np.arange(len(data.outputs))[::-1]
     models = compared(result)
     height = 0.7 / len(models)
@@ -57,9 +64,6 @@ def draw_summary(result: Verdict, data: Measurements) -> Figure:
     axes.set_yticks(place, [LABELS[o] for o in data.outputs], fontsize=9)
     axes.set_xlabel("measured − model, rms, over the noise of a run", fontsize=9)
     axes.tick_params(axis="x", labelsize=8)
-    figure.legend(fontsize=8, frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
-    figure.tight_layout()
-    return figure
 
 
 def draw_residuals(result: Verdict, data: Measurements) -> list[tuple[Figure, str]]:

@@ -15,8 +15,8 @@ from sim.io.errors import InputError
 class Sigma(NamedTuple):
     """One standard deviation of a number: in its own unit, or as a share of it."""
 
-    size: float
-    relative: bool
+    size: float  # one standard deviation
+    relative: bool  # a share of the number
 
     def of(self, value: float) -> float:
         """Compute σ in the unit of `value`."""
