@@ -135,35 +135,14 @@ def _query_points(arguments: Namespace) -> None:
     argument("--free", default="C_t,C_r,C_yr", help="inputs to find, with commas (default: C_t,C_r,C_yr)"),
 )
 def _inverse(arguments: Namespace) -> None:
-    import pandas as pd
-
     from sim.io.files import write_csv
     from sim.io.tables import read_table
-    from sim.motion.steady_motion import STEADY_OUTPUTS
-    from surrogate.input_ranges import BOUNDS
-    from surrogate.table.inverse import inverse
+    from surrogate.table.inverse import inverse_table
     from surrogate.table.model_file import load
 
     points = read_table(arguments.targets)
     names = [name.strip() for name in arguments.free.split(",")]
-    for name in names:
-        if name not in BOUNDS:
-            raise InputError(f"--free {name}; allowed are {', '.join(BOUNDS)}")
-    columns = {str(c): points[c].to_numpy() for c in points}
-    targets = {name: array for name, array in columns.items() if name in STEADY_OUTPUTS}
-    if not targets:
-        raise InputError(f"{arguments.targets} has no outputs; give at least one of {', '.join(STEADY_OUTPUTS)}")
-    robots = {name: array for name, array in columns.items() if name not in targets}
-    bounds = {name: BOUNDS[name] for name in names}
-    solutions = inverse(load(arguments.model), robots, targets, bounds)
-    table = pd.DataFrame(
-        {
-            "target": solutions.target + 1,
-            **solutions.inputs,
-            "misfit": solutions.misfit,
-            "outside": solutions.outside,
-        }
-    )
+    table = inverse_table(load(arguments.model), points, names, where=arguments.targets)
     write_csv(table, arguments.out)
     print(f"{len(table)} solutions of {len(points)} targets -> {arguments.out}")
 

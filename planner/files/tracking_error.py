@@ -7,7 +7,7 @@ as given is computed, too. A track holds the head's centre and the heading. The 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -28,16 +28,24 @@ _LAB = ("time_s", "x_m", "y_m", "heading_rad")  # or in other units
 
 @dataclass(frozen=True)
 class TrackingError:
-    """Errors in tail lengths l, from the declared path; those called raw from the path as given."""
+    """Errors in tail lengths l, from the declared path; those called raw from the path as given.
 
-    rms: float
-    largest: float
-    raw_rms: float
-    raw_largest: float
+    Example:
+        >>> from softflagella import check, circle, plan, replay
+        >>> result = plan(circle(1.2), "paper-control", objective="flips")
+        >>> error = check(result, replay(result))
+        >>> error.rms < error.largest < error.stated
+        True
+    """
+
+    rms: float  # over time
+    largest: float  # distance from the declared path
+    raw_rms: float  # over time, from the path as given
+    raw_largest: float  # distance from the path as given
     missed: float  # largest distance of a point of the path as given from the track
-    stated: float
-    track: Floats  # (K, 2) tracked point
-    tail_length: float  # in m
+    stated: float  # error that the plan states
+    track: Floats = field(repr=False)  # (K, 2) tracked point
+    tail_length: float  # of the robot [m]
 
     @property
     def line(self) -> str:

@@ -33,11 +33,11 @@ class GoalPlan:
         True
     """
 
-    plan: Plan
-    goal: Pose
+    plan: Plan  # the schedule on the way
+    goal: Pose  # as asked for
     end: Pose  # predicted
-    via: tuple[tuple[float, float], ...]
-    free_space: FreeSpace
+    via: tuple[tuple[float, float], ...]  # places x, y that the pivot passes
+    free_space: FreeSpace  # walls and regions
     length: float  # of the pivot's track
     margin: float  # kept around the body on the declared path; 0 without obstacles
     clearance: float  # smallest, of the body on the predicted track; infinite without obstacles

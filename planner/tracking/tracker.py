@@ -53,11 +53,17 @@ QUANTILE = 1.96
 
 
 class Command(NamedTuple):
-    """What the motor does now, and when it must flip next."""
+    """What the motor does now, and when it must flip next.
+
+    Example:
+        >>> from softflagella import Tracker, circle, plan
+        >>> Tracker(plan(circle(2.0), "paper-control")).update(0.0).direction
+        1
+    """
 
     direction: int  # +1 or −1; 0 at the end
     flip_at: float  # time of the next flip, or of the end
-    finished: bool
+    finished: bool  # the path has ended
     alarm: bool  # the robot is incompatible with the model: calibrate again
     error: float  # 95 % bound on the present distance from the path, zigzag included [l]
 

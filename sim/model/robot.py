@@ -36,20 +36,20 @@ class Robot:
         (2.207, 10.0)
     """
 
-    name: str
-    tails: int
-    tail_length: float
-    tail_radius: float
-    youngs_modulus: float
-    head_radius: float
-    head_length: float
-    viscosity: float
-    motor_speed: float
-    C_t: float
-    C_r: float
-    C_yr: float
+    name: str  # in messages and files
+    tails: int  # N
+    tail_length: float  # l [m]
+    tail_radius: float  # r0 [m]
+    youngs_modulus: float  # E of the tails [Pa]
+    head_radius: float  # R [m]
+    head_length: float  # L [m]
+    viscosity: float  # μ0 [Pa s]
+    motor_speed: float  # ω, tails relative to head, a magnitude [rad/s]
+    C_t: float  # the head's translational drag
+    C_r: float  # the head's spin drag
+    C_yr: float  # the head's side force
     disc_offset: float | None = None  # a; None: the head's radius
-    effects: Mapping[str, float] = field(default_factory=dict)
+    effects: Mapping[str, float] = field(default_factory=dict)  # name -> size
     sigmas: Mapping[str, Sigma] = field(default_factory=dict)  # of the fields that state one, see `sigma`
     correction: Correction | None = None  # what a calibration learnt that no effect explains
 

@@ -23,7 +23,6 @@ class Schedule:
         dwells: times between flips, (M,), in units of μ0 l⁴/EI.
         start: x, y [l] and heading [rad] of the head's centre.
         time_scale: the unit of time in seconds.
-        tail_length: l in m; without it tracks are in l alone.
 
     Raises:
         InputError: a direction, dwell, pose or time scale is not possible.
@@ -37,12 +36,12 @@ class Schedule:
         2.0
     """
 
-    robot: Mapping[str, float]
-    first_direction: int
-    dwells: Floats
-    start: tuple[float, float, float]
-    time_scale: float
-    tail_length: float | None = None
+    robot: Mapping[str, float]  # dimensionless groups and sizes of effects
+    first_direction: int  # of the motor, +1 or −1
+    dwells: Floats  # (M,) [μ0 l⁴/EI]
+    start: tuple[float, float, float]  # x, y [l] and heading [rad] of the head's centre
+    time_scale: float  # μ0 l⁴/EI [s]
+    tail_length: float | None = None  # l [m]; without it tracks are in l alone
 
     def __post_init__(self) -> None:
         if self.first_direction not in (-1, 1):
