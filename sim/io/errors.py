@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 INTERRUPTED, CLOSED_PIPE = 130, 141  # exit statuses as shells give them: 128 + SIGINT, 128 + SIGPIPE
 
@@ -27,6 +29,16 @@ class InputError(ValueError):
     """
 
     status = 2  # of a command
+
+
+@contextmanager
+def naming(path: str | Path) -> Iterator[None]:
+    """Write the name of a file before the message of an `InputError` that does not have it."""
+    try:
+        yield
+    except InputError as refusal:
+        message = " ".join(str(refusal).split())
+        raise type(refusal)(message if str(path) in message else f"{path}: {message}") from None
 
 
 def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None = None) -> int:
