@@ -12,7 +12,7 @@ standard errors are widened by the correlation time of the residuals. A run that
 fitted by a straight line. It gives only a speed and a slip angle.
 
 The tracked point must be the head's centre; with another point the calibration finds `tracked_point`. Times are in
-s, lengths in cm, angles in degrees, counter-clockwise, seen from above.
+s, lengths in cm, angles in degrees, counter-clockwise, seen from above (docs/reference/signs.md).
 """
 
 from __future__ import annotations

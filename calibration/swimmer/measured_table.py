@@ -1,6 +1,6 @@
 """Measured tables: one run a row, units in the column names.
 
-Needed: N, l_cm, omega_rpm (tails relative to head, signed) and some of the outputs
+Needed: N, l_cm, omega_rpm (tails relative to head; docs/reference/signs.md has the signs) and some of the outputs
 
     omega_h_rpm, omega_t_rpm, omega_yr_rad_s (signed), R_yr_cm, theta_deg, v_cm_s (of the head's centre).
 
@@ -11,7 +11,8 @@ circle). Rows that cannot be used are excluded with number and reason. So are co
 name looks like a misspelt one.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians. A
-row with a wrong sign is a bad row, because the direction of the motor determines all signs.
+row with a wrong sign is a bad row, because the direction of the motor determines all signs
+(docs/reference/signs.md).
 """
 
 from __future__ import annotations
@@ -40,6 +41,11 @@ OUTPUTS = {
     "R_yr": ("R_yr_cm", 0.01, 0),
     "theta": ("theta_deg", math.pi / 180, 0),
     "v": ("v_cm_s", 0.01, 0),
+}
+_SENSES = {
+    "omega_h": "the head turns against the motor",
+    "omega_t": "the tails turn with the motor",
+    "omega_yr": "a positive motor turns the robot to the left (counter-clockwise) seen from above",
 }
 _QUANTITIES = {**{name: column for name, (column, _, _) in OUTPUTS.items()}, "l": "l_cm", "omega": "omega_rpm"}
 _UNIT_SUFFIXES = {
@@ -246,7 +252,8 @@ def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...
     sign = np.sign(values["omega_rpm"])
     for i in np.flatnonzero(sign == 0):
         reasons[i] = reasons[i] or "omega_rpm = 0"
-    for column, _, expected in (OUTPUTS[name] for name in outputs if OUTPUTS[name][2]):
+    for name, (column, _, expected) in ((name, OUTPUTS[name]) for name in outputs if OUTPUTS[name][2]):
         for i in np.flatnonzero(values[column] * sign * expected <= 0):
-            reasons[i] = reasons[i] or f"{column} = {values[column][i]:g} has the wrong sign for its omega_rpm"
+            fault = f"{column} = {values[column][i]:g} has the wrong sign for its omega_rpm: {_SENSES[name]}"
+            reasons[i] = reasons[i] or fault
     return reasons

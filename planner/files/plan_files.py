@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from planner.files.plan_json import plan_record
-from planner.files.tracker_header import safe_name, tracker_header
+from planner.files.tracker_header import DIRECTIONS, safe_name, tracker_header
 from planner.planning.plan import Plan
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_csv, write_text
@@ -125,8 +125,9 @@ def controller_header(result: Plan, identity: str) -> str:
  * Motor schedule for robot "{safe_name(result)}": turn in FIRST_DIRECTION for the first entry,
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
  * lengthens the dwell before it. Stop after the last entry. Look-up table {result.tracked.model}.
+{DIRECTIONS}
  * Put the head's centre at START_X, START_Y with heading START_HEADING, at rest. Checkpoints say where it should
- * be later. x and y in tail lengths, heading in rad from the x axis to the left. */
+ * be later. x and y in tail lengths, heading in rad, counter-clockwise from the x axis, seen from above. */
 #ifndef SCHEDULE_H
 #define SCHEDULE_H
 #include <stdint.h>

@@ -28,6 +28,12 @@ _PARTS = ("follower.h", "estimate.h", "tracker.h")
 _LARGEST = 32_767
 _FLOAT_EXACT = 3e-6  # rad; in single precision a smaller angle is lost in the rounding
 
+# Comment of both headers; docs/reference/signs.md defines the signs.
+DIRECTIONS = """\
+ * Direction +1: the motor turns the tails clockwise relative to the head, seen from behind. The robot then turns
+ * left, seen from above. Direction -1: the mirror image. Check it on the bench: +1 for five seconds must turn the
+ * robot left. If it turns right, exchange the two wires of the motor, or -1 and +1 in your code."""
+
 
 def tracker_header(result: Plan, identity: str) -> str:
     """Write tracker.h as text; `identity` names the plan."""
@@ -75,8 +81,9 @@ def _intro(result: Plan, identity: str) -> str:
  *
  * Turn the motor in advice.direction and flip it at advice.flip_at. Call tracker_feed after each flip, so that the
  * next one is announced. Times are in seconds. x, y and their noise are in tail lengths, the heading and its noise
- * in rad, from the x axis to the left. Before you include this file, define TRACKER_FLOAT for single precision;
- * times stay double. Include it in one file only, since it holds the tables. */
+ * in rad, counter-clockwise from the x axis, seen from above. Before you include this file, define TRACKER_FLOAT
+ * for single precision; times stay double. Include it in one file only, since it holds the tables.
+{DIRECTIONS} */
 #ifndef TRACKER_H
 #define TRACKER_H
 #include <math.h>

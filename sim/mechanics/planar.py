@@ -1,7 +1,7 @@
 """Planar rigid motion: poses and twists in the plane seen from above.
 
-A pose is (x, y, ψ): position, and heading ψ counter-clockwise from x. A twist is (forward, left, yaw rate) in the
-body frame. Constant for a time T, it moves the body along an arc:
+A pose is (x, y, ψ): position, and heading ψ counter-clockwise from x (docs/reference/signs.md). A twist is
+(forward, left, yaw rate) in the body frame. Constant for a time T, it moves the body along an arc:
 
     p(T) = ( sin Ω T/Ω   −(1 − cos Ω T)/Ω ; (1 − cos Ω T)/Ω   sin Ω T/Ω ) (v_forward, v_left),  ψ = Ω T.
 

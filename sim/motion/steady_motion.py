@@ -4,6 +4,7 @@
     R_yr = √(v_x² + v_z²)/|ω_yr|,   θ = atan2(|v_x|, v_z)
 
 R_yr and θ are those of the head's centre. Those of another point of the axis follow from (v_x, v_z, ω_yr).
+docs/reference/signs.md defines the signs.
 Units: l, μ0 l⁴/EI.
 """
 

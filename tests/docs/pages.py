@@ -61,7 +61,12 @@ def replaced_words() -> list[str]:
 
 def generator() -> ModuleType:
     """Import docs/generate.py as a module."""
-    spec = importlib.util.spec_from_file_location("generate", DOCS / "generate.py")
+    return module_of_docs("generate")
+
+
+def module_of_docs(name: str) -> ModuleType:
+    """Import a module of the folder docs."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
     assert spec
     assert spec.loader
     module = importlib.util.module_from_spec(spec)
