@@ -50,6 +50,8 @@ def _calibrate(arguments: Namespace) -> None:
     robot = load_robot(arguments.robot)
     check_given(robot)
     data = read_measurements(arguments.table)
+    for line in data.converted:
+        print(line, file=sys.stderr)
     for line in data.excluded:
         print(f"excluded: {line}", file=sys.stderr)
     data, held_out = PROTOCOLS[arguments.protocol](data)
@@ -135,20 +137,35 @@ def _simulate(arguments: Namespace) -> None:
 @program.command(
     "tracks",
     "turn camera tracks into a table of runs",
-    argument("tracks", help="CSV: run, time_s, x_cm, y_cm, heading_deg"),
-    argument("runs", help="CSV: run, N, l_cm, omega_rpm and other columns of a measured table"),
+    argument(
+        "tracks", help="table with run, time_s, x_cm, y_cm, heading_deg, or in other units: x_mm, heading_rad"
+    ),
+    argument("runs", help="table with run, N, l_cm, omega_rpm and other columns of a measured table"),
     argument("--y-down", action="store_true", help="y and headings are those of a picture, with y downwards"),
+    argument(
+        "--robot", help="robot.toml or the name of a preset, to compare the tracks with its simulated motion"
+    ),
+    argument("--check", metavar="PNG", help="draw the fitted circles over the tracks"),
     out("CSV"),
 )
 def _tracks(arguments: Namespace) -> None:
+    from calibration.report.track_pictures import draw_tracks
     from calibration.swimmer.camera_tracks import measure_tracks
-    from sim.io.files import write_csv
+    from sim.inputs import load_robot
+    from sim.io.files import whole_file, write_csv
 
-    table, aside = measure_tracks(arguments.tracks, arguments.runs, y_down=arguments.y_down)
-    for line in aside:
+    robot = None if arguments.robot is None else load_robot(arguments.robot)
+    measured = measure_tracks(arguments.tracks, arguments.runs, y_down=arguments.y_down, robot=robot)
+    for line in measured.converted:
+        print(line, file=sys.stderr)
+    for line in measured.excluded:
         print(f"excluded: {line}", file=sys.stderr)
-    write_csv(table, arguments.out, digits=6)
-    print(f"{len(table)} runs -> {arguments.out}")
+    write_csv(measured.table, arguments.out, digits=6)
+    if arguments.check:
+        with whole_file(arguments.check) as part:
+            draw_tracks(measured.tracks).savefig(part, format="png", dpi=110)
+    pictures = f", {arguments.check}" if arguments.check else ""
+    print(f"{len(measured.table)} runs -> {arguments.out}{pictures}")
 
 
 if __name__ == "__main__":

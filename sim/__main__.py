@@ -15,12 +15,47 @@ main = program.main
 
 @program.command(
     "steady",
-    "mean motion of robots at constant motor speed",
-    argument("points", help="CSV: C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…"),
-    out("CSV with the same rows and their motion"),
+    "mean motion of a robot, or of many, at constant motor speed",
+    argument("robot", metavar="ROBOT", help="robot.toml, the name of a preset, or a table of points: CSV with "
+             "C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…"),
+    out("CSV with the same rows and their motion; needed for a table of points", default=None),
     JOBS,
-)
+)  # fmt: skip
 def _steady(arguments: Namespace) -> None:
+    from sim.inputs import names_robot
+
+    if names_robot(arguments.robot):
+        _steady_robot(arguments)
+    elif arguments.out is None:
+        raise InputError(f"{arguments.robot} is a table of points; name the file of their motion with --out")
+    else:
+        _steady_points(arguments)
+
+
+def _steady_robot(arguments: Namespace) -> None:
+    """Print the motion of one robot in lab units, beside the dimensionless numbers."""
+    import numpy as np
+    import pandas as pd
+
+    from sim.inputs import load_robot
+    from sim.io.files import write_csv
+    from sim.motion.batches import steady_columns
+    from sim.motion.lab_units import describe_motion, lab_motion
+
+    robot = load_robot(arguments.robot)
+    columns = {name: np.array([value]) for name, value in robot.group_values().items()}
+    motion = steady_columns(columns, jobs=arguments.jobs, title="")
+    print(describe_motion(robot, motion))
+    if motion["note"][0]:
+        print(f"note: {motion['note'][0]}", file=sys.stderr)
+    if arguments.out:
+        table = pd.DataFrame({"robot": [robot.name], **lab_motion([robot], motion), **motion})
+        write_csv(table, arguments.out)
+        print(f"-> {arguments.out}")
+
+
+def _steady_points(arguments: Namespace) -> None:
+    """Simulate every row of a table."""
     import numpy as np
     import pandas as pd
 
@@ -31,7 +66,7 @@ def _steady(arguments: Namespace) -> None:
     from sim.motion.batches import steady_columns
     from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS
 
-    points = read_table(arguments.points)
+    points = read_table(arguments.robot)
     replaced = [name for name in (*STEADY_COLUMNS, *QUALITY_COLUMNS) if name in points]
     if replaced:
         print(

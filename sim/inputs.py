@@ -65,6 +65,12 @@ def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
     return values
 
 
+def names_robot(source: str | Path) -> bool:
+    """Tell whether words name a robot, a preset or a robot.toml, rather than a table of points."""
+    path = Path(source)
+    return str(source) in PRESETS or path.suffix == ".toml" or not (path.suffix or path.exists())
+
+
 def load_robot(source: str | Path) -> Robot:
     """Load a robot from a preset's name or a robot.toml.
 

@@ -22,6 +22,7 @@ from sim.model.robot import Robot as Robot
 from sim.model.schedule import Schedule as Schedule
 from sim.model.schedule import load_schedule as load_schedule
 from softflagella.api.calibrate import calibrate as calibrate
+from softflagella.api.query import query as query
 from softflagella.api.simulate import replay as replay
 from softflagella.api.simulate import response as response
 from softflagella.api.simulate import sensitivities as sensitivities

@@ -10,6 +10,7 @@ from sim.io.commands import Command, Program, out
 from sim.io.errors import run_command
 
 WORDS = {  # the most important commands -> package and command
+    "steady": ("sim", "steady"),
     "plan": ("planner", "plan"),
     "sweep": ("dataset", "build"),
     "train": ("surrogate", "train"),

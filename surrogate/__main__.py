@@ -60,16 +60,54 @@ def _train(arguments: Namespace) -> None:
 
 @program.command(
     "query",
-    "predict rows, with intervals, without simulating",
-    argument("points", help="CSV like that of softflagella sim steady; dwell_bar optional"),
-    out("CSV"),
+    "predict the motion of a robot, or of many, with intervals, without simulating",
+    argument("robot", metavar="ROBOT", help="robot.toml, the name of a preset, or a table of points like that of "
+             "softflagella steady, dwell_bar optional"),
+    out("CSV; needed for a table of points", default=None),
     MODEL,
     argument(
         "--flag", action="store_true", help="answer outside the domain, too; the column `outside` says where"
     ),
     argument("--certify", action="store_true", help="simulate each row as well: the column `certified_error`"),
-)
+)  # fmt: skip
 def _query(arguments: Namespace) -> None:
+    from sim.inputs import names_robot
+
+    if names_robot(arguments.robot):
+        _query_robot(arguments)
+    elif arguments.out is None:
+        raise InputError(f"{arguments.robot} is a table of points; name the file of the answers with --out")
+    else:
+        _query_points(arguments)
+
+
+def _query_robot(arguments: Namespace) -> None:
+    """Print the answer for one robot in lab units, beside the dimensionless numbers."""
+    import numpy as np
+    import pandas as pd
+
+    from sim.inputs import load_robot
+    from sim.io.files import write_csv
+    from sim.motion.lab_units import describe_motion, lab_motion
+    from surrogate.table.answers import answer_with_error
+    from surrogate.table.model_file import load_table
+
+    robot, table = load_robot(arguments.robot), load_table(arguments.model)
+    columns = {name: np.array([value]) for name, value in robot.group_values().items()}
+    answer = answer_with_error(table, columns, flag=arguments.flag, certify=arguments.certify)
+    print(describe_motion(robot, answer, error="relative error of the look-up table (90 %)"))
+    if arguments.certify and "certified_error" in answer:
+        print(f"  certified relative error {100 * answer['certified_error'][0]:.2g} %")
+    if arguments.flag and answer.get("outside", [False])[0]:
+        print("note: the robot is outside the domain of the look-up table", file=sys.stderr)
+    if arguments.out:
+        rows = pd.DataFrame({"robot": [robot.name], **lab_motion([robot], answer), **answer})
+        write_csv(rows, arguments.out)
+        print(f"-> {arguments.out}")
+
+
+def _query_points(arguments: Namespace) -> None:
+    """Answer for every row of a table."""
     import pandas as pd
 
     from sim.io.files import write_csv
@@ -77,7 +115,7 @@ def _query(arguments: Namespace) -> None:
     from surrogate.table.lookup import NeuralTable
     from surrogate.table.model_file import load_table
 
-    points = read_table(arguments.points)
+    points = read_table(arguments.robot)
     table = load_table(arguments.model)
     columns = {str(c): points[c].to_numpy() for c in points}
     if isinstance(table, NeuralTable):

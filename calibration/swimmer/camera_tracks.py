@@ -1,82 +1,92 @@
 """Raw tracks from a camera to measured outputs: circle, yaw rate, slip angle and speed of every run, with errors.
 
-A run at constant motor speed is a circle with a heading that turns at the same rate,
+`calibration.swimmer.track_fit` fits a track. Here tables are read, and checked for what a camera's software often
+gets wrong: units, the direction of the y axis, the side of the turn, the size of the motion.
 
-    x = c_x + R cos α,  y = c_y + R sin α,  heading = h0 + ω_yr t,   α = α0 + ω_yr t,
-
-fitted to all samples of a run at once (least squares; positions and heading weighted by their own scatter). A run
-of a whole turn or more also shows whether the circle drifts in a current, c → c + U t. Then its radius and speed
-are those relative to the fluid. The slip angle is the angle between the heading and the tangent of the circle. The
-speed is R |ω_yr|. Samples of a camera are not independent, because the robot wobbles as its disc turns. So
-standard errors are widened by the correlation time of the residuals. A run that turns by less than LEAST_TURN is
-fitted by a straight line. It gives only a speed and a slip angle.
-
-The tracked point must be the head's centre; with another point the calibration finds `tracked_point`. Times are in
-s, lengths in cm, angles in degrees, counter-clockwise, seen from above (docs/reference/signs.md).
+The tracked point must be the head's centre; with another point the calibration finds `tracked_point`. Columns in
+other units than COLUMNS are converted. Angles are counter-clockwise, seen from above (docs/reference/signs.md).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import least_squares
 
+from calibration.swimmer.measured_table import INPUTS, OUTPUTS, SYNONYMS
+from calibration.swimmer.possible_runs import check_factor
+from calibration.swimmer.track_fit import TrackedRun, TrackFit, fit_track
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.quantities import convert_columns
 from sim.io.tables import read_table
+from sim.model.robot import Robot
+from sim.motion.batches import steady_columns
 
 COLUMNS = ("run", "time_s", "x_cm", "y_cm", "heading_deg")
-LEAST_TURN = math.radians(20)  # smallest turn of a run to which a circle is fitted
+_SYNONYMS = {"t": "time"}
 _FEWEST = 12  # samples that a run needs
 _ALIKE = 1.3  # ratio of the angles by which path and heading turn
 
 
-@dataclass(frozen=True)
-class TrackedRun:
-    """Results of one track; NaN where it does not give a result; errors are standard errors."""
+class Track(NamedTuple):
+    """A track (m,) and what was fitted to it; positions in cm, x to the right and y upwards."""
 
-    omega_yr_rad_s: float = math.nan
-    omega_yr_error: float = math.nan
-    R_yr_cm: float = math.nan
-    R_yr_error: float = math.nan
-    theta_deg: float = math.nan
-    theta_error: float = math.nan
-    v_cm_s: float = math.nan
-    v_error: float = math.nan
-    drift_x_cm_s: float = math.nan  # of the circle
-    drift_y_cm_s: float = math.nan
-    drift_error: float = math.nan
+    run: object
+    x: Floats
+    y: Floats
+    fit: TrackFit
+
+
+class MeasuredTracks(NamedTuple):
+    """Runs with what their tracks give."""
+
+    table: pd.DataFrame  # for `calibration.swimmer.measured_table`
+    excluded: list[str]  # what was left out, and why
+    tracks: list[Track]
+    converted: tuple[str, ...]  # columns that were renamed or converted, in words
 
 
 def measure_tracks(
-    tracks: str | Path | pd.DataFrame, runs: str | Path | pd.DataFrame, *, y_down: bool = False
-) -> tuple[pd.DataFrame, list[str]]:
+    tracks: str | Path | pd.DataFrame,
+    runs: str | Path | pd.DataFrame,
+    *,
+    y_down: bool = False,
+    robot: Robot | None = None,
+) -> MeasuredTracks:
     """Make a table for `calibration.swimmer.measured_table` from tracks and the settings of each run.
 
     Args:
-        tracks: run, time_s, x_cm, y_cm, heading_deg; one row for each sample.
+        tracks: run, time_s, x_cm, y_cm, heading_deg, or these in other units; one row for each sample.
         runs: run, N, l_cm, omega_rpm and other notes; one row for each run.
         y_down: y and headings are those of a picture, whose y axis points down.
+        robot: the robot as given; what the tracks give is compared with its simulated motion.
 
     Returns:
-        The runs with omega_yr_rad_s, R_yr_cm, theta_deg, v_cm_s and their errors; what was excluded, and why.
+        The runs with omega_yr_rad_s, R_yr_cm, theta_deg, v_cm_s and their errors, and the fits.
 
     Raises:
-        InputError: a column is missing, headings are in radians, all runs turn to the wrong side, or no track
-            gives a number.
+        InputError: a column is missing, headings are in radians, all runs turn to the wrong side, no track gives
+            a number, or all are far from what the robot does.
     """
-    samples = tracks if isinstance(tracks, pd.DataFrame) else read_table(tracks)
-    table = runs if isinstance(runs, pd.DataFrame) else read_table(runs)
+    samples, where = (
+        (tracks, "the tracks") if isinstance(tracks, pd.DataFrame) else (read_table(tracks), str(tracks))
+    )
+    table, place = (runs, "the runs") if isinstance(runs, pd.DataFrame) else (read_table(runs), str(runs))
+    samples, converted = convert_columns(samples, COLUMNS, where, _SYNONYMS)
+    table, renamed = convert_columns(table, INPUTS, place, SYNONYMS)
     for name in COLUMNS:
         if name not in samples:
             raise InputError(f"the tracks have no column {name!r}; they need {', '.join(COLUMNS)}")
     if "run" not in table:
         raise InputError("the runs have no column 'run' that says which track is theirs")
-    aside, tracked = [], []
+    aside: list[str] = []
+    tracked: list[TrackedRun] = []
+    fitted: list[Track] = []
     for run in table["run"]:
         track = samples[samples["run"] == run][list(COLUMNS[1:])].apply(pd.to_numeric, errors="coerce")
         bad = int((~np.isfinite(track.to_numpy())).any(axis=1).sum())
@@ -90,13 +100,17 @@ def measure_tracks(
         time, x, y, heading = (track[c].to_numpy(dtype=float) for c in COLUMNS[1:])
         _check_radians(run, x, y, heading)
         side = -1.0 if y_down else 1.0
-        tracked.append(measure_track(time, x, side * y, side * heading))
+        fit = fit_track(time, x, side * y, side * heading)
+        tracked.append(fit.result)
+        fitted.append(Track(run, x, side * y, fit))
     columns = pd.DataFrame([asdict(p) for p in tracked], index=table.index)
     known = [c for c in columns if columns[c].notna().any()]
     if not known:
         raise InputError(f"no track gives a number{f' ({aside[0]})' if aside else ''}; check the tracks")
     _check_sides(table, columns, y_down)
-    return pd.concat([table, columns[known]], axis=1), aside
+    if robot is not None:
+        _check_motion(robot, table, columns)
+    return MeasuredTracks(pd.concat([table, columns[known]], axis=1), aside, fitted, (*converted, *renamed))
 
 
 def _check_radians(run: object, x: Floats, y: Floats, heading_deg: Floats) -> None:
@@ -134,83 +148,30 @@ def _check_sides(runs: pd.DataFrame, measured: pd.DataFrame, y_down: bool) -> No
         )
 
 
-def measure_track(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> TrackedRun:
-    """Fit a circle or a line to one track; arrays (m,)."""
-    time = time - time.mean()
-    heading = np.unwrap(np.radians(heading_deg))
-    rate, middle = np.polyfit(time, heading, 1)
-    if abs(rate) * np.ptp(time) < LEAST_TURN:
-        return _line(time, x, y, heading)
-    scatter_h = max(float(np.std(heading - rate * time - middle)), 1e-9)
-    # On the circle the position is linear in (c_x, c_y, R cos α0, R sin α0) for a given rate.
-    drifts = abs(rate) * np.ptp(time) >= 2 * math.pi
-    turn = np.exp(1j * rate * time)
-    design = np.stack([np.ones_like(turn), turn, *([time] if drifts else [])], 1)
-    weights = np.linalg.lstsq(design, x + 1j * y, rcond=None)[0]
-    centre, arm, *drift = weights
-    scatter = max(float(np.abs(x + 1j * y - design @ weights).std() / math.sqrt(2)), 1e-9)
-    start = [centre.real, centre.imag, abs(arm), np.angle(arm), rate, middle]
-    start += [part for u in drift for part in (u.real, u.imag)]
+def _check_motion(robot: Robot, runs: pd.DataFrame, measured: pd.DataFrame) -> None:
+    """Compare what the tracks give with the simulated motion of the robot as given.
 
-    def residual(p: Floats) -> Floats:
-        angle = p[3] + p[4] * time
-        u, w = (p[6], p[7]) if drifts else (0.0, 0.0)
-        off_x = (x - p[0] - u * time - p[2] * np.cos(angle)) / scatter
-        off_y = (y - p[1] - w * time - p[2] * np.sin(angle)) / scatter
-        return np.concatenate([off_x, off_y, (heading - p[5] - p[4] * time) / scatter_h])
-
-    fitted = least_squares(residual, start, x_scale=np.maximum(np.abs(start), 1e-3))
-    covariance = _covariance(np.asarray(fitted.jac), fitted.fun, 3)
-    radius, angle, rate, middle, *drift = fitted.x[2:]
-    drifted = [*map(float, drift), math.sqrt((covariance[6, 6] + covariance[7, 7]) / 2)] if drifts else []
-    tangent = angle + math.copysign(math.pi / 2, rate)
-    slip = abs(math.remainder(middle - tangent, 2 * math.pi))
-    slip_error = math.sqrt(covariance[3, 3] + covariance[5, 5] - 2 * covariance[3, 5])
-    speed_error = math.sqrt(
-        rate**2 * covariance[2, 2] + radius**2 * covariance[4, 4] + 2 * abs(rate) * radius * covariance[2, 4]
-        * math.copysign(1, rate)
-    )  # fmt: skip
-    return TrackedRun(
-        float(rate), math.sqrt(covariance[4, 4]), float(radius), math.sqrt(covariance[2, 2]), math.degrees(slip),
-        math.degrees(slip_error), float(abs(rate) * radius), speed_error,
-        *drifted,
-    )  # fmt: skip
-
-
-def _line(time: Floats, x: Floats, y: Floats, heading: Floats) -> TrackedRun:
-    design = np.stack([np.ones_like(time), time], 1)
-    fits, variances = [], []
-    for values in (x, y, heading):
-        line = np.linalg.lstsq(design, values, rcond=None)[0]
-        fits.append(line)
-        variances.append(_covariance(design, values - design @ line, 1))
-    v_x, v_y = fits[0][1], fits[1][1]
-    speed = math.hypot(v_x, v_y)
-    error = math.sqrt((v_x**2 * variances[0][1, 1] + v_y**2 * variances[1][1, 1]) / speed**2)
-    slip = abs(math.remainder(fits[2][0] - math.atan2(v_y, v_x), 2 * math.pi))
-    slip_error = math.sqrt(variances[2][0, 0] + (error / speed) ** 2)
-    return TrackedRun(
-        theta_deg=math.degrees(slip), theta_error=math.degrees(slip_error), v_cm_s=speed, v_error=error
-    )
-
-
-def _covariance(J: Floats, residual: Floats, parts: int) -> Floats:
-    """Estimate the covariance of a fit to `parts` series in time, each with its own scatter and correlation."""
-    inverse = np.linalg.pinv(J.T @ J)
-    middle = np.zeros_like(inverse)
-    for rows, series in zip(np.split(J, parts), np.split(residual, parts), strict=True):
-        variance = float(series @ series) / max(len(series) - J.shape[1] / parts, 1)
-        middle += variance * _correlation_time(series) * rows.T @ rows
-    return np.asarray(inverse @ middle @ inverse)
-
-
-def _correlation_time(residual: Floats) -> float:
-    """Compute the integrated autocorrelation time in samples, at least 1 (summed up to its first zero)."""
-    centred = residual - residual.mean()
-    power = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
-    correlation = np.fft.irfft(power)[: len(centred)]
-    if correlation[0] <= 0:
-        return 1.0
-    correlation = correlation / correlation[0]
-    end = int(np.argmax(correlation <= 0)) or len(correlation)
-    return float(max(1.0, 1 + 2 * correlation[1:end].sum()))
+    Raises:
+        InputError: the runs lack a setting, or an output is far from the simulated one in all runs together.
+    """
+    missing = [name for name in INPUTS if name not in runs]
+    if missing:
+        raise InputError(f"the runs have no column {missing[0]!r}; the comparison with a robot needs it")
+    settings = runs[list(INPUTS)].apply(pd.to_numeric, errors="coerce")
+    usable = (settings["N"] >= 1) & (settings["l_cm"] > 0) & (settings["omega_rpm"].abs() > 0)
+    swimmers = [
+        replace(robot, tails=int(tails), tail_length=cm / 100, motor_speed=abs(rpm) * math.tau / 60)
+        for tails, cm, rpm in settings[usable].itertuples(index=False)
+    ]
+    if not swimmers:
+        return
+    columns = pd.DataFrame([swimmer.group_values() for swimmer in swimmers]).to_dict("list")
+    motion = steady_columns({str(name): np.array(values) for name, values in columns.items()})
+    rate = np.abs(motion["omega_yr_bar"]) / np.array([swimmer.time_scale for swimmer in swimmers])
+    radius = motion["R_yr_over_l"] * np.array([100 * swimmer.tail_length for swimmer in swimmers])
+    for output, simulated in (
+        ("omega_yr", rate), ("R_yr", radius), ("theta", motion["theta_deg"]), ("v", rate * radius)
+    ):  # fmt: skip
+        factors = np.abs(measured[OUTPUTS[output][0]][usable].to_numpy(dtype=float)) / simulated
+        if np.isfinite(factors).any():
+            check_factor(output, float(np.nanmedian(factors)))

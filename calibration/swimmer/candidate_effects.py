@@ -57,7 +57,7 @@ def influences() -> dict[str, Influence]:
             unit="m/s",
             plausible=(-0.02, 0.02),
         )
-        known[name] = Influence(current, None, f"heading_{axis}", False)
+        known[name] = Influence(current, None, f"course_{axis}", False)
     known[SLIP] = Influence(slip, None, None, False)
     known[TRACKED_POINT] = Influence(point, None, None, False)
     return dict(sorted(known.items()))
@@ -92,7 +92,7 @@ def reason_untestable(
 _COLUMNS = {
     "elapsed_h": "elapsed_min, differing between the runs",
     "temperature_K": "temperature_C, differing between the runs",
-    "heading_x": "heading_deg, differing between the runs",
-    "heading_y": "heading_deg, differing between the runs",
+    "course_x": "course_deg, differing between the runs",
+    "course_y": "course_deg, differing between the runs",
     "head_over_tank": "tank_diameter_cm, differing between the runs",
 }

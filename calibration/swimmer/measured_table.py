@@ -4,9 +4,11 @@ Needed: N, l_cm, omega_rpm (tails relative to head; docs/reference/signs.md has 
 
     omega_h_rpm, omega_t_rpm, omega_yr_rad_s (signed), R_yr_cm, theta_deg, v_cm_s (of the head's centre).
 
+Columns in other units (R_yr_mm, "theta [rad]") are converted, and `Measurements.converted` says which.
+
 Some conditions must be repeated, because the noise is estimated from repeats. `session` names the group of runs
 that were made together. Without it, all runs of one N are one session. Some effects need elapsed_min,
-temperature_C, tank_diameter_cm or heading_deg (direction of the path in the lab, where a run is a part of a
+temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is a part of a
 circle). Rows that cannot be used are excluded with number and reason. So are columns of other names, unless the
 name looks like a misspelt one.
 
@@ -30,6 +32,7 @@ from calibration.statistics.statistical_model import Runs, repeat_covariance
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, TACHOMETER
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
+from sim.io.quantities import convert_columns
 from sim.io.tables import read_table
 
 _RPM = 2 * math.pi / 60
@@ -47,11 +50,6 @@ _SENSES = {
     "omega_t": "the tails turn with the motor",
     "omega_yr": "a positive motor turns the robot to the left (counter-clockwise) seen from above",
 }
-_QUANTITIES = {**{name: column for name, (column, _, _) in OUTPUTS.items()}, "l": "l_cm", "omega": "omega_rpm"}
-_UNIT_SUFFIXES = {
-    "mm", "cm", "m", "in", "rad", "deg", "rpm", "rps", "Hz", "hz", "rad_s", "deg_s", "mm_s", "cm_s", "m_s",
-    "cm_min",
-}  # fmt: skip
 _ERRORS = (  # of `calibration.swimmer.camera_tracks`; not used, since repeats give the noise
     "omega_yr_error", "R_yr_error", "theta_error", "v_error", "drift_x_cm_s", "drift_y_cm_s", "drift_error",
 )  # fmt: skip
@@ -60,10 +58,14 @@ _SIGMAS = {  # column -> nuisance parameter, factor
     "heading_zero_sigma_deg": (HEADING, math.pi / 180),
     "tachometer_sigma_percent": (TACHOMETER, 0.01),
 }
-_INPUTS = ("N", "l_cm", "omega_rpm")
-_NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm", "heading_deg")
+INPUTS = ("N", "l_cm", "omega_rpm")
+SYNONYMS = {
+    "rpm": "omega", "motor": "omega", "motor_speed": "omega", "length": "l", "tail_length": "l", "tails": "N",
+    "heading": "course",
+}  # fmt: skip
+_NOTED = ("elapsed_min", "temperature_C", "tank_diameter_cm", "course_deg")
 KNOWN_COLUMNS = {
-    *_INPUTS,
+    *INPUTS,
     *(c for c, _, _ in OUTPUTS.values()),
     "run",
     "trial",
@@ -85,25 +87,24 @@ class Measurements(Runs):
     omega: Floats  # (n,) motor speed, signed [rad/s]
     noted: Floats  # (n, c) what was noted and differs between the runs, by `noted_names`
     sigmas: Mapping[str, float]  # σ of camera scale, zero of the heading [rad] and tachometer, where stated
-    noted_names: tuple[str, ...]  # elapsed_h, temperature_K (above the mean), tank_diameter, heading_x, heading_y
+    noted_names: tuple[str, ...]  # elapsed_h, temperature_K (above the mean), tank_diameter, course_x, course_y
+    converted: tuple[str, ...]  # columns that were renamed or converted, in words
 
 
 def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
-    """Read measurements from a CSV or a table.
+    """Read measurements from a file (`sim.io.tables`) or a table.
 
     Raises:
         InputError: columns are missing or misspelt, or too few runs remain.
     """
-    table = source if isinstance(source, pd.DataFrame) else read_table(source)
-    for name in _INPUTS:
+    table, where = (source, "the table") if isinstance(source, pd.DataFrame) else (read_table(source), str(source))
+    outputs_columns = (column for column, _, _ in OUTPUTS.values())
+    table, converted = convert_columns(table, (*INPUTS, *outputs_columns, *_NOTED, *_SIGMAS), where, SYNONYMS)
+    for name in INPUTS:
         if name not in table:
-            raise InputError(f"the table has no column {name!r}; it needs {', '.join(_INPUTS)}")
+            raise InputError(f"the table has no column {name!r}; it needs {', '.join(INPUTS)}")
     unknown = [str(c) for c in table if c not in KNOWN_COLUMNS]
     for name in unknown:
-        quantity = next((q for q in _QUANTITIES if name.removeprefix(f"{q}_") in _UNIT_SUFFIXES), None)
-        if quantity:
-            column = _QUANTITIES[quantity]
-            raise InputError(f"unknown column {name!r}: convert it to the unit of {column!r} and rename it")
         near = difflib.get_close_matches(name, KNOWN_COLUMNS, n=1)
         if near:
             raise InputError(f"unknown column {name!r}: is it {near[0]!r}? rename or drop it")
@@ -126,7 +127,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         if "session" in table
         else "N = " + good["N"].astype(int).astype(str)
     )
-    condition = good.groupby(list(_INPUTS), sort=True).ngroup().to_numpy()
+    condition = good.groupby(list(INPUTS), sort=True).ngroup().to_numpy()
     session_names, session = np.unique(names.to_numpy(dtype=str), return_inverse=True)
     repeats = len(good) - len(np.unique(condition))
     if repeats < _FEWEST_REPEATS:
@@ -138,7 +139,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         columns.append(value if name == "theta" else np.log(np.abs(value)))
     y, outputs, follows = _independent(np.stack(columns, 1), outputs, condition)
     tails, length, omega = (
-        good[c].to_numpy(dtype=float) * f for c, f in zip(_INPUTS, (1, 0.01, _RPM), strict=True)
+        good[c].to_numpy(dtype=float) * f for c, f in zip(INPUTS, (1, 0.01, _RPM), strict=True)
     )
     noted = _noted(good)
     inputs = [tails, np.log(length), np.log(np.abs(omega)), np.sign(omega), *noted.values()]
@@ -159,6 +160,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         noted=np.stack(list(noted.values()), 1) if noted else np.empty((len(good), 0)),
         sigmas=_sigmas(good),
         noted_names=tuple(noted),
+        converted=converted,
     )
 
 
@@ -229,17 +231,17 @@ def _noted(good: pd.DataFrame) -> dict[str, Floats]:
             value = good[column].to_numpy(dtype=float) * scale
             if np.isfinite(value).all() and np.ptp(value) > 0:
                 notes[name] = value - value.mean() if name == "temperature_K" else value
-    if "heading_deg" in good:
-        value = np.radians(good["heading_deg"].to_numpy(dtype=float))
+    if "course_deg" in good:
+        value = np.radians(good["course_deg"].to_numpy(dtype=float))
         if np.isfinite(value).all() and np.ptp(value) > 0:
-            notes["heading_x"], notes["heading_y"] = np.cos(value), np.sin(value)
+            notes["course_x"], notes["course_y"] = np.cos(value), np.sin(value)
     return notes
 
 
 def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...]) -> list[str]:
     """Say why each row cannot be used; empty where it can."""
     reasons = [""] * len(table)
-    used = (*_INPUTS, *(OUTPUTS[name][0] for name in outputs))
+    used = (*INPUTS, *(OUTPUTS[name][0] for name in outputs))
     values = {column: numbers[column].to_numpy(dtype=float) for column in used}
     positive = [column for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s") if column in values]
     for column, bad, fault in (

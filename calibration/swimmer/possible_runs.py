@@ -80,18 +80,27 @@ def check_outputs(runs: Measurements, prediction: Floats) -> None:
             )
     for i, name in enumerate(runs.outputs):
         theirs, ours = np.median(runs.y[:, i]), np.median(prediction[:, i])
-        factor = float(theirs / ours if name == "theta" else math.exp(theirs - ours))
-        for unit, wrong in UNITS[name].items():
-            if 1 / _NEAR < factor / wrong < _NEAR:
-                raise InputError(
-                    f"{OUTPUTS[name][0]} is {factor:.3g} times what the robot as given does: it seems to be in "
-                    f"{unit}; convert it, or correct the coefficients in robot.toml if its unit is right"
-                )
-        if not 1 / OFF < factor < OFF:
+        check_factor(name, float(theirs / ours if name == "theta" else math.exp(theirs - ours)))
+
+
+def check_factor(output: str, factor: float) -> None:
+    """Check the ratio of an output, a name of OUTPUTS, to the prediction of the model as given.
+
+    Raises:
+        InputError: the output seems to be in another unit.
+    """
+    column = OUTPUTS[output][0]
+    for unit, wrong in UNITS[output].items():
+        if 1 / _NEAR < factor / wrong < _NEAR:
             raise InputError(
-                f"{OUTPUTS[name][0]} is {factor:.3g} times what the robot as given does; "
-                "check its unit, those of l_cm and omega_rpm, and robot.toml"
+                f"{column} is {factor:.3g} times what the robot as given does: it seems to be in {unit}; "
+                "convert it, or correct the coefficients in robot.toml if its unit is right"
             )
+    if not 1 / OFF < factor < OFF:
+        raise InputError(
+            f"{column} is {factor:.3g} times what the robot as given does; "
+            "check its unit, those of l_cm and omega_rpm, and robot.toml"
+        )
 
 
 def owned(entries: Sequence[str]) -> dict[str, tuple[float, ...]]:

@@ -18,8 +18,7 @@ import pandas as pd
 from sim.effects import catalogue
 from sim.model.robot import Robot
 from sim.motion.batches import stepped_columns
-
-_RPM = 2 * math.pi / 60
+from sim.motion.lab_units import RPM, lab_columns
 
 
 def make_table(
@@ -56,7 +55,7 @@ def make_table(
         (8, [2])
     """
     design = [(n, length, rpm) for n in tails for length in lengths_cm for rpm in motor_rpm]
-    runs = [replace(robot, tails=n, tail_length=length / 100, motor_speed=rpm * _RPM) for n, length, rpm in design]
+    runs = [replace(robot, tails=n, tail_length=length / 100, motor_speed=rpm * RPM) for n, length, rpm in design]
     values = [run.group_values() for run in runs]
     columns = {k: np.array([v[k] for v in values]) for k in values[0]}
     odd = any(catalogue()[name].symmetry == "odd" for name in robot.effects)
@@ -67,10 +66,10 @@ def make_table(
     shift = {n: rng.normal(scale=session_noise, size=4) for n in tails}
     rows = []
     for i, (n, length, rpm) in enumerate(design):
-        spin = 1 / runs[i].time_scale / _RPM
         for direction in (1, -1):
             at = i + len(design) if odd and direction < 0 else i
             sense = 1 if odd else direction
+            seen = lab_columns({name: values[at] for name, values in motion.items()}, length, runs[i].time_scale)
             for trial in range(1, trials + 1):
                 factor = np.exp(rng.normal(scale=noise, size=4) + shift[n])
                 rows.append(
@@ -80,11 +79,11 @@ def make_table(
                         "trial": trial,
                         "session": f"N={n}",
                         "omega_rpm": direction * rpm,
-                        "omega_h_rpm": sense * motion["omega_h_bar"][at] * spin * factor[0],
-                        "omega_t_rpm": sense * motion["omega_t_bar"][at] * spin * factor[1],
-                        "omega_yr_rad_s": sense * motion["omega_yr_bar"][at] / runs[i].time_scale * factor[2],
-                        "R_yr_cm": motion["R_yr_over_l"][at] * length * factor[3],
-                        "theta_deg": motion["theta_deg"][at] + rng.normal(scale=math.degrees(noise)),
+                        "omega_h_rpm": sense * float(seen["omega_h_rpm"]) * factor[0],
+                        "omega_t_rpm": sense * float(seen["omega_t_rpm"]) * factor[1],
+                        "omega_yr_rad_s": sense * float(seen["omega_yr_rad_s"]) * factor[2],
+                        "R_yr_cm": float(seen["R_yr_cm"]) * factor[3],
+                        "theta_deg": float(seen["theta_deg"]) + rng.normal(scale=math.degrees(noise)),
                     }
                 )
     table = pd.DataFrame(rows)

@@ -1,63 +1,47 @@
 """Simulate robots: `softflagella.steady`, `response`, `sensitivities` and `replay`.
 
-Robots are a `Robot`, or a table with one row for each robot: a mapping or a pandas table with the columns `C_t`,
-`C_r`, `C_yr`, `l_over_R`, `L_over_R`, `l_over_r0`, `omega_bar`, `N`, and optionally `a_over_R` and sizes of
-effects.
+What robots are is said in `softflagella.api.robots`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from planner.planning.plan import Plan
-from sim.arrays import Floats
-from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.model.groups import DWELL, Groups
-from sim.model.response import BEFORE, DWELLS
+from sim.model.response import BEFORE, DWELLS, Responses
 from sim.model.robot import Robot
-from sim.model.schedule import Schedule
+from sim.model.schedule import Schedule, load_schedule
 from sim.motion.batches import sensitivity_columns, split, steady_columns
+from sim.motion.lab_units import lab_motion
 from sim.motion.replay import replay as replay_schedules
 from sim.motion.response import responses
 from sim.motion.switching import switch_response as respond
-
-Robots = Robot | Mapping[str, Any] | pd.DataFrame
-
-
-def robot_columns(robots: Robots) -> dict[str, Floats]:
-    """Convert robots to checked columns, each (M,)."""
-    if isinstance(robots, Robot):
-        robots = {name: [value] for name, value in robots.group_values().items()}
-    columns = {str(name): np.atleast_1d(np.asarray(values)) for name, values in robots.items()}
-    try:
-        rows = np.broadcast_shapes(*(column.shape for column in columns.values()))
-    except ValueError:
-        sizes = ", ".join(f"{name} {len(column)}" for name, column in columns.items())
-        raise InputError(
-            f"columns differ in length ({sizes}); give one value for each robot, or one for all"
-        ) from None
-    return check_columns({name: np.broadcast_to(column, rows) for name, column in columns.items()})
+from softflagella.api.robots import NAME, OneRobot, RobotRows, Robots, one_robot, robot_rows, with_units
 
 
 def steady(robots: Robots, *, jobs: int | None = None) -> pd.DataFrame:
     """Simulate the mean motion at constant motor speed, as reached from rest.
 
     Args:
-        robots: a `Robot`, or a table with M rows (single values stand for all rows).
+        robots: a `Robot`, the path of a robot.toml, the name of a preset, or a list of these; or dimensionless
+            robots, a table with M rows (single values stand for all rows).
         jobs: threads; default all processors.
 
     Returns:
-        A table with M rows and the columns `omega_t_bar`, `omega_h_bar`, `omega_yr_bar` (spins of tails and head
-        and yaw rate [EI/(μ0 l⁴)]), `v_x`, `v_z` (sway and surge of the head's centre [EI/(μ0 l³)]), `R_yr_over_l`,
+        A table with M rows. For robots in SI units it begins with their names (`robot`) and with `omega_h_rpm`,
+        `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s` and `circle_s`, the time of a circle.
+        The dimensionless columns are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar` (spins of tails and head and
+        yaw rate [EI/(μ0 l⁴)]), `v_x`, `v_z` (sway and surge of the head's centre [EI/(μ0 l³)]), `R_yr_over_l`,
         `theta_deg`, `converged`, `tail_gap` ([2 r0], below 1 if tails touch), `error` (the estimated relative
         error), `method` ("direct" or "stepping") and `note` (why a row is not converged or not solved directly).
+        `attrs["units"]` has the units.
 
     Raises:
         InputError: a column is unknown, or a number is not possible.
@@ -66,14 +50,18 @@ def steady(robots: Robots, *, jobs: int | None = None) -> pd.DataFrame:
 
     Example:
         >>> import softflagella as sf
-        >>> motion = sf.steady(sf.load_robot("paper-control"))
-        >>> motion[["omega_yr_bar", "v_x", "v_z"]].round(3).values.tolist()
-        [[0.049, 0.043, 0.018]]
+        >>> motion = sf.steady("paper-control")
+        >>> motion[["R_yr_cm", "v_cm_s", "circle_s", "omega_yr_bar"]].round(3).values.tolist()
+        [[10.359, 0.23, 282.776, 0.049]]
+        >>> motion.attrs["units"]["v_cm_s"]
+        'cm/s'
         >>> faster = {**sf.load_robot("paper-control").group_values(), "omega_bar": [10.0, 20.0, 40.0]}
         >>> sf.steady(faster)["omega_yr_bar"].round(2).tolist()
         [0.05, 0.08, 0.16]
     """
-    return pd.DataFrame(steady_columns(robot_columns(robots), jobs=jobs, title=""))
+    rows = robot_rows(robots)
+    motion = steady_columns(rows.columns, jobs=jobs, title="")
+    return rows.frame(lab_motion(rows.robots, motion) if rows.robots else {}, motion)
 
 
 def switch_response(robots: Robots, dwell: ArrayLike) -> pd.DataFrame:
@@ -90,7 +78,7 @@ def switch_response(robots: Robots, dwell: ArrayLike) -> pd.DataFrame:
     Raises:
         InputError: a robot is not possible, or a dwell is not above 0.
     """
-    columns = robot_columns(robots)
+    columns = robot_rows(robots).columns
     dwells = np.broadcast_to(np.asarray(dwell, dtype=float), columns["N"].shape)
     names = (DWELL, "net_speed_bar", "lag_psi_rad", "lag_x", "lag_z")
     table = pd.DataFrame({name: np.full(len(dwells), np.nan) for name in names})
@@ -102,42 +90,85 @@ def switch_response(robots: Robots, dwell: ArrayLike) -> pd.DataFrame:
     return table
 
 
-def response(robot: Robot) -> pd.DataFrame:
-    """Simulate the response to a flip of the motor: one row for each direction, preceding dwell and dwell.
+def response(robots: Robots) -> pd.DataFrame:
+    """Simulate the response to a flip of the motor: one row for each robot, direction, preceding dwell and dwell.
 
     Args:
-        robot: any robot, effects included.
+        robots: as for `steady`; any robots, effects included.
 
     Returns:
         A table with the columns `direction` (of the motor after the flip), `before_bar` (the dwell before:
         infinite after a long one, 0 for the start from rest), `dwell_bar`, the lag `lag_z`, `lag_x` [l] and
         `lag_psi_rad`, and `net_speed_bar` of equal dwells, where `before_bar` is infinite. `sim.model.response`
-        defines them.
+        defines them. For robots in SI units it begins with `robot` and with the same in lab units: `before_s`,
+        `dwell_s`, `lag_z_cm`, `lag_x_cm`, `lag_psi_deg`, `net_speed_cm_s`. For dimensionless robots it begins
+        with `row`.
 
     Raises:
-        InputError: the robot breaks down.
+        InputError: a robot breaks down.
 
     Example:
         >>> import softflagella as sf
-        >>> table = sf.response(sf.load_robot("paper-control"))
+        >>> table = sf.response("paper-control")
         >>> long = table[(table["direction"] == 1) & np.isinf(table["before_bar"])]
         >>> long["net_speed_bar"].iloc[[6, 12, 24]].round(4).tolist()
         [0.0116, 0.0159, 0.0174]
+        >>> long[["dwell_s", "net_speed_cm_s"]].iloc[24].round(3).tolist()
+        [8.83, 0.087]
     """
+    rows = robot_rows(robots)
+    curves = {direction: _responses(rows, direction) for direction in (1, -1)}
     tables = []
-    for direction in (1, -1):
-        groups = robot.groups()
-        flip = responses(replace(groups, omega_bar=direction * groups.omega_bar))
-        if flip.failed.any():
-            raise InputError(f"{robot.name}: the response to a flip breaks down; try a slower motor")
-        curves = {np.inf: flip.lag[0], 0.0: flip.rest[0]}
-        curves |= {float(T): flip.lag[0] + memory for T, memory in zip(BEFORE, flip.memory[0], strict=True)}
-        for before, lag in curves.items():
-            table = pd.DataFrame({"direction": direction, "before_bar": before, DWELL: DWELLS})
-            table[["lag_z", "lag_x", "lag_psi_rad"]] = lag
-            table["net_speed_bar"] = flip.net_speed[0] if before == np.inf else np.nan
-            tables.append(table)
+    for row in range(len(rows.columns["N"])):
+        table = pd.concat([_curves(flip, row, direction) for direction, flip in curves.items()], ignore_index=True)
+        if rows.robots:
+            lab = _lab_response(table, rows.robots[row])
+            table = pd.concat([table[["direction"]], lab, table.drop(columns="direction")], axis=1)
+            table.insert(0, NAME, rows.robots[row].name)
+        else:
+            table.insert(0, "row", row)
+        tables.append(table)
+    return with_units(pd.concat(tables, ignore_index=True))
+
+
+def _responses(rows: RobotRows, direction: int) -> Responses:
+    """Simulate the response of all robots, with the motor in one direction after the flip."""
+    columns = {**rows.columns, "omega_bar": direction * rows.columns["omega_bar"]}
+    batches = split(columns["N"], len(columns["N"]))
+    flips = [responses(Groups.from_columns({k: v[batch] for k, v in columns.items()})) for batch in batches]
+    for batch, flip in zip(batches, flips, strict=True):
+        for row in batch[flip.failed]:
+            name = rows.robots[row].name if rows.robots else f"the robot in row {row + 1}"
+            raise InputError(f"{name}: the response to a flip breaks down; try a slower motor")
+    order = np.argsort(np.concatenate(batches))
+    parts = {name: np.concatenate([getattr(flip, name) for flip in flips])[order]
+             for name in ("lag", "memory", "rest", "spread", "net_speed", "failed", "stepped")}  # fmt: skip
+    return Responses(**parts)
+
+
+def _curves(flip: Responses, row: int, direction: int) -> pd.DataFrame:
+    """Tabulate the curves of one robot."""
+    curves = {np.inf: flip.lag[row], 0.0: flip.rest[row]}
+    curves |= {float(T): flip.lag[row] + memory for T, memory in zip(BEFORE, flip.memory[row], strict=True)}
+    tables = []
+    for before, lag in curves.items():
+        table = pd.DataFrame({"direction": direction, "before_bar": before, DWELL: DWELLS})
+        table[["lag_z", "lag_x", "lag_psi_rad"]] = lag
+        table["net_speed_bar"] = flip.net_speed[row] if before == np.inf else np.nan
+        tables.append(table)
     return pd.concat(tables, ignore_index=True)
+
+
+def _lab_response(table: pd.DataFrame, robot: Robot) -> pd.DataFrame:
+    """Convert the columns of a response to the units of a lab."""
+    time, length = robot.time_scale, 100 * robot.tail_length
+    lab = {f"{name}_s": table[f"{name}_bar"] * time for name in ("before", "dwell")}
+    lab |= {f"{name}_cm": table[name] * length for name in ("lag_z", "lag_x")}
+    lab |= {
+        "lag_psi_deg": np.degrees(table["lag_psi_rad"]),
+        "net_speed_cm_s": table["net_speed_bar"] * length / time,
+    }
+    return pd.DataFrame(lab)
 
 
 def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None = None) -> pd.DataFrame:
@@ -162,7 +193,7 @@ def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None
         >>> slopes["omega_yr_bar", "C_yr"].round(4).tolist()  # in proportion to C_yr = 2
         [0.0245]
     """
-    result = sensitivity_columns(robot_columns(robots), parameters, jobs=jobs, title="")
+    result = sensitivity_columns(robot_rows(robots).columns, parameters, jobs=jobs, title="")
     columns = {
         (output, parameter): slopes[:, k]
         for output, slopes in result.derivatives.items()
@@ -171,11 +202,11 @@ def sensitivities(robots: Robots, parameters: Sequence[str], *, jobs: int | None
     return pd.DataFrame(columns)
 
 
-def replay(schedule: Schedule | Plan, robot: Robot | None = None) -> pd.DataFrame:
+def replay(schedule: Schedule | Plan | str | Path, robot: OneRobot | None = None) -> pd.DataFrame:
     """Simulate a schedule, from rest with straight tails.
 
     Args:
-        schedule: a plan, or its schedule.
+        schedule: a plan, the path of its plan.json, or a schedule.
         robot: the robot that carries out a plan; default: the one that the plan was made for.
 
     Returns:
@@ -194,7 +225,9 @@ def replay(schedule: Schedule | Plan, robot: Robot | None = None) -> pd.DataFram
         (2.0, [1, -1])
     """
     if isinstance(schedule, Plan):
-        schedule = schedule.schedule(robot)
+        schedule = schedule.schedule(None if robot is None else one_robot(robot))
     elif robot is not None:
         raise InputError("a schedule names its own robot; give a plan where another robot carries it out")
-    return replay_schedules([schedule])[0]
+    elif not isinstance(schedule, Schedule):
+        schedule = load_schedule(schedule)
+    return with_units(replay_schedules([schedule])[0])

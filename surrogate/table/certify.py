@@ -16,14 +16,16 @@ import numpy as np
 from sim.arrays import Floats
 from sim.motion.batches import steady_columns
 
-_RATES = ("omega_t_bar", "omega_h_bar", "omega_yr_bar")
+RATES = ("omega_t_bar", "omega_h_bar", "omega_yr_bar")
+_VELOCITIES = ("v_x", "v_z")
+CERTIFIED_OUTPUTS = (*RATES, *_VELOCITIES)
 
 
 def certified_error(robots: Mapping[str, Floats], answer: Mapping[str, Any]) -> Floats:
     """Certify the relative error of each robot's answer, (M,); NaN where the simulator finds no steady motion."""
     simulated = steady_columns(robots, title="certify")
     speed = np.hypot(simulated["v_x"], simulated["v_z"])
-    apart = [np.abs(answer[name] / simulated[name] - 1) for name in _RATES]
-    apart += [np.abs(answer[name] - simulated[name]) / speed for name in ("v_x", "v_z")]
+    apart = [np.abs(answer[name] / simulated[name] - 1) for name in RATES]
+    apart += [np.abs(answer[name] - simulated[name]) / speed for name in _VELOCITIES]
     error = np.max(apart, axis=0) + simulated["error"]
     return np.where(simulated["converged"], error, np.nan)

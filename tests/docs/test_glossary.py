@@ -22,6 +22,7 @@ from planner.files.plan_json import plan_record
 from sim.effects import catalogue
 from sim.model.body import Body
 from sim.model.groups import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS
+from sim.motion.lab_units import LAB_COLUMNS
 from sim.motion.steady_motion import QUALITY_COLUMNS, STEADY_COLUMNS
 from tests.docs.pages import DOCS, PAGES, ROOT, glossary, replaced_words
 
@@ -47,7 +48,7 @@ def sources() -> dict[str, set[str]]:
         "a robot's numbers": {*Body._fields},
         "groups": {*GROUP_COLUMNS, *OPTIONAL_COLUMNS, DWELL},
         "a data set": {column.name for column in (*INPUTS, *OUTPUTS, *FLAGS)},
-        "steady motion": {*STEADY_COLUMNS, *QUALITY_COLUMNS},
+        "steady motion": {*STEADY_COLUMNS, *QUALITY_COLUMNS, *LAB_COLUMNS},
         "measured tables": {*KNOWN_COLUMNS},
         "camera tracks": {*COLUMNS},
         "effects": {*effects, *(driver.name for effect in effects.values() for driver in effect.drivers)},

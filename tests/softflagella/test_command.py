@@ -24,7 +24,7 @@ def test_one_command_has_those_of_all_packages(package: str, capsys: pytest.Capt
 
 
 def test_words_are_commands_of_packages_and_stand_first(capsys: pytest.CaptureFixture[str]) -> None:
-    assert {"plan", "sweep", "train", "calibrate", "replay", "query"} <= set(WORDS)
+    assert {"steady", "plan", "sweep", "train", "calibrate", "replay", "query"} <= set(WORDS)
     main([])
     lines = capsys.readouterr().out.splitlines()
     places = [next(i for i, line in enumerate(lines) if line.startswith(f"  {word} ")) for word in WORDS]

@@ -1,62 +1,27 @@
-"""Camera tracks: circles, lines, errors that hold, and bad samples."""
+"""Camera tracks: bad samples, units, axes, and what the robot as given does."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from calibration.swimmer.camera_tracks import measure_track, measure_tracks
+from calibration.report.track_pictures import draw_tracks
+from calibration.swimmer.camera_tracks import measure_tracks
+from sim.inputs import load_robot
 from sim.io.errors import InputError
-from tests.calibration.track import RADIUS, RATE, SLIP, track
-
-
-def measured(table: pd.DataFrame) -> dict[str, float]:
-    return vars(measure_track(*(table[c].to_numpy() for c in ("time_s", "x_cm", "y_cm", "heading_deg"))))
-
-
-@pytest.mark.parametrize("rate", [RATE, -RATE])
-def test_a_circle_gives_rate_radius_angle_and_speed(rate: float) -> None:
-    motion = measured(track(0, rate=rate))
-    assert motion["omega_yr_rad_s"] == pytest.approx(rate, rel=5e-3)
-    assert motion["R_yr_cm"] == pytest.approx(RADIUS, rel=5e-3)
-    assert motion["theta_deg"] == pytest.approx(SLIP, abs=0.5)
-    assert motion["v_cm_s"] == pytest.approx(abs(rate) * RADIUS, rel=5e-3)
-
-
-def test_a_current_drifts_the_circle_and_leaves_its_radius() -> None:
-    still = track(2)
-    moved = still.assign(x_cm=still["x_cm"] + 0.05 * still["time_s"], y_cm=still["y_cm"] - 0.02 * still["time_s"])
-    motion = measured(moved)
-    assert motion["drift_x_cm_s"] == pytest.approx(0.05, abs=4 * motion["drift_error"])
-    assert motion["drift_y_cm_s"] == pytest.approx(-0.02, abs=4 * motion["drift_error"])
-    assert motion["drift_error"] < 0.005
-    assert motion["R_yr_cm"] == pytest.approx(measured(still)["R_yr_cm"], rel=1e-3)
-    assert np.isnan(measured(track(2, seconds=30.0))["drift_x_cm_s"])  # two thirds of a turn
-
-
-def test_errors_are_as_large_as_the_scatter_of_repeated_tracks() -> None:
-    many = pd.DataFrame([measured(track(seed)) for seed in range(60)])
-    for value, error in (
-        ("omega_yr_rad_s", "omega_yr_error"),
-        ("R_yr_cm", "R_yr_error"),
-        ("theta_deg", "theta_error"),
-    ):
-        assert 0.5 < many[error].mean() / many[value].std() < 3
-
-
-def test_a_run_that_hardly_turns_gives_a_speed_alone() -> None:
-    motion = measured(track(1, rate=0.002, wobble=0.0))
-    assert np.isnan(motion["R_yr_cm"])
-    assert np.isnan(motion["omega_yr_rad_s"])
-    assert motion["v_cm_s"] == pytest.approx(0.02, rel=0.1)
+from sim.motion.steady import steady
+from tests.calibration.track import RADIUS, track
 
 
 def test_bad_samples_and_short_tracks_are_named() -> None:
     samples = pd.concat([track(0), track(1).assign(run=2).head(5)]).astype({"x_cm": object})
     samples.iloc[3, 2] = "lost"
     runs = pd.DataFrame({"run": [1, 2], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0})
-    table, aside = measure_tracks(samples, runs)
+    measured_runs = measure_tracks(samples, runs)
+    table, aside = measured_runs.table, measured_runs.excluded
     assert table["R_yr_cm"][0] == pytest.approx(RADIUS, rel=5e-3)
     assert np.isnan(table["R_yr_cm"][1])
     assert [line.split(":")[0] for line in aside] == ["run 1", "run 2"]
@@ -80,7 +45,7 @@ def test_a_picture_s_y_axis_is_noticed_and_can_be_said() -> None:
     picture = track(0).assign(y_cm=lambda t: -t["y_cm"], heading_deg=lambda t: -t["heading_deg"])
     with pytest.raises(InputError, match=r"all runs turn to the other side .*: give --y-down"):
         measure_tracks(picture, RUNS)
-    seen, expected = measure_tracks(picture, RUNS, y_down=True)[0], measure_tracks(track(0), RUNS)[0]
+    seen, expected = measure_tracks(picture, RUNS, y_down=True).table, measure_tracks(track(0), RUNS).table
     for name in ("omega_yr_rad_s", "R_yr_cm", "theta_deg"):
         assert seen[name][0] == pytest.approx(expected[name][0], rel=1e-6)
     with pytest.raises(InputError, match="leave out --y-down"):
@@ -90,3 +55,70 @@ def test_a_picture_s_y_axis_is_noticed_and_can_be_said() -> None:
 def test_tracks_without_any_number_are_an_error() -> None:
     with pytest.raises(InputError, match=r"no track gives a number \(run 1: 5 samples"):
         measure_tracks(track(0).head(5), RUNS)
+
+
+def test_tracks_in_other_units_are_converted() -> None:
+    """Headings in radians and positions in mm used to give wrong numbers or an error."""
+    given = track(0)
+    other = pd.DataFrame(
+        {
+            "run": given["run"],
+            "t [ms]": 1000 * given["time_s"],
+            "X (mm)": 10 * given["x_cm"],
+            "Y (mm)": 10 * given["y_cm"],
+            "heading_rad": np.radians(given["heading_deg"]),
+        }
+    )
+    seen = measure_tracks(other, RUNS.rename(columns={"omega_rpm": "rpm"}))
+    expected = measure_tracks(given, RUNS)
+    pd.testing.assert_frame_equal(seen.table, expected.table, rtol=1e-6)
+    assert [note.split(" converted")[0].split(" read")[0] for note in seen.converted] == [
+        "column t [ms]", "column X (mm)", "column Y (mm)", "column heading_rad", "column rpm",
+    ]  # fmt: skip
+    with pytest.raises(InputError, match="column 'x' has no unit; name it one of x_m, x_cm"):
+        measure_tracks(given.rename(columns={"x_cm": "x"}), RUNS)
+
+
+ROBOT = load_robot("paper-measured")
+
+
+def swum(rpm: float) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """A track of the simulated motion of ROBOT, and its run."""
+    robot = replace(ROBOT, motor_speed=rpm * np.pi / 30)
+    motion = steady(robot.groups())
+    rate = float(motion.omega_yr[0]) / robot.time_scale
+    radius = 100 * robot.tail_length * float(motion.turn_radius[0])
+    time = np.linspace(0, 60, 240)
+    heading = np.degrees(rate * time) + 90 + np.degrees(float(motion.slip_angle[0]))
+    circle = {"x_cm": radius * np.cos(rate * time), "y_cm": radius * np.sin(rate * time)}
+    samples = pd.DataFrame({"run": 1, "time_s": time, **circle, "heading_deg": heading})
+    noise = np.random.default_rng(1).normal(scale=0.01, size=(len(time), 3))
+    samples[["x_cm", "y_cm", "heading_deg"]] += noise
+    return samples, pd.DataFrame({"run": [1], "N": robot.tails, "l_cm": 100 * robot.tail_length, "omega_rpm": rpm})
+
+
+def test_tracks_are_compared_with_the_robot_as_given() -> None:
+    """Positions in mm under the name x_cm used to pass without a word."""
+    samples, runs = swum(100.0)
+    measure_tracks(samples, runs, robot=ROBOT)
+    for wrong, words in (
+        (samples.assign(x_cm=10 * samples["x_cm"], y_cm=10 * samples["y_cm"]), "R_yr_cm is .* seems to be in mm"),
+        (samples.assign(time_s=1000 * samples["time_s"]), "omega_yr_rad_s is 0.001 times what the robot"),
+    ):
+        with pytest.raises(InputError, match=words):
+            measure_tracks(wrong, runs, robot=ROBOT)
+    with pytest.raises(InputError, match="no column 'l_cm'; the comparison with a robot needs it"):
+        measure_tracks(samples, runs.drop(columns="l_cm"), robot=ROBOT)
+
+
+def test_the_picture_has_a_panel_for_each_run_with_track_and_fit() -> None:
+    samples = pd.concat([track(0), track(1, rate=0.002).assign(run=2)])
+    runs = pd.DataFrame({"run": [1, 2], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0})
+    figure = draw_tracks(measure_tracks(samples, runs).tracks)
+    first, second = (axes for axes in figure.axes if axes.get_visible())
+    assert first.get_title().startswith("run 1\nR = 10")
+    assert "turns right" in first.get_title()
+    assert second.get_title().startswith("run 2\nline")
+    drawn, fitted = (np.array(line.get_xydata()) for line in first.get_lines()[:2])
+    assert drawn == pytest.approx(track(0)[["x_cm", "y_cm"]].to_numpy())
+    assert np.linalg.norm(fitted - [3, -2], axis=1) == pytest.approx(np.full(len(fitted), RADIUS), rel=0.01)

@@ -80,10 +80,32 @@ def test_an_output_in_another_unit_is_refused_with_that_unit(name: str, unit: st
 
 
 @pytest.mark.parametrize(
-    ("given", "meant"),
-    [("R_yr_mm", "R_yr_cm"), ("omega_yr_deg_s", "omega_yr_rad_s"), ("l_m", "l_cm"), ("omega_Hz", "omega_rpm")],
+    ("given", "meant", "factor"),
+    [
+        ("R_yr_mm", "R_yr_cm", 10.0),
+        ("omega_yr_deg_s", "omega_yr_rad_s", 180 / math.pi),
+        ("l_m", "l_cm", 0.01),
+        ("omega_Hz", "omega_rpm", 1 / 60),
+        ("theta [rad]", "theta_deg", math.pi / 180),
+        ("rpm", "omega_rpm", 1.0),
+        ("Tail_length_cm", "l_cm", 1.0),
+    ],
 )
-def test_a_column_in_another_unit_is_to_be_converted_not_renamed(given: str, meant: str) -> None:
+def test_a_column_in_another_unit_is_converted(given: str, meant: str, factor: float) -> None:
     """The advice used to be to rename it, which made its numbers wrong without a word."""
-    with pytest.raises(InputError, match=f"unknown column '{given}': convert it to the unit of '{meant}'"):
-        read_measurements(toy_table(4).rename(columns={meant: given}).assign(**{meant: 1.0}))
+    expected = toy_table(4)
+    other = expected.rename(columns={meant: given}).assign(**{given: factor * expected[meant]})
+    runs, same = read_measurements(other), read_measurements(expected)
+    assert runs.y == pytest.approx(same.y, rel=1e-12)
+    assert runs.inputs == pytest.approx(same.inputs, rel=1e-12)
+    assert [note.split(" read as")[0].split(" converted")[0] for note in runs.converted] == [f"column {given}"]
+    with pytest.raises(InputError, match="are the same quantity; drop all but one"):
+        read_measurements(other.assign(**{meant: 1.0}))
+
+
+def test_the_course_was_called_heading() -> None:
+    """The heading is the direction of the axis in tracks, and was that of the path in runs."""
+    table = toy_table(4).assign(heading_deg=np.linspace(0, 350, len(toy_table(4))))
+    runs = read_measurements(table)
+    assert runs.noted_names == ("course_x", "course_y")
+    assert runs.converted == ("column heading_deg read as course_deg",)

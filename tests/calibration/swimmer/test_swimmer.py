@@ -32,7 +32,7 @@ def table() -> pd.DataFrame:
     measured["elapsed_min"] = 3.0 * np.arange(len(measured))
     measured["temperature_C"] = 20 + rng.normal(size=len(measured))
     measured["tank_diameter_cm"] = rng.choice([40.0, 60.0], len(measured))
-    measured["heading_deg"] = rng.uniform(0, 360, len(measured))
+    measured["course_deg"] = rng.uniform(0, 360, len(measured))
     return measured
 
 
@@ -88,9 +88,9 @@ def test_a_current_shows_in_the_speed_along_its_heading(table: pd.DataFrame) -> 
     still, moving = model.predict([at, {**at, "current_along_x": 0.001}])
     speed = model.runs.outputs.index("v")
     gained = np.exp(moving[:, speed]) - np.exp(still[:, speed])
-    assert gained == pytest.approx(0.001 * np.cos(np.radians(table["heading_deg"])))
+    assert gained == pytest.approx(0.001 * np.cos(np.radians(table["course_deg"])))
     assert np.delete(moving - still, speed, 1) == pytest.approx(0)
-    without = SwimmerModel(START, read_measurements(table.drop(columns="heading_deg")), solver=toy.SOLVER)
+    without = SwimmerModel(START, read_measurements(table.drop(columns="course_deg")), solver=toy.SOLVER)
     assert "current in the tank along x" in without.untestable
 
 

@@ -1,0 +1,104 @@
+"""Robots as the public functions take them, and the tables that they return.
+
+Robots are a `Robot`, the path of a robot.toml, the name of a preset, or a list of these. Or they are
+dimensionless: a mapping or a pandas table with the columns `C_t`, `C_r`, `C_yr`, `l_over_R`, `L_over_R`,
+`l_over_r0`, `omega_bar`, `N`, and optionally `a_over_R` and sizes of effects, one row for each robot.
+
+A table of results begins with the robots' names and the columns in lab units. Dimensionless columns follow. Robots
+that are dimensionless have no lab units. `frame.attrs["units"]` has the unit of every column that has one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
+from sim.arrays import Floats
+from sim.effects import catalogue
+from sim.inputs import check_columns, load_robot
+from sim.io.errors import InputError
+from sim.model.robot import Robot
+
+NAME = "robot"  # the column of the robots' names
+_UNITS = {
+    "x_over_l": "l",
+    "y_over_l": "l",
+    "time_bar": "mu0 l^4/EI",
+    "dwell_bar": "mu0 l^4/EI",
+    "before_bar": "mu0 l^4/EI",
+}  # of columns that are in no data set
+_SUFFIXES = {"_rpm": "rpm", "_rad_s": "rad/s", "_cm_s": "cm/s", "_cm": "cm", "_deg": "degrees", "_rad": "rad",
+             "_s": "s"}  # fmt: skip
+
+OneRobot = Robot | str | Path
+Robots = OneRobot | Sequence[OneRobot] | Mapping[str, Any] | pd.DataFrame
+
+
+@dataclass(frozen=True)
+class RobotRows:
+    """M robots as dimensionless columns, each (M,), and the robots in SI units where they were given so."""
+
+    columns: dict[str, Floats]
+    robots: tuple[Robot, ...] = ()  # none: the rows are dimensionless
+
+    def frame(self, lab: Mapping[str, Any], values: Mapping[str, Any]) -> pd.DataFrame:
+        """Make a table of M rows: names, columns in lab units, dimensionless columns."""
+        names = {NAME: [robot.name for robot in self.robots]} if self.robots else {}
+        return with_units(pd.DataFrame({**names, **lab, **{k: v for k, v in values.items() if k not in lab}}))
+
+
+def robot_rows(robots: Robots) -> RobotRows:
+    """Check robots, and convert them to columns.
+
+    Raises:
+        InputError: a robot cannot be simulated, or columns differ in length.
+    """
+    if isinstance(robots, Mapping | pd.DataFrame):
+        return RobotRows(_checked(robots))
+    given = [robots] if isinstance(robots, Robot | str | Path) else list(robots)
+    if not given:
+        raise InputError("no robots; give at least one")
+    loaded = tuple(robot if isinstance(robot, Robot) else load_robot(robot) for robot in given)
+    values = [robot.group_values() for robot in loaded]
+    nulls = {name: effect.null for name, effect in catalogue().items()}
+    names = dict.fromkeys(name for row in values for name in row)
+    columns = {name: [row.get(name, nulls.get(name)) for row in values] for name in names}
+    return RobotRows(_checked(columns), loaded)
+
+
+def one_robot(robot: OneRobot) -> Robot:
+    """Return a robot, read from its file where a path or a preset's name is given."""
+    return robot if isinstance(robot, Robot) else load_robot(robot)
+
+
+def _checked(robots: Mapping[str, Any] | pd.DataFrame) -> dict[str, Floats]:
+    columns = {str(name): np.atleast_1d(np.asarray(values)) for name, values in robots.items()}
+    try:
+        rows = np.broadcast_shapes(*(column.shape for column in columns.values()))
+    except ValueError:
+        sizes = ", ".join(f"{name} {len(column)}" for name, column in columns.items())
+        raise InputError(
+            f"columns differ in length ({sizes}); give one value for each robot, or one for all"
+        ) from None
+    return check_columns({name: np.broadcast_to(column, rows) for name, column in columns.items()})
+
+
+def with_units(frame: pd.DataFrame) -> pd.DataFrame:
+    """Note the units of a table's columns in `frame.attrs["units"]`."""
+    frame.attrs["units"] = {str(name): unit for name in frame if (unit := unit_of(str(name)))}
+    return frame
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a column: as the data set declares it, or as its name says; empty if it has none."""
+    plain = name.removesuffix("_low").removesuffix("_high")
+    declared = _UNITS | {column.name: column.unit for column in (*INPUTS, *OUTPUTS, *FLAGS)}
+    if plain in declared:
+        return declared[plain]
+    return next((unit for suffix, unit in _SUFFIXES.items() if plain.endswith(suffix)), "")

@@ -1,0 +1,109 @@
+"""Robots as people give them, and tables in lab units."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import softflagella as sf
+from sim.motion.lab_units import LAB_COLUMNS
+from softflagella.api.robots import robot_rows, unit_of
+
+ROBOT = sf.load_robot("paper-control")
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    sf.save_robot(replace(ROBOT, name="mine", viscosity=2.0), tmp_path / "robot.toml")
+    return tmp_path / "robot.toml"
+
+
+def test_a_robot_its_name_and_its_values_are_the_same_rows(file: Path) -> None:
+    for robots in (ROBOT, "paper-control", [ROBOT], ["paper-control"], ROBOT.group_values(),
+                   pd.DataFrame([ROBOT.group_values()])):  # fmt: skip
+        columns = robot_rows(robots).columns
+        assert {name: values.item() for name, values in columns.items()} == pytest.approx(ROBOT.group_values())
+    for path in (file, str(file), [file]):
+        assert robot_rows(path).robots == (sf.load_robot(file),)
+
+
+def test_a_list_fills_in_the_null_of_an_effect_that_a_robot_lacks() -> None:
+    odd = replace(ROBOT, effects={"anisotropic_head_drag": 1.5})
+    null = sf.effects()["anisotropic_head_drag"].null
+    assert robot_rows([ROBOT, odd]).columns["anisotropic_head_drag"].tolist() == [null, 1.5]
+
+
+def test_columns_that_differ_in_length_and_no_robots_are_refused() -> None:
+    with pytest.raises(sf.InputError, match="differ in length"):
+        robot_rows({**ROBOT.group_values(), "C_t": [1.0, 2.0], "C_r": [1.0, 2.0, 3.0]})
+    with pytest.raises(sf.InputError, match="no robots"):
+        robot_rows([])
+    with pytest.raises(sf.InputError, match="no robot 'paper'"):
+        robot_rows("paper")
+
+
+def test_a_table_begins_with_names_and_lab_units(file: Path) -> None:
+    for motion in (sf.steady([ROBOT, file]), sf.query([ROBOT, file])):
+        assert list(motion)[: 1 + len(LAB_COLUMNS)] == ["robot", *LAB_COLUMNS]
+        assert motion["robot"].tolist() == ["paper-control", "mine"]
+        assert not motion.columns.duplicated().any()
+        units = motion.attrs["units"]
+        assert {units[name] for name in LAB_COLUMNS} == {"rpm", "rad/s", "cm", "degree", "cm/s", "s"}
+        assert units["omega_yr_bar"] == "EI/(mu0 l^4)"
+        assert (motion["error"] < 0.01).all()
+
+
+def test_dimensionless_robots_have_no_lab_units() -> None:
+    motion = sf.steady({**ROBOT.group_values(), "omega_bar": [5.0, 10.0]})
+    assert len(motion) == 2
+    assert not {"robot", *LAB_COLUMNS} - {"theta_deg"} & set(motion)
+    assert motion["omega_yr_bar"].iloc[1] == sf.steady(ROBOT)["omega_yr_bar"].item()
+
+
+def test_a_response_in_lab_units(file: Path) -> None:
+    both = sf.response([ROBOT, file])
+    alone = sf.response(file)
+    second = both[both["robot"] == "mine"].reset_index(drop=True)
+    assert len(both) == 2 * len(alone)
+    np.testing.assert_allclose(second["lag_z"], alone["lag_z"], rtol=1e-9, atol=1e-12)
+    robot = sf.load_robot(file)
+    assert (alone["dwell_s"] / alone["dwell_bar"]).to_numpy() == pytest.approx(robot.time_scale)
+    moves = alone.dropna(subset="net_speed_bar")
+    assert (moves["net_speed_cm_s"] / moves["net_speed_bar"]).to_numpy() == pytest.approx(
+        100 * robot.tail_length / robot.time_scale
+    )
+    assert np.degrees(alone["lag_psi_rad"]).to_numpy() == pytest.approx(alone["lag_psi_deg"].to_numpy())
+    assert list(both)[:3] == ["robot", "direction", "before_s"]
+
+
+def test_a_response_of_dimensionless_robots_names_rows() -> None:
+    """Robots with different numbers of tails in any order."""
+    table = sf.response({**ROBOT.group_values(), "N": [3, 2, 3], "C_yr": [2.0, 2.0, 3.0]})
+    assert table["row"].unique().tolist() == [0, 1, 2]
+    alone = sf.response(ROBOT)
+    np.testing.assert_allclose(table.loc[table["row"] == 1, "lag_z"], alone["lag_z"], rtol=1e-9, atol=1e-12)
+    assert "dwell_s" not in table
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("R_yr_cm", "cm"), ("omega_yr_rad_s", "rad/s"), ("lag_psi_rad", "radian"), ("v_z_low", "EI/(mu0 l^3)"),
+     ("note", ""), ("dwell_s", "s")],
+)  # fmt: skip
+def test_units_of_columns(name: str, unit: str) -> None:
+    assert unit_of(name) == unit
+
+
+def test_a_replay_of_a_file_and_by_another_robot(tmp_path: Path, file: Path) -> None:
+    result = sf.plan(sf.circle(1.2), ROBOT)
+    sf.write_plan(result, tmp_path)
+    small = sf.Schedule(ROBOT.group_values(), 1, result.dwells[:2], result.start, ROBOT.time_scale)
+    assert sf.replay(small).attrs["units"]["time_s"] == "s"
+    with pytest.raises(sf.InputError, match="names its own robot"):
+        sf.replay(small, ROBOT)
+    with pytest.raises(sf.InputError, match=r"none\.json"):
+        sf.replay(tmp_path / "none.json")
