@@ -14,7 +14,7 @@ from typing import Any
 
 from sim.arrays import Floats
 from sim.effects import catalogue, check_effects, check_size
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.files import write_text
 from sim.io.reading import read_toml
 from sim.model.correction import correction_tables, read_correction
@@ -39,6 +39,7 @@ _TOML = {
     ("drag", "C_yr"): "C_yr",
 }
 _OPTIONAL_KEYS = {"disc_offset"}
+_LARGEST = 1e100  # of a number, whatever its unit
 _SIGMA = "_sigma"  # a key with this ending holds one standard deviation of the number beside it
 _SIGMAS = {(table, key + _SIGMA): name for (table, key), name in _TOML.items() if name in DEFAULTS}
 
@@ -90,6 +91,11 @@ def load_robot(source: str | Path) -> Robot:
     path = Path(source)
     if not path.exists():
         raise InputError(f"no robot {str(source)!r}; give a robot.toml or one of {', '.join(PRESETS)}")
+    with naming(path):
+        return _read_robot(path)
+
+
+def _read_robot(path: Path) -> Robot:
     tables = read_toml(path)
     name = tables.pop("name", path.stem)
     tables.pop("calibration", None)  # read by planner.vehicle.calibration_table
@@ -126,8 +132,8 @@ def _values(path: Path, tables: dict[str, Any], stated: dict[str, tuple[str, obj
         if attribute not in values and attribute not in _OPTIONAL_KEYS:
             raise InputError(f"{path}: missing entry [{table}] {key}")
         value = values.get(attribute, 0)
-        if not isinstance(value, int | float) or isinstance(value, bool):
-            raise InputError(f"{path}: [{table}] {key} = {values[attribute]!r}; give a number")
+        if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < _LARGEST:
+            raise InputError(f"{path}: [{table}] {key} = {values[attribute]!r}; give a finite number")
     return values
 
 
@@ -167,5 +173,5 @@ def robot_toml(robot: Robot) -> str:
     if robot.correction:
         tables["correction"] = [f"{k} = {json.dumps(v)}" for k, v in correction_tables(robot.correction).items()]
     blocks = ["\n".join([f"[{table}]", *lines]) for table, lines in tables.items()]
-    name = json.dumps(robot.name, ensure_ascii=False)  # escapes as TOML does
+    name = json.dumps(robot.name, ensure_ascii=False).replace("\x7f", "\\u007f")  # escapes as TOML does
     return "\n\n".join([f"name = {name}", *blocks]) + "\n"

@@ -21,7 +21,7 @@ import numpy as np
 from sim.arrays import Floats, Integers
 from sim.effects import catalogue
 from sim.inputs import check_columns
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.reading import read_toml
 from sim.model.groups import DWELL, GROUP_COLUMNS, MOST_TAILS, OPTIONAL_COLUMNS
 
@@ -135,7 +135,20 @@ def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
     Raises:
         InputError: an input is missing or unknown, or its range contains impossible robots.
     """
-    content = read_toml(path)
+    with naming(path):
+        return checked_design(read_toml(path), str(path))
+
+
+def checked_design(content: Mapping[str, Any], path: str) -> SweepDesign:
+    """Make the design of the content of a sweep.toml.
+
+    Args:
+        content: the entries.
+        path: name of the file, for messages.
+
+    Raises:
+        InputError: an entry is missing, unknown or impossible.
+    """
     for name in set(content) - set(_ENTRIES):
         raise InputError(f"{path}: unknown entry {name!r}; allowed are {', '.join(_ENTRIES)}")
     inputs = content.get("inputs", {})
@@ -149,14 +162,14 @@ def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
     for name in GROUP_COLUMNS:
         if name not in inputs:
             raise InputError(f"{path}: missing input {name!r} in [inputs]")
-    axes = {name: _axis(str(path), name, inputs[name]) for name in _order() if name in inputs}
-    _check_ends(str(path), axes)
+    axes = {name: _axis(path, name, inputs[name]) for name in _order() if name in inputs}
+    _check_ends(path, axes)
     seed = content.get("seed", 0)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise InputError(f"{path}: seed = {seed!r}; give a whole number from 0")
     every = content.get("history_every", 4)
-    if not isinstance(every, int) or isinstance(every, bool) or every < 0:
-        raise InputError(f"{path}: history_every = {every!r}; give a whole number, 0 for none")
+    if not isinstance(every, int) or isinstance(every, bool) or not 0 <= every <= MOST_ROWS:
+        raise InputError(f"{path}: history_every = {every!r}; give a whole number to {MOST_ROWS}, 0 for none")
     slopes = content.get("sensitivities", False)
     if not isinstance(slopes, bool):
         raise InputError(f"{path}: sensitivities = {slopes!r}; give true or false")
@@ -165,10 +178,10 @@ def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
 
 def _axis(path: str, name: str, spec: Any) -> Axis:
     try:
-        low, high = (float(v) for v in spec["range"])
+        low, high = (float(v) for v in _list(spec["range"]))
         scale, mirrored = spec.get("scale", "linear"), spec.get("both_directions", False)
         unknown = set(spec) - {"range", "scale", "both_directions"}
-    except (KeyError, TypeError, ValueError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         raise InputError(
             f'{path}: {name} = {spec!r}; write {name} = {{ range = [low, high], scale = "linear" }}'
         ) from None
@@ -187,6 +200,12 @@ def _axis(path: str, name: str, spec: Any) -> Axis:
     if (name == "N" or scale == "integer") and (low != int(low) or high != int(high)):
         raise InputError(f"{path}: {name} has range [{low:g}, {high:g}]; give whole numbers")
     return Axis(low, high, "integer" if name == "N" else scale, mirrored)
+
+
+def _list(value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        raise TypeError
+    return value
 
 
 def _check_ends(path: str, axes: dict[str, Axis]) -> None:

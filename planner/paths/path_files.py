@@ -11,7 +11,7 @@ import pandas as pd
 from planner.paths.path import Path2D
 from planner.paths.svg_drawing import read_svg
 from sim.arrays import Floats
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.tables import read_table
 from sim.io.units import split, to_si
 
@@ -44,12 +44,13 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
         ...     read_path(file.name).path.points.tolist()
         [[0.0, 0.0], [6.0, 0.0], [6.0, 8.0]]
     """
-    if Path(source).suffix.lower() == ".svg":
-        return Drawing(*read_svg(Path(source), closed, shape))
-    if shape is not None:
-        raise InputError(f"{source} is no SVG, so it has no shape {shape!r}; leave --shape out")
-    points, unit = _read_columns(source)
-    return Drawing(Path2D.of(points, closed=closed), unit)
+    with naming(source):
+        if Path(source).suffix.lower() == ".svg":
+            return Drawing(*read_svg(Path(source), closed, shape))
+        if shape is not None:
+            raise InputError(f"{source} is no SVG, so it has no shape {shape!r}; leave --shape out")
+        points, unit = _read_columns(source)
+        return Drawing(Path2D.of(points, closed=closed), unit)
 
 
 def _read_columns(source: str | Path) -> tuple[Floats, float | None]:

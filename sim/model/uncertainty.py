@@ -48,7 +48,7 @@ def read_sigma(given: object, value: float, entry: str) -> Sigma:
             sigma = Sigma(float(given), False)
         else:
             raise ValueError
-    except ValueError:
+    except (ValueError, OverflowError):
         raise InputError(
             f'{entry} = {given!r}; give a number in the unit of its key, or a text like "10 %"'
         ) from None

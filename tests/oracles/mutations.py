@@ -26,7 +26,15 @@ NUMBERS = (
 _COMMON = (b"\0", b"\n", b"\r\n", b"\r", b" ", b"\t", b'"', b"'", b"\\", b"#", b"%", b"\xef\xbb\xbf", b"\xff\xfe", b"\x1a",
            b"\xc3\x28", "é".encode(), "\u2028".encode(), "\ud800".encode(errors="surrogatepass"), b"../../etc/passwd",
            b"$\\frac$", b"=1+1", b"A" * 10_000)  # fmt: skip
-_PAIRS = ((b"[", b"]"), (b"{", b"}"), (b"(", b")"), (b"<g>", b"</g>"), (b'{"a":', b"}"), (b'"', b'"'), (b"a.", b""))
+_PAIRS = (
+    (b"[", b"]"),
+    (b"{", b"}"),
+    (b"(", b")"),
+    (b"<g>", b"</g>"),
+    (b'{"a":', b"}"),
+    (b'"', b'"'),
+    (b"a.", b""),
+)
 _ENCODINGS = ("utf-16", "utf-16-le", "utf-8-sig", "utf-32", "latin-1", "utf-7", "cp500")
 
 Change = Callable[[bytes, Sequence[bytes], Random], bytes]
@@ -194,4 +202,3 @@ def _places(content: Any, random: Random) -> list[tuple[Any, Any]]:
             places.append((part, key))
             open_parts.append(part[key])
     return places
-
