@@ -113,9 +113,9 @@ def _replay(arguments: Namespace) -> None:
     out("robot.toml"),
 )
 def _robot(arguments: Namespace) -> None:
-    from sim.inputs import robot_toml
     from sim.io.files import write_text
     from sim.model.presets import PRESETS
+    from sim.model.robot_toml import robot_toml
 
     if arguments.preset not in PRESETS:
         raise InputError(f"no preset {arguments.preset!r}; there are {', '.join(PRESETS)}")

@@ -30,7 +30,7 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from calibration.report.corrected_robot import corrected_robot, corrected_toml
-from calibration.report.report import draw_residuals
+from calibration.report.figures import draw_residuals
 from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
@@ -44,13 +44,13 @@ from dataset.storage.data_set import read
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import TrackingError, draw_overlay, tracking_error
 from planner.paths.path import polygon
-from sim.inputs import robot_toml
 from sim.io.files import whole_file, write_csv, write_text
 from sim.io.pages import Page
 from sim.io.provenance import code_version
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
+from sim.model.robot_toml import robot_toml
 from sim.motion.batches import available_jobs
 from sim.motion.shapes import tails_over_a_revolution
 from sim.motion.steady import steady
@@ -263,7 +263,9 @@ def _write_page(
         page.section(f"Calibration with a table: {name}")
         page.text(verdict.sentence, tone="good" if verdict.verdict in ("effect", "none") else "bad")
         if verdict.verdict == "effect":
-            page.figure(draw_residuals(verdict, data), "residuals before and after the effect is added")
+            page.figures(
+                [(figure, f"residuals, {model}", model) for figure, model in draw_residuals(verdict, data)]
+            )
         errors = [
             ("coefficients before calibration", verdict.error_uncalibrated),
             ("calibrated", verdict.error_before),

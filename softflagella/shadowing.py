@@ -1,6 +1,6 @@
 """Modules of other people that hide a package of this project.
 
-The packages have short names, and Python imports the first module of a name that it finds: `sim.py` beside a
+The packages have short names, and Python imports the first module of a name that it finds: a file sim.py beside a
 script, a folder `dataset`, or the package `dataset` of the package index. The error that follows names neither the
 file nor the remedy. So the import of `softflagella` checks where its packages are.
 """

@@ -25,9 +25,9 @@ from calibration.swimmer.swimmer import robot_numbers
 from calibration.verdict.experiment import LearntCorrection
 from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, knowledge_toml
 from sim.effects import catalogue
-from sim.inputs import robot_toml
 from sim.io.errors import InputError
 from sim.model.robot import Robot
+from sim.model.robot_toml import robot_toml
 from surrogate.input_ranges import COEFFICIENTS
 
 

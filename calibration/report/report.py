@@ -1,4 +1,4 @@
-"""The report of a calibration: data, fit, evidence, residuals before and after, errors compared with the noise."""
+"""The report of a calibration: what to do next, the errors, the fit, the residuals and the evidence."""
 
 from __future__ import annotations
 
@@ -6,64 +6,64 @@ import math
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from calibration.attribution.refits import IMITABLE, SURE, UNSEEN, Candidate
-from calibration.statistics.fit import WRONG, least_determined
+from calibration.report.figures import draw_evidence, draw_maps, draw_residuals, draw_summary, final_model
+from calibration.report.quantities import (
+    LABELS,
+    detectable,
+    direction_in_words,
+    feature_in_words,
+    fitted_value,
+    given,
+    output_error,
+    plain,
+    size,
+    tolerance,
+)
+from calibration.statistics.fit import WRONG, Fit, least_determined
+from calibration.statistics.statistical_model import Parameter
 from calibration.swimmer.measured_table import Measurements
 from calibration.verdict.next_runs import STOP, Batch
+from calibration.verdict.next_steps import DISAGREES, next_steps
 from calibration.verdict.verdict import Verdict
 from sim.arrays import Floats
 from sim.io.pages import Page
 from sim.io.provenance import code_version
 
-_LABELS = {
-    "omega_h": "ω_h, head spin",
-    "omega_t": "ω_t, tail spin",
-    "omega_yr": "ω_yr, yaw rate",
-    "R_yr": "R_yr, turn radius",
-    "theta": "θ, slip angle [rad]",
-    "v": "v, speed",
-}
-_MODELS = {
-    "uncalibrated": "as given",
-    "before": "calibrated",
-    "after": "calibrated, with effects",
-    "generic": "calibrated, generic correction",
-    "predictive": "correction in corrected.toml, simulated",
-}
 _SETTINGS = {"l_cm": "l [cm]", "omega_rpm": "ω [rpm]"}
-_DISAGREES = 0.01  # p of the held-out runs below which the report says so
 _TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes", "score": "effects"}
 
 
 def write_report(result: Verdict, data: Measurements, out: str | Path, *, title: str) -> None:
     """Write report.html."""
     page = Page(f"Calibration: {title}", result.sentence)
-    page.figure(draw_summary(result, data), "residual of each output before and after, beside the noise")
     add_sections(page, result, data)
     page.write(out, f"code {code_version()}; fixed before the data was looked at: {result.conditions.hash}")
 
 
 def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
     """Add the sections of the report."""
+    _add_next_steps(page, result)
+    _add_errors(page, result, data)
     _add_numbers(page, result)
-    _add_data(page, result, data)
     _add_fit(page, result)
-    page.section("Residuals on the runs that were fitted, before and after")
-    page.figure(draw_residuals(result, data), "residuals by output and number of tails, before and after")
-    page.text(
-        "Where the residual is large: each output along each input, square and product, in standard deviations, "
-        "after the fit."
-    )
-    page.figure(draw_map(result, data), "map of the residual over the runs' inputs, before and after")
+    _add_residuals(page, result, data)
     _add_evidence(page, result)
-    _add_test(page, result, data)
+    _add_data(page, result, data)
+
+
+def _add_next_steps(page: Page, result: Verdict) -> None:
+    page.section("What to do next")
+    page.steps(next_steps(result), numbered=True)
+    for caveat in result.conditions.caveats:
+        page.text(f"The conclusion is weaker: {caveat}.", tone="bad")
+    if result.next.batch is not None:
+        _add_batch(page, result.next.batch)
     if result.next_runs:
-        page.section("Runs to make next")
         page.text(
-            "These runs would tell the explanations apart. Separation is for the two that they tell apart least; "
-            "the last column says how often they would. Settings are those that `--own` named, or the table's."
+            "Or repeat a single setting. Separation is for the two explanations "
+            "that it tells apart least, in units of χ². Settings are those that `--own` named, or the table's."
         )
         settings = list(result.next_runs[0].settings)
         page.table(
@@ -73,22 +73,92 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
                 for r in result.next_runs
             ],
         )
-        if result.next.batch is not None:
-            _add_batch(page, result.next.batch)
 
 
 def _add_batch(page: Page, batch: Batch) -> None:
-    decides = f"{100 * batch.decides:.0f} %"
-    wrong = f"{100 / STOP:.0f} %"
-    page.text(
-        f"Or these {len(batch.settings)} runs together. They would decide in {decides} of cases. "
-        'Add them to the table with a session of their own. Then "calibration decide" says which explanation they '
-        f"speak for. An explanation is given up when the best one is {STOP:.0f} times as likely. So the right one "
-        f"is given up in about {wrong} of cases at most, however often you look."
-    )
+    page.text("Runs to make next:")
+    counts: dict[tuple[str, ...], int] = {}
+    for settings in batch.settings:
+        key = tuple(map(str, settings.values()))
+        counts[key] = counts.get(key, 0) + 1
     page.table(
-        [_SETTINGS.get(s, s) for s in batch.settings[0]], [tuple(map(str, s.values())) for s in batch.settings]
+        (*(_SETTINGS.get(s, s) for s in batch.settings[0]), "runs"),
+        [(*settings, str(count)) for settings, count in counts.items()],
     )
+    page.text(
+        f"They would decide in {100 * batch.decides:.0f} % of cases. An explanation is given up when the best one "
+        f"is {STOP:.0f} times as likely. So the right one is given up in about {100 / STOP:.0f} % of cases at "
+        "most, however often you look."
+    )
+
+
+def _add_errors(page: Page, result: Verdict, data: Measurements) -> None:
+    page.section("Error on the held-out runs")
+    errors, split = result.errors, result.conditions.split
+    page.text(
+        f"{int(split.test.sum())} runs ({split.names}) were held out before anything was fitted. This is how far "
+        "each model is from them."
+    )
+    models = {"uncalibrated": "as given", "before": "calibrated"}
+    if final_model(result):
+        models["after"] = f"calibrated, {final_model(result)}"
+    if "predictive" in errors.rms:
+        models["predictive"] = "calibrated, with the correction in corrected.toml"
+    models["generic"] = "calibrated, with a regression of the residual"
+    rows = [
+        (
+            words,
+            f"{100 * errors.rms[name]:.2f} %",
+            *(output_error(output, error) for output, error in errors.by_output[name].items()),
+        )
+        for name, words in models.items()
+    ]
+    scatter = np.sqrt(np.diag(result.base.noise.run)).tolist()
+    noise = (
+        "noise of one run",
+        f"{100 * errors.noise:.2f} %",
+        *(output_error(output, error) for output, error in zip(data.outputs, scatter, strict=True)),
+    )
+    page.table(("model", "all outputs", *(LABELS[o] for o in data.outputs)), [*rows, noise])
+    low, high = errors.after_interval
+    agree = errors.p_value >= DISAGREES
+    page.text(
+        f"The held-out runs {'agree' if agree else 'do not agree'} with the final model (p = "
+        f"{plain(errors.p_value, 2)}). Its error has the 95 % interval {100 * low:.2f} to {100 * high:.2f} %.",
+        tone="good" if agree else "bad",
+    )
+    if result.held_out_error_falls is False:
+        page.text(
+            f"The error does not fall with what is claimed: {100 * result.error_before:.2f} % without it, "
+            f"{100 * result.error_after:.2f} % with it.",
+            tone="bad",
+        )
+    page.figures([(draw_summary(result, data), "residual of each output over the noise, for each model",
+                   "The same on the runs that were fitted, for each output.")])  # fmt: skip
+    features = [feature_in_words(name) for name in result.corrections.regression.features]
+    page.text(
+        "The regression of the residual describes it, and does not explain it. It uses "
+        f"{', '.join(features) or 'no feature'}."
+    )
+    _add_correction(page, result, data)
+
+
+def _add_correction(page: Page, result: Verdict, data: Measurements) -> None:
+    learnt = result.corrections.learnt
+    if learnt is None:
+        return
+    speed = np.abs(data.omega) * 30 / math.pi
+    page.text(
+        "So that the robot can be steered although nothing explains the residual, corrected.toml has a correction "
+        f"of the head's load in {', '.join(learnt.terms)}. It holds between these runs only: "
+        f"{_range('N', data.tails, '')}, {_range('l', 100 * data.length, ' cm')}, {_range('ω', speed, ' rpm')}. "
+        "A robot outside is refused. The response to a flip is simulated with the same load."
+    )
+
+
+def _range(name: str, values: Floats, unit: str) -> str:
+    low, high = float(values.min()), float(values.max())
+    return f"{name} = {plain(low)}{unit}" if low == high else f"{name} from {plain(low)} to {plain(high)}{unit}"
 
 
 def _add_numbers(page: Page, result: Verdict) -> None:
@@ -96,105 +166,151 @@ def _add_numbers(page: Page, result: Verdict) -> None:
         return
     page.section("Nuisance parameters")
     wrong = [" or ".join(p.parameter.title for p in alike) for alike in result.wrong_numbers]
-    said = "; ".join(wrong) if wrong else "none is"
     page.text(
         "What was given is known to a tolerance only. So these parameters are fitted, too, each with the "
         "tolerance that was stated for it. The pull is how far the runs move a parameter, in standard deviations "
-        f"of what chance would do. Beyond {WRONG:g} the stated value is taken to be wrong: {said}.",
-        tone="bad" if wrong else "good",
+        f"of what chance would do; beyond {WRONG:g} the stated value is taken to be wrong."
     )
-    rows = []
-    for p in result.fits.pulls:
-        nuisance = p.parameter
-        assert nuisance.sigma is not None
-        scale, unit = (100.0, "%") if nuisance.logarithmic else (nuisance.shown, nuisance.unit)
-        runs = f"{p.off(p.alone)}, ± {scale * p.alone_error:.2g} {unit}" if p.learnt else "nothing"
-        rows.append(
+    if wrong:
+        page.text(f"Taken to be wrong: {'; and '.join(wrong)}.", tone="bad")
+    elif result.verdict == "unexplained":
+        page.text(
+            "Nothing explains the residual, so none is taken to be wrong: what is missing pulls at them, too."
+        )
+    else:
+        page.text("None is taken to be wrong.", tone="good")
+    page.table(
+        ("parameter", "given", "tolerance (σ)", "fitted", "by the runs alone", "pull"),
+        [
             (
-                nuisance.title,
-                f"{nuisance.start:.4g}"
-                if nuisance.unit != nuisance.title and nuisance.start not in (0.0, 1.0)
-                else "",
-                f"± {scale * nuisance.sigma:.2g} {unit}",
-                f"{p.off(p.change)}, ± {scale * p.error:.2g} {unit}",
-                runs,
+                p.parameter.title,
+                given(p.parameter),
+                tolerance(p.parameter),
+                fitted_value(p),
+                fitted_value(p, alone=True) if p.learnt else "nothing",
                 f"{p.z:+.1f}" if p.learnt else "",
             )
-        )
-    page.table(("parameter", "given [SI]", "tolerance (σ)", "fitted", "what the runs alone say", "pull"), rows)
+            for p in result.fits.pulls
+        ],
+    )
 
 
 def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
     page.section("Data")
+    sessions, conditions = len(data.session_names), result.conditions
+    speed = np.abs(data.omega) * 30 / math.pi
     page.text(
-        f"{len(data)} usable runs in {len(data.session_names)} session(s); held out for the test: "
-        f"{result.conditions.split.names}. Excluded: "
-        + ("; ".join(result.conditions.excluded) if result.conditions.excluded else "nothing")
-        + "."
+        f"{len(data)} usable runs in {sessions} session{'s' if sessions > 1 else ''}: "
+        f"{_range('N', data.tails, '')}, {_range('tail length', 100 * data.length, ' cm')}, "
+        f"{_range('motor speed', speed, ' rpm')}. Held out for the test: {conditions.split.names}. Excluded: "
+        f"{'; '.join(conditions.excluded) or 'nothing'}."
     )
-    scatter = np.sqrt(np.diag(result.base.noise.run))
-    noise = ", ".join(f"{_LABELS[o]} {100 * s:.1f} %" for o, s in zip(data.outputs, scatter, strict=True))
-    share = f"{100 * math.sqrt(result.final.noise.share):.0f} % of that"
-    shift = f"A session shifts all its runs by {share}."
-    if len(data.session_names) == 1:
-        shift = f"With one session its shift cannot be measured; {share} is assumed."
+    scatter = np.sqrt(np.diag(result.base.noise.run)).tolist()
+    noise = ", ".join(f"{LABELS[o]} {output_error(o, s)}" for o, s in zip(data.outputs, scatter, strict=True))
+    share = math.sqrt(result.final.noise.share)
+    if sessions == 1:
+        shift = f"With one session its shift cannot be measured; {100 * share:.0f} % of the scatter is assumed."
+    elif share < 0.005:
+        shift = "No shift of whole sessions can be seen beside it."
+    else:
+        shift = f"A session shifts all its runs by {100 * share:.0f} % of that."
     page.text(f"Scatter of one run, from the repeats: {noise}. {shift}")
-    for limit in result.conditions.caveats:
-        page.text(f"The conclusion is weaker: {limit}.", tone="bad")
 
 
 def _add_fit(page: Page, result: Verdict) -> None:
     page.section("Fit")
-    given = {p.parameter.name for p in result.fits.pulls}
-    rows = []
-    for fitted, intervals, name in (
-        (result.base, result.fits.base_intervals, "without effects"),
-        (result.final, result.fits.final_intervals, "with the verdict's effects"),
-    ):
-        for parameter in (p.name for p in fitted.fitted if p.name not in given):
-            low, high = intervals[parameter]
-            rows.append(
-                (f"{parameter}, {name}", f"{fitted.parameters[parameter]:.4g}", f"{low:.4g} to {high:.4g}")
+    refit = result.fits.final_refit
+    stated = {p.parameter.name for p in result.fits.pulls}
+    models: list[tuple[str, Fit, dict[str, tuple[float, float]]]] = [
+        ("calibrated", result.base, result.fits.base_intervals)
+    ]
+    if final_model(result):
+        models.append((final_model(result), result.final, result.fits.final_intervals))
+    fitted = {p.name: p for _, fit, _ in models for p in fit.fitted if p.name not in stated}
+    page.table(
+        ("parameter", *(name for name, _, _ in models), "in corrected.toml"),
+        [
+            (
+                p.title,
+                *(_with_interval(p, fit, intervals) for _, fit, intervals in models),
+                size(p, refit.parameters[p.name], 4),
             )
-        if result.final is result.base:
-            break
-    page.table(("parameter", "value", "95 % interval, by profile deviance"), rows)
-    combination, error = least_determined(result.final)
-    final = result.fits.final_refit.parameters
+            for p in fitted.values()
+        ],
+    )
     page.text(
-        f"The runs determine {combination} worst: {100 * error:.1f} %. corrected.toml has the model fitted once "
-        "more to all runs, with the held-out ones: "
-        + ", ".join(f"{name} {final[name]:.4g}" for name in result.final.names if name not in given)
-        + "."
+        "In brackets: 95 % interval, by profile deviance. corrected.toml has the model fitted once more to all "
+        "runs, with the held-out ones."
+    )
+    direction, error = least_determined(result.final)
+    page.text(
+        "What the runs determine worst: one standard deviation is "
+        f"{direction_in_words(direction, error)}, together."
+    )
+
+
+def _with_interval(parameter: Parameter, fit: Fit, intervals: dict[str, tuple[float, float]]) -> str:
+    if parameter.name not in fit.names:
+        return "–"
+    low, high = intervals[parameter.name]
+    value = size(parameter, fit.parameters[parameter.name], 4)
+    return f"{value} ({plain(low * parameter.shown, 4)} to {plain(high * parameter.shown, 4)})"
+
+
+def _add_residuals(page: Page, result: Verdict, data: Measurements) -> None:
+    page.section("Residuals on the runs that were fitted")
+    page.text("Measured minus model, of every run, against the length of its tails.")
+    page.figures(
+        [
+            (figure, f"residuals by output and number of tails, {model}", model)
+            for figure, model in draw_residuals(result, data)
+        ]
+    )
+    page.text(
+        "Where the residual is large: each output along each input, square and product, in standard deviations. "
+        "Red: measured above the model. Numbers where it is beyond 3."
+    )
+    page.figures(
+        [
+            (figure, f"map of the residual over the runs' inputs, {model}", model)
+            for figure, model in draw_maps(result, data.outputs)
+        ]
     )
 
 
 def _add_evidence(page: Page, result: Verdict) -> None:
     page.section("Evidence for each effect of the catalogue")
     misfit = result.evidence.misfit
-    each = ", ".join(f"{_TESTS[name]} {p:.2g}" for name, p in misfit.p.items())
+    each = ", ".join(f"{_TESTS[name]} {plain(p, 2)}" for name, p in misfit.p.items())
     page.text(
-        f"Is there more than noise? p = {misfit.p_value:.2g} by all tests together ({each}). Below: score of each "
-        "effect, without the part that the coefficients and the nuisance parameters can absorb; claims need more "
-        f"than {misfit.critical_z:.2f}. The smallest detectable size is found half of the time. The column beside "
-        "it is that size if every nuisance parameter were exact. A dash means that the effect changes nothing in "
-        "these runs."
+        f"Is there more than noise? p = {plain(misfit.p_value, 2)} by all tests together ({each}). The score of "
+        "an effect is how well it fits the residual, without the part that the coefficients and the nuisance "
+        f"parameters can absorb; a claim needs more than {misfit.critical_z:.2f} (dashed). Green: explains the "
+        "residual. Orange: refitted and rejected."
     )
-    page.figure(draw_evidence(result), "score of each effect against what a claim needs")
+    page.figures([(draw_evidence(result), "score of each effect against what a claim needs", "")])
+    page.text(
+        "The smallest detectable size is found half of the time. The column beside it is that size if every "
+        "nuisance parameter were exact."
+    )
+    seen = [c for c in result.evidence.candidates if c.detectable < UNSEEN]
     page.table(
-        ("effect", "score z", "survived share", "smallest detectable size", "numbers exact", "judgement"),
+        ("effect", "score z", "not absorbed", "smallest detectable size", "with exact numbers", "judgement"),
         [
             (
                 c.effect.title,
                 f"{c.z:+.1f}",
-                f"{c.survived:.2f}",
-                _size(c.detectable),
-                _size(c.detectable_exact),
+                f"{100 * c.survived:.0f} %",
+                detectable(c.effect, c.detectable),
+                detectable(c.effect, c.detectable_exact),
                 c.verdict,
             )
-            for c in result.evidence.candidates
+            for c in seen
         ],
     )
+    unseen = [c.effect.title for c in result.evidence.candidates if c.detectable >= UNSEEN]
+    if unseen:
+        page.text(f"These effects change nothing in these runs, whatever their size: {'; '.join(unseen)}.")
     for c in result.explaining:
         page.text(
             f"{c.title}: {100 * c.imitable:.0f} % of the departures from outside the catalogue that were drawn "
@@ -202,10 +318,8 @@ def _add_evidence(page: Page, result: Verdict) -> None:
             + _carried(c)
         )
     if result.evidence.untestable:
-        page.text(
-            "Not tested, because data are missing: "
-            + "; ".join(f"{t} ({why})" for t, why in result.evidence.untestable.items())
-        )
+        page.text("Not tested, because data are missing:")
+        page.steps([f"{title}: {why}" for title, why in result.evidence.untestable.items()])
 
 
 def _carried(claim: Candidate) -> str:
@@ -213,160 +327,3 @@ def _carried(claim: Candidate) -> str:
         return ""
     words = "predicts" if claim.transfer >= SURE else "does not predict"
     return f"Fitted to short tails and few of them, it {words} the other runs (p = {claim.transfer:.3f})."
-
-
-def _add_test(page: Page, result: Verdict, data: Measurements) -> None:
-    page.section("Error on the held-out runs")
-    errors = result.errors
-    low, high = errors.after_interval
-    page.table(
-        ("model", "relative rms", *(_LABELS[o] for o in data.outputs)),
-        [
-            (_MODELS[name], f"{100 * rms:.2f} %", *(f"{100 * v:.1f} %" for v in errors.by_output[name].values()))
-            for name, rms in errors.rms.items()
-        ],
-    )
-    learnt = result.corrections.learnt
-    if learnt is not None:
-        page.text(
-            "So that the robot can be steered although nothing explains the residual, corrected.toml has a "
-            f"correction of the head's load in {', '.join(learnt.terms)}. It holds between these runs "
-            f"only: N from {data.tails.min():.0f} to {data.tails.max():.0f}, l from "
-            f"{100 * data.length.min():.3g} to {100 * data.length.max():.3g} cm, ω from {_rpm(data).min():.3g} "
-            f"to {_rpm(data).max():.3g} rpm. A robot outside is refused. The response to a flip is simulated with "
-            "the same load."
-        )
-    features = ", ".join(result.corrections.regression.features) or "no feature"
-    agree = errors.p_value >= _DISAGREES
-    page.text(
-        f"95 % interval with effects: {100 * low:.2f} to {100 * high:.2f} %. "
-        f"Noise of one run from the repeats: {100 * errors.noise:.2f} %. The held-out runs "
-        f"{'agree' if agree else 'do not agree'} with the final model (p = {errors.p_value:.2g}). "
-        f"Generic correction: {features} (it describes the residual and does not explain it).",
-        tone="good" if agree else "bad",
-    )
-
-
-def _rpm(data: Measurements) -> Floats:
-    return np.asarray(np.abs(data.omega) * 30 / math.pi)
-
-
-def draw_summary(result: Verdict, data: Measurements) -> Figure:
-    """Draw the residual of each output before and after, as rms over the fitted runs, and the noise of a run."""
-    bars = [
-        ("calibrated, without effects", result.base.prediction, "#e08a1e"),
-        ("final model", result.final.prediction, "#3d9a5f"),
-    ]
-    noise = 100 * np.sqrt(np.diag(result.base.noise.run))
-    figure = Figure(figsize=(9, 2.6))
-    axes = figure.add_subplot()
-    place = np.arange(len(data.outputs))
-    for i, (label, prediction, colour) in enumerate(bars):
-        rms = 100 * np.sqrt(((data.y - prediction)[result.conditions.split.fitted] ** 2).mean(0))
-        axes.bar(place + 0.32 * (i - 0.5), rms, width=0.3, color=colour, label=label)
-    for i, height in enumerate(noise.tolist()):
-        said = "noise of a run" if i == 0 else None
-        axes.plot([i - 0.38, i + 0.38], [height] * 2, color="#1c2733", lw=1.6, label=said)
-    axes.set_xticks(place, [_LABELS[o] for o in data.outputs], fontsize=8)
-    axes.set_ylabel("measured − model, rms [%]", fontsize=8)
-    axes.tick_params(axis="y", labelsize=8)
-    axes.legend(fontsize=7, frameon=False)
-    figure.tight_layout()
-    return figure
-
-
-def draw_map(result: Verdict, data: Measurements) -> Figure:
-    """Draw z of every output along every feature of the inputs, before and after."""
-    maps = [("calibrated", result.evidence.misfit)]
-    if result.explaining and result.explaining[0].refit_misfit is not None:
-        maps.append(("with the verdict's effects", result.explaining[0].refit_misfit))
-    names = [name.replace("omega", "ω") for name in result.evidence.misfit.features]
-    height = 0.32 * len(data.outputs) + 0.5
-    figure = Figure(figsize=(11, len(maps) * height + 1.6))
-    limit = max(4.0, float(np.abs(result.evidence.misfit.scores.shapes).max(initial=0.0)))
-    for place, (label, misfit) in enumerate(maps):
-        axes = figure.add_subplot(len(maps), 1, place + 1)
-        z = misfit.scores.shapes
-        axes.imshow(
-            np.arcsinh(z / 2),
-            cmap="RdBu_r",
-            vmin=-np.arcsinh(limit / 2),
-            vmax=np.arcsinh(limit / 2),
-            aspect="auto",
-        )
-        for i, j in np.argwhere(np.abs(z) > 3):
-            colour = "white" if abs(z[i, j]) > 0.4 * limit else "#1c2733"
-            axes.text(j, i, f"{z[i, j]:+.0f}", ha="center", va="center", fontsize=7, color=colour)
-        axes.set_yticks(range(len(data.outputs)), [_LABELS[o].split(" [")[0] for o in data.outputs], fontsize=8)
-        last = place == len(maps) - 1
-        axes.set_xticks(range(len(names)), names if last else [""] * len(names), rotation=90, fontsize=7)
-        axes.set_title(f"{label} (numbers where |z| > 3)", fontsize=9)
-    figure.tight_layout()
-    return figure
-
-
-def draw_evidence(result: Verdict) -> Figure:
-    """Draw the score of every effect as a bar, with the critical score; what explains the residual is green."""
-    named = {name for c in result.explaining for name in (e.name for e in c.claimed)}
-    ranked = sorted(result.evidence.candidates, key=lambda c: abs(c.z))
-    figure = Figure(figsize=(9, 0.8 + 0.24 * len(ranked)))
-    axes = figure.add_subplot()
-    for place, candidate in enumerate(ranked):
-        tested = candidate.refit is not None
-        colour = "#3d9a5f" if candidate.effect.name in named else "#e08a1e" if tested else "#b8c2cc"
-        axes.barh(place, candidate.z, color=colour, height=0.7)
-    for edge in (-result.evidence.misfit.critical_z, result.evidence.misfit.critical_z):
-        axes.axvline(edge, color="#1c2733", lw=0.8, ls="--")
-    axes.set_yticks(range(len(ranked)), [c.effect.title for c in ranked], fontsize=7)
-    axes.set_xscale("symlog", linthresh=2 * result.evidence.misfit.critical_z)
-    axes.tick_params(axis="x", labelsize=8)
-    axes.set_xlabel(
-        "score z (dashed: needed for a claim; green: explains; orange: refitted and rejected)", fontsize=8
-    )
-    figure.tight_layout()
-    return figure
-
-
-def draw_residuals(result: Verdict, data: Measurements) -> Figure:
-    """Draw measured minus model in per cent, against tail length, before (left) and after (right)."""
-    outputs = data.outputs
-    figure = Figure(figsize=(11, 1.9 * len(outputs)))
-    colours = {n: c for n, c in zip((2, 3, 4, 5), ("#2a7fba", "#e08a1e", "#3d9a5f", "#8a4fa3"), strict=True)}
-    rng = np.random.default_rng(0)
-    used = result.conditions.split.fitted
-    jitter = rng.uniform(-0.25, 0.25, used.sum())
-    for i, name in enumerate(outputs):
-        limit = 0.0
-        pair = []
-        for j, fitted in enumerate((result.base, result.final)):
-            axes = figure.add_subplot(len(outputs), 2, 2 * i + j + 1)
-            residual = 100 * (data.y - fitted.prediction)[used, i]
-            limit = max(limit, float(np.abs(residual).max()) * 1.1)
-            for n in np.unique(data.tails[used]):
-                some = data.tails[used] == n
-                axes.plot(
-                    100 * data.length[used][some] + jitter[some],
-                    residual[some],
-                    ".",
-                    ms=4,
-                    color=colours.get(int(n), "#555555"),
-                    label=f"N = {int(n)}",
-                )
-            axes.axhline(0, color="#1c2733", lw=0.6)
-            axes.set_ylabel(f"{_LABELS[name]} [%]", fontsize=8)
-            axes.tick_params(labelsize=8)
-            pair.append(axes)
-        for axes in pair:
-            axes.set_ylim(-limit, limit)
-    figure.axes[0].set_title("calibrated", fontsize=10)
-    figure.axes[1].set_title("calibrated, with the verdict's effects", fontsize=10)
-    figure.axes[0].legend(fontsize=7, frameon=False, ncols=4)
-    for axes in figure.axes[-2:]:
-        axes.set_xlabel("tail length [cm]", fontsize=8)
-    figure.tight_layout()
-    return figure
-
-
-def _size(value: float) -> str:
-    """Write a smallest detectable size; a dash where no size shows in these runs."""
-    return f"{value:.2g}" if value < UNSEEN else "–"

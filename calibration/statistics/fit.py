@@ -46,6 +46,7 @@ from sim.arrays import Flags, Floats, Integers
 
 WRONG = 3.0  # pull beyond which a nuisance parameter is taken to be wrong
 _LEARNT = 0.02  # share of the prior's variance that the runs must remove before a pull means anything
+_NOTHING = 0.01  # change in per cent, or in the unit in which it is shown, that is not stated
 _MOST_STEPS = 25
 _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
 _SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ⁻¹ r by less
@@ -83,13 +84,13 @@ class Pull:
     @property
     def words(self) -> str:
         """What the runs alone say, as in "E is 40 % below what was given (3.7 σ)"."""
-        return f"{self.parameter.title} is {self.off(self.alone)} what was given ({abs(self.z):.1f} σ)"
-
-    def off(self, change: float) -> str:
-        """Put a change into words: "40 % below"."""
-        given = self.parameter
+        given, change = self.parameter, self.alone
         size = abs(math.expm1(change)) * 100 if given.logarithmic else abs(change) * given.shown
-        return f"{size:.2g} {'%' if given.logarithmic else given.unit} {'below' if change < 0 else 'above'}"
+        if size < _NOTHING:
+            return f"{given.title} is what was given ({abs(self.z):.1f} σ)"
+        unit, side = "%" if given.logarithmic else given.unit, "below" if change < 0 else "above"
+        digits = f"{size:.2g}" if size < 99.5 else f"{size:.0f}"
+        return f"{given.title} is {digits} {unit} {side} what was given ({abs(self.z):.1f} σ)"
 
 
 @dataclass(frozen=True)
@@ -363,14 +364,14 @@ def _deviance(
     return float(normal[p, p] - absorbed)
 
 
-def least_determined(fitted: Fit) -> tuple[str, float]:
-    """Find the combination of logarithmic parameters that the runs determine worst, and its error (of ln)."""
+def least_determined(fitted: Fit) -> tuple[dict[str, float], float]:
+    """Find the direction in the coefficients, as logarithms, that the runs determine worst.
+
+    Returns:
+        The direction, a unit vector by name, largest component positive; and the standard deviation along it.
+    """
     places = [i for i, p in enumerate(fitted.fitted) if p.logarithmic and p.sigma is None]
     values, vectors = np.linalg.eigh(fitted.covariance[np.ix_(places, places)])
     vector = vectors[:, -1] * np.sign(vectors[np.argmax(np.abs(vectors[:, -1])), -1])
-    parts = [
-        f"{fitted.fitted[i].name}^{power:.2f}"
-        for i, power in zip(places, vector.tolist(), strict=True)
-        if abs(power) > 0.1
-    ]
-    return " ".join(parts), float(np.sqrt(values[-1]))
+    direction = {fitted.fitted[i].name: part for i, part in zip(places, vector.tolist(), strict=True)}
+    return direction, float(np.sqrt(values[-1]))

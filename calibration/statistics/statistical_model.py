@@ -52,10 +52,10 @@ class Parameter:
     bounds: tuple[float, float]
     typical: float  # a typical size; it sets the finite-difference step
     logarithmic: bool = False  # fitted as its logarithm
-    unit: str = "1"
+    unit: str = "1"  # in which it is shown
     sigma: float | None = None  # of a nuisance parameter's prior, on its own scale; None: free
     plausible: tuple[float, float] | None = None  # sizes of an effect that its source allows; None: all
-    shown: float = 1.0  # factor to the unit in which a change is shown
+    shown: float = 1.0  # factor to that unit
     second: Parameter | None = None  # of an effect: its second number, which shows only with the effect
     grid: tuple[float, ...] = ()  # of a second number: values at which the effect is looked for
 

@@ -41,7 +41,7 @@ def influences() -> dict[str, Influence]:
             )  # fmt: skip
             known[driver.name] = Influence(parameter, effect.name, driver.column, effect.symmetry == "odd")
     slip = Parameter(
-        SLIP, "slip of the motor", 0.0, (-0.3, 0.3), 0.02, unit="share of its speed", plausible=(-0.1, 0.1)
+        SLIP, "slip of the motor", 0.0, (-0.3, 0.3), 0.02, unit="%", plausible=(-0.1, 0.1), shown=100.0
     )
     point = Parameter(
         TRACKED_POINT, "tracked point off the head's centre", 0.0, (-2.0, 2.0), 0.1, unit="L, forward",
@@ -54,8 +54,9 @@ def influences() -> dict[str, Influence]:
             0.0,
             (-0.05, 0.05),
             0.001,
-            unit="m/s",
+            unit="cm/s",
             plausible=(-0.02, 0.02),
+            shown=100.0,
         )
         known[name] = Influence(current, None, f"course_{axis}", False)
     known[SLIP] = Influence(slip, None, None, False)

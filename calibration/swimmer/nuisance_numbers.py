@@ -14,6 +14,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from calibration.statistics.statistical_model import Parameter
+from sim.io.units import UNITS, from_si
 from sim.model.robot import Robot
 
 CAMERA, HEADING, TACHOMETER = "camera_scale", "heading_zero", "tachometer"
@@ -43,9 +44,9 @@ _TITLES = {
     "head_length": "L (head length)",
     "disc_offset": "a (radius of the circle of the clamps)",
 }
-_UNITS = {
-    "youngs_modulus": "Pa", "viscosity": "Pa s", "tail_radius": "m", "head_radius": "m", "head_length": "m",
-    "disc_offset": "m",
+_SHOWN_IN = {
+    "youngs_modulus": "MPa", "viscosity": "Pa_s", "tail_radius": "mm", "head_radius": "cm", "head_length": "cm",
+    "disc_offset": "cm",
 }  # fmt: skip
 _FACTOR = 5.0  # a number may be off by
 
@@ -69,7 +70,9 @@ def nuisance_parameters(robot: Robot, table: Mapping[str, float], outputs: Seque
         value = robot_number(robot, name)
         sigma = robot.sigma(name).of(value) / value
         bounds = (value / _FACTOR, value * _FACTOR)
-        parameters.append(Parameter(name, title, value, bounds, 1.0, True, _UNITS[name], sigma))
+        unit = UNITS[_SHOWN_IN[name]]
+        shown = from_si(1.0, unit.suffix)
+        parameters.append(Parameter(name, title, value, bounds, 1.0, True, unit.text, sigma, shown=shown))
     length = robot.sigma("tail_length")
     size = length.of(robot.tail_length)
     parameters.append(

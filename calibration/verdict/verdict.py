@@ -230,15 +230,36 @@ class Verdict:
         return (*known, further) if further else known
 
     @property
+    def held_out_error_falls(self) -> bool | None:
+        """Whether what is claimed lowers the error on the held-out runs; None where nothing is claimed."""
+        return None if self.verdict in ("none", "unexplained") else self.error_after < self.error_before
+
+    @property
     def sentence(self) -> str:
-        """The verdict in one sentence with its certainty; a second one for a nuisance parameter that is wrong."""
-        words = self._number_words
+        """The verdict in one sentence with its certainty; a second one for a nuisance parameter that is wrong.
+
+        The first sentence says so if the claim does not lower the error on the held-out runs.
+        """
+        sentences = self._sentences
+        if self.held_out_error_falls is False:
+            without, with_claim = 100 * self.error_before, 100 * self.error_after
+            sentences[0] = (
+                f"{sentences[0].removesuffix('.')}, but the error on the held-out runs does not fall with it "
+                f"({without:.2f} % without, {with_claim:.2f} % with it)."
+            )
+        return " ".join(sentences)
+
+    @property
+    def _sentences(self) -> list[str]:
+        """What is wrong with nuisance parameters, and the effects; an unconfirmed claim comes first."""
+        number = [self._number_words] if self._number_words else []
         if self.verdict == "number":
-            if not self.evidence.rival_effects:
-                return f"{words} No effect is claimed."
-            names = " or ".join(c.title for c in self.evidence.rival_effects)
-            return f"{words} No effect is claimed. If the number is right, {names} would explain as much."
-        return f"{words} {self._effect_words}" if words else self._effect_words
+            rivals = " or ".join(c.title for c in self.evidence.rival_effects)
+            instead = [f"If the number is right, {rivals} would explain as much."] if rivals else []
+            return [*number, "No effect is claimed.", *instead]
+        if self.held_out_error_falls is False and not self.wrong_numbers:
+            return [self._effect_words, *number]
+        return [*number, self._effect_words]
 
     @property
     def _number_words(self) -> str:

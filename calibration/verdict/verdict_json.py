@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from calibration.statistics.fit import Pull
+from calibration.verdict.next_steps import next_steps
 from calibration.verdict.verdict import MODELS, Verdict
 from sim.io.provenance import provenance
 
@@ -24,6 +25,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "verdict": result.verdict,
         "effects": list(result.effects),
         "sentence": result.sentence,
+        "next_steps": next_steps(result),
         "parameters": parameters,
         "in_form_only": list(result.in_form_only),
         "imitability": [c.imitable for c in result.explaining],
@@ -33,6 +35,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
         "numbers_as_given": [_number_record(p) for p in result.fits.pulls],
         **{f"error_{name}": errors.rms.get(name) for name in MODELS},
+        "held_out_error_falls": result.held_out_error_falls,
         "error_after_interval": list(errors.after_interval),
         "noise_ceiling": errors.noise,
         "errors_by_output": errors.by_output,

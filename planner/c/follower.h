@@ -62,9 +62,19 @@ static tracker_real tracker_dot(const tracker_real *a, const tracker_real *b)
 
 /* ---- the robot's motion -------------------------------------------------------------------------------------- */
 
-static tracker_real tracker_between(const int16_t row[][3], int i, int part, tracker_real w)
+/* One number of the lag; knot -1: from rest. */
+static tracker_real tracker_lag_entry(int side, int knot, int i, int part)
 {
-    tracker_real low = row[i][part] * tracker_lag_unit[part], high = row[i + 1][part] * tracker_lag_unit[part];
+    int at = 3 * i + part, row = 3 * TRACKER_TIMES;
+    if (knot < 0) return TRACKER_SHORT(tracker_rest, at + side * row) * tracker_lag_unit[part];
+    at += knot * row;
+    if (side == 0) return TRACKER_SHORT(tracker_lag_left, at) * tracker_lag_unit[part];
+    return TRACKER_SHORT(tracker_lag_right, at) * tracker_lag_unit[part];
+}
+
+static tracker_real tracker_between(int side, int knot, int i, int part, tracker_real w)
+{
+    tracker_real low = tracker_lag_entry(side, knot, i, part), high = tracker_lag_entry(side, knot, i + 1, part);
     return low + w * (high - low);
 }
 
@@ -77,17 +87,20 @@ static void tracker_lag_of(int side, tracker_real before, tracker_real time, tra
         w = u - i;
     }
     if (before < 0) {
-        for (int n = 0; n < 3; n++) lag[n] = tracker_between(tracker_rest[side], i, n, w);
+        for (int n = 0; n < 3; n++) lag[n] = tracker_between(side, -1, i, n, w);
         return;
     }
-    if (before < tracker_knots[TRACKER_KNOTS - 1]) {
+    if (before < TRACKER_REAL(tracker_knots, TRACKER_KNOTS - 1)) {
+        tracker_real low, high;
         k = 0;
-        while (before > tracker_knots[k + 1]) k++;
-        part = tracker_larger((before - tracker_knots[k]) / (tracker_knots[k + 1] - tracker_knots[k]), 0);
+        while (before > TRACKER_REAL(tracker_knots, k + 1)) k++;
+        low = TRACKER_REAL(tracker_knots, k);
+        high = TRACKER_REAL(tracker_knots, k + 1);
+        part = tracker_larger((before - low) / (high - low), 0);
     }
     for (int n = 0; n < 3; n++) {
-        lag[n] = tracker_between(tracker_lag[side][k], i, n, w);
-        if (part != 0) lag[n] += part * (tracker_between(tracker_lag[side][k + 1], i, n, w) - lag[n]);
+        lag[n] = tracker_between(side, k, i, n, w);
+        if (part != 0) lag[n] += part * (tracker_between(side, k + 1, i, n, w) - lag[n]);
     }
 }
 
@@ -148,8 +161,8 @@ static void tracker_apply(tracker *t)
 
 static tracker_real tracker_step(int i, tracker_real *dx, tracker_real *dy)
 {
-    *dx = tracker_path[i + 1][0] - tracker_path[i][0];
-    *dy = tracker_path[i + 1][1] - tracker_path[i][1];
+    *dx = TRACKER_REAL(tracker_path_x, i + 1) - TRACKER_REAL(tracker_path_x, i);
+    *dy = TRACKER_REAL(tracker_path_y, i + 1) - TRACKER_REAL(tracker_path_y, i);
     return *dx * *dx + *dy * *dy;
 }
 
@@ -165,8 +178,8 @@ static tracker_real tracker_look(tracker *t, const tracker_real pose[3], int sen
     y -= TRACKER_ROD * TRACKER_SIN(heading);
     for (;;) {
         square = tracker_step(i, &dx, &dy);
-        away_x = x - tracker_path[i][0];
-        away_y = y - tracker_path[i][1];
+        away_x = x - TRACKER_REAL(tracker_path_x, i);
+        away_y = y - TRACKER_REAL(tracker_path_y, i);
         share = square > 0 ? (away_x * dx + away_y * dy) / square : 2;
         if (share > 1 && i < TRACKER_POINTS - 2 && came >= 0) {
             i++;
@@ -181,8 +194,9 @@ static tracker_real tracker_look(tracker *t, const tracker_real pose[3], int sen
     t->place = i;
     t->share = share;
     t->error = square > 0 ? (dx * away_y - dy * away_x) / TRACKER_SQRT(square) : 0;
-    tracker_real turn = tracker_path[i + 1][2] - tracker_path[i][2];
-    tracker_real wanted = tracker_path[i][2] + tracker_smaller(tracker_larger(share, 0), 1) * turn;
+    tracker_real wanted = TRACKER_REAL(tracker_path_heading, i);
+    tracker_real turn = TRACKER_REAL(tracker_path_heading, i + 1) - wanted;
+    wanted += tracker_smaller(tracker_larger(share, 0), 1) * turn;
     wanted -= TRACKER_ATAN(t->error / TRACKER_AHEAD) + t->bias;
     tracker_real curvature = TRACKER_FABS(turn / tracker_larger(TRACKER_SQRT(square), (tracker_real)1e-9));
     tracker_real bend = tracker_smaller(curvature * TRACKER_PIVOT_RADIUS, 1);

@@ -97,10 +97,10 @@ static inline tracker_advice tracker_answer(const tracker *t)
  * a pose: of x and y [tail lengths], of the heading [rad]. */
 static inline void tracker_begin(tracker *t, tracker_real noise, tracker_real noise_heading, double begin)
 {
-    *t = (tracker){.kept = 0};
+    memset(t, 0, sizeof *t);
     for (int i = 0; i < 3; i++) t->state[i] = tracker_start[i];
     for (int i = 0; i < TRACKER_STATES; i++)
-        for (int j = 0; j < TRACKER_STATES; j++) t->covariance[i][j] = tracker_prior[i][j];
+        for (int j = 0; j < TRACKER_STATES; j++) t->covariance[i][j] = TRACKER_REAL(tracker_prior, i * TRACKER_STATES + j);
     t->noise[0] = t->noise[1] = noise * noise;
     t->noise[2] = noise_heading * noise_heading;
     t->latest = TRACKER_KEPT - 1;

@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from planner.files.plan_json import plan_record
-from planner.files.tracker_header import DIRECTIONS, safe_name, tracker_header
+from planner.files.tracker_header import DIRECTIONS, c_part, safe_name, tracker_header
 from planner.planning.plan import Plan
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_csv, write_text
@@ -127,7 +127,8 @@ def controller_header(result: Plan, identity: str) -> str:
  * lengthens the dwell before it. Stop after the last entry. Look-up table {result.tracked.model}.
 {DIRECTIONS}
  * Put the head's centre at START_X, START_Y with heading START_HEADING, at rest. Checkpoints say where it should
- * be later. x and y in tail lengths, heading in rad, counter-clockwise from the x axis, seen from above. */
+ * be later. x and y in tail lengths, heading in rad, counter-clockwise from the x axis, seen from above.
+ * C99 or C++11. Include it in one file only, since it holds the tables. */
 #ifndef SCHEDULE_H
 #define SCHEDULE_H
 #include <stdint.h>
@@ -139,14 +140,16 @@ def controller_header(result: Plan, identity: str) -> str:
 #define SCHEDULE_START_Y {y:.6f}
 #define SCHEDULE_START_HEADING {heading:.6f}
 #define SCHEDULE_CHECKPOINTS {len(checkpoints)}
-static const uint16_t schedule_ms[SCHEDULE_COUNT] = {{
+
+{c_part("schedule_flash.h")}
+static const uint16_t SCHEDULE_TABLE(schedule_ms)[SCHEDULE_COUNT] SCHEDULE_FLASH = {{
     {body}
 }};
 typedef struct {{ uint32_t ms; float x, y, heading; }} schedule_checkpoint;
-static const schedule_checkpoint schedule_checkpoints[SCHEDULE_CHECKPOINTS] = {{
+static const schedule_checkpoint SCHEDULE_TABLE(schedule_checkpoints)[SCHEDULE_CHECKPOINTS] SCHEDULE_FLASH = {{
     {places}
 }};
-#endif
+{c_part("schedule.h")}#endif
 """
 
 

@@ -1,4 +1,4 @@
-"""tracker.h: the tracker and the plan's tables as one C99 header for the robot's microcontroller.
+"""tracker.h: the tracker and the plan's tables as one header for the robot's microcontroller, in C99 and C++11.
 
 The code is that of `planner/c`, which mirrors `planner.planning.line_of_sight`, `planner.tracking.kalman_filter`
 and `planner.tracking.tracker`. Numbers that both need come from the Python side. Lags are 16-bit numbers with one
@@ -8,10 +8,9 @@ these numbers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -25,8 +24,10 @@ from sim.arrays import Floats
 
 _CODE = Path(__file__).parents[1] / "c"
 _PARTS = ("follower.h", "estimate.h", "tracker.h")
+_PER_LINE = 12  # numbers of a table
 _LARGEST = 32_767
 _FLOAT_EXACT = 3e-6  # rad; in single precision a smaller angle is lost in the rounding
+_FLOAT_SLACK = 5e-4  # time units; the same for a time of some thousand units
 
 # Comment of both headers; docs/reference/signs.md defines the signs.
 DIRECTIONS = """\
@@ -37,8 +38,8 @@ DIRECTIONS = """\
 
 def tracker_header(result: Plan, identity: str) -> str:
     """Write tracker.h as text; `identity` names the plan."""
-    code = "\n".join((_CODE / name).read_text() for name in _PARTS)
-    return f"{_intro(result, identity)}\n{_numbers(result)}\n{_tables(result)}\n{code}#endif\n"
+    code = "\n".join(map(c_part, _PARTS))
+    return f"{_intro(result, identity)}\n{_numbers(result)}\n{c_part('flash.h')}{_tables(result)}\n{code}#endif\n"
 
 
 def rounded(result: Plan) -> Plan:
@@ -60,6 +61,11 @@ def table_bytes(result: Plan) -> int:
     return 2 * (vehicle.lag.size + vehicle.rest.size) + 4 * 3 * len(result.declared.reference.q)
 
 
+def c_part(name: str) -> str:
+    """Return a file of `planner/c`."""
+    return (_CODE / name).read_text()
+
+
 def safe_name(result: Plan) -> str:
     """Return the robot's name without characters that could end a comment in C."""
     return "".join(c for c in result.robot.name if c.isalnum() or c in " -_.")
@@ -69,9 +75,9 @@ def _intro(result: Plan, identity: str) -> str:
     name, model = safe_name(result), result.tracked.model
     return f"""/* Plan {identity}.
  * Tracker for robot "{name}", look-up table {model}: keeps the robot on its plan
- * with poses from a camera, and learns the robot. It is softflagella.Tracker in C99, with the same formulas in
- * the same order. It needs <math.h> and <stdint.h>, and no heap.
- * Tables: {table_bytes(result)} bytes in single precision.
+ * with poses from a camera, and learns the robot. It is softflagella.Tracker in C99 and C++11, with the same
+ * formulas in the same order. It needs <math.h>, <stdint.h> and <string.h>, and no heap.
+ * Tables: {table_bytes(result)} bytes in single precision; on AVR they are in flash.
  *
  *     static tracker keeper;
  *     tracker_begin(&keeper, 0.01, 0.01, now);          noise of a pose, the time at which the motor starts
@@ -82,13 +88,23 @@ def _intro(result: Plan, identity: str) -> str:
  * Turn the motor in advice.direction and flip it at advice.flip_at. Call tracker_feed after each flip, so that the
  * next one is announced. Times are in seconds. x, y and their noise are in tail lengths, the heading and its noise
  * in rad, counter-clockwise from the x axis, seen from above. Before you include this file, define TRACKER_FLOAT
- * for single precision; times stay double. Include it in one file only, since it holds the tables.
+ * for single precision; times stay double. Where double has four bytes (AVR) all is in single precision, and times
+ * have seven digits. Include it in one file only, since it holds the tables.
 {DIRECTIONS} */
 #ifndef TRACKER_H
 #define TRACKER_H
 #include <math.h>
 #include <stdint.h>
+#include <string.h>
 
+#if defined(__SIZEOF_DOUBLE__) && __SIZEOF_DOUBLE__ < 8
+#ifndef TRACKER_FLOAT
+#define TRACKER_FLOAT
+#endif
+#define TRACKER_SLACK {_FLOAT_SLACK!r}
+#else
+#define TRACKER_SLACK {tracker.SLACK!r}
+#endif
 #ifdef TRACKER_FLOAT
 typedef float tracker_real;
 #define TRACKER_EXACT ((tracker_real){_FLOAT_EXACT!r})
@@ -108,7 +124,7 @@ def _numbers(result: Plan) -> str:
         "HALVINGS": line_of_sight.HALVINGS, "MOST_LOOKS": line_of_sight.MOST_LOOKS,
         "KEPT": tracker.KEPT, "LOST": tracker.LOST, "WINDOW": tracker.WINDOW,
     }  # fmt: skip
-    times = {"TIME_SCALE": result.robot.time_scale, "SLACK": tracker.SLACK, "LONGEST_GAP": tracker.LONGEST_GAP}
+    times = {"TIME_SCALE": result.robot.time_scale, "LONGEST_GAP": tracker.LONGEST_GAP}
     reals = {
         "TAIL_LENGTH_M": result.robot.tail_length,
         "STEP": STEP,
@@ -140,19 +156,23 @@ def _tables(result: Plan) -> str:
     most = kalman_filter.most(result)
     lag, rest = (np.round(table / unit).astype(int) for table in (vehicle.lag, vehicle.rest))
     real, short = "static const tracker_real tracker_", "static const int16_t tracker_"
+    x, y, heading = (_table(column, _nine) for column in _path(result).T)
     return "\n".join(
         [
             f"{real}start[3] = {_row(result.start)};",
-            f"{real}twist[2][3] = {_nested(vehicle.twist.tolist())};",
+            f"{real}twist[2][3] = {{{', '.join(_row(twist) for twist in vehicle.twist.tolist())}}};",
             f"{real}current[2] = {_row(vehicle.current.tolist())};",
             f"{real}changes[4] = {_row(kalman_filter.CHANGES)};",
             f"{real}most[TRACKER_STATES - 3] = {_row(most)};",
-            f"{real}prior[TRACKER_STATES][TRACKER_STATES] = {_nested(prior(result))};",
-            f"{real}knots[TRACKER_KNOTS] = {_row(BEFORE_KNOTS.tolist())};",
             f"{real}lag_unit[3] = {_row(unit.tolist())};",
-            f"{real}path[TRACKER_POINTS][3] = {_nested(_path(result).tolist(), _nine)};",
-            f"{short}rest[2][TRACKER_TIMES][3] = {_nested(rest.tolist())};",
-            f"{short}lag[2][TRACKER_KNOTS][TRACKER_TIMES][3] = {_nested(lag.tolist())};\n",
+            f"{real}prior[TRACKER_STATES * TRACKER_STATES] TRACKER_FLASH = {_table(np.array(prior(result)))};",
+            f"{real}knots[TRACKER_KNOTS] TRACKER_FLASH = {_table(BEFORE_KNOTS)};",
+            f"{real}path_x[TRACKER_POINTS] TRACKER_FLASH = {x};",
+            f"{real}path_y[TRACKER_POINTS] TRACKER_FLASH = {y};",
+            f"{real}path_heading[TRACKER_POINTS] TRACKER_FLASH = {heading};",
+            f"{short}rest[2 * TRACKER_TIMES * 3] TRACKER_FLASH = {_table(rest)};",
+            f"{short}lag_left[TRACKER_KNOTS * TRACKER_TIMES * 3] TRACKER_FLASH = {_table(lag[0])};",
+            f"{short}lag_right[TRACKER_KNOTS * TRACKER_TIMES * 3] TRACKER_FLASH = {_table(lag[1])};\n",
         ]
     )
 
@@ -176,8 +196,8 @@ def _row(values: Iterable[float]) -> str:
     return "{" + ", ".join(map(repr, values)) + "}"
 
 
-def _nested(table: Sequence[Any], write: Callable[[float], str] = repr) -> str:
-    """Write nested rows as C, one line for each innermost row."""
-    if not isinstance(table[0], list):
-        return "{" + ", ".join(map(write, table)) + "}"
-    return "{\n" + ",\n".join(_nested(row, write) for row in table) + "}"
+def _table(values: np.ndarray, write: Callable[[float], str] = repr) -> str:
+    """Write all values of an array as one row in C, over several lines."""
+    numbers = [write(value) for value in values.ravel().tolist()]
+    lines = [", ".join(numbers[i : i + _PER_LINE]) for i in range(0, len(numbers), _PER_LINE)]
+    return "{\n" + ",\n".join(lines) + "}"

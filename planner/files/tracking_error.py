@@ -17,6 +17,7 @@ from planner.files.pictures import REPLAYED, draw_tracks
 from planner.paths.distance import distance_to, two_sided
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.quantities import numbers_of
 from sim.mechanics import planar
 
 _LARGEST = 1e100  # of a number
@@ -55,7 +56,7 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
     for name in _COLUMNS:
         if name not in track:
             raise InputError(f"the track has no column {name!r}; it needs {', '.join(_COLUMNS)}")
-    values = {name: pd.to_numeric(track[name], errors="coerce").to_numpy(dtype=float) for name in _COLUMNS}
+    values = {name: numbers_of(track[name]).to_numpy() for name in _COLUMNS}
     pose = np.stack([values["x_over_l"], values["y_over_l"], values["heading_rad"]], 1)
     if not (np.abs([*pose.T, values["time_bar"]]) < _LARGEST).all():
         raise InputError("the track has a value that is not a finite number; correct the file")

@@ -32,13 +32,19 @@ class InputError(ValueError):
 
 
 @contextmanager
-def naming(path: str | Path) -> Iterator[None]:
-    """Write the name of a file before the message of an `InputError` that does not have it."""
+def naming(source: object) -> Iterator[None]:
+    """Write the name of a file before the message of an `InputError` that does not have it.
+
+    Args:
+        source: the path of the file; anything else has no name.
+    """
     try:
         yield
     except InputError as refusal:
         message = " ".join(str(refusal).split())
-        raise type(refusal)(message if str(path) in message else f"{path}: {message}") from None
+        if not isinstance(source, str | Path) or str(source) in message:
+            raise
+        raise type(refusal)(f"{source}: {message}") from None
 
 
 def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None = None) -> int:

@@ -1,30 +1,66 @@
-"""Self-contained pages: text, tables and pictures in one HTML file that opens anywhere."""
+"""Self-contained pages: text, tables, commands and figures in one HTML file that opens anywhere.
+
+Pages follow the reader's light or dark colours, and are readable from 390 pixels of width: figures that belong
+together stand below each other there, and a wide table becomes a list. In texts and tables `words` between
+backticks are set as code.
+"""
 
 from __future__ import annotations
 
-import base64
 import html
-import io
+import re
 from collections.abc import Sequence
 from pathlib import Path
+from urllib.parse import quote
 
 from matplotlib.figure import Figure
 
 from sim.io.files import write_text
+from sim.io.page_figures import figure_markup, variables
 
-_STYLE = """
-:root { color-scheme: light; --ink: #1c2733; --soft: #5b6a78; --line: #dde3e9; --accent: #2a7fba; }
-body { font: 16px/1.55 system-ui, sans-serif; color: var(--ink); margin: 0; background: #f6f8fa; }
-main { max-width: 1080px; margin: 0 auto; padding: 32px 24px 64px; }
-h1 { font-size: 30px; margin: 0 0 4px; } h2 { font-size: 21px; margin: 0 0 8px; }
-p { margin: 8px 0; max-width: 76ch; } .lead { color: var(--soft); font-size: 18px; }
-section { background: #fff; border: 1px solid var(--line); border-radius: 10px; padding: 20px 24px;
-  margin: 20px 0; } img { max-width: 100%; height: auto; display: block; margin: 12px auto; }
-table { border-collapse: collapse; margin: 12px 0; font-size: 14px; } td, th { text-align: right;
-  padding: 4px 12px; border-bottom: 1px solid var(--line); white-space: nowrap; } td:first-child, th:first-child {
-  text-align: left; white-space: normal; } .wide { overflow-x: auto; } .good { color: #1c7c43; }
-.bad { color: #b3391f; }
-footer { color: var(--soft); font-size: 13px; overflow-wrap: anywhere; } code { font-size: 14px; }
+_WIDE = 48  # characters of a table's row beyond which the table becomes a list on a narrow screen
+_LONG = 5  # sections beyond which a page begins with a list of them
+_STYLE = f"""
+:root {{ color-scheme: light dark; --page: #f6f8fa; --card: #fff; --good: #1c7c43; --bad: #b3391f;
+  {variables(1)} }}
+@media (prefers-color-scheme: dark) {{ :root {{ --page: #10161c; --card: #182028; --good: #6fce94;
+  --bad: #ff9580; {variables(2)} }} }}
+* {{ box-sizing: border-box; }}
+body {{ font: 16px/1.55 system-ui, sans-serif; color: var(--ink); margin: 0; background: var(--page); }}
+main {{ max-width: 1080px; margin: 0 auto; padding: 32px 24px 64px; }}
+h1 {{ font-size: 30px; line-height: 1.25; margin: 0 0 8px; overflow-wrap: anywhere; }}
+h2 {{ font-size: 21px; margin: 0 0 8px; }}
+p, li {{ max-width: 76ch; overflow-wrap: break-word; }} p {{ margin: 8px 0; }}
+ul, ol {{ margin: 8px 0; padding-left: 24px; }} li {{ margin: 4px 0; }}
+.lead {{ color: var(--soft); font-size: 18px; }} .good {{ color: var(--good); }} .bad {{ color: var(--bad); }}
+a {{ color: var(--blue); }} nav {{ margin: 12px 0; }} nav a {{ margin-right: 16px; display: inline-block; }}
+section {{ background: var(--card); border: 1px solid var(--line); border-radius: 10px; padding: 20px 24px;
+  margin: 20px 0; scroll-margin-top: 8px; }}
+pre {{ background: var(--page); border: 1px solid var(--line); border-radius: 6px; padding: 10px 14px;
+  overflow-x: auto; margin: 10px 0; font-size: 14px; }}
+code {{ font-family: ui-monospace, monospace; font-size: .9em; overflow-wrap: anywhere; }}
+pre code {{ font-size: 14px; white-space: pre-wrap; }}
+.figures {{ display: flex; flex-wrap: wrap; gap: 12px 28px; justify-content: center; margin: 12px 0; }}
+figure {{ margin: 0; max-width: 100%; }} figcaption {{ color: var(--soft); font-size: 14px; max-width: 420px;
+  text-align: center; margin: 2px auto 0; }}
+svg * {{ stroke-linejoin: round; stroke-linecap: butt; }}
+svg {{ display: block; max-width: 100%; height: auto; margin: 0 auto; }}
+img {{ display: block; max-width: 100%; height: auto; margin: 0 auto; background: #fff; border-radius: 6px; }}
+table {{ border-collapse: collapse; margin: 12px 0; font-size: 14px; }}
+td, th {{ text-align: right; padding: 4px 12px; border-bottom: 1px solid var(--line); vertical-align: top; }}
+td:first-child, th:first-child {{ text-align: left; padding-left: 0; }} th {{ vertical-align: bottom; }}
+.wide {{ overflow-x: auto; }}
+footer {{ color: var(--soft); font-size: 13px; overflow-wrap: anywhere; }}
+@media (max-width: 640px) {{
+  main {{ padding: 20px 12px 40px; }} section {{ padding: 16px 14px; }} h1 {{ font-size: 25px; }}
+  td, th {{ padding: 4px 0 4px 12px; }}
+  .cards tr:first-child {{ display: none; }} .cards, .cards tbody {{ display: block; }}
+  .cards tr {{ display: block; border-bottom: 1px solid var(--line); padding: 8px 0; }}
+  .cards td {{ display: flex; justify-content: space-between; gap: 16px; border: 0; padding: 1px 0; }}
+  .cards td::before {{ content: attr(data-column); color: var(--soft); text-align: left; }}
+  .cards td:first-child {{ display: block; font-weight: 600; }} .cards td:first-child::before {{ content: none; }}
+  .cards td:empty {{ display: none; }}
+}}
 """
 
 
@@ -33,35 +69,80 @@ class Page:
 
     def __init__(self, title: str, lead: str):
         self._title = html.escape(title)
-        self._parts = [f"<h1>{self._title}</h1>", f'<p class="lead">{html.escape(lead)}</p>']
-        self._open = False
+        self._lead = _inline(lead)
+        self._parts: list[str] = []
+        self._sections: list[str] = []
+        self._figures = 0
 
     def section(self, heading: str) -> None:
         """Begin a section."""
-        self._parts.append(("</section>" if self._open else "") + f"<section><h2>{html.escape(heading)}</h2>")
-        self._open = True
+        end = "</section>" if self._sections else ""
+        self._sections.append(html.escape(heading))
+        self._parts.append(f'{end}<section id="section-{len(self._sections)}"><h2>{self._sections[-1]}</h2>')
 
     def text(self, words: str, *, tone: str = "") -> None:
         """Add a paragraph; tone "good" or "bad" colours it."""
-        self._parts.append(f'<p class="{tone}">{html.escape(words)}</p>')
+        self._parts.append(f'<p class="{tone}">{_inline(words)}</p>')
+
+    def steps(self, steps: Sequence[str], *, numbered: bool = False) -> None:
+        """Add a list of sentences."""
+        kind = "ol" if numbered else "ul"
+        self._parts.append(f"<{kind}>" + "".join(f"<li>{_inline(step)}</li>" for step in steps) + f"</{kind}>")
+
+    def commands(self, lines: Sequence[str]) -> None:
+        """Add commands to type, one a line."""
+        self._parts.append(f"<pre><code>{html.escape(chr(10).join(lines))}</code></pre>")
+
+    def links(self, links: Sequence[tuple[str, str, str]]) -> None:
+        """Add a list of links to files: path relative to the page, name, and what it is."""
+        items = (
+            f'<li><a href="{html.escape(quote(path))}">{html.escape(name)}</a>: {_inline(words)}</li>'
+            for path, name, words in links
+        )
+        self._parts.append(f"<ul>{''.join(items)}</ul>")
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
         """Add a table; the first column is left-aligned."""
-        head = "".join(f"<th>{html.escape(h)}</th>" for h in header)
-        body = "".join("<tr>" + "".join(f"<td>{html.escape(str(c))}</td>" for c in row) + "</tr>" for row in rows)
-        self._parts.append(f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>')
+        head = "".join(f"<th>{_inline(h)}</th>" for h in header)
+        body = "".join(
+            "<tr>"
+            + "".join(
+                f'<td data-column="{html.escape(column)}">{_inline(str(cell))}</td>'
+                for column, cell in zip(header, row, strict=True)
+            )
+            + "</tr>"
+            for row in rows
+        )
+        kind = ' class="cards"' if _row_width(header, rows) > _WIDE else ""
+        self._parts.append(f'<div class="wide"><table{kind}><tr>{head}</tr>{body}</table></div>')
 
     def figure(self, figure: Figure, description: str) -> None:
-        """Add a picture, with a description for people who cannot see it."""
-        store = io.BytesIO()
-        figure.savefig(store, format="png", dpi=110, bbox_inches="tight")
-        data = base64.b64encode(store.getvalue()).decode()
-        self._parts.append(f'<img alt="{html.escape(description)}" src="data:image/png;base64,{data}">')
+        """Add a figure, with a description for people who cannot see it."""
+        self.figures([(figure, description, "")])
+
+    def figures(self, figures: Sequence[tuple[Figure, str, str]]) -> None:
+        """Add figures beside each other, or below each other on a narrow screen.
+
+        Args:
+            figures: each with its description and a caption.
+        """
+        self._parts.append('<div class="figures">')
+        for figure, description, caption in figures:
+            self._figures += 1
+            below = f"<figcaption>{_inline(caption)}</figcaption>" if caption else ""
+            self._parts.append(
+                f"<figure>{figure_markup(figure, description, number=self._figures)}{below}</figure>"
+            )
+        self._parts.append("</div>")
 
     def write(self, path: str | Path, footer: str) -> None:
         """Write the page completely or not at all."""
-        end = "</section>" if self._open else ""
-        body = "\n".join(self._parts)
+        end = "</section>" if self._sections else ""
+        contents = ""
+        if len(self._sections) > _LONG:
+            places = (f'<a href="#section-{n}">{heading}</a>' for n, heading in enumerate(self._sections, 1))
+            contents = f"<nav>{' '.join(places)}</nav>"
+        body = "\n".join((f"<h1>{self._title}</h1>", f'<p class="lead">{self._lead}</p>', contents, *self._parts))
         write_text(
             path,
             f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{self._title}</title>'
@@ -69,3 +150,17 @@ class Page:
             f"<style>{_STYLE}</style></head><body><main>{body}{end}"
             f"<footer><p>{html.escape(footer)}</p></footer></main></body></html>\n",
         )
+
+
+def _row_width(header: Sequence[str], rows: Sequence[Sequence[object]]) -> int:
+    """Estimate the width of a table in characters; headings break between words, what is below them does not."""
+    width = 0
+    for place, heading in enumerate(header):
+        cells = [len(str(row[place])) for row in rows]
+        width += 2 + max([*map(len, heading.split()), *cells], default=0)
+    return width
+
+
+def _inline(words: str) -> str:
+    """Escape words, and set what is between backticks as code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(words))

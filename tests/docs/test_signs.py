@@ -138,7 +138,7 @@ def test_the_picture_of_a_camera(above: bool) -> None:
     side = -1 if above else 1
     picture = samples.assign(y_cm=side * samples["y_cm"], heading_deg=side * samples["heading_deg"])
     runs = pd.DataFrame({"run": [1], "N": [2], "l_cm": [11.0], "omega_rpm": [43.3]})
-    measured, _ = measure_tracks(picture, runs, y_down=above)
+    measured = measure_tracks(picture, runs, y_down=above).table
     assert measured["omega_yr_rad_s"][0] > 0
     assert measured["theta_deg"][0] == pytest.approx(67.1, abs=0.5)
     with pytest.raises(sf.InputError, match="turn to the other side"):

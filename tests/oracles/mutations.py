@@ -1,7 +1,7 @@
 """Mutations of files: what a disk, an editor, another program or a prankster may make of a valid file.
 
-`mutated` changes bytes and knows the format only by its tokens. `changed_content` changes entries of nested content
-(JSON), so that a file which is protected by a hash can be sealed again and is read to its end.
+`mutated` changes bytes and knows the format only by its tokens. `changed_content` changes entries of nested
+content (JSON), so that a file which is protected by a hash can be sealed again and is read to its end.
 
 A mutation depends on the random state alone: the same seed gives the same file.
 """
@@ -14,18 +14,20 @@ from collections.abc import Callable, Sequence
 from random import Random
 from typing import Any
 
-MOST = 2**21  # bytes of a mutated file; larger ones are cut
+MOST = 2**19  # bytes of a mutated file; larger ones are cut
 _NUMBER = re.compile(rb"[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
 _WORD = re.compile(rb"[A-Za-z_]\w*")
 NUMBERS = (
-    b"0", b"-0", b"-1", b"1", b"2", b"0.5", b"nan", b"-nan", b"NaN", b"inf", b"-inf", b"Infinity", b"1e999", b"-1e999",
-    b"1e308", b"-1e308", b"1e200", b"1e-320", b"1e9", b"1e5", b"65536", b"2147483648", b"9223372036854775808", b"9" * 30,
-    b"1" * 5000, b"0x10", b"1_000", b"1,5", b"1.5.2", b"1e", b"--1", b"1979-05-27", b"true", b"null", b'""', b"''", b"[]",
-    b"{}", "٣".encode(), "½".encode(), "−1".encode(),
+    b"0", b"-0", b"-1", b"1", b"2", b"0.5", b"nan", b"-nan", b"NaN", b"inf", b"-inf", b"Infinity", b"1e999",
+    b"-1e999", b"1e308", b"-1e308", b"1e200", b"1e-320", b"1e9", b"1e5", b"65536", b"2147483648",
+    b"9223372036854775808", b"9" * 30, b"1" * 5000, b"0x10", b"1_000", b"1,5", b"1.5.2", b"1e", b"--1",
+    b"1979-05-27", b"true", b"null", b'""', b"''", b"[]", b"{}", "٣".encode(), "½".encode(), "−1".encode(),
 )  # fmt: skip
-_COMMON = (b"\0", b"\n", b"\r\n", b"\r", b" ", b"\t", b'"', b"'", b"\\", b"#", b"%", b"\xef\xbb\xbf", b"\xff\xfe", b"\x1a",
-           b"\xc3\x28", "é".encode(), "\u2028".encode(), "\ud800".encode(errors="surrogatepass"), b"../../etc/passwd",
-           b"$\\frac$", b"=1+1", b"A" * 10_000)  # fmt: skip
+_COMMON = (
+    b"\0", b"\n", b"\r\n", b"\r", b" ", b"\t", b'"', b"'", b"\\", b"#", b"%", b"\xef\xbb\xbf", b"\xff\xfe",
+    b"\x1a", b"\xc3\x28", "é".encode(), "\u2028".encode(), "\ud800".encode(errors="surrogatepass"),
+    b"../../etc/passwd", b"$\\frac$", b"=1+1", b"A" * 10_000,
+)  # fmt: skip
 _PAIRS = (
     (b"[", b"]"),
     (b"{", b"}"),
@@ -152,14 +154,14 @@ def _encode(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
 
 
 _CHANGES: tuple[Change, ...] = (
-    _flip, _delete, _duplicate, _move, _insert, _insert, _number, _number, _number, _word, _word, _lines, _truncate,
-    _nest, _noise, _encode,
+    _flip, _delete, _duplicate, _move, _insert, _insert, _number, _number, _number, _word, _word, _lines,
+    _truncate, _nest, _noise, _encode,
 )  # fmt: skip
 
 VALUES: tuple[Any, ...] = (
     None, True, False, 0, -1, 1, 2, 0.5, -0.0, 1e-320, 1e308, -1e308, 1e9, 2**31, 2**63, 10**400, float("nan"),
-    float("inf"), float("-inf"), "", "x", "0", "nan", "../x", "A" * 1000, "\0", "\ud800", "two\nlines", [], {}, [[]],
-    [0.0], [0.0, 0.0], [None], [1, [2, [3]]], {"a": 1}, {"": {}}, [1.0] * 5000,
+    float("inf"), float("-inf"), "", "x", "0", "nan", "../x", "A" * 1000, "\0", "\ud800", "two\nlines", [], {},
+    [[]], [0.0], [0.0, 0.0], [None], [1, [2, [3]]], {"a": 1}, {"": {}}, [1.0] * 5000,
 )  # fmt: skip
 
 

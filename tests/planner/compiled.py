@@ -1,4 +1,8 @@
-"""tracker.h compiled as a library: a tracker that is fed like `softflagella.Tracker`, in the plan's time units."""
+"""The C headers compiled: as C99, as C++, with their tables in the flash of a pretended or a real AVR.
+
+`CompiledTracker` is tracker.h as a library, a tracker that is fed like `softflagella.Tracker`, in the plan's time
+units.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +20,24 @@ from planner.tracking.kalman_filter import STATES
 from planner.tracking.tracker import Command
 from tests.processes import LIMIT
 
-FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2")
+WARNINGS = ("-Wall", "-Wextra", "-Werror", "-pedantic")
+FLAGS = ("-std=c99", *WARNINGS, "-O2")
+LANGUAGES = {
+    "c99": FLAGS,
+    **{name: ("-x", "c++", f"-std={name}", *WARNINGS, "-O2") for name in ("c++11", "c++17")},
+}
+_FAKE_AVR = ("-D__AVR__", "-D_DEFAULT_SOURCE", "-I", str(Path(__file__).parent / "fake_avr"))
+MEMORIES = {"constants": (), "near flash": _FAKE_AVR, "far flash": (*_FAKE_AVR, "-D__AVR_HAVE_ELPM__")}
 _LIBRARY = """#include "tracker.h"
+#ifdef __cplusplus
+extern "C" {
+#endif
+void begin(double noise, double heading);
+void feed(double now, const double *pose, double seen, double *out);
+int memory(void);
+#ifdef __cplusplus
+}
+#endif
 static tracker keeper;
 static void told(tracker_advice advice, double *out)
 {
@@ -39,24 +59,27 @@ int memory(void) { return (int)sizeof(tracker); }
 """
 
 
-def compile_c(source: Path, out: Path, *flags: str) -> None:
+def compile_c(source: Path, out: Path, *flags: str, language: str = "c99") -> None:
     """Compile a C file with all warnings as errors; the test is skipped where there is no compiler."""
-    compiler = shutil.which("cc") or shutil.which("gcc")
+    names = ("cc", "gcc") if language == "c99" else ("c++", "g++")
+    compiler = next(filter(None, map(shutil.which, names)), None)
     if compiler is None:
-        pytest.skip("no C compiler on this machine")
-    subprocess.run([compiler, *FLAGS, *flags, "-o", str(out), str(source), "-lm"], check=True, timeout=LIMIT)
+        pytest.skip(f"no compiler for {language} on this machine")
+    words = [compiler, *LANGUAGES[language], *flags, "-o", str(out), str(source), "-lm"]
+    subprocess.run(words, check=True, timeout=LIMIT)
 
 
 class CompiledTracker:
     """tracker.h behind the methods of `softflagella.Tracker`; one plan in one library."""
 
     def __init__(
-        self, plan: Plan, folder: Path, *, single: bool = False, noise: tuple[float, float] = (0.01, 0.01)
+        self, plan: Plan, folder: Path, *, single: bool = False, language: str = "c99", memory: str = "constants"
     ):
         (folder / "tracker.h").write_text(tracker_header(plan, "test"))
         (folder / "library.c").write_text(_LIBRARY)
         out = folder / f"library{int(single)}.so"
-        compile_c(folder / "library.c", out, "-shared", "-fPIC", *(["-DTRACKER_FLOAT"] if single else []))
+        flags = ("-shared", "-fPIC", *(["-DTRACKER_FLOAT"] if single else []), *MEMORIES[memory])
+        compile_c(folder / "library.c", out, *flags, language=language)
         self._library = ctypes.CDLL(str(out))
         self._library.begin.argtypes = [ctypes.c_double] * 2
         self._library.feed.argtypes = [ctypes.c_double, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]

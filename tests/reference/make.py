@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 
 from calibration.swimmer.synthetic_table import make_table
-from sim.inputs import robot_toml
 from sim.model.presets import PRESETS
+from sim.model.robot_toml import robot_toml
 
 HERE = Path(__file__).parent
 GIVEN = PRESETS["paper-measured"]  # what the calibration starts from

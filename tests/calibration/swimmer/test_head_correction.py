@@ -17,10 +17,11 @@ from planner.paths.path import circle
 from planner.planning.plan import plan
 from planner.vehicle.calibration_table import read_knowledge
 from planner.vehicle.from_table import table_vehicle
-from sim.inputs import load_robot, robot_toml
+from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command
 from sim.model.correction import Correction
 from sim.model.presets import PRESETS
+from sim.model.robot_toml import robot_toml
 from sim.motion.steady import steady
 from surrogate.table.model_file import load
 from tests.calibration.toy_tables import START, calibrated, install_toy, toy_swimmer, toy_table

@@ -64,6 +64,7 @@ def test_profile_intervals_are_those_of_the_covariance_where_the_model_is_linear
         wald = result.final.interval(name)
         assert low < result.final.parameters[name] < high
         assert (low, high) == pytest.approx(wald, abs=0.35 * (wald[1] - wald[0]))
-    combination, error = least_determined(result.base)
-    assert "C_" in combination
+    direction, error = least_determined(result.base)
+    assert set(direction) == {"C_t", "C_r", "C_yr"}
+    assert sum(part**2 for part in direction.values()) == pytest.approx(1.0)
     assert 0 < error < 1.0

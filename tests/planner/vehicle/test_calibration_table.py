@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge, knowledge_toml, read_knowledge
-from sim.inputs import load_robot, robot_toml
+from sim.inputs import load_robot
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
+from sim.model.robot_toml import robot_toml
 
 CONTROL = PRESETS["paper-control"]
 

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from sim.inputs import load_robot, robot_toml
+from sim.inputs import load_robot
 from sim.io.errors import InputError, run_command
 from sim.io.files import whole_file
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
+from sim.model.robot_toml import robot_toml
 from tests.processes import LIMIT
 from tests.sim.robots import CONTROL_VALUES
 
@@ -117,7 +118,7 @@ def test_robots_in_files_come_back_as_they_were(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("length_m = 0.11", "length_m = -0.11", "tail_length"),
+        ("length_cm = 11", "length_cm = -11", "tail_length"),
         ("count = 2", "count = 0", "N = 0"),
         ("count = 2", 'count = "two"', "give a number"),
         ("[head]", "[head]\ncolour = 1", "unknown entry"),

@@ -11,12 +11,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from dataset.rows.design import load_design
-from sim.inputs import load_robot, robot_toml
+from sim.inputs import load_robot
 from sim.io import tables
 from sim.io.errors import InputError
 from sim.io.reading import ContentError, decode, read_bytes, read_json, read_toml
 from sim.io.tables import read_table
 from sim.model.presets import PRESETS
+from sim.model.robot_toml import robot_toml
 
 DEEP = [
     ("x = " + "[" * 100_000, "nested too deeply"),

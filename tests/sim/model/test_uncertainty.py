@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from sim.inputs import load_robot, robot_toml, save_robot
+from sim.inputs import load_robot, save_robot
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
+from sim.model.robot_toml import robot_toml
 from sim.model.uncertainty import DEFAULTS, Sigma
 
 ROBOT = PRESETS["paper-measured"]

@@ -1,0 +1,158 @@
+"""Draw the figures of a calibration's report, each readable on a telephone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+from calibration.attribution.refits import UNSEEN
+from calibration.report.quantities import LABELS, feature_in_words, output_scale
+from calibration.statistics.residual_tests import Misfit
+from calibration.swimmer.measured_table import Measurements
+from calibration.verdict.verdict import Verdict
+from sim.arrays import Flags, Floats
+from sim.io.page_figures import BLUE, GREEN, INK, ORANGE, PALE, RED, VIOLET
+
+_WIDTH = 4.4  # inches
+_TAILS = {2: BLUE, 3: ORANGE, 4: GREEN, 5: VIOLET}
+_ON_CELLS = "#101010"  # of numbers on pale cells, whatever the colours of the page
+_TICKS = (3.0, 10.0, 30.0, 100.0, 300.0)
+
+
+def final_model(result: Verdict) -> str:
+    """Name the final model, in words for a column or a caption; empty if it is the calibrated one."""
+    if result.verdict == "number":
+        return "with the wrong value corrected"
+    return "with the verdict's effects" if result.effects else ""
+
+
+def compared(result: Verdict) -> list[tuple[str, Floats]]:
+    """List the models whose residuals are drawn, with their predictions (n, k)."""
+    models = [("calibrated", result.base.prediction)]
+    if final_model(result):
+        models.append((final_model(result), result.final.prediction))
+    elif result.corrections.learnt is not None:
+        models.append(("with the correction in corrected.toml", result.corrections.learnt.prediction))
+    return models
+
+
+def draw_summary(result: Verdict, data: Measurements) -> Figure:
+    """Draw the residual of each output for each model, as rms over the fitted runs, in units of the noise."""
+    noise = np.sqrt(np.diag(result.base.noise.run))
+    figure = Figure(figsize=(_WIDTH, 0.9 + 0.42 * len(data.outputs)))
+    axes = figure.add_subplot()
+    place = np.arange(len(data.outputs))[::-1]
+    models = compared(result)
+    height = 0.7 / len(models)
+    for i, ((label, prediction), colour) in enumerate(zip(models, (ORANGE, GREEN), strict=False)):
+        rms = np.sqrt(((data.y - prediction)[result.conditions.split.fitted] ** 2).mean(0)) / noise
+        axes.barh(
+            place + height * ((len(models) - 1) / 2 - i), rms, height=0.9 * height, color=colour, label=label
+        )
+    axes.axvline(1.0, color=INK, lw=1.4, label="noise of a run")
+    axes.set_yticks(place, [LABELS[o] for o in data.outputs], fontsize=9)
+    axes.set_xlabel("measured − model, rms, over the noise of a run", fontsize=9)
+    axes.tick_params(axis="x", labelsize=8)
+    figure.legend(fontsize=8, frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    figure.tight_layout()
+    return figure
+
+
+def draw_residuals(result: Verdict, data: Measurements) -> list[tuple[Figure, str]]:
+    """Draw measured minus model against tail length, a figure for each model; return each with its model."""
+    used = result.conditions.split.fitted
+    residuals = {label: (data.y - prediction)[used] for label, prediction in compared(result)}
+    limits = 1.1 * np.max([np.abs(residual).max(0) for residual in residuals.values()], 0)
+    return [(_draw_residual(residual, limits, used, data), label) for label, residual in residuals.items()]
+
+
+def _draw_residual(residual: Floats, limits: Floats, used: Flags, data: Measurements) -> Figure:
+    """Draw a residual (n, k) of the runs in `used`, an output in each panel."""
+    figure = Figure(figsize=(_WIDTH, 1.25 * len(data.outputs) + 0.5))
+    jitter = np.random.default_rng(0).uniform(-1, 1, len(residual))
+    tails, length = data.tails[used], 100 * data.length[used]
+    jitter *= 0.1 * max(float(np.ptp(length)) / 6, 0.3)
+    panels = figure.subplots(len(data.outputs), 1, sharex=True, squeeze=False)[:, 0]
+    for i, (name, axes) in enumerate(zip(data.outputs, panels, strict=True)):
+        scale, unit = output_scale(name)
+        for n in np.unique(tails):
+            some = tails == n
+            colour = _TAILS.get(int(n), RED)
+            axes.plot(length[some] + jitter[some], scale * residual[some, i], ".", ms=4, color=colour)
+        axes.axhline(0, color=INK, lw=0.6)
+        axes.set_ylim(-scale * limits[i], scale * limits[i])
+        axes.set_ylabel(f"{LABELS[name]} [{unit}]", fontsize=8)
+        axes.tick_params(labelsize=8)
+    lengths = np.unique(length)
+    if len(lengths) <= 8:
+        panels[-1].set_xticks(lengths, [f"{value:g}" for value in lengths])
+    panels[-1].set_xlabel("tail length [cm]", fontsize=9)
+    _name_tails(panels[0], np.unique(tails))
+    figure.align_ylabels()
+    figure.tight_layout(h_pad=0.3)
+    return figure
+
+
+def _name_tails(axes: Axes, numbers: Floats) -> None:
+    """Add a legend of the numbers of tails above a panel."""
+    for n in numbers:
+        axes.plot([], [], ".", ms=7, color=_TAILS.get(int(n), RED), label=f"N = {int(n)}")
+    axes.legend(fontsize=8, frameon=False, ncols=len(numbers), loc="lower center", bbox_to_anchor=(0.5, 1.0))
+
+
+def draw_maps(result: Verdict, outputs: Sequence[str]) -> list[tuple[Figure, str]]:
+    """Draw z of every output along every feature of the inputs, a figure for each model; each with its model."""
+    maps = [("calibrated", result.evidence.misfit)]
+    if result.explaining and result.explaining[0].refit_misfit is not None:
+        maps.append((final_model(result), result.explaining[0].refit_misfit))
+    limit = max(4.0, float(np.abs(result.evidence.misfit.scores.shapes).max(initial=0.0)))
+    return [(_draw_map(misfit, outputs, limit), label) for label, misfit in maps]
+
+
+def _draw_map(misfit: Misfit, outputs: Sequence[str], limit: float) -> Figure:
+    z = misfit.scores.shapes.T  # (features, outputs)
+    figure = Figure(figsize=(_WIDTH, 0.27 * len(z) + 1.0))
+    axes = figure.add_subplot()
+    largest = np.arcsinh(limit / 2)
+    axes.imshow(np.arcsinh(z / 2), cmap="RdBu_r", vmin=-largest, vmax=largest, aspect="auto")
+    for i, j in np.argwhere(np.abs(z) > 3):
+        colour = "white" if abs(z[i, j]) > 0.4 * limit else _ON_CELLS
+        axes.text(j, i, f"{z[i, j]:+.0f}", ha="center", va="center", fontsize=8, color=colour)
+    axes.set_yticks(range(len(z)), [feature_in_words(name) for name in misfit.features], fontsize=8)
+    axes.set_xticks(range(len(outputs)), [LABELS[o].replace(" ", "\n") for o in outputs], fontsize=8)
+    axes.tick_params(length=0)
+    figure.tight_layout()
+    return figure
+
+
+def draw_evidence(result: Verdict) -> Figure:
+    """Draw the score of every effect that these runs can show, with the critical score; what explains is green."""
+    named = {name for c in result.explaining for name in (e.name for e in c.claimed)}
+    seen = [c for c in result.evidence.candidates if c.detectable < UNSEEN]
+    ranked = sorted(seen, key=lambda c: abs(c.z))
+    critical = result.evidence.misfit.critical_z
+    figure = Figure(figsize=(_WIDTH, 0.7 + 0.36 * len(ranked)))
+    axes = figure.add_subplot()
+    limit = 1.15 * max([critical, *(abs(c.z) for c in ranked)])
+    for place, candidate in enumerate(ranked):
+        tested = candidate.refit is not None
+        colour = GREEN if candidate.effect.name in named else ORANGE if tested else PALE
+        axes.barh(place - 0.2, candidate.z, color=colour, height=0.4)
+        axes.text(-limit, place + 0.2, f" {candidate.effect.title}", fontsize=8, va="center")
+        axes.vlines([-critical, critical], place - 0.45, place, color=INK, lw=0.8, ls="--")
+    axes.set_xscale("symlog", linthresh=2 * critical)
+    axes.set_xlim(-limit, limit)
+    axes.set_ylim(-0.7, len(ranked) - 0.3)
+    axes.set_yticks([])
+    ticks = [t for t in _TICKS if t < limit]
+    axes.xaxis.set_major_locator(FixedLocator([*(-t for t in ticks), 0.0, *ticks]))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.tick_params(axis="x", labelsize=8)
+    axes.set_xlabel("score z", fontsize=9)
+    figure.tight_layout()
+    return figure

@@ -1,0 +1,122 @@
+"""Numbers of a calibration as people read them: outputs, nuisance parameters and sizes, in the lab's units.
+
+Inside a calibration outputs are logarithms, so their residuals are relative; θ is in rad, so its residuals are
+shown in degrees. Nuisance parameters and effects know the unit in which they are shown
+(`calibration.statistics.statistical_model.Parameter`).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from calibration.attribution.refits import UNSEEN
+from calibration.statistics.fit import Pull
+from calibration.statistics.statistical_model import Parameter
+
+LABELS = {
+    "omega_h": "head spin",
+    "omega_t": "tail spin",
+    "omega_yr": "yaw rate",
+    "R_yr": "turn radius",
+    "theta": "slip angle",
+    "v": "speed",
+}
+_FEATURES = {"omega": "ω", "direction": "motor's direction"}  # what words of a feature's name read as
+_IN_DEGREES = "theta"
+
+
+def output_scale(output: str) -> tuple[float, str]:
+    """Return the factor and the unit in which residuals of an output are shown."""
+    return (math.degrees(1.0), "°") if output == _IN_DEGREES else (100.0, "%")
+
+
+def output_error(output: str, error: float) -> str:
+    """Write an error of an output: in per cent, of the slip angle in degrees."""
+    scale, unit = output_scale(output)
+    return f"{scale * error:.1f}{_after_number(unit)}"
+
+
+def feature_in_words(name: str) -> str:
+    """Write the name of a feature of the inputs."""
+    for word, read in _FEATURES.items():
+        name = name.replace(word, read)
+    return name
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """Write a number with so many significant digits and without an exponent."""
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    return np.format_float_positional(float(f"{value:.{digits - 1}e}"), trim="-")
+
+
+def with_error(value: float, error: float, unit: str, *, signed: bool = False) -> str:
+    """Write a value with its error, both to the second digit of the error: "1.34 ± 0.09 MPa"."""
+    decimals = min(max(1 - math.floor(math.log10(error)), 0), 6) if error > 0 else 3
+    number = f"{value:{'+' if signed else ''}.{decimals}f}"
+    if float(number) == 0:
+        number = f"{0:.{decimals}f}"
+    return f"{number} ± {error:.{decimals}f}{_after_number(unit)}"
+
+
+def given(nuisance: Parameter) -> str:
+    """Write the value of a nuisance parameter that was given; that of an offset or a scale is in the table."""
+    if nuisance.start in (0.0, 1.0) and (nuisance.unit == "1" or not nuisance.logarithmic):
+        return "as in the table"
+    return f"{plain(nuisance.start * nuisance.shown, 4)} {nuisance.unit}"
+
+
+def tolerance(nuisance: Parameter) -> str:
+    """Write the standard deviation that was stated for a nuisance parameter."""
+    assert nuisance.sigma is not None
+    if nuisance.logarithmic:
+        return f"± {plain(100 * nuisance.sigma, 2)} %"
+    return f"± {plain(nuisance.shown * nuisance.sigma, 2)}{_after_number(nuisance.unit)}"
+
+
+def _after_number(unit: str) -> str:
+    """Write a unit as it stands behind a number."""
+    return unit if unit == "°" else f" {unit}"
+
+
+def fitted_value(pull: Pull, *, alone: bool = False) -> str:
+    """Write what a nuisance parameter is with its prior, or by the runs `alone`."""
+    nuisance = pull.parameter
+    change, error = (pull.alone, pull.alone_error) if alone else (pull.change, pull.error)
+    if not nuisance.logarithmic:
+        return with_error(change * nuisance.shown, error * nuisance.shown, nuisance.unit, signed=True)
+    if nuisance.unit == "1":
+        return with_error(100 * math.expm1(change), 100 * error * math.exp(change), "%", signed=True)
+    value = nuisance.start * math.exp(change) * nuisance.shown
+    return with_error(value, error * value, nuisance.unit)
+
+
+def size(effect: Parameter, value: float, digits: int = 3) -> str:
+    """Write the size of an effect in its unit."""
+    number, unit = plain(value * effect.shown, digits), effect.unit
+    if unit == "1" or unit.startswith("1:"):
+        return number
+    if unit.startswith("1/"):
+        return f"{number} per {unit[2:]}"
+    if unit.startswith("ln "):
+        return f"{number} ({unit})"
+    is_product = unit[0].isdigit() or "μ0" in unit or unit == "d/D" or unit.startswith("time scale")
+    return f"{number} × {unit}" if is_product else f"{number} {unit}"
+
+
+def detectable(effect: Parameter, value: float) -> str:
+    """Write a smallest detectable size; a dash where no size shows in these runs."""
+    if value >= UNSEEN:
+        return "–"
+    if value > max(abs(bound - effect.start) for bound in effect.bounds):
+        return "beyond its range"
+    return size(effect, value, 2)
+
+
+def direction_in_words(direction: dict[str, float], error: float) -> str:
+    """Say how coefficients change together along a direction in their logarithms, by one standard deviation."""
+    changes = {name: 100 * math.expm1(part * error) for name, part in direction.items() if abs(part) > 0.1}
+    words = [f"{name} {plain(abs(c), 2)} % {'larger' if c > 0 else 'smaller'}" for name, c in changes.items()]
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]

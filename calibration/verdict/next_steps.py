@@ -1,0 +1,130 @@
+"""What a lab does next, by the verdict of a table, in words.
+
+A verdict that the held-out runs contradict comes before all others: more runs, and no use of it until then.
+"""
+
+from __future__ import annotations
+
+from calibration.verdict.verdict import Verdict
+
+DISAGREES = 0.01  # p of the held-out runs below which they do not agree with the final model
+_SELDOM = 0.5  # share of cases in which runs must decide to be worth making
+_PLAN = "Plan with the corrected robot: `softflagella plan square:3 --robot corrected.toml --out plan`."
+_NEW_SESSION = "add the new runs to the table with a session of their own (column `session`)"
+
+
+def next_steps(result: Verdict) -> list[str]:
+    """List what to do next, the most urgent first; code is between backticks."""
+    by_verdict = {
+        "none": _after_none,
+        "number": _after_number,
+        "effect": _after_effect,
+        "ambiguous": _after_ambiguous,
+        "unexplained": _after_unexplained,
+    }
+    return [*_contradicted(result), *by_verdict[result.verdict](result)]
+
+
+def _contradicted(result: Verdict) -> list[str]:
+    """What comes first if the held-out runs do not bear the verdict out."""
+    held_out = result.conditions.split.names
+    if result.errors.p_value < DISAGREES and result.verdict != "unexplained":
+        return [
+            f"Find out what is different about the held-out runs ({held_out}): they do not agree with the final "
+            f"model (p = {result.errors.p_value:.2g}). Look for a change of the set-up on that day, or make more "
+            f"runs: {_NEW_SESSION}, and calibrate again."
+        ]
+    if result.held_out_error_falls is False and result.effects:
+        return [
+            f"Do not rely on this claim yet: it does not lower the error on the held-out runs ({held_out}). Make "
+            f"more runs: {_NEW_SESSION}, and calibrate again."
+        ]
+    return []
+
+
+def _after_none(result: Verdict) -> list[str]:
+    return [
+        _PLAN,
+        "An effect may still be there if it is smaller than these runs can show: the table of evidence has the "
+        "smallest detectable size of each.",
+    ]
+
+
+def _after_number(result: Verdict) -> list[str]:
+    titles = [" or ".join(pull.parameter.title for pull in alike) for alike in result.wrong_numbers]
+    unconfirmed = (
+        " Do not take over the fitted value without measuring it: it does not lower the error on the held-out "
+        "runs."
+    )
+    steps = [
+        f"Measure again: {'; and '.join(titles)}. Correct it in the robot's file or in the table, and calibrate "
+        f"again.{unconfirmed if result.held_out_error_falls is False else ''}",
+        *_telling_apart(result),
+    ]
+    return [*steps, f"Until then, corrected.toml has the fitted value. {_PLAN}"]
+
+
+def _after_effect(result: Verdict) -> list[str]:
+    steps = []
+    if any(claim.uncertain for claim in result.explaining):
+        steps.append(
+            "Test the claim where it matters most: make runs with other numbers of tails and tail lengths, "
+            f"{_NEW_SESSION}, and calibrate again. Something outside the catalogue may look like it."
+        )
+    if result.in_form_only:
+        steps.append(
+            "Take the effect as a description of the runs: its size is outside the range that its source allows."
+        )
+    return [
+        *steps,
+        f"{_PLAN} It has the effect.",
+        "Film the robot on its way, and compare: `softflagella planner check plan/plan.json track.csv`.",
+    ]
+
+
+def _after_ambiguous(result: Verdict) -> list[str]:
+    first = result.explaining[0].title
+    return [
+        *_telling_apart(result),
+        f"Until then, corrected.toml has {first}. It predicts runs like those of this table; elsewhere the "
+        "explanations differ.",
+    ]
+
+
+def _after_unexplained(result: Verdict) -> list[str]:
+    steps = [
+        "Look where the residual is large (below): a dependence on one input points to the part of the set-up to "
+        "check."
+    ]
+    if result.evidence.untestable:
+        missing = sorted(result.evidence.untestable)
+        steps.append(
+            f"Note more in the table, so that these effects can be tested: {', '.join(missing)}. The section on "
+            "the evidence says which columns they need."
+        )
+    if result.error_predictive is None:
+        return [
+            *steps,
+            "Plan with corrected.toml only where a residual of this size does not matter: nothing in it describes "
+            "the residual.",
+        ]
+    return [*steps, f"{_PLAN} It has a correction of the residual, which holds between these runs only."]
+
+
+def _telling_apart(result: Verdict) -> list[str]:
+    """The runs that tell several explanations apart, and the command that judges them."""
+    if result.next.batch is None:
+        return []
+    count, decides = len(result.next.batch.settings), result.next.batch.decides
+    if decides < _SELDOM:
+        return [
+            "No runs with the settings of this table tell the explanations apart well: the best "
+            f"{count} decide in {100 * decides:.0f} % of cases (table below). Say what else the lab can set, and "
+            "calibrate again, for example with `--own l_cm=5,7,9`."
+        ]
+    return [
+        f"Make the {count} runs of the table below, which tell the explanations apart in "
+        f"{100 * decides:.0f} % of cases; {_NEW_SESSION}.",
+        "Ask which explanation they speak for: `softflagella calibration decide TABLE verdict.json --robot "
+        "ROBOT`, with the table, the verdict.json beside this report, and the robot as it was given.",
+    ]

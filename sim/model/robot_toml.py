@@ -1,0 +1,193 @@
+"""robot.toml: a robot in the units of a laboratory, with comments.
+
+The file has the tables [tails], [head], [fluid], [motor], [drag] and, if there are any, [effects] and
+[correction]. A key is a quantity with its unit as suffix: length_cm, speed_rpm, viscosity_Pa_s. Every usual unit
+is read (`sim.io.units`), one is written. KEY_sigma states one standard deviation of a number that was measured: a
+number in the unit of its key, or a text like "10 %".
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from sim.io.errors import InputError
+from sim.io.units import UNITS, from_si, of_kind, split, to_si
+from sim.model.correction import correction_tables
+from sim.model.robot import Robot
+from sim.model.uncertainty import DEFAULTS, Sigma, read_sigma, sigma_text
+
+
+class Entry(NamedTuple):
+    """A number of a robot: its table and key, its field of `Robot`, and the unit in which it is written."""
+
+    table: str
+    quantity: str
+    field: str
+    unit: str = ""  # none: the key has no suffix
+    comment: str = ""
+    optional: bool = False
+
+    @property
+    def key(self) -> str:
+        """The key as it is written."""
+        return self.with_unit(self.unit)
+
+    def with_unit(self, unit: str) -> str:
+        """Return the key for another unit."""
+        return f"{self.quantity}_{unit}" if unit else self.quantity
+
+    def fits(self, table: str, key: str) -> bool:
+        """Say whether a key holds this number, in any unit of its kind."""
+        quantity, unit = split(key)
+        if not self.unit:
+            return (table, key) == (self.table, self.quantity)
+        kind = unit.kind if unit else None
+        return (table, quantity, kind) == (self.table, self.quantity, UNITS[self.unit].kind)
+
+
+ENTRIES = (
+    Entry("tails", "count", "tails"),
+    Entry("tails", "length", "tail_length", "cm"),
+    Entry("tails", "radius", "tail_radius", "mm", "of a tail's section"),
+    Entry("tails", "youngs_modulus", "youngs_modulus", "MPa"),
+    Entry("tails", "disc_offset", "disc_offset", "mm", "from the axis to a tail's clamp", optional=True),
+    Entry("head", "radius", "head_radius", "mm"),
+    Entry("head", "length", "head_length", "mm"),
+    Entry("fluid", "viscosity", "viscosity", "Pa_s"),
+    Entry("motor", "speed", "motor_speed", "rpm", "tails relative to head; the direction is the control"),
+    Entry("drag", "C_t", "C_t", comment="force against motion: C_t 6π μ R v"),
+    Entry("drag", "C_r", "C_r", comment="couple against spin: C_r 8π μ R³ ω"),
+    Entry("drag", "C_yr", "C_yr", comment="side force of the spinning head, from the surface: C_yr μ R L ω"),
+)
+_SIGMA = "_sigma"
+_LARGEST = 1e100  # of a number, whatever its unit
+_HEADER = """\
+# Units are suffixes: length_cm, length_mm, speed_rpm, speed_rad_s, ... KEY_sigma states one standard deviation of
+# a number, in its unit or as "5 %"; only a calibration uses it.
+"""
+_NOTES = {
+    "drag": (
+        "# Coefficients of the head (radius R, length L). For a new robot, start from 3, 2.8 and 2 as a first\n"
+        "# guess, and let `softflagella calibrate` fit them to measured runs."
+    )
+}
+_NO_EFFECTS = "# [effects]                       # their sizes, if there are any\n# end_over_end_drag = 5.0"
+
+
+def read_robot(tables: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Read the fields of `Robot` in SI units, and `sigmas`, from the tables of a robot.toml.
+
+    Args:
+        tables: as parsed, without name, effects, correction and calibration.
+        where: the file's name, for messages.
+
+    Raises:
+        InputError: an entry is unknown, missing, given twice, without a unit, or no number.
+    """
+    values: dict[str, Any] = {}
+    keys: dict[str, str] = {}  # field -> the key that gave it
+    stated: list[tuple[Entry, str, object]] = []
+    for table, content in tables.items():
+        for key, value in content.items() if isinstance(content, dict) else [("", content)]:
+            entry = _entry(table, key.removesuffix(_SIGMA))
+            if entry is None or (key.endswith(_SIGMA) and entry.field not in DEFAULTS):
+                raise InputError(f"{where}: {_unknown(table, key)}")
+            if key.endswith(_SIGMA):
+                stated.append((entry, key, value))
+            elif entry.field in values:
+                raise InputError(f"{where}: [{table}] {keys[entry.field]} and {key} are the same number; drop one")
+            else:
+                values[entry.field], keys[entry.field] = _number(value, key, f"{where}: [{table}] {key}"), key
+    for entry in ENTRIES:
+        if entry.field not in values and not entry.optional:
+            raise InputError(f"{where}: missing entry [{entry.table}] {entry.key}")
+    scales = {**values, "disc_offset": values.get("disc_offset", values["head_radius"])}  # by default
+    sigmas = {
+        entry.field: _read_sigma(value, scales[entry.field], key, f"{where}: [{entry.table}] {key}")
+        for entry, key, value in stated
+    }
+    return {**values, "sigmas": sigmas}
+
+
+def robot_toml(robot: Robot) -> str:
+    """Write the text of a robot.toml that is read back to the same robot, to the last bit."""
+    tables: dict[str, list[str]] = {table: [note] for table, note in _NOTES.items()}
+    for entry in ENTRIES:
+        lines = tables.setdefault(entry.table, [])
+        value = getattr(robot, entry.field)
+        unit, number = _written(robot.head_radius if value is None else value, entry.unit)
+        text = f"{entry.with_unit(unit)} = {number}"
+        if value is None:  # the default of the disc offset, the only optional number
+            lines.append(_line(f"# {text}", f"{entry.comment}; without it R"))
+        else:
+            lines.append(_line(text, entry.comment))
+        if entry.field in robot.sigmas:
+            lines.append(_sigma_line(robot.sigmas[entry.field], entry.with_unit(unit), entry))
+    if robot.effects:
+        tables["effects"] = [f"{name} = {float(size)!r}" for name, size in robot.effects.items()]
+    if robot.correction:
+        tables["correction"] = [f"{k} = {json.dumps(v)}" for k, v in correction_tables(robot.correction).items()]
+    order = sorted(tables, key=[*dict.fromkeys(entry.table for entry in ENTRIES), "effects", "correction"].index)
+    blocks = ["\n".join([f"[{table}]", *tables[table]]) for table in order]
+    name = json.dumps(robot.name, ensure_ascii=False).replace("\x7f", "\\u007f")  # escapes as TOML does
+    return "\n\n".join([f"{_HEADER}name = {name}", *blocks, *([] if robot.effects else [_NO_EFFECTS])]) + "\n"
+
+
+def _entry(table: str, key: str) -> Entry | None:
+    return next((entry for entry in ENTRIES if entry.fits(table, key)), None)
+
+
+def _unknown(table: str, key: str) -> str:
+    """Say what is wrong with a key: it has no unit, or there is no such number."""
+    for entry in ENTRIES:
+        if entry.unit and (table, key.removesuffix(_SIGMA)) == (entry.table, entry.quantity):
+            units = ", ".join(entry.with_unit(suffix) for suffix in of_kind(UNITS[entry.unit].kind))
+            return f"[{table}] {key} has no unit; give one of {units}"
+    allowed = ", ".join(f"[{entry.table}] {entry.key}" for entry in ENTRIES)
+    return f"unknown entry [{table}] {key}; allowed are {allowed}, in any usual unit"
+
+
+def _number(value: object, key: str, entry: str) -> float:
+    """Convert a number of the file to SI units."""
+    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < _LARGEST:
+        raise InputError(f"{entry} = {value!r}; give a finite number")
+    unit = split(key).unit
+    return to_si(value, unit.suffix) if unit else value
+
+
+def _read_sigma(value: object, number: float, key: str, entry: str) -> Sigma:
+    unit = split(key.removesuffix(_SIGMA)).unit
+    return read_sigma(value, number, entry, to_si(1.0, unit.suffix) if unit else 1.0)
+
+
+def _sigma_line(sigma: Sigma, key: str, entry: Entry) -> str:
+    if sigma.relative or not entry.unit:
+        return f"{key}{_SIGMA} = {sigma_text(sigma)}"
+    unit, number = _written(sigma.size, entry.unit)
+    return f"{entry.with_unit(unit)}{_SIGMA} = {number}"
+
+
+def _written(value: float, unit: str) -> tuple[str, str]:
+    """Write a number in a unit, as short as it can be so that it is read back to the last bit.
+
+    Returns:
+        The unit and the number; in SI units where no number in `unit` is read back exactly.
+    """
+    if not unit:
+        return unit, repr(value)
+    guess = from_si(value, unit)
+    rounded = (float(f"{guess:.{digits}g}") for digits in range(1, 18))
+    for number in (*rounded, math.nextafter(guess, math.inf), math.nextafter(guess, 0.0)):
+        if to_si(number, unit) == value:
+            return unit, repr(number).removesuffix(".0")
+    return _SI[UNITS[unit].kind], repr(value)
+
+
+_SI = {"length": "m", "pressure": "Pa", "viscosity": "Pa_s", "angular velocity": "rad_s"}
+
+
+def _line(text: str, comment: str) -> str:
+    return f"{text:<34}# {comment}" if comment else text
