@@ -248,10 +248,10 @@ def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...
     """Say why each row cannot be used; empty where it can."""
     reasons = [""] * len(table)
     used = (*INPUTS, *(OUTPUTS[name][0] for name in outputs))
-    values = {column: numbers[column].to_numpy(dtype=float) for column in used}
+    values = {column: numbers[column].where(numbers[column].abs() < _LARGEST).to_numpy() for column in used}
     positive = [column for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s") if column in values]
     for column, bad, fault in (
-        *((column, ~(np.abs(value) < _LARGEST), "is not a finite number") for column, value in values.items()),
+        *((column, ~np.isfinite(value), "is not a finite number") for column, value in values.items()),
         ("N", values["N"] % 1 != 0, "is not a whole number"),
         *((column, values[column] <= 0, "is not above 0") for column in positive),
     ):

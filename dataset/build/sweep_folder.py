@@ -280,7 +280,8 @@ def _checked(storage: Storage, sweep: dict[str, Any]) -> SweepDesign:
     config, path = sweep["config"], storage.path(SWEEP)
     if not isinstance(config, dict):
         raise InputError(f"{path} has no table of inputs; give another folder or remove this one")
-    return checked_design({**config, "rows": 1}, path)
+    checked_design({**config, "rows": 1}, path)
+    return SweepDesign.from_config(config, 1)  # to the letter, as the key has it
 
 
 def _text(storage: Storage, name: str) -> str:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from calibration.statistics.statistical_model import Noise
 from calibration.verdict.sequential_test import Explanation
@@ -36,7 +35,6 @@ from surrogate.one_robot.robot_table import FORMAT as TABLE_FORMAT
 from surrogate.one_robot.robot_table import RobotTable, _digest, save_robot_table
 from surrogate.table import tensor_file
 from surrogate.table.model_file import FORMAT, SHIPPED, load
-from tests.calibration.toy_tables import install_toy, toy_table
 from tests.calibration.track import track
 from tests.dataset.sweeps import design, invented
 
@@ -191,10 +189,8 @@ SVG_TOKENS = (
 
 @cache
 def runs() -> pd.DataFrame:
-    with pytest.MonkeyPatch.context() as patch:
-        install_toy(patch)
-        runs = toy_table(3, lengths_cm=(6.0, 9.0)).head(40)
-    return runs.assign(elapsed_min=4.0 * np.arange(len(runs)), temperature_C=22.0)
+    table = pd.read_csv(Path(__file__).parents[1] / "reference" / "none.csv")
+    return table.assign(elapsed_min=4.0 * np.arange(len(table)), temperature_C=22.0)
 
 
 @cache
