@@ -133,7 +133,7 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         if "session" in table
         else "N = " + good["N"].astype(int).astype(str)
     )
-    condition = good.groupby(list(INPUTS), sort=True).ngroup().to_numpy()
+    condition: Integers = np.asarray(good.groupby(list(INPUTS), sort=True).ngroup(), dtype=np.int64)
     session_names, session = np.unique(names.to_numpy(dtype=str), return_inverse=True)
     repeats = len(good) - len(np.unique(condition))
     if repeats < _FEWEST_REPEATS:

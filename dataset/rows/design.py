@@ -77,10 +77,11 @@ class SweepDesign:
     def from_config(config: Mapping[str, Any], rows: int) -> SweepDesign:
         """Return the design that `config` describes."""
         axes = {
-            name: Axis(spec["range"][0], spec["range"][1], spec["scale"], spec.get("both_directions", False))
+            name: Axis(*spec["range"], spec.get("scale", "linear"), spec.get("both_directions", False))
             for name, spec in config["inputs"].items()
         }
-        return SweepDesign(axes, rows, config["seed"], config["history_every"], config.get("sensitivities", False))
+        seed, every = config.get("seed", 0), config.get("history_every", 4)
+        return SweepDesign(axes, rows, seed, every, config.get("sensitivities", False))
 
     def config(self) -> dict[str, Any]:
         """Return what determines the robot of each index, JSON-like: all but the number of rows."""

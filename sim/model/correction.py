@@ -60,7 +60,7 @@ class Correction:
         numbers = [*self.centre, *self.scale, *self.low, *self.high, *weights, self.error, self.error_without]
         if not (np.abs(numbers) < _LARGEST).all() or min(self.scale) < 1 / _LARGEST:
             raise InputError(
-                f"correction: its numbers must be below {_LARGEST:g}, its scales above {1 / _LARGEST:g}"
+                f"correction: its numbers must be finite, below {_LARGEST:g}, its scales above {1 / _LARGEST:g}"
             )
         if any(power not in (0, 1, 2, 3) for term in self.powers for power in term):
             raise InputError("correction: powers are 0, 1, 2 or 3")

@@ -152,7 +152,9 @@ def _unknown(table: str, key: str) -> str:
 
 def _number(value: object, key: str, entry: str) -> float:
     """Convert a number of the file to SI units."""
-    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < _LARGEST:
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise InputError(f"{entry} = {value!r}; give a number")
+    if not abs(value) < _LARGEST:
         raise InputError(f"{entry} = {value!r}; give a finite number")
     unit = split(key).unit
     return to_si(value, unit.suffix) if unit else value
@@ -160,7 +162,7 @@ def _number(value: object, key: str, entry: str) -> float:
 
 def _read_sigma(value: object, number: float, key: str, entry: str) -> Sigma:
     unit = split(key.removesuffix(_SIGMA)).unit
-    return read_sigma(value, number, entry, to_si(1.0, unit.suffix) if unit else 1.0)
+    return read_sigma(value, number, entry, unit.suffix if unit else "")
 
 
 def _sigma_line(sigma: Sigma, key: str, entry: Entry) -> str:

@@ -26,10 +26,10 @@ from planner.files.plan_files import write_plan
 from planner.paths.path import circle
 from planner.planning.plan import plan
 from planner.vehicle.calibration_table import CalibrationKnowledge, knowledge_toml
-from sim.inputs import robot_toml
 from sim.io.provenance import fingerprint
 from sim.model.correction import Correction
 from sim.model.presets import PRESETS
+from sim.model.robot_toml import robot_toml
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.one_robot.robot_table import FORMAT as TABLE_FORMAT
 from surrogate.one_robot.robot_table import RobotTable, _digest, save_robot_table
@@ -44,7 +44,8 @@ ROBOT = PRESETS["paper-control"]
 Files = Mapping[str, bytes]  # by name; the first is the one that is mutated
 
 
-def text(columns: Mapping[str, Any]) -> bytes:
+def text(columns: Mapping[str, Any] | pd.DataFrame) -> bytes:
+    """Write a table as CSV."""
     return pd.DataFrame(columns).to_csv(index=False).encode()
 
 

@@ -33,9 +33,10 @@ from planner.files.plan_json import load_plan
 from planner.files.tracking_error import tracking_error
 from planner.paths.path_files import read_path
 from planner.vehicle.calibration_table import read_knowledge
-from sim.inputs import check_columns, load_robot, robot_toml
+from sim.inputs import check_columns, load_robot
 from sim.io.errors import InputError, naming
 from sim.io.tables import read_table
+from sim.model.robot_toml import robot_toml
 from sim.model.schedule import load_schedule
 from surrogate.one_robot.robot_table import load_robot_table
 from surrogate.table.model_file import SHIPPED, load

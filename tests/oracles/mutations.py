@@ -64,8 +64,9 @@ def _slice(data: bytes, random: Random) -> tuple[int, int]:
 
 def _flip(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
     changed = bytearray(data)
-    for _ in range(random.choice((1, 1, 2, 8)) if data else 0):
-        changed[random.randrange(len(data))] = random.randrange(256)
+    places = random.choices(range(len(data)), k=random.choice((1, 1, 2, 8))) if data else []
+    for place in places:
+        changed[place] = random.randrange(256)
     return bytes(changed)
 
 
