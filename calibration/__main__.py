@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from argparse import Namespace
-from pathlib import Path
 
 from sim.io.commands import JOBS, ROBOT, Program, argument, out
 from sim.io.errors import InputError
 
-FILES = ("verdict.json", "report.html", "corrected.toml")
 program = Program("calibration", "Find from measured runs what the model of a robot lacks, and correct it.")
 main = program.main
 
@@ -34,36 +31,21 @@ main = program.main
     aliases=("close",),
 )
 def _calibrate(arguments: Namespace) -> None:
-    from calibration.report.corrected_robot import check_given, corrected_toml
-    from calibration.report.report import write_report
-    from calibration.swimmer.head_correction import learn_head_correction
-    from calibration.swimmer.measured_table import read_measurements
+    from calibration.report.robot_verdict import calibrate_robot
     from calibration.swimmer.possible_runs import owned
-    from calibration.swimmer.protocols import PROTOCOLS
-    from calibration.swimmer.swimmer import SwimmerModel
-    from calibration.verdict.calibrate import calibrate
-    from calibration.verdict.verdict_json import verdict_record
     from sim.inputs import load_robot
-    from sim.io.files import files_together, write_text
 
     own = owned(arguments.own)
-    robot = load_robot(arguments.robot)
-    check_given(robot)
-    data = read_measurements(arguments.table)
-    for line in data.converted:
-        print(line, file=sys.stderr)
-    for line in data.excluded:
-        print(f"excluded: {line}", file=sys.stderr)
-    data, held_out = PROTOCOLS[arguments.protocol](data)
-    model = SwimmerModel(robot, data, arguments.jobs, own=own)
-    result = calibrate(model, held_out=held_out, correction=learn_head_correction, seed=arguments.seed)
-    folder = Path(arguments.out)
-    record = verdict_record(result, table=Path(arguments.table).name)
-    corrected = corrected_toml(robot, result.fits.final_refit, result.corrections.learnt)
-    with files_together(folder, FILES) as temporary:
-        write_report(result, data, temporary / "report.html", title=Path(arguments.table).name)
-        write_text(temporary / "corrected.toml", corrected)
-        write_text(temporary / "verdict.json", json.dumps(record, indent=1) + "\n")
+    result = calibrate_robot(
+        arguments.table,
+        load_robot(arguments.robot),
+        protocol=arguments.protocol,
+        own=own,
+        seed=arguments.seed,
+        jobs=arguments.jobs,
+        tell=lambda line: print(line, file=sys.stderr),
+    )
+    paths = result.save(arguments.out)
     print(result.sentence)
     held_out_runs = result.conditions.split.names
     print(
@@ -75,7 +57,7 @@ def _calibrate(arguments: Namespace) -> None:
         print(f"the conclusion is weaker: {limit}")
     if result.conditions.excluded:
         print(f"excluded: {len(result.conditions.excluded)}, first {result.conditions.excluded[0]}")
-    print(f"-> {folder / 'verdict.json'}, {folder / 'report.html'}, {folder / 'corrected.toml'}")
+    print(f"-> {', '.join(map(str, paths))}")
 
 
 @program.command(
@@ -90,17 +72,16 @@ def _decide(arguments: Namespace) -> None:
     from calibration.swimmer.measured_table import read_measurements
     from calibration.swimmer.swimmer import SwimmerModel
     from calibration.verdict.next_runs import GIVEN_UP
-    from calibration.verdict.sequential_test import new_runs, read_explanations, sentence, standings
+    from calibration.verdict.sequential_test import decide, read_explanations
     from sim.inputs import load_robot
 
     explanations, before = read_explanations(arguments.verdict)
     model = SwimmerModel(load_robot(arguments.robot), read_measurements(arguments.table), arguments.jobs)
-    new = new_runs(model.runs, before)
-    standing = standings(model, explanations, new)
-    print(f"{new.sum()} new runs. An explanation that is behind by more than {GIVEN_UP:.1f} is given up.")
-    for explanation in standing:
+    decision = decide(model, explanations, before)
+    print(f"{decision.new_runs} new runs. An explanation that is behind by more than {GIVEN_UP:.1f} is given up.")
+    for explanation in decision.standings:
         print(f"  {explanation.title}: {f'behind by {explanation.behind:.1f}' if explanation.behind else 'best'}")
-    print(sentence(standing))
+    print(decision.sentence)
 
 
 @program.command(

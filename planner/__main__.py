@@ -15,7 +15,7 @@ from sim.io.errors import InputError
 
 if TYPE_CHECKING:
     from planner.paths.path import Path2D
-    from planner.planning.plan import Plan
+    from planner.planning.planned import Plan
     from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import CalibrationKnowledge
     from sim.model.robot import Robot

@@ -37,7 +37,7 @@ def _listed() -> dict[str, tuple[str, str]]:
 
 _HOMES = _listed()
 _RENAMED = {  # old name -> (module, name in it, what to use instead), for one release
-    "Voyage": ("planner.goal.to_goal", "GoalPlan", "GoalPlan"),
+    "Voyage": ("planner.goal.goal_plan", "GoalPlan", "GoalPlan"),
     "switch_response": ("softflagella.api.simulate", "switch_response", "response"),
 }
 

@@ -1,17 +1,23 @@
 # The public names of softflagella and their modules: the one list, for type checkers and for `__init__.py`.
+from calibration.report.robot_verdict import RobotVerdict as RobotVerdict
 from calibration.swimmer.synthetic_table import make_table as make_table
+from calibration.verdict.sequential_test import Decision as Decision
 from calibration.verdict.verdict import Verdict as Verdict
 from planner.files.plan_files import write_plan as write_plan
+from planner.files.plan_json import load_plan as load_plan
+from planner.files.tracking_error import TrackingError as TrackingError
+from planner.goal.goal_plan import GoalPlan as GoalPlan
 from planner.goal.obstacles import Circle as Circle
-from planner.goal.to_goal import GoalPlan as GoalPlan
 from planner.goal.to_goal import to_goal as to_goal
 from planner.paths.path import Path2D as Path2D
 from planner.paths.path import circle as circle
 from planner.paths.path import polygon as polygon
+from planner.paths.path_files import Drawing as Drawing
 from planner.paths.path_files import read_path as read_path
-from planner.planning.plan import Plan as Plan
-from planner.planning.plan import plan as plan
+from planner.planning.planned import Plan as Plan
+from planner.tracking.tracker import Command as Command
 from planner.tracking.tracker import Tracker as Tracker
+from planner.vehicle.calibration_table import CalibrationKnowledge as CalibrationKnowledge
 from sim.effects import catalogue
 from sim.inputs import load_robot as load_robot
 from sim.inputs import save_robot as save_robot
@@ -22,6 +28,12 @@ from sim.model.robot import Robot as Robot
 from sim.model.schedule import Schedule as Schedule
 from sim.model.schedule import load_schedule as load_schedule
 from softflagella.api.calibrate import calibrate as calibrate
+from softflagella.api.calibrate import decide as decide
+from softflagella.api.calibrate import tracks as tracks
+from softflagella.api.plan import check as check
+from softflagella.api.plan import plan as plan
+from softflagella.api.query import export as export
+from softflagella.api.query import inverse as inverse
 from softflagella.api.query import query as query
 from softflagella.api.simulate import replay as replay
 from softflagella.api.simulate import response as response

@@ -12,25 +12,21 @@ run side by side, one process for each core.
 from __future__ import annotations
 
 import json
-import math
 import os
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from calibration.report.corrected_robot import corrected_robot, corrected_toml
-from calibration.report.figures import draw_residuals
+from calibration.report.report import write_report
 from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.swimmer import SwimmerModel
@@ -38,27 +34,22 @@ from calibration.swimmer.synthetic_table import make_table
 from calibration.verdict.calibrate import calibrate
 from calibration.verdict.verdict import Verdict
 from calibration.verdict.verdict_json import verdict_record
-from dataset.report.figures import draw_responses, draw_trends, plain_logarithms
-from dataset.report.report import usable_rows
 from dataset.storage.data_set import read
 from planner.files.plan_json import load_plan
-from planner.files.tracking_error import TrackingError, draw_overlay, tracking_error
+from planner.files.tracking_error import TrackingError, tracking_error
 from planner.paths.path import polygon
 from sim.io.files import whole_file, write_csv, write_text
-from sim.io.pages import Page
-from sim.io.provenance import code_version
-from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import robot_toml
 from sim.motion.batches import available_jobs
-from sim.motion.shapes import tails_over_a_revolution
+from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady
 from sim.motion.warm import compile_once
-from softflagella.replanning import Steered, draw_steered, gap_closed, steer
-from surrogate.table.errors import error_scale
-from surrogate.table.lookup import NeuralTable
+from softflagella.demo_figures import draw_plans
+from softflagella.demo_page import Results, write_page
+from softflagella.replanning import Steered, steer
 from surrogate.table.model_file import load
 
 
@@ -92,7 +83,7 @@ def run_demo(out: str | Path) -> None:
     _command("sim", "check")
     robot, motions = _look(folder)
     print("2/4 plan circle, square and triangle without simulating, and replay them")
-    errors = _plan_and_replay(folder)
+    plans = _plan_and_replay(folder)
     print("3/4 a small sweep and a look-up table trained on it")
     data, model = folder / "sweep", folder / "model.safetensors"
     shutil.rmtree(data, ignore_errors=True)  # an earlier demo's rows, perhaps of another version
@@ -101,9 +92,19 @@ def run_demo(out: str | Path) -> None:
     print("4/4 calibrate with two measured tables")
     loops = {name: _calibrate(folder, name) for name in ("hidden effect", "nothing hidden")}
     steered = _steer(loops["hidden effect"][0])
-    seconds = time.perf_counter() - began
-    _write_page(page_path, robot, motions, read(data), load(model), errors, loops, steered, seconds)
-    print(f"done in {seconds:.0f} s -> {page_path}")
+    found = Results(
+        robot=robot,
+        motions=motions,
+        net_speed=responses(robot.groups(), motions[0]).net_speed[0],
+        plans=plans,
+        rows=read(data),
+        small=load(model),
+        loops=loops,
+        steered=steered,
+        seconds=time.perf_counter() - began,
+    )
+    write_page(page_path, found)
+    print(f"done in {time.perf_counter() - began:.0f} s -> {page_path}")
 
 
 def _command(*words: str, quiet: bool = False) -> None:
@@ -147,6 +148,8 @@ def _plan_and_replay(folder: Path) -> dict[str, tuple[dict[str, Any], TrackingEr
         error = tracking_error(plan, pd.read_csv(folder / case.name / "track.csv"))
         print(f"  {case.name}: {error.line}")
         result[case.name] = (plan, error)
+    with whole_file(folder / "plans.png") as part:  # of the README
+        draw_plans(result).savefig(part, format="png", dpi=90, bbox_inches="tight")
     return result
 
 
@@ -161,7 +164,8 @@ def _steer(verdict: Verdict) -> dict[str, Steered]:
     }
     steered = steer(models, truth, polygon(4, 3.0))
     for label, run in steered.items():
-        print(f"  square planned with the model {label}: {run.error.rms:.4f} l rms on the true robot")
+        mm = 1000 * start.tail_length * run.error.rms
+        print(f"  square planned with the model {label}: {mm:.1f} mm rms on the true robot")
     return steered
 
 
@@ -178,188 +182,9 @@ def _calibrate(folder: Path, name: str) -> tuple[Verdict, Measurements]:
     verdict = calibrate(SwimmerModel(start, data), correction=learn_head_correction)
     record = verdict_record(verdict, table="table.csv")
     write_text(case / "verdict.json", json.dumps(record, indent=1) + "\n")
+    write_report(verdict, data, case / "report.html", title=f"table with {name}")
     write_text(
         case / "corrected.toml", corrected_toml(start, verdict.fits.final_refit, verdict.corrections.learnt)
     )
     print(f"  {name}: {verdict.sentence}")
     return verdict, data
-
-
-def _write_page(
-    out: Path,
-    robot: Robot,
-    motions: Sequence[Steady],
-    rows: pd.DataFrame,
-    small: NeuralTable,
-    tracks: dict[str, tuple[dict[str, Any], TrackingError]],
-    loops: dict[str, tuple[Verdict, Measurements]],
-    steered: dict[str, Steered],
-    seconds: float,
-) -> None:
-    page = Page(
-        "A soft flagellated robot, from simulation to a schedule that works",
-        "Simulated, learned, planned without simulating, replayed, and corrected from measurements.",
-    )
-    page.section("The robot and its circles")
-    page.text(
-        "Two straight tails on a disc behind the head bend as they turn. The head spins the other way, is pushed "
-        "sideways by the surface, and the robot swims on a circle; a reversed motor mirrors it."
-    )
-    page.figure(_draw_robot(robot, motions), "tail shapes, and circles for both motor directions")
-    motion = motions[0]
-    page.text(
-        f"Yaw rate {float(motion.omega_yr[0]):.4f}, turn radius {float(motion.turn_radius[0]):.3f} l, slip angle "
-        f"{math.degrees(motion.slip_angle[0]):.1f} degrees (independent solver: 0.0490, 0.9415, 67.1)."
-    )
-    page.section("Three paths, planned without simulating")
-    page.text(
-        "The planner uses the look-up table only. The schedule is then replayed, open loop, in the simulator. "
-        "Errors are distances from the declared path: the feasible path nearest to the given one. The robot "
-        "cannot turn on the spot."
-    )
-    plans = _draw_plans(tracks)
-    with whole_file(out.parent / "demo" / "plans.png") as part:
-        plans.savefig(part, format="png", dpi=90, bbox_inches="tight")
-    page.figure(plans, "three planned paths with the replayed tracks")
-    header = (
-        "path",
-        "dwells",
-        "minutes",
-        "rms / l",
-        "max / l",
-        "stated error / l",
-        "rms / l, raw",
-        "max / l, raw",
-    )
-    page.table(
-        header,
-        [
-            (name, len(plan["dwell_bar"]), f"{sum(plan['dwell_s']) / 60:.1f}", f"{e.rms:.4f}", f"{e.largest:.4f}",
-             f"{e.stated:.3f}", f"{e.raw_rms:.3f}", f"{e.raw_largest:.3f}")
-            for name, (plan, e) in tracks.items()
-        ],
-    )  # fmt: skip
-    page.section("The sweep at a glance")
-    page.text(f"{len(rows)} robots of the demo's small sweep; the shipped table learned from a full one.")
-    good = usable_rows(rows)
-    page.figure(
-        draw_trends(good, "omega_yr_bar", ("omega_bar", "C_yr", "l_over_R", "C_t")), "yaw rate over inputs"
-    )
-    page.text("After a flip the tails turn over, and the robot lags behind its new circle:")
-    page.figure(draw_responses(good), "lags and net speed over the dwell")
-    page.section("Look-up table against simulator")
-    page.figure(_draw_parity(rows), "shipped look-up table against simulated rows")
-    shipped = load()
-    page.text("Relative rms error on held-out rows (slip angle in degrees):")
-    shown = ("omega_t_bar", "omega_yr_bar", "R_yr_over_l", "theta_deg", "v_z")
-    page.table(
-        ("look-up table", *shown),
-        [
-            (label, *(_figure(name, table.errors[name]["rms"]) for name in shown))
-            for label, table in (("shipped", shipped), (f"trained in this demo on {len(rows)} rows", small))
-        ],
-    )
-    for name, (verdict, data) in loops.items():
-        page.section(f"Calibration with a table: {name}")
-        page.text(verdict.sentence, tone="good" if verdict.verdict in ("effect", "none") else "bad")
-        if verdict.verdict == "effect":
-            page.figures(
-                [(figure, f"residuals, {model}", model) for figure, model in draw_residuals(verdict, data)]
-            )
-        errors = [
-            ("coefficients before calibration", verdict.error_uncalibrated),
-            ("calibrated", verdict.error_before),
-            ("calibrated, with the effect", verdict.error_after),
-            ("noise of one run, from repeats", verdict.noise_ceiling),
-        ]
-        shown_errors = [e for e in errors if verdict.effects or "effect" not in e[0]]
-        page.table(
-            ("error on the held-out session", "relative rms"),
-            [(label, f"{100 * value:.2f} %") for label, value in shown_errors],
-        )
-    page.section("Planning again: the square, on the robot with the hidden effect")
-    rms = [run.error.rms for run in steered.values()]
-    page.text(
-        "Planned without simulating, with three models, run open loop on the true robot: "
-        f"{rms[0]:.3f} l rms with the calibrated model, {rms[1]:.3f} l with the corrected one, {rms[2]:.3f} l "
-        f"with the truth known. The correction closes {100 * gap_closed(*rms):.0f} % of the gap."
-    )
-    page.figure(draw_steered(steered), "tracks of the true robot under three plans")
-    page.write(out, f"code {code_version()}, made in {seconds:.0f} s")
-
-
-def _figure(name: str, rms: float) -> str:
-    return f"{rms:.1g} deg" if name == "theta_deg" else f"{100 * rms:.1g} %"
-
-
-def _draw_robot(robot: Robot, motions: Sequence[Steady]) -> Figure:
-    figure = Figure(figsize=(11, 4.2))
-    shape = figure.add_subplot(1, 2, 1, projection="3d")
-    radius, length = robot.head_radius / robot.tail_length, robot.head_length / robot.tail_length
-    angle, z = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(0, length, 2))
-    shape.plot_surface(z, radius * np.cos(angle), radius * np.sin(angle), color="#c9d3dc", alpha=0.6)
-    _, tails = tails_over_a_revolution(robot, 1)
-    for x, y, z in tails[0].transpose(0, 2, 1):
-        shape.plot(z, x, y, color="#c8452f", lw=3)
-    shape.set_box_aspect((1.6, 0.6, 0.6))
-    shape.set_title("steady shape at $\\bar\\omega$ = 10", fontsize=10)
-    shape.set_xlabel("z / l", fontsize=8)
-    shape.tick_params(labelsize=6)
-    shape.set_yticks([-0.1, 0.1])
-    shape.set_zticks([-0.1, 0.1])
-    plane = figure.add_subplot(1, 2, 2)
-    for motion, label, colour in zip(
-        motions, ("$\\omega$ > 0", "$\\omega$ < 0"), ("#2a7fba", "#e08a1e"), strict=True
-    ):
-        turn, sway, surge = float(motion.omega_yr[0]), float(motion.v_x[0]), float(motion.v_z[0])
-        time = np.linspace(0, 2 * np.pi / abs(turn), 300)
-        heading = turn * time
-        x = (surge * np.sin(heading) - sway * (1 - np.cos(heading))) / turn
-        y = (surge * (1 - np.cos(heading)) + sway * np.sin(heading)) / turn
-        plane.plot(x, y, color=colour, label=label)
-    plane.plot(0, 0, "o", color="#1c2733", ms=4)
-    plane.annotate("", (0.45, 0), (0, 0), arrowprops={"arrowstyle": "->", "color": "#1c2733"})
-    plane.set_xlim(-2.05, 0.6)
-    plane.set_aspect("equal")
-    plane.set_xlabel("x / l (starting heading)")
-    plane.set_ylabel("y / l")
-    plane.set_title("circle of the head's centre", fontsize=10)
-    plane.legend(frameon=False, fontsize=9)
-    return figure
-
-
-def _draw_plans(errors: dict[str, tuple[dict[str, Any], TrackingError]]) -> Figure:
-    figure = Figure(figsize=(13, 4.6))
-    for panel, (name, (plan, error)) in enumerate(errors.items()):
-        axes = figure.add_subplot(1, len(errors), panel + 1)
-        draw_overlay(axes, plan, error, f"{name}, N = {int(plan['robot']['groups']['N'])}")
-    figure.axes[0].legend(fontsize=7, frameon=False, loc="center")
-    figure.tight_layout()
-    return figure
-
-
-def _draw_parity(rows: pd.DataFrame) -> Figure:
-    names = (("omega_yr_bar", "yaw rate"), ("v_z", "surge"), ("R_yr_over_l", "turn radius / l"),
-             ("theta_deg", "slip angle [deg]"))  # fmt: skip
-    good = usable_rows(rows)
-    predicted = load().query({n: good[n].to_numpy(float) for n in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS)}, flag=True)
-    truth = {name: good[name].to_numpy(float) for name in ("v_x", *(name for name, _ in names))}
-    figure = Figure(figsize=(12, 3.4))
-    for panel, (name, label) in enumerate(names):
-        axes = figure.add_subplot(1, 4, panel + 1)
-        axes.plot(truth[name], predicted[name], ".", ms=4, color="#2a7fba", alpha=0.7)
-        ends = [np.nanmin(truth[name]), np.nanmax(truth[name])]
-        axes.plot(ends, ends, color="#1c2733", lw=0.7)
-        error = np.nanmedian(np.abs(predicted[name] - truth[name]) / error_scale(name, truth))
-        text = f"{error:.1g} deg" if name == "theta_deg" else f"{100 * error:.1g} %"
-        axes.set_title(f"{label}: median error {text}", fontsize=9)
-        axes.set_xlabel("simulated", fontsize=8)
-        axes.tick_params(labelsize=7)
-        if name in ("omega_yr_bar", "v_z"):
-            axes.set_xscale("log")
-            axes.set_yscale("log")
-            plain_logarithms(axes.xaxis)
-            plain_logarithms(axes.yaxis)
-    figure.axes[0].set_ylabel("look-up table", fontsize=8)
-    figure.tight_layout()
-    return figure

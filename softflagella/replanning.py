@@ -11,10 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from matplotlib.figure import Figure
-
-from planner.files.plan_json import plan_record
 from planner.files.tracking_error import TrackingError, tracking_error
 from planner.paths.path import Path2D
 from planner.planning.plan import plan
@@ -42,7 +38,7 @@ def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, 
     runs = {}
     for label, model in models.items():
         planned = plan(path, model, lookup=tabulate(model))
-        content = plan_record(planned)
+        content = planned.to_dict()
         track = replay([planned.schedule(truth)])[0]
         track[["x_over_l", "y_over_l"]] *= truth.tail_length / model.tail_length
         runs[label] = Steered(content, tracking_error(content, track), track[["x_over_l", "y_over_l"]].to_numpy())
@@ -52,20 +48,3 @@ def steer(models: Mapping[str, Robot], truth: Robot, path: Path2D) -> dict[str, 
 def gap_closed(before: float, after: float, best: float) -> float:
     """Return the share of the avoidable error that the correction removes."""
     return (before - after) / (before - best)
-
-
-def draw_steered(runs: Mapping[str, Steered]) -> Figure:
-    """Draw the tracks side by side, each with the path that its plan declares."""
-    figure = Figure(figsize=(3.7 * len(runs), 3.9))
-    for i, (label, run) in enumerate(runs.items()):
-        axes = figure.add_subplot(1, len(runs), i + 1)
-        reference, raw = np.array(run.plan["reference"]), np.array(run.plan["raw_path"])
-        axes.plot(*raw.T, color="#b8c2cc", lw=1)
-        axes.plot(*reference.T, color="#1c2733", lw=1)
-        axes.plot(*run.track.T, color="#c8452f", lw=1.3)
-        axes.set_aspect("equal")
-        axes.set_title(f"{label}: {run.error.rms:.3f} l rms", fontsize=9)
-        axes.tick_params(labelsize=7)
-        axes.set_xlabel("x / l", fontsize=8)
-    figure.tight_layout()
-    return figure

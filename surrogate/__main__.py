@@ -33,7 +33,6 @@ def _train(arguments: Namespace) -> None:
     from surrogate.networks.checkpoints import device_named, remove_states
     from surrogate.networks.training_loop import Settings
     from surrogate.table.errors import error_table, shortcomings
-    from surrogate.table.model_file import save
     from surrogate.training.fit_response import SETTINGS
     from surrogate.training.model_card import model_card
     from surrogate.training.train import held_out, train
@@ -46,7 +45,7 @@ def _train(arguments: Namespace) -> None:
             raise InputError(f"--epochs {arguments.epochs}; give a whole number from 1")
         tails, curves = (replace(s, epochs=arguments.epochs, iterations=arguments.epochs) for s in (tails, curves))
     lookup = train(arguments.data, tails, curves, device=device, states=states)
-    save(lookup, arguments.out)
+    lookup.save(arguments.out)
     card = Path(arguments.out).with_suffix(".md")
     write_text(card, model_card(lookup, held_out(arguments.data)))
     remove_states(states)
@@ -136,35 +135,14 @@ def _query_points(arguments: Namespace) -> None:
     argument("--free", default="C_t,C_r,C_yr", help="inputs to find, with commas (default: C_t,C_r,C_yr)"),
 )
 def _inverse(arguments: Namespace) -> None:
-    import pandas as pd
-
     from sim.io.files import write_csv
     from sim.io.tables import read_table
-    from sim.motion.steady_motion import STEADY_OUTPUTS
-    from surrogate.input_ranges import BOUNDS
-    from surrogate.table.inverse import inverse
+    from surrogate.table.inverse import inverse_table
     from surrogate.table.model_file import load
 
     points = read_table(arguments.targets)
     names = [name.strip() for name in arguments.free.split(",")]
-    for name in names:
-        if name not in BOUNDS:
-            raise InputError(f"--free {name}; allowed are {', '.join(BOUNDS)}")
-    columns = {str(c): points[c].to_numpy() for c in points}
-    targets = {name: array for name, array in columns.items() if name in STEADY_OUTPUTS}
-    if not targets:
-        raise InputError(f"{arguments.targets} has no outputs; give at least one of {', '.join(STEADY_OUTPUTS)}")
-    robots = {name: array for name, array in columns.items() if name not in targets}
-    bounds = {name: BOUNDS[name] for name in names}
-    solutions = inverse(load(arguments.model), robots, targets, bounds)
-    table = pd.DataFrame(
-        {
-            "target": solutions.target + 1,
-            **solutions.inputs,
-            "misfit": solutions.misfit,
-            "outside": solutions.outside,
-        }
-    )
+    table = inverse_table(load(arguments.model), points, names, where=arguments.targets)
     write_csv(table, arguments.out)
     print(f"{len(table)} solutions of {len(points)} targets -> {arguments.out}")
 
@@ -188,11 +166,10 @@ def _errors(arguments: Namespace) -> None:
 )
 def _robot(arguments: Namespace) -> None:
     from sim.inputs import load_robot
-    from surrogate.one_robot.robot_table import save_robot_table
     from surrogate.one_robot.tabulate import tabulate
 
     table = tabulate(load_robot(arguments.robot))
-    save_robot_table(table, arguments.out)
+    table.save(arguments.out)
     worst = max(error["rms"] for error in table.errors.values())
     print(f"both directions of the motor, largest error {100 * worst:.2f} % -> {arguments.out}")
 

@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Protocol
 
 from sim.arrays import Floats
@@ -46,6 +47,14 @@ class LookupTable(Protocol):
 
         Raises:
             InputError: a robot that cannot be, or one outside the domain.
+        """
+        ...
+
+    def save(self, path: str | Path) -> None:
+        """Write the table's file, which `softflagella.load_table` reads.
+
+        Raises:
+            InputError: the file cannot be written.
         """
         ...
 

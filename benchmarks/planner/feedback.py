@@ -21,9 +21,10 @@ from matplotlib.figure import Figure
 from benchmarks.parallel import in_parallel
 from benchmarks.planner.simulated_swim import Blind, Camera, Swum, swim
 from benchmarks.proportions import wilson
-from planner.files.pictures import DECLARED, REPLAYED
 from planner.paths.path import Path2D, circle
-from planner.planning.plan import Plan, plan
+from planner.planning.picture import DECLARED, REPLAYED
+from planner.planning.plan import plan
+from planner.planning.planned import Plan
 from planner.tracking.tracker import FALSE_ALARM, WINDOW, Tracker
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 
+from planner.goal.goal_plan import GoalPlan
 from planner.goal.route import NoWayError
-from planner.goal.to_goal import GoalPlan, to_goal
+from planner.goal.to_goal import to_goal
 from sim.model.presets import PRESETS
 from surrogate.table.model_file import load
 

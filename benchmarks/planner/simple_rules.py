@@ -20,9 +20,9 @@ import numpy as np
 import torch
 
 from benchmarks.planner.tracking import CASES
-from planner.files.plan_json import plan_record
 from planner.files.tracking_error import tracking_error
-from planner.planning.plan import Plan, plan
+from planner.planning.plan import plan
+from planner.planning.planned import Plan
 from sim.arrays import Floats
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
@@ -98,7 +98,7 @@ def _errors(result: Plan, rule: Rule) -> tuple[float, float, float]:
     first, dwells, start = rule
     robot = result.robot
     track = replay([Schedule(robot.group_values(), first, np.array(dwells), start, robot.time_scale)])[0]
-    error = tracking_error(plan_record(result), track)
+    error = tracking_error(result.to_dict(), track)
     return error.raw_rms, error.raw_largest, sum(dwells) * robot.time_scale
 
 

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from planner.paths.distance import distance_to
-from planner.planning.plan import Plan
+from planner.planning.planned import Plan
 from planner.tracking.kalman_filter import POSE
 from planner.tracking.tracker import Command
 from sim.arrays import Floats

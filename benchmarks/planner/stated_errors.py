@@ -23,11 +23,11 @@ import torch
 from benchmarks.markdown import heading, row
 from benchmarks.parallel import in_parallel
 from benchmarks.proportions import wilson
-from planner.files.plan_json import plan_record
 from planner.files.tracking_error import tracking_error
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle, polygon
-from planner.planning.plan import Plan, plan
+from planner.planning.plan import plan
+from planner.planning.planned import Plan
 from planner.vehicle.calibration_table import COEFFICIENTS, CalibrationKnowledge
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
@@ -110,7 +110,7 @@ def swum(seed: int) -> Swum | str:
         tracks = [replay([result.schedule(swimmer)])[0] for swimmer in (replace(robot, **moved), robot)]
     except InputError as refused:
         return f"{seed}: {refused}"
-    wrong, exact = (tracking_error(plan_record(result), track) for track in tracks)
+    wrong, exact = (tracking_error(result.to_dict(), track) for track in tracks)
     return Swum(
         seed, robot, len(result.dwells), result.tracked.vehicle.yaw_rate, result.stated_error,
         wrong.largest, exact.largest, exact.rms, _mean_path(result, tracks[1]), result.straight.rms,

@@ -13,7 +13,6 @@ import pandas as pd
 import torch
 from tqdm import tqdm
 
-from planner.files.plan_json import plan_record
 from planner.files.tracking_error import tracking_error
 from planner.paths.path import circle, polygon
 from planner.planning.plan import plan
@@ -46,7 +45,7 @@ def main() -> None:
     print("\nOpen-loop replay against the declared path, in tail lengths l")
     print(f"{'case':30}{'dwells':>8}{'rms':>9}{'max':>9}{'stated':>9}{'raw rms':>9}{'ms/switch':>11}")
     for (name, _, _), result, track, seconds in zip(CASES, plans, tracks, spent, strict=True):
-        error = tracking_error(plan_record(result), track)
+        error = tracking_error(result.to_dict(), track)
         count = len(result.dwells)
         print(
             f"{name:30}{count:8d}{error.rms:9.4f}{error.largest:9.4f}{error.stated:9.3f}"

@@ -28,7 +28,7 @@ from surrogate.networks.checkpoints import TrainingContext, remove_states
 from surrogate.networks.training_loop import Settings
 from surrogate.table.errors import coverage, curve_errors, error_table, relative_errors, summary
 from surrogate.table.lookup import NeuralTable
-from surrogate.table.model_file import load, save
+from surrogate.table.model_file import load
 from surrogate.training.simulated import (
     MOTION,
     SimulatedRobots,
@@ -176,7 +176,7 @@ def main(*words: str) -> None:
             tails, widths, held_out, join_robots([flips, learned]), TAILS, CURVES, source=source,
             flips_held_out=swept_held_out, work=TrainingContext("train", folder=arguments.work / "states"),
         )  # fmt: skip
-        save(lookup, arguments.out)
+        lookup.save(arguments.out)
         remove_states(arguments.work / "states")
         print(error_table(lookup.errors))
     if arguments.test:

@@ -46,17 +46,17 @@ _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
 class Candidate:
     """What was found about one effect; what only a refit tells is left at its default if there was none."""
 
-    effect: Parameter
+    effect: Parameter  # as a parameter
     claimed: tuple[Parameter, ...]  # all effects of its refit: those that were in the model before, and this one
-    z: float
-    survived: float
+    z: float  # score, in standard deviations of the noise
+    survived: float  # share of its signal that the fit cannot absorb
     detectable: float  # size that is found half of the time: critical |z| / signal per unit
     detectable_exact: float  # the same if every nuisance parameter were exact
     verdict: str  # why it was kept or not
-    refit: Fit | None = None
-    refit_misfit: Misfit | None = None
+    refit: Fit | None = None  # the model with this effect
+    refit_misfit: Misfit | None = None  # tests of the residual that the refit leaves
     gain: float = 0.0  # predictive gain summed over left-out sessions, in log likelihood
-    gain_error: float = 0.0
+    gain_error: float = 0.0  # standard error of `gain`
     imitable: float = 0.0  # imitability index of the claim (`calibration.attribution.claim_checks`), if it is kept
     transfer: float = 1.0  # p-value that it carries over to other runs, if it is kept
 

@@ -79,12 +79,20 @@ def calibration_knowledge(robot: Robot, final: FinalRefit) -> CalibrationKnowled
 
 def corrected_toml(robot: Robot, final: FinalRefit, learnt: LearntCorrection | None = None) -> str:
     """Write corrected.toml, with the correction that was `learnt` where nothing explains the runs."""
+    corrected, known = handed_on(robot, final, learnt)
+    return robot_toml(corrected) + "\n" + knowledge_toml(known)
+
+
+def handed_on(
+    robot: Robot, final: FinalRefit, learnt: LearntCorrection | None = None
+) -> tuple[Robot, CalibrationKnowledge]:
+    """Return the corrected robot and what is known about it, see `corrected_toml`."""
     corrected = corrected_robot(robot, final.parameters)
     known = calibration_knowledge(robot, final)
     if isinstance(learnt, HeadCorrection):
         known = _with_correction(known, learnt, corrected)
         corrected = replace(corrected, correction=learnt.correction)
-    return robot_toml(corrected) + "\n" + knowledge_toml(known)
+    return corrected, known
 
 
 def _with_correction(known: CalibrationKnowledge, learnt: HeadCorrection, robot: Robot) -> CalibrationKnowledge:

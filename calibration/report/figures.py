@@ -42,9 +42,16 @@ def compared(result: Verdict) -> list[tuple[str, Floats]]:
 
 def draw_summary(result: Verdict, data: Measurements) -> Figure:
     """Draw the residual of each output for each model, as rms over the fitted runs, in units of the noise."""
-    noise = np.sqrt(np.diag(result.base.noise.run))
     figure = Figure(figsize=(_WIDTH, 0.9 + 0.42 * len(data.outputs)))
-    axes = figure.add_subplot()
+    plot_summary(figure.add_subplot(), result, data)
+    figure.legend(fontsize=8, frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    figure.tight_layout()
+    return figure
+
+
+def plot_summary(axes: Axes, result: Verdict, data: Measurements) -> None:
+    """Draw the bars of `draw_summary`, without a legend."""
+    noise = np.sqrt(np.diag(result.base.noise.run))
     place = np.arange(len(data.outputs))[::-1]
     models = compared(result)
     height = 0.7 / len(models)
@@ -57,9 +64,6 @@ def draw_summary(result: Verdict, data: Measurements) -> Figure:
     axes.set_yticks(place, [LABELS[o] for o in data.outputs], fontsize=9)
     axes.set_xlabel("measured − model, rms, over the noise of a run", fontsize=9)
     axes.tick_params(axis="x", labelsize=8)
-    figure.legend(fontsize=8, frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
-    figure.tight_layout()
-    return figure
 
 
 def draw_residuals(result: Verdict, data: Measurements) -> list[tuple[Figure, str]]:
@@ -142,7 +146,8 @@ def draw_evidence(result: Verdict) -> Figure:
         tested = candidate.refit is not None
         colour = GREEN if candidate.effect.name in named else ORANGE if tested else PALE
         axes.barh(place - 0.2, candidate.z, color=colour, height=0.4)
-        axes.text(-limit, place + 0.2, f" {candidate.effect.title}", fontsize=8, va="center")
+        beside_frame = axes.get_yaxis_transform()
+        axes.text(0.02, place + 0.2, candidate.effect.title, fontsize=8, va="center", transform=beside_frame)
         axes.vlines([-critical, critical], place - 0.45, place, color=INK, lw=0.8, ls="--")
     axes.set_xscale("symlog", linthresh=2 * critical)
     axes.set_xlim(-limit, limit)

@@ -63,12 +63,12 @@ _STEEP = 5.0  # if it is larger, the others were not refitted along a bent valle
 class Pull:
     """What the runs say about one nuisance parameter, on its own scale."""
 
-    parameter: Parameter
+    parameter: Parameter  # the nuisance parameter
     change: float  # fitted, with its prior
-    error: float
+    error: float  # standard error of `change`
     alone: float  # from the runs alone, with the other nuisance parameters as far as their priors allow
-    alone_error: float
-    z: float
+    alone_error: float  # standard error of `alone`
+    z: float  # `change` over its standard deviation under noise
     freed: bool  # its prior was taken away
 
     @property
@@ -97,7 +97,7 @@ class Pull:
 class Fit:
     """A fitted model; arrays over all runs of the table, used or not."""
 
-    parameters: dict[str, float]
+    parameters: dict[str, float]  # name -> fitted value
     fitted: tuple[Parameter, ...]  # in the order of the covariance
     names: tuple[str, ...]  # of these
     covariance: Floats  # (p, p) of (ln C, ε)
@@ -105,7 +105,7 @@ class Fit:
     freedom: Floats  # (p,) degrees of freedom of the intervals
     prediction: Floats  # (n, k)
     jacobian: Floats  # (n, k, p)
-    noise: Noise
+    noise: Noise  # of runs and sessions
     deviance: float  # rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| over the fitted runs
     converged: bool  # the fit is at a minimum, or at one within the bounds
     wrong_numbers: tuple[tuple[Pull, ...], ...] = ()  # the first of each has lost its prior; see `fit`

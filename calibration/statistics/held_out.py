@@ -79,8 +79,8 @@ def one_step(data: Runs, fitted: Fit, rows: Flags) -> Linear:
 class FinalRefit:
     """The model that is handed on: fitted to all runs."""
 
-    parameters: dict[str, float]
-    fitted: tuple[Parameter, ...]
+    parameters: dict[str, float]  # name -> value
+    fitted: tuple[Parameter, ...]  # those that were fitted
     covariance: Floats  # (p, p); a 95 % interval is 1.96 standard deviations to each side
 
 

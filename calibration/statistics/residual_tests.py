@@ -126,12 +126,12 @@ class Scores:
 class Misfit:
     """Observed statistics and their p-values."""
 
-    scores: Scores
+    scores: Scores  # statistics of the residual
     p: dict[str, float]  # of each statistic
     general_p: float  # of the general tests together
     p_value: float  # any departure: general tests and scores together
     critical_z: float  # quantile of max |z_j| at the level
-    features: tuple[str, ...]
+    features: tuple[str, ...]  # names of the features of the inputs
     exact_length: Floats  # (e,) `Scores.length` if the nuisance parameters were exact
     second: Floats  # (e,) value of each effect's second number at its largest score; NaN where there is none
 

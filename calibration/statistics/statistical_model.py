@@ -46,10 +46,10 @@ _CUBIC = 0.2  # share of a cube that lower powers must leave
 class Parameter:
     """A number to fit: a coefficient, a nuisance parameter, or the size of an effect, which the model may lack."""
 
-    name: str
-    title: str
+    name: str  # in code and files
+    title: str  # in words
     start: float  # the value as given; for an effect its null
-    bounds: tuple[float, float]
+    bounds: tuple[float, float]  # least and largest value
     typical: float  # a typical size; it sets the finite-difference step
     logarithmic: bool = False  # fitted as its logarithm
     unit: str = "1"  # in which it is shown
@@ -167,8 +167,8 @@ def by_differences(
 class Noise:
     """S (k, k) of a run and ρ of a session."""
 
-    run: Floats
-    share: float
+    run: Floats  # S: covariance (k, k) of a run
+    share: float  # ρ: variance of a session over that of a run
 
     def whitener(self, session: Integers) -> Whitener:
         return Whitener(self, session)

@@ -46,8 +46,8 @@ _MOST_RIVALS = 4
 class NextRun:
     """An experiment, and how well it tells the rivals apart, for the two that it tells apart least."""
 
-    settings: dict[str, Any]
-    repeats: int
+    settings: dict[str, Any]  # column -> value
+    repeats: int  # of the setting
     separation: float  # λ of all repeats
     decides: float  # share of draws in which the true one is chosen
 

@@ -28,10 +28,10 @@ from sim.io.reading import ContentError, read_json
 class Explanation:
     """A fitted model that explains a table, as verdict.json keeps it."""
 
-    title: str
+    title: str  # in words
     parameters: dict[str, float]  # all that are fitted
     covariance: Floats  # (p, p) of them
-    noise: Noise
+    noise: Noise  # of runs and sessions
     outputs: tuple[str, ...]  # (k,) that were fitted
 
     @staticmethod
@@ -73,7 +73,7 @@ class Explanation:
 class Standing:
     """How far an explanation is behind the best one on the new runs."""
 
-    title: str
+    title: str  # of the explanation
     behind: float  # 2 ln of the ratio of the densities
 
     @property
@@ -148,9 +148,39 @@ def standings(model: ForwardModel, explanations: Sequence[Explanation], new: Fla
     return sorted(standing, key=lambda s: s.behind)
 
 
-def sentence(standing: Sequence[Standing]) -> str:
-    """Say what to do now."""
-    titles = [s.title for s in standing if not s.given_up]
-    if len(titles) == 1:
-        return f"Decided: {titles[0]}. The next step is to calibrate with all runs."
-    return f"Not decided between {' and '.join(titles)}: make more runs."
+@dataclass(frozen=True)
+class Decision:
+    """What new runs say about several explanations.
+
+    Example:
+        >>> from softflagella import decide
+        >>> decide("runs.csv", "calibrated/verdict.json", "robot.toml").sentence  # doctest: +SKIP
+        'Decided: tank wall. The next step is to calibrate with all runs.'
+    """
+
+    standings: tuple[Standing, ...]  # best first
+    new_runs: int  # how many there were
+
+    @property
+    def decided(self) -> str | None:
+        """The explanation that is left; None if there are several."""
+        titles = [standing.title for standing in self.standings if not standing.given_up]
+        return titles[0] if len(titles) == 1 else None
+
+    @property
+    def sentence(self) -> str:
+        """What to do now."""
+        if self.decided:
+            return f"Decided: {self.decided}. The next step is to calibrate with all runs."
+        titles = [standing.title for standing in self.standings if not standing.given_up]
+        return f"Not decided between {' and '.join(titles)}: make more runs."
+
+
+def decide(model: ForwardModel, explanations: Sequence[Explanation], before: set[str]) -> Decision:
+    """Judge explanations by the runs of sessions that were not among those `before`.
+
+    Raises:
+        InputError: there are no new runs, or they cannot be compared with what was fitted.
+    """
+    new = new_runs(model.runs, before)
+    return Decision(tuple(standings(model, explanations, new)), int(new.sum()))

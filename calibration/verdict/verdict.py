@@ -27,6 +27,8 @@ MODELS = ("uncalibrated", "before", "after", "generic", "predictive")  # whose e
 _NOTABLE = 2.0  # pull of a nuisance parameter beyond which the sentence says so
 _NEAR = 0.5  # if no effect explains the residual, the best one is named if it removes at least this share
 
+_LONGEST = 500  # letters of a sentence in a repr
+
 _OLD_NAMES = {  # of attributes -> where they are now
     "base_intervals": "fits.base_intervals",
     "final_intervals": "fits.final_intervals",
@@ -58,9 +60,9 @@ _OLD_NAMES = {  # of attributes -> where they are now
 class Evidence:
     """The residual of the calibrated model, and what every effect makes of it."""
 
-    misfit: Misfit
+    misfit: Misfit  # tests of the residual
     draws: int  # of its bootstrap
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[Candidate, ...]  # all effects of the catalogue
     explaining: tuple[Candidate, ...]  # what explains the residual, best first; more than one: not told apart
     rival_effects: tuple[Candidate, ...]  # effects that explain as much as the number that is wrong
     untestable: dict[str, str]  # effects that these runs cannot test: what is missing
@@ -71,11 +73,11 @@ class Fits:
     """The calibrated model (base), that with the effects of the verdict (final), and its refit to all runs."""
 
     uncalibrated: Floats  # (n, k) prediction of the model as given
-    base: Fit
+    base: Fit  # the calibrated model
     base_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
-    final: Fit
-    final_intervals: dict[str, tuple[float, float]]
-    final_refit: FinalRefit
+    final: Fit  # that with the effects of the verdict
+    final_intervals: dict[str, tuple[float, float]]  # 95 %, by profile deviance
+    final_refit: FinalRefit  # the final model, fitted to all runs
     pulls: tuple[Pull, ...]  # of every nuisance parameter in the final model, the farthest first
 
 
@@ -88,7 +90,7 @@ class HeldOutErrors:
     """
 
     rms: dict[str, float]  # of each model, over all outputs
-    by_output: dict[str, dict[str, float]]
+    by_output: dict[str, dict[str, float]]  # model -> output -> relative rms
     after_interval: tuple[float, float]  # 95 %
     noise: float  # of a run, from the repeats
     p_value: float  # agreement of the held-out runs with the final model
@@ -107,7 +109,7 @@ class Next:
     """Explanations that the runs cannot tell apart, and the runs that would; none if there are not two."""
 
     explanations: tuple[Explanation, ...] = ()  # best first
-    runs: tuple[NextRun, ...] = ()
+    runs: tuple[NextRun, ...] = ()  # single settings, the best first
     batch: Batch | None = None  # the same, for several runs together
 
 
@@ -115,11 +117,11 @@ class Next:
 class Conditions:
     """What was fixed before the runs were looked at, and what weakens the conclusion."""
 
-    split: Split
+    split: Split  # fitted and held-out runs
     sessions: tuple[str, ...]  # names of all sessions
     hash: str  # of everything that was fixed
     excluded: tuple[str, ...]  # rows that were not used, and why
-    caveats: tuple[str, ...]
+    caveats: tuple[str, ...]  # what weakens the conclusion, in words
 
 
 def reach_verdict(evidence: Evidence, level: float, *, number_explains: bool) -> str:
@@ -140,7 +142,7 @@ def reach_verdict(evidence: Evidence, level: float, *, number_explains: bool) ->
     return ("unexplained", "effect", "ambiguous")[min(len(evidence.explaining), 2)]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Verdict:
     """What runs say about a model; made by `softflagella.calibrate`.
 
@@ -151,12 +153,25 @@ class Verdict:
     """
 
     verdict: str  # "none", "number", "effect", "ambiguous", "unexplained"; see `reach_verdict`
-    evidence: Evidence
-    fits: Fits
-    errors: HeldOutErrors
-    corrections: Corrections
-    next: Next
-    conditions: Conditions
+    evidence: Evidence  # the residual, and what explains it
+    fits: Fits  # the fitted models
+    errors: HeldOutErrors  # on the held-out runs
+    corrections: Corrections  # descriptions of the residual
+    next: Next  # runs to make next
+    conditions: Conditions  # what was fixed before the fit
+
+    def __repr__(self) -> str:
+        sentence = self.sentence if len(self.sentence) <= _LONGEST else f"{self.sentence[:_LONGEST]} …"
+        errors = f"as given {_percent(self.error_uncalibrated)}, calibrated {_percent(self.error_before)}"
+        if self.effects:
+            errors += f", with the effects {_percent(self.error_after)}"
+        names = ", ".join(self.effects)
+        return (
+            f"Verdict {self.verdict!r}{f': {names}' if names else ''}\n"
+            f"  {sentence}\n"
+            f"  error on the held-out runs ({self.conditions.split.names}): {errors}; "
+            f"noise of a run {_percent(self.noise_ceiling)}"
+        )
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -339,3 +354,7 @@ class Verdict:
         if share < _NEAR:
             return ""
         return f"; the nearest, {title}, removes {100 * min(share, 1.0):.0f} % of it and leaves more than noise"
+
+
+def _percent(error: float) -> str:
+    return f"{100 * error:.2f} %"

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 from planner.files.plan_files import EXTRA, FILES, write_plan_files
+from planner.goal.goal_plan import GoalPlan
 from planner.goal.obstacles import Circle, Polygon, Region
-from planner.goal.to_goal import GoalPlan
 from planner.paths.path_files import read_path
 from planner.paths.units import in_tails
 from sim.io.errors import InputError, naming
 from sim.io.files import files_together, write_text
 from sim.model.robot import Robot
 
-FORMAT = 1
 _SHAPES = {"circle": "circle:X,Y,RADIUS", "box": "box:LEFT,LOW,RIGHT,HIGH"}
 
 
@@ -55,31 +53,6 @@ def write_goal_plan(goal_plan: GoalPlan, folder: str | Path) -> list[Path]:
 
     with files_together(folder, (*FILES, *EXTRA)) as temporary:
         identity = write_plan_files(goal_plan.plan, temporary)
-        write_text(temporary / "goal.json", json.dumps({**goal_record(goal_plan), "plan_id": identity}) + "\n")
+        write_text(temporary / "goal.json", json.dumps({**goal_plan.to_dict(), "plan_id": identity}) + "\n")
         write_svg(draw_goal_plan(goal_plan), temporary / "goal.svg", identity)
     return [Path(folder, name) for name in (*FILES, "goal.json", "goal.svg")]
-
-
-def goal_record(goal_plan: GoalPlan) -> dict[str, Any]:
-    """Return what was asked for and what is predicted, as JSON-like content. Lengths in l, angles in rad."""
-    finite = goal_plan.clearance if goal_plan.clearance < float("inf") else None
-    walls = goal_plan.free_space.walls
-    return {
-        "format": FORMAT,
-        "start": goal_plan.plan.start,
-        "goal": goal_plan.goal,
-        "via": goal_plan.via,
-        "keep_out": [
-            {"circle": [region.x, region.y, region.radius]}
-            if isinstance(region, Circle)
-            else {"polygon": region.corners.tolist()}
-            for region in goal_plan.free_space.regions
-        ],
-        "walls": None if walls is None else walls.corners.tolist(),
-        "predicted_end": goal_plan.end,
-        "end_error_over_l": goal_plan.end_error[0],
-        "end_error_rad": goal_plan.end_error[1],
-        "length_over_l": goal_plan.length,
-        "margin_over_l": goal_plan.margin,
-        "predicted_clearance_over_l": finite,
-    }

@@ -17,14 +17,15 @@ from sim.model.robot import Robot
 from surrogate.interface import LookupTable
 
 ENDING = ".table.json"
+_TABLES: dict[tuple[tuple[str, float], ...], LookupTable] = {}  # of robots without a file, by their groups
 
 
-def table_for(robot: Robot, source: str, knowledge: CalibrationKnowledge) -> LookupTable:
+def table_for(robot: Robot, source: str | None, knowledge: CalibrationKnowledge) -> LookupTable:
     """Load the package's table if it knows a robot, else the robot's own; simulate that where there is none.
 
     Args:
         robot: the robot.
-        source: its file, or the name of a preset.
+        source: its file, or the name of a preset; None: the table is kept in this process alone.
         knowledge: what a calibration found besides the robot.
 
     Raises:
@@ -37,7 +38,7 @@ def table_for(robot: Robot, source: str, knowledge: CalibrationKnowledge) -> Loo
         reason = str(unknown).partition("; ")[0]
     else:
         return shipped
-    kept = None if source in PRESETS else Path(source).with_suffix(ENDING)
+    kept = None if source is None or source in PRESETS else Path(source).with_suffix(ENDING)
     table = _kept_table(robot, kept, knowledge)
     if table is None:
         print(f"{reason}: simulating this robot's own look-up table, for some seconds", file=sys.stderr)
@@ -49,7 +50,9 @@ def _kept_table(robot: Robot, kept: Path | None, knowledge: CalibrationKnowledge
     """Read the table beside the robot's file; None where there is none, or one of another robot or version."""
     from surrogate.one_robot.robot_table import load_robot_table
 
-    if kept is None or not kept.exists():
+    if kept is None:
+        return _TABLES.get(_key(robot))
+    if not kept.exists():
         return None
     try:
         table = load_robot_table(kept)
@@ -61,14 +64,19 @@ def _kept_table(robot: Robot, kept: Path | None, knowledge: CalibrationKnowledge
 
 def _simulated_table(robot: Robot, kept: Path | None) -> LookupTable:
     """Simulate the table of a robot, and keep it where that is possible."""
-    from surrogate.one_robot.robot_table import save_robot_table
     from surrogate.one_robot.tabulate import tabulate
 
     table = tabulate(robot)
-    if kept is not None:
+    if kept is None:
+        _TABLES[_key(robot)] = table
+    else:
         try:
-            save_robot_table(table, kept)
+            table.save(kept)
             print(f"-> {kept}", file=sys.stderr)
         except InputError as refusal:  # a folder that cannot be written is no reason not to plan
             print(f"the table is not kept: {refusal}", file=sys.stderr)
     return table
+
+
+def _key(robot: Robot) -> tuple[tuple[str, float], ...]:
+    return tuple(sorted(robot.group_values().items()))

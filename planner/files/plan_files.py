@@ -16,11 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
-from planner.files.plan_json import plan_record
 from planner.files.tracker_header import DIRECTIONS, c_part, safe_name, tracker_header
-from planner.planning.plan import Plan
+from planner.planning.planned import Plan
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_csv, write_text
 from sim.io.provenance import code_version
@@ -65,31 +63,14 @@ def write_plan_files(result: Plan, folder: Path) -> str:
     """Write the five files of a plan into a folder, one after the other, and return the plan's identity."""
     from planner.files.pictures import draw_plan, write_svg
 
-    record = plan_record(result)
+    record = result.to_dict()
     identity = record["id"]
     write_text(folder / "plan.json", json.dumps({**record, "code_version": code_version()}) + "\n")
-    write_csv(dwell_table(result).assign(plan_id=identity), folder / "plan.csv")
+    write_csv(result.to_frame().assign(plan_id=identity), folder / "plan.csv")
     write_text(folder / "schedule.h", controller_header(result, identity))
     write_text(folder / "tracker.h", tracker_header(result, identity))
     write_svg(draw_plan(result), folder / "plan.svg", identity)
     return identity
-
-
-def dwell_table(result: Plan) -> pd.DataFrame:
-    """Tabulate the dwells: start, direction, length and predicted pose."""
-    count = len(result.dwells)
-    start = np.concatenate([[0.0], np.cumsum(result.dwells)[:-1]])
-    return pd.DataFrame(
-        {
-            "start_s": start * result.robot.time_scale,
-            "direction": result.first_direction * (-1) ** np.arange(count),
-            "dwell_s": result.seconds,
-            "dwell_bar": result.dwells,
-            "x_over_l": result.poses[:-1, 0],
-            "y_over_l": result.poses[:-1, 1],
-            "heading_rad": result.poses[:-1, 2],
-        }
-    )
 
 
 def milliseconds(seconds: np.ndarray) -> list[int]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from planner.paths.path import arc_length
 from planner.planning import line_of_sight
-from planner.planning.plan import Plan
+from planner.planning.planned import Plan
 from planner.tracking import kalman_filter, tracker
 from planner.tracking.kalman_filter import prior
 from planner.vehicle.vehicle import BEFORE_KNOTS, STEP

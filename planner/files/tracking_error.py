@@ -6,15 +6,15 @@ as given is computed, too. A track holds the head's centre and the heading. The 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from planner.files.pictures import REPLAYED, draw_tracks
 from planner.paths.distance import distance_to, two_sided
+from planner.planning.picture import REPLAYED, draw_tracks
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.quantities import numbers_of
@@ -26,15 +26,23 @@ _COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
 
 @dataclass(frozen=True)
 class TrackingError:
-    """Errors in tail lengths l, from the declared path; those called raw from the path as given."""
+    """Errors in tail lengths l, from the declared path; those called raw from the path as given.
 
-    rms: float
-    largest: float
-    raw_rms: float
-    raw_largest: float
+    Example:
+        >>> from softflagella import check, circle, plan, replay
+        >>> result = plan(circle(1.2), "paper-control", objective="flips")
+        >>> error = check(result, replay(result))
+        >>> error.rms < error.largest < error.stated
+        True
+    """
+
+    rms: float  # over time
+    largest: float  # distance from the declared path
+    raw_rms: float  # over time, from the path as given
+    raw_largest: float  # distance from the path as given
     missed: float  # largest distance of a point of the path as given from the track
-    stated: float
-    track: Floats  # (K, 2) tracked point
+    stated: float  # error that the plan states
+    track: Floats = field(repr=False)  # (K, 2) tracked point
 
     @property
     def line(self) -> str:

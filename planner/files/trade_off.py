@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from matplotlib.figure import Figure
 
-from planner.files.pictures import DECLARED, PREDICTED, RAW, REPLAYED
-from planner.planning.plan import Plan, make_plan
+from planner.planning.picture import DECLARED, PREDICTED, RAW, REPLAYED
+from planner.planning.plan import make_plan
+from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.dwell_choice import QUICK, longest_dwell
 from sim.io.errors import InputError

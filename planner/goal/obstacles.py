@@ -31,9 +31,9 @@ class Circle:
         [0.5]
     """
 
-    x: float
-    y: float
-    radius: float
+    x: float  # of the centre [l]
+    y: float  # of the centre [l]
+    radius: float  # [l]
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.x) and math.isfinite(self.y) and 0 < self.radius < math.inf):
@@ -56,7 +56,7 @@ class Circle:
 class Polygon:
     """A region with straight edges, (n, 2) corners in order."""
 
-    corners: Floats
+    corners: Floats  # (n, 2), in order [l]
 
     @staticmethod
     def of(points: Path2D | ArrayLike) -> Polygon:
@@ -103,8 +103,8 @@ Region = Circle | Polygon
 class FreeSpace:
     """Free space: inside the walls, outside all regions."""
 
-    regions: tuple[Region, ...] = ()
-    walls: Polygon | None = None
+    regions: tuple[Region, ...] = ()  # that the body must not touch
+    walls: Polygon | None = None  # that it must stay within; None: there are none
 
     @property
     def empty(self) -> bool:

@@ -14,13 +14,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planner.goal.final_dwells import end_at_goal
+from planner.goal.goal_plan import GoalPlan, Pose
 from planner.goal.lattice import RouteLimits
 from planner.goal.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.goal.route import COURSES, Lattices, NoWayError, Route, route
@@ -29,7 +28,8 @@ from planner.paths.tractrix import Drift, Reference, slips
 from planner.paths.units import LONGEST
 from planner.planning.declared_path import Declared
 from planner.planning.errors import plan_errors
-from planner.planning.plan import Plan, choose_guidance, zigzag_drift
+from planner.planning.plan import choose_guidance, zigzag_drift
+from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.planning.schedule import Start, follow
 from planner.vehicle.calibration_table import CalibrationKnowledge
@@ -40,51 +40,17 @@ from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
-from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
 
-Pose = tuple[float, float, float]
 _SPACING = 0.02  # l
 _SHORTER = 0.4  # share of the chosen dwell that dwells near the end must keep
 _MARGINS = 6  # tried for each dwell
 _MORE = 1.05  # times the stated error is the next margin
 _DWELLS = 5  # shortest dwells that are tried
 _FARTHEST = 1e6  # l
-
-
-@dataclass(frozen=True)
-class GoalPlan:
-    """A plan from a pose to a pose. Lengths in l, angles in rad.
-
-    Poses are x, y and heading of the head's centre.
-
-    Example:
-        >>> from softflagella import load_robot, to_goal
-        >>> trip = to_goal((0, 0, 0), (3, 1, 1), load_robot("paper-control"))
-        >>> trip.end_error[0] < 0.01
-        True
-    """
-
-    plan: Plan
-    goal: Pose
-    end: Pose  # predicted
-    via: tuple[tuple[float, float], ...]
-    free_space: FreeSpace
-    length: float  # of the pivot's track
-    margin: float  # kept around the body on the declared path; 0 without obstacles
-    clearance: float  # smallest, of the body on the predicted track; infinite without obstacles
-
-    @property
-    def end_error(self) -> tuple[float, float]:
-        """Predicted distance from the goal, and difference of the heading."""
-        turn = (self.end[2] - self.goal[2] + math.pi) % (2 * math.pi) - math.pi
-        return math.dist(self.end[:2], self.goal[:2]), abs(turn)
-
-    if not TYPE_CHECKING:
-        __getattr__ = old_attributes({"room": "free_space"})
 
 
 def to_goal(

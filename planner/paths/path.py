@@ -29,8 +29,8 @@ class Path2D:
         7.0
     """
 
-    points: Floats
-    closed: bool = False
+    points: Floats  # (n, 2)
+    closed: bool = False  # the last point is joined to the first
 
     @staticmethod
     def of(points: ArrayLike, *, closed: bool | None = None) -> Path2D:

@@ -19,10 +19,18 @@ from sim.io.units import split, to_si
 
 @dataclass(frozen=True)
 class Drawing:
-    """A path, and the size of its unit in metres if the file has physical units."""
+    """A path, and the size of its unit in metres if the file has physical units.
 
-    path: Path2D
-    unit: float | None
+    Example:
+        >>> from softflagella import Drawing, load_robot, plan, polygon
+        >>> robot = load_robot("paper-control")
+        >>> square = Drawing(polygon(4, side=33.0), unit=0.01)  # a side of 33 cm
+        >>> round(plan(square, robot).drawn.length, 9)  # four sides of three tail lengths
+        12.0
+    """
+
+    path: Path2D  # in the unit of the file
+    unit: float | None  # [m]; None: the numbers have no unit
 
 
 def read_path(source: str | Path, *, closed: bool | None = None, shape: str | None = None) -> Drawing:

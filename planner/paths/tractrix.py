@@ -52,7 +52,7 @@ class Reference:
     q: Floats  # (m, 2)
     heading: Floats  # (m,), unwrapped [rad]
     arc: Floats  # (m,), arc length of q
-    closed: bool
+    closed: bool  # the path ends where it begins
 
     @property
     def curvature(self) -> Floats:

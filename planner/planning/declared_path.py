@@ -51,11 +51,11 @@ class Feasibility(NamedTuple):
 class Declared:
     """The declared path with its tractrix, and its distances from the path as drawn [l]."""
 
-    reference: Reference
+    reference: Reference  # the path and the pivot that follows it
     curvature: float  # largest of the pivot's reference
     off_drawn: float  # largest distance of a declared point from the drawn path
     missed: float  # largest distance of a drawn point from the declared path
-    warnings: tuple[str, ...]
+    warnings: tuple[str, ...]  # in words
 
 
 def declare(raw: Path2D, feasibility: Feasibility) -> Declared:

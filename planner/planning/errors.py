@@ -23,9 +23,9 @@ class PlanErrors:
 
     track: Floats  # (K, 2): predicted tracked point, several samples a dwell
     predicted_rms: float  # from the declared path, over time
-    predicted_max: float
+    predicted_max: float  # largest distance from the declared path
     drawn_rms: float  # from the path as drawn
-    drawn_max: float
+    drawn_max: float  # largest distance from the path as drawn
     stated: float  # holds for 95 % of the robots that the model's uncertainty allows, open loop
     feedback: float  # the same where the pose is measured, and the rest planned again, every 20 flips
     guaranteed: float | None  # bound for a robot without errors, however long the path; None: not known

@@ -16,9 +16,8 @@ path is reported from both sides.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Unpack
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,159 +26,21 @@ from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
 from planner.paths.units import check_size
 from planner.planning.declared_path import Declared, Feasibility, declare
-from planner.planning.errors import PlanErrors, plan_errors
+from planner.planning.errors import plan_errors
 from planner.planning.line_of_sight import Guidance
+from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest, RequestOptions
 from planner.planning.schedule import follow
 from planner.planning.stated_error import guaranteed, look_ahead
 from planner.vehicle.calibration_table import CalibrationKnowledge
-from planner.vehicle.dwell_choice import Objective, check_least, dwells_for
+from planner.vehicle.dwell_choice import check_least, dwells_for
 from planner.vehicle.from_table import OWN_TABLE
-from planner.vehicle.rollout import Switches
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
-from sim.arrays import Floats
-from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
 from sim.model.robot import Robot
-from sim.model.schedule import Schedule
 from surrogate.interface import LookupTable
-
-# Attributes of a plan by their old names, for one release.
-_MOVED = {
-    "point": "tracked.point",
-    "offset": "tracked.offset",
-    "vehicle": "tracked.vehicle",
-    "model": "tracked.model",
-    "pivot_distance": "tracked.rod",
-    "raw": "drawn.polyline()",
-    "closed": "drawn.closed",
-    "guide": "declared.reference",
-    "off_drawn": "declared.off_drawn",
-    "missed": "declared.missed",
-    "zigzag_rms": "straight.rms",
-    "net_speed": "straight.net_speed",
-    "ahead": "guidance.ahead",
-    "swing": "guidance.swing",
-    "drawn_rms": "errors.drawn_rms",
-    "drawn_max": "errors.drawn_max",
-    "guaranteed": "errors.guaranteed",
-    "closure": "errors.closure",
-}
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A schedule and its errors. Lengths are in l, times in μ0 l⁴/EI, unless a name says its unit.
-
-    Example:
-        >>> from softflagella import circle, load_robot, plan
-        >>> result = plan(circle(2.0), load_robot("paper-control"))
-        >>> result.predicted_max < result.stated_error, len(result.seconds) == len(result.dwells)
-        (True, True)
-    """
-
-    tracked: TrackedVehicle  # who follows
-    objective: Objective  # what decided the shortest dwell
-    drawn: Path2D  # the path that was asked for
-    declared: Declared  # the path that is followed, with the pivot's reference
-    straight: Zigzag  # straight motion with the shortest dwell: no schedule has a smaller rms error
-    guidance: Guidance  # when the motor flips
-    switches: Switches  # the schedule
-    errors: PlanErrors  # how far from the paths it leads
-
-    @property
-    def robot(self) -> Robot:
-        """The robot that the plan is for."""
-        return self.tracked.robot
-
-    @property
-    def first_direction(self) -> int:
-        """Direction of the motor in the first dwell, +1 or −1."""
-        return self.switches.first_direction
-
-    @property
-    def dwells(self) -> Floats:
-        """Dwell times (M,)."""
-        return self.switches.dwells
-
-    @property
-    def seconds(self) -> Floats:
-        """Dwell times (M,) [s]."""
-        return self.dwells * self.robot.time_scale
-
-    @property
-    def duration(self) -> float:
-        """Time of the whole schedule."""
-        return float(self.dwells.sum())
-
-    @property
-    def minimum_dwell(self) -> float:
-        """The shortest dwell that the schedule may have."""
-        return self.guidance.dwell
-
-    @property
-    def start(self) -> tuple[float, float, float]:
-        """Where the head's centre must be put, at rest: x, y [l] and heading [rad]."""
-        x, y, heading = self.poses[0].tolist()
-        return x, y, heading
-
-    @property
-    def poses(self) -> Floats:
-        """Predicted poses (M + 1, 3) of the head's centre at the flips and at the end."""
-        return self.switches.poses
-
-    @property
-    def track(self) -> Floats:
-        """Predicted track (K, 2) of the tracked point, several samples a dwell."""
-        return self.errors.track
-
-    @property
-    def reference(self) -> Floats:
-        """The declared path (m, 2)."""
-        return self.declared.reference.p
-
-    @property
-    def predicted_rms(self) -> float:
-        """Root mean square over time of the predicted distance from the declared path."""
-        return self.errors.predicted_rms
-
-    @property
-    def predicted_max(self) -> float:
-        """Largest predicted distance from the declared path."""
-        return self.errors.predicted_max
-
-    @property
-    def stated_error(self) -> float:
-        """Distance that 95 % of the robots that the model's uncertainty allows keep to, open loop."""
-        return self.errors.stated
-
-    @property
-    def feedback_error(self) -> float:
-        """The stated error where the pose is measured, and the rest planned again, every 20 flips."""
-        return self.errors.feedback
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What the user should know, in words."""
-        return (*self.declared.warnings, *self.tracked.warnings)
-
-    def schedule(self, robot: Robot | None = None) -> Schedule:
-        """Return the schedule for `sim.motion.replay`.
-
-        Args:
-            robot: the robot that carries it out; default: the one that the plan was made for. Seconds and metres
-                stay as planned, so numbers change where its units of time and length are others.
-        """
-        swims = robot or self.robot
-        time, length = self.robot.time_scale / swims.time_scale, self.robot.tail_length / swims.tail_length
-        x, y, heading = self.start
-        start = (x * length, y * length, heading)
-        return Schedule(swims.group_values(), self.first_direction, self.dwells * time, start, swims.time_scale)
-
-    if not TYPE_CHECKING:
-        __getattr__ = old_attributes(_MOVED)
 
 
 def plan(

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.planning.line_of_sight import LineOfSight, arc_terms
-from planner.planning.plan import Plan
+from planner.planning.planned import Plan
 
 POSE = tuple[float, float, float]
 ROWS = list[list[float]]

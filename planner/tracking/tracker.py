@@ -24,15 +24,20 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from scipy.stats import chi2
 
 from planner.planning.line_of_sight import LineOfSight
-from planner.planning.plan import Plan
+from planner.planning.planned import Plan, in_lab
 from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate
 from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
+from sim.io.notebook import as_html
+from sim.io.units import format_time
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FALSE_ALARM = 1e-3  # probability of an alarm per WINDOW poses, for a robot of the model
 WINDOW = 40
@@ -47,11 +52,17 @@ QUANTILE = 1.96
 
 
 class Command(NamedTuple):
-    """What the motor does now, and when it must flip next."""
+    """What the motor does now, and when it must flip next.
+
+    Example:
+        >>> from softflagella import Tracker, circle, plan
+        >>> Tracker(plan(circle(2.0), "paper-control")).update(0.0).direction
+        1
+    """
 
     direction: int  # +1 or −1; 0 at the end
     flip_at: float  # time of the next flip, or of the end
-    finished: bool
+    finished: bool  # the path has ended
     alarm: bool  # the robot is incompatible with the model: calibrate again
     error: float  # 95 % bound on the present distance from the path, zigzag included [l]
 
@@ -77,6 +88,7 @@ class Tracker:
         self, plan: Plan, *, noise: tuple[float, float] = (0.01, 0.01), latency: float = 0.0, begin: float = 0.0
     ):
         self.shortest = plan.minimum_dwell
+        self._plan = plan
         tracked = plan.tracked
         self._law = LineOfSight(plan.declared.reference, tracked.vehicle, plan.guidance, tracked.offset)
         self._estimate = Estimate(plan, self._law, noise)
@@ -122,6 +134,48 @@ class Tracker:
 
     if not TYPE_CHECKING:
         __getattr__ = old_attributes({"feed": "update", "advice": "command"})
+
+    def __repr__(self) -> str:
+        command, robot = self.command, self._plan.robot
+        when, flip = (format_time(time * robot.time_scale) for time in (self._now, command.flip_at))
+        if command.finished:
+            motor = "the path has ended"
+        else:
+            motor = f"motor {command.direction:+d} until {flip} ({command.flip_at:.4g} time units)"
+        x, y, heading = self.pose
+        cm = 100 * robot.tail_length
+        return "\n".join(
+            [
+                f"Tracker of {robot.name!r} at {when} ({self._now:.4g} time units): {motor}",
+                f"  estimated pose: x = {x * cm:.4g} cm, y = {y * cm:.4g} cm, heading "
+                f"{math.degrees(heading):.1f} degrees; within {in_lab(command.error, robot)} of the path (95 %)",
+                f"  alarm: {'calibrate again, the robot is not as the model says' if command.alarm else 'none'}",
+            ]
+        )
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), self.plot)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the plan and the estimated pose at the last flip, on axes in l.
+
+        Args:
+            ax: default: axes of a new figure.
+        """
+        ax = self._plan.plot(ax)
+        x, y, heading = self.pose
+        ax.plot(x, y, "^", color="black", label="estimated")
+        ax.plot([x, x + 0.3 * math.cos(heading)], [y, y + 0.3 * math.sin(heading)], color="black", lw=1)
+        return ax
+
+    @property
+    def pose(self) -> POSE:
+        """Estimated x, y [l] and heading [rad] of the head's centre at the last flip."""
+        return self._estimate.pose
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return command, pose and estimates as plain content."""
+        return {**self.command._asdict(), "pose": list(self.pose), "learned": self.learned}
 
     @property
     def learned(self) -> dict[str, float]:

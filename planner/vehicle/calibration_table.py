@@ -34,12 +34,20 @@ NUMBERS = tuple(DEFAULTS)  # fields of `Robot` that are not exact
 
 @dataclass(frozen=True)
 class CalibrationKnowledge:
-    """Covariance (p, p) of ln C, ln numbers and effect sizes; current and its standard deviation [m/s]."""
+    """Covariance (p, p) of ln C, ln numbers and effect sizes; current and its standard deviation [m/s].
 
-    names: tuple[str, ...] = ()
-    covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
-    current: tuple[float, float] = (0.0, 0.0)
-    current_error: tuple[float, float] = (0.0, 0.0)
+    Example:
+        >>> import softflagella as sf
+        >>> known = sf.CalibrationKnowledge(current=(1e-4, 0.0))
+        >>> robot = sf.load_robot("paper-control")
+        >>> sf.plan(sf.circle(2.0), robot, knowledge=known).tracked.vehicle.current.round(4).tolist()
+        [0.002, 0.0]
+    """
+
+    names: tuple[str, ...] = ()  # coefficients, fields of `Robot` and effects, p of them
+    covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (p, p)
+    current: tuple[float, float] = (0.0, 0.0)  # along x and y [m/s]
+    current_error: tuple[float, float] = (0.0, 0.0)  # [m/s]
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.names if name not in {*COEFFICIENTS, *NUMBERS, *catalogue()}]

@@ -19,7 +19,7 @@ from sim.mechanics import planar
 class Switches:
     """First direction and dwell times; poses of the head's centre at the flips and the end."""
 
-    first_direction: int
+    first_direction: int  # of the motor, +1 or −1
     dwells: Floats  # (M,)
     poses: Floats  # (M + 1, 3)
 

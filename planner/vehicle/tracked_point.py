@@ -17,9 +17,9 @@ Point = Literal["head_centre", "head_tip", "pivot"]
 class TrackedVehicle(NamedTuple):
     """A robot, its vehicle, and the tracked point: the point of its axis that follows the path."""
 
-    robot: Robot
-    vehicle: Vehicle
-    point: Point
+    robot: Robot  # in SI units
+    vehicle: Vehicle  # its motion as the look-up table tells it
+    point: Point  # the point that follows the path
     offset: float  # from the head's centre forward to the tracked point
     model: str  # hash of the look-up table
 

@@ -108,10 +108,10 @@ class Vehicle:
 class Mode:
     """An independent cause of error: what one standard deviation of it adds to a vehicle."""
 
-    name: str
+    name: str  # of the cause
     twist: Floats  # (2, 3)
     lag: Floats  # (2, 3), to all lags after a flip
-    current: Floats = field(default_factory=lambda: np.zeros(2))
+    current: Floats = field(default_factory=lambda: np.zeros(2))  # (2,), in l per time unit
 
 
 def resampled(curve: Floats) -> Floats:

@@ -29,7 +29,7 @@ class Zigzag:
     sway: float  # of the pivot: from its mean line to where it is when the motor stops turning left
     drift: float  # net, to the left of the heading's middle
     rms: float  # distance of the tracked point from its mean line
-    largest: float
+    largest: float  # largest distance from the line
 
     def hysteresis(self, ahead: float) -> float:
         """Compute 2 h, the swing of the heading past the line of sight, with look-ahead `ahead`."""

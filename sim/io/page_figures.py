@@ -31,7 +31,10 @@ PALETTE = {
     VIOLET: ("violet", "#8a4fa3", "#bb8ad0"),
     RED: ("red", "#c8452f", "#ee7c66"),
 }
-_DRAWN_AS = {"#000000": INK, "#1a1a1a": INK, "#b0b0b0": PALE, "#c9d3dc": PALE}  # what other drawings use
+_DRAWN_AS = {  # colours of drawings that have other readers as well
+    "#000000": INK, "#1a1a1a": INK, "#222222": INK, "#b0b0b0": PALE, "#9aa3ab": SOFT, "#dfe9f1": GRID,
+    "#2a6fa8": BLUE, "#2a7f4f": GREEN, "#8a4fa8": VIOLET,
+}  # fmt: skip
 _LARGEST = 600_000  # characters of an SVG
 _SETTINGS: dict[Any, Any] = {"svg.fonttype": "none", "svg.hashsalt": "page"}
 

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from sim.io.files import write_text
 from sim.io.page_figures import figure_markup, variables
 
+_WRAPS = 18  # characters at which the first column of a table may wrap
 _WIDE = 48  # characters of a table's row beyond which the table becomes a list on a narrow screen
 _LONG = 5  # sections beyond which a page begins with a list of them
 _STYLE = f"""
@@ -39,7 +40,7 @@ section {{ background: var(--card); border: 1px solid var(--line); border-radius
 pre {{ background: var(--page); border: 1px solid var(--line); border-radius: 6px; padding: 10px 14px;
   overflow-x: auto; margin: 10px 0; font-size: 14px; }}
 code {{ font-family: ui-monospace, monospace; font-size: .9em; overflow-wrap: anywhere; }}
-pre code {{ font-size: 14px; white-space: pre-wrap; }}
+pre code {{ font-size: 14px; white-space: pre-wrap; overflow-wrap: break-word; }}
 .figures {{ display: flex; flex-wrap: wrap; gap: 12px 28px; justify-content: center; margin: 12px 0; }}
 figure {{ margin: 0; max-width: 100%; }} figcaption {{ color: var(--soft); font-size: 14px; max-width: 420px;
   text-align: center; margin: 2px auto 0; }}
@@ -101,13 +102,18 @@ class Page:
         )
         self._parts.append(f"<ul>{''.join(items)}</ul>")
 
+    def link_line(self, words: str, links: Sequence[tuple[str, str]]) -> None:
+        """Add a line of links to files behind some words: path relative to the page, and name."""
+        anchors = (f'<a href="{html.escape(quote(path))}">{html.escape(name)}</a>' for path, name in links)
+        self._parts.append(f"<p>{_inline(words)}: {', '.join(anchors)}</p>")
+
     def table(self, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
         """Add a table; the first column is left-aligned."""
         head = "".join(f"<th>{_inline(h)}</th>" for h in header)
         body = "".join(
             "<tr>"
             + "".join(
-                f'<td data-column="{html.escape(column)}">{_inline(str(cell))}</td>'
+                f'<td data-column="{html.escape(column)}">{_cell(cell)}</td>'
                 for column, cell in zip(header, row, strict=True)
             )
             + "</tr>"
@@ -152,11 +158,16 @@ class Page:
         )
 
 
+def _cell(content: object) -> str:
+    """Escape the content of a cell; a number and its unit stay on one line."""
+    return re.sub(r"(?<=\d) (?=[^\W\d]|[%°±])", "\u00a0", _inline(str(content)))
+
+
 def _row_width(header: Sequence[str], rows: Sequence[Sequence[object]]) -> int:
-    """Estimate the width of a table in characters; headings break between words, what is below them does not."""
+    """Estimate the width of a table in characters; headings and the first column wrap between words."""
     width = 0
     for place, heading in enumerate(header):
-        cells = [len(str(row[place])) for row in rows]
+        cells = [len(str(row[place])) if place else min(len(str(row[place])), _WRAPS) for row in rows]
         width += 2 + max([*map(len, heading.split()), *cells], default=0)
     return width
 

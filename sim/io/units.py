@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -170,3 +171,20 @@ def format_length(metres: float) -> str:
     if size and size < 0.01:
         return f"{1000 * metres:.3g} mm"
     return f"{metres:.3g} m" if size >= 2 else f"{100 * metres:.3g} cm"
+
+
+def column_units(names: Iterable[object]) -> dict[str, str]:
+    """Find the units of columns by their names: as a suffix, or l where a name ends with `_over_l`.
+
+    Columns without a unit are left out.
+    """
+    units = {}
+    for name in map(str, names):
+        unit = split(name).unit
+        if name.endswith("_over_l"):
+            units[name] = "l"
+        elif name.endswith(("time_bar", "dwell_bar", "before_bar")):
+            units[name] = "μ0 l⁴/EI"
+        elif unit is not None:
+            units[name] = unit.text
+    return units

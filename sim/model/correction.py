@@ -40,14 +40,14 @@ _FACTORS = ("C_t", "C_r", "C_yr")  # what it multiplies; it adds to the others
 class Correction:
     """Weights w of the terms φ for every knob, and the range of the inputs; tuples, in the order of INPUTS."""
 
-    centre: tuple[float, ...]
-    scale: tuple[float, ...]
+    centre: tuple[float, ...]  # of the inputs, subtracted first
+    scale: tuple[float, ...]  # of the inputs, divided by then
     low: tuple[float, ...]  # smallest inputs of the runs
-    high: tuple[float, ...]
+    high: tuple[float, ...]  # largest inputs
     powers: tuple[tuple[int, ...], ...]  # of each term, three numbers
     weights: Mapping[str, tuple[float, ...]]  # knob -> a number for each term
     error: float  # relative rms on runs that it was not learnt from
-    error_without: float
+    error_without: float  # relative error of the runs without it
 
     def __post_init__(self) -> None:
         """Refuse numbers that are no correction."""

@@ -43,11 +43,11 @@ class Driver:
     """A noted quantity that makes an effect differ from run to run: size = null + ε × quantity."""
 
     name: str  # of the candidate in a calibration
-    title: str
+    title: str  # in words
     column: str  # of the noted quantity, see `calibration.swimmer.measured_table`
     unit: str  # of ε
-    bounds: tuple[float, float]
-    typical: float
+    bounds: tuple[float, float]  # of its size
+    typical: float  # a size that is often met
     plausible: tuple[float, float]  # sizes that its source allows
 
 
@@ -63,16 +63,16 @@ class Effect:
 
     name: str  # column name and identifier, e.g. "end_over_end_drag"
     title: str  # what a person calls it
-    equation: str
-    source: str
-    unit: str
-    null: float
-    bounds: tuple[float, float]
-    typical: float
-    symmetry: Literal["even", "odd"]
-    dissipative: bool
+    equation: str  # as text, with the size ε
+    source: str  # author and year, or where it follows from
+    unit: str  # of the size ε
+    null: float  # size at which the base model comes back exactly
+    bounds: tuple[float, float]  # least and largest size
+    typical: float  # a size that is often met
+    symmetry: Literal["even", "odd"]  # whether a reversed motor mirrors the motion ("even")
+    dissipative: bool  # it can only take energy out
     similar: bool = True  # the motion at viscosity f and speed ω is that at viscosity 1 and speed f ω
-    reach: Literal["local", "nonlocal"] = "local"
+    reach: Literal["local", "nonlocal"] = "local"  # whether it couples nodes of the tails
     is_drag: bool = False  # of a non-local effect: its number grows with drag
     drivers: tuple[Driver, ...] = ()  # if any, the effect is seen through them alone
     plausible: tuple[float, float] | None = None  # sizes that its source allows; None: all within the bounds

@@ -15,12 +15,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sim.io.errors import InputError
+from sim.io.notebook import as_html
+from sim.io.units import format_length, from_si
 from sim.model.correction import Correction
 from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
 from sim.model.uncertainty import DEFAULTS, Sigma
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Robot:
     """A robot and its fluid in SI units.
 
@@ -35,20 +37,20 @@ class Robot:
         (2.207, 10.0)
     """
 
-    name: str
-    tails: int
-    tail_length: float
-    tail_radius: float
-    youngs_modulus: float
-    head_radius: float
-    head_length: float
-    viscosity: float
-    motor_speed: float
-    C_t: float
-    C_r: float
-    C_yr: float
+    name: str  # in messages and files
+    tails: int  # N
+    tail_length: float  # l [m]
+    tail_radius: float  # r0 [m]
+    youngs_modulus: float  # E of the tails [Pa]
+    head_radius: float  # R [m]
+    head_length: float  # L [m]
+    viscosity: float  # μ0 [Pa s]
+    motor_speed: float  # ω, tails relative to head, a magnitude [rad/s]
+    C_t: float  # the head's translational drag
+    C_r: float  # the head's spin drag
+    C_yr: float  # the head's side force
     disc_offset: float | None = None  # a; None: the head's radius
-    effects: Mapping[str, float] = field(default_factory=dict)
+    effects: Mapping[str, float] = field(default_factory=dict)  # name -> size
     sigmas: Mapping[str, Sigma] = field(default_factory=dict)  # of the fields that state one, see `sigma`
     correction: Correction | None = None  # what a calibration learnt that no effect explains
 
@@ -67,6 +69,27 @@ class Robot:
             numbers = [math.inf]
         if not all(map(math.isfinite, numbers)) or not self.omega_bar > 0:
             raise InputError("lengths, stiffness and viscosity give no finite unit of time; check their units")
+
+    def __repr__(self) -> str:
+        length, radius, R, L = map(
+            format_length, (self.tail_length, self.tail_radius, self.head_radius, self.head_length)
+        )
+        modulus, rpm = from_si(self.youngs_modulus, "MPa"), from_si(self.motor_speed, "rpm")
+        tails = "1 tail" if self.tails == 1 else f"{self.tails} tails"
+        lines = [
+            f"Robot {self.name!r}: {tails}, l = {length}, r0 = {radius}, E = {modulus:.4g} MPa",
+            f"  head R = {R}, L = {L}; fluid {self.viscosity:.4g} Pa s; motor {rpm:.4g} rpm",
+            f"  C_t = {self.C_t:.4g}, C_r = {self.C_r:.4g}, C_yr = {self.C_yr:.4g}; "
+            f"ω̄ = {self.omega_bar:.4g}, unit of time {self.time_scale:.4g} s",
+        ]
+        if self.effects:
+            lines.append("  effects: " + ", ".join(f"{name} {size:.4g}" for name, size in self.effects.items()))
+        if self.correction is not None:
+            lines.append("  with the correction of a calibration")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self))
 
     def sigma(self, name: str) -> Sigma:
         """Return one standard deviation of a field, as stated or by default (`sim.model.uncertainty`)."""

@@ -36,11 +36,11 @@ class Schedule:
         2.0
     """
 
-    robot: Mapping[str, float]
-    first_direction: int
-    dwells: Floats
-    start: tuple[float, float, float]
-    time_scale: float
+    robot: Mapping[str, float]  # dimensionless groups and sizes of effects
+    first_direction: int  # of the motor, +1 or −1
+    dwells: Floats  # (M,) [μ0 l⁴/EI]
+    start: tuple[float, float, float]  # x, y [l] and heading [rad] of the head's centre
+    time_scale: float  # μ0 l⁴/EI [s]
 
     def __post_init__(self) -> None:
         if self.first_direction not in (-1, 1):

@@ -16,8 +16,8 @@ from sim.io.units import to_si
 class Sigma(NamedTuple):
     """One standard deviation of a number: in its own unit, or as a share of it."""
 
-    size: float
-    relative: bool
+    size: float  # one standard deviation
+    relative: bool  # a share of the number
 
     def of(self, value: float) -> float:
         """Compute σ in the unit of `value`."""

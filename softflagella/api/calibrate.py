@@ -1,37 +1,41 @@
-"""Calibrate with measured data: the function behind `softflagella.calibrate`."""
+"""Calibrate with measured data: `softflagella.calibrate`, `decide` and `tracks`."""
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
+from typing import Literal
 
 import pandas as pd
 
-from calibration.report.corrected_robot import check_given
-from calibration.swimmer.head_correction import learn_head_correction
+from calibration.report.robot_verdict import RobotVerdict, calibrate_robot
+from calibration.swimmer.camera_tracks import measure_tracks
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.possible_runs import Owned
 from calibration.swimmer.swimmer import SwimmerModel
-from calibration.verdict.calibrate import calibrate as close_loop
+from calibration.verdict.sequential_test import Decision, read_explanations
+from calibration.verdict.sequential_test import decide as decide_between
 from calibration.verdict.verdict import Verdict
-from sim.inputs import load_robot
-from sim.model.robot import Robot
+from softflagella.api.robots import OneRobot, one_robot, with_units
 
 
 def calibrate(
     table: str | Path | pd.DataFrame,
-    robot: Robot | str | Path,
+    robot: OneRobot,
     *,
+    protocol: Literal["session", "paper"] = "session",
     seed: int = 0,
     own: Owned | None = None,
     jobs: int | None = None,
     progress: bool = True,
-) -> Verdict:
+) -> RobotVerdict:
     """Fit a table of measured runs, find what the model lacks, and correct the robot.
 
     Args:
         table: measured runs, one row for each run, or their file: `N`, `l_cm`, `omega_rpm` and two or more
             of `omega_h_rpm`, `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s`; repeats.
-        robot: the robot as given, or its robot.toml.
+        robot: the robot as given, its robot.toml, or the name of a preset.
+        protocol: what is fitted: all sessions but one ("session"), or N = 3 and 4 as in the paper ("paper").
         seed: of the bootstrap; the same seed gives the same result.
         own: what the lab can set in its next runs, such as `{"l_cm": (5, 7, 9)}`; for `N`, `l_cm` and `omega_rpm`
             (both directions). Default: the table's range.
@@ -39,8 +43,8 @@ def calibrate(
         progress: show progress bars.
 
     Returns:
-        The verdict, with `verdict` ("none", "effect", "ambiguous", "unexplained"), `sentence`, `effects`, fits
-        with intervals, and errors on the held-out runs.
+        The verdict, with `verdict` ("none", "number", "effect", "ambiguous", "unexplained"), `sentence`,
+        `effects`, fits with intervals, errors on the held-out runs, the `corrected` robot, and `save(folder)`.
 
     Raises:
         InputError: the table cannot be used; the message says why.
@@ -49,8 +53,77 @@ def calibrate(
         >>> import softflagella as sf
         >>> verdict = sf.calibrate("runs.csv", "robot.toml")  # doctest: +SKIP
         >>> print(verdict.sentence)  # doctest: +SKIP
+        >>> result = sf.plan(sf.circle(2.0), verdict.corrected, knowledge=verdict.knowledge)  # doctest: +SKIP
     """
-    given = robot if isinstance(robot, Robot) else load_robot(robot)
-    check_given(given)
-    model = SwimmerModel(given, read_measurements(table), jobs, own=own or {})
-    return close_loop(model, correction=learn_head_correction, seed=seed, progress=progress)
+    return calibrate_robot(
+        table, one_robot(robot), protocol=protocol, own=own, seed=seed, jobs=jobs, progress=progress
+    )
+
+
+def decide(
+    table: str | Path | pd.DataFrame, verdict: Verdict | str | Path, robot: OneRobot, *, jobs: int | None = None
+) -> Decision:
+    """Say which of several explanations new runs speak for.
+
+    Args:
+        table: the measured table with the new runs, in sessions of their own.
+        verdict: an "ambiguous" verdict on the table before, or its verdict.json.
+        robot: the robot as given.
+        jobs: threads; default all processors.
+
+    Returns:
+        The explanations, best first, with how far each is behind, and a `sentence`.
+
+    Raises:
+        InputError: there is nothing to decide, or there are no new runs.
+
+    Example:
+        >>> import softflagella as sf
+        >>> sf.decide("runs.csv", "calibrated/verdict.json", "robot.toml").sentence  # doctest: +SKIP
+        'Decided: tank wall. The next step is to calibrate with all runs.'
+    """
+    if isinstance(verdict, Verdict):
+        explanations, before = list(verdict.next.explanations), set(verdict.conditions.sessions)
+    else:
+        explanations, before = read_explanations(verdict)
+    return decide_between(SwimmerModel(one_robot(robot), read_measurements(table), jobs), explanations, before)
+
+
+def tracks(
+    tracks: str | Path | pd.DataFrame,
+    runs: str | Path | pd.DataFrame,
+    *,
+    y_down: bool = False,
+    robot: OneRobot | None = None,
+) -> pd.DataFrame:
+    """Turn camera tracks into a measured table: yaw rate, turn radius, slip angle and speed of each run.
+
+    Args:
+        tracks: one row for each sample: `run`, `time_s`, `x_cm`, `y_cm`, `heading_deg`, or these in other units.
+        runs: one row for each run: `run`, `N`, `l_cm`, `omega_rpm` and other columns of a measured table.
+        y_down: y and headings are those of a picture, whose y axis points down.
+        robot: the robot as given, with whose simulated motion the tracks are compared.
+
+    Returns:
+        The runs with `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s` and their errors. What was left out is in
+        `attrs["excluded"]`, and is warned of.
+
+    Raises:
+        InputError: the tracks cannot be used; the message says why.
+
+    Example:
+        >>> import numpy as np, pandas as pd
+        >>> import softflagella as sf
+        >>> time = np.linspace(0, 120, 240)
+        >>> circle = pd.DataFrame({"run": 1, "time_s": time, "x_cm": 9 * np.cos(0.05 * time),
+        ...     "y_cm": 9 * np.sin(0.05 * time), "heading_deg": np.degrees(0.05 * time) + 20})
+        >>> runs = pd.DataFrame({"run": [1], "N": [2], "l_cm": [11.0], "omega_rpm": [43.0]})
+        >>> sf.tracks(circle, runs)[["omega_yr_rad_s", "R_yr_cm", "theta_deg"]].round(3).values.tolist()
+        [[0.05, 9.0, 70.0]]
+    """
+    measured = measure_tracks(tracks, runs, y_down=y_down, robot=None if robot is None else one_robot(robot))
+    for line in measured.excluded:
+        warnings.warn(f"excluded: {line}", stacklevel=2)
+    table = with_units(measured.table)
+    table.attrs["excluded"] = list(measured.excluded)
+    return table

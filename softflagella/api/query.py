@@ -1,15 +1,21 @@
-"""Ask look-up tables about robots: `softflagella.query`."""
+"""Ask look-up tables about robots: `softflagella.query` and `inverse`; write them for other programs: `export`."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
+from sim.io.errors import InputError
 from sim.motion.lab_units import lab_motion
-from softflagella.api.robots import Robots, robot_rows
+from softflagella.api.robots import Robots, robot_rows, with_units
+from surrogate.export.small_copy_files import save_small_copy
 from surrogate.interface import LookupTable
 from surrogate.table.answers import answer_with_error
+from surrogate.table.inverse import inverse_table
+from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load_table
 
 
@@ -38,7 +44,77 @@ def query(
         >>> motion[["robot", "R_yr_cm", "v_cm_s"]].round(2).values.tolist()
         [['paper-control', 10.36, 0.23], ['paper-triangle', 10.11, 0.36]]
     """
-    rows = robot_rows(robots)
-    lookup = load_table(table) if table is None or isinstance(table, str | Path) else table
+    rows, lookup = robot_rows(robots), _table(table)
     answer = answer_with_error(lookup, rows.columns, flag=flag, certify=certify)
     return rows.frame(lab_motion(rows.robots, answer) if rows.robots else {}, answer)
+
+
+def inverse(
+    targets: Mapping[str, Any] | pd.DataFrame,
+    *,
+    free: Sequence[str] = ("C_t", "C_r", "C_yr"),
+    table: LookupTable | str | Path | None = None,
+) -> pd.DataFrame:
+    """Find robots that have given motions, with a trained look-up table.
+
+    Args:
+        targets: M rows (single values stand for all rows): the given inputs of the robots, and one or more
+            outputs that they shall have, such as `omega_yr_bar`.
+        free: inputs to find.
+        table: a trained table, or its file; default: the one that comes with the package.
+
+    Returns:
+        A row for each solution: `target` (the row of the target, from 1), the inputs, `misfit`, `outside`.
+
+    Raises:
+        InputError: there is no output among the columns, or an input cannot be found.
+
+    Example:
+        >>> import softflagella as sf
+        >>> robot = sf.load_robot("paper-control").group_values()
+        >>> given = {name: value for name, value in robot.items() if name != "C_yr"}
+        >>> sf.inverse({**given, "omega_yr_bar": 0.06}, free=["C_yr"])["C_yr"].round(2).tolist()
+        [2.45]
+    """
+    return with_units(inverse_table(_trained(table), pd.DataFrame(dict(targets), index=_index(targets)), free))
+
+
+def _index(targets: Mapping[str, Any] | pd.DataFrame) -> Any:
+    """Return the rows of a table of single values; None where columns say how many there are."""
+    if isinstance(targets, pd.DataFrame) or any(hasattr(values, "__len__") for values in targets.values()):
+        return None
+    return [0]
+
+
+def export(folder: str | Path, *, table: LookupTable | str | Path | None = None) -> str:
+    """Write a trained look-up table for other programs: at most 150 kB, with readers in C99 and JavaScript.
+
+    Args:
+        folder: it is made if it is missing.
+        table: a trained table, or its file; default: the one that comes with the package.
+
+    Returns:
+        What the copy loses in accuracy, in words.
+
+    Raises:
+        InputError: the table is that of one robot, or the files cannot be written.
+
+    Example:
+        >>> import tempfile
+        >>> import softflagella as sf
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     print(sf.export(folder)[:8])
+        148.8 kB
+    """
+    return save_small_copy(_trained(table), folder)
+
+
+def _table(table: LookupTable | str | Path | None) -> LookupTable:
+    return load_table(table) if table is None or isinstance(table, str | Path) else table
+
+
+def _trained(table: LookupTable | str | Path | None) -> NeuralTable:
+    lookup = _table(table)
+    if not isinstance(lookup, NeuralTable):
+        raise InputError("this is the table of a single robot; give a trained one")
+    return lookup

@@ -18,23 +18,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
+from dataset.rows.schema import INPUTS, OUTPUTS
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.inputs import check_columns, load_robot
 from sim.io.errors import InputError
+from sim.io.units import column_units
 from sim.model.robot import Robot
 
 NAME = "robot"  # the column of the robots' names
-_UNITS = {
-    "x_over_l": "l",
-    "y_over_l": "l",
-    "time_bar": "mu0 l^4/EI",
-    "dwell_bar": "mu0 l^4/EI",
-    "before_bar": "mu0 l^4/EI",
-}  # of columns that are in no data set
-_SUFFIXES = {"_rpm": "rpm", "_rad_s": "rad/s", "_cm_s": "cm/s", "_cm": "cm", "_deg": "degrees", "_rad": "rad",
-             "_s": "s"}  # fmt: skip
 
 OneRobot = Robot | str | Path
 Robots = OneRobot | Sequence[OneRobot] | Mapping[str, Any] | pd.DataFrame
@@ -90,15 +82,12 @@ def _checked(robots: Mapping[str, Any] | pd.DataFrame) -> dict[str, Floats]:
 
 
 def with_units(frame: pd.DataFrame) -> pd.DataFrame:
-    """Note the units of a table's columns in `frame.attrs["units"]`."""
-    frame.attrs["units"] = {str(name): unit for name in frame if (unit := unit_of(str(name)))}
+    """Note the units of a table's columns in `frame.attrs["units"]`: as its names or the data set say."""
+    declared = {column.name: column.unit for column in (*INPUTS, *OUTPUTS) if column.unit != "1"}
+    units = column_units(frame)
+    for name in map(str, frame):
+        plain = name.removesuffix("_low").removesuffix("_high")
+        if name not in units and plain in declared:
+            units[name] = declared[plain]
+    frame.attrs["units"] = units
     return frame
-
-
-def unit_of(name: str) -> str:
-    """Return the unit of a column: as the data set declares it, or as its name says; empty if it has none."""
-    plain = name.removesuffix("_low").removesuffix("_high")
-    declared = _UNITS | {column.name: column.unit for column in (*INPUTS, *OUTPUTS, *FLAGS)}
-    if plain in declared:
-        return declared[plain]
-    return next((unit for suffix, unit in _SUFFIXES.items() if plain.endswith(suffix)), "")

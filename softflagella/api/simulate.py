@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from planner.planning.plan import Plan
+from planner.planning.planned import Plan
 from sim.io.errors import InputError
 from sim.model.groups import DWELL, Groups
 from sim.model.response import BEFORE, DWELLS, Responses

@@ -13,18 +13,22 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.files import write_text
+from sim.io.notebook import as_html, given_axes
 from sim.io.reading import ContentError, read_json
 from sim.model.response import DWELLS, Responses
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.input_ranges import ROBOT
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FORMAT = 3
 _LARGEST = 1e100  # of a number
@@ -32,7 +36,7 @@ _CURVES = {"lag": (2, len(DWELLS), 3), "memory": (2, -1, len(DWELLS), 3),
            "rest": (2, len(DWELLS), 3), "spread": (2, len(DWELLS), 3)}  # fmt: skip
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RobotTable:
     """Motion and response of one robot, with the interface of `surrogate.interface.LookupTable`.
 
@@ -84,6 +88,45 @@ class RobotTable:
         none = np.zeros(len(side), dtype=bool)
         return Responses(lag, memory, rest, spread, speed, none, none, before)
 
+    def save(self, path: str | Path) -> None:
+        """Write the table as JSON, with a hash over everything in it."""
+        content = asdict(self)
+        write_text(path, json.dumps({"format": FORMAT, "hash": _digest(content), **content}) + "\n")
+
+    def __repr__(self) -> str:
+        of = self.provenance.get("config", {}).get("robot", "one robot")
+        radius, slip = (self.steady[name][0] for name in ("R_yr_over_l", "theta_deg"))
+        worst, error = max(self.errors.items(), key=lambda item: item[1]["rms"], default=("", {"rms": math.nan}))
+        return (
+            f"Look-up table {self.identity} of {of}, both directions of the motor\n"
+            f"  turn radius {radius:.4g} l, slip angle {slip:.1f} degrees; response to a flip for dwells of "
+            f"{DWELLS[0]:g} to {DWELLS[-1]:g} time units\n"
+            f"  largest error {100 * error['rms']:.2g} % ({worst})"
+        )
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), self.plot)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the net speed over equal dwells, with a positive and a negative motor first.
+
+        Args:
+            ax: default: axes of a new figure.
+        """
+        ax = given_axes(ax)
+        columns = {name: np.array([value, value]) for name, value in self.robot.items()}
+        columns["omega_bar"] = columns["omega_bar"] * [1.0, -1.0]
+        for speed, label in zip(self.response(columns).net_speed, ("motor + first", "motor − first"), strict=True):
+            ax.plot(DWELLS, speed, label=label)
+        ax.set_xlabel("dwell [μ0 l⁴/EI]")
+        ax.set_ylabel("net speed [EI/(μ0 l³)]")
+        ax.legend(frameon=False)
+        return ax
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything in the table as plain content."""
+        return asdict(self)
+
     def _side(self, columns: Mapping[str, Floats]) -> Any:
         """Return 0 or 1 for every row, by the direction of its motor."""
         count = len(next(iter(columns.values())))
@@ -97,12 +140,6 @@ class RobotTable:
                 )
         omega = columns.get("omega_bar", np.ones(count))
         return np.where(np.asarray(omega) < 0, 1, 0)
-
-
-def save_robot_table(table: RobotTable, path: str | Path) -> None:
-    """Write a table of one robot as JSON, with a hash over everything in it."""
-    content = asdict(table)
-    write_text(path, json.dumps({"format": FORMAT, "hash": _digest(content), **content}) + "\n")
 
 
 def load_robot_table(path: str | Path) -> RobotTable:

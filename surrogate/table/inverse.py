@@ -8,14 +8,17 @@ Free inputs are varied as logarithms within their bounds. Left out: N, which is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from scipy.stats import qmc
 
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError
+from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.input_ranges import BOUNDS
 from surrogate.table.errors import error_scale
 from surrogate.table.lookup import OUTSIDE, NeuralTable
 
@@ -80,6 +83,39 @@ def inverse(
     p, residual, outside = _least_squares(misfits, p, low, high)
     rms = np.sqrt((residual**2).mean(-1))
     return _different(row, p, rms, outside, names)
+
+
+def inverse_table(
+    lookup: NeuralTable, points: pd.DataFrame, free: Sequence[str], *, where: str = "the table"
+) -> pd.DataFrame:
+    """Find inputs for a table of targets, see `inverse`; a row for each solution.
+
+    Args:
+        lookup: the table.
+        points: M rows: the given inputs of the robots, and outputs that they shall have.
+        free: inputs to find.
+        where: the name of `points`, for messages.
+
+    Raises:
+        InputError: there is no output among the columns, or an input cannot be found.
+    """
+    for name in free:
+        if name not in BOUNDS:
+            raise InputError(f"{name} cannot be found; allowed are {', '.join(BOUNDS)}")
+    columns = {str(name): points[name].to_numpy() for name in points}
+    targets = {name: array for name, array in columns.items() if name in STEADY_OUTPUTS}
+    if not targets:
+        raise InputError(f"{where} has no outputs; give at least one of {', '.join(STEADY_OUTPUTS)}")
+    robots = {name: array for name, array in columns.items() if name not in targets}
+    solutions = inverse(lookup, robots, targets, {name: BOUNDS[name] for name in free})
+    return pd.DataFrame(
+        {
+            "target": solutions.target + 1,
+            **solutions.inputs,
+            "misfit": solutions.misfit,
+            "outside": solutions.outside,
+        }
+    )
 
 
 def _sizes(targets: Mapping[str, Floats]) -> dict[str, Floats]:

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import torch
@@ -24,23 +25,29 @@ from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
 from sim.inputs import check_columns
 from sim.io.errors import InputError
+from sim.io.notebook import as_html, given_axes
 from sim.mechanics import planar
 from sim.model.groups import DWELL
 from sim.model.response import DWELLS, LAGS, Responses, at_equal_dwells
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.networks.ensemble import Ensemble
-from surrogate.table.errors import error_scale
+from surrogate.table.errors import RELATIVE, error_scale
 from surrogate.table.intervals import Intervals
 from surrogate.table.jacobian import slopes
 from surrogate.table.response_table import ResponseTable, between_dwells
 from surrogate.table.support import Support
-from surrogate.table.tensor_file import digest
+from surrogate.table.tensor_file import digest, write
 from surrogate.table.wrench_table import WrenchTable, motion_sensitivity, network_index
 from surrogate.wrench.balance import inputs_rows
 from surrogate.wrench.heads import Heads, heads_and_tails, needs_no_learning
 from surrogate.wrench.tails import Tails, pack_tails, wrench_slopes
 
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+FORMAT = 5  # of model files
 RESPONSE_OUTPUTS = ("net_speed_bar", *LAGS[::-1])
 OUTSIDE = "outside"  # flag of robots that the table does not know
 BRANCHES = 0.6  # |ω_yr/ω_t| from which a robot may have several motions
@@ -65,7 +72,7 @@ class Motions(NamedTuple):
     reason: list[str]  # why a robot is outside; else empty
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class NeuralTable:
     """A trained table with its domain, its intervals and its held-out errors."""
 
@@ -153,6 +160,46 @@ class NeuralTable:
         values = check_columns({**columns, **{n: columns.get(n, 0.0 * columns["N"]) for n in parameters}})
         return slopes(self.tails, values, self.motions(values, flag=flag).motion, parameters)
 
+    def save(self, path: str | Path) -> None:
+        """Write the model file completely or not at all."""
+        write(path, table_content(self), FORMAT)
+
+    def __repr__(self) -> str:
+        rows, (fewest, most) = self.provenance.get("rows", {}), self.ranges["N"]
+        lines = [f"Look-up table {self.identity} for {fewest:g} to {most:g} tails"]
+        if rows:
+            lines[0] += f", learned from {rows['train']} robots"
+            lines.append(f"  median error on {rows['held_out']} held-out robots: {_medians(self.errors)}")
+        ends = [(name, *self.ranges[name]) for name in (*_NOT_OF_HEAD, "C_yr") if name in self.ranges]
+        within = ", ".join(f"{name} {low:.4g} to {high:.4g}" for name, low, high in ends)
+        return "\n".join([*lines, f"  within {within}"])
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), self.plot)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw median and 95th percentile of the held-out errors of each steady output [%].
+
+        Args:
+            ax: default: axes of a new figure.
+        """
+        ax = given_axes(ax)
+        frame = self.to_frame().loc[[name for name in (*RELATIVE, "v_z") if name in self.errors]]
+        for column, mark in (("median", "o"), ("p95", "|")):
+            if column in frame:
+                ax.plot(100 * frame[column], range(len(frame)), mark, label=column)
+        ax.set_yticks(range(len(frame)), list(frame.index))
+        ax.set_xscale("log")
+        ax.set_xlabel("held-out error [%]")
+        ax.legend(frameon=False)
+        return ax
+
+    def to_frame(self) -> pd.DataFrame:
+        """Tabulate the held-out errors: a row for each output, see `surrogate.table.errors`."""
+        import pandas as pd  # a query does not need it
+
+        return pd.DataFrame.from_dict(self.errors, orient="index")
+
     def motions(self, values: Mapping[str, Floats], *, flag: bool = False) -> Motions:
         """Return the motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
         heads, tails = heads_and_tails(values)
@@ -237,6 +284,14 @@ class NeuralTable:
         speed = net_speeds(twist, curves["lag"], curves["memory"])
         none = np.zeros(len(sense), dtype=bool)
         return Responses(**curves, net_speed=speed, failed=none, stepped=none)
+
+
+def _medians(errors: Mapping[str, Mapping[str, float]]) -> str:
+    """Write the median errors that matter most."""
+    shown = {"omega_yr_bar": "yaw rate", "R_yr_over_l": "turn radius", "v_z": "surge"}
+    return ", ".join(
+        f"{what} {100 * errors[name]['median']:.2g} %" for name, what in shown.items() if name in errors
+    )
 
 
 def _check_flips(values: Mapping[str, Floats]) -> None:

@@ -17,19 +17,13 @@ from surrogate.networks.ensemble import Ensemble
 from surrogate.one_robot.robot_table import load_robot_table
 from surrogate.table import tensor_file
 from surrogate.table.intervals import Intervals
-from surrogate.table.lookup import NeuralTable, table_content
+from surrogate.table.lookup import FORMAT, NeuralTable
 from surrogate.table.model_form import IncompleteError, check_form
 from surrogate.table.response_table import Basis, ResponseTable
 from surrogate.table.support import Support
 from surrogate.table.wrench_table import WrenchTable
 
 SHIPPED = Path(__file__).parents[1] / "shipped" / "model.safetensors"
-FORMAT = 5
-
-
-def save(lookup: NeuralTable, path: str | Path) -> None:
-    """Write a model file completely or not at all."""
-    tensor_file.write(path, table_content(lookup), FORMAT)
 
 
 def load(path: str | Path | None = None) -> NeuralTable:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import subprocess
 import sys
@@ -66,6 +67,24 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytes
                 timeout=LIMIT,
             )
             assert done.returncode == 0, f"{block.code}\n{done.stdout}\n{done.stderr}"
+
+
+# Pages for people who change the package, whose examples are parts of its modules.
+DEEPER = {"howto/effect.md", "howto/column.md", "maintaining.md"}
+PACKAGES = {"sim", "dataset", "surrogate", "planner", "calibration"}
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if page_name(p) not in DEEPER], ids=page_name)
+def test_pages_need_no_deeper_import_than_softflagella(page: Path) -> None:
+    for block in blocks(page):
+        if block.language != "python":
+            continue
+        for node in ast.walk(ast.parse(block.code)):
+            modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            modules += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            for module in modules:
+                assert module.split(".")[0] not in PACKAGES, f"{page_name(page)} imports {module}"
+                assert not module.startswith("softflagella."), f"{page_name(page)} imports {module}"
 
 
 def test_c_on_pages_compiles(tmp_path: Path) -> None:

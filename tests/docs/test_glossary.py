@@ -17,8 +17,6 @@ from calibration.swimmer.camera_tracks import COLUMNS
 from calibration.swimmer.candidate_effects import influences
 from calibration.swimmer.measured_table import KNOWN_COLUMNS
 from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
-from planner.files.plan_files import dwell_table
-from planner.files.plan_json import plan_record
 from sim.effects import catalogue
 from sim.model.body import Body
 from sim.model.groups import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS
@@ -36,10 +34,10 @@ def plan_names() -> set[str]:
     """Collect the keys of plan.json, and the columns of plan.csv and of a track."""
     robot = sf.load_robot("paper-control")
     result = sf.plan(sf.circle(2.0), robot)
-    record = plan_record(result)
+    record = result.to_dict()
     inside = {key for value in record.values() if isinstance(value, dict) for key in value}
     schedule = sf.Schedule(robot.group_values(), 1, np.array([0.05]), (0.0, 0.0, 0.0), robot.time_scale)
-    return {*record, *inside, *dwell_table(result), *sf.replay(schedule), "code_version"}
+    return {*record, *inside, *result.to_frame(), *sf.replay(schedule), "code_version"}
 
 
 def sources() -> dict[str, set[str]]:

@@ -19,6 +19,7 @@ from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
+from sim.motion.robot_views import from_behind, scene
 from sim.motion.shapes import tails_over_a_revolution
 from sim.motion.steady import steady
 from surrogate.input_ranges import BOUNDS
@@ -174,10 +175,10 @@ def test_five_seconds_at_plus_one_turn_left_on_the_bench() -> None:
 def test_the_picture_shows_the_simulated_senses() -> None:
     """Its words and arrows follow from the simulation: of a robot with C_yr < 0 it draws a right turn."""
     drawing = module_of_docs("draw_signs")
-    shown = drawing.scene(ROBOT)
+    shown = scene(ROBOT)
     moved = shown.at(1.0)
     assert moved[2] > shown.at(0.0)[2]
-    right, up = (drawing.from_behind(np.array(angle), 1.0) for angle in (math.pi, math.pi / 2))
+    right, up = (from_behind(np.array(angle), 1.0) for angle in (math.pi, math.pi / 2))
     assert right == pytest.approx([1, 0])
     assert up == pytest.approx([0, 1])
     words = {text.get_text() for axes in drawing.draw(shown).axes for text in axes.texts}

@@ -34,7 +34,8 @@ from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.one_robot.robot_table import FORMAT as TABLE_FORMAT
 from surrogate.one_robot.robot_table import RobotTable, _digest, save_robot_table
 from surrogate.table import tensor_file
-from surrogate.table.model_file import FORMAT, SHIPPED, load
+from surrogate.table.lookup import FORMAT
+from surrogate.table.model_file import SHIPPED, load
 from tests.calibration.track import track
 from tests.dataset.sweeps import design, invented
 

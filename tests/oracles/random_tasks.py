@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from planner.goal.goal_plan import GoalPlan
 from planner.goal.obstacles import Circle, Footprint, Polygon
-from planner.goal.to_goal import GoalPlan
 from sim.motion.replay import replay
 
 

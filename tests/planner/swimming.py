@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from planner.paths.distance import distance_to
-from planner.planning.plan import Plan
+from planner.planning.planned import Plan
 from planner.tracking.tracker import Command
 from planner.vehicle.vehicle import Vehicle
 from sim.mechanics import planar

@@ -16,11 +16,11 @@ from scipy.stats import binom
 from calibration.statistics.statistical_model import Noise
 from calibration.verdict.next_runs import GIVEN_UP, STOP
 from calibration.verdict.sequential_test import (
+    Decision,
     Explanation,
     Standing,
     new_runs,
     read_explanations,
-    sentence,
     standings,
 )
 from calibration.verdict.verdict_json import verdict_record
@@ -53,7 +53,7 @@ def test_new_runs_of_other_lengths_decide_for_the_truth(undecided: tuple[pd.Data
     standing = standings(model, explanations, new)
     assert [s.given_up for s in standing] == [False, True]
     assert standing[0] == Standing("head's end-over-end drag", 0.0)
-    assert sentence(standing).startswith("Decided: head's end-over-end drag.")
+    assert Decision(tuple(standing), 1).sentence.startswith("Decided: head's end-over-end drag.")
 
 
 @shares_verdicts
@@ -65,7 +65,7 @@ def test_eight_runs_like_the_old_ones_decide_nothing(undecided: tuple[pd.DataFra
     model = toy_swimmer(pd.concat([table, more.sample(8, random_state=3)], ignore_index=True))
     standing = standings(model, explanations, new_runs(model.runs, before))
     assert not any(s.given_up for s in standing)
-    assert "make more runs" in sentence(standing)
+    assert "make more runs" in Decision(tuple(standing), 1).sentence
     with pytest.raises(InputError, match="a session of their own"):
         new_runs(toy_swimmer(table).runs, before)
 
@@ -122,4 +122,4 @@ def test_a_verdict_without_rivals_is_refused(tmp_path: Path) -> None:
 
 def test_what_is_left_is_said() -> None:
     three = [Standing("A", 0.0), Standing("B", GIVEN_UP - 0.1), Standing("C", GIVEN_UP + 0.1)]
-    assert sentence(three) == "Not decided between A and B: make more runs."
+    assert Decision(tuple(three), 1).sentence == "Not decided between A and B: make more runs."

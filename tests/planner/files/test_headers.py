@@ -14,7 +14,8 @@ import pytest
 from planner.files.plan_files import controller_header, milliseconds
 from planner.files.tracker_header import tracker_header
 from planner.paths.path import circle
-from planner.planning.plan import Plan, plan
+from planner.planning.plan import plan
+from planner.planning.planned import Plan
 from sim.model.presets import PRESETS
 from tests.planner.compiled import LANGUAGES, MEMORIES, CompiledTracker, compile_c
 from tests.processes import LIMIT

@@ -14,7 +14,6 @@ import pytest
 
 from planner.files.pictures import draw_plan
 from planner.files.plan_files import milliseconds, write_plan
-from planner.files.plan_json import plan_record
 from planner.paths.path import circle, polygon
 from planner.planning.plan import plan
 from sim.io.errors import InputError
@@ -35,7 +34,7 @@ def test_files_of_a_plan(tmp_path: Path) -> None:
     schedule = load_schedule(written[0])
     assert np.array_equal(schedule.dwells, result.dwells)
     assert schedule.first_direction == result.first_direction
-    assert schedule.robot == plan_record(result)["robot"]["groups"]
+    assert schedule.robot == result.to_dict()["robot"]["groups"]
     header = written[2].read_text()
     numbers = [int(v) for v in header.split("{")[1].split("}")[0].replace("\n", " ").split(",")]
     assert sum(numbers) == pytest.approx(1000 * result.seconds.sum(), abs=1)

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from planner.files.plan_json import load_plan, plan_record
+from planner.files.plan_json import load_plan
 from planner.paths.path import circle
 from planner.planning.plan import plan
 from sim.io.errors import InputError
@@ -20,7 +20,7 @@ from sim.model.schedule import load_schedule
 
 @pytest.fixture(scope="module")
 def record() -> dict[str, Any]:
-    return json.loads(json.dumps(plan_record(plan(circle(2.0), PRESETS["paper-control"]))))  # type: ignore[no-any-return]
+    return json.loads(json.dumps(plan(circle(2.0), PRESETS["paper-control"]).to_dict()))  # type: ignore[no-any-return]
 
 
 def written(record: dict[str, Any], folder: Path, **changes: Any) -> Path:

@@ -12,7 +12,8 @@ import pytest
 
 from planner.files.tracker_header import rounded, table_bytes, tracker_header
 from planner.paths.path import circle
-from planner.planning.plan import Plan, plan
+from planner.planning.plan import plan
+from planner.planning.planned import Plan
 from planner.tracking.tracker import POSE, SLACK, Command, Tracker
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker, compile_c

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.files.plan_json import load_plan, plan_record
+from planner.files.plan_json import load_plan
+from planner.goal.goal_plan import GoalPlan
 from planner.goal.obstacles import Circle, Polygon
 from planner.goal.route import NoWayError
-from planner.goal.to_goal import GoalPlan, to_goal
+from planner.goal.to_goal import to_goal
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.rollout import Switches, poses_at_flips
 from sim.io.errors import InputError
@@ -61,7 +62,7 @@ def test_a_plan_to_a_goal_gives_no_guarantee_and_is_read_again(tmp_path: Path) -
     """The guaranteed bound is for paths with wider turns."""
     plan = to_goal((0, 0, 0), (2, 1.5, 2.0), CONTROL).plan
     assert plan.errors.guaranteed is None
-    (tmp_path / "plan.json").write_text(json.dumps(plan_record(plan)))
+    (tmp_path / "plan.json").write_text(json.dumps(plan.to_dict()))
     assert load_plan(tmp_path / "plan.json")["guaranteed_error_over_l"] is None
 
 

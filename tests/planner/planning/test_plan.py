@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from planner.paths.path import Path2D, circle, polygon
-from planner.planning.plan import _MOVED, plan
+from planner.planning.plan import plan
+from planner.planning.planned import _MOVED
 from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.errors import InputError

@@ -9,7 +9,8 @@ import pytest
 
 from planner.paths.path import circle
 from planner.planning.line_of_sight import LineOfSight
-from planner.planning.plan import Plan, plan
+from planner.planning.plan import plan
+from planner.planning.planned import Plan
 from planner.tracking.kalman_filter import MOST, STATES, Dwell, Estimate
 from sim.mechanics import planar
 from sim.model.presets import PRESETS

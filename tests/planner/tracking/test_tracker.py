@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.paths.path import circle, polygon
-from planner.planning.plan import Plan, plan
+from planner.planning.plan import plan
+from planner.planning.planned import Plan
 from planner.tracking.tracker import Command, Tracker
 from planner.vehicle.vehicle import Vehicle
 from sim.model.presets import PRESETS

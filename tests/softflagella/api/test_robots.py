@@ -11,7 +11,7 @@ import pytest
 
 import softflagella as sf
 from sim.motion.lab_units import LAB_COLUMNS
-from softflagella.api.robots import robot_rows, unit_of
+from softflagella.api.robots import robot_rows, with_units
 
 ROBOT = sf.load_robot("paper-control")
 
@@ -52,7 +52,7 @@ def test_a_table_begins_with_names_and_lab_units(file: Path) -> None:
         assert motion["robot"].tolist() == ["paper-control", "mine"]
         assert not motion.columns.duplicated().any()
         units = motion.attrs["units"]
-        assert {units[name] for name in LAB_COLUMNS} == {"rpm", "rad/s", "cm", "degree", "cm/s", "s"}
+        assert {units[name] for name in LAB_COLUMNS} == {"rpm", "rad/s", "cm", "degrees", "cm/s", "s"}
         assert units["omega_yr_bar"] == "EI/(mu0 l^4)"
         assert (motion["error"] < 0.01).all()
 
@@ -89,13 +89,15 @@ def test_a_response_of_dimensionless_robots_names_rows() -> None:
     assert "dwell_s" not in table
 
 
-@pytest.mark.parametrize(
-    ("name", "unit"),
-    [("R_yr_cm", "cm"), ("omega_yr_rad_s", "rad/s"), ("lag_psi_rad", "radian"), ("v_z_low", "EI/(mu0 l^3)"),
-     ("note", ""), ("dwell_s", "s")],
-)  # fmt: skip
-def test_units_of_columns(name: str, unit: str) -> None:
-    assert unit_of(name) == unit
+def test_units_of_columns() -> None:
+    units = {
+        "R_yr_cm": "cm",
+        "omega_yr_rad_s": "rad/s",
+        "lag_psi_rad": "rad",
+        "v_z_low": "EI/(mu0 l^3)",
+        "x_s": "s",
+    }
+    assert with_units(pd.DataFrame(columns=[*units, "note"])).attrs["units"] == units
 
 
 def test_a_replay_of_a_file_and_by_another_robot(tmp_path: Path, file: Path) -> None:

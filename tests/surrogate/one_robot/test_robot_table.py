@@ -11,7 +11,7 @@ import pytest
 
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
-from surrogate.one_robot.robot_table import RobotTable, load_robot_table, save_robot_table
+from surrogate.one_robot.robot_table import RobotTable, load_robot_table
 from surrogate.one_robot.tabulate import tabulate
 from surrogate.table.model_file import load_table
 from tests.surrogate.refusals import refusal
@@ -23,7 +23,7 @@ def single() -> RobotTable:
 
 
 def test_a_table_of_one_robot_comes_back_as_it_was(single: RobotTable, tmp_path: Path) -> None:
-    save_robot_table(single, tmp_path / "robot.json")
+    single.save(tmp_path / "robot.json")
     again = load_table(tmp_path / "robot.json")
     assert again == single
     assert again.identity == single.identity
@@ -32,7 +32,7 @@ def test_a_table_of_one_robot_comes_back_as_it_was(single: RobotTable, tmp_path:
 def test_damaged_tables_of_one_robot_are_refused(single: RobotTable, tmp_path: Path) -> None:
     """Or hold the same numbers, as where 1e-5 has become 1E-5."""
     path = tmp_path / "robot.json"
-    save_robot_table(single, path)
+    single.save(path)
     contents = path.read_bytes()
     random = np.random.default_rng(6)
     same = 0
@@ -75,13 +75,13 @@ def test_wrong_numbers_of_one_robot_are_refused_though_the_hash_is_right(
     name: str, value: Any, expected: str, single: RobotTable, tmp_path: Path
 ) -> None:
     path = tmp_path / "robot.json"
-    save_robot_table(RobotTable(**{**vars(single), name: value}), path)
+    RobotTable(**{**vars(single), name: value}).save(path)
     assert expected in refusal(path, load_robot_table)
 
 
 def test_an_edited_number_and_a_missing_key_of_one_robot_are_refused(single: RobotTable, tmp_path: Path) -> None:
     path = tmp_path / "robot.json"
-    save_robot_table(single, path)
+    single.save(path)
     content = json.loads(path.read_text())
     for name in content:
         less = {key: part for key, part in content.items() if key != name}

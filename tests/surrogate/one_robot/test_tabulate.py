@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.files.plan_json import plan_record
 from planner.files.tracking_error import tracking_error
 from planner.paths.path import polygon
 from planner.planning.plan import plan
@@ -20,7 +19,7 @@ from sim.model.robot import Robot
 from sim.motion.replay import replay
 from sim.motion.steady import steady
 from sim.motion.switching import switch_response
-from surrogate.one_robot.robot_table import RobotTable, save_robot_table
+from surrogate.one_robot.robot_table import RobotTable
 from surrogate.one_robot.tabulate import tabulate
 from surrogate.table.model_file import load_table
 
@@ -64,7 +63,7 @@ def test_it_has_both_directions_of_a_robot_that_turns_unequally() -> None:
 def test_a_robot_that_turns_unequally_is_planned_and_stays_within_the_stated_error() -> None:
     robot = replace(PRESETS["paper-control"], effects={"left_right_bias": 0.2})
     result = plan(polygon(4, 3.0), robot, lookup=tabulate(robot))
-    error = tracking_error(plan_record(result), replay([result.schedule()])[0])
+    error = tracking_error(result.to_dict(), replay([result.schedule()])[0])
     assert error.largest < error.stated
     assert error.rms < 1.5 * result.predicted_rms + 0.005
 
@@ -72,10 +71,10 @@ def test_a_robot_that_turns_unequally_is_planned_and_stays_within_the_stated_err
 def test_a_robot_with_an_effect_is_planned_and_stays_within_the_stated_error(
     table: RobotTable, tmp_path: Path
 ) -> None:
-    save_robot_table(table, tmp_path / "robot.json")
+    table.save(tmp_path / "robot.json")
     result = plan(polygon(4, 2.5), ROBOT, lookup=load_table(tmp_path / "robot.json"))
     track = replay([result.schedule()])[0]
-    error = tracking_error(plan_record(result), track)
+    error = tracking_error(result.to_dict(), track)
     assert error.largest < error.stated
     assert error.rms < 0.03
 

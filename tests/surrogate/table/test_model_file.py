@@ -12,15 +12,15 @@ import pytest
 import torch
 
 from surrogate.table import tensor_file
-from surrogate.table.lookup import table_content
-from surrogate.table.model_file import FORMAT, SHIPPED, load, save
+from surrogate.table.lookup import FORMAT, table_content
+from surrogate.table.model_file import SHIPPED, load
 from tests.surrogate.refusals import refusal
 from tests.surrogate.small import rows, table
 
 
 def test_a_model_comes_back_as_it_was(tmp_path: Path) -> None:
     path = tmp_path / "model.safetensors"
-    save(table(), path)
+    table().save(path)
     again = load(path)
     assert again.identity == table().identity
     assert (again.domain, again.errors) == (table().domain, table().errors)

@@ -1,0 +1,134 @@
+"""Calibrate a robot with a measured table, and what comes of it: the verdict, the corrected robot, their files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import pandas as pd
+
+from calibration.report.corrected_robot import check_given, corrected_toml, handed_on
+from calibration.report.report import write_report
+from calibration.swimmer.head_correction import learn_head_correction
+from calibration.swimmer.measured_table import Measurements, read_measurements
+from calibration.swimmer.possible_runs import Owned
+from calibration.swimmer.protocols import PROTOCOLS
+from calibration.swimmer.swimmer import SwimmerModel
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.verdict import Verdict
+from calibration.verdict.verdict_json import verdict_record
+from planner.vehicle.calibration_table import CalibrationKnowledge
+from sim.io.files import files_together, write_text
+from sim.io.notebook import as_html, given_axes
+from sim.model.robot import Robot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FILES = ("verdict.json", "report.html", "corrected.toml")
+
+
+@dataclass(frozen=True, repr=False)
+class RobotVerdict(Verdict):
+    """What a measured table says about a robot: a `Verdict` with the robot, its runs, and the corrected robot.
+
+    Example:
+        >>> from softflagella import calibrate
+        >>> verdict = calibrate("runs.csv", "robot.toml")  # doctest: +SKIP
+        >>> verdict.corrected.effects  # doctest: +SKIP
+        {'end_over_end_drag': 4.9}
+    """
+
+    robot: Robot  # as it was given
+    runs: Measurements  # of the table
+    table: str  # name of the table
+
+    @property
+    def corrected(self) -> Robot:
+        """The robot with fitted coefficients, nuisance parameters and effects."""
+        return handed_on(self.robot, self.fits.final_refit, self.corrections.learnt)[0]
+
+    @property
+    def knowledge(self) -> CalibrationKnowledge:
+        """Covariance of what was fitted, and the current in the tank; for `softflagella.plan`."""
+        return handed_on(self.robot, self.fits.final_refit, self.corrections.learnt)[1]
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), self.plot)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the residual of each output, before and after, over the noise of a run.
+
+        Args:
+            ax: default: axes of a new figure.
+        """
+        from calibration.report.figures import plot_summary  # loads matplotlib
+
+        ax = given_axes(ax)
+        plot_summary(ax, self, self.runs)
+        ax.legend(frameon=False, fontsize=8)
+        return ax
+
+    def to_frame(self) -> pd.DataFrame:
+        """Tabulate the relative errors on the held-out runs: a row for each model, all outputs and each output."""
+        rows = {name: {"all": rms, **self.errors.by_output[name]} for name, rms in self.errors.rms.items()}
+        return pd.DataFrame.from_dict(rows, orient="index")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of verdict.json."""
+        return verdict_record(self, table=self.table)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write verdict.json, report.html and corrected.toml, all or none, and return their paths.
+
+        Raises:
+            InputError: the files cannot be written.
+        """
+        corrected = corrected_toml(self.robot, self.fits.final_refit, self.corrections.learnt)
+        with files_together(folder, FILES) as temporary:
+            write_report(self, self.runs, temporary / "report.html", title=self.table)
+            write_text(temporary / "corrected.toml", corrected)
+            write_text(temporary / "verdict.json", json.dumps(self.to_dict(), indent=1) + "\n")
+        return [Path(folder, name) for name in FILES]
+
+
+def calibrate_robot(
+    table: str | Path | pd.DataFrame,
+    robot: Robot,
+    *,
+    protocol: Literal["session", "paper"] = "session",
+    own: Owned | None = None,
+    seed: int = 0,
+    jobs: int | None = None,
+    progress: bool = True,
+    tell: Callable[[str], object] = lambda line: None,
+) -> RobotVerdict:
+    """Calibrate a robot, see `softflagella.calibrate`.
+
+    Args:
+        table: measured runs, or their file.
+        robot: as given.
+        protocol: what is fitted and tested.
+        own: what the lab can set in its next runs.
+        seed: of the bootstrap.
+        jobs: threads; default all processors.
+        progress: show progress bars.
+        tell: is told, before the fit, what was converted and what was excluded, a line at a time.
+
+    Raises:
+        InputError: the table cannot be used.
+    """
+    check_given(robot)
+    data = read_measurements(table)
+    for line in data.converted:
+        tell(line)
+    for line in data.excluded:
+        tell(f"excluded: {line}")
+    data, held_out = PROTOCOLS[protocol](data)
+    model = SwimmerModel(robot, data, jobs, own=own or {})
+    verdict = calibrate(model, held_out=held_out, correction=learn_head_correction, seed=seed, progress=progress)
+    name = "table" if isinstance(table, pd.DataFrame) else Path(table).name
+    return RobotVerdict(**vars(verdict), robot=robot, runs=data, table=name)

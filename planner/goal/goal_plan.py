@@ -1,0 +1,105 @@
+"""A plan from a pose to a pose, and how it shows itself: text, picture, table, content of goal.json."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from planner.goal.obstacles import Circle, Footprint, FreeSpace
+from planner.planning.planned import Plan, in_lab
+from sim.io.deprecated import old_attributes
+from sim.io.notebook import as_html
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+FORMAT = 1
+Pose = tuple[float, float, float]
+
+
+@dataclass(frozen=True, repr=False)
+class GoalPlan:
+    """A plan from a pose to a pose. Lengths in l, angles in rad.
+
+    Poses are x, y and heading of the head's centre.
+
+    Example:
+        >>> from softflagella import load_robot, to_goal
+        >>> trip = to_goal((0, 0, 0), (3, 1, 1), load_robot("paper-control"))
+        >>> trip.end_error[0] < 0.01
+        True
+    """
+
+    plan: Plan  # the schedule on the way
+    goal: Pose  # as asked for
+    end: Pose  # predicted
+    via: tuple[tuple[float, float], ...]  # places x, y that the pivot passes
+    free_space: FreeSpace  # walls and regions
+    length: float  # of the pivot's track
+    margin: float  # kept around the body on the declared path; 0 without obstacles
+    clearance: float  # smallest, of the body on the predicted track; infinite without obstacles
+
+    @property
+    def end_error(self) -> tuple[float, float]:
+        """Predicted distance from the goal, and difference of the heading."""
+        turn = (self.end[2] - self.goal[2] + math.pi) % (2 * math.pi) - math.pi
+        return math.dist(self.end[:2], self.goal[:2]), abs(turn)
+
+    def __repr__(self) -> str:
+        robot, (off, turned) = self.plan.robot, self.end_error
+        lines = [
+            f"Goal plan: way of {in_lab(self.length, robot)}; ends {in_lab(off, robot)} and "
+            f"{math.degrees(turned):.2g} degrees from the goal, as predicted"
+        ]
+        if not self.free_space.empty:
+            lines.append(f"  margin {in_lab(self.margin, robot)}, clearance {in_lab(self.clearance, robot)}")
+        return "\n".join([*lines, repr(self.plan)])
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), self.plot)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the plan, start and goal, and what the robot must keep out of, on axes in l.
+
+        Args:
+            ax: default: axes of a new figure.
+        """
+        from planner.goal.picture import draw_places, draw_regions  # loads matplotlib
+
+        ax = self.plan.plot(ax)
+        draw_regions(ax, self.free_space)
+        draw_places(ax, Footprint.of(self.plan.robot, 0.0), (self.plan.start, self.goal), self.via)
+        return ax
+
+    def to_frame(self) -> pd.DataFrame:
+        """Tabulate the dwells, see `Plan.to_frame`."""
+        return self.plan.to_frame()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of goal.json: what was asked for, what is predicted. Lengths in l, angles in rad."""
+        finite = self.clearance if self.clearance < float("inf") else None
+        walls = self.free_space.walls
+        return {
+            "format": FORMAT,
+            "start": self.plan.start,
+            "goal": self.goal,
+            "via": self.via,
+            "keep_out": [
+                {"circle": [region.x, region.y, region.radius]}
+                if isinstance(region, Circle)
+                else {"polygon": region.corners.tolist()}
+                for region in self.free_space.regions
+            ],
+            "walls": None if walls is None else walls.corners.tolist(),
+            "predicted_end": self.end,
+            "end_error_over_l": self.end_error[0],
+            "end_error_rad": self.end_error[1],
+            "length_over_l": self.length,
+            "margin_over_l": self.margin,
+            "predicted_clearance_over_l": finite,
+        }
+
+    if not TYPE_CHECKING:
+        __getattr__ = old_attributes({"room": "free_space"})

@@ -1,0 +1,34 @@
+"""Pictures of paths and tracks: the path as given, the declared path with the stated error, the prediction."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from sim.arrays import Floats
+
+RAW, DECLARED, PREDICTED, REPLAYED = "#b0b0b0", "#1a1a1a", "#2a7fba", "#c8452f"
+
+
+def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float) -> None:
+    """Draw the raw and the declared path with a band of the stated error."""
+    edges = _band(declared, stated)
+    axes.fill(*edges.T, color="#2a7fba", alpha=0.10, lw=0, label=f"stated error {stated:.2f} l")
+    axes.plot(*raw.T, color=RAW, lw=1.0, label="path as given")
+    axes.plot(*declared.T, color=DECLARED, lw=1.2, label="declared")
+    axes.set_aspect("equal")
+    axes.set_xlabel("x / l")
+    axes.set_ylabel("y / l")
+
+
+def draw_prediction(axes: Axes, track: Floats) -> None:
+    """Draw the predicted track, and its start as a dot."""
+    axes.plot(*track.T, color=PREDICTED, lw=0.8, label="predicted")
+    axes.plot(*track[0], "o", color=DECLARED, ms=5)
+
+
+def _band(polyline: Floats, width: float) -> Floats:
+    tangent = np.gradient(polyline, axis=0)
+    norm = np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
+    left = np.stack([-tangent[:, 1], tangent[:, 0]], 1) / norm * width
+    return np.concatenate([polyline + left, (polyline - left)[::-1]])

@@ -1,0 +1,283 @@
+"""The plan: a schedule with its errors, and how it shows itself: text, picture, table, content of plan.json."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planner.paths.path import Path2D
+from planner.planning.declared_path import Declared
+from planner.planning.errors import FEEDBACK_EVERY, PlanErrors
+from planner.planning.line_of_sight import Guidance
+from planner.vehicle.dwell_choice import Objective
+from planner.vehicle.rollout import Switches
+from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.zigzag import Zigzag
+from sim.arrays import Floats
+from sim.io.deprecated import old_attributes
+from sim.io.notebook import as_html, given_axes
+from sim.io.units import column_units, format_length, format_time
+from sim.model.plan_file import FORMAT
+from sim.model.robot import Robot
+from sim.model.schedule import Schedule
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+GUARANTEE = "guaranteed_error_over_l"  # of plan.json; null where it is not known
+# Attributes of a plan by their old names, for one release.
+_MOVED = {
+    "point": "tracked.point",
+    "offset": "tracked.offset",
+    "vehicle": "tracked.vehicle",
+    "model": "tracked.model",
+    "pivot_distance": "tracked.rod",
+    "raw": "drawn.polyline()",
+    "closed": "drawn.closed",
+    "guide": "declared.reference",
+    "off_drawn": "declared.off_drawn",
+    "missed": "declared.missed",
+    "zigzag_rms": "straight.rms",
+    "net_speed": "straight.net_speed",
+    "ahead": "guidance.ahead",
+    "swing": "guidance.swing",
+    "drawn_rms": "errors.drawn_rms",
+    "drawn_max": "errors.drawn_max",
+    "guaranteed": "errors.guaranteed",
+    "closure": "errors.closure",
+}
+
+
+@dataclass(frozen=True, repr=False)
+class Plan:
+    """A schedule and its errors. Lengths are in l, times in μ0 l⁴/EI, unless a name says its unit.
+
+    Example:
+        >>> from softflagella import circle, load_robot, plan
+        >>> result = plan(circle(2.0), load_robot("paper-control"))
+        >>> result.predicted_max < result.stated_error, len(result.seconds) == len(result.dwells)
+        (True, True)
+    """
+
+    tracked: TrackedVehicle  # who follows
+    objective: Objective  # what decided the shortest dwell
+    drawn: Path2D  # the path that was asked for
+    declared: Declared  # the path that is followed, with the pivot's reference
+    straight: Zigzag  # straight motion with the shortest dwell: no schedule has a smaller rms error
+    guidance: Guidance  # when the motor flips
+    switches: Switches  # the schedule
+    errors: PlanErrors  # how far from the paths it leads
+
+    @property
+    def robot(self) -> Robot:
+        """The robot that the plan is for."""
+        return self.tracked.robot
+
+    @property
+    def first_direction(self) -> int:
+        """Direction of the motor in the first dwell, +1 or −1."""
+        return self.switches.first_direction
+
+    @property
+    def dwells(self) -> Floats:
+        """Dwell times (M,)."""
+        return self.switches.dwells
+
+    @property
+    def seconds(self) -> Floats:
+        """Dwell times (M,) [s]."""
+        return self.dwells * self.robot.time_scale
+
+    @property
+    def duration(self) -> float:
+        """Time of the whole schedule."""
+        return float(self.dwells.sum())
+
+    @property
+    def minimum_dwell(self) -> float:
+        """The shortest dwell that the schedule may have."""
+        return self.guidance.dwell
+
+    @property
+    def start(self) -> tuple[float, float, float]:
+        """Where the head's centre must be put, at rest: x, y [l] and heading [rad]."""
+        x, y, heading = self.poses[0].tolist()
+        return x, y, heading
+
+    @property
+    def poses(self) -> Floats:
+        """Predicted poses (M + 1, 3) of the head's centre at the flips and at the end."""
+        return self.switches.poses
+
+    @property
+    def track(self) -> Floats:
+        """Predicted track (K, 2) of the tracked point, several samples a dwell."""
+        return self.errors.track
+
+    @property
+    def reference(self) -> Floats:
+        """The declared path (m, 2)."""
+        return self.declared.reference.p
+
+    @property
+    def predicted_rms(self) -> float:
+        """Root mean square over time of the predicted distance from the declared path."""
+        return self.errors.predicted_rms
+
+    @property
+    def predicted_max(self) -> float:
+        """Largest predicted distance from the declared path."""
+        return self.errors.predicted_max
+
+    @property
+    def stated_error(self) -> float:
+        """Distance that 95 % of the robots that the model's uncertainty allows keep to, open loop."""
+        return self.errors.stated
+
+    @property
+    def feedback_error(self) -> float:
+        """The stated error where the pose is measured, and the rest planned again, every 20 flips."""
+        return self.errors.feedback
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know, in words."""
+        return (*self.declared.warnings, *self.tracked.warnings)
+
+    def schedule(self, robot: Robot | None = None) -> Schedule:
+        """Return the schedule for `sim.motion.replay`.
+
+        Args:
+            robot: the robot that carries it out; default: the one that the plan was made for. Seconds and metres
+                stay as planned, so numbers change where its units of time and length are others.
+        """
+        swims = robot or self.robot
+        time, length = self.robot.time_scale / swims.time_scale, self.robot.tail_length / swims.tail_length
+        x, y, heading = self.start
+        start = (x * length, y * length, heading)
+        return Schedule(swims.group_values(), self.first_direction, self.dwells * time, start, swims.time_scale)
+
+    def __repr__(self) -> str:
+        robot, (x, y, heading) = self.robot, self.start
+        cm = 100 * robot.tail_length
+        rms, largest, stated, feedback = (
+            in_lab(error, robot)
+            for error in (self.predicted_rms, self.predicted_max, self.stated_error, self.feedback_error)
+        )
+        path = f"{'closed path' if self.drawn.closed else 'path'} of {in_lab(self.drawn.length, robot)}"
+        dwells = f"{len(self.dwells)} dwells of {self.minimum_dwell * robot.time_scale:.3g} s or more"
+        lines = [
+            f"Plan for {robot.name!r}: {path}, {dwells}, {format_time(float(self.seconds.sum()))}",
+            f"  predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}",
+            f"  start at x = {x * cm:.4g} cm, y = {y * cm:.4g} cm, heading {math.degrees(heading):.1f} degrees, "
+            f"motor {self.first_direction:+d}",
+        ]
+        if self.warnings:
+            lines.append(f"  {len(self.warnings)} warnings, the first: {self.warnings[0][:200]}")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), self.plot)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the drawn, the declared and the predicted path, with the stated error, on axes in l.
+
+        Args:
+            ax: default: axes of a new figure.
+        """
+        from planner.planning.picture import draw_prediction, draw_tracks  # loads matplotlib
+
+        ax = given_axes(ax)
+        draw_tracks(ax, self.drawn.polyline(), self.reference, self.stated_error)
+        draw_prediction(ax, self.track)
+        return ax
+
+    def to_frame(self) -> pd.DataFrame:
+        """Tabulate the dwells: start, direction of the motor, length, and predicted pose at the start; M rows.
+
+        Columns in lab units come first. x, y and heading are those of the head's centre.
+        """
+        import pandas as pd  # a plan is made without it
+
+        start = np.concatenate([[0.0], np.cumsum(self.dwells)[:-1]])
+        x, y, heading = self.poses[:-1].T
+        cm = 100 * self.robot.tail_length
+        frame = pd.DataFrame(
+            {
+                "start_s": start * self.robot.time_scale,
+                "direction": self.first_direction * (-1) ** np.arange(len(self.dwells)),
+                "dwell_s": self.seconds,
+                "x_cm": x * cm,
+                "y_cm": y * cm,
+                "heading_deg": np.degrees(heading),
+                "dwell_bar": self.dwells,
+                "x_over_l": x,
+                "y_over_l": y,
+                "heading_rad": heading,
+            }
+        )
+        frame.attrs["units"] = column_units(frame)
+        return frame
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of plan.json, which `softflagella.load_plan` reads.
+
+        `id` is a digest of all the rest. The other files of the plan have it, too.
+        """
+        content = self._content()
+        digest = sha256(json.dumps(content).encode()).hexdigest()
+        return {"id": f"p{digest[:11]}", **content}  # a letter first: no reader of plan.csv takes it for a number
+
+    def _content(self) -> dict[str, Any]:
+        robot, schedule = self.robot, self.schedule()
+        x, y, heading = schedule.start
+        return {
+            "format": FORMAT,
+            "robot": {
+                "name": robot.name,
+                "groups": schedule.robot,
+                "tail_length_m": robot.tail_length,
+                "motor_speed_rad_s": robot.motor_speed,
+                "time_scale_s": robot.time_scale,
+            },
+            "point": self.tracked.point,
+            "offset_over_l": self.tracked.offset,
+            "first_direction": self.first_direction,
+            "start": {"x_over_l": x, "y_over_l": y, "heading_rad": heading},
+            "dwell_bar": self.dwells.tolist(),
+            "dwell_s": self.seconds.tolist(),
+            "predicted_poses": self.poses.tolist(),
+            "reference": self.reference.tolist(),
+            "raw_path": self.drawn.polyline().tolist(),
+            "closed": self.drawn.closed,
+            "objective": self.objective,
+            "minimum_dwell_bar": self.minimum_dwell,
+            "off_drawn_over_l": self.declared.off_drawn,
+            "missed_over_l": self.declared.missed,
+            "zigzag_rms_over_l": self.straight.rms,
+            GUARANTEE: self.errors.guaranteed,
+            "stated_error_over_l": self.errors.stated,
+            "feedback_error_over_l": self.errors.feedback,
+            "feedback_every": FEEDBACK_EVERY,
+            "predicted_rms_over_l": self.errors.predicted_rms,
+            "predicted_max_over_l": self.errors.predicted_max,
+            "drawn_rms_over_l": self.errors.drawn_rms,
+            "drawn_max_over_l": self.errors.drawn_max,
+            "closure_over_l": self.errors.closure,
+            "model": self.tracked.model,
+            "warnings": list(self.warnings),
+        }
+
+    if not TYPE_CHECKING:
+        __getattr__ = old_attributes(_MOVED)
+
+
+def in_lab(tails: float, robot: Robot) -> str:
+    """Write a length in lab units, with tail lengths in brackets."""
+    return f"{format_length(tails * robot.tail_length)} ({tails:.3g} l)"

@@ -1,0 +1,117 @@
+"""Plan and check: `softflagella.plan` and `check`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Unpack
+
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from planner.files.own_table import table_for
+from planner.files.plan_json import load_plan
+from planner.files.tracking_error import TrackingError, tracking_error
+from planner.goal.goal_plan import GoalPlan
+from planner.paths.path import Path2D
+from planner.paths.path_files import Drawing, read_path
+from planner.planning.plan import plan as plan_path
+from planner.planning.planned import Plan
+from planner.planning.request import RequestOptions
+from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
+from sim.io.tables import read_table
+from sim.model.robot import Robot
+from softflagella.api.robots import OneRobot, one_robot
+from surrogate.interface import LookupTable
+
+
+def plan(
+    path: Path2D | Drawing | ArrayLike | str | Path,
+    robot: OneRobot,
+    *,
+    lookup: LookupTable | None = None,
+    knowledge: CalibrationKnowledge | None = None,
+    progress: Callable[[float], object] | None = None,
+    **options: Unpack[RequestOptions],
+) -> Plan:
+    """Plan the motor's switching times for a path.
+
+    Args:
+        path: (n, 2) points or a Path2D, lengths in tail lengths l; or what `read_path` reads, or its file. Where
+            a file says its unit, its lengths are converted.
+        robot: the robot, its robot.toml, or the name of a preset; its motor speed is used in both directions.
+        lookup: trained table, or the table of this one robot. Default: the one that comes with the package. Where
+            that one does not know the robot, the robot's own table is simulated, and kept beside its file.
+        knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
+        progress: called now and then with the share of the path that is done.
+        options: any of
+
+            - point: which point must follow the path: "head_centre" (default), "head_tip" or "pivot".
+            - corner: what to do with places that are too tight: declare the nearest path that can be followed, by
+              root mean square ("nearest", the default) or by its largest distance ("minimax"), round corners
+              ("fillet"), or refuse ("error").
+            - time_weight: for "nearest" and "minimax": the mean squared distance [l²] from the drawn path that is
+              worth as much as the time in which the whole path is followed; 0 (default): distance alone counts.
+            - objective: what decides the dwell: small "error" (default), short "time", or few "flips"; see
+              `planner.vehicle.dwell_choice`.
+            - minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
+            - minimum_seconds: the same in seconds; the larger one counts.
+            - dwell: this shortest dwell, and not the one that the objective would choose.
+            - tolerance: largest acceptable stated error [l]; the dwell is shortened until it is kept.
+            - seed: of the random robots from which the stated error is computed.
+
+    Raises:
+        InputError: the path is bad or too tight, the dwell too short, the tolerance too small, or the robot
+            cannot be simulated.
+
+    Example:
+        >>> import softflagella as sf
+        >>> result = sf.plan(sf.circle(2.0), "paper-control")
+        >>> len(result.dwells) > 100, result.predicted_rms < 0.03
+        (True, True)
+    """
+    swims = one_robot(robot)
+    source = None if isinstance(robot, Robot) else str(robot)
+    known = knowledge or (CalibrationKnowledge() if source is None else read_knowledge(source))
+    table = lookup or table_for(swims, source, known)
+    return plan_path(_in_tails(path, swims), swims, lookup=table, knowledge=known, progress=progress, **options)
+
+
+def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot) -> Path2D | ArrayLike:
+    """Read a path where a file is given; convert one that has a unit to tail lengths."""
+    drawing = read_path(path) if isinstance(path, str | Path) else path
+    if not isinstance(drawing, Drawing):
+        return drawing
+    return drawing.path if drawing.unit is None else drawing.path.scaled(drawing.unit / robot.tail_length)
+
+
+def check(
+    plan: Plan | GoalPlan | Mapping[str, Any] | str | Path, track: pd.DataFrame | str | Path
+) -> TrackingError:
+    """Compare a replayed or measured track with its plan.
+
+    Args:
+        plan: a plan, the path of its plan.json, or its content.
+        track: `time_bar`, `x_over_l`, `y_over_l`, `heading_rad` of the head's centre, such as `replay` returns,
+            or its file.
+
+    Returns:
+        Distances of the tracked point from the declared path: `rms` and `largest`, with the `stated` error; from
+        the path as drawn: `raw_rms` and `raw_largest` [l]. `line` says it in words.
+
+    Raises:
+        InputError: the track has no such columns, or values that are not finite.
+
+    Example:
+        >>> import softflagella as sf
+        >>> result = sf.plan(sf.circle(1.2), "paper-control", objective="flips")
+        >>> error = sf.check(result, sf.replay(result))
+        >>> error.rms < error.largest < error.stated
+        True
+    """
+    if isinstance(plan, GoalPlan):
+        plan = plan.plan
+    content = (
+        load_plan(plan) if isinstance(plan, str | Path) else plan if isinstance(plan, Mapping) else plan.to_dict()
+    )
+    return tracking_error(dict(content), track if isinstance(track, pd.DataFrame) else read_table(track))

@@ -1,0 +1,45 @@
+"""Tracks and decisions through the public functions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import softflagella as sf
+from tests.calibration.toy_tables import START, calibrated_toy, install_toy, shares_verdicts, toy_table
+
+
+def circle_track(run: int, samples: int) -> pd.DataFrame:
+    time = np.linspace(0, 120, samples)
+    angle = 0.05 * time
+    columns: dict[str, Any] = {"run": run, "time_s": time, "x_cm": 9 * np.cos(angle), "y_cm": 9 * np.sin(angle)}
+    return pd.DataFrame({**columns, "heading_deg": np.degrees(angle) + 20})
+
+
+def test_tracks_that_are_left_out_are_warned_of() -> None:
+    samples = pd.concat([circle_track(1, 200), circle_track(2, 5)])
+    runs = pd.DataFrame({"run": [1, 2], "N": 2, "l_cm": 11.0, "omega_rpm": 43.0})
+    with pytest.warns(UserWarning, match="excluded: run 2: 5 samples"):
+        table = sf.tracks(samples, runs)
+    assert table["R_yr_cm"].round(6).tolist()[0] == 9.0
+    assert np.isnan(table["R_yr_cm"].iloc[1])
+    assert len(table.attrs["excluded"]) == 1
+    assert table.attrs["units"]["v_cm_s"] == "cm/s"
+
+
+@shares_verdicts
+def test_new_runs_decide_a_verdict_that_is_at_hand(monkeypatch: pytest.MonkeyPatch) -> None:
+    verdict = calibrated_toy(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
+    install_toy(monkeypatch)
+    table = toy_table(1, lengths_cm=(8.0,), end_over_end_drag=4.0)
+    more = (
+        toy_table(2, lengths_cm=(5.0, 11.0), end_over_end_drag=4.0).assign(session="new").sample(8, random_state=1)
+    )
+    decision = sf.decide(pd.concat([table, more], ignore_index=True), verdict, START)
+    assert decision.new_runs == 8
+    assert decision.decided == "head's end-over-end drag"
+    assert decision.sentence.startswith("Decided: head's end-over-end drag.")
+    assert not sf.Decision(decision.standings[:1] * 2, 8).decided

@@ -1,0 +1,153 @@
+"""What objects say about themselves: short, true, with a picture and a table."""
+
+from __future__ import annotations
+
+import base64
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import softflagella as sf
+
+ROBOT = sf.load_robot("paper-control")
+CM = 100 * ROBOT.tail_length
+MAKE: dict[str, Callable[[], Any]] = {
+    "robot": lambda: ROBOT,
+    "robot with effects": lambda: replace(ROBOT, effects={name: 1.0 for name in list(sf.effects())[:3]}),
+    "plan": lambda: sf.plan(sf.polygon(4, side=3.0), ROBOT),
+    "goal": lambda: sf.to_goal((0, 0, 0), (4, 1, 0.5), ROBOT, keep_out=[sf.Circle(2.0, -0.8, 0.3)]),
+    "tracker": lambda: sf.Tracker(sf.plan(sf.circle(2.0), ROBOT)),
+    "table": sf.load_table,
+    "own table": lambda: sf.tabulate(ROBOT),
+}
+_made: dict[str, Any] = {}
+
+
+def made(name: str) -> Any:
+    """Make an object once."""
+    if name not in _made:
+        _made[name] = MAKE[name]()
+    return _made[name]
+
+
+def number(pattern: str, text: str) -> float:
+    """Find a number in a text."""
+    match = re.search(pattern.replace("#", r"(-?[\d.]+(?:e-?\d+)?)"), text)
+    assert match, (pattern, text)
+    return float(match[1])
+
+
+@pytest.mark.parametrize("name", MAKE)
+def test_an_object_says_what_it_is_in_a_few_lines(name: str) -> None:
+    thing = made(name)
+    text = repr(thing)
+    assert len(text.encode()) < 1000
+    assert len(text.splitlines()) <= 6
+    assert max(map(len, text.splitlines())) < 160
+    page = thing._repr_html_()
+    assert page.startswith("<pre>")
+    if hasattr(thing, "plot"):
+        data = re.search(r'src="data:image/png;base64,([^"]+)"', page)
+        assert data
+        assert base64.b64decode(data[1]).startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", [name for name in MAKE if "robot" not in name])
+def test_pictures_go_on_given_axes(name: str) -> None:
+    axes = Figure().add_subplot()
+    assert made(name).plot(axes) is axes
+    assert axes.lines
+
+
+def test_axes_are_made_where_none_are_given() -> None:
+    from matplotlib import pyplot
+
+    axes = made("plan").plot()
+    assert axes.figure.number in pyplot.get_fignums()
+    pyplot.close(axes.figure)
+
+
+def test_a_plan_says_what_it_holds() -> None:
+    plan, text = made("plan"), repr(made("plan"))
+    assert number(r"of # cm \(12 l\)", text) == pytest.approx(12 * CM)
+    assert number(r"# dwells of", text) == len(plan.dwells)
+    assert number(r"dwells of # s", text) == pytest.approx(plan.minimum_dwell * ROBOT.time_scale, rel=0.01)
+    assert number(r"more, # min", text) == pytest.approx(plan.seconds.sum() / 60, rel=0.01)
+    assert number(r"stated error # mm", text) == pytest.approx(10 * CM * plan.stated_error, rel=0.01)
+    assert number(r"predicted error # mm", text) == pytest.approx(10 * CM * plan.predicted_rms, rel=0.01)
+    assert number(r"with feedback # mm", text) == pytest.approx(10 * CM * plan.feedback_error, rel=0.01)
+    assert number(r"heading # degrees", text) == pytest.approx(math.degrees(plan.start[2]), abs=0.06)
+    assert number(r"x = # cm", text) == pytest.approx(plan.start[0] * CM, rel=0.01)
+    assert f"motor {plan.first_direction:+d}" in text
+
+
+def test_a_plan_as_a_table_and_as_plain_content(tmp_path: Path) -> None:
+    plan = made("plan")
+    frame = plan.to_frame()
+    assert len(frame) == len(plan.dwells)
+    assert frame["dwell_s"].sum() == pytest.approx(plan.duration * ROBOT.time_scale)
+    assert frame["x_cm"].to_numpy() == pytest.approx(CM * plan.poses[:-1, 0])
+    assert np.radians(frame["heading_deg"]).to_numpy() == pytest.approx(plan.poses[:-1, 2])
+    assert frame.attrs["units"]["x_cm"] == "cm"
+    sf.write_plan(plan, tmp_path)
+    content = sf.load_plan(tmp_path / "plan.json")
+    assert {name: content[name] for name in plan.to_dict()} == plan.to_dict()
+
+
+def test_a_goal_plan_says_where_it_ends() -> None:
+    goal, text = made("goal"), repr(made("goal"))
+    assert number(r"clearance # cm", text) == pytest.approx(CM * goal.clearance, rel=0.01)
+    assert number(r"margin # cm", text) == pytest.approx(CM * goal.margin, rel=0.01)
+    assert number(r"way of # cm", text) == pytest.approx(CM * goal.length, rel=0.01)
+    assert text.endswith(repr(goal.plan))
+    assert goal.to_frame().equals(goal.plan.to_frame())
+    assert goal.to_dict()["keep_out"] == [{"circle": [2.0, -0.8, 0.3]}]
+
+
+def test_a_tracker_says_what_the_motor_does() -> None:
+    tracker = sf.Tracker(made("plan"))
+    command = tracker.update(0.0)
+    assert number(r"motor \+1 until # s", repr(tracker)) == pytest.approx(
+        command.flip_at * ROBOT.time_scale, rel=0.01
+    )
+    assert "alarm: none" in repr(tracker)
+    assert tracker.pose == pytest.approx(made("plan").start)
+    command = tracker.update(command.flip_at)
+    assert "motor -1 until" in repr(tracker)
+    assert tracker.to_dict()["direction"] == command.direction == -1
+    assert set(tracker.to_dict()["learned"]) == set(tracker.learned)
+
+
+def test_a_robot_in_the_units_of_a_lab() -> None:
+    text = repr(ROBOT)
+    assert number(r"l = # cm", text) == 11
+    assert number(r"motor # rpm", text) == pytest.approx(ROBOT.motor_speed * 30 / math.pi, rel=1e-3)
+    assert number(r"unit of time # s", text) == pytest.approx(ROBOT.time_scale, rel=1e-3)
+    assert list(sf.effects())[1] in repr(made("robot with effects"))
+
+
+def test_a_table_says_its_errors() -> None:
+    table, text = made("table"), repr(made("table"))
+    assert table.identity in text
+    assert number(r"yaw rate # %", text) == pytest.approx(100 * table.errors["omega_yr_bar"]["median"], rel=0.05)
+    assert table.to_frame().loc["v_z", "median"] == table.errors["v_z"]["median"]
+    own = made("own table")
+    assert number(r"largest error # %", repr(own)) == pytest.approx(
+        100 * max(error["rms"] for error in own.errors.values()), rel=0.05
+    )
+    assert number(r"turn radius # l", repr(own)) == pytest.approx(own.steady["R_yr_over_l"][0], rel=1e-3)
+    assert own.to_dict()["robot"] == own.robot
+
+
+@pytest.mark.parametrize("name", ["table", "own table"])
+def test_tables_are_saved_and_loaded(name: str, tmp_path: Path) -> None:
+    path = tmp_path / ("own.json" if name == "own table" else "model.safetensors")
+    made(name).save(path)
+    assert sf.load_table(path).identity == made(name).identity
