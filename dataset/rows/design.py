@@ -77,7 +77,9 @@ class SweepDesign:
     def from_config(config: Mapping[str, Any], rows: int) -> SweepDesign:
         """Return the design that `config` describes."""
         axes = {
-            name: Axis(*spec["range"], spec.get("scale", "linear"), spec.get("both_directions", False))
+            name: Axis(
+                spec["range"][0], spec["range"][1], spec.get("scale", "linear"), spec.get("both_directions", False)
+            )
             for name, spec in config["inputs"].items()
         }
         seed, every = config.get("seed", 0), config.get("history_every", 4)

@@ -32,7 +32,7 @@ from sim.model.presets import PRESETS
 from sim.model.robot_toml import robot_toml
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.one_robot.robot_table import FORMAT as TABLE_FORMAT
-from surrogate.one_robot.robot_table import RobotTable, _digest, save_robot_table
+from surrogate.one_robot.robot_table import RobotTable, _digest
 from surrogate.table import tensor_file
 from surrogate.table.lookup import FORMAT
 from surrogate.table.model_file import SHIPPED, load
@@ -139,7 +139,7 @@ def robot_table() -> dict[str, Any]:
 @cache
 def robot_table_file() -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        save_robot_table(RobotTable(**robot_table()), Path(folder, "a.json"))
+        RobotTable(**robot_table()).save(Path(folder, "a.json"))
         return Path(folder, "a.json").read_bytes()
 
 
