@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from dataset.rows.robot_inputs import (
+    FIELDS,
     WITH_UNIT,
     column_names,
     converted,
@@ -30,7 +31,7 @@ from dataset.rows.robot_inputs import (
 from sim.arrays import Floats, Integers
 from sim.effects import catalogue
 from sim.inputs import check_columns
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.reading import read_toml
 from sim.model.groups import DWELL, GROUP_COLUMNS, MOST_TAILS, OPTIONAL_COLUMNS
 
@@ -87,11 +88,13 @@ class SweepDesign:
     def from_config(config: Mapping[str, Any], rows: int) -> SweepDesign:
         """Return the design that `config` describes."""
         axes = {
-            name: Axis(spec["range"][0], spec["range"][1], spec["scale"], spec.get("both_directions", False))
+            name: Axis(
+                spec["range"][0], spec["range"][1], spec.get("scale", "linear"), spec.get("both_directions", False)
+            )
             for name, spec in config["inputs"].items()
         }
-        slopes, robot = config.get("sensitivities", False), config.get("robot")
-        return SweepDesign(axes, rows, config["seed"], config["history_every"], slopes, robot)
+        seed, every = config.get("seed", 0), config.get("history_every", 4)
+        return SweepDesign(axes, rows, seed, every, config.get("sensitivities", False), config.get("robot"))
 
     def config(self) -> dict[str, Any]:
         """Return what determines the robot of each index, JSON-like: all but the number of rows."""
@@ -164,7 +167,23 @@ def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
     Raises:
         InputError: an input is missing or unknown, or its range contains impossible robots.
     """
-    content = read_toml(path)
+    with naming(path):
+        content = read_toml(path)
+        if not isinstance(content.get("robot", ""), str):
+            raise InputError(f"{path}: robot = {content['robot']!r}; give the name of a robot.toml or of a preset")
+        return checked_design(content, str(path))
+
+
+def checked_design(content: Mapping[str, Any], path: str) -> SweepDesign:
+    """Make the design of the content of a sweep.toml.
+
+    Args:
+        content: the entries. In a sweep.json the robot is a table of its fields in SI units, and inputs are fields.
+        path: name of the file, for messages.
+
+    Raises:
+        InputError: an entry is missing, unknown or impossible.
+    """
     for name in set(content) - set(_ENTRIES):
         raise InputError(f"{path}: unknown entry {name!r}; allowed are {', '.join(_ENTRIES)}")
     inputs = content.get("inputs", {})
@@ -172,17 +191,17 @@ def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
         raise InputError(f"{path}: inputs = {inputs!r}; write a table [inputs]")
     try:
         robot = robot_of_sweep(content["robot"], Path(path).parent) if "robot" in content else None
-        read = _inputs(inputs) if robot is None else _inputs_of_robot(inputs)
+        read = _inputs(inputs) if robot is None else _inputs_of_robot(inputs, isinstance(content["robot"], dict))
     except InputError as refusal:
         raise InputError(f"{path}: {refusal}") from None
-    axes = {name: _axis(str(path), *read[name]) for name in _order() if name in read}
-    _check_ends(str(path), axes, robot)
+    axes = {name: _axis(path, *read[name]) for name in _order() if name in read}
+    _check_ends(path, axes, robot)
     seed = content.get("seed", 0)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise InputError(f"{path}: seed = {seed!r}; give a whole number from 0")
     every = content.get("history_every", 4)
-    if not isinstance(every, int) or isinstance(every, bool) or every < 0:
-        raise InputError(f"{path}: history_every = {every!r}; give a whole number, 0 for none")
+    if not isinstance(every, int) or isinstance(every, bool) or not 0 <= every <= MOST_ROWS:
+        raise InputError(f"{path}: history_every = {every!r}; give a whole number to {MOST_ROWS}, 0 for none")
     slopes = content.get("sensitivities", False)
     if not isinstance(slopes, bool):
         raise InputError(f"{path}: sensitivities = {slopes!r}; give true or false")
@@ -206,13 +225,13 @@ def _inputs(inputs: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
     return {name: (name, spec) for name, spec in inputs.items()}
 
 
-def _inputs_of_robot(inputs: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
+def _inputs_of_robot(inputs: Mapping[str, Any], fields_in_si: bool) -> dict[str, tuple[str, Any]]:
     """Convert the inputs of a sweep around a robot to SI units; return name and entry by field or effect."""
     if not inputs:
         raise InputError("no inputs; give at least one in a table [inputs], such as tail_length_cm")
     fields: dict[str, tuple[str, Any]] = {}
     for name, spec in inputs.items():
-        field, unit = input_of_robot(name)
+        field, unit = (name, "") if fields_in_si and name in FIELDS else input_of_robot(name)
         if field in fields:
             raise InputError(f"{fields[field][0]} and {name} are the same input; drop one")
         fields[field] = (name, converted(spec, unit))
@@ -221,10 +240,10 @@ def _inputs_of_robot(inputs: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
 
 def _axis(path: str, name: str, spec: Any) -> Axis:
     try:
-        low, high = (float(v) for v in spec["range"])
+        low, high = (float(v) for v in _list(spec["range"]))
         scale, mirrored = spec.get("scale", "linear"), spec.get("both_directions", False)
         unknown = set(spec) - {"range", "scale", "both_directions"}
-    except (KeyError, TypeError, ValueError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         raise InputError(
             f'{path}: {name} = {spec!r}; write {name} = {{ range = [low, high], scale = "linear" }}'
         ) from None
@@ -245,6 +264,12 @@ def _axis(path: str, name: str, spec: Any) -> Axis:
     if (name == "N" or scale == "integer") and (low != int(low) or high != int(high)):
         raise InputError(f"{path}: {name} has range [{low:g}, {high:g}]; give whole numbers")
     return Axis(low, high, "integer" if name == "N" else scale, mirrored)
+
+
+def _list(value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        raise TypeError
+    return value
 
 
 def _check_ends(path: str, axes: dict[str, Axis], robot: dict[str, Any] | None) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Floats
-from sim.effects import catalogue
+from sim.effects import catalogue, check_effects
 from sim.inputs import load_robot
 from sim.io.errors import InputError
 from sim.io.units import UNITS, from_si, of_kind, split, to_si
@@ -26,6 +26,7 @@ from sim.model.robot import Robot
 LENGTHS = {"tail_length": "cm", "tail_radius": "mm", "head_radius": "mm", "head_length": "mm", "disc_offset": "mm"}
 WITH_UNIT = {**LENGTHS, "youngs_modulus": "MPa", "viscosity": "Pa_s", "motor_speed": "rpm"}
 WITHOUT_UNIT = {"N": "tails", "C_t": "C_t", "C_r": "C_r", "C_yr": "C_yr"}
+FIELDS = {*WITH_UNIT, *WITHOUT_UNIT.values()}  # that a sweep may vary
 _UNUSED = ("name", "sigmas", "correction")  # of a robot, in a sweep
 
 
@@ -33,12 +34,14 @@ def robot_of_sweep(source: object, folder: Path) -> dict[str, Any]:
     """Load the robot that a sweep.toml names, as fields of `Robot` in SI units.
 
     Args:
-        source: a preset, or a file relative to the folder of the sweep.toml.
+        source: a preset, a file relative to the folder of the sweep.toml, or the fields as they were stored.
         folder: of the sweep.toml.
 
     Raises:
         InputError: there is no such robot, or it has a correction.
     """
+    if isinstance(source, dict):
+        return _checked_fields(source)
     if not isinstance(source, str):
         raise InputError(f"robot = {source!r}; give the name of a robot.toml or of a preset")
     robot = load_robot(source if source in PRESETS else folder / source)
@@ -49,6 +52,20 @@ def robot_of_sweep(source: object, folder: Path) -> dict[str, Any]:
         for field in fields(robot)
         if field.name not in _UNUSED
     }
+
+
+def _checked_fields(stored: dict[str, Any]) -> dict[str, Any]:
+    """Check the fields of a robot that were stored.
+
+    Raises:
+        InputError: they are not those of a robot.
+    """
+    try:
+        robot = Robot(name="", **stored)
+        check_effects(robot.effects)
+    except (TypeError, AttributeError):
+        raise InputError("the fields of its robot are damaged") from None
+    return stored
 
 
 def input_of_robot(name: str) -> tuple[str, str]:
