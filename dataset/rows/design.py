@@ -178,7 +178,7 @@ def checked_design(content: Mapping[str, Any], path: str) -> SweepDesign:
     """Make the design of the content of a sweep.toml.
 
     Args:
-        content: the entries. In a sweep.json the robot is a table of its fields in SI units, and inputs are fields.
+        content: the entries. In a sweep.json the robot is a table of its fields in SI units, inputs are fields.
         path: name of the file, for messages.
 
     Raises:
