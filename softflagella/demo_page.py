@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -262,11 +263,11 @@ def _add_schedule(page: Page, results: Results, folder: Path) -> None:
 
 
 def header_excerpt(header: str) -> list[str]:
-    """Return the definitions of a schedule.h and the first line of its numbers."""
+    """Return the numbers that a schedule.h defines, and the first line of its dwells."""
     lines = header.splitlines()
-    first = next(place for place, line in enumerate(lines) if line.startswith("#define SCHEDULE_FIRST_DIRECTION"))
-    numbers = next(place for place, line in enumerate(lines) if line.strip()[:1].isdigit())
-    return [*lines[first : numbers + 1], "    …"]
+    defined = [line for line in lines if re.match(r"#define SCHEDULE_\w+ [-(\d]", line)]
+    dwells = next(place for place, line in enumerate(lines) if line.strip()[:1].isdigit())
+    return [*defined, *lines[dwells - 1 : dwells + 1], "    …"]
 
 
 def _add_sweep(page: Page, results: Results) -> None:

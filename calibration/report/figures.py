@@ -146,7 +146,8 @@ def draw_evidence(result: Verdict) -> Figure:
         tested = candidate.refit is not None
         colour = GREEN if candidate.effect.name in named else ORANGE if tested else PALE
         axes.barh(place - 0.2, candidate.z, color=colour, height=0.4)
-        axes.text(-limit, place + 0.2, f" {candidate.effect.title}", fontsize=8, va="center")
+        beside_frame = axes.get_yaxis_transform()
+        axes.text(0.02, place + 0.2, candidate.effect.title, fontsize=8, va="center", transform=beside_frame)
         axes.vlines([-critical, critical], place - 0.45, place, color=INK, lw=0.8, ls="--")
     axes.set_xscale("symlog", linthresh=2 * critical)
     axes.set_xlim(-limit, limit)

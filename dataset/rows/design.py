@@ -21,7 +21,7 @@ import numpy as np
 from sim.arrays import Floats, Integers
 from sim.effects import catalogue
 from sim.inputs import check_columns
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.reading import read_toml
 from sim.model.groups import DWELL, GROUP_COLUMNS, MOST_TAILS, OPTIONAL_COLUMNS
 
@@ -77,10 +77,13 @@ class SweepDesign:
     def from_config(config: Mapping[str, Any], rows: int) -> SweepDesign:
         """Return the design that `config` describes."""
         axes = {
-            name: Axis(spec["range"][0], spec["range"][1], spec["scale"], spec.get("both_directions", False))
+            name: Axis(
+                spec["range"][0], spec["range"][1], spec.get("scale", "linear"), spec.get("both_directions", False)
+            )
             for name, spec in config["inputs"].items()
         }
-        return SweepDesign(axes, rows, config["seed"], config["history_every"], config.get("sensitivities", False))
+        seed, every = config.get("seed", 0), config.get("history_every", 4)
+        return SweepDesign(axes, rows, seed, every, config.get("sensitivities", False))
 
     def config(self) -> dict[str, Any]:
         """Return what determines the robot of each index, JSON-like: all but the number of rows."""
@@ -135,7 +138,20 @@ def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
     Raises:
         InputError: an input is missing or unknown, or its range contains impossible robots.
     """
-    content = read_toml(path)
+    with naming(path):
+        return checked_design(read_toml(path), str(path))
+
+
+def checked_design(content: Mapping[str, Any], path: str) -> SweepDesign:
+    """Make the design of the content of a sweep.toml.
+
+    Args:
+        content: the entries.
+        path: name of the file, for messages.
+
+    Raises:
+        InputError: an entry is missing, unknown or impossible.
+    """
     for name in set(content) - set(_ENTRIES):
         raise InputError(f"{path}: unknown entry {name!r}; allowed are {', '.join(_ENTRIES)}")
     inputs = content.get("inputs", {})
@@ -149,14 +165,14 @@ def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
     for name in GROUP_COLUMNS:
         if name not in inputs:
             raise InputError(f"{path}: missing input {name!r} in [inputs]")
-    axes = {name: _axis(str(path), name, inputs[name]) for name in _order() if name in inputs}
-    _check_ends(str(path), axes)
+    axes = {name: _axis(path, name, inputs[name]) for name in _order() if name in inputs}
+    _check_ends(path, axes)
     seed = content.get("seed", 0)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise InputError(f"{path}: seed = {seed!r}; give a whole number from 0")
     every = content.get("history_every", 4)
-    if not isinstance(every, int) or isinstance(every, bool) or every < 0:
-        raise InputError(f"{path}: history_every = {every!r}; give a whole number, 0 for none")
+    if not isinstance(every, int) or isinstance(every, bool) or not 0 <= every <= MOST_ROWS:
+        raise InputError(f"{path}: history_every = {every!r}; give a whole number to {MOST_ROWS}, 0 for none")
     slopes = content.get("sensitivities", False)
     if not isinstance(slopes, bool):
         raise InputError(f"{path}: sensitivities = {slopes!r}; give true or false")
@@ -165,10 +181,10 @@ def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
 
 def _axis(path: str, name: str, spec: Any) -> Axis:
     try:
-        low, high = (float(v) for v in spec["range"])
+        low, high = (float(v) for v in _list(spec["range"]))
         scale, mirrored = spec.get("scale", "linear"), spec.get("both_directions", False)
         unknown = set(spec) - {"range", "scale", "both_directions"}
-    except (KeyError, TypeError, ValueError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         raise InputError(
             f'{path}: {name} = {spec!r}; write {name} = {{ range = [low, high], scale = "linear" }}'
         ) from None
@@ -187,6 +203,12 @@ def _axis(path: str, name: str, spec: Any) -> Axis:
     if (name == "N" or scale == "integer") and (low != int(low) or high != int(high)):
         raise InputError(f"{path}: {name} has range [{low:g}, {high:g}]; give whole numbers")
     return Axis(low, high, "integer" if name == "N" else scale, mirrored)
+
+
+def _list(value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        raise TypeError
+    return value
 
 
 def _check_ends(path: str, axes: dict[str, Axis]) -> None:

@@ -17,8 +17,10 @@ from planner.paths.distance import distance_to, two_sided
 from planner.planning.picture import REPLAYED, draw_tracks
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.quantities import numbers_of
 from sim.mechanics import planar
 
+_LARGEST = 1e100  # of a number
 _COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
 
 
@@ -62,10 +64,12 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
     for name in _COLUMNS:
         if name not in track:
             raise InputError(f"the track has no column {name!r}; it needs {', '.join(_COLUMNS)}")
-    values = {name: track[name].to_numpy(dtype=float) for name in _COLUMNS}
+    values = {name: numbers_of(track[name]).to_numpy() for name in _COLUMNS}
     pose = np.stack([values["x_over_l"], values["y_over_l"], values["heading_rad"]], 1)
-    if not np.isfinite(pose).all():
+    if not (np.abs([*pose.T, values["time_bar"]]) < _LARGEST).all():
         raise InputError("the track has a value that is not a finite number; correct the file")
+    if len(pose) < 2 or not np.ptp(values["time_bar"]) > 0:
+        raise InputError("the track has no two times; give a row for each time, in order")
     offset = np.array([plan.get("offset_over_l", 0.0), 0.0, 0.0])
     tracked = planar.compose(pose, offset)[:, :2]
     declared = distance_to(np.array(plan["reference"]), tracked)

@@ -202,10 +202,10 @@ def test_rows_are_read_as_robots_with_this_head_and_silicone() -> None:
 
 
 def test_the_excerpt_of_a_header_ends_with_its_first_numbers() -> None:
-    header = "/* 1 */\n#define SCHEDULE_FIRST_DIRECTION (1)\nstatic x[] = {\n    12, 34,\n    56,\n};"
-    assert header_excerpt(header) == [
-        "#define SCHEDULE_FIRST_DIRECTION (1)", "static x[] = {", "    12, 34,", "    …",
-    ]  # fmt: skip
+    defined = "#define SCHEDULE_FIRST_DIRECTION (1)\n#define SCHEDULE_START_X -0.5\n"
+    macros = "#ifdef __AVR__\n#define SCHEDULE_TABLE(name) name\n#endif\n"
+    header = f"/* 1 */\n{defined}{macros}static x[] = {{\n    12, 34,\n    56,\n}};"
+    assert header_excerpt(header) == [*defined.splitlines(), "static x[] = {", "    12, 34,", "    …"]
 
 
 def test_without_a_checkout_there_are_no_links_to_the_documentation(
