@@ -42,7 +42,7 @@ class TrackingError:
     raw_largest: float  # distance from the path as given
     missed: float  # largest distance of a point of the path as given from the track
     stated: float  # error that the plan states
-    track: Floats = field(repr=False)  # (K, 2) tracked point
+    track: Floats = field(repr=False)  # (S, 2) tracked point
 
     @property
     def line(self) -> str:

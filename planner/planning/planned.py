@@ -117,7 +117,7 @@ class Plan:
 
     @property
     def track(self) -> Floats:
-        """Predicted track (K, 2) of the tracked point, several samples a dwell."""
+        """Predicted track (S, 2) of the tracked point, several samples a dwell."""
         return self.errors.track
 
     @property
