@@ -83,7 +83,7 @@ class _Count:
 @contextmanager
 def _shown_in(bar: Any, folder: Path) -> Iterator[None]:
     """Show compiled loops in this bar, or not at all, rather than in one of their own."""
-    own = compiling.tqdm
+    own = vars(compiling)["tqdm"]
     vars(compiling)["tqdm"] = lambda **_: _Count(bar, folder)
     try:
         yield
