@@ -105,6 +105,8 @@ class SweepFolder:
         theirs, ours = stored["config"], self.config
         if theirs["seed"] != ours["seed"]:
             raise self._refusal(f"rows of another configuration: seed {theirs['seed']} there, {ours['seed']} here")
+        if theirs.get("robot") != ours.get("robot"):
+            raise self._refusal("rows of another robot")
         for name in sorted({*theirs["inputs"], *ours["inputs"]}):
             axes = theirs["inputs"].get(name), ours["inputs"].get(name)
             if axes[0] != axes[1]:
