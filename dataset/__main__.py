@@ -102,12 +102,28 @@ def _verify(arguments: Namespace) -> None:
     print(verify(arguments.data, rows=arguments.rows))
 
 
-@program.command("config", "write a copy of the default sweep.toml, to edit", out("sweep.toml"))
+@program.command(
+    "config",
+    "write a sweep.toml, to edit",
+    argument("--robot", help="robot.toml or the name of a preset: sweep around it, in cm and rpm "
+             "(default: a copy of the sweep that comes with the package)"),
+    out("sweep.toml"),
+)  # fmt: skip
 def _config(arguments: Namespace) -> None:
     from dataset.rows.design import SWEEP_TOML
+    from dataset.rows.robot_inputs import sweep_toml
+    from sim.inputs import load_robot
     from sim.io.files import write_text
+    from sim.model.presets import PRESETS
 
-    write_text(arguments.out, SWEEP_TOML.read_text())
+    if arguments.robot is None:
+        text = SWEEP_TOML.read_text()
+    else:
+        source = arguments.robot
+        if source not in PRESETS:
+            source = os.path.relpath(source, os.path.dirname(os.path.abspath(arguments.out)))
+        text = sweep_toml(load_robot(arguments.robot), source)
+    write_text(arguments.out, text)
     print(f"-> {arguments.out}")
 
 

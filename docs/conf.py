@@ -21,8 +21,13 @@ project = "softflagella"
 author = "the softflagella developers"
 project_copyright = author
 release = version = __version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
-exclude_patterns = ["_build"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+exclude_patterns = ["_build", "**/.ipynb_checkpoints"]
+nb_execution_mode = "force"  # notebooks are kept without outputs
+nb_execution_timeout = 600  # seconds a cell
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_merge_streams = True
 default_role = "code"
 maximum_signature_line_length = 80
 myst_heading_anchors = 3

@@ -1,13 +1,20 @@
-"""Generate pages from the code: the table of effects, the columns of a data set, the commands."""
+"""Generate pages from the code: the table of effects, columns of a data set, fields of objects, the commands."""
 
 from __future__ import annotations
 
+import ast
 import inspect
+import io
 import os
-from collections.abc import Iterable, Sequence
+import textwrap
+import tokenize
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import is_dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import Any, NamedTuple, get_args, get_type_hints
 
+import softflagella
 from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
 from sim.io.commands import Command
@@ -16,9 +23,15 @@ from softflagella.__main__ import PACKAGES, WORDS, command
 
 
 def write_generated_pages(folder: Path) -> None:
-    """Write effects.md, columns.md and commands.md into `folder`."""
+    """Write effects.md, columns.md, objects.md and commands.md into `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, text in (("effects", effects_page()), ("columns", columns_page()), ("commands", commands_page())):
+    pages = {
+        "effects": effects_page(),
+        "columns": columns_page(),
+        "objects": objects_page(),
+        "commands": commands_page(),
+    }
+    for name, text in pages.items():
         page = folder / f"{name}.md"
         if not page.exists() or page.read_text() != text:
             page.write_text(text)
@@ -83,6 +96,67 @@ def columns_page() -> str:
         parts += [f"## {title}", table(("column", "type", "unit", "meaning"), rows)]
     parts.append("A sweep over effects has one column for each effect, see [Effects](effects.md).")
     return "\n\n".join(parts) + "\n"
+
+
+class Field(NamedTuple):
+    """A field of a class, as its source declares it."""
+
+    name: str
+    type: str
+    meaning: str  # the comment behind it
+
+
+def objects_page() -> str:
+    """List the fields of the public classes and of their parts."""
+    parts = [
+        "# Fields of objects",
+        "What the objects of [Python](../api.md) hold, and their parts. Lengths are in tail lengths l, times in "
+        "μ0 l⁴/EI, unless a field says its unit.",
+    ]
+    for record in public_records():
+        rows = [(f"`{name}`", f"`{kind}`", meaning) for name, kind, meaning in fields_of(record)]
+        summary = (inspect.getdoc(record) or "").split("\n\n")[0].replace("\n", " ")
+        parts += [f"## {record.__name__}", summary, table(("field", "type", "meaning"), rows)]
+    return "\n\n".join(parts) + "\n"
+
+
+def public_records() -> list[type]:
+    """List the public dataclasses and named tuples, then those of which their fields are made."""
+    public = [getattr(softflagella, name) for name in softflagella.__all__]
+    records = [thing for thing in public if _is_record(thing)]
+    for record in records:  # which grows
+        for hint in get_type_hints(record).values():
+            records += [part for part in _classes(hint) if _is_record(part) and part not in records]
+    return records
+
+
+def fields_of(record: type) -> list[Field]:
+    """Read the fields of a class from its source, those of its bases first."""
+    bases = [base for base in reversed(record.__mro__[1:]) if _is_record(base)]
+    fields = {field.name: field for base in bases for field in fields_of(base)}
+    source = textwrap.dedent(inspect.getsource(record))
+    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
+    comments = {token.start[0]: token.string.lstrip("# ") for token in tokens if token.type == tokenize.COMMENT}
+    (definition,) = ast.parse(source).body
+    assert isinstance(definition, ast.ClassDef)
+    for node in definition.body:
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            meaning = comments.get(node.end_lineno or 0, "")
+            fields[node.target.id] = Field(node.target.id, ast.unparse(node.annotation), meaning)
+    return list(fields.values())
+
+
+def _is_record(thing: Any) -> bool:
+    if not inspect.isclass(thing) or thing.__module__.partition(".")[0] not in PACKAGES:
+        return False
+    return is_dataclass(thing) or (issubclass(thing, tuple) and hasattr(thing, "_fields"))
+
+
+def _classes(hint: Any) -> Iterator[type]:
+    if inspect.isclass(hint):
+        yield hint
+    for part in get_args(hint):
+        yield from _classes(part)
 
 
 def commands_page() -> str:

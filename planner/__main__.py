@@ -9,9 +9,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from planner.paths.units import UNITS, in_tails
+from planner.paths.units import UNITS, check_unstated_unit, describe, in_lab, in_tails, place_in_lab
 from sim.io.commands import MODEL, ROBOT, Program, argument, out
 from sim.io.errors import InputError
+from sim.io.units import format_time
 
 if TYPE_CHECKING:
     from planner.paths.path import Path2D
@@ -69,9 +70,13 @@ def _plan(arguments: Namespace) -> None:
     pictures = {"trade_off.svg": draw_trade_off(trade_off(result, request))} if arguments.trade_off else {}
     paths = write_plan(result, arguments.out, pictures=pictures)
     _say(result)
+    robot, errors = result.robot, result.errors
+    rms, largest, missed = (
+        in_lab(value, robot) for value in (errors.drawn_rms, errors.drawn_max, result.declared.missed)
+    )
     print(
-        f"from the path as drawn {result.errors.drawn_rms:.4f} l rms, {result.errors.drawn_max:.3f} l at most; "
-        f"every drawn point is within {result.declared.missed:.3f} l of the declared path"
+        f"from the path as drawn {rms} rms, {largest} at most; every drawn point is within {missed} of the "
+        "declared path"
     )
     print(f"-> {', '.join(map(str, paths))}")
 
@@ -80,19 +85,20 @@ def _say(result: Plan) -> None:
     """Print warnings, start, dwells and errors."""
     for warning in result.warnings:
         print(f"warning: {warning}", file=sys.stderr)
+    robot = result.robot
     x, y, heading = result.start
+    place = place_in_lab(x, y, robot)
+    print(f"start: put the head's centre at {place}, heading {math.degrees(heading):.1f} degrees, at rest")
+    shortest = format_time(result.minimum_dwell * robot.time_scale)
     print(
-        f"start: put the head's centre at ({x:.3f}, {y:.3f}) l, heading {math.degrees(heading):.1f} degrees, "
-        "at rest"
+        f"{len(result.dwells)} dwells of {shortest} ({result.minimum_dwell:.2f} time units) or more, "
+        f"{format_time(float(result.seconds.sum()))} in all"
     )
-    print(
-        f"{len(result.dwells)} dwells of {result.minimum_dwell:.2f} time units or more, "
-        f"{result.seconds.sum():.1f} s"
+    rms, largest, stated, feedback = (
+        in_lab(value, robot)
+        for value in (result.predicted_rms, result.predicted_max, result.stated_error, result.feedback_error)
     )
-    print(
-        f"predicted error {result.predicted_rms:.4f} l rms, {result.predicted_max:.3f} l at most; stated error "
-        f"{result.stated_error:.3f} l, with feedback {result.feedback_error:.3f} l"
-    )
+    print(f"predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}")
 
 
 @program.command(
@@ -153,12 +159,14 @@ def _goal(arguments: Namespace) -> None:
     _say(goal_plan.plan)
     off, turned = goal_plan.end_error
     x, y, heading = goal_plan.end
+    place = place_in_lab(x, y, robot)
     print(
-        f"end: ({x:.3f}, {y:.3f}) l, heading {math.degrees(math.remainder(heading, math.tau)):.1f} degrees; "
-        f"from the goal {off:.1g} l and {math.degrees(turned):.1g} degrees as predicted"
+        f"end: {place}, heading {math.degrees(math.remainder(heading, math.tau)):.1f} degrees; "
+        f"from the goal {in_lab(off, robot)} and {math.degrees(turned):.1g} degrees as predicted"
     )
     if not goal_plan.free_space.empty:
-        print(f"margin {goal_plan.margin:.3f} l around the body; predicted clearance {goal_plan.clearance:.3f} l")
+        margin, clearance = (in_lab(value, robot) for value in (goal_plan.margin, goal_plan.clearance))
+        print(f"margin {margin} around the body; predicted clearance {clearance}")
     print(f"-> {', '.join(map(str, paths))}")
 
 
@@ -191,15 +199,16 @@ def _track(arguments: Namespace) -> None:
 
 def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     """Make the plan that the command asks for, and return it with the request."""
-    from planner.paths.units import describe
     from planner.planning.plan import make_plan
     from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import read_knowledge
+    from planner.vehicle.dwell_choice import dwells_for
     from planner.vehicle.tracked_point import tracked_vehicle
+    from planner.vehicle.zigzag import zigzag
     from sim.inputs import load_robot
 
     robot = load_robot(arguments.robot)
-    path = _path(arguments, robot)
+    path, unit_known = _path(arguments, robot)
     print(f"path: {describe(path, robot)}")
     request = PlanRequest(
         point=arguments.point,
@@ -212,6 +221,10 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     )
     knowledge = read_knowledge(arguments.robot)
     tracked = tracked_vehicle(robot, _table(arguments, robot, knowledge), request.point, knowledge)
+    if not unit_known:
+        dwell = dwells_for(tracked.vehicle, request.objective, request.least_dwell(robot))[0]
+        speed = zigzag(tracked.vehicle, dwell, tracked.offset).speed
+        check_unstated_unit(path, robot, tracked.vehicle.turn_radius, speed)
     with _progress() as progress:
         return make_plan(path, tracked, request, progress), request
 
@@ -233,8 +246,8 @@ def _progress() -> Iterator[Callable[[float], object]]:
         yield lambda share: bar.update(100 * share - bar.n)
 
 
-def _path(arguments: Namespace, robot: Robot) -> Path2D:
-    """Make the path that the command asks for, in tail lengths."""
+def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, bool]:
+    """Make the path that the command asks for, in tail lengths, and say whether it has a unit."""
     from planner.paths.path import circle, polygon, smoothed
     from planner.paths.path_files import Drawing, read_path
 
@@ -250,6 +263,7 @@ def _path(arguments: Namespace, robot: Robot) -> Path2D:
     else:
         closed = True if arguments.closed else None
         drawing = read_path(arguments.path, closed=closed, shape=arguments.shape)
+    unit_known = drawing.unit is not None or arguments.unit is not None
     if drawing.unit is None:
         unit = in_tails(arguments.unit or "l", robot)
     elif arguments.unit is None:
@@ -265,17 +279,17 @@ def _path(arguments: Namespace, robot: Robot) -> Path2D:
         raise InputError(f"--scale {arguments.scale}; give a number above 0")
     path = drawing.path.scaled(scale)
     if arguments.smooth is None:
-        return path
+        return path, unit_known
     smooth, moved = smoothed(path, arguments.smooth)
-    print(f"smoothed over {arguments.smooth:g} l, which moves the path by up to {moved:.3g} l")
-    return smooth
+    print(f"smoothed over {in_lab(arguments.smooth, robot)}, which moves the path by up to {in_lab(moved, robot)}")
+    return smooth, unit_known
 
 
 @program.command(
     "check",
     "tracking error of a replayed track",
     argument("plan", help="plan.json"),
-    argument("track", help="CSV written by softflagella replay"),
+    argument("track", help="table written by softflagella replay, or with time_s, x_cm, y_cm, heading_deg"),
     out("overlay picture, PNG", default=None),
 )
 def _check(arguments: Namespace) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from sim.arrays import Floats
 from sim.effects import catalogue, check_effects, check_size
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.files import write_text
 from sim.io.reading import read_toml
 from sim.model.correction import read_correction
@@ -68,6 +68,11 @@ def load_robot(source: str | Path) -> Robot:
     path = Path(source)
     if not path.exists():
         raise InputError(f"no robot {str(source)!r}; give a robot.toml or one of {', '.join(PRESETS)}")
+    with naming(path):
+        return _read_robot(path)
+
+
+def _read_robot(path: Path) -> Robot:
     tables = read_toml(path)
     name = tables.pop("name", path.stem)
     tables.pop("calibration", None)  # read by planner.vehicle.calibration_table

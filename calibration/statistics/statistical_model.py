@@ -64,13 +64,13 @@ class Parameter:
 class Runs:
     """Measured runs, ready to be compared: n runs of k outputs."""
 
-    outputs: tuple[str, ...]
+    outputs: tuple[str, ...]  # (k,) names
     y: Floats  # (n, k), scaled so that errors are relative
     condition: Integers  # (n,) repeats share a number
     session: Integers  # (n,) 0, 1, …: runs made together
-    session_names: tuple[str, ...]
+    session_names: tuple[str, ...]  # by number
     inputs: Floats  # (n, q) what was set or noted, scaled (some by logarithm)
-    input_names: tuple[str, ...]
+    input_names: tuple[str, ...]  # (q,)
     rows: Integers  # (n,) numbers in the table, from 1
     excluded: tuple[str, ...]  # "row 7: …"
     caveats: tuple[str, ...]  # what these runs cannot show, in words

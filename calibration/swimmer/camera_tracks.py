@@ -21,14 +21,15 @@ from calibration.swimmer.measured_table import INPUTS, OUTPUTS, SYNONYMS
 from calibration.swimmer.possible_runs import check_factor
 from calibration.swimmer.track_fit import TrackedRun, TrackFit, fit_track
 from sim.arrays import Floats
-from sim.io.errors import InputError
-from sim.io.quantities import convert_columns
+from sim.io.errors import InputError, naming
+from sim.io.quantities import convert_columns, numbers_of
 from sim.io.tables import read_table
 from sim.model.robot import Robot
 from sim.motion.batches import steady_columns
 
 COLUMNS = ("run", "time_s", "x_cm", "y_cm", "heading_deg")
 _SYNONYMS = {"t": "time"}
+_LARGEST = 1e9  # of a sample
 _FEWEST = 12  # samples that a run needs
 _ALIKE = 1.3  # ratio of the angles by which path and heading turn
 
@@ -79,20 +80,39 @@ def measure_tracks(
     table, place = (runs, "the runs") if isinstance(runs, pd.DataFrame) else (read_table(runs), str(runs))
     samples, converted = convert_columns(samples, COLUMNS, where, _SYNONYMS)
     table, renamed = convert_columns(table, INPUTS, place, SYNONYMS)
+    with naming(runs):
+        _check_runs(table)
+    with naming(tracks):
+        measured = _measured(samples, table, y_down, robot)
+    return measured._replace(converted=(*converted, *renamed))
+
+
+def _check_runs(table: pd.DataFrame) -> None:
+    """Refuse runs that have no names, or that are there twice."""
+    if "run" not in table:
+        raise InputError("the runs have no column 'run' that says which track is theirs")
+    twice = table["run"][table["run"].duplicated()]
+    if len(twice):
+        raise InputError(f"run {str(twice.iloc[0])[:40]} is there twice; give one row for each run")
+
+
+def _measured(samples: pd.DataFrame, table: pd.DataFrame, y_down: bool, robot: Robot | None) -> MeasuredTracks:
     for name in COLUMNS:
         if name not in samples:
             raise InputError(f"the tracks have no column {name!r}; they need {', '.join(COLUMNS)}")
-    if "run" not in table:
-        raise InputError("the runs have no column 'run' that says which track is theirs")
+    values = pd.DataFrame({name: numbers_of(samples[name]) for name in COLUMNS[1:]})
+    values[~(values.abs() < _LARGEST)] = np.nan
+    of_run = dict(list(values.groupby(samples["run"], sort=False)))
+    nothing = values.iloc[:0]
     aside: list[str] = []
     tracked: list[TrackedRun] = []
     fitted: list[Track] = []
     for run in table["run"]:
-        track = samples[samples["run"] == run][list(COLUMNS[1:])].apply(pd.to_numeric, errors="coerce")
-        bad = int((~np.isfinite(track.to_numpy())).any(axis=1).sum())
-        if bad:
-            aside.append(f"run {run}: {bad} samples with a value that is not a number")
-        track = track[np.isfinite(track.to_numpy()).all(axis=1)].sort_values("time_s")
+        track = of_run.get(run, nothing)
+        known_samples = track.notna().all(axis=1)
+        if not known_samples.all():
+            aside.append(f"run {run}: {int((~known_samples).sum())} samples with a value that is not a number")
+        track = track[known_samples].sort_values("time_s")
         if len(track) < _FEWEST:
             aside.append(f"run {run}: {len(track)} samples; a track needs at least {_FEWEST}")
             tracked.append(TrackedRun())
@@ -100,8 +120,11 @@ def measure_tracks(
         time, x, y, heading = (track[c].to_numpy(dtype=float) for c in COLUMNS[1:])
         _check_radians(run, x, y, heading)
         side = -1.0 if y_down else 1.0
-        fit = fit_track(time, x, side * y, side * heading)
-        tracked.append(fit.result)
+        fit = _fitted(time, x, side * y, side * heading)
+        tracked.append(TrackedRun() if fit is None else fit.result)
+        if fit is None:
+            aside.append(f"run {run}: neither a circle nor a line fits its samples")
+            continue
         fitted.append(Track(run, x, side * y, fit))
     columns = pd.DataFrame([asdict(p) for p in tracked], index=table.index)
     known = [c for c in columns if columns[c].notna().any()]
@@ -110,7 +133,19 @@ def measure_tracks(
     _check_sides(table, columns, y_down)
     if robot is not None:
         _check_motion(robot, table, columns)
-    return MeasuredTracks(pd.concat([table, columns[known]], axis=1), aside, fitted, (*converted, *renamed))
+    return MeasuredTracks(pd.concat([table, columns[known]], axis=1), aside, fitted, ())
+
+
+def _fitted(time: Floats, x: Floats, y: Floats, heading_deg: Floats) -> TrackFit | None:
+    """Fit a track; None where it gives no speed, as samples of one time or one place do."""
+    if not np.ptp(time) > 1e-9 * np.abs(time).max():
+        return None
+    try:
+        with np.errstate(all="ignore"):
+            fit = fit_track(time, x, y, heading_deg)
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError):
+        return None
+    return fit if math.isfinite(fit.result.v_cm_s) and math.isfinite(fit.result.theta_deg) else None
 
 
 def _check_radians(run: object, x: Floats, y: Floats, heading_deg: Floats) -> None:

@@ -31,8 +31,8 @@ import pandas as pd
 from calibration.statistics.statistical_model import Runs, repeat_covariance
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, TACHOMETER
 from sim.arrays import Floats, Integers
-from sim.io.errors import InputError
-from sim.io.quantities import convert_columns
+from sim.io.errors import InputError, naming
+from sim.io.quantities import convert_columns, numbers_of
 from sim.io.tables import read_table
 
 _RPM = 2 * math.pi / 60
@@ -74,6 +74,7 @@ KNOWN_COLUMNS = {
     *_ERRORS,
     *_SIGMAS,
 }
+_LARGEST = 1e9  # of a value
 _FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
 _OWN = 1e-3  # share of an output's scatter that must be independent of the other outputs
 
@@ -97,6 +98,11 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
     Raises:
         InputError: columns are missing or misspelt, or too few runs remain.
     """
+    with naming(source):
+        return _read(source)
+
+
+def _read(source: str | Path | pd.DataFrame) -> Measurements:
     table, where = (source, "the table") if isinstance(source, pd.DataFrame) else (read_table(source), str(source))
     outputs_columns = (column for column, _, _ in OUTPUTS.values())
     table, converted = convert_columns(table, (*INPUTS, *outputs_columns, *_NOTED, *_SIGMAS), where, SYNONYMS)
@@ -114,7 +120,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
             "the table needs at least two outputs, one of them omega_yr_rad_s, R_yr_cm, theta_deg or v_cm_s: "
             "the spins alone do not tell the coefficients apart"
         )
-    numbers = table.drop(columns="session", errors="ignore").apply(pd.to_numeric, errors="coerce")
+    numbers = table.drop(columns="session", errors="ignore").apply(numbers_of)
     reasons = _reasons(table, numbers, outputs)
     keep = np.array([not r for r in reasons])
     aside = tuple(f"row {i + 1}: {r}" for i, r in enumerate(reasons) if r)
@@ -127,7 +133,7 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
         if "session" in table
         else "N = " + good["N"].astype(int).astype(str)
     )
-    condition = good.groupby(list(INPUTS), sort=True).ngroup().to_numpy()
+    condition: Integers = np.asarray(good.groupby(list(INPUTS), sort=True).ngroup(), dtype=np.int64)
     session_names, session = np.unique(names.to_numpy(dtype=str), return_inverse=True)
     repeats = len(good) - len(np.unique(condition))
     if repeats < _FEWEST_REPEATS:
@@ -242,7 +248,7 @@ def _reasons(table: pd.DataFrame, numbers: pd.DataFrame, outputs: tuple[str, ...
     """Say why each row cannot be used; empty where it can."""
     reasons = [""] * len(table)
     used = (*INPUTS, *(OUTPUTS[name][0] for name in outputs))
-    values = {column: numbers[column].to_numpy(dtype=float) for column in used}
+    values = {column: numbers[column].where(numbers[column].abs() < _LARGEST).to_numpy() for column in used}
     positive = [column for column in ("N", "l_cm", "R_yr_cm", "theta_deg", "v_cm_s") if column in values]
     for column, bad, fault in (
         *((column, ~np.isfinite(value), "is not a finite number") for column, value in values.items()),

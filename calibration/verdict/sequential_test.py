@@ -53,14 +53,20 @@ class Explanation:
 
     @staticmethod
     def read(record: dict[str, Any]) -> Explanation:
-        """Read it from verdict.json."""
-        return Explanation(
-            record["title"],
-            record["parameters"],
-            np.array(record["covariance"]),
-            Noise(np.array(record["noise_of_a_run"]), record["share_of_sessions"]),
-            tuple(record["outputs"]),
-        )
+        """Read it from verdict.json.
+
+        Raises:
+            ValueError, TypeError, KeyError, AttributeError, OverflowError: it is none.
+        """
+        parameters = {str(name): float(value) for name, value in record["parameters"].items()}
+        covariance, run = (np.array(record[name], dtype=float) for name in ("covariance", "noise_of_a_run"))
+        outputs, share = tuple(map(str, record["outputs"])), float(record["share_of_sessions"])
+        numbers = np.concatenate([covariance.ravel(), run.ravel(), [share, *parameters.values()]])
+        if covariance.shape != (len(parameters),) * 2 or run.shape != (len(outputs),) * 2:
+            raise ValueError
+        if not np.isfinite(numbers).all():
+            raise ValueError
+        return Explanation(str(record["title"]), parameters, covariance, Noise(run, share), outputs)
 
 
 @dataclass(frozen=True)
@@ -88,8 +94,9 @@ def read_explanations(path: str | Path) -> tuple[list[Explanation], set[str]]:
     if not isinstance(record, dict) or not record.get("explanations"):
         raise InputError(f"{path}: this verdict has no two explanations between which new runs could decide")
     try:
-        return [Explanation.read(explanation) for explanation in record["explanations"]], set(record["sessions"])
-    except (KeyError, TypeError, ValueError):
+        explanations = [Explanation.read(explanation) for explanation in record["explanations"]]
+        return explanations, set(map(str, record["sessions"]))
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         raise InputError(f"{path} is no verdict.json of this version: calibrate the table again") from None
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import pyarrow as pa
 
 from dataset.report.data_card import write_card
-from dataset.rows.design import SweepDesign
+from dataset.rows.design import SweepDesign, checked_design
 from dataset.rows.schema import schema
 from dataset.storage.data_set import (
     CARD,
@@ -101,9 +101,12 @@ class SweepFolder:
         if all(stored[name] == value for name, value in self._sweep.items()):
             return
         check_version(self.storage, stored["code"], self.code)
+        _checked(self.storage, stored)
         theirs, ours = stored["config"], self.config
         if theirs["seed"] != ours["seed"]:
             raise self._refusal(f"rows of another configuration: seed {theirs['seed']} there, {ours['seed']} here")
+        if theirs.get("robot") != ours.get("robot"):
+            raise self._refusal("rows of another robot")
         for name in sorted({*theirs["inputs"], *ours["inputs"]}):
             axes = theirs["inputs"].get(name), ours["inputs"].get(name)
             if axes[0] != axes[1]:
@@ -252,7 +255,7 @@ def load_sweep(storage: Storage, *, same_version: bool = False) -> tuple[SweepDe
     sweep = _loaded(storage)
     if same_version:
         check_version(storage, sweep["code"])
-    return SweepDesign.from_config(sweep["config"], 1), sweep["rows_by"]
+    return _checked(storage, sweep), sweep["rows_by"]
 
 
 def _published(stored: Stored, rows: int) -> list[Shard]:
@@ -263,7 +266,8 @@ def _published(stored: Stored, rows: int) -> list[Shard]:
 def _loaded(storage: Storage) -> dict[str, Any]:
     try:
         sweep = stored_json(storage, SWEEP)
-        sound = sweep["key"] == sweep_key(sweep["config"], sweep["code"], sweep["rows_by"])
+        texts = isinstance(sweep["code"], str) and isinstance(sweep["rows_by"], str)
+        sound = texts and sweep["key"] == sweep_key(sweep["config"], sweep["code"], sweep["rows_by"])
     except (ValueError, KeyError, TypeError):
         sound = False
     if not sound:
@@ -271,6 +275,15 @@ def _loaded(storage: Storage) -> dict[str, Any]:
             f"{storage.path(SWEEP)} has been edited or is damaged; give another folder or remove this one"
         )
     return dict(sweep)
+
+
+def _checked(storage: Storage, sweep: dict[str, Any]) -> SweepDesign:
+    """Make the design of a sweep.json, which anybody may have written."""
+    config, path = sweep["config"], storage.path(SWEEP)
+    if not isinstance(config, dict):
+        raise InputError(f"{path} has no table of inputs; give another folder or remove this one")
+    checked_design({**config, "rows": 1}, path)
+    return SweepDesign.from_config(config, 1)  # to the letter, as the key has it
 
 
 def _text(storage: Storage, name: str) -> str:

@@ -73,7 +73,7 @@ def _check_batch(address: str, design: SweepDesign, batch: pa.RecordBatch, start
 
 def _check_again(address: str, design: SweepDesign, stored: pa.Table, chosen: np.ndarray) -> None:
     """Simulate stored rows again and compare all bits."""
-    points = {name: stored[name].to_numpy().astype(float) for name in design.axes}
+    points = {name: stored[name].to_numpy().astype(float) for name in design.columns}
     points[HISTORY] = stored[HISTORY].to_numpy()
     again_columns = call_in_worker(simulate_in_worker, points, design.sensitivities)
     again = arrow_table(
@@ -99,7 +99,7 @@ def _check_stepped(address: str, design: SweepDesign, stored: pd.DataFrame) -> f
     good = stored[stored["converged"]]
     if good.empty:
         return 0.0
-    again = stepped_columns({name: good[name].to_numpy(dtype=float) for name in design.axes}, title="")
+    again = stepped_columns({name: good[name].to_numpy(dtype=float) for name in design.columns}, title="")
     worst = max(
         _largest_difference(good, again, _SPINS) / _SPIN_ERROR,
         _largest_difference(good, again, _OTHERS) / _OTHER_ERROR,

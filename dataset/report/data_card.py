@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from dataset.rows.design import SweepDesign
 from dataset.rows.schema import COST
 from dataset.storage.data_set import CARD, batches, read_manifest
 from dataset.storage.shards import plain
@@ -24,7 +25,7 @@ _SPEEDS = 4  # regions of ω̄
 def write_card(storage: Storage) -> None:
     """Write the card of a finished data set."""
     manifest = read_manifest(storage)
-    inputs = manifest["config"]["inputs"]
+    inputs = SweepDesign.from_config(manifest["config"], 1).ranges()
     statistics = _Statistics(inputs)
     for batch in batches(storage, [*inputs, *({"N", "omega_bar"} - set(inputs)), "failed", "reason", COST]):
         statistics.add({name: plain(batch[name]) for name in batch.schema.names})

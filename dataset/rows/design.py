@@ -4,12 +4,13 @@ The design is a scrambled Sobol sequence over the inputs of `sweep.toml`, of low
 projection is covered evenly. A row is an index of that sequence. Its robot depends on the seed, the inputs and the
 index, not on the number of rows: a longer sweep begins with the shorter one. A log scale spreads rows evenly over
 ratios; an integer scale gives each whole number of the range the same share; with `both_directions` half of the
-robots turn their motor the other way.
+robots turn their motor the other way. With a robot the inputs are its numbers (`dataset.rows.robot_inputs`).
 Source: Sobol (1967); scrambling: Owen (1998), as in scipy.stats.qmc.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,14 +19,23 @@ from typing import Any
 
 import numpy as np
 
+from dataset.rows.robot_inputs import (
+    FIELDS,
+    WITH_UNIT,
+    column_names,
+    converted,
+    input_of_robot,
+    robot_columns,
+    robot_of_sweep,
+)
 from sim.arrays import Floats, Integers
 from sim.effects import catalogue
 from sim.inputs import check_columns
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.reading import read_toml
 from sim.model.groups import DWELL, GROUP_COLUMNS, MOST_TAILS, OPTIONAL_COLUMNS
 
-_ENTRIES = ("rows", "seed", "history_every", "sensitivities", "inputs")
+_ENTRIES = ("robot", "rows", "seed", "history_every", "sensitivities", "inputs")
 _SCALES = ("linear", "log", "integer")
 SWEEP_TOML = Path(__file__).parents[1] / "sweep.toml"  # the default sweep
 MOST_ROWS = 2**30  # points of the sequence in double precision
@@ -72,26 +82,47 @@ class SweepDesign:
     seed: int
     history_every: int = 4  # one block of HISTORY_BLOCK rows in so many has them; 0: none
     sensitivities: bool = False  # derivatives of the steady motion in the inputs, as columns
+    robot: dict[str, Any] | None = None  # fields of `Robot` in SI units; then axes are fields, too, and effects
 
     @staticmethod
     def from_config(config: Mapping[str, Any], rows: int) -> SweepDesign:
         """Return the design that `config` describes."""
         axes = {
-            name: Axis(spec["range"][0], spec["range"][1], spec["scale"], spec.get("both_directions", False))
+            name: Axis(
+                spec["range"][0], spec["range"][1], spec.get("scale", "linear"), spec.get("both_directions", False)
+            )
             for name, spec in config["inputs"].items()
         }
-        return SweepDesign(axes, rows, config["seed"], config["history_every"], config.get("sensitivities", False))
+        seed, every = config.get("seed", 0), config.get("history_every", 4)
+        return SweepDesign(axes, rows, seed, every, config.get("sensitivities", False), config.get("robot"))
 
     def config(self) -> dict[str, Any]:
         """Return what determines the robot of each index, JSON-like: all but the number of rows."""
         inputs = {name: axis.config() for name, axis in self.axes.items()}
         extra = {"history_every": self.history_every, "sensitivities": self.sensitivities}
-        return {"seed": self.seed, **extra, "inputs": inputs}
+        around = {} if self.robot is None else {"robot": self.robot}
+        return {"seed": self.seed, **extra, **around, "inputs": inputs}
+
+    @property
+    def columns(self) -> list[str]:
+        """The columns of the robots."""
+        return list(self.axes) if self.robot is None else column_names(self.robot, self.axes)
 
     @property
     def effects(self) -> list[str]:
-        """The effects among the inputs, in alphabetical order."""
-        return sorted(set(self.axes) & set(catalogue()))
+        """The effects among the columns, in alphabetical order."""
+        return sorted(set(self.columns) & set(catalogue()))
+
+    def ranges(self) -> dict[str, dict[str, Any]]:
+        """Return range and scale of each column, as in sweep.toml; around a robot, what its corners span."""
+        if self.robot is None:
+            return {name: axis.config() for name, axis in self.axes.items()}
+        mirrored = {"both_directions": True} if any(axis.both_directions for axis in self.axes.values()) else {}
+        extra: dict[str, dict[str, Any]] = {"N": {"scale": "integer"}, "omega_bar": {"scale": "log", **mirrored}}
+        return {
+            name: {"range": [float(values.min()), float(values.max())], "scale": "linear", **extra.get(name, {})}
+            for name, values in _corners(self.axes, self.robot).items()
+        }
 
     def indices(self, start: int = 0, stop: int | None = None) -> Integers:
         """Return the numbers of the rows `start` … `stop` − 1; by default all `rows`."""
@@ -108,8 +139,9 @@ class SweepDesign:
             sampler.fast_forward(start)
         first = 0 if start else min(1, rows)  # alone: scipy warns of a first draw that is no power of two
         share = np.concatenate([sampler.random(count) for count in (first, rows - first)])
-        columns = {name: self.axes[name].at(np.ascontiguousarray(share[:, i])) for i, name in enumerate(names)}
-        return {name: columns[name] for name in self.axes}
+        shares = {name: np.ascontiguousarray(share[:, i]) for i, name in enumerate(names)}
+        columns = {name: axis.at(shares[name]) for name, axis in self.axes.items()}
+        return columns if self.robot is None else robot_columns(self.robot, columns)
 
     def history(self, start: int = 0, stop: int | None = None) -> np.ndarray:
         """Return whether memory and rest are simulated for the robots in the rows `start` … `stop` − 1.
@@ -126,7 +158,7 @@ class SweepDesign:
 
 def _order() -> tuple[str, ...]:
     """Return all inputs in the order of the sequence's dimensions, whatever the order in sweep.toml."""
-    return (*GROUP_COLUMNS, *OPTIONAL_COLUMNS, *catalogue())
+    return (*GROUP_COLUMNS, *OPTIONAL_COLUMNS, "tails", *WITH_UNIT, *catalogue())
 
 
 def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
@@ -135,40 +167,83 @@ def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
     Raises:
         InputError: an input is missing or unknown, or its range contains impossible robots.
     """
-    content = read_toml(path)
+    with naming(path):
+        content = read_toml(path)
+        if not isinstance(content.get("robot", ""), str):
+            raise InputError(f"{path}: robot = {content['robot']!r}; give the name of a robot.toml or of a preset")
+        return checked_design(content, str(path))
+
+
+def checked_design(content: Mapping[str, Any], path: str) -> SweepDesign:
+    """Make the design of the content of a sweep.toml.
+
+    Args:
+        content: the entries. In a sweep.json the robot is a table of its fields in SI units, inputs are fields.
+        path: name of the file, for messages.
+
+    Raises:
+        InputError: an entry is missing, unknown or impossible.
+    """
     for name in set(content) - set(_ENTRIES):
         raise InputError(f"{path}: unknown entry {name!r}; allowed are {', '.join(_ENTRIES)}")
     inputs = content.get("inputs", {})
     if not isinstance(inputs, dict):
         raise InputError(f"{path}: inputs = {inputs!r}; write a table [inputs]")
-    for name in inputs:
-        if name == DWELL:
-            raise InputError(f"{path}: {name} is no longer an input, rows hold all dwells; remove the line")
-        if name not in _order():
-            raise InputError(f"{path}: unknown input {name!r}; allowed are {', '.join(sorted(_order()))}")
-    for name in GROUP_COLUMNS:
-        if name not in inputs:
-            raise InputError(f"{path}: missing input {name!r} in [inputs]")
-    axes = {name: _axis(str(path), name, inputs[name]) for name in _order() if name in inputs}
-    _check_ends(str(path), axes)
+    try:
+        robot = robot_of_sweep(content["robot"], Path(path).parent) if "robot" in content else None
+        read = _inputs(inputs) if robot is None else _inputs_of_robot(inputs, isinstance(content["robot"], dict))
+    except InputError as refusal:
+        raise InputError(f"{path}: {refusal}") from None
+    axes = {name: _axis(path, *read[name]) for name in _order() if name in read}
+    _check_ends(path, axes, robot)
     seed = content.get("seed", 0)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise InputError(f"{path}: seed = {seed!r}; give a whole number from 0")
     every = content.get("history_every", 4)
-    if not isinstance(every, int) or isinstance(every, bool) or every < 0:
-        raise InputError(f"{path}: history_every = {every!r}; give a whole number, 0 for none")
+    if not isinstance(every, int) or isinstance(every, bool) or not 0 <= every <= MOST_ROWS:
+        raise InputError(f"{path}: history_every = {every!r}; give a whole number to {MOST_ROWS}, 0 for none")
     slopes = content.get("sensitivities", False)
     if not isinstance(slopes, bool):
         raise InputError(f"{path}: sensitivities = {slopes!r}; give true or false")
-    return SweepDesign(axes, _check_rows(content.get("rows", 1024)), seed, every, slopes)
+    return SweepDesign(axes, _check_rows(content.get("rows", 1024)), seed, every, slopes, robot)
+
+
+def _inputs(inputs: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
+    """Check the names of dimensionless inputs; return name and entry of each."""
+    allowed = {*GROUP_COLUMNS, *OPTIONAL_COLUMNS, *catalogue()}
+    for name in inputs:
+        if name == DWELL:
+            raise InputError(f"{name} is no longer an input, rows hold all dwells; remove the line")
+        if name not in allowed:
+            raise InputError(
+                f"unknown input {name!r}; allowed are {', '.join(sorted(allowed))}; "
+                "with an entry robot, the numbers of a robot"
+            )
+    for name in GROUP_COLUMNS:
+        if name not in inputs:
+            raise InputError(f"missing input {name!r} in [inputs]")
+    return {name: (name, spec) for name, spec in inputs.items()}
+
+
+def _inputs_of_robot(inputs: Mapping[str, Any], fields_in_si: bool) -> dict[str, tuple[str, Any]]:
+    """Convert the inputs of a sweep around a robot to SI units; return name and entry by field or effect."""
+    if not inputs:
+        raise InputError("no inputs; give at least one in a table [inputs], such as tail_length_cm")
+    fields: dict[str, tuple[str, Any]] = {}
+    for name, spec in inputs.items():
+        field, unit = (name, "") if fields_in_si and name in FIELDS else input_of_robot(name)
+        if field in fields:
+            raise InputError(f"{fields[field][0]} and {name} are the same input; drop one")
+        fields[field] = (name, converted(spec, unit))
+    return fields
 
 
 def _axis(path: str, name: str, spec: Any) -> Axis:
     try:
-        low, high = (float(v) for v in spec["range"])
+        low, high = (float(v) for v in _list(spec["range"]))
         scale, mirrored = spec.get("scale", "linear"), spec.get("both_directions", False)
         unknown = set(spec) - {"range", "scale", "both_directions"}
-    except (KeyError, TypeError, ValueError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         raise InputError(
             f'{path}: {name} = {spec!r}; write {name} = {{ range = [low, high], scale = "linear" }}'
         ) from None
@@ -176,8 +251,10 @@ def _axis(path: str, name: str, spec: Any) -> Axis:
         raise InputError(f"{path}: {name} has an entry {key!r}; allowed are range, scale and both_directions")
     if scale not in _SCALES:
         raise InputError(f"{path}: {name} has scale {scale!r}; allowed are {', '.join(_SCALES)}")
-    if not isinstance(mirrored, bool) or (mirrored and name != "omega_bar"):
-        raise InputError(f"{path}: {name} has both_directions = {mirrored!r}; only omega_bar takes true or false")
+    if not isinstance(mirrored, bool) or (mirrored and not name.startswith(("omega_bar", "motor_speed"))):
+        raise InputError(
+            f"{path}: {name} has both_directions = {mirrored!r}; only the motor speed takes true or false"
+        )
     if not (math.isfinite(low) and math.isfinite(high) and low <= high):
         raise InputError(f"{path}: {name} has range [{low:g}, {high:g}]; it must be finite and ordered")
     if low <= 0 and name not in catalogue():
@@ -189,8 +266,17 @@ def _axis(path: str, name: str, spec: Any) -> Axis:
     return Axis(low, high, "integer" if name == "N" else scale, mirrored)
 
 
-def _check_ends(path: str, axes: dict[str, Axis]) -> None:
+def _list(value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        raise TypeError
+    return value
+
+
+def _check_ends(path: str, axes: dict[str, Axis], robot: dict[str, Any] | None) -> None:
     """Reject ranges with robots that cannot be simulated."""
+    if robot is not None:
+        _check_corners(path, axes, robot)
+        return
     for name, (least, most) in _LIMITS.items():
         if name in axes and not least <= axes[name].low <= axes[name].high <= most:
             a = axes[name]
@@ -202,6 +288,26 @@ def _check_ends(path: str, axes: dict[str, Axis]) -> None:
             check_columns({name: np.array([getattr(a, end)]) for name, a in axes.items()})
         except InputError as refusal:
             raise InputError(f"{path}: the {end} ends of the ranges make an impossible robot: {refusal}") from None
+
+
+def _check_corners(path: str, axes: dict[str, Axis], robot: dict[str, Any]) -> None:
+    """Reject ranges around a robot: every group is largest and smallest at some corner of them."""
+    try:
+        columns = check_columns(_corners(axes, robot))
+    except InputError as refusal:
+        raise InputError(f"{path}: the ends of the ranges make an impossible robot: {refusal}") from None
+    for name, (least, most) in _LIMITS.items():
+        low, high = float(columns[name].min()), float(columns[name].max())
+        if not least <= low <= high <= most:
+            raise InputError(
+                f"{path}: the ranges give {name} from {low:.3g} to {high:.3g}; a sweep takes {least:g} to {most:g}"
+            )
+
+
+def _corners(axes: dict[str, Axis], robot: dict[str, Any]) -> dict[str, Floats]:
+    """Return the columns of the robots at all corners of the ranges."""
+    corners = np.array(list(itertools.product(*((axis.low, axis.high) for axis in axes.values()))))
+    return robot_columns(robot, dict(zip(axes, corners.T, strict=True)))
 
 
 def _check_rows(rows: object) -> int:

@@ -26,6 +26,7 @@ from dataset.rows.schema import schema
 from dataset.rows.version import rows_version
 from dataset.storage.shards import BadShardError, Contents, OtherColumnsError, Shard, shard_name, tables
 from dataset.storage.storage import Storage, open_storage
+from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.io.provenance import fingerprint, provenance
 
@@ -129,7 +130,24 @@ def read_manifest(folder: Storage | str | Path) -> dict[str, Any]:
         raise InputError(f"{path} is not the manifest of a data set of this version; build the data set anew")
     if digest != fingerprint(content):
         raise _damage(storage, f"{path} has been edited: it does not fit its own digest")
+    if not _has_form(content):
+        raise InputError(f"{path} has entries that no build writes; build the data set anew")
     return {**content, "digest": digest}
+
+
+def _has_form(content: dict[str, Any]) -> bool:
+    """Whether the entries of a manifest are there, and of the types that readers expect."""
+    kinds = {"config_hash": str, "code_version": str, "config": dict, "effects": list, "parts": list, "rows": int,
+             "converged": int, "failed": int, "touching": int, "cost_s": int | float, "reasons": dict}  # fmt: skip
+    if not all(isinstance(content.get(name), kind) for name, kind in kinds.items()):
+        return False
+    of_parts = {name: kinds.get(name, int) for name in Contents._fields} | {"sha256": str}
+    return all(
+        isinstance(part, dict)
+        and set(part) == set(of_parts)
+        and all(isinstance(part[name], kind) for name, kind in of_parts.items())
+        for part in content["parts"]
+    ) and all(isinstance(name, str) and name in catalogue() for name in content["effects"])
 
 
 def manifest_parts(manifest: dict[str, Any]) -> list[Contents]:

@@ -10,7 +10,7 @@ from planner.goal.goal_plan import GoalPlan
 from planner.goal.obstacles import Circle, Polygon, Region
 from planner.paths.path_files import read_path
 from planner.paths.units import in_tails
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.files import files_together, write_text
 from sim.model.robot import Robot
 
@@ -43,7 +43,8 @@ def read_region(words: str, unit: str, robot: Robot) -> Region:
         raise InputError(f"{words!r}; write {_SHAPES[shape]}")
     drawing = read_path(words, closed=True)
     unit_length = scale if drawing.unit is None else drawing.unit / robot.tail_length
-    return Polygon.of(drawing.path.scaled(unit_length))
+    with naming(words):
+        return Polygon.of(drawing.path.scaled(unit_length))
 
 
 def write_goal_plan(goal_plan: GoalPlan, folder: str | Path) -> list[Path]:

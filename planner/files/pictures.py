@@ -7,8 +7,10 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from planner.goal.goal_plan import GoalPlan
+from planner.paths.units import in_lab
 from planner.planning.planned import Plan
 from sim.io.files import whole_file
+from sim.io.units import format_time
 
 
 def write_svg(figure: Figure, path: Path, identity: str) -> None:
@@ -22,10 +24,9 @@ def draw_plan(result: Plan) -> Figure:
     figure = Figure(figsize=(6, 6))
     axes = figure.add_subplot()
     result.plot(axes)
-    minutes = result.seconds.sum() / 60
+    rms, stated = (in_lab(error, result.robot) for error in (result.predicted_rms, result.stated_error))
     axes.set_title(
-        f"{result.robot.name}: {len(result.dwells)} dwells, {minutes:.1f} min\n"
-        f"predicted error {result.predicted_rms:.3f} l rms, stated error {result.stated_error:.2f} l",
+        f"{_schedule(result)}\npredicted error {rms} rms, stated error {stated}",
         fontsize=10,
         parse_math=False,
     )
@@ -37,11 +38,12 @@ def draw_goal_plan(goal_plan: GoalPlan) -> Figure:
     """Draw a plan from pose to pose, with what the robot must keep out of."""
     figure = Figure(figsize=(6, 6))
     axes = goal_plan.plot(figure.add_subplot())
-    minutes = goal_plan.plan.seconds.sum() / 60
-    axes.set_title(
-        f"{goal_plan.plan.robot.name}: {len(goal_plan.plan.dwells)} dwells, {minutes:.1f} min\n"
-        f"way {goal_plan.length:.2f} l, stated error {goal_plan.plan.stated_error:.2f} l",
-        fontsize=10,
-    )
+    robot = goal_plan.plan.robot
+    way, stated = in_lab(goal_plan.length, robot), in_lab(goal_plan.plan.stated_error, robot)
+    axes.set_title(f"{_schedule(goal_plan.plan)}\nway {way}, stated error {stated}", fontsize=10, parse_math=False)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, fontsize=8, frameon=False)
     return figure
+
+
+def _schedule(result: Plan) -> str:
+    return f"{result.robot.name}: {len(result.dwells)} dwells, {format_time(float(result.seconds.sum()))}"

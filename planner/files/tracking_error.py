@@ -6,6 +6,7 @@ as given is computed, too. A track holds the head's centre and the heading. The 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,9 +18,13 @@ from planner.paths.distance import distance_to, two_sided
 from planner.planning.picture import REPLAYED, draw_tracks
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.quantities import convert_columns, numbers_of
+from sim.io.units import format_length
 from sim.mechanics import planar
 
+_LARGEST = 1e100  # of a number
 _COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
+_LAB = ("time_s", "x_m", "y_m", "heading_rad")  # or in other units
 
 
 @dataclass(frozen=True)
@@ -40,15 +45,20 @@ class TrackingError:
     raw_largest: float  # distance from the path as given
     missed: float  # largest distance of a point of the path as given from the track
     stated: float  # error that the plan states
-    track: Floats = field(repr=False)  # (K, 2) tracked point
+    track: Floats = field(repr=False)  # (S, 2) tracked point
+    tail_length: float  # of the robot [m]
 
     @property
     def line(self) -> str:
+        """The errors in one sentence, in units of length and in l."""
         verdict = "within" if self.largest <= self.stated else "ABOVE"
+        rms, largest, stated, raw_rms, raw_largest, missed = (
+            f"{format_length(value * self.tail_length)} ({value:.3g} l)"
+            for value in (self.rms, self.largest, self.stated, self.raw_rms, self.raw_largest, self.missed)
+        )
         return (
-            f"tracking error {self.rms:.4f} l rms, {self.largest:.4f} l at most, {verdict} the stated error "
-            f"{self.stated:.3f} l; from the raw path {self.raw_rms:.3f} l rms, {self.raw_largest:.3f} l at most, "
-            f"every point of it within {self.missed:.3f} l"
+            f"tracking error {rms} rms, {largest} at most, {verdict} the stated error {stated}; from the path as "
+            f"drawn {raw_rms} rms, {raw_largest} at most, every point of it within {missed}"
         )
 
 
@@ -57,15 +67,19 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
 
     Args:
         plan: content of plan.json.
-        track: time_bar, x_over_l, y_over_l, heading_rad of the head's centre.
+        track: time_s, x_cm, y_cm, heading_deg of the head's centre, or in other units; or the columns of a replay,
+            time_bar, x_over_l, y_over_l, heading_rad.
+
+    Raises:
+        InputError: a column is missing, or a value is no finite number.
     """
-    for name in _COLUMNS:
-        if name not in track:
-            raise InputError(f"the track has no column {name!r}; it needs {', '.join(_COLUMNS)}")
-    values = {name: track[name].to_numpy(dtype=float) for name in _COLUMNS}
+    track = _in_tails(track, plan["robot"])
+    values = {name: numbers_of(track[name]).to_numpy() for name in _COLUMNS}
     pose = np.stack([values["x_over_l"], values["y_over_l"], values["heading_rad"]], 1)
-    if not np.isfinite(pose).all():
+    if not (np.abs([*pose.T, values["time_bar"]]) < _LARGEST).all():
         raise InputError("the track has a value that is not a finite number; correct the file")
+    if len(pose) < 2 or not np.ptp(values["time_bar"]) > 0:
+        raise InputError("the track has no two times; give a row for each time, in order")
     offset = np.array([plan.get("offset_over_l", 0.0), 0.0, 0.0])
     tracked = planar.compose(pose, offset)[:, :2]
     declared = distance_to(np.array(plan["reference"]), tracked)
@@ -80,11 +94,35 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
         missed=float(two_sided(np.array(plan["raw_path"]), tracked)[0]),
         stated=float(plan["stated_error_over_l"]),
         track=tracked,
+        tail_length=float(plan["robot"]["tail_length_m"]),
+    )
+
+
+def _in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFrame:
+    """Return a track with the columns of a replay."""
+    if set(_COLUMNS) <= set(track):
+        return track
+    lab = convert_columns(track, _LAB, "the track").table
+    for name in _LAB:
+        if name not in lab:
+            raise InputError(
+                f"the track has no column {name!r}; it needs time_s, x_cm, y_cm and heading_deg, or in other units"
+            )
+    values = {name: pd.to_numeric(lab[name], errors="coerce") for name in _LAB}
+    return pd.DataFrame(
+        {
+            "time_bar": values["time_s"] / robot["time_scale_s"],
+            "x_over_l": values["x_m"] / robot["tail_length_m"],
+            "y_over_l": values["y_m"] / robot["tail_length_m"],
+            "heading_rad": values["heading_rad"],
+        }
     )
 
 
 def draw_overlay(axes: Axes, plan: dict[str, Any], error: TrackingError, title: str) -> None:
-    """Draw the replayed track over the declared and the raw path."""
-    draw_tracks(axes, np.array(plan["raw_path"]), np.array(plan["reference"]), error.stated)
-    axes.plot(*error.track.T, color=REPLAYED, lw=0.8, label="replayed in the simulator")
-    axes.set_title(f"{title}\n{error.rms:.3f} l rms, {error.largest:.3f} l at most", fontsize=10, parse_math=False)
+    """Draw a track over the declared and the raw path, on axes in cm."""
+    length = error.tail_length
+    draw_tracks(axes, np.array(plan["raw_path"]), np.array(plan["reference"]), error.stated, length)
+    axes.plot(*(100 * length * error.track.T), color=REPLAYED, lw=0.8, label="track")
+    rms, largest = format_length(error.rms * length), format_length(error.largest * length)
+    axes.set_title(f"{title}\n{rms} rms, {largest} at most from the declared path", fontsize=10, parse_math=False)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from planner.goal.obstacles import Circle, Footprint, FreeSpace
-from planner.planning.planned import Plan, in_lab
+from planner.paths.units import in_lab
+from planner.planning.planned import Plan
 from sim.io.deprecated import old_attributes
 from sim.io.notebook import as_html
 
@@ -61,7 +62,7 @@ class GoalPlan:
         return as_html(repr(self), self.plot)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the plan, start and goal, and what the robot must keep out of, on axes in l.
+        """Draw the plan, start and goal, and what the robot must keep out of, on axes in cm.
 
         Args:
             ax: default: axes of a new figure.
@@ -69,8 +70,9 @@ class GoalPlan:
         from planner.goal.picture import draw_places, draw_regions  # loads matplotlib
 
         ax = self.plan.plot(ax)
-        draw_regions(ax, self.free_space)
-        draw_places(ax, Footprint.of(self.plan.robot, 0.0), (self.plan.start, self.goal), self.via)
+        length = self.plan.robot.tail_length
+        draw_regions(ax, self.free_space, length)
+        draw_places(ax, Footprint.of(self.plan.robot, 0.0), (self.plan.start, self.goal), self.via, length)
         return ax
 
     def to_frame(self) -> pd.DataFrame:

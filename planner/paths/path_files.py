@@ -11,7 +11,8 @@ import pandas as pd
 from planner.paths.path import Path2D
 from planner.paths.svg_drawing import read_svg
 from sim.arrays import Floats
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
+from sim.io.quantities import numbers_of
 from sim.io.tables import read_table
 from sim.io.units import split, to_si
 
@@ -52,12 +53,13 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
         ...     read_path(file.name).path.points.tolist()
         [[0.0, 0.0], [6.0, 0.0], [6.0, 8.0]]
     """
-    if Path(source).suffix.lower() == ".svg":
-        return Drawing(*read_svg(Path(source), closed, shape))
-    if shape is not None:
-        raise InputError(f"{source} is no SVG, so it has no shape {shape!r}; leave --shape out")
-    points, unit = _read_columns(source)
-    return Drawing(Path2D.of(points, closed=closed), unit)
+    with naming(source):
+        if Path(source).suffix.lower() == ".svg":
+            return Drawing(*read_svg(Path(source), closed, shape))
+        if shape is not None:
+            raise InputError(f"{source} is no SVG, so it has no shape {shape!r}; leave --shape out")
+        points, unit = _read_columns(source)
+        return Drawing(Path2D.of(points, closed=closed), unit)
 
 
 def _read_columns(source: str | Path) -> tuple[Floats, float | None]:
@@ -74,7 +76,7 @@ def _read_columns(source: str | Path) -> tuple[Floats, float | None]:
         units = [unit for unit in (split(name).unit for name in names) if unit]
     if len(names) != 2 or len(units) == 1:
         raise InputError(f"{source}: give x and y, both with a unit (x_mm and y_mm) or both without")
-    points = table[names].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+    points = table[names].apply(numbers_of).to_numpy(dtype=float)
     broken = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(broken):
         raise InputError(f"{source}: x or y of point {broken[0] + 1} is no number; correct the file")

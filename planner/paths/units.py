@@ -1,10 +1,14 @@
-"""Check the size of a path against the robot; reject absurd sizes and suggest the unit that was probably meant."""
+"""Lengths in the units of a laboratory, and paths whose size makes no sense for a robot.
+
+A message gives lengths in mm, cm or m first and in tail lengths l second.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from sim.io.errors import InputError
+from sim.io.units import format_length, format_time
 
 if TYPE_CHECKING:  # the command needs UNITS before it loads NumPy
     from planner.paths.path import Path2D
@@ -13,17 +17,27 @@ if TYPE_CHECKING:  # the command needs UNITS before it loads NumPy
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 LONGEST = 1500.0  # l
 SMALLEST = 0.25  # of the radius of the robot's circle, largest extent of a path
+MOST_CIRCLES = 30.0  # of the robot, across a path whose unit is not stated
+MOST_SECONDS = 4 * 3600.0  # that such a path may take
 _SENSIBLE = (3.0, 300.0)  # length in l
 
 
-def describe(path: Path2D, robot: Robot) -> str:
-    """Describe length and extent of a path, in l and cm."""
-    width, height = extent(path)
+def in_lab(value: float, robot: Robot) -> str:
+    """Write a length given in tail lengths: 3.52 cm (0.32 l)."""
+    return f"{format_length(value * robot.tail_length)} ({value:.3g} l)"
+
+
+def place_in_lab(x: float, y: float, robot: Robot) -> str:
+    """Write a place given in tail lengths: (3.52, 1.1) cm = (0.32, 0.1) l."""
     cm = 100 * robot.tail_length
-    return (
-        f"{path.length:.3g} l ({path.length * cm:.3g} cm) long, {width:.3g} by {height:.3g} l "
-        f"({width * cm:.3g} by {height * cm:.3g} cm)"
-    )
+    return f"({cm * x:.2f}, {cm * y:.2f}) cm = ({x:.3f}, {y:.3f}) l"
+
+
+def describe(path: Path2D, robot: Robot) -> str:
+    """Describe length and extent of a path."""
+    width, height = extent(path)
+    across = [format_length(value * robot.tail_length) for value in (width, height)]
+    return f"{in_lab(path.length, robot)} long, {' by '.join(across)} ({width:.3g} by {height:.3g} l)"
 
 
 def in_tails(unit: str, robot: Robot) -> float:
@@ -49,7 +63,29 @@ def check_size(path: Path2D, robot: Robot, turn_radius: float) -> None:
     if max(extent(path)) < SMALLEST * turn_radius:
         raise InputError(
             f"the path is {describe(path, robot)}: too small, the robot's circle has a radius of "
-            f"{turn_radius:.3g} l{_hint(path, robot)}"
+            f"{in_lab(turn_radius, robot)}{_hint(path, robot)}"
+        )
+
+
+def check_unstated_unit(path: Path2D, robot: Robot, turn_radius: float, speed: float) -> None:
+    """Ask for the unit of a path that is very large if its numbers are tail lengths, which nobody said.
+
+    Args:
+        path: in tail lengths.
+        robot: its tail length and unit of time.
+        turn_radius: of the robot's circle, in l.
+        speed: net speed along a path, in l per unit of time.
+
+    Raises:
+        InputError: the path is more than MOST_CIRCLES circles across, or takes more than MOST_SECONDS.
+    """
+    circles = max(extent(path)) / (2 * turn_radius)
+    seconds = path.length / max(speed, 1e-9) * robot.time_scale
+    if circles > MOST_CIRCLES or seconds > MOST_SECONDS:
+        raise InputError(
+            f"the path is {describe(path, robot)} if its numbers are tail lengths: {circles:.0f} of the robot's "
+            f"circles across, about {format_time(seconds)}; say its unit, --unit l if this is meant"
+            f"{_hint(path, robot)}"
         )
 
 

@@ -21,7 +21,7 @@ FEEDBACK_EVERY = 20  # flips
 class PlanErrors:
     """The predicted track, its distances from the two paths, and what is stated for uncertain robots [l]."""
 
-    track: Floats  # (K, 2): predicted tracked point, several samples a dwell
+    track: Floats  # (S, 2): predicted tracked point, several samples a dwell
     predicted_rms: float  # from the declared path, over time
     predicted_max: float  # largest distance from the declared path
     drawn_rms: float  # from the path as drawn

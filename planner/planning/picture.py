@@ -6,25 +6,37 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from sim.arrays import Floats
+from sim.io.units import format_length
 
 RAW, DECLARED, PREDICTED, REPLAYED = "#b0b0b0", "#1a1a1a", "#2a7fba", "#c8452f"
 
 
-def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float) -> None:
-    """Draw the raw and the declared path with a band of the stated error."""
-    edges = _band(declared, stated)
-    axes.fill(*edges.T, color="#2a7fba", alpha=0.10, lw=0, label=f"stated error {stated:.2f} l")
-    axes.plot(*raw.T, color=RAW, lw=1.0, label="path as given")
-    axes.plot(*declared.T, color=DECLARED, lw=1.2, label="declared")
+def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, tail_length: float) -> None:
+    """Draw the raw and the declared path with a band of the stated error, on axes in cm.
+
+    Args:
+        axes: where to draw.
+        raw, declared: points (n, 2), in l.
+        stated: half the width of the band, in l.
+        tail_length: l in m.
+    """
+    cm = 100 * tail_length
+    edges = cm * _band(declared, stated)
+    axes.fill(
+        *edges.T, color="#2a7fba", alpha=0.10, lw=0, label=f"stated error {format_length(stated * tail_length)}"
+    )
+    axes.plot(*(cm * raw.T), color=RAW, lw=1.0, label="path as given")
+    axes.plot(*(cm * declared.T), color=DECLARED, lw=1.2, label="declared")
     axes.set_aspect("equal")
-    axes.set_xlabel("x / l")
-    axes.set_ylabel("y / l")
+    axes.set_xlabel("x [cm]")
+    axes.set_ylabel("y [cm]")
 
 
-def draw_prediction(axes: Axes, track: Floats) -> None:
-    """Draw the predicted track, and its start as a dot."""
-    axes.plot(*track.T, color=PREDICTED, lw=0.8, label="predicted")
-    axes.plot(*track[0], "o", color=DECLARED, ms=5)
+def draw_prediction(axes: Axes, track: Floats, tail_length: float) -> None:
+    """Draw the predicted track, given in l, and its start as a dot, on axes in cm."""
+    points = 100 * tail_length * track
+    axes.plot(*points.T, color=PREDICTED, lw=0.8, label="predicted")
+    axes.plot(*points[0], "o", color=DECLARED, ms=5)
 
 
 def _band(polyline: Floats, width: float) -> Floats:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.paths.path import Path2D
+from planner.paths.units import in_lab
 from planner.planning.declared_path import Declared
 from planner.planning.errors import FEEDBACK_EVERY, PlanErrors
 from planner.planning.line_of_sight import Guidance
@@ -21,7 +22,7 @@ from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats
 from sim.io.deprecated import old_attributes
 from sim.io.notebook import as_html, given_axes
-from sim.io.units import column_units, format_length, format_time
+from sim.io.units import column_units, format_time
 from sim.model.plan_file import FORMAT
 from sim.model.robot import Robot
 from sim.model.schedule import Schedule
@@ -117,7 +118,7 @@ class Plan:
 
     @property
     def track(self) -> Floats:
-        """Predicted track (K, 2) of the tracked point, several samples a dwell."""
+        """Predicted track (S, 2) of the tracked point, several samples a dwell."""
         return self.errors.track
 
     @property
@@ -161,7 +162,14 @@ class Plan:
         time, length = self.robot.time_scale / swims.time_scale, self.robot.tail_length / swims.tail_length
         x, y, heading = self.start
         start = (x * length, y * length, heading)
-        return Schedule(swims.group_values(), self.first_direction, self.dwells * time, start, swims.time_scale)
+        return Schedule(
+            swims.group_values(),
+            self.first_direction,
+            self.dwells * time,
+            start,
+            swims.time_scale,
+            swims.tail_length,
+        )
 
     def __repr__(self) -> str:
         robot, (x, y, heading) = self.robot, self.start
@@ -186,7 +194,7 @@ class Plan:
         return as_html(repr(self), self.plot)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the drawn, the declared and the predicted path, with the stated error, on axes in l.
+        """Draw the drawn, the declared and the predicted path, with the stated error, on axes in cm.
 
         Args:
             ax: default: axes of a new figure.
@@ -194,8 +202,9 @@ class Plan:
         from planner.planning.picture import draw_prediction, draw_tracks  # loads matplotlib
 
         ax = given_axes(ax)
-        draw_tracks(ax, self.drawn.polyline(), self.reference, self.stated_error)
-        draw_prediction(ax, self.track)
+        length = self.robot.tail_length
+        draw_tracks(ax, self.drawn.polyline(), self.reference, self.stated_error, length)
+        draw_prediction(ax, self.track, length)
         return ax
 
     def to_frame(self) -> pd.DataFrame:
@@ -276,8 +285,3 @@ class Plan:
 
     if not TYPE_CHECKING:
         __getattr__ = old_attributes(_MOVED)
-
-
-def in_lab(tails: float, robot: Robot) -> str:
-    """Write a length in lab units, with tail lengths in brackets."""
-    return f"{format_length(tails * robot.tail_length)} ({tails:.3g} l)"

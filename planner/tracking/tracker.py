@@ -28,8 +28,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from scipy.stats import chi2
 
+from planner.paths.units import in_lab
 from planner.planning.line_of_sight import LineOfSight
-from planner.planning.planned import Plan, in_lab
+from planner.planning.planned import Plan
 from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate
 from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError

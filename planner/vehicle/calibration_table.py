@@ -23,11 +23,12 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.effects import catalogue
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.reading import read_toml
 from sim.model.uncertainty import DEFAULTS
 
 COEFFICIENTS = ("C_t", "C_r", "C_yr")
+_LARGEST = 1e50  # of a covariance
 NUMBERS = tuple(DEFAULTS)  # fields of `Robot` that are not exact
 
 
@@ -54,7 +55,7 @@ class CalibrationKnowledge:
             allowed = ", ".join((*COEFFICIENTS, *NUMBERS))
             raise InputError(f"calibration: unknown name {unknown[0]!r}; give {allowed} or an effect")
         V = self.covariance
-        if V.shape != (len(self.names),) * 2 or not np.isfinite(V).all() or not np.allclose(V, V.T):
+        if V.shape != (len(self.names),) * 2 or not (np.abs(V) < _LARGEST).all() or not np.allclose(V, V.T):
             raise InputError(f"calibration: covariance must be symmetric, {len(self.names)} by {len(self.names)}")
         if len(V) and np.linalg.eigvalsh(V).min() < -1e-9 * np.abs(V).max():
             raise InputError("calibration: covariance has a negative eigenvalue; copy it from the calibration")
@@ -77,9 +78,10 @@ def read_knowledge(path: str | Path) -> CalibrationKnowledge:
         names = tuple(str(name) for name in table.get("names", ()))
         covariance = np.array(table.get("covariance", []), dtype=float).reshape(len(names), len(names))
         current, error = (_pair(table.get(key, (0.0, 0.0))) for key in ("current_m_s", "current_error_m_s"))
-    except (TypeError, ValueError, AttributeError) as broken:
+    except (TypeError, ValueError, AttributeError, OverflowError) as broken:
         raise InputError(f"{path}: [calibration] cannot be read: {broken}") from None
-    return CalibrationKnowledge(names, covariance, current, error)
+    with naming(path):
+        return CalibrationKnowledge(names, covariance, current, error)
 
 
 def knowledge_toml(knowledge: CalibrationKnowledge) -> str:

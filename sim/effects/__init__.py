@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import importlib
-import math
 import pkgutil
+import sys
 from collections.abc import Mapping
 from functools import cache
 
@@ -52,7 +52,7 @@ def check_effects(effects: Mapping[str, float]) -> None:
 def check_size(name: str, size: float) -> None:
     """Reject an unknown effect, or a size that is not a number or outside its bounds."""
     low, high = effect_named(name).bounds
-    if not isinstance(size, int | float) or not math.isfinite(size):
+    if not isinstance(size, int | float) or not abs(size) < sys.float_info.max:  # there are larger integers
         raise InputError(f"{name} = {size}; it must be a finite number")
     if not low <= size <= high:
         raise InputError(f"{name} = {size:g}; its size must lie from {low:g} to {high:g}")

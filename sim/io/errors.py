@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 INTERRUPTED, CLOSED_PIPE = 130, 141  # exit statuses as shells give them: 128 + SIGINT, 128 + SIGPIPE
 
@@ -27,6 +29,22 @@ class InputError(ValueError):
     """
 
     status = 2  # of a command
+
+
+@contextmanager
+def naming(source: object) -> Iterator[None]:
+    """Write the name of a file before the message of an `InputError` that does not have it.
+
+    Args:
+        source: the path of the file; anything else has no name.
+    """
+    try:
+        yield
+    except InputError as refusal:
+        message = " ".join(str(refusal).split())
+        if not isinstance(source, str | Path) or str(source) in message:
+            raise
+        raise type(refusal)(f"{source}: {message}") from None
 
 
 def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None = None) -> int:

@@ -29,14 +29,15 @@ def as_html(text: str, draw: Callable[[Axes], Any] | None = None, *, width: floa
         draw: draws on axes.
         width: of the picture [inch]; its height is 4.5 inch.
     """
-    return f"<pre>{html.escape(text)}</pre>" + ("" if draw is None else _picture(draw, width))
+    words = f'<pre style="white-space: pre-wrap">{html.escape(text)}</pre>'
+    return words + ("" if draw is None else _picture(draw, width, text.partition("\n")[0]))
 
 
-def _picture(draw: Callable[[Axes], Any], width: float) -> str:
+def _picture(draw: Callable[[Axes], Any], width: float, description: str) -> str:
     from matplotlib.figure import Figure
 
     figure, store = Figure(figsize=(width, 4.5)), io.BytesIO()
     draw(figure.add_subplot())
     figure.savefig(store, format="png", dpi=90, bbox_inches="tight")
     data = base64.b64encode(store.getvalue()).decode()
-    return f'<img alt="" src="data:image/png;base64,{data}">'
+    return f'<img alt="{html.escape(description)}" src="data:image/png;base64,{data}">'

@@ -6,6 +6,7 @@ the same kind, as a suffix or in brackets, in upper or lower case. The notes say
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
@@ -54,11 +55,26 @@ def convert_columns(
         if given is None or target is None or given == target:
             notes.append(f"column {column} read as {name}")
         else:
-            numbers = pd.to_numeric(table[column], errors="coerce")
+            numbers = numbers_of(table[column])
             table = table.assign(**{column: convert(numbers, given.suffix, target.suffix)})
             notes.append(f"column {column} converted from {given.text} to {target.text} ({name})")
         table = table.rename(columns={column: name})
     return Converted(table, tuple(notes))
+
+
+def numbers_of(column: pd.Series) -> pd.Series:
+    """Convert a column to float64, with NaN for what is no number."""
+    try:
+        return pd.to_numeric(column, errors="coerce").astype(float)
+    except (TypeError, ValueError, OverflowError):  # dates, lists, whole numbers of hundreds of digits
+        return column.map(_number)
+
+
+def _number(value: object) -> float:
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
 
 
 def _alike(table: pd.DataFrame, wanted: str, synonyms: Mapping[str, str]) -> list[str]:

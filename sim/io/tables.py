@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pandas as pd
 import pyarrow.parquet as pq
-from pyarrow import ArrowException
 
 from sim.io.errors import InputError
 from sim.io.reading import read_bytes
@@ -57,8 +56,10 @@ def _parquet(path: Path) -> pd.DataFrame:
                 f"{path} has {shape.num_rows} rows and {shape.num_columns} columns; give a smaller table"
             )
         return pd.read_parquet(path)
-    except ArrowException as broken:
-        raise InputError(f"{path} is no Parquet table ({str(broken).splitlines()[0]})") from None
+    except (InputError, FileNotFoundError):
+        raise
+    except Exception as broken:  # a damaged file can raise any error from within the parsers
+        raise InputError(f"{path} is no Parquet table ({_reason(broken)})") from None
 
 
 def _spreadsheet(path: str | Path) -> pd.DataFrame:
@@ -75,8 +76,12 @@ def _spreadsheet(path: str | Path) -> pd.DataFrame:
     except InputError:
         raise
     except Exception as broken:  # a damaged archive can raise any error from within the parsers
-        reason = (str(broken).splitlines() or [type(broken).__name__])[0]
-        raise InputError(f"{path} is no spreadsheet in the form .xlsx ({reason})") from None
+        raise InputError(f"{path} is no spreadsheet in the form .xlsx ({_reason(broken)})") from None
+
+
+def _reason(broken: Exception) -> str:
+    """Return the first line of an error."""
+    return (str(broken).splitlines() or [type(broken).__name__])[0]
 
 
 def _without_units_row(table: pd.DataFrame) -> pd.DataFrame:

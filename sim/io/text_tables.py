@@ -18,6 +18,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
+from collections import Counter
 from collections.abc import Sequence
 
 import pandas as pd
@@ -32,6 +33,7 @@ _SEPARATORS = (";", "\t", ",")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 _DECIMAL_POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:\.\d{3})+,\d+|[+-]?\d{1,3}(?:,\d{3})+\.\d+")
+_MOST_COLUMNS = 10_000
 _SAMPLE = 2**18  # characters from which the form of the text is found out
 
 
@@ -56,6 +58,8 @@ def parse_table(data: bytes, where: str, *, names: bool = True) -> pd.DataFrame:
         raise InputError(f"{where} is empty; give a table with one row per line")
     separator = max(_SEPARATORS, key=lines[0].count) if any(mark in lines[0] for mark in _SEPARATORS) else None
     words = _words(lines[0], separator)
+    if len(words) > _MOST_COLUMNS:
+        raise InputError(f"{where} has more than {_MOST_COLUMNS} columns; give a table with one row per line")
     header = not all(is_number(word) for word in words if word)
     columns = words if header else _commented_names(comments, len(words), separator)
     if columns is None and names:
@@ -173,6 +177,6 @@ def _decimal(text: str, where: str, separator: str | None) -> str:
 
 def _check_names(names: Sequence[str], where: str) -> None:
     """Refuse a name that stands above two columns."""
-    for name in filter(None, names):
-        if names.count(name) > 1:
+    for name, times in Counter(filter(None, names)).items():
+        if times > 1:
             raise InputError(f"{where} has two columns {name!r}; rename or drop one")

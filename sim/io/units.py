@@ -93,7 +93,7 @@ _SPELLINGS = {  # other spellings of units, after signs have become underscores
     "cm_s^-1": "cm_s", "mm_s^-1": "mm_s", "Pas": "Pa_s", "mPas": "mPa_s", "degC": "C", "degF": "F", "%": "percent",
     "-": "1", "": "1",
 }  # fmt: skip
-_BRACKETS = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
+_MOST_PARTS = max(len(suffix.split("_")) for suffix in UNITS)  # of a suffix
 _SIGNS = str.maketrans({"°": "deg", "º": "deg", "µ": "u", "μ": "u", "/": "_", "·": "_", "*": "_", " ": "_",
                         "⁻": "^-", "¹": "1", "−": "-"})  # fmt: skip
 
@@ -111,11 +111,12 @@ def split(name: str) -> Name:
 
     The unit is a suffix (R_yr_mm) or stands in brackets behind the name ("R_yr [mm]", "X (cm)").
     """
-    bracketed = _BRACKETS.match(name)
-    if bracketed:
-        return Name(bracketed["name"].strip(), find_unit(bracketed["unit"]))
-    parts = name.strip().split("_")
-    for first in range(1, len(parts)):
+    text = name.strip()
+    before, bracket, inside = text[:-1].replace("(", "[").rpartition("[")
+    if bracket and text[-1:] in ("]", ")") and not set(inside) & set("])"):
+        return Name(text[: len(before)].rstrip("_ \t").strip(), find_unit(inside))
+    parts = text.split("_")
+    for first in range(max(1, len(parts) - _MOST_PARTS), len(parts)):
         unit = UNITS.get("_".join(parts[first:]))
         if unit is not None and unit.suffix != "1":  # x_1 is a name
             return Name("_".join(parts[:first]), unit)

@@ -31,6 +31,7 @@ from sim.io.errors import InputError
 INPUTS = ("N", "ln l/R", "ln ω̄ (R/l)⁴")
 _MARGIN = (0.5, 0.1, 0.1)  # of the inputs, beyond the runs
 MOST = {"C_t": 1.5, "C_r": 1.5, "C_yr": 1.5, "surface_couple": 2.0, "anisotropic_head_drag": 0.6}  # b
+_LARGEST = 1e9  # of any number: powers of larger ones overflow
 KNOBS = tuple(MOST)  # what a correction may change
 _FACTORS = ("C_t", "C_r", "C_yr")  # what it multiplies; it adds to the others
 
@@ -57,8 +58,10 @@ class Correction:
             raise InputError(f"correction: unknown weights {unknown[0]!r}; allowed are {', '.join(KNOBS)}")
         weights = [w for row in self.weights.values() for w in row]
         numbers = [*self.centre, *self.scale, *self.low, *self.high, *weights, self.error, self.error_without]
-        if not np.isfinite(numbers).all() or min(self.scale) <= 0:
-            raise InputError("correction: its numbers must be finite, its scales above 0")
+        if not (np.abs(numbers) < _LARGEST).all() or min(self.scale) < 1 / _LARGEST:
+            raise InputError(
+                f"correction: its numbers must be finite, below {_LARGEST:g}, its scales above {1 / _LARGEST:g}"
+            )
         if any(power not in (0, 1, 2, 3) for term in self.powers for power in term):
             raise InputError("correction: powers are 0, 1, 2 or 3")
 
@@ -125,6 +128,6 @@ def read_correction(table: Any, place: str) -> Correction:
         weights = {str(name): tuple(map(float, row)) for name, row in content.items()}
     except KeyError as missing:
         raise InputError(f"{place}: [correction] has no entry {missing}; copy it from the calibration") from None
-    except (TypeError, ValueError) as broken:
+    except (TypeError, ValueError, OverflowError) as broken:
         raise InputError(f"{place}: [correction] cannot be read: {broken}") from None
     return Correction(centre, scale, low, high, powers, weights, error, without)

@@ -13,6 +13,7 @@ and the sizes of the effects of `sim.effects` (absent means null).
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
@@ -119,7 +120,7 @@ def check_tails(count: float) -> None:
 
 def check_finite(name: str, value: float) -> None:
     """Refuse what is no finite number."""
-    if not isinstance(value, int | float) or not math.isfinite(value):
+    if not isinstance(value, int | float) or not abs(value) < sys.float_info.max:  # there are larger integers
         raise InputError(f"{name} = {value}; it must be a finite number")
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sim.io.errors import InputError
 from sim.io.notebook import as_html
 from sim.io.units import format_length, from_si
 from sim.model.correction import Correction
@@ -62,6 +63,12 @@ class Robot:
             check_positive("disc_offset", self.disc_offset)
         check_finite("C_yr", self.C_yr)
         check_slenderness(self.tail_length / self.tail_radius)
+        try:
+            numbers = [self.time_scale, *self._given_groups().values()]
+        except ArithmeticError:
+            numbers = [math.inf]
+        if not all(map(math.isfinite, numbers)) or not self.omega_bar > 0:
+            raise InputError("lengths, stiffness and viscosity give no finite unit of time; check their units")
 
     def __repr__(self) -> str:
         length, radius, R, L = map(
@@ -109,7 +116,12 @@ class Robot:
         Raises:
             InputError: the robot has a correction, and is outside its range.
         """
-        values = {
+        values = self._given_groups()
+        return values if self.correction is None else self.correction.applied(values)
+
+    def _given_groups(self) -> dict[str, float]:
+        """Compute the groups without the correction."""
+        return {
             "C_t": self.C_t,
             "C_r": self.C_r,
             "C_yr": self.C_yr,
@@ -121,7 +133,6 @@ class Robot:
             "a_over_R": (self.disc_offset or self.head_radius) / self.head_radius,
             **self.effects,
         }
-        return values if self.correction is None else self.correction.applied(values)
 
     def groups(self) -> Groups:
         """Return this robot as a batch of one."""

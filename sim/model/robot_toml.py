@@ -63,6 +63,7 @@ ENTRIES = (
     Entry("drag", "C_yr", "C_yr", comment="side force of the spinning head, from the surface: C_yr μ R L ω"),
 )
 _SIGMA = "_sigma"
+_LARGEST = 1e100  # of a number, whatever its unit
 _HEADER = """\
 # Units are suffixes: length_cm, length_mm, speed_rpm, speed_rad_s, ... KEY_sigma states one standard deviation of
 # a number, in its unit or as "5 %"; only a calibration uses it.
@@ -131,7 +132,7 @@ def robot_toml(robot: Robot) -> str:
         tables["correction"] = [f"{k} = {json.dumps(v)}" for k, v in correction_tables(robot.correction).items()]
     order = sorted(tables, key=[*dict.fromkeys(entry.table for entry in ENTRIES), "effects", "correction"].index)
     blocks = ["\n".join([f"[{table}]", *tables[table]]) for table in order]
-    name = json.dumps(robot.name, ensure_ascii=False)  # escapes as TOML does
+    name = json.dumps(robot.name, ensure_ascii=False).replace("\x7f", "\\u007f")  # escapes as TOML does
     return "\n\n".join([f"{_HEADER}name = {name}", *blocks, *([] if robot.effects else [_NO_EFFECTS])]) + "\n"
 
 
@@ -153,13 +154,15 @@ def _number(value: object, key: str, entry: str) -> float:
     """Convert a number of the file to SI units."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise InputError(f"{entry} = {value!r}; give a number")
+    if not abs(value) < _LARGEST:
+        raise InputError(f"{entry} = {value!r}; give a finite number")
     unit = split(key).unit
     return to_si(value, unit.suffix) if unit else value
 
 
 def _read_sigma(value: object, number: float, key: str, entry: str) -> Sigma:
     unit = split(key.removesuffix(_SIGMA)).unit
-    return read_sigma(value, number, entry, to_si(1.0, unit.suffix) if unit else 1.0)
+    return read_sigma(value, number, entry, unit.suffix if unit else "")
 
 
 def _sigma_line(sigma: Sigma, key: str, entry: Entry) -> str:

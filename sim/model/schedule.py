@@ -41,6 +41,7 @@ class Schedule:
     dwells: Floats  # (M,) [μ0 l⁴/EI]
     start: tuple[float, float, float]  # x, y [l] and heading [rad] of the head's centre
     time_scale: float  # μ0 l⁴/EI [s]
+    tail_length: float | None = None  # l [m]; without it tracks are in l alone
 
     def __post_init__(self) -> None:
         if self.first_direction not in (-1, 1):
@@ -53,6 +54,8 @@ class Schedule:
             raise InputError(f"the schedule starts at {self.start}; give finite numbers")
         if not (np.isfinite(self.time_scale) and self.time_scale > 0):
             raise InputError(f"time_scale_s = {self.time_scale}; it must be a finite number above 0")
+        if self.tail_length is not None and not (np.isfinite(self.tail_length) and self.tail_length > 0):
+            raise InputError(f"tail_length_m = {self.tail_length}; it must be a finite number above 0")
 
 
 def load_schedule(path: str | Path) -> Schedule:
@@ -78,6 +81,7 @@ def load_schedule(path: str | Path) -> Schedule:
             dwells=np.asarray(content["dwell_bar"], dtype=float),
             start=tuple(float(content["start"][k]) for k in ("x_over_l", "y_over_l", "heading_rad")),  # type: ignore[arg-type]
             time_scale=float(content["robot"]["time_scale_s"]),
+            tail_length=None if (length := content["robot"].get("tail_length_m")) is None else float(length),
         )
     except KeyError as missing:
         raise InputError(f"{path} has no entry {missing}; give a plan.json of the planner") from None

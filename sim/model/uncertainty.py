@@ -10,6 +10,7 @@ import math
 from typing import NamedTuple
 
 from sim.io.errors import InputError
+from sim.io.units import to_si
 
 
 class Sigma(NamedTuple):
@@ -35,14 +36,14 @@ DEFAULTS = {
 _LARGEST = 0.5  # share of the number itself
 
 
-def read_sigma(given: object, value: float, entry: str, factor: float = 1.0) -> Sigma:
+def read_sigma(given: object, value: float, entry: str, suffix: str = "") -> Sigma:
     """Read σ from an entry of a robot.toml: a number in the unit of its key, or a text like "10 %".
 
     Args:
         given: the number or text.
         value: what it belongs to.
         entry: its place, for messages.
-        factor: unit of the key, in the unit of `value`.
+        suffix: unit of the key; none where it has that of `value`.
 
     Raises:
         InputError: neither of them, below 0, or more than half of the number.
@@ -51,10 +52,10 @@ def read_sigma(given: object, value: float, entry: str, factor: float = 1.0) -> 
         if isinstance(given, str) and given.strip().endswith("%"):
             sigma = Sigma(float(given.strip()[:-1]) / 100, True)
         elif isinstance(given, int | float) and not isinstance(given, bool):
-            sigma = Sigma(float(given) * factor, False)
+            sigma = Sigma(float(to_si(given, suffix) if suffix else given), False)
         else:
             raise ValueError
-    except ValueError:
+    except (ValueError, OverflowError):
         raise InputError(
             f'{entry} = {given!r}; give a number in the unit of its key, or a text like "10 %"'
         ) from None

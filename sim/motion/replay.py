@@ -39,8 +39,9 @@ def replay(
         progress: called after each dwell with the number of dwells done since the last call.
 
     Returns:
-        A track for each schedule: time_bar, time_s, x_over_l, y_over_l, heading_rad, direction,
-        dwell (index of the dwell that ends at or after the sample).
+        A track for each schedule: time_s, x_cm and y_cm (if the schedule has a tail length), heading_deg,
+        time_bar, x_over_l, y_over_l, heading_rad, direction, dwell (index of the dwell that ends at or after the
+        sample).
     """
     return [_replay(schedule, resolution, progress) for schedule in schedules]
 
@@ -85,10 +86,16 @@ def _replay(
 def _track(schedule: Schedule, rows: list[tuple[float, ...]]) -> pd.DataFrame:
     table = np.array(rows)
     pose = planar.compose(np.array(schedule.start), table[:, 1:4])
+    lab = {}
+    if schedule.tail_length is not None:
+        cm = 100 * schedule.tail_length
+        lab = {"x_cm": cm * pose[:, 0], "y_cm": cm * pose[:, 1]}
     return pd.DataFrame(
         {
-            "time_bar": table[:, 0],
             "time_s": table[:, 0] * schedule.time_scale,
+            **lab,
+            "heading_deg": np.degrees(pose[:, 2]),
+            "time_bar": table[:, 0],
             "x_over_l": pose[:, 0],
             "y_over_l": pose[:, 1],
             "heading_rad": pose[:, 2],

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FORMAT = 3
+_LARGEST = 1e100  # of a number
 _CURVES = {"lag": (2, len(DWELLS), 3), "memory": (2, -1, len(DWELLS), 3),
            "rest": (2, len(DWELLS), 3), "spread": (2, len(DWELLS), 3)}  # fmt: skip
 
@@ -166,7 +167,7 @@ def load_robot_table(path: str | Path) -> RobotTable:
         raise InputError(f"{path} is no complete table of a robot{first}; {remedy}")
     try:
         wrong = _wrong(RobotTable(**content))
-    except (KeyError, TypeError, ValueError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         wrong = "its numbers have no such form"
     if wrong:
         raise InputError(f"{path} is no table of a robot: {wrong}; {remedy}")
@@ -179,21 +180,37 @@ def _digest(content: Mapping[str, Any]) -> str:
 
 def _wrong(table: RobotTable) -> str:
     """Return what is wrong with the numbers of a table; empty if nothing is."""
+    if not all(isinstance(part, dict) for part in (table.robot, table.steady, table.slopes, table.errors)):
+        return "its robot, motion, slopes and errors are not named numbers"
+    before = np.array(table.before, dtype=float)
+    if before.ndim != 1 or not _all_ordinary(before):
+        return "its numbers have no such form"
     for name, shape in _CURVES.items():
         curves = np.array(getattr(table, name), dtype=float)
         wanted = tuple(len(table.before) if size < 0 else size for size in shape)
-        if curves.shape != wanted or not np.isfinite(curves).all():
+        if curves.shape != wanted or not _all_ordinary(curves):
             return f"it has no curves {name!r} of shape {wanted} in finite numbers"
     missing = [name for name in STEADY_OUTPUTS if name not in table.steady]
     if missing:
         return f"it has no {missing[0]!r}"
     motion = np.array([table.steady[name] for name in STEADY_OUTPUTS], dtype=float)
-    if motion.shape != (len(STEADY_OUTPUTS), 2) or np.isnan(motion).any():  # the gap of one tail is infinite
+    columns = [np.array(values) for values in table.steady.values()]
+    if any(column.shape != (2,) for column in columns) or not _all_ordinary(motion[np.isfinite(motion)]):
+        return "its steady motion is not two numbers for each output"
+    gap = STEADY_OUTPUTS.index("tail_gap")
+    if (
+        not np.isfinite(np.delete(motion, gap, 0)).all() or not (motion[gap] > -np.inf).all()
+    ):  # infinite for one tail
         return "its steady motion is not two numbers for each output"
     groups = np.array([table.robot[name] for name in {*ROBOT, *table.robot}], dtype=float)
     slopes = [np.array(slope, dtype=float) for slope in table.slopes.values()]
-    if not np.isfinite(groups).all() or any(s.shape != (2, 3) or not np.isfinite(s).all() for s in slopes):
+    if not _all_ordinary(groups) or any(s.shape != (2, 3) or not _all_ordinary(s) for s in slopes):
         return "its robot or its slopes are not finite numbers"
     if any(not math.isfinite(error["rms"]) for error in table.errors.values()):
         return "its errors are not finite numbers"
     return ""
+
+
+def _all_ordinary(values: Floats) -> bool:
+    """Whether numbers are finite, and such that sums and squares of them are."""
+    return bool((np.abs(values) < _LARGEST).all())

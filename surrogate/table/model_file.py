@@ -11,19 +11,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import torch
-
 from sim.io.errors import InputError
-from surrogate.input_ranges import ROBOT
 from surrogate.interface import LookupTable
 from surrogate.networks.ensemble import Ensemble
 from surrogate.one_robot.robot_table import load_robot_table
 from surrogate.table import tensor_file
 from surrogate.table.intervals import Intervals
 from surrogate.table.lookup import FORMAT, NeuralTable
-from surrogate.table.response_table import PARTS, SHAPES, Basis, ResponseTable
+from surrogate.table.model_form import IncompleteError, check_form
+from surrogate.table.response_table import Basis, ResponseTable
 from surrogate.table.support import Support
-from surrogate.table.wrench_table import CLASSES, WrenchTable
+from surrogate.table.wrench_table import WrenchTable
 
 SHIPPED = Path(__file__).parents[1] / "shipped" / "model.safetensors"
 
@@ -41,14 +39,10 @@ def load(path: str | Path | None = None) -> NeuralTable:
     content = tensor_file.read(path, FORMAT, remedy)
     try:
         return _lookup(content)
-    except _IncompleteError as lack:
+    except IncompleteError as lack:
         raise InputError(f"{path} is no complete look-up table: {lack}; {remedy}") from None
-    except (RuntimeError, KeyError, TypeError, ValueError, AttributeError, IndexError):
+    except (RuntimeError, KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError):
         raise InputError(f"{path} is no complete look-up table; {remedy}") from None
-
-
-class _IncompleteError(Exception):
-    """What a content lacks."""
 
 
 def load_table(path: str | Path | None = None) -> LookupTable:
@@ -71,7 +65,7 @@ def load_table(path: str | Path | None = None) -> LookupTable:
 
 
 def _lookup(content: dict[str, Any]) -> NeuralTable:
-    _check(content)
+    check_form(content)
     intervals = content["intervals"]
     return NeuralTable(
         tails=WrenchTable(
@@ -89,48 +83,9 @@ def _lookup(content: dict[str, Any]) -> NeuralTable:
     )
 
 
-def _check(content: Mapping[str, Any]) -> None:
-    """Refuse a content with which a query would not work."""
-    wanted = ("wrench", "gap", "curves", "bases", "support", "intervals", "ranges", "errors", "provenance")
-    for name in wanted:
-        if name not in content:
-            raise _IncompleteError(f"it has no {name!r}")
-    wrench, support = content["wrench"], content["support"]
-    if len(wrench) != len(CLASSES) or all(part is None for part in wrench):
-        raise _IncompleteError("it has no networks")
-    if [part is None for part in wrench] != [part is None for part in support]:
-        raise _IncompleteError("its networks and their domains do not belong together")
-    if len(content["curves"]) != len(PARTS) or set(content["bases"]) != set(SHAPES):
-        raise _IncompleteError("it has no response to a flip")
-    for name in ROBOT:
-        low, high = content["ranges"].get(name, (1.0, 0.0))
-        if not low <= high:
-            raise _IncompleteError(f"it has no range of {name}")
-    if "rows" not in content["provenance"] or not content["errors"]:
-        raise _IncompleteError("it states no errors")
-    numbers = [content[name] for name in ("wrench", "gap", "curves", "bases", "support")]
-    widths = content["intervals"] or {}
-    if not _all_finite([*numbers, *(widths[name] for name in widths if name != "factor")]):
-        raise _IncompleteError("some of its numbers are not finite")
-    if any(bool(torch.isnan(part).any()) for part in widths.get("factor", {}).values()):  # infinite: no rows
-        raise _IncompleteError("some of its intervals are no numbers")
-
-
-def _all_finite(part: Any) -> bool:
-    if isinstance(part, Mapping | list):
-        return all(_all_finite(own) for own in (part.values() if isinstance(part, Mapping) else part))
-    return part is None or bool(torch.isfinite(torch.as_tensor(part)).all())
-
-
 def _network(stored: Mapping[str, Any]) -> Ensemble:
-    shape, state = stored["shape"], stored["state"]
-    sizes = state["bypass"].shape + state["weights.0"].shape[2:]
-    if sizes != tuple(shape[name] for name in ("members", "inputs", "outputs", "width")) or shape["depth"] > len(
-        state
-    ):
-        raise _IncompleteError("a network has another shape than is said")
-    network = Ensemble(**shape, seed=0)
-    network.load_state_dict(state)
+    network = Ensemble(**stored["shape"], seed=0)
+    network.load_state_dict(stored["state"])
     for parameter in network.parameters():
         parameter.requires_grad_(False)
     return network

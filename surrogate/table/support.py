@@ -53,6 +53,11 @@ class Support:
         return _novelty_rows(shift, scale, factor, *_products(len(shift)), inputs) / self.limit
 
 
+def monomial_count(inputs: int) -> int:
+    """Return the number of monomials up to DEGREE of some inputs, P."""
+    return len(_products(inputs)[0])
+
+
 @cache
 def _products(inputs: int) -> tuple[Integers, Integers]:
     """List the monomials up to DEGREE of some inputs, the constant first: `parents` and `last`, both (P,).

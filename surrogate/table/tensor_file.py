@@ -62,7 +62,7 @@ def read(path: str | Path, version: int, remedy: str) -> dict[str, Any]:
         metadata = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])["__metadata__"]
         manifest = json.loads(metadata["manifest"])
         found_version, written, plain = manifest["format"], manifest["hash"], manifest["content"]
-    except (SafetensorError, KeyError, TypeError, ValueError, RecursionError):
+    except (SafetensorError, KeyError, TypeError, ValueError, RecursionError, OverflowError, AttributeError):
         raise InputError(f"{path} is not a model file, or is damaged; {remedy}") from None
     if found_version != version:
         raise InputError(f"{path} has format {str(found_version)[:20]}, this version reads {version}; {remedy}")

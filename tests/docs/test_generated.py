@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from importlib import import_module
 from importlib.util import find_spec
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import softflagella as sf
 from dataset.rows.schema import FLAGS, INPUTS, OUTPUTS
 from sim.effects import catalogue
 from softflagella.__main__ import PACKAGES, WORDS
@@ -46,11 +48,53 @@ def test_the_page_of_commands_has_each() -> None:
         assert f"usage: softflagella {word}" in page
 
 
+def test_all_fields_of_public_classes_say_what_they_hold() -> None:
+    generate = generator()
+    records = generate.public_records()
+    names = {record.__name__ for record in records}
+    assert {"Robot", "Plan", "Command", "Drawing", "Verdict", "RobotVerdict", "Declared", "Evidence"} <= names
+    page = generate.objects_page()
+    for record in records:
+        assert f"## {record.__name__}\n" in page
+        for field in generate.fields_of(record):
+            assert field.meaning, f"{record.__module__}.{record.__name__}.{field.name} has no comment"
+            assert f"| `{field.name}` |" in page
+
+
+_SHAPE = re.compile(r"\((?:[A-Za-z\d](?: \+ 1)?,|(?:[A-Za-z\d](?: \+ 1)?, )+[A-Za-z\d])\)")
+
+
+def test_shapes_are_written_with_the_letters_of_the_page() -> None:
+    """In docstrings of public names and their methods, and in the comments of fields."""
+    page = (DOCS / "reference" / "api.md").read_text()
+    letters = set(re.findall(r"^\| (\w) \|", page, re.MULTILINE))
+    texts = {}
+    for name in sf.__all__:
+        thing = getattr(sf, name)
+        parts = vars(thing).items() if inspect.isclass(thing) else []
+        shown = {part: value for part, value in parts if callable(value) or isinstance(value, property)}
+        texts |= {f"{name}.{part}": inspect.getdoc(value) or "" for part, value in shown.items()}
+        texts[name] = inspect.getdoc(thing) or ""
+    generate = generator()
+    for record in generate.public_records():
+        texts |= {f"{record.__name__}.{field.name}": field.meaning for field in generate.fields_of(record)}
+    shapes = {(name, shape) for name, text in texts.items() for shape in _SHAPE.findall(text)}
+    assert len(shapes) > 40
+    for name, shape in shapes:
+        assert set(re.findall(r"[A-Za-z]", shape)) <= letters, f"{name}: {shape}"
+
+
+def test_the_page_of_python_has_each_public_name() -> None:
+    page = (DOCS / "reference" / "api.md").read_text()
+    documented = set(re.findall(r"^\.\. auto(?:function|class|exception):: (\w+)$", page, re.MULTILINE))
+    assert documented == set(sf.__all__) - {"__version__"}
+
+
 def test_generated_pages_are_written_once(tmp_path: Path) -> None:
     write = generator().write_generated_pages
     write(tmp_path / "new")
     files = sorted((tmp_path / "new").iterdir())
-    assert [file.name for file in files] == ["columns.md", "commands.md", "effects.md"]
+    assert [file.name for file in files] == ["columns.md", "commands.md", "effects.md", "objects.md"]
     before = [file.stat().st_mtime_ns for file in files]
     write(tmp_path / "new")
     assert [file.stat().st_mtime_ns for file in files] == before

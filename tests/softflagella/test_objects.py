@@ -52,7 +52,7 @@ def test_an_object_says_what_it_is_in_a_few_lines(name: str) -> None:
     assert len(text.splitlines()) <= 6
     assert max(map(len, text.splitlines())) < 160
     page = thing._repr_html_()
-    assert page.startswith("<pre>")
+    assert page.startswith("<pre ")
     if hasattr(thing, "plot"):
         data = re.search(r'src="data:image/png;base64,([^"]+)"', page)
         assert data

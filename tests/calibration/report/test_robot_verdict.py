@@ -38,7 +38,7 @@ def test_a_verdict_says_what_it_found_in_a_few_lines(seed: int, effects: dict[st
     errors += [verdict.error_after] if verdict.effects else []
     assert shares == pytest.approx([100 * error for error in (*errors, verdict.noise_ceiling)], abs=0.006)
     page = verdict._repr_html_()
-    assert page.startswith("<pre>")
+    assert page.startswith("<pre ")
     assert "data:image/png" in page
     axes = Figure().add_subplot()
     assert verdict.plot(axes) is axes

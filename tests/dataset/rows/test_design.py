@@ -87,7 +87,7 @@ def test_optional_inputs_effects_and_directions_are_swept(tmp_path: Path) -> Non
         ("[2, 3]", "[2, 3.5]", "whole numbers"),
         ('"log"', '"cubic"', "scale"),
         ("C_t = { range = [2.0, 5.0] }", "C_t = { range = [2.0, 5.0], sclae = 'log' }", "sclae"),
-        ("C_t = { range = [2.0, 5.0] }", "C_t = { range = [2.0, 5.0], both_directions = true }", "only omega_bar"),
+        ("C_t = { range = [2.0, 5.0] }", "C_t = { range = [2.0, 5.0], both_directions = true }", "only the motor"),
         ("C_t =", "C_x =", "unknown input"),
         ("C_t = { range = [2.0, 5.0] }", "", "missing input"),
         (

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from planner.__main__ import main
+from planner.paths.path import circle
+from planner.paths.units import check_unstated_unit, in_lab, place_in_lab
 from planner.planning.plan import plan
-from sim.io.errors import InputError
+from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
 
 CONTROL = PRESETS["paper-control"]
@@ -14,3 +19,32 @@ CONTROL = PRESETS["paper-control"]
 def test_millimetres_taken_for_tail_lengths_are_refused() -> None:
     with pytest.raises(InputError, match=r"if you gave l and mean mm, it is 27.3 l: --unit mm"):
         plan([[0, 0], [900, 0], [900, 700], [0, 700], [0, 200]], CONTROL)
+
+
+def test_a_path_in_tail_lengths_that_nobody_stated_is_asked_about(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A circle of 150 mm used to be planned as one of 150 l: 104 m, 37 h."""
+    words = ["plan", "circle:150", "--robot", "paper-control", "--out", str(tmp_path / "plan")]
+    assert run_command(main, words) == 2
+    (refusal,) = capsys.readouterr().err.splitlines()
+    for part in ("104 m (942 l) long", "36 h 4", "of the robot's circles across", "--unit l if this is meant",
+                 "if you gave l and mean mm, it is 8.57 l: --unit mm"):  # fmt: skip
+        assert part in refusal
+    assert not (tmp_path / "plan").exists()
+    assert run_command(main, [*words, "--unit", "mm"]) == 0
+    assert "94.2 cm (8.57 l) long" in capsys.readouterr().out
+
+
+def test_a_stated_unit_is_not_asked_about() -> None:
+    path = circle(60.0)
+    with pytest.raises(InputError, match="of the robot's circles across"):
+        check_unstated_unit(path, CONTROL, 0.9, 0.5)
+    with pytest.raises(InputError, match="about 4 h"):
+        check_unstated_unit(circle(20.0), CONTROL, 0.9, 0.5 * CONTROL.time_scale / 60)
+    check_unstated_unit(circle(20.0), CONTROL, 0.9, 0.5)
+
+
+def test_lengths_in_messages_are_in_a_laboratory_s_units_first() -> None:
+    assert in_lab(0.32, CONTROL) == "3.52 cm (0.32 l)"
+    assert place_in_lab(1.0, -0.5, CONTROL) == "(11.00, -5.50) cm = (1.000, -0.500) l"

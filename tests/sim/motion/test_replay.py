@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sim.io.errors import InputError
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
 from sim.motion.steady import steady
@@ -20,8 +21,18 @@ def test_replays_of_several_schedules_equal_replays_alone() -> None:
     for schedule, track in zip(schedules, together, strict=True):
         alone = replay([schedule])[0]
         assert track.equals(alone)
+        assert "x_cm" not in track
         assert float(track.time_bar.iloc[-1]) == pytest.approx(schedule.dwells.sum())
     assert together[0].iloc[0][["x_over_l", "y_over_l", "heading_rad"]].tolist() == [1.0, 2.0, 0.5]
+
+
+def test_a_track_of_a_robot_with_a_size_is_in_centimetres_too() -> None:
+    track = replay([Schedule(CONTROL_VALUES, 1, np.array([0.8]), (1.0, 2.0, 0.5), 2.0, 0.11)])[0]
+    assert track["x_cm"].to_numpy() == pytest.approx(11 * track["x_over_l"].to_numpy())
+    assert track["y_cm"].to_numpy() == pytest.approx(11 * track["y_over_l"].to_numpy())
+    assert np.radians(track["heading_deg"].to_numpy()) == pytest.approx(track["heading_rad"].to_numpy())
+    with pytest.raises(InputError, match="tail_length_m = -1"):
+        Schedule(CONTROL_VALUES, 1, np.array([0.8]), (1.0, 2.0, 0.5), 2.0, -1.0)
 
 
 @pytest.mark.parametrize(("tails", "omega_bar"), [(2.0, 10.0), (4.0, 10.0)])

@@ -1,0 +1,286 @@
+"""All formats of files that people bring: a valid example of each, and the function that reads it.
+
+The contract of every reader, whatever a file holds: it returns a result, or it raises an `InputError` of one line
+that names the file, or another one in its folder; nothing else, and no warning. `judged` checks it. Files that are
+protected by a hash appear twice: as they are, and as somebody could forge them, with the hash of their changed
+content (`seal`).
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from calibration.swimmer.camera_tracks import measure_tracks
+from calibration.swimmer.measured_table import read_measurements
+from calibration.verdict.sequential_test import read_explanations
+from dataset.build.sweep_folder import load_sweep
+from dataset.rows.design import SWEEP_TOML, load_design
+from dataset.rows.schema import schema
+from dataset.storage.data_set import MANIFEST, ROWS, SWEEP, batches
+from dataset.storage.shards import BadShardError, Shard, check_shard, shard_name
+from dataset.storage.storage import open_storage
+from planner.files.goal_files import read_region
+from planner.files.plan_json import load_plan
+from planner.files.tracking_error import tracking_error
+from planner.paths.path_files import read_path
+from planner.vehicle.calibration_table import read_knowledge
+from sim.inputs import check_columns, load_robot
+from sim.io.errors import InputError, naming
+from sim.io.tables import read_table
+from sim.model.robot_toml import robot_toml
+from sim.model.schedule import load_schedule
+from surrogate.one_robot.robot_table import load_robot_table
+from surrogate.table.model_file import SHIPPED, load
+from tests.oracles.example_files import (
+    JSON,
+    NOTED,
+    ROBOT,
+    SVG,
+    SVG_TOKENS,
+    TABLE,
+    TOML,
+    Files,
+    corrected,
+    file,
+    json_of,
+    model_content,
+    of_data_set,
+    parquet,
+    plan_file,
+    replayed,
+    robot_table,
+    robot_table_file,
+    robots,
+    runs,
+    samples,
+    sealed_manifest,
+    sealed_model,
+    sealed_robot_table,
+    sealed_sweep,
+    spreadsheet,
+    text,
+    verdict,
+)
+from tests.oracles.mutations import changed_content, mutated
+
+
+@dataclass(frozen=True)
+class FileFormat:
+    """A format of files.
+
+    Attributes:
+        example: a valid file, and the files beside it that its reader needs.
+        read: reads the file of this path; what it returns has been checked.
+        tokens: what matters to the format.
+        seal: makes the file, with its hash, of its content; then entries of the content are changed, not bytes.
+        content: of the example, if `seal` is given.
+        first_bytes: how much of the file is mutated: its header, where the rest is numbers.
+    """
+
+    example: Callable[[], Files]
+    read: Callable[[Path], object]
+    tokens: tuple[bytes, ...] = ()
+    seal: Callable[[Any], bytes] | None = None
+    content: Callable[[], Any] | None = None
+    first_bytes: int | None = None
+
+    def install(self, folder: Path) -> Path:
+        """Write the example into a folder; return the path of the file that is read."""
+        for name, data in self.example().items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(data)
+        return folder / next(iter(self.example()))
+
+    def mutated(self, random: Random) -> bytes:
+        """Mutate the example's file."""
+        if self.seal is None or self.content is None:
+            data = next(iter(self.example().values()))
+            rest = b"" if self.first_bytes is None else data[self.first_bytes :]
+            return mutated(data[: self.first_bytes], self.tokens, random) + rest
+        return self.seal(changed_content(self.content(), random))
+
+
+def judged(form: FileFormat, path: Path) -> bool:
+    """Read a file; return whether it was read (or refused).
+
+    Raises:
+        AssertionError: a refusal is not one line that names the file.
+        Exception: whatever the reader raised.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            form.read(path)
+    except InputError as refusal:
+        message = str(refusal)
+        assert len(message.splitlines()) == 1, f"more than one line: {message!r}"
+        assert path.name in message or str(path.parent) in message, f"it does not name {path.name}: {message!r}"
+        return False
+    return True
+
+
+def _finite(*values: Any) -> None:
+    for value in values:
+        assert np.isfinite(np.asarray(value, dtype=float)).all(), "a result is not finite"
+
+
+# Robots and sweeps
+
+
+def _read_robot(path: Path) -> None:
+    robot, knowledge = load_robot(path), read_knowledge(path)
+    _finite(robot.time_scale, knowledge.covariance)
+    with naming(path):  # a correction holds within its runs
+        _finite(list(robot.group_values().values()))
+    again = path.with_name("again.toml")
+    again.write_text(robot_toml(robot), encoding="utf-8")
+    assert load_robot(again) == robot, "it is not read back as it was"
+
+
+def _read_robots(path: Path) -> None:
+    table = read_table(path)
+    with naming(path):
+        columns = check_columns({str(name): table[name].to_numpy() for name in table})
+    _finite(*columns.values())
+
+
+def _read_design(path: Path) -> None:
+    sweep = load_design(path)
+    _finite(*sweep.with_rows(4).points().values())
+
+
+# Data sets
+
+
+def _read_rows(path: Path) -> None:
+    for batch in batches(path.parent):
+        assert batch.num_rows
+
+
+def _read_sweep(path: Path) -> None:
+    sweep, function = load_sweep(open_storage(path.parent))
+    _finite(*sweep.with_rows(4).points().values())
+    assert isinstance(function, str)
+
+
+def _read_shard(path: Path) -> None:
+    storage, key = open_storage(path.parents[1]), json_of(SWEEP)["key"]
+    try:
+        check_shard(storage, Shard(f"{ROWS}/{path.name}", 0, 16), schema(), key)
+    except BadShardError as bad:  # such a shard is removed, and its rows are simulated again
+        raise InputError(f"{path}: {bad}") from None
+
+
+# Look-up tables
+
+
+def _read_robot_table(path: Path) -> None:
+    table = load_robot_table(path)
+    columns = {name: np.array([value]) for name, value in table.robot.items()}
+    _finite(*(table.query(columns)[name] for name in ("omega_yr_bar", "v_x", "v_z")))
+    response = table.response(columns)
+    _finite(response.lag, response.memory, response.rest, response.spread)
+
+
+def _read_model(path: Path) -> None:
+    _finite(*load(path).query({name: np.array([value]) for name, value in ROBOT.group_values().items()}).values())
+
+
+# Paths, regions and plans
+
+
+def _read_path(path: Path) -> None:
+    drawing = read_path(path)
+    _finite(drawing.path.points, drawing.path.length, drawing.unit or 1.0)
+    assert len(drawing.path.points) >= 2
+
+
+def _read_plan(path: Path) -> None:
+    content, schedule = load_plan(path), load_schedule(path)
+    _finite(schedule.dwells, schedule.start, content["stated_error_over_l"])
+
+
+def _read_track(path: Path) -> None:
+    content = load_plan(path.with_name("plan.json"))
+    with naming(path):
+        error = tracking_error(content, read_table(path))
+    _finite(error.rms, error.largest, error.raw_rms)
+
+
+# Measurements
+
+
+def _read_runs(path: Path) -> None:
+    runs = read_measurements(path)
+    _finite(runs.y, runs.inputs, runs.length, runs.omega, runs.noted)
+
+
+def _measure(path: Path) -> None:
+    table = measure_tracks(path.with_name("tracks.csv"), path.with_name("runs.csv")).table
+    for name in ("omega_yr_rad_s", "R_yr_cm", "v_cm_s"):
+        assert name not in table or not np.isinf(table[name]).any(), "a result is infinite"
+
+
+def _read_verdict(path: Path) -> None:
+    explanations, sessions = read_explanations(path)
+    for explanation in explanations:
+        size = len(explanation.parameters)
+        assert explanation.covariance.shape == (size, size), "a covariance of another size"
+        _finite(explanation.covariance, list(explanation.parameters.values()), explanation.noise.run)
+        _finite(explanation.noise.share)
+        hash(explanation.title)
+    assert all(isinstance(session, str) for session in sessions)
+
+
+FORMATS: dict[str, FileFormat] = {
+    "robot": FileFormat(file("robot.toml", lambda: robot_toml(ROBOT).encode()), _read_robot, TOML),
+    "corrected robot": FileFormat(file("corrected.toml", corrected), _read_robot, TOML),
+    "sweep": FileFormat(file("sweep.toml", SWEEP_TOML.read_bytes), _read_design, TOML),
+    "sweep.json": FileFormat(partial(of_data_set, SWEEP), _read_sweep, JSON),
+    "sweep.json, sealed": FileFormat(
+        partial(of_data_set, SWEEP), _read_sweep, JSON, sealed_sweep, partial(json_of, SWEEP)
+    ),
+    "manifest": FileFormat(partial(of_data_set, MANIFEST), _read_rows, JSON),
+    "manifest, sealed": FileFormat(
+        partial(of_data_set, MANIFEST), _read_rows, JSON, sealed_manifest, partial(json_of, MANIFEST, "digest")
+    ),
+    "shard of rows": FileFormat(partial(of_data_set, shard_name(ROWS, 0, 16)), _read_shard),
+    "table of robots": FileFormat(file("robots.csv", lambda: text(robots())), _read_robots, TABLE),
+    "table of robots, Parquet": FileFormat(file("robots.parquet", parquet), _read_robots),
+    "table of robots, xlsx": FileFormat(file("robots.xlsx", spreadsheet), _read_robots),
+    "table of one robot": FileFormat(file("robot.table.json", robot_table_file), _read_robot_table, JSON),
+    "table of one robot, sealed": FileFormat(
+        file("robot.table.json", robot_table_file), _read_robot_table, JSON, sealed_robot_table, robot_table
+    ),
+    "model": FileFormat(
+        file("model.safetensors", SHIPPED.read_bytes), _read_model, JSON, first_bytes=20_000
+    ),
+    "model, sealed": FileFormat(
+        file("model.safetensors", SHIPPED.read_bytes), _read_model, JSON, sealed_model, model_content
+    ),
+    "path": FileFormat(file("path.csv", lambda: text({"x": [0, 1, 2.5], "y": [0, 1.5, 1]})), _read_path, TABLE),
+    "drawing": FileFormat(file("path.svg", lambda: SVG), _read_path, SVG_TOKENS),
+    "region": FileFormat(
+        file("region.csv", lambda: text({"x": [0, 1, 1, 0], "y": [0, 0, 1, 1]})),
+        lambda path: read_region(str(path), "cm", ROBOT), TABLE,
+    ),
+    "plan": FileFormat(file("plan.json", plan_file), _read_plan, JSON),
+    "replayed track": FileFormat(file("track.csv", replayed, plan_json=plan_file), _read_track, TABLE),
+    "measured runs": FileFormat(file("table.csv", lambda: text(runs())), _read_runs, TABLE),
+    "camera tracks": FileFormat(
+        file("tracks.csv", lambda: text(samples()), runs_csv=lambda: text(NOTED)), _measure, TABLE
+    ),
+    "runs of camera tracks": FileFormat(
+        file("runs.csv", lambda: text(NOTED), tracks_csv=lambda: text(samples())), _measure, TABLE
+    ),
+    "verdict": FileFormat(file("verdict.json", lambda: json.dumps(verdict()).encode()), _read_verdict, JSON),
+}  # fmt: skip

@@ -1,0 +1,207 @@
+"""Mutations of files: what a disk, an editor, another program or a prankster may make of a valid file.
+
+`mutated` changes bytes and knows the format only by its tokens. `changed_content` changes entries of nested
+content (JSON), so that a file which is protected by a hash can be sealed again and is read to its end.
+
+A mutation depends on the random state alone: the same seed gives the same file.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Callable, Sequence
+from random import Random
+from typing import Any
+
+MOST = 2**19  # bytes of a mutated file; larger ones are cut
+_NUMBER = re.compile(rb"[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
+_WORD = re.compile(rb"[A-Za-z_]\w*")
+NUMBERS = (
+    b"0", b"-0", b"-1", b"1", b"2", b"0.5", b"nan", b"-nan", b"NaN", b"inf", b"-inf", b"Infinity", b"1e999",
+    b"-1e999", b"1e308", b"-1e308", b"1e200", b"1e-320", b"1e9", b"1e5", b"65536", b"2147483648",
+    b"9223372036854775808", b"9" * 30, b"1" * 5000, b"0x10", b"1_000", b"1,5", b"1.5.2", b"1e", b"--1",
+    b"1979-05-27", b"true", b"null", b'""', b"''", b"[]", b"{}", "٣".encode(), "½".encode(), "−1".encode(),
+)  # fmt: skip
+_COMMON = (
+    b"\0", b"\n", b"\r\n", b"\r", b" ", b"\t", b'"', b"'", b"\\", b"#", b"%", b"\xef\xbb\xbf", b"\xff\xfe",
+    b"\x1a", b"\xc3\x28", "é".encode(), "\u2028".encode(), "\ud800".encode(errors="surrogatepass"),
+    b"../../etc/passwd", b"$\\frac$", b"=1+1", b"A" * 10_000,
+)  # fmt: skip
+_PAIRS = (
+    (b"[", b"]"),
+    (b"{", b"}"),
+    (b"(", b")"),
+    (b"<g>", b"</g>"),
+    (b'{"a":', b"}"),
+    (b'"', b'"'),
+    (b"a.", b""),
+)
+_ENCODINGS = ("utf-16", "utf-16-le", "utf-8-sig", "utf-32", "latin-1", "utf-7", "cp500")
+
+Change = Callable[[bytes, Sequence[bytes], Random], bytes]
+
+
+def mutated(data: bytes, tokens: Sequence[bytes], random: Random) -> bytes:
+    """Mutate a file one to five times.
+
+    Args:
+        data: content of a valid file.
+        tokens: words and signs that matter to the format.
+        random: its state decides all.
+    """
+    for _ in range(random.choice((1, 1, 1, 2, 3, 5))):
+        data = random.choice(_CHANGES)(data, tokens, random)[:MOST]
+    return data
+
+
+def _slice(data: bytes, random: Random) -> tuple[int, int]:
+    """Choose a slice, short ones more often than long ones."""
+    start = random.randrange(len(data) + 1)
+    length = int(len(data) ** random.random())
+    return start, min(start + length, len(data))
+
+
+def _flip(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
+    changed = bytearray(data)
+    places = random.choices(range(len(data)), k=random.choice((1, 1, 2, 8))) if data else []
+    for place in places:
+        changed[place] = random.randrange(256)
+    return bytes(changed)
+
+
+def _delete(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
+    start, end = _slice(data, random)
+    return data[:start] + data[end:]
+
+
+def _duplicate(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
+    start, end = _slice(data, random)
+    times = random.choice((1, 1, 2, 100, 20_000))
+    times = min(times, MOST // max(end - start, 1))
+    return data[:end] + data[start:end] * times + data[end:]
+
+
+def _move(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
+    start, end = _slice(data, random)
+    rest = data[:start] + data[end:]
+    place = random.randrange(len(rest) + 1)
+    return rest[:place] + data[start:end] + rest[place:]
+
+
+def _insert(data: bytes, tokens: Sequence[bytes], random: Random) -> bytes:
+    place = random.randrange(len(data) + 1)
+    token = random.choice((*tokens, *_COMMON, *NUMBERS))
+    return data[:place] + token + data[place:]
+
+
+def _number(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
+    """Replace a number by a strange one."""
+    places = list(_NUMBER.finditer(data))
+    if not places:
+        return data
+    place = random.choice(places)
+    return data[: place.start()] + random.choice(NUMBERS) + data[place.end() :]
+
+
+def _word(data: bytes, tokens: Sequence[bytes], random: Random) -> bytes:
+    """Replace a word by another word of the file, or by a token."""
+    places = list(_WORD.finditer(data))
+    if not places:
+        return data
+    place = random.choice(places)
+    other = random.choice((random.choice(places)[0], *random.sample(tokens, min(3, len(tokens))), b""))
+    return data[: place.start()] + other + data[place.end() :]
+
+
+def _lines(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
+    """Delete, repeat or swap lines."""
+    lines = data.split(b"\n")
+    first, second = random.randrange(len(lines)), random.randrange(len(lines))
+    kind = random.choice(("delete", "repeat", "swap", "one"))
+    if kind == "delete":
+        del lines[first]
+    elif kind == "repeat":
+        lines.insert(second, lines[first])
+    elif kind == "swap":
+        lines[first], lines[second] = lines[second], lines[first]
+    else:
+        lines = lines[: first + 1]
+    return b"\n".join(lines)
+
+
+def _truncate(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
+    return data[: random.randrange(len(data) + 1)]
+
+
+def _nest(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
+    """Open brackets many times, and close them or not."""
+    start, end = _slice(data, random)
+    left, right = random.choice(_PAIRS)
+    times = random.choice((1, 3, 60, 1000, 100_000))
+    times = min(times, MOST // len(left))
+    return data[:start] + left * times + data[start:end] + right * random.choice((times, times, 0)) + data[end:]
+
+
+def _noise(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
+    place = random.randrange(len(data) + 1)
+    return data[:place] + random.randbytes(random.choice((1, 4, 100, 10_000))) + data[place:]
+
+
+def _encode(data: bytes, _: Sequence[bytes], random: Random) -> bytes:
+    """Write a text in another encoding."""
+    text = data.decode("utf-8", errors="replace")
+    return text.encode(random.choice(_ENCODINGS), errors="replace")
+
+
+_CHANGES: tuple[Change, ...] = (
+    _flip, _delete, _duplicate, _move, _insert, _insert, _number, _number, _number, _word, _word, _lines,
+    _truncate, _nest, _noise, _encode,
+)  # fmt: skip
+
+VALUES: tuple[Any, ...] = (
+    None, True, False, 0, -1, 1, 2, 0.5, -0.0, 1e-320, 1e308, -1e308, 1e9, 2**31, 2**63, 10**400, float("nan"),
+    float("inf"), float("-inf"), "", "x", "0", "nan", "../x", "A" * 1000, "\0", "\ud800", "two\nlines", [], {},
+    [[]], [0.0], [0.0, 0.0], [None], [1, [2, [3]]], {"a": 1}, {"": {}}, [1.0] * 5000,
+)  # fmt: skip
+
+
+def changed_content(content: Any, random: Random) -> Any:
+    """Change one to three entries of nested dictionaries and lists."""
+    content = copy.deepcopy(content)
+    for _ in range(random.choice((1, 1, 1, 2, 3))):
+        places = _places(content, random)
+        if not places:
+            return random.choice(VALUES)
+        parent, key = random.choice(places)
+        kind = random.choice(("value", "value", "value", "delete", "swap", "scale", "nest", "add"))
+        if kind == "delete":
+            del parent[key]
+        elif kind == "swap":
+            other, name = random.choice(places)
+            parent[key], other[name] = copy.deepcopy(other[name]), copy.deepcopy(parent[key])  # no circles
+        elif kind == "scale" and isinstance(parent[key], int | float):
+            parent[key] = parent[key] * random.choice((-1, 0, 1.5, 10, 1000, 1e12))
+        elif kind == "nest":
+            for _ in range(random.choice((1, 2, 100))):
+                parent[key] = [parent[key]]
+        elif kind == "add" and isinstance(parent, list):
+            parent.insert(key, random.choice((copy.deepcopy(parent[key]), *VALUES)))
+        elif kind == "add":
+            parent[random.choice(("x", "format", "names", f"{key}s", ""))] = random.choice(VALUES)
+        else:
+            parent[key] = copy.deepcopy(random.choice(VALUES))
+    return content
+
+
+def _places(content: Any, random: Random) -> list[tuple[Any, Any]]:
+    """List entries as pairs of what they are in and their key; of long lists a few."""
+    places: list[tuple[Any, Any]] = []
+    open_parts = [content]
+    while open_parts:
+        part = open_parts.pop()
+        keys = list(part) if isinstance(part, dict) else list(range(len(part))) if isinstance(part, list) else []
+        for key in keys if len(keys) < 40 else random.sample(keys, 6):
+            places.append((part, key))
+            open_parts.append(part[key])
+    return places

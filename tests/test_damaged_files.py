@@ -1,0 +1,220 @@
+"""Every reader, given anything: it ends with a result, or with one line that names the file.
+
+The formats and the mutations are those of `tests.oracles`. The benchmark `damaged_files` tries many more
+mutations, and limits time and memory.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+import torch
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.oracles.file_formats import FORMATS, FileFormat, judged
+from tests.oracles.mutations import changed_content
+
+CASES, FEW = 300, 30  # mutations of a format; of one whose reader takes more than 10 ms
+COSTLY = (
+    "camera tracks",
+    "runs of camera tracks",
+    "replayed track",
+    "table of one robot, sealed",
+    "model, sealed",
+)
+FILES = {name: form for name, form in FORMATS.items() if form.seal is None}
+TEXTS = {name: form for name, form in FILES.items() if form.tokens and name != "model"}
+SEALED = {name: form for name, form in FORMATS.items() if form.seal is not None}
+
+few = settings(
+    max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+numbers = st.one_of(st.floats(), st.integers(), st.sampled_from([0, -1, 1e-320, 1e200, 10**400]))
+scalars = st.one_of(numbers, st.text(max_size=5), st.booleans(), st.none())
+values = st.recursive(
+    scalars,
+    lambda inner: st.one_of(st.lists(inner, max_size=4), st.dictionaries(st.text(max_size=4), inner, max_size=3)),
+    max_leaves=8,
+)
+
+
+def replaced(form: FileFormat, path: Path, pattern: str, text: str) -> bool:
+    """Replace what matches a pattern in the example's file, and read it."""
+    data = next(iter(form.example().values())).decode()
+    changed, times = re.subn(pattern, lambda _: text, data)
+    assert times
+    path.write_bytes(changed.encode("utf-8", errors="surrogatepass"))
+    return judged(form, path)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_the_examples_are_read(name: str, tmp_path: Path) -> None:
+    assert judged(FORMATS[name], FORMATS[name].install(tmp_path))
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_mutated_files_are_read_or_refused(name: str, tmp_path: Path) -> None:
+    _try(name, range(FEW if name in COSTLY else CASES), tmp_path)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", COSTLY)
+def test_more_mutated_files_are_read_or_refused(name: str, tmp_path: Path) -> None:
+    _try(name, range(FEW, CASES), tmp_path)
+
+
+def _try(name: str, cases: range, folder: Path) -> None:
+    form = FORMATS[name]
+    path = form.install(folder)
+    for case in cases:
+        path.write_bytes(form.mutated(Random(f"{name} {case}")))
+        try:
+            judged(form, path)
+        except BaseException as error:
+            error.add_note(f"case {case} of {name!r}")
+            raise
+
+
+def test_the_same_seed_gives_the_same_file() -> None:
+    for form in (FORMATS["robot"], SEALED["sweep.json, sealed"]):
+        assert form.mutated(Random(3)) == form.mutated(Random(3)) != form.mutated(Random(4))
+
+
+@pytest.mark.parametrize("name", TEXTS)
+@few
+@given(data=st.data())
+def test_any_word_in_place_of_a_value(name: str, data: st.DataObject, tmp_path: Path) -> None:
+    """A number or a quoted word of a text becomes any other value, as JSON, TOML or a table would write it."""
+    form = FORMATS[name]
+    path = form.install(tmp_path)
+    text = next(iter(form.example().values())).decode()
+    places = list(re.finditer(r'"[^"\n]*"|-?\d[\d.e+-]*|\b(?:true|false|null)\b', text[:20_000]))
+    place = places[data.draw(st.integers(0, len(places) - 1))]
+    written = data.draw(st.one_of(values.map(json.dumps), numbers.map(str), st.text(max_size=8)))
+    changed = text[: place.start()] + written + text[place.end() :]
+    path.write_bytes(changed.encode("utf-8", errors="surrogatepass"))
+    judged(form, path)
+
+
+@pytest.mark.parametrize("name", [name for name in SEALED if name != "model, sealed"])
+@few
+@given(data=st.data())
+def test_any_value_of_a_forged_file(name: str, data: st.DataObject, tmp_path: Path) -> None:
+    form = FORMATS[name]
+    assert form.seal is not None
+    assert form.content is not None
+    path = form.install(tmp_path)
+    content = changed_content(form.content(), Random(data.draw(st.integers(0, 9))))
+    if isinstance(content, dict) and content:
+        content[data.draw(st.sampled_from(sorted(content)))] = data.draw(values)
+    path.write_bytes(form.seal(content))
+    judged(form, path)
+
+
+@few
+@given(data=st.binary(max_size=200))
+@pytest.mark.parametrize("name", FILES)
+def test_any_bytes(name: str, data: bytes, tmp_path: Path) -> None:
+    path = FILES[name].install(tmp_path)
+    path.write_bytes(data)
+    judged(FILES[name], path)
+
+
+ONCE = [  # format, pattern, what replaced it: each was another error than an InputError, or did not name the file
+    ("robot", r"viscosity_Pa_s = \S+", "viscosity_Pa_s = 1e-320"),
+    ("robot", r"radius_mm = \S+", "radius_mm = 1e-320"),
+    ("robot", r"count = 2", "count = 2147483648"),
+    ("robot", r"count = 2", "count = " + "9" * 400),
+    ("corrected robot", r"end_over_end_drag = \S+", "end_over_end_drag = " + "9" * 400),
+    ("corrected robot", r"scale = \[1.0", "scale = [1e-320"),
+    ("corrected robot", r"powers = \[\[0", "powers = [[inf"),
+    ("corrected robot", r"covariance = \[\n\s*\[\S+", "covariance = [[1e308,"),
+    ("corrected robot", r"covariance = \[\n\s*\[\S+", f"covariance = [[{'9' * 400},"),
+    ("sweep", r"rows = \d+", "rows = 0"),
+    ("sweep", r"range = \[[^]]*\]", 'range = "12"'),
+    ("sweep", r"range = \[[^,]*", "range = [" + "9" * 400),
+    ("path", r"1\.5", "1e308"),
+    ("camera tracks", r"time_s", "time"),
+    ("camera tracks", r"(?m)^\d,[^,]*,", "1,5,"),
+    ("runs of camera tracks", r"\n2,", "\n1,"),
+    ("runs of camera tracks", r"run,", "name,"),
+    ("measured runs", r"(?s)\n.*", "\n"),
+    ("measured runs", r"omega_h_rpm", "omega_hh_rpm"),
+    ("region", r",1\n", ",0\n"),
+    ("replayed track", r"\n\d+,[^,]*", "\n1,word"),
+    ("replayed track", r"(?s)\n.*", "\n1,0,0,0\n"),
+    ("replayed track", r"(?m)^\d+,[^,]*", "1,1e308"),
+    ("verdict", r'"covariance": \[\[[^]]*\], ', '"covariance": ['),
+    ("verdict", r'"C_t": 3.0', '"C_t": NaN'),
+]
+
+
+@pytest.mark.parametrize(("name", "pattern", "text"), ONCE)
+def test_what_once_ended_otherwise(name: str, pattern: str, text: str, tmp_path: Path) -> None:
+    path = FORMATS[name].install(tmp_path)
+    assert not replaced(FORMATS[name], path, pattern, text)
+
+
+def _set(name: str, value: Any) -> Callable[[Any], None]:
+    """Set the entry of a path of names and numbers, with dots between them."""
+
+    def change(content: Any) -> None:
+        *above, last = (int(part) if part.isdigit() else part for part in name.split("."))
+        for part in above:
+            content = content[part]
+        content[last] = value
+
+    return change
+
+
+FORGED = [
+    ("sweep.json, sealed", _set("config.inputs.C_t.range", 3.0)),
+    ("sweep.json, sealed", _set("config.inputs.C_t", None)),
+    ("sweep.json, sealed", _set("config.history_every", 10**30)),
+    ("sweep.json, sealed", _set("config", [])),
+    ("sweep.json, sealed", _set("rows_by", 3)),
+    ("manifest, sealed", _set("parts.0.start", 0.5)),
+    ("manifest, sealed", _set("parts.0.x", 1)),
+    ("manifest, sealed", _set("effects", ["no such effect"])),
+    ("manifest, sealed", _set("effects", 3)),
+    ("table of one robot, sealed", _set("steady.omega_yr_bar", 3.0)),
+    ("table of one robot, sealed", _set("steady.other", 3.0)),
+    ("table of one robot, sealed", _set("lag.0.0.0", 1e308)),
+    ("model, sealed", _set("support.2.factor", True)),
+    ("model, sealed", _set("support.2.shift", torch.zeros(3, dtype=torch.float64))),
+    ("model, sealed", _set("intervals.middle", torch.zeros(1, dtype=torch.float64))),
+    ("model, sealed", _set("errors.v_x.rms", "x")),
+    ("model, sealed", _set("ranges.N", [float("nan"), float("nan")])),
+]
+
+
+@pytest.mark.parametrize(("name", "change"), FORGED, ids=range(len(FORGED)))
+def test_forged_content_that_once_ended_otherwise(
+    name: str, change: Callable[[Any], None], tmp_path: Path
+) -> None:
+    """The hash is right, the content is not; compiled loops read behind the ends of arrays of another shape."""
+    form = FORMATS[name]
+    assert form.seal is not None
+    assert form.content is not None
+    path, content = form.install(tmp_path), copy.deepcopy(form.content())
+    change(content)
+    path.write_bytes(form.seal(content))
+    assert not judged(form, path)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_a_truncated_parquet_file_is_refused(share: float, tmp_path: Path) -> None:
+    """It was an OSError."""
+    form = FORMATS["table of robots, Parquet"]
+    path = form.install(tmp_path)
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))] + data[-8:])
+    assert not judged(form, path)
