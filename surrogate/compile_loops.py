@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-
+from sim.compile_stages import run_stages
 from sim.compiling import mark_all_compiled
 from surrogate.loops import FOLDER
 from surrogate.table.model_file import load
@@ -16,7 +15,7 @@ def compile_all() -> float:
     Returns:
         The time that it took, in seconds.
     """
-    began = time.perf_counter()
-    load().query(draw_robots(16, 0, wide=False), flag=True)
+    stages = (("look-up table", lambda: load().query(draw_robots(16, 0, wide=False), flag=True)),)
+    seconds = run_stages("surrogate", stages, FOLDER)
     mark_all_compiled(FOLDER)
-    return time.perf_counter() - began
+    return seconds

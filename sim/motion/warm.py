@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import sys
-import time
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from sim.compiling import all_compiled, compile_apart, mark_all_compiled
+from sim.compile_stages import Stage, run_stages
+from sim.compiling import CACHE, all_compiled, compile_apart, mark_all_compiled
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
@@ -21,7 +20,7 @@ from sim.motion.steady import steady
 
 _ROBOT = PRESETS["paper-control"]
 _TOUCHING = replace(PRESETS["paper-measured"], effects={"tail_contact": 1.0})
-_STAGES: tuple[tuple[str, Callable[[], object]], ...] = (
+_STAGES: tuple[Stage, ...] = (
     ("steady motion", lambda: steady(_ROBOT.groups())),
     ("time steps", lambda: settle(_ROBOT.groups())),
     ("response to flips", lambda: responses(_ROBOT.groups())),
@@ -38,12 +37,9 @@ def compile_all() -> float:
     Returns:
         The time that it took, in seconds.
     """
-    began = time.perf_counter()
-    for i, (name, call) in enumerate(_STAGES):
-        print(f"compiling {i + 1}/{len(_STAGES)}: {name} …", file=sys.stderr, flush=True)
-        call()
+    seconds = run_stages("sim", _STAGES, CACHE)
     mark_all_compiled()
-    return time.perf_counter() - began
+    return seconds
 
 
 def compile_once() -> bool:

@@ -2,38 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from dataset.build.build import build
-from dataset.rows.design import checked_design, load_design
-from dataset.rows.robot_inputs import fields_of_robot
+from dataset.rows.design import design_around, load_design
 from dataset.storage.data_set import read
 from sim.io.errors import InputError
 from sim.model.robot import Robot
-from softflagella.api.robots import one_robot
 
 
 def sweep(
     config: str | Path | Robot,
     out: str | Path,
     *,
-    inputs: Mapping[str, Sequence[float] | Mapping[str, Any]] | None = None,
+    inputs: Mapping[str, tuple[float, float]] | None = None,
     rows: int | None = None,
     jobs: int | None = None,
 ) -> dict[str, Any]:
     """Simulate a sweep into a folder of Parquet files. An interrupted sweep continues.
 
     Args:
-        config: a sweep.toml. With `inputs`: the robot, its robot.toml, or the name of a preset, around which the
-            sweep lies.
+        config: a sweep.toml, or a robot to sweep around.
         out: the folder.
-        inputs: what varies around the robot: name with unit, such as `tail_length_cm` or `motor_speed_rpm`; its
-            least and largest value, or an entry as in sweep.toml. All else is the robot's.
-        rows: number of robots; default the configuration's, or 1024.
+        inputs: around a robot, the lowest and highest value by name, in any unit; by default tail length, motor
+            speed, N and the coefficients of drag.
+        rows: number of robots; default the configuration's, or 1,024.
         jobs: processes; default all processors.
 
     Returns:
@@ -45,18 +42,15 @@ def sweep(
     Example:
         >>> import softflagella as sf
         >>> manifest = sf.sweep("sweep.toml", "data/sweep")  # doctest: +SKIP
-        >>> ranges = {"tail_length_cm": (6, 11), "motor_speed_rpm": (20, 60)}
-        >>> manifest = sf.sweep("robot.toml", "data/around", inputs=ranges, rows=256)  # doctest: +SKIP
+        >>> robot, ranges = sf.load_robot("robot.toml"), {"tail_length_cm": (7, 13), "motor_speed_rpm": (30, 160)}
+        ... # doctest: +SKIP
+        >>> manifest = sf.sweep(robot, "data/around", inputs=ranges)  # doctest: +SKIP
     """
-    if inputs is None:
-        if isinstance(config, Robot):
-            raise InputError("a sweep around a robot needs inputs, such as {'tail_length_cm': (6, 11)}")
-        design = load_design(config)
-    else:
-        entries = {name: dict(v) if isinstance(v, Mapping) else {"range": list(v)} for name, v in inputs.items()}
-        content = {"robot": fields_of_robot(one_robot(config)), "inputs": entries}
-        design = checked_design(content, "inputs")
-    return build(design.with_rows(rows), out, jobs=jobs)
+    if isinstance(config, Robot):
+        return build(design_around(config, inputs, rows or 1024), out, jobs=jobs)
+    if inputs is not None:
+        raise InputError("inputs are for a sweep around a robot; a sweep.toml has its own: leave them out")
+    return build(load_design(config).with_rows(rows), out, jobs=jobs)
 
 
 def read_sweep(folder: str | Path) -> pd.DataFrame:
