@@ -7,8 +7,6 @@ a checkout of the repository.
 from __future__ import annotations
 
 import math
-import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,19 +40,11 @@ from softflagella.demo_figures import (
     draw_sweep,
     in_lab_units,
 )
+from softflagella.demo_files import PLAN_FILES, documentation, header_excerpt
 from softflagella.replanning import Steered, gap_closed
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
 
-PAPER = "https://arxiv.org/abs/2103.05712"
-_DOCS = Path(__file__).parents[1] / "docs"
-_PAGES = (  # of the documentation: name without suffix, title, what it is
-    ("tutorial/schedule", "From a robot to a schedule", "the first tutorial, ten minutes"),
-    ("tutorial/calibration", "Calibrating the model", "the second tutorial"),
-    ("howto/tank", "Calibrate your tank", "which runs to make"),
-    ("reference/signs", "Signs and frames", "which way +1 turns, and a check on the bench"),
-    ("howto/tracker", "Keep a robot on its path with a camera", "a schedule with feedback"),
-)
 _INDEPENDENT = {  # the control robot's motion by an independent solver of the same equations, see `lab_columns`
     "omega_t_bar": 7.589,
     "omega_h_bar": -2.411,
@@ -70,14 +60,6 @@ _ERRORS = {  # column of a look-up table -> what it is called
     "R_yr_over_l": "turn radius",
     "theta_deg": "slip angle",
     "v_z": "forward speed",
-}
-_PLAN_FILES = {
-    "schedule.h": "the schedule for a microcontroller, open loop",
-    "tracker.h": "the same with feedback from a camera",
-    "plan.csv": "dwells and poses as a table",
-    "plan.json": "everything about the plan",
-    "plan.svg": "a drawing of it",
-    "track.csv": "the replayed track",
 }
 
 
@@ -238,10 +220,10 @@ def _add_plans(page: Page, results: Results) -> None:
         rows,
     )  # fmt: skip
     page.text("Errors are distances from the declared path; the last column is from the path as given.")
-    files = "; ".join(f"`{file}`, {words}" for file, words in _PLAN_FILES.items())
+    files = "; ".join(f"`{file}`, {words}" for file, words in PLAN_FILES.items())
     page.text(f"Files of each plan: {files}.")
     for name in results.plans:
-        page.link_line(name.capitalize(), [(f"demo/{name}/{file}", file) for file in _PLAN_FILES])
+        page.link_line(name.capitalize(), [(f"demo/{name}/{file}", file) for file in PLAN_FILES])
 
 
 def _add_schedule(page: Page, results: Results, folder: Path) -> None:
@@ -260,14 +242,6 @@ def _add_schedule(page: Page, results: Results, folder: Path) -> None:
     )  # fmt: skip
     page.text("The same for a microcontroller, from `schedule.h` (milliseconds between flips):")
     page.commands(header_excerpt((folder / name / "schedule.h").read_text()))
-
-
-def header_excerpt(header: str) -> list[str]:
-    """Return the numbers that a schedule.h defines, and the first line of its dwells."""
-    lines = header.splitlines()
-    defined = [line for line in lines if re.match(r"#define SCHEDULE_\w+ [-(\d]", line)]
-    dwells = next(place for place, line in enumerate(lines) if line.strip()[:1].isdigit())
-    return [*defined, *lines[dwells - 1 : dwells + 1], "    …"]
 
 
 def _add_sweep(page: Page, results: Results) -> None:
@@ -385,14 +359,3 @@ def _add_own_robot(page: Page, folder: Path) -> None:
         page.links(links)
     else:
         page.text("The documentation is in the folder docs of the repository.")
-
-
-def documentation(folder: Path) -> list[tuple[str, str, str]]:
-    """List pages of the documentation, relative to a folder: HTML if it was built; none without a checkout."""
-    built = _DOCS / "_build" / "html"
-    root, suffix = (built, ".html") if (built / "index.html").is_file() else (_DOCS, ".md")
-    return [
-        (os.path.relpath(path, folder), title, words)
-        for name, title, words in _PAGES
-        if (path := root / f"{name}{suffix}").is_file()
-    ]

@@ -23,8 +23,8 @@ ROOMS = {
                   "export", "compile_loops", "__main__"],
     "planner": ["paths", "vehicle", "planning", "goal", "tracking", "files", "__main__"],
     "calibration": ["statistics", "attribution", "verdict", "swimmer", "report", "examples", "__main__"],
-    "softflagella": ["shadowing", "api", "replanning", "demo_figures", "demo_page", "demo", "__init__",
-                     "__main__"],
+    "softflagella": ["shadowing", "api", "replanning", "demo_figures", "demo_files", "demo_page", "demo",
+                     "__init__", "__main__"],
 }  # fmt: skip
 ORDER = list(ROOMS)
 

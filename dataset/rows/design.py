@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,7 +27,9 @@ from dataset.rows.robot_inputs import (
     converted,
     input_of_robot,
     robot_columns,
+    robot_fields,
     robot_of_sweep,
+    sweep_toml,
 )
 from sim.arrays import Floats, Integers
 from sim.effects import catalogue
@@ -34,8 +37,10 @@ from sim.inputs import check_columns
 from sim.io.errors import InputError, naming
 from sim.io.reading import read_toml
 from sim.model.groups import DWELL, GROUP_COLUMNS, MOST_TAILS, OPTIONAL_COLUMNS
+from sim.model.robot import Robot
 
 _ENTRIES = ("robot", "rows", "seed", "history_every", "sensitivities", "inputs")
+_COUNTS = ("N", "tails")
 _SCALES = ("linear", "log", "integer")
 SWEEP_TOML = Path(__file__).parents[1] / "sweep.toml"  # the default sweep
 MOST_ROWS = 2**30  # points of the sequence in double precision
@@ -174,6 +179,28 @@ def load_design(path: str | Path = SWEEP_TOML) -> SweepDesign:
         return checked_design(content, str(path))
 
 
+def design_around(
+    robot: Robot, inputs: Mapping[str, tuple[float, float]] | None = None, rows: int = 1024
+) -> SweepDesign:
+    """Make the design of a sweep around a robot.
+
+    Args:
+        robot: what is not in `inputs` is as in this robot.
+        inputs: lowest and highest value by name, such as {"tail_length_cm": (7, 13)}; default: those that
+            `softflagella dataset config --robot` writes.
+        rows: number of robots.
+
+    Raises:
+        InputError: an input is unknown, or its range contains impossible robots.
+    """
+    content = tomllib.loads(sweep_toml(robot, "robot"))
+    if inputs is not None:
+        content["inputs"] = {name: {"range": list(ends)} for name, ends in inputs.items()}
+    read = {field: spec for field, (_, spec) in _inputs_of_robot(content["inputs"], False).items()}
+    around = {**content, "robot": robot_fields(robot), "rows": rows, "inputs": read}
+    return checked_design(around, f"sweep around robot {robot.name!r}")
+
+
 def checked_design(content: Mapping[str, Any], path: str) -> SweepDesign:
     """Make the design of the content of a sweep.toml.
 
@@ -261,9 +288,9 @@ def _axis(path: str, name: str, spec: Any) -> Axis:
         raise InputError(f"{path}: {name} starts at {low:g}; it must be above 0")
     if scale == "log" and low <= 0:
         raise InputError(f"{path}: {name} starts at {low:g}; a log scale needs a low end above 0")
-    if (name == "N" or scale == "integer") and (low != int(low) or high != int(high)):
+    if (name in _COUNTS or scale == "integer") and (low != int(low) or high != int(high)):
         raise InputError(f"{path}: {name} has range [{low:g}, {high:g}]; give whole numbers")
-    return Axis(low, high, "integer" if name == "N" else scale, mirrored)
+    return Axis(low, high, "integer" if name in _COUNTS else scale, mirrored)
 
 
 def _list(value: Any) -> list[Any]:

@@ -44,9 +44,17 @@ def robot_of_sweep(source: object, folder: Path) -> dict[str, Any]:
         return _checked_fields(source)
     if not isinstance(source, str):
         raise InputError(f"robot = {source!r}; give the name of a robot.toml or of a preset")
-    robot = load_robot(source if source in PRESETS else folder / source)
+    return robot_fields(load_robot(source if source in PRESETS else folder / source))
+
+
+def robot_fields(robot: Robot) -> dict[str, Any]:
+    """Return the fields of a robot that a sweep keeps.
+
+    Raises:
+        InputError: the robot has a correction.
+    """
     if robot.correction is not None:
-        raise InputError(f"robot {source!r} has a table [correction], which no sweep covers; give it without")
+        raise InputError(f"robot {robot.name!r} has a table [correction], which no sweep covers; give it without")
     return {
         field.name: dict(value) if isinstance(value := getattr(robot, field.name), Mapping) else value
         for field in fields(robot)

@@ -205,7 +205,7 @@ class RemoteStorage(Storage):
 
             self._files, self._root = fsspec.core.url_to_fs(address)
         except ImportError as missing:
-            raise InputError(f"{address} needs a package: {missing}; install softflagella[s3] for s3://") from None
+            raise InputError(f"{address} needs a package: {missing}; pip install s3fs for s3://") from None
         except ValueError as unknown:
             raise InputError(f"{address}: {unknown}; give a folder or a URL that fsspec knows") from None
 

@@ -9,7 +9,8 @@ from dataset.workers import BACKENDS
 from dataset.workers.backend import Backend
 from sim.io.errors import InputError
 
-_PACKAGES = {"dask": "distributed", "ray": "ray"}  # that a backend needs
+# Module that a backend needs, and how it is installed.
+_PACKAGES = {"dask": ("distributed", "dask[distributed]"), "ray": ("ray", "ray")}
 
 
 def processors() -> int:
@@ -21,11 +22,9 @@ def check_backend(name: str, jobs: int | None) -> None:
     """Reject an unknown backend, one whose package is missing, and an impossible number of workers."""
     if name not in BACKENDS:
         raise InputError(f"backend {name!r}; allowed are {', '.join(BACKENDS)}")
-    package = _PACKAGES.get(name)
-    if package and find_spec(package) is None:
-        raise InputError(
-            f"backend {name!r} needs the package {package}; pip install 'softflagella[{name}]', or use loky"
-        )
+    module, package = _PACKAGES.get(name, ("", ""))
+    if module and find_spec(module) is None:
+        raise InputError(f"backend {name!r} needs the package {module}; pip install '{package}', or use loky")
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs = {jobs}; give at least 1, or nothing for all processors")
 

@@ -93,8 +93,8 @@ def check(
 
     Args:
         plan: a plan, the path of its plan.json, or its content.
-        track: `time_bar`, `x_over_l`, `y_over_l`, `heading_rad` of the head's centre, such as `replay` returns,
-            or its file.
+        track: `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre, as a camera gives them, or the columns
+            that `replay` returns; or its file.
 
     Returns:
         Distances of the tracked point from the declared path: `rms` and `largest`, with the `stated` error; from

@@ -26,7 +26,8 @@ from sim.model.response import DWELLS
 from sim.motion.lab_units import lab_motion
 from sim.motion.steady import steady
 from softflagella.demo_figures import draw_circles, draw_schedule, in_lab_units
-from softflagella.demo_page import Results, documentation, header_excerpt, write_page
+from softflagella.demo_files import documentation, header_excerpt
+from softflagella.demo_page import Results, write_page
 from softflagella.replanning import Steered
 from surrogate.table.model_file import load
 from tests.calibration.toy_tables import calibrated_toy, install_toy, shares_verdicts, toy_swimmer, toy_table
@@ -212,5 +213,5 @@ def test_without_a_checkout_there_are_no_links_to_the_documentation(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert len(documentation(tmp_path)) == 5
-    monkeypatch.setattr("softflagella.demo_page._DOCS", tmp_path / "docs")
+    monkeypatch.setattr("softflagella.demo_files._DOCS", tmp_path / "docs")
     assert documentation(tmp_path) == []

@@ -11,7 +11,7 @@ import pytest
 from dataset.__main__ import main
 from dataset.build.build import build
 from dataset.build.verify import verify
-from dataset.rows.design import SweepDesign, load_design
+from dataset.rows.design import SweepDesign, design_around, load_design
 from dataset.rows.robot_inputs import sweep_toml
 from dataset.storage.data_set import read
 from sim.inputs import save_robot
@@ -137,3 +137,20 @@ def test_the_command_writes_a_sweep_around_a_robot(tmp_path: Path) -> None:
         every = every.replace(f"# {name}", name)
     out.write_text(every)
     assert len(load_design(out).axes) == 12
+
+
+def test_a_design_around_a_robot_needs_no_file(tmp_path: Path) -> None:
+    given = {"tail_length_mm": (70.0, 130.0), "motor_speed_rpm": (30.0, 160.0), "N": (2.0, 4.0)}
+    design = design_around(CONTROL, given, rows=32)
+    points = design.points()
+    assert set(points["N"]) == {2.0, 3.0, 4.0}
+    length = points["l_over_R"] * CONTROL.head_radius
+    assert 0.07 <= length.min() <= length.max() <= 0.13
+    assert points["C_t"].tolist() == [CONTROL.C_t] * 32
+    (tmp_path / "sweep.toml").write_text(sweep_toml(CONTROL, "paper-control"))
+    default, written = design_around(CONTROL), load_design(tmp_path / "sweep.toml")
+    assert default.config() == written.config()
+    with pytest.raises(InputError, match=r"sweep around robot 'paper-control'.*motor_speed"):
+        design_around(CONTROL, {"motor_speed_rpm": (160.0, 30.0)})
+    with pytest.raises(InputError, match="'motor_speed' has no unit"):
+        design_around(CONTROL, {"motor_speed": (30.0, 160.0)})

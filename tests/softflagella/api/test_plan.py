@@ -63,8 +63,10 @@ def test_a_track_is_checked_against_a_plan_in_any_form(tmp_path: Path) -> None:
     track.to_csv(tmp_path / "track.csv", index=False)
     for plan_given in (result.to_dict(), tmp_path / "plan.json", str(tmp_path / "plan.json")):
         assert sf.check(plan_given, tmp_path / "track.csv").rms == pytest.approx(error.rms, rel=1e-9)
-    with pytest.raises(sf.InputError, match="no column 'x_over_l'"):
-        sf.check(result, track.drop(columns="x_over_l"))
+    camera = track[["time_s", "x_cm", "y_cm", "heading_deg"]]
+    assert sf.check(result, camera).rms == pytest.approx(error.rms, rel=1e-9)
+    with pytest.raises(sf.InputError, match="it needs time_s, x_cm"):
+        sf.check(result, camera.drop(columns="x_cm"))
 
 
 def test_a_goal_plan_is_checked_as_its_plan() -> None:
