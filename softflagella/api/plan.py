@@ -21,7 +21,7 @@ from planner.planning.plan import plan as plan_path
 from planner.planning.planned import Plan
 from planner.planning.request import RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.tables import read_table
 from sim.model.robot import Robot
 from softflagella.api.robots import OneRobot, one_robot
@@ -120,7 +120,8 @@ def check(
     content = (
         load_plan(plan) if isinstance(plan, str | Path) else plan if isinstance(plan, Mapping) else plan.to_dict()
     )
-    return tracking_error(dict(content), track if isinstance(track, pd.DataFrame) else read_table(track))
+    with naming(track):
+        return tracking_error(dict(content), track if isinstance(track, pd.DataFrame) else read_table(track))
 
 
 def write_plan(
