@@ -149,6 +149,7 @@ ONCE = [  # format, pattern, what replaced it: each was another error than an In
     ("measured runs", r"(?s)\n.*", "\n"),
     ("measured runs", r"omega_h_rpm", "omega_hh_rpm"),
     ("region", r",1\n", ",0\n"),
+    ("region", r"x,y", "x,\u2028z"),
     ("replayed track", r"\n\d+,[^,]*", "\n1,word"),
     ("replayed track", r"(?s)\n.*", "\n1,0,0,0\n"),
     ("replayed track", r"(?m)^\d+,[^,]*", "1,1e308"),
@@ -208,6 +209,14 @@ def test_forged_content_that_once_ended_otherwise(
     change(content)
     path.write_bytes(form.seal(content))
     assert not judged(form, path)
+
+
+@pytest.mark.parametrize(("name", "case"), [("drawing", 482), ("drawing", 754), ("region", 554)])
+def test_mutations_that_once_ended_otherwise(name: str, case: int, tmp_path: Path) -> None:
+    """A warning of an overflow, and a message of two lines."""
+    path = FORMATS[name].install(tmp_path)
+    path.write_bytes(FORMATS[name].mutated(Random(f"{name} {case}")))
+    assert not judged(FORMATS[name], path)
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])

@@ -22,8 +22,10 @@ from pathlib import Path
 from random import Random
 from typing import NamedTuple
 
+from joblib import Parallel, delayed
+
 from benchmarks.markdown import heading, row
-from benchmarks.parallel import in_parallel
+from sim.motion.batches import available_jobs
 from tests.oracles.file_formats import FORMATS, judged
 
 SECONDS, MEMORY = 5.0, 10**9  # a case may take
@@ -45,16 +47,17 @@ def main(cases: str = "20000", *names: str) -> None:
     chosen = names or tuple(FORMATS)
     print(heading("file", "cases", "read", "refused", "other ends", "longest [s]", "median [ms]", "memory [MB]"))
     wrong: list[str] = []
-    for name, results in zip(
-        chosen, in_parallel(tried, [(name, int(cases)) for name in chosen], quiet=True), strict=True
-    ):
+    trials = Parallel(n_jobs=available_jobs(), return_as="generator")(
+        delayed(tried)(n, int(cases)) for n in chosen
+    )
+    for name, results in zip(chosen, trials, strict=True):
         counts = Counter(case.outcome for case in results)
         times = sorted(case.seconds for case in results)
         others = [case for case in results if case.outcome not in ("read", "refused")]
         wrong += [f"{name}, case {case.number}: {case.outcome}" for case in others]
         memory = max(case.memory for case in results) / 1e6
         print(row(name, len(results), counts["read"], counts["refused"], len(others), f"{times[-1]:.2f}",
-                  f"{1e3 * times[len(times) // 2]:.1f}", f"{memory:.0f}"))  # fmt: skip
+                  f"{1e3 * times[len(times) // 2]:.1f}", f"{memory:.0f}"), flush=True)  # fmt: skip
     print(*wrong[:40], sep="\n")
 
 

@@ -56,7 +56,8 @@ def read_svg(path: Path, closed: bool | None, shape: str | None) -> tuple[Path2D
     except _BROKEN as broken:
         reason = next(iter(str(broken).splitlines()), type(broken).__name__)
         raise InputError(f"{path} is not SVG: {reason}") from None
-    subpaths = _subpaths(elements)
+    with np.errstate(all="ignore"):  # `Path2D.of` refuses what is not finite
+        subpaths = _subpaths(elements)
     if not subpaths:
         raise InputError(f"{path} has no path, line, polyline, polygon, rectangle, circle or ellipse; draw one")
     if shape is None and len(subpaths) > 1:

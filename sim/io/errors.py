@@ -42,9 +42,8 @@ def naming(source: object) -> Iterator[None]:
         yield
     except InputError as refusal:
         message = " ".join(str(refusal).split())
-        if not isinstance(source, str | Path) or str(source) in message:
-            raise
-        raise type(refusal)(f"{source}: {message}") from None
+        known = not isinstance(source, str | Path) or str(source) in message
+        raise type(refusal)(message if known else f"{source}: {message}") from None
 
 
 def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None = None) -> int:
