@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from planner.paths.units import UNITS, check_unstated_unit, describe, in_lab, in_tails, place_in_lab
 from sim.io.commands import MODEL, ROBOT, Program, argument, out
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
@@ -299,7 +299,8 @@ def _check(arguments: Namespace) -> None:
     from sim.io.tables import read_table
 
     content = load_plan(arguments.plan)
-    error = tracking_error(content, read_table(arguments.track))
+    with naming(arguments.track):
+        error = tracking_error(content, read_table(arguments.track))
     print(error.line)
     if arguments.out:
         from matplotlib.figure import Figure

@@ -7,7 +7,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from sim.io.commands import JOBS, Program, argument, out
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 
 program = Program("sim", "Simulate swimming robots.")
 main = program.main
@@ -73,7 +73,8 @@ def _steady_points(arguments: Namespace) -> None:
             f"note: these columns of the input are replaced by new results: {', '.join(replaced)}", file=sys.stderr
         )
         points = points.drop(columns=replaced)
-    result = steady_columns({str(c): points[c].to_numpy() for c in points}, jobs=arguments.jobs)
+    with naming(arguments.robot):
+        result = steady_columns({str(c): points[c].to_numpy() for c in points}, jobs=arguments.jobs)
     table = pd.concat([points, pd.DataFrame(result)], axis=1)
     write_csv(table, arguments.out)
     ended = table["converged"].to_numpy()

@@ -3,7 +3,6 @@ from calibration.report.robot_verdict import RobotVerdict as RobotVerdict
 from calibration.swimmer.synthetic_table import make_table as make_table
 from calibration.verdict.sequential_test import Decision as Decision
 from calibration.verdict.verdict import Verdict as Verdict
-from planner.files.plan_files import write_plan as write_plan
 from planner.files.plan_json import load_plan as load_plan
 from planner.files.tracking_error import TrackingError as TrackingError
 from planner.goal.goal_plan import GoalPlan as GoalPlan
@@ -32,6 +31,7 @@ from softflagella.api.calibrate import decide as decide
 from softflagella.api.calibrate import tracks as tracks
 from softflagella.api.plan import check as check
 from softflagella.api.plan import plan as plan
+from softflagella.api.plan import write_plan as write_plan
 from softflagella.api.query import export as export
 from softflagella.api.query import inverse as inverse
 from softflagella.api.query import query as query

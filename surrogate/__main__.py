@@ -7,7 +7,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from sim.io.commands import MODEL, Program, argument, out
-from sim.io.errors import InputError
+from sim.io.errors import InputError, naming
 
 program = Program("surrogate", "Train look-up tables and query them.")
 main = program.main
@@ -117,10 +117,11 @@ def _query_points(arguments: Namespace) -> None:
     points = read_table(arguments.robot)
     table = load_table(arguments.model)
     columns = {str(c): points[c].to_numpy() for c in points}
-    if isinstance(table, NeuralTable):
-        result = table.query(columns, intervals=True, flag=arguments.flag, certify=arguments.certify)
-    else:
-        result = table.query(columns)
+    with naming(arguments.robot):
+        if isinstance(table, NeuralTable):
+            result = table.query(columns, intervals=True, flag=arguments.flag, certify=arguments.certify)
+        else:
+            result = table.query(columns)
     answers = pd.concat([points, pd.DataFrame(result)], axis=1)
     write_csv(answers, arguments.out)
     print(f"{len(answers)} rows -> {arguments.out}")
@@ -142,7 +143,8 @@ def _inverse(arguments: Namespace) -> None:
 
     points = read_table(arguments.targets)
     names = [name.strip() for name in arguments.free.split(",")]
-    table = inverse_table(load(arguments.model), points, names, where=arguments.targets)
+    with naming(arguments.targets):
+        table = inverse_table(load(arguments.model), points, names, where=arguments.targets)
     write_csv(table, arguments.out)
     print(f"{len(table)} solutions of {len(points)} targets -> {arguments.out}")
 

@@ -158,15 +158,17 @@ class Tracker:
         return as_html(repr(self), self.plot)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the plan and the estimated pose at the last flip, on axes in l.
+        """Draw the plan and the estimated pose at the last flip, on axes in cm.
 
         Args:
             ax: default: axes of a new figure.
         """
         ax = self._plan.plot(ax)
+        cm = 100 * self._plan.robot.tail_length
         x, y, heading = self.pose
-        ax.plot(x, y, "^", color="black", label="estimated")
-        ax.plot([x, x + 0.3 * math.cos(heading)], [y, y + 0.3 * math.sin(heading)], color="black", lw=1)
+        ahead = x + 0.3 * math.cos(heading), y + 0.3 * math.sin(heading)
+        ax.plot(cm * x, cm * y, "^", color="black", label="estimated")
+        ax.plot([cm * x, cm * ahead[0]], [cm * y, cm * ahead[1]], color="black", lw=1)
         return ax
 
     @property

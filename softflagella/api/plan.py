@@ -1,15 +1,17 @@
-"""Plan and check: `softflagella.plan` and `check`."""
+"""Plan, write plans, and check tracks: `softflagella.plan`, `write_plan` and `check`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from planner.files.goal_files import write_goal_plan
 from planner.files.own_table import table_for
+from planner.files.plan_files import write_plan as write_plan_files
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import TrackingError, tracking_error
 from planner.goal.goal_plan import GoalPlan
@@ -19,10 +21,14 @@ from planner.planning.plan import plan as plan_path
 from planner.planning.planned import Plan
 from planner.planning.request import RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
+from sim.io.errors import InputError, naming
 from sim.io.tables import read_table
 from sim.model.robot import Robot
 from softflagella.api.robots import OneRobot, one_robot
 from surrogate.interface import LookupTable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def plan(
@@ -92,8 +98,8 @@ def check(
 
     Args:
         plan: a plan, the path of its plan.json, or its content.
-        track: `time_bar`, `x_over_l`, `y_over_l`, `heading_rad` of the head's centre, such as `replay` returns,
-            or its file.
+        track: `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre, as a camera gives them, or the columns
+            that `replay` returns; or its file.
 
     Returns:
         Distances of the tracked point from the declared path: `rms` and `largest`, with the `stated` error; from
@@ -114,4 +120,32 @@ def check(
     content = (
         load_plan(plan) if isinstance(plan, str | Path) else plan if isinstance(plan, Mapping) else plan.to_dict()
     )
-    return tracking_error(dict(content), track if isinstance(track, pd.DataFrame) else read_table(track))
+    with naming(track):
+        return tracking_error(dict(content), track if isinstance(track, pd.DataFrame) else read_table(track))
+
+
+def write_plan(
+    result: Plan | GoalPlan, folder: str | Path, *, pictures: Mapping[str, Figure] | None = None
+) -> list[Path]:
+    """Write the files of a plan, all or none, and return their paths.
+
+    Args:
+        result: a plan, or a plan from pose to pose, which has goal.json and a picture besides.
+        folder: it is made if it is missing.
+        pictures: of a plan, more pictures, by the name of their file, such as "trade_off.svg".
+
+    Raises:
+        InputError: a dwell is too short for whole milliseconds, or a file cannot be written.
+
+    Example:
+        >>> import tempfile
+        >>> from softflagella import circle, plan, write_plan
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [path.name for path in write_plan(plan(circle(2.0), "paper-control"), folder)]
+        ['plan.json', 'plan.csv', 'schedule.h', 'tracker.h', 'plan.svg']
+    """
+    if not isinstance(result, GoalPlan):
+        return write_plan_files(result, folder, pictures=pictures)
+    if pictures:
+        raise InputError("a plan from pose to pose takes no further pictures; write its plan: result.plan")
+    return write_goal_plan(result, folder)

@@ -66,6 +66,17 @@ def test_pictures_go_on_given_axes(name: str) -> None:
     assert axes.lines
 
 
+def test_pictures_are_in_centimetres() -> None:
+    plan, tracker = made("plan"), made("tracker")
+    axes = plan.plot(Figure().add_subplot())
+    assert axes.get_xlabel() == "x [cm]"
+    predicted = next(line for line in axes.lines if line.get_label() == "predicted")
+    np.testing.assert_allclose(predicted.get_xydata(), CM * plan.track)
+    axes = tracker.plot(Figure().add_subplot())
+    estimated = next(line for line in axes.lines if line.get_label() == "estimated")
+    np.testing.assert_allclose(estimated.get_xydata()[0], CM * np.array(tracker.pose[:2]))
+
+
 def test_axes_are_made_where_none_are_given() -> None:
     from matplotlib import pyplot
 

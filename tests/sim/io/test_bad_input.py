@@ -53,6 +53,7 @@ def test_steady_refuses(case: str, tmp_path: Path, capsys: pytest.CaptureFixture
     assert run_command(main, ["steady", str(points), "--out", str(out)]) == 2
     error = capsys.readouterr().err
     assert expected in error
+    assert "points.csv" in error
     assert error.startswith("error: ")
     assert len(error.splitlines()) == 1
     assert [p.name for p in tmp_path.iterdir()] == ["points.csv"]

@@ -63,11 +63,16 @@ def test_a_track_is_checked_against_a_plan_in_any_form(tmp_path: Path) -> None:
     track.to_csv(tmp_path / "track.csv", index=False)
     for plan_given in (result.to_dict(), tmp_path / "plan.json", str(tmp_path / "plan.json")):
         assert sf.check(plan_given, tmp_path / "track.csv").rms == pytest.approx(error.rms, rel=1e-9)
-    with pytest.raises(sf.InputError, match="no column 'x_over_l'"):
-        sf.check(result, track.drop(columns="x_over_l"))
+    camera = track[["time_s", "x_cm", "y_cm", "heading_deg"]]
+    assert sf.check(result, camera).rms == pytest.approx(error.rms, rel=1e-9)
+    with pytest.raises(sf.InputError, match="it needs time_s, x_cm"):
+        sf.check(result, camera.drop(columns="x_cm"))
 
 
-def test_a_goal_plan_is_checked_as_its_plan() -> None:
+def test_a_goal_plan_is_written_with_its_goal_and_checked_as_its_plan(tmp_path: Path) -> None:
     goal = sf.to_goal((0, 0, 0), (2.5, 0.5, 0.3), ROBOT)
+    names = [path.name for path in sf.write_plan(goal, tmp_path)]
+    assert names[-2:] == ["goal.json", "goal.svg"]
+    assert sf.load_plan(tmp_path / "plan.json")["id"] == goal.plan.to_dict()["id"]
     track = sf.replay(goal.plan)
     assert sf.check(goal, track).rms == sf.check(goal.plan, track).rms
