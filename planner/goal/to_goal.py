@@ -25,7 +25,7 @@ from planner.goal.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.goal.route import COURSES, Lattices, NoWayError, Route, route
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift, Reference, slips
-from planner.paths.units import LONGEST
+from planner.paths.units import LONGEST, in_lab, time_in_lab
 from planner.planning.declared_path import Declared
 from planner.planning.errors import plan_errors
 from planner.planning.plan import choose_guidance, zigzag_drift
@@ -123,8 +123,8 @@ def to_goal(
         if tolerance is None or trip.plan.stated_error <= tolerance:
             return trip
         refusal = InputError(
-            f"tolerance {tolerance:g} l cannot be kept: with dwells of {dwell:.2g} time units the stated error is "
-            f"{trip.plan.stated_error:.3g} l; allow more"
+            f"tolerance {in_lab(tolerance, robot)} cannot be kept: with dwells of {time_in_lab(dwell, robot)} the "
+            f"stated error is {in_lab(trip.plan.stated_error, robot)}; allow more"
         )
     assert refusal is not None
     raise refusal
@@ -177,7 +177,7 @@ class _Task:
         """
         vehicle = self.tracked.vehicle
         straight = zigzag(vehicle, dwell)
-        drift = zigzag_drift(vehicle, straight, dwell)
+        drift = zigzag_drift(self.tracked, straight, dwell)
         limits = RouteLimits(vehicle.pivot_radius, self.body, self.free_space, drift)
         margin = 0.0 if self.free_space.empty else 1.5 * straight.largest
         for _ in range(_MARGINS):
@@ -188,8 +188,9 @@ class _Task:
                 return trip
             margin = max(_MORE * needed, margin * 1.02)
         raise NoWayError(
-            f"there is no way that leaves the plan's stated error around the robot: it is {needed:.3g} l; plan "
-            f"with feedback, make a table of this robot ({OWN_TABLE}), or move goal or obstacles"
+            f"there is no way that leaves the plan's stated error around the robot: it is "
+            f"{in_lab(needed, self.tracked.robot)}; plan with feedback, make a table of this robot "
+            f"({OWN_TABLE}), or move goal or obstacles"
         )
 
     def _stops(self, drift: Drift) -> list[Floats]:

@@ -27,6 +27,11 @@ def in_lab(value: float, robot: Robot) -> str:
     return f"{format_length(value * robot.tail_length)} ({value:.3g} l)"
 
 
+def time_in_lab(value: float, robot: Robot) -> str:
+    """Write a time given in units of μ0 l⁴/EI: 1.79 s (0.81 time units)."""
+    return f"{format_time(value * robot.time_scale)} ({value:.2g} time units)"
+
+
 def place_in_lab(x: float, y: float, robot: Robot) -> str:
     """Write a place given in tail lengths: (3.52, 1.1) cm = (0.32, 0.1) l."""
     cm = 100 * robot.tail_length

@@ -19,10 +19,11 @@ from planner.paths.fillets import CORNER, fillet, kinks, largest_fillet
 from planner.paths.nearest_feasible import nearest_path
 from planner.paths.path import Path2D, smoothed
 from planner.paths.tractrix import Drift, Reference, reference
-from planner.paths.units import LONGEST, extent
+from planner.paths.units import LONGEST, extent, in_lab, place_in_lab
 from planner.planning.request import Corner
 from planner.vehicle.vehicle import Vehicle
 from sim.io.errors import InputError
+from sim.model.robot import Robot
 
 AS_DRAWN = 0.85  # share of the pivot's largest curvature up to which a path is followed as it was drawn
 ROOMS = (0.92, 0.85, 0.7, 0.55)  # shares of it that the nearest path may use
@@ -40,6 +41,7 @@ _SMALL = 0.1  # of the path's extent: what smoothing may move a path that is noi
 class Feasibility(NamedTuple):
     """What decides whether a path can be followed, and which one is declared if it cannot."""
 
+    robot: Robot  # whose lengths messages are in
     vehicle: Vehicle  # its pivot radius limits the curvature
     rod: float  # from the pivot to the tracked point
     drift: Drift  # what carries the robot off its heading
@@ -80,27 +82,27 @@ def declare(raw: Path2D, feasibility: Feasibility) -> Declared:
     too_sharp = curvature > TIGHTEST / feasibility.vehicle.pivot_radius
     if too_sharp or distance > _lost(raw, feasibility.vehicle):
         raise InputError(_too_tight(raw, feasibility))
-    warnings = []
+    warnings, robot = [], feasibility.robot
     if distance > WARN * max(extent(raw)):
         warnings.append(
-            f"the shape is lost in part: the declared path is up to {distance:.2g} l from the drawn one, "
-            f"which is {max(extent(raw)):.3g} l across; draw it larger"
+            f"the shape is lost in part: the declared path is up to {in_lab(distance, robot)} from the drawn one, "
+            f"which is {in_lab(max(extent(raw)), robot)} across; draw it larger"
         )
     return Declared(followed, curvature, off_drawn, missed, tuple(warnings))
 
 
 def _try(raw: Path2D, feasibility: Feasibility) -> Reference | None:
     """Find a reference that can be followed; None if there is none."""
-    vehicle, rod, drift, corner, time_weight = feasibility
+    _, vehicle, rod, drift, corner, time_weight = feasibility
     limit = TIGHTEST / vehicle.pivot_radius
     drawn = reference(raw, rod, _spacing(raw), drift)
     sharpest = np.abs(drawn.curvature).max()
     if sharpest * vehicle.pivot_radius <= AS_DRAWN and not time_weight:
         return drawn
     if corner == "error":
-        _refuse_corner(raw)
+        _refuse_corner(raw, feasibility.robot)
         return drawn if sharpest <= limit else None
-    if _smoothing_advice(raw, vehicle.turn_radius / 4):
+    if _smoothing_advice(raw, vehicle.turn_radius / 4, feasibility.robot):
         return None
     if corner == "fillet":
         path = _rounded(raw, feasibility)
@@ -127,14 +129,14 @@ def _spacing(path: Path2D) -> float:
     return max(_SPACING, path.length / _MOST_POINTS)
 
 
-def _refuse_corner(raw: Path2D) -> None:
+def _refuse_corner(raw: Path2D, robot: Robot) -> None:
     """Refuse a path with a sharp corner, and name the corner."""
     angle = np.abs(kinks(raw))
     sharpest = int(angle.argmax())
     if angle[sharpest] > CORNER:
         x, y = raw.points[sharpest]
         raise InputError(
-            f"corner of {math.degrees(angle[sharpest]):.0f} degrees at ({x:.3g}, {y:.3g}); "
+            f"corner of {math.degrees(angle[sharpest]):.0f} degrees at {place_in_lab(x, y, robot)}; "
             "round it, or allow corner = nearest"
         )
 
@@ -158,18 +160,20 @@ def _rounded(raw: Path2D, feasibility: Feasibility) -> Path2D:
 
 def _too_tight(raw: Path2D, feasibility: Feasibility) -> str:
     """Say where a path is too tight, and what to change."""
-    vehicle = feasibility.vehicle
+    robot, vehicle = feasibility.robot, feasibility.vehicle
     drawn = reference(raw, feasibility.rod, _spacing(raw), feasibility.drift)
     curvature = np.abs(drawn.curvature)
     worst = int(curvature.argmax())
     x, y = drawn.p[worst]
-    remedy = _smoothing_advice(raw, vehicle.turn_radius / 4)
+    remedy = _smoothing_advice(raw, vehicle.turn_radius / 4, feasibility.robot)
     scale = None if remedy else _working_scale(raw, feasibility)
     remedy = remedy or (f"scale the path by {scale:.3g}" if scale else "smooth the path, with --smooth LENGTH")
     return (
-        f"path too tight at ({x:.3g}, {y:.3g}) l: the pivot would turn with radius {1 / curvature[worst]:.3g} l, "
-        f"the robot can with {vehicle.pivot_radius / TIGHTEST:.3g} l (its circle has radius "
-        f"{vehicle.turn_radius:.3g} l), and the nearest path that it can follow has lost the shape; {remedy}"
+        f"path too tight at {place_in_lab(x, y, robot)}: the pivot would turn with radius "
+        f"{in_lab(1 / float(curvature[worst]), robot)}, the robot can with "
+        f"{in_lab(vehicle.pivot_radius / TIGHTEST, robot)}; its circle has radius "
+        f"{in_lab(vehicle.turn_radius, robot)}, and the nearest path that it can follow has lost the shape; "
+        f"{remedy}"
     )
 
 
@@ -189,7 +193,7 @@ def _working_scale(raw: Path2D, feasibility: Feasibility) -> float | None:
     return None
 
 
-def _smoothing_advice(raw: Path2D, radius: float) -> str:
+def _smoothing_advice(raw: Path2D, radius: float, robot: Robot) -> str:
     """Advise to smooth a path that is much longer than after smoothing: it is noisy, and no scale helps.
 
     A path that smoothing changes as a whole is small, not noisy.
@@ -201,6 +205,6 @@ def _smoothing_advice(raw: Path2D, radius: float) -> str:
     if raw.length < _NOISY * smooth.length or moved > _SMALL * max(extent(raw)):
         return ""
     return (
-        f"it looks noisy: smoothed over {length:g} l it is {smooth.length:.3g} l long, not {raw.length:.3g} l, "
-        f"and moves by up to {moved:.2g} l; give --smooth {length:g}"
+        f"it looks noisy: smoothed over {in_lab(length, robot)} it is {in_lab(smooth.length, robot)} long, not "
+        f"{in_lab(raw.length, robot)}, and moves by up to {in_lab(moved, robot)}; give --smooth {length:g}"
     )

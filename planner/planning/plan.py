@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
-from planner.paths.units import check_size
+from planner.paths.units import check_size, in_lab, time_in_lab
 from planner.planning.declared_path import Declared, Feasibility, declare
 from planner.planning.errors import plan_errors
 from planner.planning.line_of_sight import Guidance
@@ -105,12 +105,12 @@ def make_plan(
 
     @cache
     def declared_path(drift: Drift) -> Declared:
-        feasibility = Feasibility(vehicle, tracked.rod, drift, request.corner, request.time_weight)
+        feasibility = Feasibility(tracked.robot, vehicle, tracked.rod, drift, request.corner, request.time_weight)
         return declare(drawn, feasibility)
 
     def with_dwell(dwell: float) -> Plan:
         straight = zigzag(vehicle, dwell, tracked.offset)
-        declared = declared_path(zigzag_drift(vehicle, straight, dwell))
+        declared = declared_path(zigzag_drift(tracked, straight, dwell))
         guidance = choose_guidance(vehicle, declared, straight, dwell)
         switches = follow(declared.reference, vehicle, guidance, tracked.offset, progress=progress)
         bound = guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
@@ -141,25 +141,28 @@ def _shortened(first: Plan, dwells: list[float], with_dwell: Callable[[float], P
         else:
             low = middle
     if kept is None:
+        robot = first.robot
         raise InputError(
-            f"tolerance {tolerance:g} l cannot be kept: the smallest stated error is {best.stated_error:.3g} l, "
-            f"with dwells from {best.minimum_dwell:.2g} time units; allow more, or make a table of this robot "
-            f"with {OWN_TABLE}"
+            f"tolerance {in_lab(tolerance, robot)} cannot be kept: the smallest stated error is "
+            f"{in_lab(best.stated_error, robot)}, with dwells from {time_in_lab(best.minimum_dwell, robot)}; "
+            f"allow more, or make a table of this robot with {OWN_TABLE}"
         )
     return kept
 
 
-def zigzag_drift(vehicle: Vehicle, straight: Zigzag, dwell: float) -> Drift:
+def zigzag_drift(tracked: TrackedVehicle, straight: Zigzag, dwell: float) -> Drift:
     """Return what carries the robot off its heading, with one shortest dwell, as shares of its net speed.
 
     Raises:
         InputError: with such dwells the robot does not get ahead.
     """
+    vehicle = tracked.vehicle
     if straight.speed <= 0:
         turn = dwell * float(np.abs(vehicle.twist[:, 2]).max())
         remedy = "shorter ones: it turns too far" if turn > 1.0 else "longer ones: it is still accelerating"
         raise InputError(
-            f"with dwells of {dwell:.2g} time units the robot does not get ahead; allow {remedy} in each dwell"
+            f"with dwells of {time_in_lab(dwell, tracked.robot)} the robot does not get ahead; allow {remedy} in "
+            "each dwell"
         )
     sideways = straight.drift / straight.speed
     x, y = (vehicle.current / straight.speed).tolist()

@@ -131,7 +131,7 @@ def test_refusals() -> None:
         to_goal((0, math.nan, 0), (5, 0, 0), CONTROL)
     with pytest.raises(InputError, match="start and goal are the same"):
         to_goal((1, 1, 0.5), (1, 1, 0.5), CONTROL)
-    with pytest.raises(InputError, match=r"tolerance 0.001 l cannot be kept"):
+    with pytest.raises(InputError, match=r"tolerance 0.11 mm \(0.001 l\) cannot be kept"):
         to_goal((0, 0, 0), (3, 0, 0), CONTROL, tolerance=0.001)
     with pytest.raises(InputError, match="radius above 0"):
         Circle(0, 0, -1)
