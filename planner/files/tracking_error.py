@@ -24,7 +24,7 @@ from sim.mechanics import planar
 
 _LARGEST = 1e100  # of a number
 _COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
-_LAB = ("time_s", "x_m", "y_m", "heading_rad")  # or in other units
+_LAB = ("time_s", "x_cm", "y_cm", "heading_deg")  # or in other units
 
 
 @dataclass(frozen=True)
@@ -108,13 +108,14 @@ def _in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFrame:
             raise InputError(
                 f"the track has no column {name!r}; it needs time_s, x_cm, y_cm and heading_deg, or in other units"
             )
-    values = {name: pd.to_numeric(lab[name], errors="coerce") for name in _LAB}
+    values = {name: numbers_of(lab[name]) for name in _LAB}
+    cm = 100 * robot["tail_length_m"]
     return pd.DataFrame(
         {
             "time_bar": values["time_s"] / robot["time_scale_s"],
-            "x_over_l": values["x_m"] / robot["tail_length_m"],
-            "y_over_l": values["y_m"] / robot["tail_length_m"],
-            "heading_rad": values["heading_rad"],
+            "x_over_l": values["x_cm"] / cm,
+            "y_over_l": values["y_cm"] / cm,
+            "heading_rad": np.radians(values["heading_deg"]),
         }
     )
 

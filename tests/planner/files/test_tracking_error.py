@@ -51,6 +51,8 @@ def test_a_track_without_a_column_is_refused(planned: tuple[dict[str, object], p
     record, track = planned
     with pytest.raises(InputError, match="no column 'time_s'; it needs time_s, x_cm, y_cm and heading_deg"):
         tracking_error(record, track.drop(columns="time_bar"))
+    with pytest.raises(InputError, match="no column 'x_cm'; it needs"):
+        tracking_error(record, pd.DataFrame({"time_s": [0.0], "y_cm": [0.0], "heading_deg": [0.0]}))
     with pytest.raises(InputError, match="'y' has no unit"):
         tracking_error(record, pd.DataFrame({"time_s": [0.0], "x_cm": [0.0], "y": [0.0], "heading_deg": [0.0]}))
     with pytest.raises(InputError, match="not a finite number"):
