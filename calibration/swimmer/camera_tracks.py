@@ -26,6 +26,7 @@ from sim.io.quantities import convert_columns, numbers_of
 from sim.io.tables import read_table
 from sim.model.robot import Robot
 from sim.motion.batches import steady_columns
+from sim.motion.lab_units import lab_motion
 
 COLUMNS = ("run", "time_s", "x_cm", "y_cm", "heading_deg")
 _SYNONYMS = {"t": "time"}
@@ -202,11 +203,9 @@ def _check_motion(robot: Robot, runs: pd.DataFrame, measured: pd.DataFrame) -> N
         return
     columns = pd.DataFrame([swimmer.group_values() for swimmer in swimmers]).to_dict("list")
     motion = steady_columns({str(name): np.array(values) for name, values in columns.items()})
-    rate = np.abs(motion["omega_yr_bar"]) / np.array([swimmer.time_scale for swimmer in swimmers])
-    radius = motion["R_yr_over_l"] * np.array([100 * swimmer.tail_length for swimmer in swimmers])
-    for output, simulated in (
-        ("omega_yr", rate), ("R_yr", radius), ("theta", motion["theta_deg"]), ("v", rate * radius)
-    ):  # fmt: skip
-        factors = np.abs(measured[OUTPUTS[output][0]][usable].to_numpy(dtype=float)) / simulated
+    simulated = lab_motion(swimmers, motion)
+    for output in ("omega_yr", "R_yr", "theta", "v"):
+        column = OUTPUTS[output][0]
+        factors = np.abs(measured[column][usable].to_numpy(dtype=float) / simulated[column])
         if np.isfinite(factors).any():
             check_factor(output, float(np.nanmedian(factors)))
