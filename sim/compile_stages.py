@@ -36,10 +36,11 @@ def run_stages(package: str, stages: Sequence[Stage], folder: Path) -> float:
     began = time.perf_counter()
     total = count_loops(package)
     if sys.stderr.isatty():
-        with tqdm(total=total, bar_format=_BAR, leave=False) as bar, _shown_in(bar, folder):
+        with tqdm(total=total, bar_format=_BAR, leave=False, mininterval=0) as bar, _shown_in(bar, folder):
             for i, (name, call) in enumerate(stages):
                 bar.set_description_str(f"compiling {i + 1}/{len(stages)}: {name}")
                 call()
+                bar.update(count_ready(folder) - bar.n)
     else:
         with _shown_in(None, folder):
             for i, (name, call) in enumerate(stages):

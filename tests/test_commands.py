@@ -191,7 +191,7 @@ def goal(made: Path, out: Path) -> str:
     end = load_plan(out / "trip" / "plan.json")["predicted_poses"][-1]
     assert end[:2] == pytest.approx([3, 1], abs=1e-3)
     assert np.sin(end[2]) > 1 - 1e-6
-    return "end: (3.000, 1.000) l, heading 90.0 degrees"
+    return "end: (33.00, 11.00) cm = (3.000, 1.000) l, heading 90.0 degrees"
 
 
 def check(made: Path, out: Path) -> str:
