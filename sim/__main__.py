@@ -34,16 +34,15 @@ def _steady(arguments: Namespace) -> None:
 
 def _steady_robot(arguments: Namespace) -> None:
     """Print the motion of one robot in lab units, beside the dimensionless numbers."""
-    import numpy as np
     import pandas as pd
 
-    from sim.inputs import load_robot
+    from sim.inputs import group_columns, load_robot
     from sim.io.files import write_csv
     from sim.motion.batches import steady_columns
     from sim.motion.lab_units import describe_motion, lab_motion
 
     robot = load_robot(arguments.robot)
-    columns = {name: np.array([value]) for name, value in robot.group_values().items()}
+    columns = group_columns([robot])
     motion = steady_columns(columns, jobs=arguments.jobs, title="")
     print(describe_motion(robot, motion))
     if motion["note"][0]:

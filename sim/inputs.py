@@ -5,9 +5,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from sim.arrays import Floats
 from sim.effects import catalogue, check_effects, check_size
@@ -41,6 +43,14 @@ def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
         for size in (values[name].min(), values[name].max()):
             check_size(name, float(size))
     return values
+
+
+def group_columns(robots: Sequence[Robot]) -> dict[str, Floats]:
+    """Return the dimensionless columns of robots, (M,) each; an effect that a robot lacks is null."""
+    rows = [robot.group_values() for robot in robots]
+    names = dict.fromkeys(name for row in rows for name in row)
+    nulls = {name: effect.null for name, effect in catalogue().items()}
+    return {name: np.array([row.get(name, nulls.get(name)) for row in rows]) for name in names}
 
 
 def names_robot(source: str | Path) -> bool:

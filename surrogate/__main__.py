@@ -82,17 +82,16 @@ def _query(arguments: Namespace) -> None:
 
 def _query_robot(arguments: Namespace) -> None:
     """Print the answer for one robot in lab units, beside the dimensionless numbers."""
-    import numpy as np
     import pandas as pd
 
-    from sim.inputs import load_robot
+    from sim.inputs import group_columns, load_robot
     from sim.io.files import write_csv
     from sim.motion.lab_units import describe_motion, lab_motion
     from surrogate.table.answers import answer_with_error
     from surrogate.table.model_file import load_table
 
     robot, table = load_robot(arguments.robot), load_table(arguments.model)
-    columns = {name: np.array([value]) for name, value in robot.group_values().items()}
+    columns = group_columns([robot])
     answer = answer_with_error(table, columns, flag=arguments.flag, certify=arguments.certify)
     print(describe_motion(robot, answer, error="relative error of the look-up table (90 %)"))
     if arguments.certify and "certified_error" in answer:

@@ -21,9 +21,11 @@ from calibration.swimmer.measured_table import INPUTS, OUTPUTS, SYNONYMS
 from calibration.swimmer.possible_runs import check_factor
 from calibration.swimmer.track_fit import TrackedRun, TrackFit, fit_track
 from sim.arrays import Floats
+from sim.inputs import group_columns
 from sim.io.errors import InputError, naming
 from sim.io.quantities import convert_columns, numbers_of
 from sim.io.tables import read_table
+from sim.io.units import to_si
 from sim.model.robot import Robot
 from sim.motion.batches import steady_columns
 from sim.motion.lab_units import lab_motion
@@ -193,17 +195,15 @@ def _check_motion(robot: Robot, runs: pd.DataFrame, measured: pd.DataFrame) -> N
     missing = [name for name in INPUTS if name not in runs]
     if missing:
         raise InputError(f"the runs have no column {missing[0]!r}; the comparison with a robot needs it")
-    settings = runs[list(INPUTS)].apply(pd.to_numeric, errors="coerce")
+    settings = runs[list(INPUTS)].apply(numbers_of)
     usable = (settings["N"] >= 1) & (settings["l_cm"] > 0) & (settings["omega_rpm"].abs() > 0)
     swimmers = [
-        replace(robot, tails=int(tails), tail_length=cm / 100, motor_speed=abs(rpm) * math.tau / 60)
+        replace(robot, tails=int(tails), tail_length=cm / 100, motor_speed=to_si(abs(rpm), "rpm"))
         for tails, cm, rpm in settings[usable].itertuples(index=False)
     ]
     if not swimmers:
         return
-    columns = pd.DataFrame([swimmer.group_values() for swimmer in swimmers]).to_dict("list")
-    motion = steady_columns({str(name): np.array(values) for name, values in columns.items()})
-    simulated = lab_motion(swimmers, motion)
+    simulated = lab_motion(swimmers, steady_columns(group_columns(swimmers)))
     for output in ("omega_yr", "R_yr", "theta", "v"):
         column = OUTPUTS[output][0]
         factors = np.abs(measured[column][usable].to_numpy(dtype=float) / simulated[column])

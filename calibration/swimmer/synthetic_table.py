@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from sim.effects import catalogue
+from sim.inputs import group_columns
 from sim.model.robot import Robot
 from sim.motion.batches import stepped_columns
 from sim.motion.lab_units import RPM, lab_columns
@@ -56,8 +57,7 @@ def make_table(
     """
     design = [(n, length, rpm) for n in tails for length in lengths_cm for rpm in motor_rpm]
     runs = [replace(robot, tails=n, tail_length=length / 100, motor_speed=rpm * RPM) for n, length, rpm in design]
-    values = [run.group_values() for run in runs]
-    columns = {k: np.array([v[k] for v in values]) for k in values[0]}
+    columns = group_columns(runs)
     odd = any(catalogue()[name].symmetry == "odd" for name in robot.effects)
     directions = (1, -1) if odd else (1,)  # else a reversed motor mirrors the motion
     both = {k: np.concatenate([d * v if k == "omega_bar" else v for d in directions]) for k, v in columns.items()}

@@ -6,6 +6,7 @@ these numbers, as its dimensionless groups. Inputs that are not listed are those
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.effects import catalogue, check_effects
-from sim.inputs import load_robot
+from sim.inputs import group_columns, load_robot
 from sim.io.errors import InputError
 from sim.io.units import UNITS, from_si, of_kind, split, to_si
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
@@ -113,18 +114,16 @@ def robot_columns(robot: Mapping[str, Any], samples: Mapping[str, Floats]) -> di
     """
     base = Robot(name="", **robot)
     effects = [name for name in samples if name in catalogue()]
-    rows: list[dict[str, float]] = []
+    robots = []
     for values in zip(*(column.tolist() for column in samples.values()), strict=True):
         row = dict(zip(samples, values, strict=True))
-        sign = np.copysign(1.0, row.get("motor_speed", 1.0))
         sizes = {**base.effects, **{name: row.pop(name) for name in effects}}
-        if "motor_speed" in row:
-            row["motor_speed"] = abs(row["motor_speed"])
-        if "tails" in row:
-            row["tails"] = int(row["tails"])
-        groups = replace(base, **row, effects=sizes).group_values()
-        rows.append({**groups, "omega_bar": float(sign * groups["omega_bar"])})
-    return {name: np.array([row[name] for row in rows]) for name in column_names(robot, samples)}
+        tails, speed = int(row.pop("tails", base.tails)), abs(row.pop("motor_speed", base.motor_speed))
+        robots.append(replace(base, tails=tails, motor_speed=speed, **row, effects=sizes))
+    columns = group_columns(robots)
+    if "motor_speed" in samples:
+        columns["omega_bar"] = np.copysign(columns["omega_bar"], samples["motor_speed"])
+    return {name: columns[name] for name in column_names(robot, samples)}
 
 
 def column_names(robot: Mapping[str, Any], inputs: Mapping[str, object]) -> list[str]:
@@ -134,7 +133,7 @@ def column_names(robot: Mapping[str, Any], inputs: Mapping[str, object]) -> list
 
 
 def sweep_toml(robot: Robot, source: str) -> str:
-    """Write a sweep.toml around a robot: tail length and stiffness by a third, motor speed, N and coefficients.
+    """Write a sweep.toml around a robot: tail length, motor speed, N and coefficients; other inputs as comments.
 
     Args:
         robot: the robot.
@@ -143,7 +142,7 @@ def sweep_toml(robot: Robot, source: str) -> str:
     lines = [
         "# Sweep around a robot. An input has [low, high] and a scale: linear, log or integer. Inputs not listed",
         "# are those of the robot. Units are suffixes: tail_length_mm, motor_speed_rad_s, ...",
-        f'robot = "{source}"'.replace("\\", "/"),
+        f"robot = {json.dumps(Path(source).as_posix(), ensure_ascii=False)}",
         "rows = 1024",
         "seed = 1",
         "history_every = 8  # one block of 256 rows in so many has the memory of the dwell before",

@@ -8,13 +8,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sim.io.errors import InputError
-from sim.io.units import format_length, format_time
+from sim.io.units import format_length, format_time, to_si
 
 if TYPE_CHECKING:  # the command needs UNITS before it loads NumPy
     from planner.paths.path import Path2D
     from sim.model.robot import Robot
 
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+UNITS = ("m", "cm", "mm")
 LONGEST = 1500.0  # l
 SMALLEST = 0.25  # of the radius of the robot's circle, largest extent of a path
 MOST_CIRCLES = 30.0  # of the robot, across a path whose unit is not stated
@@ -47,7 +47,7 @@ def describe(path: Path2D, robot: Robot) -> str:
 
 def in_tails(unit: str, robot: Robot) -> float:
     """Convert a unit of length to tail lengths; l is the tail length itself."""
-    return 1.0 if unit == "l" else UNITS[unit] / robot.tail_length
+    return 1.0 if unit == "l" else to_si(1.0, unit) / robot.tail_length
 
 
 def extent(path: Path2D) -> tuple[float, float]:

@@ -60,21 +60,7 @@ def plan(
         lookup: trained table, or the table of this one robot; default the shipped one.
         knowledge: what a calibration found besides the robot: covariance, current.
         progress: called now and then with the share of the path that is done.
-        options: any of
-
-            - point: which point must follow the path: "head_centre" (default), "head_tip" or "pivot".
-            - corner: what to do with places that are too tight: declare the nearest path that can be followed, by
-              root mean square ("nearest", the default) or by its largest distance ("minimax"), round corners
-              ("fillet"), or refuse ("error").
-            - time_weight: for "nearest" and "minimax": the mean squared distance [l²] from the drawn path that is
-              worth as much as the time in which the whole path is followed; 0 (default): distance alone counts.
-            - objective: what decides the dwell: small "error" (default), short "time", or few "flips"; see
-              `planner.vehicle.dwell_choice`.
-            - minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
-            - minimum_seconds: the same in seconds; the larger one counts.
-            - dwell: this shortest dwell, and not the one that the objective would choose.
-            - tolerance: largest acceptable stated error [l]; the dwell is shortened until it is kept.
-            - seed: of the random robots from which the stated error is computed.
+        options: the fields of `PlanRequest`; `softflagella.plan` explains them.
 
     Raises:
         InputError: the path is bad or too tight, the dwell too short, the tolerance too small, or the robot

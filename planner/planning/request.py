@@ -16,7 +16,7 @@ Corner = Literal["nearest", "minimax", "fillet", "error"]
 
 @dataclass(frozen=True)
 class PlanRequest:
-    """Point, corners, dwells and tolerance, as `planner.planning.plan.plan` explains them."""
+    """Point, corners, dwells and tolerance, as `softflagella.plan` explains them."""
 
     point: Point = "head_centre"
     corner: Corner = "nearest"

@@ -42,13 +42,12 @@ def convert_columns(
     """
     notes = []
     for name in wanted:
-        if name in table and not _alike(table, name, synonyms):
-            continue
         candidates = [*([name] if name in table else []), *_alike(table, name, synonyms)]
         if len(candidates) > 1:
             raise InputError(f"{where}: {' and '.join(candidates)} are the same quantity; drop all but one")
         if not candidates:
             _check_bare(table, name, where, synonyms)
+        if candidates in ([], [name]):
             continue
         column, target = candidates[0], split(name).unit
         given = _unit(column, synonyms)

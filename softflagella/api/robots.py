@@ -20,8 +20,7 @@ import pandas as pd
 
 from dataset.rows.schema import INPUTS, OUTPUTS
 from sim.arrays import Floats
-from sim.effects import catalogue
-from sim.inputs import check_columns, load_robot
+from sim.inputs import check_columns, group_columns, load_robot
 from sim.io.errors import InputError
 from sim.io.units import column_units
 from sim.model.robot import Robot
@@ -57,11 +56,7 @@ def robot_rows(robots: Robots) -> RobotRows:
     if not given:
         raise InputError("no robots; give at least one")
     loaded = tuple(robot if isinstance(robot, Robot) else load_robot(robot) for robot in given)
-    values = [robot.group_values() for robot in loaded]
-    nulls = {name: effect.null for name, effect in catalogue().items()}
-    names = dict.fromkeys(name for row in values for name in row)
-    columns = {name: [row.get(name, nulls.get(name)) for row in values] for name in names}
-    return RobotRows(_checked(columns), loaded)
+    return RobotRows(check_columns(group_columns(loaded)), loaded)
 
 
 def one_robot(robot: OneRobot) -> Robot:
