@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from sim.io.units import format_time
 if TYPE_CHECKING:
     from planner.paths.path import Path2D
     from planner.planning.planned import Plan
+    from planner.planning.progress import Progress
     from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import CalibrationKnowledge
     from sim.model.robot import Robot
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
 main = program.main
-_SHAPES = {"circle": 0, "triangle": 3, "square": 4}  # number of corners
-
 
 _DWELLS = (
     argument("--min-dwell", type=float, help="shortest dwell, in time units μ0 l⁴/EI"),
@@ -33,7 +32,8 @@ _DWELLS = (
     argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
 )
 _PLANNING = (
-    argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE"),
+    argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE, polygon:CORNERS:SIDE "
+             "(polygon:6:2)"),
     ROBOT,
     MODEL,
     argument("--unit", choices=("l", *UNITS), help="unit of the path's numbers (default: tail lengths)"),
@@ -208,7 +208,7 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     from sim.inputs import load_robot
 
     robot = load_robot(arguments.robot)
-    path, unit_known = _path(arguments, robot)
+    path, given_in = _path(arguments, robot)
     print(f"path: {describe(path, robot)}")
     request = PlanRequest(
         point=arguments.point,
@@ -221,12 +221,12 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     )
     knowledge = read_knowledge(arguments.robot)
     tracked = tracked_vehicle(robot, _table(arguments, robot, knowledge), request.point, knowledge)
-    if not unit_known:
+    if given_in and arguments.unit is None:
         dwell = dwells_for(tracked.vehicle, request.objective, request.least_dwell(robot))[0]
         speed = zigzag(tracked.vehicle, dwell, tracked.offset).speed
         check_unstated_unit(path, robot, tracked.vehicle.turn_radius, speed)
     with _progress() as progress:
-        return make_plan(path, tracked, request, progress), request
+        return make_plan(path, tracked, request, progress, given_in=given_in), request
 
 
 def _table(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge) -> LookupTable:
@@ -238,32 +238,29 @@ def _table(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge) 
 
 
 @contextmanager
-def _progress() -> Iterator[Callable[[float], object]]:
-    """Show a bar on a terminal, for long paths."""
+def _progress() -> Iterator[Progress]:
+    """Show a bar on a terminal, for plans that take long."""
     from tqdm import tqdm
 
-    with tqdm(total=100, desc="plan", unit="%", leave=False, delay=1.0, disable=not sys.stderr.isatty()) as bar:
-        yield lambda share: bar.update(100 * share - bar.n)
+    style = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}"
+    with tqdm(
+        total=100, leave=False, delay=1.0, miniters=0, bar_format=style, disable=not sys.stderr.isatty()
+    ) as bar:
+
+        def tell(stage: str, share: float) -> None:
+            bar.set_description_str(stage, refresh=False)
+            bar.update(100 * min(share, 1.0) - bar.n)
+
+        yield tell
 
 
-def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, bool]:
-    """Make the path that the command asks for, in tail lengths, and say whether it has a unit."""
-    from planner.paths.path import circle, polygon, smoothed
-    from planner.paths.path_files import Drawing, read_path
+def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, tuple[str, ...]]:
+    """Make the path that the command asks for, in tail lengths; return the unit of its numbers if given."""
+    from planner.paths.path import smoothed
+    from planner.paths.path_files import read_path
 
-    shape, _, size = arguments.path.partition(":")
-    if shape in _SHAPES and size:
-        try:
-            length = float(size)
-        except ValueError:
-            raise InputError(f"{arguments.path!r}; write for example circle:2 or square:3") from None
-        if not 0 < length < float("inf"):
-            raise InputError(f"{arguments.path!r}; its size must be above 0")
-        drawing = Drawing(polygon(_SHAPES[shape], length) if _SHAPES[shape] else circle(length), None)
-    else:
-        closed = True if arguments.closed else None
-        drawing = read_path(arguments.path, closed=closed, shape=arguments.shape)
-    unit_known = drawing.unit is not None or arguments.unit is not None
+    drawing = read_path(arguments.path, closed=True if arguments.closed else None, shape=arguments.shape)
+    given_in = (arguments.unit or "l",) if drawing.unit is None else ()
     if drawing.unit is None:
         unit = in_tails(arguments.unit or "l", robot)
     elif arguments.unit is None:
@@ -279,10 +276,10 @@ def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, bool]:
         raise InputError(f"--scale {arguments.scale}; give a number above 0")
     path = drawing.path.scaled(scale)
     if arguments.smooth is None:
-        return path, unit_known
+        return path, given_in
     smooth, moved = smoothed(path, arguments.smooth)
     print(f"smoothed over {in_lab(arguments.smooth, robot)}, which moves the path by up to {in_lab(moved, robot)}")
-    return smooth, unit_known
+    return smooth, given_in
 
 
 @program.command(

@@ -25,20 +25,23 @@ is linear in the length of the path. On a closed path the last pose is a neighbo
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import LinAlgError, solveh_banded
+from scipy.linalg.lapack import dpbsv
 
 from planner.paths.path import Path2D, resample
 from planner.paths.tractrix import STILL, Drift
 from sim.arrays import Floats, Integers
 
 _SPACING = 0.2  # of the poses, in radii of the pivot's circle
-_MOST_POSES = 20_000
+_MOST_POSES = 20_000  # of a path that is not longer than so many times _COARSEST
+_COARSEST = 0.075  # spacing in l
 _WEIGHTS = (0.3, 3.0, 30.0, 300.0, 1000.0)  # of what the robot cannot do, one stage after another
 _ITERATIONS = 20  # in each stage
 _EVEN = 0.01  # weight of equal steps
+_SHORT = 10.0  # weight of steps that are too short
 _ALONG = 0.6  # of distances along the path beside those across: a robot that is late is still on it
 _SHORTEST_STEP = 0.25  # of the steps, as a share of the spacing
 _POINTS_A_POSE = 4  # points of the path for each pose
@@ -54,6 +57,7 @@ def nearest_path(
     drift: Drift = STILL,
     minimax: bool = False,
     time_weight: float = 0.0,
+    progress: Callable[[float], object] | None = None,
 ) -> Path2D:
     """Find the path of the tracked point that is nearest to `raw` among those that the robot can follow.
 
@@ -64,8 +68,9 @@ def nearest_path(
         drift: what carries the robot off its heading.
         minimax: nearest by the largest distance, not by the root mean square.
         time_weight: what time counts beside the distance, w of the module [l²].
+        progress: called now and then with the share that is done.
     """
-    target = resample(raw.polyline(), max(_SPACING * radius, raw.length / _MOST_POSES))
+    target = resample(raw.polyline(), pose_spacing(raw, radius))
     spacing = raw.length / (len(target) - 1)
     if raw.closed:
         target = target[:-1]
@@ -74,10 +79,17 @@ def nearest_path(
         target, _sides(target, closed=raw.closed), np.ones(len(target)), pivot_distance, radius, drift, spacing,
         time_weight, turn,
     )  # fmt: skip
-    for weight in _WEIGHTS:
+    stages = len(_WEIGHTS) + (_ROUNDS if minimax else 0)
+
+    def told(stage: int) -> None:
+        if progress is not None:
+            progress(stage / stages)
+
+    for stage, weight in enumerate(_WEIGHTS):
+        told(stage)
         poses = _descend(poses, task, weight)
     if minimax:
-        poses = _minimax(poses, task)
+        poses = _minimax(poses, task, told)
     if turn is not None:
         poses = _whole_lap(poses, turn)
     at = np.arange(_POINTS_A_POSE * (len(poses) - 1) + 1) / _POINTS_A_POSE
@@ -89,6 +101,11 @@ def nearest_path(
     points = np.stack([x - off * np.sin(heading), y + off * np.cos(heading)], 1)
     points += pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
     return Path2D.of(points[:-1] if raw.closed else points, closed=raw.closed)
+
+
+def pose_spacing(raw: Path2D, radius: float) -> float:
+    """Return the spacing of the poses by which the nearest path is sought, for the smallest turn radius."""
+    return max(_SPACING * radius, min(raw.length / _MOST_POSES, _COARSEST))
 
 
 def _start(target: Floats, pivot_distance: float, *, closed: bool) -> tuple[Floats, float | None]:
@@ -140,10 +157,11 @@ class _Task(NamedTuple):
     turn: float | None  # of the heading in a lap; None: an open path
 
 
-def _minimax(poses: Floats, task: _Task) -> Floats:
+def _minimax(poses: Floats, task: _Task, told: Callable[[int], object]) -> Floats:
     """Find poses whose largest distance from the target is small."""
     best, shares = poses, task.shares
-    for _ in range(_ROUNDS):
+    for stage in range(_ROUNDS):
+        told(len(_WEIGHTS) + stage)
         away = _distances(poses, task)
         shares = shares * away
         shares = np.maximum(shares / shares.mean(), _LEAST)
@@ -163,84 +181,158 @@ def _descend(poses: Floats, task: _Task, weight: float) -> Floats:
     """Minimise by Gauss-Newton with Levenberg's damping, for one weight of the constraints."""
     damping = 1e-3
     place = _places(len(poses), closed=task.turn is not None)
-    residual, single, pair = _system(poses, task, weight)
-    cost = float((residual[0] ** 2).sum() + (residual[1] ** 2).sum())
+    system = _system(poses, task, weight)
     for _ in range(_ITERATIONS):
-        band, right = _normal(residual, single, pair, place)
+        band, right = _sorted_normal(system, place)
         while damping < 1e6:
-            damped = band.copy()
-            damped[-1] += damping
-            try:
-                step = solveh_banded(damped, right, check_finite=False).reshape(-1, 3)[place]
-            except LinAlgError:
+            step = _damped_step(band, right, damping)
+            if step is None:
                 damping *= 10
                 continue
-            tried = poses - step
-            system = _system(tried, task, weight)
-            new = float((system[0][0] ** 2).sum() + (system[0][1] ** 2).sum())
-            if new < cost:
+            tried = poses - step.reshape(-1, 3)[place]
+            candidate = _system(tried, task, weight)
+            if candidate.cost < system.cost:
                 break
             damping *= 6
         else:
             return poses
-        gained = cost - new
-        poses, cost = tried, new
-        residual, single, pair = system
+        gained = system.cost - candidate.cost
+        poses, system = tried, candidate
         damping = max(damping / 5, 1e-9)
-        if gained < 1e-3 * cost:
+        if gained < 1e-3 * system.cost:
             break
     return poses
 
 
-def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Floats], Floats, Floats]:
-    """Compute residuals of poses (m, 2) and of steps (k, 5), and derivatives (m, 2, 3) and (k, 5, 6).
+def _damped_step(band: Floats, right: Floats, damping: float) -> Floats | None:
+    """Solve the damped normal equations (3 m,) in lower band form; None where they are not positive definite."""
+    damped = band.copy(order="F")
+    damped[0] += damping
+    _, step, info = dpbsv(damped, right, lower=1, overwrite_ab=1)
+    return step if info == 0 else None
 
-    There are k = m − 1 steps on an open path, and m on a closed one.
+
+class _System(NamedTuple):
+    """The linearised least squares: cost, and normal equations without damping."""
+
+    cost: float  # sum of squared residuals
+    gradient: Floats  # (3, m), half of the cost's
+    diagonal: Floats  # (3, 3, m), blocks of the poses; the upper triangle is filled
+    across: Floats  # (3, 3, k), blocks of neighbours: row of the first pose, column of the second
+
+
+def _system(poses: Floats, task: _Task, weight: float) -> _System:
+    """Compute cost and normal equations at poses (m, 3).
+
+    There are k = m − 1 steps on an open path, and m on a closed one. The residuals of a step depend on its forward
+    part f, its sideways part g and its turn t. Derivatives by these are chained with those of f, g and t by the
+    two poses.
     """
-    target, sides, shares, distance, radius, drift, spacing, time_weight, lap = task
-    root = np.sqrt(shares)
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    sides = root[:, None, None] * sides
-    pose_residual = np.einsum("kri,ki->kr", sides, poses[:, :2] + distance * np.stack([c, s], 1) - target)
-    single = np.concatenate([sides, (sides @ (distance * np.stack([-s, c], 1))[..., None])], -1)
-    if lap is not None:
-        poses = _whole_lap(poses, lap)
-    move = np.diff(poses[:, :2], axis=0)
-    turn = np.diff(poses[:, 2])
-    middle = (poses[1:, 2] + poses[:-1, 2]) / 2
+    x, y, heading = poses.T
+    gradient, diagonal = np.zeros((3, len(poses))), np.zeros((3, 3, len(poses)))
+    cost = _add_distances(poses, task, gradient, diagonal)
+    if task.turn is not None:
+        x, y, heading = _whole_lap(poses, task.turn).T
+    dx, dy, turn = np.diff(x), np.diff(y), np.diff(heading)
+    middle = (heading[1:] + heading[:-1]) / 2
     c, s = np.cos(middle), np.sin(middle)
-    forward, aside = c * move[:, 0] + s * move[:, 1], c * move[:, 1] - s * move[:, 0]
-    cx, cy = drift.current
-    way = 1 + cx * c + cy * s
-    slip = (drift.sideways - cx * s + cy * c) / way
-    steps, pair = np.zeros((len(move), 5)), np.zeros((len(move), 5, 6))
+    forward, aside = c * dx + s * dy, c * dy - s * dx
+    part = _step_part(forward, aside, turn, (c, s), task, weight)
+    # second derivatives by x and y of the step, in the lab
+    xx = c * c * part.ff - 2 * c * s * part.fg + s * s * part.gg
+    xy = c * s * (part.ff - part.gg) + (c * c - s * s) * part.fg
+    yy = s * s * part.ff + 2 * c * s * part.fg + c * c * part.gg
+    # by x, y and the mean heading, which adds g dφ to f and −f dφ to g
+    swing_f, swing_g = aside / 2, -forward / 2
+    by_f, by_g = part.ff * swing_f + part.fg * swing_g, part.fg * swing_f + part.gg * swing_g
+    x_swing, y_swing, swing = c * by_f - s * by_g, s * by_f + c * by_g, by_f * swing_f + by_g * swing_g
+    # by x, y, mean heading and the turn
+    x_turn, y_turn, swing_turn = c * part.ft, s * part.ft, swing_f * part.ft
+    first, second = slice(0, len(dx)), np.roll(np.arange(len(poses)), -1)[: len(dx)]
+    from_x, from_y = c * part.f - s * part.g, s * part.f + c * part.g
+    from_swing = swing_f * part.f + swing_g * part.g
+    for at, sign in ((first, -1.0), (second, 1.0)):
+        gradient[0, at] += sign * from_x
+        gradient[1, at] += sign * from_y
+        gradient[2, at] += from_swing + sign * part.t
+        diagonal[0, 0, at] += xx
+        diagonal[0, 1, at] += xy
+        diagonal[1, 1, at] += yy
+        diagonal[0, 2, at] += sign * x_swing + x_turn
+        diagonal[1, 2, at] += sign * y_swing + y_turn
+        diagonal[2, 2, at] += swing + 2 * sign * swing_turn + part.tt
+    across = np.array([
+        [-xx, -xy, -x_swing - x_turn],
+        [-xy, -yy, -y_swing - y_turn],
+        [x_swing - x_turn, y_swing - y_turn, swing - part.tt],
+    ])  # fmt: skip
+    return _System(cost + part.cost, gradient, diagonal, across)
 
-    def put(row: int, forward_part: Floats, sideways_part: Floats, turning: Floats) -> None:
-        """Store a residual's derivatives by forward part, sideways part and turn of the step."""
-        dx, dy = forward_part * c - sideways_part * s, forward_part * s + sideways_part * c
-        swing = (forward_part * aside - sideways_part * forward) / 2
-        pair[:, row, 0], pair[:, row, 1], pair[:, row, 2] = -dx, -dy, swing - turning
-        pair[:, row, 3], pair[:, row, 4], pair[:, row, 5] = dx, dy, swing + turning
 
-    ones, zeros = np.ones(len(move)), np.zeros(len(move))
-    broken: Floats
-    steps[:, 0] = weight * (aside - slip * forward)
-    put(0, np.asarray(-weight * slip, dtype=np.float64), weight * ones, zeros)
+def _add_distances(poses: Floats, task: _Task, gradient: Floats, diagonal: Floats) -> float:
+    """Add the squared distances from the target to the normal equations; return their sum."""
+    (along_x, along_y), (across_x, across_y) = np.moveaxis(task.sides, 0, -1)
+    x, y, heading = poses.T
+    ahead_x, ahead_y = task.distance * np.cos(heading), task.distance * np.sin(heading)
+    off_x, off_y = x + ahead_x - task.target[:, 0], y + ahead_y - task.target[:, 1]
+    cost = 0.0
+    for side_x, side_y in ((along_x, along_y), (across_x, across_y)):
+        residual = side_x * off_x + side_y * off_y
+        by_heading = side_y * ahead_x - side_x * ahead_y
+        weighted = task.shares * residual
+        cost += float((weighted * residual).sum())
+        derivatives = (side_x, side_y, by_heading)
+        for i in range(3):
+            gradient[i] += derivatives[i] * weighted
+            for j in range(i, 3):
+                diagonal[i, j] += task.shares * derivatives[i] * derivatives[j]
+    return cost
+
+
+class _StepPart(NamedTuple):
+    """What the residuals of the steps add: cost, and derivatives (k,) by forward part, sideways part and turn."""
+
+    cost: float
+    f: Floats
+    g: Floats
+    t: Floats
+    ff: Floats
+    fg: Floats
+    gg: Floats
+    ft: Floats
+    tt: Floats
+
+
+def _step_part(
+    forward: Floats, aside: Floats, turn: Floats, direction: tuple[Floats, Floats], task: _Task, weight: float
+) -> _StepPart:
+    """Compute what the residuals of the steps add."""
+    c, s = direction
+    cx, cy = task.drift.current
+    slip = (task.drift.sideways - cx * s + cy * c) / (1 + cx * c + cy * s)
+    sideways = weight * (aside - slip * forward)
     sense = np.sign(turn)
-    over = sense * turn * radius - forward
-    broken = np.asarray(weight * (over > 0), dtype=np.float64)
-    steps[:, 1] = broken * over
-    put(1, -broken, zeros, np.asarray(broken * sense * radius, dtype=np.float64))
-    short = _SHORTEST_STEP * spacing - forward
-    broken = np.asarray(10.0 * (short > 0), dtype=np.float64)
-    steps[:, 2] = broken * short
-    put(2, -broken * ones, zeros, zeros)
-    steps[:, 3] = _EVEN * (forward - spacing)
-    put(3, _EVEN * ones, zeros, zeros)
-    length = np.maximum(forward, _SHORTEST_STEP * spacing)
-    steps[:, 4] = np.sqrt(time_weight / spacing * length)
-    put(4, np.asarray(steps[:, 4] / (2 * length) * (length == forward), dtype=np.float64), zeros, zeros)
-    return (pose_residual, steps), single, pair
+    over = np.maximum(sense * turn * task.radius - forward, 0.0)  # turns further than it can
+    turning, bent = weight**2 * over, weight**2 * (over > 0)
+    least = _SHORTEST_STEP * task.spacing
+    short = np.maximum(least - forward, 0.0)
+    uneven = _EVEN * (forward - task.spacing)
+    late = task.time_weight / task.spacing  # times the length
+    length = np.maximum(forward, least)
+    going = forward >= least
+    return _StepPart(
+        cost=float(
+            (sideways**2 + turning * over + _SHORT**2 * short**2 + uneven**2 + late * length).sum()
+        ),
+        f=-weight * slip * sideways - turning - _SHORT**2 * short + _EVEN * uneven + late / 2 * going,
+        g=weight * sideways,
+        t=task.radius * sense * turning,
+        ff=weight**2 * slip**2 + bent + _SHORT**2 * (short > 0) + _EVEN**2 + late / 4 * going / length,
+        fg=-(weight**2) * slip,
+        gg=np.full(len(turn), weight**2),
+        ft=-task.radius * sense * bent,
+        tt=np.asarray(task.radius**2 * bent, dtype=np.float64),
+    )  # fmt: skip
 
 
 def _places(count: int, *, closed: bool) -> Integers:
@@ -253,30 +345,20 @@ def _places(count: int, *, closed: bool) -> Integers:
     return place
 
 
-def _normal(
-    residual: tuple[Floats, Floats], single: Floats, pair: Floats, place: Integers
-) -> tuple[Floats, Floats]:
-    """Assemble the normal matrix, upper form (band, 3 m), and the right side (3 m,), sorted by `place`."""
-    pose_residual, step_residual = residual
-    count, first = len(pose_residual), np.arange(len(step_residual))
-    second = (first + 1) % count
-    right = np.einsum("kri,kr->ki", single, pose_residual)
-    from_steps = np.einsum("kri,kr->ki", pair, step_residual)
-    right[first] += from_steps[:, :3]
-    right[second] += from_steps[:, 3:]
-    diagonal = np.einsum("kri,krj->kij", single, single)
-    blocks = np.einsum("kri,krj->kij", pair, pair)
-    diagonal[first] += blocks[:, :3, :3]
-    diagonal[second] += blocks[:, 3:, 3:]
-    low, high = np.minimum(place[first], place[second]), np.maximum(place[first], place[second])
-    across = np.where((place[first] < place[second])[:, None, None], blocks[:, :3, 3:], blocks[:, 3:, :3])
+def _sorted_normal(system: _System, place: Integers) -> tuple[Floats, Floats]:
+    """Assemble the normal matrix, lower form (band, 3 m), and the right side (3 m,), sorted by `place`."""
+    count, first = len(place), place[: system.across.shape[2]]
+    second = np.roll(place, -1)[: len(first)]
+    later = second > first
+    low, high = np.where(later, first, second), np.where(later, second, first)
     width = 3 * int((high - low).max()) + 2
     band = np.zeros((width + 1, count, 3))
     for i in range(3):
         for j in range(3):
             if j >= i:
-                band[width + i - j, place, j] = diagonal[:, i, j]
-            band[width + i - j - 3 * (high - low), high, j] = across[:, i, j]
-    sorted_right = np.empty_like(right)
-    sorted_right[place] = right
-    return band.reshape(width + 1, -1), sorted_right.reshape(-1)
+                band[j - i, place, i] = system.diagonal[i, j]
+            # row j of the later pose, column i of the earlier one
+            band[3 * (high - low) + j - i, low, i] = np.where(later, system.across[i, j], system.across[j, i])
+    right = np.empty((count, 3))
+    right[place] = system.gradient.T
+    return band.reshape(width + 1, -1), right.reshape(-1)

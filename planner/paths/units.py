@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # the command needs UNITS before it loads NumPy
     from sim.model.robot import Robot
 
 UNITS = ("m", "cm", "mm")
+ANY_UNIT = ("l", *UNITS)
 LONGEST = 1500.0  # l
 SMALLEST = 0.25  # of the radius of the robot's circle, largest extent of a path
 MOST_CIRCLES = 30.0  # of the robot, across a path whose unit is not stated
@@ -56,19 +57,25 @@ def extent(path: Path2D) -> tuple[float, float]:
     return width, height
 
 
-def check_size(path: Path2D, robot: Robot, turn_radius: float) -> None:
+def check_size(path: Path2D, robot: Robot, turn_radius: float, given_in: tuple[str, ...] = ANY_UNIT) -> None:
     """Refuse a path that no schedule can be meant for.
+
+    Args:
+        path: in tail lengths.
+        robot: its tail length.
+        turn_radius: of the robot's circle, in l.
+        given_in: units in which the user may have given the numbers; none: the path has a size of its own.
 
     Raises:
         InputError: the path is far too long or too small; the message names a unit that would make sense.
     """
     if path.length > LONGEST:
         raise InputError(f"the path is {describe(path, robot)}; at most {LONGEST:g} l can be planned"
-                         f"{_hint(path, robot)}")  # fmt: skip
+                         f"{_remedy(path, robot, given_in)}")  # fmt: skip
     if max(extent(path)) < SMALLEST * turn_radius:
         raise InputError(
             f"the path is {describe(path, robot)}: too small, the robot's circle has a radius of "
-            f"{in_lab(turn_radius, robot)}{_hint(path, robot)}"
+            f"{in_lab(turn_radius, robot)}{_remedy(path, robot, given_in)}"
         )
 
 
@@ -90,18 +97,27 @@ def check_unstated_unit(path: Path2D, robot: Robot, turn_radius: float, speed: f
         raise InputError(
             f"the path is {describe(path, robot)} if its numbers are tail lengths: {circles:.0f} of the robot's "
             f"circles across, about {format_time(seconds)}; say its unit, --unit l if this is meant"
-            f"{_hint(path, robot)}"
+            f"{_remedy(path, robot, ('l',))}"
         )
 
 
-def _hint(path: Path2D, robot: Robot) -> str:
-    """Suggest the units with which the numbers of the path would make sense."""
-    scales = {unit: in_tails(unit, robot) for unit in ("l", *UNITS)}
-    # The path may have been given in any of these units: undo it, then try the others.
+def unit_hint(path: Path2D, robot: Robot, given_in: tuple[str, ...]) -> str:
+    """Suggest at most two units with which the numbers of a path would make sense; empty if there is none.
+
+    Args:
+        path: in tail lengths.
+        robot: its tail length.
+        given_in: units in which the user may have given the numbers; none: the path has a size of its own.
+    """
     hints = []
-    for given, scale in scales.items():
-        for meant, meant_scale in scales.items():
-            length = path.length / scale * meant_scale
+    for given in given_in:
+        for meant in ANY_UNIT:
+            length = path.length / in_tails(given, robot) * in_tails(meant, robot)
             if given != meant and _SENSIBLE[0] <= length <= _SENSIBLE[1]:
                 hints.append(f"if you gave {given} and mean {meant}, it is {length:.3g} l: --unit {meant}")
-    return "; " + "; or ".join(hints[:2]) if hints else "; scale it"
+    return "; or ".join(hints[:2])
+
+
+def _remedy(path: Path2D, robot: Robot, given_in: tuple[str, ...]) -> str:
+    """Suggest units that would make sense, or another scale."""
+    return f"; {unit_hint(path, robot, given_in) or 'scale it'}"

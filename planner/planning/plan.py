@@ -24,11 +24,13 @@ from numpy.typing import ArrayLike
 
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
-from planner.paths.units import check_size, in_lab, time_in_lab
-from planner.planning.declared_path import Declared, Feasibility, declare
+from planner.paths.units import ANY_UNIT, check_size, in_lab, time_in_lab
+from planner.planning.declared_path import Declared, declare
 from planner.planning.errors import plan_errors
+from planner.planning.feasible import Feasibility
 from planner.planning.line_of_sight import Guidance
 from planner.planning.planned import Plan
+from planner.planning.progress import FOLLOWING, Progress, of_path, silent
 from planner.planning.request import PlanRequest, RequestOptions
 from planner.planning.schedule import follow
 from planner.planning.stated_error import guaranteed, look_ahead
@@ -74,15 +76,28 @@ def plan(
     """
     request = PlanRequest(**options)
     tracked = tracked_vehicle(robot, lookup, request.point, knowledge)
-    return make_plan(path if isinstance(path, Path2D) else Path2D.of(path), tracked, request, progress)
+    return make_plan(path if isinstance(path, Path2D) else Path2D.of(path), tracked, request, of_path(progress))
 
 
 def make_plan(
-    drawn: Path2D, tracked: TrackedVehicle, request: PlanRequest, progress: Callable[[float], object] | None = None
+    drawn: Path2D,
+    tracked: TrackedVehicle,
+    request: PlanRequest,
+    progress: Progress = silent,
+    *,
+    given_in: tuple[str, ...] = ANY_UNIT,
 ) -> Plan:
-    """Plan for a path, a vehicle and a request; see `plan`."""
+    """Plan for a path, a vehicle and a request; see `plan`.
+
+    Args:
+        drawn: the path as drawn, in tail lengths.
+        tracked: the vehicle and its tracked point.
+        request: what the user asks for.
+        progress: called now and then.
+        given_in: units in which the user may have given the numbers; none: the path has a size of its own.
+    """
     vehicle = tracked.vehicle
-    check_size(drawn, tracked.robot, vehicle.turn_radius)
+    check_size(drawn, tracked.robot, vehicle.turn_radius, given_in)
     least = request.least_dwell(tracked.robot)
     if request.dwell is None:
         dwells = dwells_for(vehicle, request.objective, least)
@@ -91,14 +106,19 @@ def make_plan(
 
     @cache
     def declared_path(drift: Drift) -> Declared:
-        feasibility = Feasibility(tracked.robot, vehicle, tracked.rod, drift, request.corner, request.time_weight)
-        return declare(drawn, feasibility)
+        feasibility = Feasibility(
+            tracked.robot, vehicle, tracked.rod, drift, request.corner, request.time_weight, given_in
+        )
+        return declare(drawn, feasibility, progress)
 
     def with_dwell(dwell: float) -> Plan:
         straight = zigzag(vehicle, dwell, tracked.offset)
         declared = declared_path(zigzag_drift(tracked, straight, dwell))
         guidance = choose_guidance(vehicle, declared, straight, dwell)
-        switches = follow(declared.reference, vehicle, guidance, tracked.offset, progress=progress)
+        switches = follow(
+            declared.reference, vehicle, guidance, tracked.offset,
+            progress=lambda share: progress(FOLLOWING, share),
+        )  # fmt: skip
         bound = guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
         errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed)
         return Plan(tracked, request.objective, drawn, declared, straight, guidance, switches, errors)

@@ -43,8 +43,8 @@ def plan(
     """Plan the motor's switching times for a path.
 
     Args:
-        path: (n, 2) points or a Path2D, lengths in tail lengths l; or what `read_path` reads, or its file. Where
-            a file says its unit, its lengths are converted.
+        path: (n, 2) points or a Path2D, lengths in tail lengths l; or what `read_path` reads, or its file; or a
+            shape in words, such as "polygon:6:3". Where a file says its unit, its lengths are converted.
         robot: the robot, its robot.toml, or the name of a preset; its motor speed is used in both directions.
         lookup: trained table, or the table of this one robot. Default: the one that comes with the package. Where
             that one does not know the robot, the robot's own table is simulated, and kept beside its file.
