@@ -125,8 +125,8 @@ def _say(result: Plan) -> None:
 )  # fmt: skip
 def _goal(arguments: Namespace) -> None:
     from planner.files.goal_files import read_region, write_goal_plan
-    from planner.goal.obstacles import Polygon
     from planner.goal.to_goal import to_goal
+    from planner.paths.obstacles import Polygon
     from planner.vehicle.calibration_table import read_knowledge
     from sim.inputs import load_robot
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from planner.files.plan_files import EXTRA, FILES, write_plan_files
 from planner.goal.goal_plan import GoalPlan
-from planner.goal.obstacles import Circle, Polygon, Region
+from planner.paths.obstacles import Circle, Polygon, Region
 from planner.paths.path_files import read_path
 from planner.paths.units import in_tails
 from sim.io.errors import InputError, naming

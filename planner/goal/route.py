@@ -16,7 +16,7 @@ import numpy as np
 
 from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, words
 from planner.goal.lattice import Lattice, RouteLimits
-from planner.goal.obstacles import FreeSpace
+from planner.paths.obstacles import FreeSpace
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
