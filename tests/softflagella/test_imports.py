@@ -1,4 +1,4 @@
-"""What answers need at run time: torch is for training alone, and slow libraries are imported where they are used."""
+"""What answers need at run time: torch is for training alone, slow libraries are imported where they are used."""
 
 from __future__ import annotations
 
