@@ -21,7 +21,7 @@ from planner.paths.tractrix import Drift, Reference
 from planner.paths.units import in_lab
 from planner.planning.declared_path import Declared
 from planner.planning.kept_clear import Detour, KeptClear
-from planner.planning.plan import make_plan
+from planner.planning.plan import Redirect, make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.dwell_choice import dwells_for
@@ -58,9 +58,24 @@ def plan_clear(
     """
     if space.empty:
         return make_plan(drawn, tracked, request, progress)
-    clearing = _Clearing(drawn, tracked, space, feedback=feedback)
+    clearing = Clearing(drawn, tracked, space, feedback=feedback)
+    return plan_redirected(drawn, tracked, request, clearing.redirect, progress)
+
+
+def plan_redirected(
+    drawn: Path2D,
+    tracked: TrackedVehicle,
+    request: PlanRequest,
+    redirect: Redirect,
+    progress: Callable[[float], object] | None = None,
+) -> Plan:
+    """Plan with the dwell that the objective chooses; where the path is blocked, with shorter ones.
+
+    Raises:
+        BlockedError: there is no way around what blocks the path.
+    """
     try:
-        return make_plan(drawn, tracked, request, progress, clearing.redirect)
+        return make_plan(drawn, tracked, request, progress, redirect)
     except BlockedError as blocked:
         if blocked.hopeless or request.dwell is not None:
             raise
@@ -68,14 +83,14 @@ def plan_clear(
     dwells = dwells_for(tracked.vehicle, request.objective, request.least_dwell(tracked.robot))
     for place in np.unique(np.linspace(0, len(dwells) - 1, _DWELLS).astype(int))[1:].tolist():
         try:
-            return make_plan(drawn, tracked, replace(request, dwell=dwells[place]), progress, clearing.redirect)
+            return make_plan(drawn, tracked, replace(request, dwell=dwells[place]), progress, redirect)
         except BlockedError:
             continue
     raise refusal
 
 
 @dataclass
-class _Clearing:
+class Clearing:
     """Replaces a declared path by one that keeps clear, and plans for it."""
 
     drawn: Path2D
@@ -84,7 +99,7 @@ class _Clearing:
     feedback: bool = field(kw_only=True)
     detours: dict[Drift, Detours] = field(default_factory=dict)
 
-    def redirect(self, declared: Declared, drift: Drift, follow: Callable[[Declared], Plan]) -> Plan:
+    def redirect(self, declare: Callable[[], Declared], drift: Drift, follow: Callable[[Declared], Plan]) -> Plan:
         """Plan with larger and larger margins, until the margin is at least the stated error.
 
         Raises:
@@ -92,7 +107,8 @@ class _Clearing:
         """
         around = self.detours.setdefault(drift, Detours(self.tracked, self.space, drift))
         body = Footprint.of(self.tracked.robot, 0.0)
-        plan, margin = follow(declared), 0.0
+        declared, margin = declare(), 0.0
+        plan = follow(declared)
         for _ in range(_MARGINS):
             margin = max(_MORE * self._needed(plan), 1.02 * margin)
             reference, detours = self._around(around, declared, margin)

@@ -16,7 +16,7 @@ path is reported from both sides.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Unpack
 
 import numpy as np
@@ -42,7 +42,8 @@ from sim.io.errors import InputError
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
 
-Redirect = Callable[[Declared, Drift, Callable[[Declared], Plan]], Plan]
+# Plans from what declares the path, the drift, and what follows a declared path.
+Redirect = Callable[[Callable[[], Declared], Drift, Callable[[Declared], Plan]], Plan]
 
 
 def plan(
@@ -119,8 +120,9 @@ def make_plan(
             errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed)
             return Plan(tracked, request.objective, drawn, declared, straight, guidance, switches, errors)
 
-        declared = declared_path(drift)
-        return follow_declared(declared) if redirect is None else redirect(declared, drift, follow_declared)
+        if redirect is not None:
+            return redirect(partial(declared_path, drift), drift, follow_declared)
+        return follow_declared(declared_path(drift))
 
     first = with_dwell(dwells[0])
     if request.tolerance is None or first.stated_error <= request.tolerance:
