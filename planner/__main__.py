@@ -9,7 +9,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from planner.paths.units import UNITS, check_unstated_unit, describe, in_lab, in_tails, place_in_lab
+from planner.paths.units import (
+    UNITS,
+    check_unstated_unit,
+    describe,
+    hinting_at_units,
+    in_lab,
+    in_tails,
+    place_in_lab,
+)
 from sim.io.commands import MODEL, ROBOT, Program, argument, out
 from sim.io.errors import InputError, naming
 from sim.io.units import format_time
@@ -31,6 +39,14 @@ _DWELLS = (
     argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
     argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
 )
+_OBSTACLES = (
+    argument("--keep-out", action="append", default=[], metavar="REGION",
+             help="circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; may be given again"),
+    argument("--walls", metavar="REGION", help="what the robot must stay within: box:…, or a CSV or SVG outline"),
+    argument("--feedback", action="store_true",
+             help="the pose will be measured every 20 flips: the margin around obstacles is the stated error with "
+             "feedback"),
+)  # fmt: skip
 _PLANNING = (
     argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE, polygon:CORNERS:SIDE "
              "(polygon:6:2)"),
@@ -52,6 +68,7 @@ _PLANNING = (
     argument("--objective", default="error", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: error)"),
     *_DWELLS,
+    *_OBSTACLES,
 )  # fmt: skip
 
 
@@ -64,10 +81,13 @@ _PLANNING = (
 )
 def _plan(arguments: Namespace) -> None:
     from planner.files.plan_files import write_plan
-    from planner.files.trade_off import draw_trade_off, trade_off
 
     result, request = _planned(arguments)
-    pictures = {"trade_off.svg": draw_trade_off(trade_off(result, request))} if arguments.trade_off else {}
+    pictures = {}
+    if arguments.trade_off:
+        from planner.files.trade_off import draw_trade_off, trade_off
+
+        pictures["trade_off.svg"] = draw_trade_off(trade_off(result, request))
     paths = write_plan(result, arguments.out, pictures=pictures)
     _say(result)
     robot, errors = result.robot, result.errors
@@ -99,6 +119,8 @@ def _say(result: Plan) -> None:
         for value in (result.predicted_rms, result.predicted_max, result.stated_error, result.feedback_error)
     )
     print(f"predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}")
+    for line in () if result.kept_clear is None else result.kept_clear.lines(robot):
+        print(line)
 
 
 @program.command(
@@ -110,23 +132,18 @@ def _say(result: Plan) -> None:
              help="of the head's centre at the start, at rest (default: 0 0 0)"),
     argument("--via", nargs=2, type=float, action="append", default=[], metavar=("X", "Y"),
              help="a place that the pivot passes; may be given again"),
-    argument("--keep-out", action="append", default=[], metavar="REGION",
-             help="circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; may be given again"),
-    argument("--walls", metavar="REGION", help="what the robot must stay within: box:…, or a CSV or SVG outline"),
+    *_OBSTACLES,
     argument("--unit", choices=("l", *UNITS), default="l", help="unit of all lengths (default: tail lengths)"),
     ROBOT,
     MODEL,
     argument("--objective", default="time", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: time)"),
-    argument("--feedback", action="store_true",
-             help="the pose will be measured every 20 flips: the margin is the stated error with feedback"),
     *_DWELLS,
     out("folder"),
 )  # fmt: skip
 def _goal(arguments: Namespace) -> None:
-    from planner.files.goal_files import read_region, write_goal_plan
+    from planner.files.goal_files import read_free_space, write_goal_plan
     from planner.goal.to_goal import to_goal
-    from planner.paths.obstacles import Polygon
     from planner.vehicle.calibration_table import read_knowledge
     from sim.inputs import load_robot
 
@@ -136,17 +153,15 @@ def _goal(arguments: Namespace) -> None:
         (scale * x, scale * y, math.radians(math.fmod(angle, 360)))
         for x, y, angle in (arguments.start, arguments.goal)
     )
-    walls = None if arguments.walls is None else read_region(arguments.walls, unit, robot)
-    if walls is not None and not isinstance(walls, Polygon):
-        raise InputError(f"--walls {arguments.walls!r}; give a box or an outline")
+    space = read_free_space(arguments.keep_out, arguments.walls, scale, robot)
     knowledge = read_knowledge(arguments.robot)
     goal_plan = to_goal(
         start,
         goal,
         robot,
         via=[(scale * x, scale * y) for x, y in arguments.via],
-        keep_out=[read_region(words, unit, robot) for words in arguments.keep_out],
-        walls=walls,
+        keep_out=space.regions,
+        walls=space.walls,
         lookup=_table(arguments, robot, knowledge),
         objective=arguments.objective,
         minimum_dwell=arguments.min_dwell,
@@ -199,7 +214,8 @@ def _track(arguments: Namespace) -> None:
 
 def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     """Make the plan that the command asks for, and return it with the request."""
-    from planner.planning.plan import make_plan
+    from planner.files.goal_files import read_free_space
+    from planner.jobs.clear_plan import plan_clear
     from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import read_knowledge
     from planner.vehicle.dwell_choice import dwells_for
@@ -208,7 +224,8 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     from sim.inputs import load_robot
 
     robot = load_robot(arguments.robot)
-    path, given_in = _path(arguments, robot)
+    path, unit, given_in = _path(arguments, robot)
+    space = read_free_space(arguments.keep_out, arguments.walls, unit, robot)
     print(f"path: {describe(path, robot)}")
     request = PlanRequest(
         point=arguments.point,
@@ -225,8 +242,9 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
         dwell = dwells_for(tracked.vehicle, request.objective, request.least_dwell(robot))[0]
         speed = zigzag(tracked.vehicle, dwell, tracked.offset).speed
         check_unstated_unit(path, robot, tracked.vehicle.turn_radius, speed)
-    with _progress() as progress:
-        return make_plan(path, tracked, request, progress, given_in=given_in), request
+    with hinting_at_units(path, robot, tracked.vehicle.turn_radius, given_in), _progress() as progress:
+        result = plan_clear(path, tracked, request, space, feedback=arguments.feedback, progress=progress)
+    return result, request
 
 
 def _table(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge) -> LookupTable:
@@ -242,20 +260,23 @@ def _progress() -> Iterator[Progress]:
     """Show a bar on a terminal, for plans that take long."""
     from tqdm import tqdm
 
+    from planner.planning.progress import Share
+
     style = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}"
     with tqdm(
         total=100, leave=False, delay=1.0, miniters=0, bar_format=style, disable=not sys.stderr.isatty()
     ) as bar:
 
-        def tell(stage: str, share: float) -> None:
-            bar.set_description_str(stage, refresh=False)
-            bar.update(100 * min(share, 1.0) - bar.n)
+        def show(share: float) -> None:
+            if isinstance(share, Share):
+                bar.set_description_str(share.stage, refresh=False)
+                bar.update(100 * min(share.done, 1.0) - bar.n)
 
-        yield tell
+        yield show
 
 
-def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, tuple[str, ...]]:
-    """Make the path that the command asks for, in tail lengths; return the unit of its numbers if given."""
+def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, float, tuple[str, ...]]:
+    """Make the path that the command asks for, in l; return the unit of its numbers, and its name."""
     from planner.paths.path import smoothed
     from planner.paths.path_files import read_path
 
@@ -276,10 +297,10 @@ def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, tuple[str, ...]]:
         raise InputError(f"--scale {arguments.scale}; give a number above 0")
     path = drawing.path.scaled(scale)
     if arguments.smooth is None:
-        return path, given_in
+        return path, unit, given_in
     smooth, moved = smoothed(path, arguments.smooth)
     print(f"smoothed over {in_lab(arguments.smooth, robot)}, which moves the path by up to {in_lab(moved, robot)}")
-    return smooth, given_in
+    return smooth, unit, given_in
 
 
 @program.command(

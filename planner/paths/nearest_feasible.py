@@ -26,27 +26,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dpbsv
 
 from planner.paths.path import Path2D, resample
+from planner.paths.pose_equations import (
+    Hindrance,
+    Task,
+    damped_step,
+    normal_equations,
+    places,
+    sorted_equations,
+    whole_lap,
+)
 from planner.paths.tractrix import STILL, Drift
-from sim.arrays import Floats, Integers
+from sim.arrays import Floats
 
 _SPACING = 0.2  # of the poses, in radii of the pivot's circle
 _MOST_POSES = 20_000  # of a path that is not longer than so many times _COARSEST
 _COARSEST = 0.075  # spacing in l
 _WEIGHTS = (0.3, 3.0, 30.0, 300.0, 1000.0)  # of what the robot cannot do, one stage after another
 _ITERATIONS = 20  # in each stage
-_EVEN = 0.01  # weight of equal steps
-_SHORT = 10.0  # weight of steps that are too short
 _ALONG = 0.6  # of distances along the path beside those across: a robot that is late is still on it
-_SHORTEST_STEP = 0.25  # of the steps, as a share of the spacing
 _POINTS_A_POSE = 4  # points of the path for each pose
 _ROUNDS = 12  # of growing weights
 _LEAST = 0.01  # share of the mean weight that every point keeps
+_HINDERED = (30.0, 30.0, 30.0, 100.0, 100.0, 300.0, 300.0, 1000.0)  # the same as _WEIGHTS, with a hindrance
+_PINNED = 1e6  # weight of the ends of a part of a path
 
 
 def nearest_path(
@@ -75,7 +81,7 @@ def nearest_path(
     if raw.closed:
         target = target[:-1]
     poses, turn = _start(target, pivot_distance, closed=raw.closed)
-    task = _Task(
+    task = Task(
         target, _sides(target, closed=raw.closed), np.ones(len(target)), pivot_distance, radius, drift, spacing,
         time_weight, turn,
     )  # fmt: skip
@@ -91,7 +97,46 @@ def nearest_path(
     if minimax:
         poses = _minimax(poses, task, told)
     if turn is not None:
-        poses = _whole_lap(poses, turn)
+        poses = whole_lap(poses, turn)
+    points = tracked_points(poses, pivot_distance)
+    return Path2D.of(points[:-1] if raw.closed else points, closed=raw.closed)
+
+
+def nearest_poses(
+    poses: Floats,
+    target: Floats,
+    pivot_distance: float,
+    radius: float,
+    *,
+    drift: Drift = STILL,
+    shares: Floats,
+    hindrance: Hindrance,
+) -> Floats:
+    """Move poses (m, 3) of the pivot as near to points (m, 2) as the robot can follow and a hindrance allows.
+
+    The tracked point stays where it is at the first and at the last pose.
+
+    Args:
+        poses: x, y and heading, on the same side of every obstacle as the result.
+        target: where the tracked point should be.
+        pivot_distance: from the pivot to the tracked point; at least 0.
+        radius: smallest radius of the pivot's track.
+        drift: what carries the robot off its heading.
+        shares: (m,), how much the distance of each point counts.
+        hindrance: residuals (m, r) of poses, zero where they are allowed, and derivatives (m, r, 3).
+    """
+    shares = np.concatenate([[_PINNED], shares[1:-1], [_PINNED]])
+    spacing = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).mean())
+    task = Task(
+        target, _sides(target, closed=False), shares, pivot_distance, radius, drift, spacing, 0.0, None, hindrance
+    )
+    for weight in _HINDERED:
+        poses = _descend(poses, task, weight)
+    return poses
+
+
+def tracked_points(poses: Floats, pivot_distance: float) -> Floats:
+    """Interpolate between poses (m, 3) of the pivot, and return the points (k, 2) of the tracked point."""
     at = np.arange(_POINTS_A_POSE * (len(poses) - 1) + 1) / _POINTS_A_POSE
     x, y, heading = (np.interp(at, np.arange(len(poses)), column) for column in poses.T)
     # Between two poses the pivot moves on an arc, which lies off its chord.
@@ -99,8 +144,7 @@ def nearest_path(
     chord = np.append(np.repeat(np.hypot(*np.diff(poses[:, :2], axis=0).T), _POINTS_A_POSE), 0.0)
     off = -turned * chord * (at % 1) * (1 - at % 1) / 2
     points = np.stack([x - off * np.sin(heading), y + off * np.cos(heading)], 1)
-    points += pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
-    return Path2D.of(points[:-1] if raw.closed else points, closed=raw.closed)
+    return points + pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
 
 
 def pose_spacing(raw: Path2D, radius: float) -> float:
@@ -138,26 +182,7 @@ def _sides(target: Floats, *, closed: bool) -> Floats:
     return np.stack([_ALONG * along, across], 1)
 
 
-def _whole_lap(poses: Floats, turn: float) -> Floats:
-    """Repeat the first pose of a lap at its end."""
-    return np.concatenate([poses, poses[:1] + np.array([0.0, 0.0, turn])])
-
-
-class _Task(NamedTuple):
-    """What stays the same while the poses are sought."""
-
-    target: Floats  # (m, 2), points on the path as drawn
-    sides: Floats  # (m, 2, 2), along the path, times the share that such distances count; and across it
-    shares: Floats  # (m,), how much the distance of each point counts
-    distance: float  # from the pivot to the tracked point
-    radius: float  # smallest of the pivot's track
-    drift: Drift
-    spacing: float  # of the target's points
-    time_weight: float  # of the length of the pivot's track
-    turn: float | None  # of the heading in a lap; None: an open path
-
-
-def _minimax(poses: Floats, task: _Task, told: Callable[[int], object]) -> Floats:
+def _minimax(poses: Floats, task: Task, told: Callable[[int], object]) -> Floats:
     """Find poses whose largest distance from the target is small."""
     best, shares = poses, task.shares
     for stage in range(_ROUNDS):
@@ -171,26 +196,26 @@ def _minimax(poses: Floats, task: _Task, told: Callable[[int], object]) -> Float
     return best
 
 
-def _distances(poses: Floats, task: _Task) -> Floats:
+def _distances(poses: Floats, task: Task) -> Floats:
     """Compute the distances (m,) of the tracked point from the target."""
     ahead = task.distance * np.stack([np.cos(poses[:, 2]), np.sin(poses[:, 2])], 1)
     return np.asarray(np.hypot(*(poses[:, :2] + ahead - task.target).T))
 
 
-def _descend(poses: Floats, task: _Task, weight: float) -> Floats:
+def _descend(poses: Floats, task: Task, weight: float) -> Floats:
     """Minimise by Gauss-Newton with Levenberg's damping, for one weight of the constraints."""
     damping = 1e-3
-    place = _places(len(poses), closed=task.turn is not None)
-    system = _system(poses, task, weight)
+    place = places(len(poses), closed=task.turn is not None)
+    system = normal_equations(poses, task, weight)
     for _ in range(_ITERATIONS):
-        band, right = _sorted_normal(system, place)
+        band, right = sorted_equations(system, place)
         while damping < 1e6:
-            step = _damped_step(band, right, damping)
+            step = damped_step(band, right, damping)
             if step is None:
                 damping *= 10
                 continue
             tried = poses - step.reshape(-1, 3)[place]
-            candidate = _system(tried, task, weight)
+            candidate = normal_equations(tried, task, weight)
             if candidate.cost < system.cost:
                 break
             damping *= 6
@@ -202,163 +227,3 @@ def _descend(poses: Floats, task: _Task, weight: float) -> Floats:
         if gained < 1e-3 * system.cost:
             break
     return poses
-
-
-def _damped_step(band: Floats, right: Floats, damping: float) -> Floats | None:
-    """Solve the damped normal equations (3 m,) in lower band form; None where they are not positive definite."""
-    damped = band.copy(order="F")
-    damped[0] += damping
-    _, step, info = dpbsv(damped, right, lower=1, overwrite_ab=1)
-    return step if info == 0 else None
-
-
-class _System(NamedTuple):
-    """The linearised least squares: cost, and normal equations without damping."""
-
-    cost: float  # sum of squared residuals
-    gradient: Floats  # (3, m), half of the cost's
-    diagonal: Floats  # (3, 3, m), blocks of the poses; the upper triangle is filled
-    across: Floats  # (3, 3, k), blocks of neighbours: row of the first pose, column of the second
-
-
-def _system(poses: Floats, task: _Task, weight: float) -> _System:
-    """Compute cost and normal equations at poses (m, 3).
-
-    There are k = m − 1 steps on an open path, and m on a closed one. The residuals of a step depend on its forward
-    part f, its sideways part g and its turn t. Derivatives by these are chained with those of f, g and t by the
-    two poses.
-    """
-    x, y, heading = poses.T
-    gradient, diagonal = np.zeros((3, len(poses))), np.zeros((3, 3, len(poses)))
-    cost = _add_distances(poses, task, gradient, diagonal)
-    if task.turn is not None:
-        x, y, heading = _whole_lap(poses, task.turn).T
-    dx, dy, turn = np.diff(x), np.diff(y), np.diff(heading)
-    middle = (heading[1:] + heading[:-1]) / 2
-    c, s = np.cos(middle), np.sin(middle)
-    forward, aside = c * dx + s * dy, c * dy - s * dx
-    part = _step_part(forward, aside, turn, (c, s), task, weight)
-    # second derivatives by x and y of the step, in the lab
-    xx = c * c * part.ff - 2 * c * s * part.fg + s * s * part.gg
-    xy = c * s * (part.ff - part.gg) + (c * c - s * s) * part.fg
-    yy = s * s * part.ff + 2 * c * s * part.fg + c * c * part.gg
-    # by x, y and the mean heading, which adds g dφ to f and −f dφ to g
-    swing_f, swing_g = aside / 2, -forward / 2
-    by_f, by_g = part.ff * swing_f + part.fg * swing_g, part.fg * swing_f + part.gg * swing_g
-    x_swing, y_swing, swing = c * by_f - s * by_g, s * by_f + c * by_g, by_f * swing_f + by_g * swing_g
-    # by x, y, mean heading and the turn
-    x_turn, y_turn, swing_turn = c * part.ft, s * part.ft, swing_f * part.ft
-    first, second = slice(0, len(dx)), np.roll(np.arange(len(poses)), -1)[: len(dx)]
-    from_x, from_y = c * part.f - s * part.g, s * part.f + c * part.g
-    from_swing = swing_f * part.f + swing_g * part.g
-    for at, sign in ((first, -1.0), (second, 1.0)):
-        gradient[0, at] += sign * from_x
-        gradient[1, at] += sign * from_y
-        gradient[2, at] += from_swing + sign * part.t
-        diagonal[0, 0, at] += xx
-        diagonal[0, 1, at] += xy
-        diagonal[1, 1, at] += yy
-        diagonal[0, 2, at] += sign * x_swing + x_turn
-        diagonal[1, 2, at] += sign * y_swing + y_turn
-        diagonal[2, 2, at] += swing + 2 * sign * swing_turn + part.tt
-    across = np.array([
-        [-xx, -xy, -x_swing - x_turn],
-        [-xy, -yy, -y_swing - y_turn],
-        [x_swing - x_turn, y_swing - y_turn, swing - part.tt],
-    ])  # fmt: skip
-    return _System(cost + part.cost, gradient, diagonal, across)
-
-
-def _add_distances(poses: Floats, task: _Task, gradient: Floats, diagonal: Floats) -> float:
-    """Add the squared distances from the target to the normal equations; return their sum."""
-    (along_x, along_y), (across_x, across_y) = np.moveaxis(task.sides, 0, -1)
-    x, y, heading = poses.T
-    ahead_x, ahead_y = task.distance * np.cos(heading), task.distance * np.sin(heading)
-    off_x, off_y = x + ahead_x - task.target[:, 0], y + ahead_y - task.target[:, 1]
-    cost = 0.0
-    for side_x, side_y in ((along_x, along_y), (across_x, across_y)):
-        residual = side_x * off_x + side_y * off_y
-        by_heading = side_y * ahead_x - side_x * ahead_y
-        weighted = task.shares * residual
-        cost += float((weighted * residual).sum())
-        derivatives = (side_x, side_y, by_heading)
-        for i in range(3):
-            gradient[i] += derivatives[i] * weighted
-            for j in range(i, 3):
-                diagonal[i, j] += task.shares * derivatives[i] * derivatives[j]
-    return cost
-
-
-class _StepPart(NamedTuple):
-    """What the residuals of the steps add: cost, and derivatives (k,) by forward part, sideways part and turn."""
-
-    cost: float
-    f: Floats
-    g: Floats
-    t: Floats
-    ff: Floats
-    fg: Floats
-    gg: Floats
-    ft: Floats
-    tt: Floats
-
-
-def _step_part(
-    forward: Floats, aside: Floats, turn: Floats, direction: tuple[Floats, Floats], task: _Task, weight: float
-) -> _StepPart:
-    """Compute what the residuals of the steps add."""
-    c, s = direction
-    cx, cy = task.drift.current
-    slip = (task.drift.sideways - cx * s + cy * c) / (1 + cx * c + cy * s)
-    sideways = weight * (aside - slip * forward)
-    sense = np.sign(turn)
-    over = np.maximum(sense * turn * task.radius - forward, 0.0)  # turns further than it can
-    turning, bent = weight**2 * over, weight**2 * (over > 0)
-    least = _SHORTEST_STEP * task.spacing
-    short = np.maximum(least - forward, 0.0)
-    uneven = _EVEN * (forward - task.spacing)
-    late = task.time_weight / task.spacing  # times the length
-    length = np.maximum(forward, least)
-    going = forward >= least
-    return _StepPart(
-        cost=float(
-            (sideways**2 + turning * over + _SHORT**2 * short**2 + uneven**2 + late * length).sum()
-        ),
-        f=-weight * slip * sideways - turning - _SHORT**2 * short + _EVEN * uneven + late / 2 * going,
-        g=weight * sideways,
-        t=task.radius * sense * turning,
-        ff=weight**2 * slip**2 + bent + _SHORT**2 * (short > 0) + _EVEN**2 + late / 4 * going / length,
-        fg=-(weight**2) * slip,
-        gg=np.full(len(turn), weight**2),
-        ft=-task.radius * sense * bent,
-        tt=np.asarray(task.radius**2 * bent, dtype=np.float64),
-    )  # fmt: skip
-
-
-def _places(count: int, *, closed: bool) -> Integers:
-    """Order the poses in the system (m,) so that neighbours are near one another."""
-    order = np.arange(count)
-    if closed:
-        order[::2], order[1::2] = np.arange((count + 1) // 2), np.arange(count - 1, (count - 1) // 2, -1)
-    place = np.empty(count, dtype=np.int64)
-    place[order] = np.arange(count)
-    return place
-
-
-def _sorted_normal(system: _System, place: Integers) -> tuple[Floats, Floats]:
-    """Assemble the normal matrix, lower form (band, 3 m), and the right side (3 m,), sorted by `place`."""
-    count, first = len(place), place[: system.across.shape[2]]
-    second = np.roll(place, -1)[: len(first)]
-    later = second > first
-    low, high = np.where(later, first, second), np.where(later, second, first)
-    width = 3 * int((high - low).max()) + 2
-    band = np.zeros((width + 1, count, 3))
-    for i in range(3):
-        for j in range(3):
-            if j >= i:
-                band[j - i, place, i] = system.diagonal[i, j]
-            # row j of the later pose, column i of the earlier one
-            band[3 * (high - low) + j - i, low, i] = np.where(later, system.across[i, j], system.across[j, i])
-    right = np.empty((count, 3))
-    right[place] = system.gradient.T
-    return band.reshape(width + 1, -1), right.reshape(-1)

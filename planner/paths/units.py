@@ -5,6 +5,8 @@ A message gives lengths in mm, cm or m first and in tail lengths l second.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from sim.io.errors import InputError
@@ -20,6 +22,7 @@ LONGEST = 1500.0  # l
 SMALLEST = 0.25  # of the radius of the robot's circle, largest extent of a path
 MOST_CIRCLES = 30.0  # of the robot, across a path whose unit is not stated
 MOST_SECONDS = 4 * 3600.0  # that such a path may take
+_LITTLE = 2.0  # turn radii across: a path whose unit may be wrong
 _SENSIBLE = (3.0, 300.0)  # length in l
 
 
@@ -57,25 +60,19 @@ def extent(path: Path2D) -> tuple[float, float]:
     return width, height
 
 
-def check_size(path: Path2D, robot: Robot, turn_radius: float, given_in: tuple[str, ...] = ANY_UNIT) -> None:
+def check_size(path: Path2D, robot: Robot, turn_radius: float) -> None:
     """Refuse a path that no schedule can be meant for.
-
-    Args:
-        path: in tail lengths.
-        robot: its tail length.
-        turn_radius: of the robot's circle, in l.
-        given_in: units in which the user may have given the numbers; none: the path has a size of its own.
 
     Raises:
         InputError: the path is far too long or too small; the message names a unit that would make sense.
     """
     if path.length > LONGEST:
         raise InputError(f"the path is {describe(path, robot)}; at most {LONGEST:g} l can be planned"
-                         f"{_remedy(path, robot, given_in)}")  # fmt: skip
+                         f"{_remedy(path, robot, ANY_UNIT)}")  # fmt: skip
     if max(extent(path)) < SMALLEST * turn_radius:
         raise InputError(
             f"the path is {describe(path, robot)}: too small, the robot's circle has a radius of "
-            f"{in_lab(turn_radius, robot)}{_remedy(path, robot, given_in)}"
+            f"{in_lab(turn_radius, robot)}{_remedy(path, robot, ANY_UNIT)}"
         )
 
 
@@ -99,6 +96,30 @@ def check_unstated_unit(path: Path2D, robot: Robot, turn_radius: float, speed: f
             f"circles across, about {format_time(seconds)}; say its unit, --unit l if this is meant"
             f"{_remedy(path, robot, ('l',))}"
         )
+
+
+class TooTightError(InputError):
+    """A path is too tight for a robot."""
+
+
+@contextmanager
+def hinting_at_units(path: Path2D, robot: Robot, turn_radius: float, given_in: tuple[str, ...]) -> Iterator[None]:
+    """Add a hint at its unit where a path is too tight, and not much larger than the robot's circle.
+
+    Args:
+        path: in tail lengths.
+        robot: its tail length.
+        turn_radius: of the robot's circle, in l.
+        given_in: units in which the user may have given the numbers; none: the path has a size of its own.
+
+    Raises:
+        TooTightError: with the hint.
+    """
+    try:
+        yield
+    except TooTightError as refusal:
+        hint = unit_hint(path, robot, given_in) if max(extent(path)) < _LITTLE * turn_radius else ""
+        raise TooTightError(f"{refusal}; or, {hint}" if hint else str(refusal)) from None
 
 
 def unit_hint(path: Path2D, robot: Robot, given_in: tuple[str, ...]) -> str:

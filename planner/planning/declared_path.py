@@ -16,15 +16,14 @@ import numpy as np
 
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference, reference
-from planner.paths.units import extent, in_lab, place_in_lab, unit_hint
+from planner.paths.units import TooTightError, extent, in_lab, place_in_lab
 from planner.planning.feasible import TIGHTEST, Feasibility, feasible, spacing
-from planner.planning.progress import Progress, silent
+from planner.planning.progress import Progress
 from planner.planning.remedy import remedy
 from planner.planning.request import Corner
 from sim.io.errors import InputError
 
 WARN = 0.1  # share of the extent; a declared path that is further off gets a warning
-_LITTLE = 2.0  # turn radii: extent of a path whose unit may be wrong
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class Declared:
     warnings: tuple[str, ...]  # in words
 
 
-def declare(raw: Path2D, feasibility: Feasibility, progress: Progress = silent) -> Declared:
+def declare(raw: Path2D, feasibility: Feasibility, progress: Progress | None = None) -> Declared:
     """Choose the path that the robot will follow.
 
     Raises:
@@ -53,7 +52,7 @@ def declare(raw: Path2D, feasibility: Feasibility, progress: Progress = silent) 
         raise InputError(f"a time weight needs corner = nearest or minimax, not {feasibility.corner}")
     accepted = feasible(raw, feasibility, progress)
     if accepted is None:
-        raise InputError(_too_tight(raw, feasibility, progress))
+        raise TooTightError(_too_tight(raw, feasibility, progress))
     followed, off_drawn, missed = accepted
     warnings, robot = [], feasibility.robot
     distance = max(off_drawn, missed)
@@ -65,19 +64,17 @@ def declare(raw: Path2D, feasibility: Feasibility, progress: Progress = silent) 
     return Declared(followed, float(np.abs(followed.curvature).max()), off_drawn, missed, tuple(warnings))
 
 
-def _too_tight(raw: Path2D, feasibility: Feasibility, progress: Progress) -> str:
+def _too_tight(raw: Path2D, feasibility: Feasibility, progress: Progress | None) -> str:
     """Say where a path is too tight, and what to change."""
     robot, vehicle = feasibility.robot, feasibility.vehicle
     drawn = reference(raw, feasibility.rod, spacing(raw), feasibility.drift)
     curvature = np.abs(drawn.curvature)
     worst = int(curvature.argmax())
     x, y = drawn.p[worst]
-    small = max(extent(raw)) < _LITTLE * vehicle.turn_radius
-    hint = unit_hint(raw, robot, feasibility.given_in[:1]) if small else ""
     return (
         f"path too tight at {place_in_lab(x, y, robot)}: the pivot would turn with radius "
         f"{in_lab(1 / float(curvature[worst]), robot)}, the robot can with "
         f"{in_lab(vehicle.pivot_radius / TIGHTEST, robot)}; its circle has radius "
         f"{in_lab(vehicle.turn_radius, robot)}, and the nearest path that it can follow has lost the shape; "
-        f"{hint + '; otherwise ' if hint else ''}{remedy(raw, feasibility, progress)}"
+        f"{remedy(raw, feasibility, progress)}"
     )

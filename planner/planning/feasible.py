@@ -17,8 +17,8 @@ from planner.paths.fillets import CORNER, fillet, kinks, largest_fillet
 from planner.paths.nearest_feasible import nearest_path, pose_spacing
 from planner.paths.path import Path2D, smoothed
 from planner.paths.tractrix import Drift, Reference, reference
-from planner.paths.units import ANY_UNIT, extent, place_in_lab
-from planner.planning.progress import DECLARING, Progress, silent
+from planner.paths.units import extent, place_in_lab
+from planner.planning.progress import DECLARING, Progress, tell
 from planner.planning.request import Corner
 from planner.vehicle.vehicle import Vehicle
 from sim.io.errors import InputError
@@ -49,7 +49,6 @@ class Feasibility(NamedTuple):
     drift: Drift  # what carries the robot off its heading
     corner: Corner  # what to do with places that are too tight
     time_weight: float = 0.0  # as in `planner.paths.nearest_feasible` [l²]
-    given_in: tuple[str, ...] = ANY_UNIT  # as in `planner.paths.units.unit_hint`
 
     @property
     def ways(self) -> tuple[Way, ...]:
@@ -65,7 +64,7 @@ class Accepted(NamedTuple):
     missed: float  # largest distance of a drawn point from it
 
 
-def feasible(raw: Path2D, feasibility: Feasibility, progress: Progress = silent) -> Accepted | None:
+def feasible(raw: Path2D, feasibility: Feasibility, progress: Progress | None = None) -> Accepted | None:
     """Find the path to declare: the first way that is accepted; None if there is none.
 
     Raises:
@@ -97,7 +96,7 @@ def as_drawn(raw: Path2D, feasibility: Feasibility) -> Accepted | None:
     return _accepted(raw, drawn, feasibility)
 
 
-def changed(raw: Path2D, feasibility: Feasibility, way: Way, progress: Progress = silent) -> Accepted | None:
+def changed(raw: Path2D, feasibility: Feasibility, way: Way, progress: Progress | None = None) -> Accepted | None:
     """Change a path in one way so that the robot can follow it; None if that fails, or loses the shape."""
     vehicle, rod, drift, corner = feasibility.vehicle, feasibility.rod, feasibility.drift, feasibility.corner
     if way == ROUNDED:
@@ -107,7 +106,7 @@ def changed(raw: Path2D, feasibility: Feasibility, way: Way, progress: Progress 
     else:
         path = nearest_path(
             raw, max(rod, 0.0), vehicle.pivot_radius / way, drift=drift, minimax=corner == "minimax",
-            time_weight=feasibility.time_weight, progress=lambda share: progress(DECLARING, share),
+            time_weight=feasibility.time_weight, progress=lambda share: tell(progress, DECLARING, share),
         )  # fmt: skip
     return _accepted(raw, reference(path, rod, spacing(path), drift), feasibility)
 

@@ -16,7 +16,7 @@ path is reported from both sides.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Unpack
 
 import numpy as np
@@ -24,13 +24,12 @@ from numpy.typing import ArrayLike
 
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
-from planner.paths.units import ANY_UNIT, check_size, in_lab, time_in_lab
+from planner.paths.units import check_size, in_lab, time_in_lab
 from planner.planning.declared_path import Declared, declare
 from planner.planning.errors import plan_errors
 from planner.planning.feasible import Feasibility
 from planner.planning.line_of_sight import Guidance
 from planner.planning.planned import Plan
-from planner.planning.progress import FOLLOWING, Progress, of_path, silent
 from planner.planning.request import PlanRequest, RequestOptions
 from planner.planning.schedule import follow
 from planner.planning.stated_error import guaranteed, look_ahead
@@ -43,6 +42,9 @@ from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.io.errors import InputError
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
+
+# Plans from what declares the path, the drift, and what follows a declared path.
+Redirect = Callable[[Callable[[], Declared], Drift, Callable[[Declared], Plan]], Plan]
 
 
 def plan(
@@ -76,28 +78,27 @@ def plan(
     """
     request = PlanRequest(**options)
     tracked = tracked_vehicle(robot, lookup, request.point, knowledge)
-    return make_plan(path if isinstance(path, Path2D) else Path2D.of(path), tracked, request, of_path(progress))
+    return make_plan(path if isinstance(path, Path2D) else Path2D.of(path), tracked, request, progress)
 
 
 def make_plan(
     drawn: Path2D,
     tracked: TrackedVehicle,
     request: PlanRequest,
-    progress: Progress = silent,
-    *,
-    given_in: tuple[str, ...] = ANY_UNIT,
+    progress: Callable[[float], object] | None = None,
+    redirect: Redirect | None = None,
 ) -> Plan:
     """Plan for a path, a vehicle and a request; see `plan`.
 
     Args:
-        drawn: the path as drawn, in tail lengths.
+        drawn: the path as drawn.
         tracked: the vehicle and its tracked point.
-        request: what the user asks for.
-        progress: called now and then.
-        given_in: units in which the user may have given the numbers; none: the path has a size of its own.
+        request: corners, dwells, tolerance.
+        progress: called now and then with the share of the path that is done.
+        redirect: plans for another path than the nearest one that can be followed.
     """
     vehicle = tracked.vehicle
-    check_size(drawn, tracked.robot, vehicle.turn_radius, given_in)
+    check_size(drawn, tracked.robot, vehicle.turn_radius)
     least = request.least_dwell(tracked.robot)
     if request.dwell is None:
         dwells = dwells_for(vehicle, request.objective, least)
@@ -106,22 +107,23 @@ def make_plan(
 
     @cache
     def declared_path(drift: Drift) -> Declared:
-        feasibility = Feasibility(
-            tracked.robot, vehicle, tracked.rod, drift, request.corner, request.time_weight, given_in
-        )
+        feasibility = Feasibility(tracked.robot, vehicle, tracked.rod, drift, request.corner, request.time_weight)
         return declare(drawn, feasibility, progress)
 
     def with_dwell(dwell: float) -> Plan:
         straight = zigzag(vehicle, dwell, tracked.offset)
-        declared = declared_path(zigzag_drift(tracked, straight, dwell))
-        guidance = choose_guidance(vehicle, declared, straight, dwell)
-        switches = follow(
-            declared.reference, vehicle, guidance, tracked.offset,
-            progress=lambda share: progress(FOLLOWING, share),
-        )  # fmt: skip
-        bound = guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
-        errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed)
-        return Plan(tracked, request.objective, drawn, declared, straight, guidance, switches, errors)
+        drift = zigzag_drift(tracked, straight, dwell)
+
+        def follow_declared(declared: Declared) -> Plan:
+            guidance = choose_guidance(vehicle, declared, straight, dwell)
+            switches = follow(declared.reference, vehicle, guidance, tracked.offset, progress=progress)
+            bound = guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
+            errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed)
+            return Plan(tracked, request.objective, drawn, declared, straight, guidance, switches, errors)
+
+        if redirect is not None:
+            return redirect(partial(declared_path, drift), drift, follow_declared)
+        return follow_declared(declared_path(drift))
 
     first = with_dwell(dwells[0])
     if request.tolerance is None or first.stated_error <= request.tolerance:

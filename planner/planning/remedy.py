@@ -20,7 +20,7 @@ from planner.planning.feasible import (
     cost,
     smoothing_of_noise,
 )
-from planner.planning.progress import REMEDY, Progress, silent
+from planner.planning.progress import REMEDY, Progress, tell
 
 SCALES = (1.5, 2.0, 2.5, 3.5, 5.0, 7.5, 12.0, 20.0)
 MOST_WORK = 20_000.0  # poses of the nearest path
@@ -28,7 +28,7 @@ _SMOOTHINGS = (1.0, 1.5, 2.2, 3.2, 4.7, 7.0)  # over the length that shows noise
 _FIRST = 0.5  # of the turn radius: the first length over which a path that is not noisy is smoothed
 
 
-def remedy(raw: Path2D, feasibility: Feasibility, progress: Progress = silent) -> str:
+def remedy(raw: Path2D, feasibility: Feasibility, progress: Progress | None = None) -> str:
     """Say what helps a path that is too tight."""
     search = _Search(feasibility, progress)
     robot = feasibility.robot
@@ -58,7 +58,7 @@ def remedy(raw: Path2D, feasibility: Feasibility, progress: Progress = silent) -
 class _Search:
     """A search whose work is bounded."""
 
-    def __init__(self, feasibility: Feasibility, progress: Progress):
+    def __init__(self, feasibility: Feasibility, progress: Progress | None):
         self._feasibility, self._progress = feasibility, progress
         self._work = 0.0
 
@@ -67,7 +67,7 @@ class _Search:
         if self._work + work > MOST_WORK:
             return False
         self._work += work
-        self._progress(REMEDY, self._work / MOST_WORK)
+        self._told()
         return True
 
     def _ways(self) -> Iterator[Way | None]:
@@ -85,9 +85,9 @@ class _Search:
             return False
         return changed(path, self._feasibility, way, self._told) is not None
 
-    def _told(self, stage: str, share: float) -> None:
+    def _told(self, _: float = 0.0) -> None:
         """Tell that the search goes on."""
-        self._progress(REMEDY, self._work / MOST_WORK)
+        tell(self._progress, REMEDY, self._work / MOST_WORK)
 
     def scale(self, raw: Path2D) -> float | None:
         """Find a small one of SCALES at which the path is accepted, by bisection; None if there is none."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import softflagella as sf
 from planner.paths.path import Path2D, circle, smoothed
 from planner.planning.plan import plan
 from sim.io.errors import InputError
@@ -45,11 +46,12 @@ def test_the_smoothing_that_a_very_noisy_path_is_told_works(noise: float) -> Non
 
 
 def test_a_small_path_is_not_noisy_and_may_be_in_another_unit() -> None:
-    with pytest.raises(
-        InputError, match=r"if you gave l and mean m, it is 11.4 l: --unit m; otherwise scale"
-    ) as caught:
-        plan(circle(0.2), CONTROL)
+    hint = r"scale the path by 3.5; or, if you gave l and mean m, it is 11.4 l: --unit m$"
+    with pytest.raises(InputError, match=hint) as caught:
+        sf.plan(circle(0.2), CONTROL)
     assert "noisy" not in str(caught.value)
+    with pytest.raises(InputError, match=r"scale the path by 3.5$"):  # its size is known
+        sf.plan(sf.Drawing(circle(0.2 * CONTROL.tail_length), 1.0), CONTROL)
 
 
 def test_a_line_and_back_ends_with_a_line() -> None:

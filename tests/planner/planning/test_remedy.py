@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from planner.paths.tractrix import STILL
 from planner.planning import remedy
 from planner.planning.declared_path import declare
 from planner.planning.feasible import Feasibility, changed, cost, feasible
-from planner.planning.progress import DECLARING, REMEDY
+from planner.planning.progress import DECLARING, REMEDY, Share
 from planner.planning.request import Corner
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
@@ -50,16 +50,17 @@ def test_the_search_is_bounded_and_says_that_it_goes_on(path: Path2D, monkeypatc
         return changed(raw, feasibility, way, *rest)
 
     monkeypatch.setattr(remedy, "changed", counted)
-    told: list[tuple[str, float]] = []
+    told: list[Share] = []
     with pytest.raises(InputError) as caught:
-        declare(path, five_tails(), lambda stage, share: told.append((stage, share)))
+        declare(path, five_tails(), lambda share: told.append(cast(Share, share)))
     assert "\n" not in str(caught.value)
     assert 0 < sum(work) <= remedy.MOST_WORK
-    shares = [share for stage, share in told if stage == REMEDY]
+    shares = [share.done for share in told if share.stage == REMEDY]
     assert len(shares) > 4 * len(work)  # several times while one way is tried
     assert shares == sorted(shares)
     assert shares[-1] <= 1
-    assert {stage for stage, _ in told} == {DECLARING, REMEDY}
+    assert {share.stage for share in told} == {DECLARING, REMEDY}
+    assert max(told) == 0  # of the path
 
 
 @pytest.mark.parametrize("corner", ["nearest", "minimax", "fillet", "error"])
