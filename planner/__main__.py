@@ -167,7 +167,7 @@ def _track(arguments: Namespace) -> None:
 def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     """Make the plan that the command asks for, and return it with the request."""
     from planner.files.goal_files import read_free_space
-    from planner.jobs.clear_plan import plan_clear
+    from planner.planning.plan import make_plan
     from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import read_knowledge
     from planner.vehicle.dwell_choice import dwells_for
@@ -195,8 +195,11 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
         speed = zigzag(tracked.vehicle, dwell, tracked.offset).speed
         check_unstated_unit(path, robot, tracked.vehicle.turn_radius, speed)
     with progress_bar() as progress:
-        result = plan_clear(path, tracked, request, space, feedback=arguments.feedback, progress=progress)
-    return result, request
+        if space.empty:
+            return make_plan(path, tracked, request, progress), request
+        from planner.jobs.clear_plan import plan_clear  # loads SciPy's graphs
+
+        return plan_clear(path, tracked, request, space, feedback=arguments.feedback, progress=progress), request
 
 
 def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, float, bool]:
@@ -249,6 +252,7 @@ def _check(arguments: Namespace) -> None:
     from planner.files.plan_json import load_plan
     from planner.files.tracking_error import draw_overlay, tracking_error
     from sim.io.files import whole_file
+    from sim.io.tables import read_table
 
     content = load_plan(arguments.plan)
     with naming(arguments.track):

@@ -59,6 +59,7 @@ def say(result: Plan) -> None:
 def table_of(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge) -> LookupTable:
     """Load the table that the command names, or the one that fits the robot."""
     from planner.files.own_table import table_for
+    from surrogate.table.model_file import load_table
 
     return load_table(arguments.model) if arguments.model else table_for(robot, arguments.robot, knowledge)
 

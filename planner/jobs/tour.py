@@ -12,22 +12,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from planner.goal.route import Route
-from planner.jobs.clear_plan import Clearing, plan_redirected
-from planner.jobs.pivot_track import pivot_reference
+from planner.jobs.planned_track import pivot_poses, plan_track
 from planner.jobs.shortest_order import EXACT, shortest_order
 from planner.jobs.tour_plan import TourPlan
 from planner.jobs.travel_times import SLACK, Travel
 from planner.paths.distance import distance_to
 from planner.paths.obstacles import FreeSpace
-from planner.paths.path import Path2D
-from planner.paths.tractrix import Drift, slips
-from planner.paths.units import LONGEST, in_lab, place_in_lab
-from planner.planning.declared_path import Declared
+from planner.paths.tractrix import Drift
+from planner.paths.units import in_lab, place_in_lab
 from planner.planning.plan import zigzag_drift
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
@@ -78,32 +76,12 @@ def tour(
     drift, margin = zigzag_drift(tracked, straight, dwell), 1.5 * straight.largest
     for _ in range(_MARGINS):
         found = task.ordered(Travel.of(tracked, straight, task.space, drift, margin))
-        plan = _planned(task, found, request, feedback=feedback, progress=progress)
+        track = partial(task.track, found)
+        plan = plan_track(tracked, request, task.space, track, drift, feedback=feedback, progress=progress)
         if plan.kept_clear is None or not plan.kept_clear.detours or plan.kept_clear.margin <= margin:
             break
         margin = plan.kept_clear.margin
     return task.result(plan, found)
-
-
-def _planned(
-    task: _Tour, found: _Ordered, request: PlanRequest, *, feedback: bool,
-    progress: Callable[[float], object] | None,
-) -> Plan:  # fmt: skip
-    """Plan the tracks between places in their order."""
-    tracked, drawn = task.tracked, Path2D(task.declared(found).reference.p, False)
-    if drawn.length > LONGEST:
-        length = in_lab(drawn.length, tracked.robot)
-        raise InputError(f"the tour is {length} long; at most {LONGEST:g} l can be planned")
-    clearing = Clearing(drawn, tracked, task.space, feedback=feedback)
-
-    def redirect(_: Callable[[], Declared], drift: Drift, follow: Callable[[Declared], Plan]) -> Plan:
-        limits = replace(found.travel.limits, drift=drift)
-        declared = task.declared(replace(found, travel=replace(found.travel, limits=limits)))
-        if task.space.empty:
-            return follow(declared)
-        return clearing.redirect(lambda: declared, drift, follow)
-
-    return plan_redirected(drawn, tracked, request, redirect, progress)
 
 
 def _checked(places: Sequence[Sequence[float]]) -> Floats:
@@ -143,17 +121,12 @@ class _Tour:
     any_start: bool = field(kw_only=True)
     back: bool = field(kw_only=True)
 
-    def poses(self, places: Floats, courses: Floats, drift: Drift) -> Floats:
-        """Return the pivot's poses (..., 3), place and course, where the tracked point is at places (..., 2)."""
-        heading = courses - slips(courses, drift)
-        axis = np.stack([np.cos(heading), np.sin(heading)], -1)
-        return np.concatenate([places - self.tracked.rod * axis, courses[..., None]], -1)
-
     def ordered(self, travel: Travel) -> _Ordered:
         """Find the order, and refine the directions of motion."""
         count = len(self.places)
         turns = 2 * math.pi * np.arange(COURSES) / COURSES
-        poses = self.poses(self.places[:, None], np.broadcast_to(turns, (count, COURSES)), travel.limits.drift)
+        courses = np.broadcast_to(turns, (count, COURSES))
+        poses = pivot_poses(self.places[:, None], courses, self.tracked, travel.limits.drift)
         blocked = np.flatnonzero((travel.limits.clearance(poses) < travel.margin + SLACK).all(1))
         if len(blocked):
             x, y = self.places[blocked[0]].tolist()
@@ -186,18 +159,17 @@ class _Tour:
         step = 2 * math.pi / COURSES
         choices = np.tile(step * np.arange(COURSES), (len(order), 1))
         for _ in range(_FINER + 1):
-            poses = self.poses(places[:, None], choices, travel.limits.drift)
+            poses = pivot_poses(places[:, None], choices, self.tracked, travel.limits.drift)
             courses, total = _quickest(poses, travel)
             step /= 3
             choices = courses[:, None] + step * np.arange(-3, 4)
         return courses, total
 
-    def declared(self, found: _Ordered) -> Declared:
-        """Declare the path of the tracked point on the tracks between the places."""
-        poses = self.poses(self.places[list(found.order)], found.courses, found.travel.limits.drift)
-        track = Route(found.travel.tracks(poses[:-1], poses[1:]), found.travel.radius).poses(_SPACING)
-        reference = pivot_reference(track, self.tracked.rod, found.travel.limits.drift)
-        return Declared(reference, float(np.abs(reference.curvature).max()), 0.0, 0.0, ())
+    def track(self, found: _Ordered, drift: Drift) -> Route:
+        """Join the places by tracks of the pivot."""
+        travel = replace(found.travel, limits=replace(found.travel.limits, drift=drift))
+        poses = pivot_poses(self.places[list(found.order)], found.courses, self.tracked, drift)
+        return Route(travel.tracks(poses[:-1], poses[1:]), travel.radius)
 
     def result(self, plan: Plan, found: _Ordered) -> TourPlan:
         """Compare the predicted track with the places.

@@ -16,11 +16,11 @@ from planner.files.plan_files import write_plan as write_plan_files
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import TrackingError, tracking_error
 from planner.goal.goal_plan import GoalPlan
-from planner.jobs.clear_plan import plan_clear
 from planner.jobs.tour_plan import TourPlan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.path_files import Drawing, read_path
+from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
@@ -91,6 +91,10 @@ def plan(
     swims, table, known = planned_robot(robot, lookup, knowledge)
     drawn, request, space = _in_tails(path, swims), PlanRequest(**options), FreeSpace.of(keep_out, walls)
     tracked = tracked_vehicle(swims, table, request.point, known)
+    if space.empty:
+        return make_plan(drawn, tracked, request, progress)
+    from planner.jobs.clear_plan import plan_clear  # loads SciPy's graphs
+
     return plan_clear(drawn, tracked, request, space, feedback=feedback, progress=progress)
 
 
