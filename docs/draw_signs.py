@@ -9,6 +9,7 @@ Usage: python docs/draw_signs.py [FOLDER]
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,7 @@ def draw_camera(axes: Any) -> None:
 
 def draw(shown: Scene) -> dict[str, Figure]:
     """Draw the three views, by the names of their files."""
-    views = {
+    views: dict[str, tuple[float, Callable[[Any], None]]] = {  # file -> height over width, what draws it
         "signs-from-above.svg": (0.67, lambda axes: draw_from_above(axes, shown)),
         "signs-from-behind.svg": (0.8, lambda axes: draw_from_behind(axes, shown)),
         "signs-camera.svg": (0.72, draw_camera),
