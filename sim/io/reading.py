@@ -87,7 +87,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         comma = _DECIMAL_COMMA.search(text)
         if comma is None:
             raise
-        raise ContentError(f"{broken}; write {comma[2]}.{comma[3]} for {comma[2]},{comma[3]}") from None
+        raise ContentError(f"{broken}; write {comma[1]}.{comma[2]} for {comma[1]},{comma[2]}") from None
 
 
 def read_json(path: str | Path, **options: Any) -> Any:
