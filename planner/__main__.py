@@ -73,10 +73,13 @@ _PLANNING = (
 )
 def _plan(arguments: Namespace) -> None:
     from planner.files.plan_files import write_plan
-    from planner.files.trade_off import draw_trade_off, trade_off
 
     result, request = _planned(arguments)
-    pictures = {"trade_off.svg": draw_trade_off(trade_off(result, request))} if arguments.trade_off else {}
+    pictures = {}
+    if arguments.trade_off:
+        from planner.files.trade_off import draw_trade_off, trade_off
+
+        pictures["trade_off.svg"] = draw_trade_off(trade_off(result, request))
     paths = write_plan(result, arguments.out, pictures=pictures)
     _say(result)
     robot, errors = result.robot, result.errors
