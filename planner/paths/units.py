@@ -28,7 +28,7 @@ _SENSIBLE = (3.0, 300.0)  # length in l
 
 def in_lab(value: float, robot: Robot) -> str:
     """Write a length given in tail lengths: 3.52 cm (0.32 l)."""
-    return f"{format_length(value * robot.tail_length)} ({value:.3g} l)"
+    return f"{format_length(value * robot.tail_length)} ({_tails(value)} l)"
 
 
 def time_in_lab(value: float, robot: Robot) -> str:
@@ -39,14 +39,25 @@ def time_in_lab(value: float, robot: Robot) -> str:
 def place_in_lab(x: float, y: float, robot: Robot) -> str:
     """Write a place given in tail lengths: (3.52, 1.1) cm = (0.32, 0.1) l."""
     cm = 100 * robot.tail_length
-    return f"({cm * x:.2f}, {cm * y:.2f}) cm = ({x:.3f}, {y:.3f}) l"
+    lab, tails = (", ".join(_fixed(s * value, n) for value in (x, y)) for s, n in ((cm, 2), (1.0, 3)))
+    return f"({lab}) cm = ({tails}) l"
+
+
+def _fixed(value: float, places: int) -> str:
+    """Write a number with some decimals, and zero without a sign."""
+    return f"{round(value, places) + 0.0:.{places}f}"
+
+
+def _tails(value: float) -> str:
+    """Write a length in tail lengths: 0.32, 12, 1200."""
+    return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
 def describe(path: Path2D, robot: Robot) -> str:
     """Describe length and extent of a path."""
     width, height = extent(path)
     across = [format_length(value * robot.tail_length) for value in (width, height)]
-    return f"{in_lab(path.length, robot)} long, {' by '.join(across)} ({width:.3g} by {height:.3g} l)"
+    return f"{in_lab(path.length, robot)} long, {' by '.join(across)} ({_tails(width)} by {_tails(height)} l)"
 
 
 def in_tails(unit: str, robot: Robot) -> float:
