@@ -5,6 +5,8 @@ A message gives lengths in mm, cm or m first and in tail lengths l second.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from sim.io.errors import InputError
@@ -15,16 +17,18 @@ if TYPE_CHECKING:  # the command needs UNITS before it loads NumPy
     from sim.model.robot import Robot
 
 UNITS = ("m", "cm", "mm")
+ANY_UNIT = ("l", *UNITS)
 LONGEST = 1500.0  # l
 SMALLEST = 0.25  # of the radius of the robot's circle, largest extent of a path
 MOST_CIRCLES = 30.0  # of the robot, across a path whose unit is not stated
 MOST_SECONDS = 4 * 3600.0  # that such a path may take
+_LITTLE = 2.0  # turn radii across: a path whose unit may be wrong
 _SENSIBLE = (3.0, 300.0)  # length in l
 
 
 def in_lab(value: float, robot: Robot) -> str:
     """Write a length given in tail lengths: 3.52 cm (0.32 l)."""
-    return f"{format_length(value * robot.tail_length)} ({value:.3g} l)"
+    return f"{format_length(value * robot.tail_length)} ({_tails(value)} l)"
 
 
 def time_in_lab(value: float, robot: Robot) -> str:
@@ -35,14 +39,25 @@ def time_in_lab(value: float, robot: Robot) -> str:
 def place_in_lab(x: float, y: float, robot: Robot) -> str:
     """Write a place given in tail lengths: (3.52, 1.1) cm = (0.32, 0.1) l."""
     cm = 100 * robot.tail_length
-    return f"({cm * x:.2f}, {cm * y:.2f}) cm = ({x:.3f}, {y:.3f}) l"
+    lab, tails = (", ".join(_fixed(s * value, n) for value in (x, y)) for s, n in ((cm, 2), (1.0, 3)))
+    return f"({lab}) cm = ({tails}) l"
+
+
+def _fixed(value: float, places: int) -> str:
+    """Write a number with some decimals, and zero without a sign."""
+    return f"{round(value, places) + 0.0:.{places}f}"
+
+
+def _tails(value: float) -> str:
+    """Write a length in tail lengths: 0.32, 12, 1200."""
+    return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
 def describe(path: Path2D, robot: Robot) -> str:
     """Describe length and extent of a path."""
     width, height = extent(path)
     across = [format_length(value * robot.tail_length) for value in (width, height)]
-    return f"{in_lab(path.length, robot)} long, {' by '.join(across)} ({width:.3g} by {height:.3g} l)"
+    return f"{in_lab(path.length, robot)} long, {' by '.join(across)} ({_tails(width)} by {_tails(height)} l)"
 
 
 def in_tails(unit: str, robot: Robot) -> float:
@@ -64,11 +79,11 @@ def check_size(path: Path2D, robot: Robot, turn_radius: float) -> None:
     """
     if path.length > LONGEST:
         raise InputError(f"the path is {describe(path, robot)}; at most {LONGEST:g} l can be planned"
-                         f"{_hint(path, robot)}")  # fmt: skip
+                         f"{_remedy(path, robot, ANY_UNIT)}")  # fmt: skip
     if max(extent(path)) < SMALLEST * turn_radius:
         raise InputError(
             f"the path is {describe(path, robot)}: too small, the robot's circle has a radius of "
-            f"{in_lab(turn_radius, robot)}{_hint(path, robot)}"
+            f"{in_lab(turn_radius, robot)}{_remedy(path, robot, ANY_UNIT)}"
         )
 
 
@@ -90,18 +105,51 @@ def check_unstated_unit(path: Path2D, robot: Robot, turn_radius: float, speed: f
         raise InputError(
             f"the path is {describe(path, robot)} if its numbers are tail lengths: {circles:.0f} of the robot's "
             f"circles across, about {format_time(seconds)}; say its unit, --unit l if this is meant"
-            f"{_hint(path, robot)}"
+            f"{_remedy(path, robot, ('l',))}"
         )
 
 
-def _hint(path: Path2D, robot: Robot) -> str:
-    """Suggest the units with which the numbers of the path would make sense."""
-    scales = {unit: in_tails(unit, robot) for unit in ("l", *UNITS)}
-    # The path may have been given in any of these units: undo it, then try the others.
+class TooTightError(InputError):
+    """A path is too tight for a robot."""
+
+
+@contextmanager
+def hinting_at_units(path: Path2D, robot: Robot, turn_radius: float, given_in: tuple[str, ...]) -> Iterator[None]:
+    """Add a hint at its unit where a path is too tight, and not much larger than the robot's circle.
+
+    Args:
+        path: in tail lengths.
+        robot: its tail length.
+        turn_radius: of the robot's circle, in l.
+        given_in: units in which the user may have given the numbers; none: the path has a size of its own.
+
+    Raises:
+        TooTightError: with the hint.
+    """
+    try:
+        yield
+    except TooTightError as refusal:
+        hint = unit_hint(path, robot, given_in) if max(extent(path)) < _LITTLE * turn_radius else ""
+        raise TooTightError(f"{refusal}; or, {hint}" if hint else str(refusal)) from None
+
+
+def unit_hint(path: Path2D, robot: Robot, given_in: tuple[str, ...]) -> str:
+    """Suggest at most two units with which the numbers of a path would make sense; empty if there is none.
+
+    Args:
+        path: in tail lengths.
+        robot: its tail length.
+        given_in: units in which the user may have given the numbers; none: the path has a size of its own.
+    """
     hints = []
-    for given, scale in scales.items():
-        for meant, meant_scale in scales.items():
-            length = path.length / scale * meant_scale
+    for given in given_in:
+        for meant in ANY_UNIT:
+            length = path.length / in_tails(given, robot) * in_tails(meant, robot)
             if given != meant and _SENSIBLE[0] <= length <= _SENSIBLE[1]:
                 hints.append(f"if you gave {given} and mean {meant}, it is {length:.3g} l: --unit {meant}")
-    return "; " + "; or ".join(hints[:2]) if hints else "; scale it"
+    return "; or ".join(hints[:2])
+
+
+def _remedy(path: Path2D, robot: Robot, given_in: tuple[str, ...]) -> str:
+    """Suggest units that would make sense, or another scale."""
+    return f"; {unit_hint(path, robot, given_in) or 'scale it'}"

@@ -16,7 +16,7 @@ path is reported from both sides.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Unpack
 
 import numpy as np
@@ -25,8 +25,9 @@ from numpy.typing import ArrayLike
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
 from planner.paths.units import check_size, in_lab, time_in_lab
-from planner.planning.declared_path import Declared, Feasibility, declare
+from planner.planning.declared_path import Declared, declare
 from planner.planning.errors import plan_errors
+from planner.planning.feasible import Feasibility
 from planner.planning.line_of_sight import Guidance
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest, RequestOptions
@@ -41,6 +42,9 @@ from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.io.errors import InputError
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
+
+# Plans from what declares the path, the drift, and what follows a declared path.
+Redirect = Callable[[Callable[[], Declared], Drift, Callable[[Declared], Plan]], Plan]
 
 
 def plan(
@@ -78,9 +82,21 @@ def plan(
 
 
 def make_plan(
-    drawn: Path2D, tracked: TrackedVehicle, request: PlanRequest, progress: Callable[[float], object] | None = None
+    drawn: Path2D,
+    tracked: TrackedVehicle,
+    request: PlanRequest,
+    progress: Callable[[float], object] | None = None,
+    redirect: Redirect | None = None,
 ) -> Plan:
-    """Plan for a path, a vehicle and a request; see `plan`."""
+    """Plan for a path, a vehicle and a request; see `plan`.
+
+    Args:
+        drawn: the path as drawn.
+        tracked: the vehicle and its tracked point.
+        request: corners, dwells, tolerance.
+        progress: called now and then with the share of the path that is done.
+        redirect: plans for another path than the nearest one that can be followed.
+    """
     vehicle = tracked.vehicle
     check_size(drawn, tracked.robot, vehicle.turn_radius)
     least = request.least_dwell(tracked.robot)
@@ -92,16 +108,22 @@ def make_plan(
     @cache
     def declared_path(drift: Drift) -> Declared:
         feasibility = Feasibility(tracked.robot, vehicle, tracked.rod, drift, request.corner, request.time_weight)
-        return declare(drawn, feasibility)
+        return declare(drawn, feasibility, progress)
 
     def with_dwell(dwell: float) -> Plan:
         straight = zigzag(vehicle, dwell, tracked.offset)
-        declared = declared_path(zigzag_drift(tracked, straight, dwell))
-        guidance = choose_guidance(vehicle, declared, straight, dwell)
-        switches = follow(declared.reference, vehicle, guidance, tracked.offset, progress=progress)
-        bound = guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
-        errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed)
-        return Plan(tracked, request.objective, drawn, declared, straight, guidance, switches, errors)
+        drift = zigzag_drift(tracked, straight, dwell)
+
+        def follow_declared(declared: Declared) -> Plan:
+            guidance = choose_guidance(vehicle, declared, straight, dwell)
+            switches = follow(declared.reference, vehicle, guidance, tracked.offset, progress=progress)
+            bound = guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
+            errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed)
+            return Plan(tracked, request.objective, drawn, declared, straight, guidance, switches, errors)
+
+        if redirect is not None:
+            return redirect(partial(declared_path, drift), drift, follow_declared)
+        return follow_declared(declared_path(drift))
 
     first = with_dwell(dwells[0])
     if request.tolerance is None or first.stated_error <= request.tolerance:

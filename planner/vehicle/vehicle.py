@@ -20,8 +20,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
+from planner.vehicle.cubic_spline import spline_at
 from sim.arrays import Floats
 from sim.mechanics import planar
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED
@@ -119,7 +119,8 @@ def resampled(curve: Floats) -> Floats:
 
     Below the shortest dwell the curve is a straight line to zero; after SETTLED it is constant.
     """
-    spline = CubicSpline(np.log(DWELLS), curve, axis=-2)(np.log(np.maximum(TIMES, DWELLS[0])))
+    places = np.log(np.maximum(TIMES, DWELLS[0]))
+    spline = np.moveaxis(spline_at(np.log(DWELLS), np.moveaxis(curve, -2, 0), places), 0, -2)
     return np.asarray(spline * np.minimum(TIMES / DWELLS[0], 1.0)[:, None])
 
 
@@ -127,5 +128,5 @@ def lag_table(lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
     """Compute lags (K, T, 3) after dwells of BEFORE_KNOTS, from curves of `sim.model.response`."""
     knots = np.log(np.append(before, FORGOTTEN))
     known = np.concatenate([memory, np.zeros_like(memory[:1])])
-    fine = CubicSpline(knots, known, bc_type=("not-a-knot", "clamped"))(np.log(BEFORE_KNOTS))
+    fine = spline_at(knots, known, np.log(BEFORE_KNOTS), flat_end=True)
     return resampled(lag + fine)

@@ -84,8 +84,4 @@ def _lookup(content: dict[str, Any]) -> NeuralTable:
 
 
 def _network(stored: Mapping[str, Any]) -> Ensemble:
-    network = Ensemble(**stored["shape"], seed=0)
-    network.load_state_dict(stored["state"])
-    for parameter in network.parameters():
-        parameter.requires_grad_(False)
-    return network
+    return Ensemble.from_state(stored["state"])
