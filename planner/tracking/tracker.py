@@ -7,9 +7,9 @@
 Every call returns the direction of the motor and the time of the next flip. At most one flip can have happened
 since the last call: the one that was announced. The tracker estimates twelve numbers of the robot
 (`planner.tracking.kalman_filter`). A pose may be late: it is compared with the predicted pose at its own time.
-Implausible poses, values that are not finite, and times that cannot be (`planner.tracking.clock`) are ignored. Long
-gaps between poses only increase the error. Implausible poses that agree with each other are those of a robot that
-has been moved (`planner.tracking.displacement`). From afar the tracker plans a way back
+Implausible poses, values that are not finite, and times that cannot be (`planner.tracking.clock`) are ignored.
+Long gaps between poses only increase the error. Implausible poses that agree with each other are those of a robot
+that has been moved (`planner.tracking.displacement`). From afar the tracker plans a way back
 (`planner.tracking.guidance`).
 
 The alarm means that the robot is incompatible with the model. It compares WINDOW accepted poses with the predicted
