@@ -5,41 +5,23 @@ from __future__ import annotations
 import math
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from planner.command_line import DWELLS, OBSTACLES, progress_bar, say, table_of
+from planner.job_commands import JOBS
 from planner.paths.units import UNITS, check_unstated_unit, describe, in_lab, in_tails, place_in_lab
 from sim.io.commands import MODEL, ROBOT, Program, argument, out
 from sim.io.errors import InputError, naming
-from sim.io.units import format_time
 
 if TYPE_CHECKING:
     from planner.paths.path import Path2D
     from planner.planning.planned import Plan
     from planner.planning.request import PlanRequest
-    from planner.vehicle.calibration_table import CalibrationKnowledge
     from sim.model.robot import Robot
-    from surrogate.interface import LookupTable
 
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
 main = program.main
 _SHAPES = {"circle": 0, "triangle": 3, "square": 4}  # number of corners
-
-
-_DWELLS = (
-    argument("--min-dwell", type=float, help="shortest dwell, in time units μ0 l⁴/EI"),
-    argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
-    argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
-)
-_OBSTACLES = (
-    argument("--keep-out", action="append", default=[], metavar="REGION",
-             help="circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; may be given again"),
-    argument("--walls", metavar="REGION", help="what the robot must stay within: box:…, or a CSV or SVG outline"),
-    argument("--feedback", action="store_true",
-             help="the pose will be measured every 20 flips: the margin around obstacles is the stated error with "
-             "feedback"),
-)  # fmt: skip
 _PLANNING = (
     argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE"),
     ROBOT,
@@ -59,8 +41,8 @@ _PLANNING = (
              "whole path (default: 0; 0.03 cuts a little)"),
     argument("--objective", default="error", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: error)"),
-    *_DWELLS,
-    *_OBSTACLES,
+    *DWELLS,
+    *OBSTACLES,
 )  # fmt: skip
 
 
@@ -81,7 +63,7 @@ def _plan(arguments: Namespace) -> None:
 
         pictures["trade_off.svg"] = draw_trade_off(trade_off(result, request))
     paths = write_plan(result, arguments.out, pictures=pictures)
-    _say(result)
+    say(result)
     robot, errors = result.robot, result.errors
     rms, largest, missed = (
         in_lab(value, robot) for value in (errors.drawn_rms, errors.drawn_max, result.declared.missed)
@@ -93,28 +75,6 @@ def _plan(arguments: Namespace) -> None:
     print(f"-> {', '.join(map(str, paths))}")
 
 
-def _say(result: Plan) -> None:
-    """Print warnings, start, dwells and errors."""
-    for warning in result.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
-    robot = result.robot
-    x, y, heading = result.start
-    place = place_in_lab(x, y, robot)
-    print(f"start: put the head's centre at {place}, heading {math.degrees(heading):.1f} degrees, at rest")
-    shortest = format_time(result.minimum_dwell * robot.time_scale)
-    print(
-        f"{len(result.dwells)} dwells of {shortest} ({result.minimum_dwell:.2f} time units) or more, "
-        f"{format_time(float(result.seconds.sum()))} in all"
-    )
-    rms, largest, stated, feedback = (
-        in_lab(value, robot)
-        for value in (result.predicted_rms, result.predicted_max, result.stated_error, result.feedback_error)
-    )
-    print(f"predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}")
-    for line in () if result.kept_clear is None else result.kept_clear.lines(robot):
-        print(line)
-
-
 @program.command(
     "goal",
     "plan the way from one pose to another, around obstacles; exit status 3 where there is none",
@@ -124,13 +84,13 @@ def _say(result: Plan) -> None:
              help="of the head's centre at the start, at rest (default: 0 0 0)"),
     argument("--via", nargs=2, type=float, action="append", default=[], metavar=("X", "Y"),
              help="a place that the pivot passes; may be given again"),
-    *_OBSTACLES,
+    *OBSTACLES,
     argument("--unit", choices=("l", *UNITS), default="l", help="unit of all lengths (default: tail lengths)"),
     ROBOT,
     MODEL,
     argument("--objective", default="time", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: time)"),
-    *_DWELLS,
+    *DWELLS,
     out("folder"),
 )  # fmt: skip
 def _goal(arguments: Namespace) -> None:
@@ -154,7 +114,7 @@ def _goal(arguments: Namespace) -> None:
         via=[(scale * x, scale * y) for x, y in arguments.via],
         keep_out=space.regions,
         walls=space.walls,
-        lookup=_table(arguments, robot, knowledge),
+        lookup=table_of(arguments, robot, knowledge),
         objective=arguments.objective,
         minimum_dwell=arguments.min_dwell,
         minimum_seconds=arguments.min_dwell_s,
@@ -163,7 +123,7 @@ def _goal(arguments: Namespace) -> None:
         knowledge=knowledge,
     )
     paths = write_goal_plan(goal_plan, arguments.out)
-    _say(goal_plan.plan)
+    say(goal_plan.plan)
     off, turned = goal_plan.end_error
     x, y, heading = goal_plan.end
     place = place_in_lab(x, y, robot)
@@ -207,7 +167,7 @@ def _track(arguments: Namespace) -> None:
 def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     """Make the plan that the command asks for, and return it with the request."""
     from planner.files.goal_files import read_free_space
-    from planner.jobs.clear_plan import plan_clear
+    from planner.planning.plan import make_plan
     from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import read_knowledge
     from planner.vehicle.dwell_choice import dwells_for
@@ -229,31 +189,17 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
         tolerance=arguments.tolerance,
     )
     knowledge = read_knowledge(arguments.robot)
-    tracked = tracked_vehicle(robot, _table(arguments, robot, knowledge), request.point, knowledge)
+    tracked = tracked_vehicle(robot, table_of(arguments, robot, knowledge), request.point, knowledge)
     if not unit_known:
         dwell = dwells_for(tracked.vehicle, request.objective, request.least_dwell(robot))[0]
         speed = zigzag(tracked.vehicle, dwell, tracked.offset).speed
         check_unstated_unit(path, robot, tracked.vehicle.turn_radius, speed)
-    with _progress() as progress:
-        result = plan_clear(path, tracked, request, space, feedback=arguments.feedback, progress=progress)
-    return result, request
+    with progress_bar() as progress:
+        if space.empty:
+            return make_plan(path, tracked, request, progress), request
+        from planner.jobs.clear_plan import plan_clear  # loads SciPy's graphs
 
-
-def _table(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge) -> LookupTable:
-    """Load the table that the command names, or the one that fits the robot."""
-    from planner.files.own_table import table_for
-    from surrogate.table.model_file import load_table
-
-    return load_table(arguments.model) if arguments.model else table_for(robot, arguments.robot, knowledge)
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[float], object]]:
-    """Show a bar on a terminal, for long paths."""
-    from tqdm import tqdm
-
-    with tqdm(total=100, desc="plan", unit="%", leave=False, delay=1.0, disable=not sys.stderr.isatty()) as bar:
-        yield lambda share: bar.update(100 * share - bar.n)
+        return plan_clear(path, tracked, request, space, feedback=arguments.feedback, progress=progress), request
 
 
 def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, float, bool]:
@@ -322,6 +268,10 @@ def _check(arguments: Namespace) -> None:
         with whole_file(arguments.out) as part:
             figure.savefig(part, format="png", dpi=130, bbox_inches="tight")
         print(f"-> {arguments.out}")
+
+
+for job in JOBS:
+    program.command(job.name, job.help, *job.arguments)(job.run)
 
 
 if __name__ == "__main__":

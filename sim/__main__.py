@@ -92,6 +92,7 @@ def _replay(arguments: Namespace) -> None:
     from tqdm import tqdm
 
     from sim.io.files import write_csv
+    from sim.io.units import format_time
     from sim.model.schedule import load_schedule
     from sim.motion.replay import replay
 
@@ -100,10 +101,10 @@ def _replay(arguments: Namespace) -> None:
         track = replay([schedule], progress=bar.update)[0]
     write_csv(track, arguments.out)
     end = track.iloc[-1]
-    print(
-        f"{len(schedule.dwells)} dwells, {end.time_s:.1f} s, "
-        f"ends at ({end.x_over_l:.3f}, {end.y_over_l:.3f}) l -> {arguments.out}"
-    )
+    place = f"({end.x_over_l:.3f}, {end.y_over_l:.3f}) l"
+    if "x_cm" in track:
+        place = f"({end.x_cm:.2f}, {end.y_cm:.2f}) cm = {place}"
+    print(f"{len(schedule.dwells)} dwells, {format_time(end.time_s)}, ends at {place} -> {arguments.out}")
 
 
 @program.command(
