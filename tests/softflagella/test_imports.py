@@ -60,4 +60,4 @@ table.response(columns)
 table.jacobian(columns, ["C_t", "disc_drag"])
 sf.Tracker(sf.plan(sf.circle(2.0), robot)).update(0.0)
 """
-    assert loaded(code) == []
+    assert loaded(code, slow=("torch", "scipy.stats", "scipy.interpolate", "scipy.optimize", "joblib")) == []
