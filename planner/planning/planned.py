@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.paths.path import Path2D
-from planner.paths.units import in_lab
+from planner.paths.units import in_lab, time_in_lab
 from planner.planning.declared_path import Declared
 from planner.planning.errors import FEEDBACK_EVERY, PlanErrors
 from planner.planning.kept_clear import KeptClear
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 GUARANTEE = "guaranteed_error_over_l"  # of plan.json; null where it is not known
+WIDE = 0.25  # turn radii; a predicted track that is further from the declared path gets a warning
 # Attributes of a plan by their old names, for one release.
 _MOVED = {
     "point": "tracked.point",
@@ -152,7 +153,18 @@ class Plan:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know, in words."""
-        return (*self.declared.warnings, *self.tracked.warnings)
+        return (*self.declared.warnings, *self._zigzag_warnings(), *self.tracked.warnings)
+
+    def _zigzag_warnings(self) -> tuple[str, ...]:
+        """Warn of a predicted track that is far from the declared path."""
+        if self.predicted_max <= WIDE * self.tracked.vehicle.turn_radius:
+            return ()
+        turn = math.degrees(self.minimum_dwell * self.tracked.vehicle.yaw_rate)
+        return (
+            f"the predicted track is up to {in_lab(self.predicted_max, self.robot)} from the declared path: in "
+            f"dwells of {time_in_lab(self.minimum_dwell, self.robot)} the robot turns by {turn:.0f} degrees; "
+            "shorter ones keep it nearer",
+        )
 
     def schedule(self, robot: Robot | None = None) -> Schedule:
         """Return the schedule for `sim.motion.replay`.

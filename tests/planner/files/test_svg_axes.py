@@ -28,7 +28,7 @@ def test_scales_are_equal_and_ticks_are_in_place(size: tuple[float, float]) -> N
     axes.fill(*corners.T, color="#aabbcc")
     text = axes.text("p1")
     drawn = places(text)[0]
-    scale = np.ptp(drawn) / max(size)
+    scale = np.ptp(drawn, axis=0).max() / max(size)
     x, y = (drawn - drawn[0]).T
     assert x == pytest.approx(scale * (corners - corners[0])[:, 0], abs=0.02)
     assert y == pytest.approx(-scale * (corners - corners[0])[:, 1], abs=0.02)
