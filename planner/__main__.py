@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 
 from planner.command_line import DWELLS, OBSTACLES, progress_bar, say, table_of
 from planner.job_commands import JOBS
-from planner.paths.units import UNITS, check_unstated_unit, describe, in_lab, in_tails, place_in_lab
+from planner.paths.units import (
+    UNITS,
+    check_unstated_unit,
+    describe,
+    hinting_at_units,
+    in_lab,
+    in_tails,
+    place_in_lab,
+)
 from sim.io.commands import MODEL, ROBOT, Program, argument, out
 from sim.io.errors import InputError, naming
 
@@ -21,9 +29,10 @@ if TYPE_CHECKING:
 
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
 main = program.main
-_SHAPES = {"circle": 0, "triangle": 3, "square": 4}  # number of corners
+
 _PLANNING = (
-    argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE"),
+    argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE, polygon:CORNERS:SIDE "
+             "(polygon:6:2)"),
     ROBOT,
     MODEL,
     argument("--unit", choices=("l", *UNITS), help="unit of the path's numbers (default: tail lengths)"),
@@ -176,7 +185,7 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     from sim.inputs import load_robot
 
     robot = load_robot(arguments.robot)
-    path, unit, unit_known = _path(arguments, robot)
+    path, unit, given_in = _path(arguments, robot)
     space = read_free_space(arguments.keep_out, arguments.walls, unit, robot)
     print(f"path: {describe(path, robot)}")
     request = PlanRequest(
@@ -190,11 +199,11 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     )
     knowledge = read_knowledge(arguments.robot)
     tracked = tracked_vehicle(robot, table_of(arguments, robot, knowledge), request.point, knowledge)
-    if not unit_known:
+    if given_in and arguments.unit is None:
         dwell = dwells_for(tracked.vehicle, request.objective, request.least_dwell(robot))[0]
         speed = zigzag(tracked.vehicle, dwell, tracked.offset).speed
         check_unstated_unit(path, robot, tracked.vehicle.turn_radius, speed)
-    with progress_bar() as progress:
+    with hinting_at_units(path, robot, tracked.vehicle.turn_radius, given_in), progress_bar() as progress:
         if space.empty:
             return make_plan(path, tracked, request, progress), request
         from planner.jobs.clear_plan import plan_clear  # loads SciPy's graphs
@@ -202,24 +211,13 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
         return plan_clear(path, tracked, request, space, feedback=arguments.feedback, progress=progress), request
 
 
-def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, float, bool]:
-    """Make the path that the command asks for, in l; return the unit of its numbers, and whether it is known."""
-    from planner.paths.path import circle, polygon, smoothed
-    from planner.paths.path_files import Drawing, read_path
+def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, float, tuple[str, ...]]:
+    """Make the path that the command asks for, in l; return the unit of its numbers, and its name."""
+    from planner.paths.path import smoothed
+    from planner.paths.path_files import read_path
 
-    shape, _, size = arguments.path.partition(":")
-    if shape in _SHAPES and size:
-        try:
-            length = float(size)
-        except ValueError:
-            raise InputError(f"{arguments.path!r}; write for example circle:2 or square:3") from None
-        if not 0 < length < float("inf"):
-            raise InputError(f"{arguments.path!r}; its size must be above 0")
-        drawing = Drawing(polygon(_SHAPES[shape], length) if _SHAPES[shape] else circle(length), None)
-    else:
-        closed = True if arguments.closed else None
-        drawing = read_path(arguments.path, closed=closed, shape=arguments.shape)
-    unit_known = drawing.unit is not None or arguments.unit is not None
+    drawing = read_path(arguments.path, closed=True if arguments.closed else None, shape=arguments.shape)
+    given_in = (arguments.unit or "l",) if drawing.unit is None else ()
     if drawing.unit is None:
         unit = in_tails(arguments.unit or "l", robot)
     elif arguments.unit is None:
@@ -235,10 +233,10 @@ def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, float, bool]:
         raise InputError(f"--scale {arguments.scale}; give a number above 0")
     path = drawing.path.scaled(scale)
     if arguments.smooth is None:
-        return path, unit, unit_known
+        return path, unit, given_in
     smooth, moved = smoothed(path, arguments.smooth)
     print(f"smoothed over {in_lab(arguments.smooth, robot)}, which moves the path by up to {in_lab(moved, robot)}")
-    return smooth, unit, unit_known
+    return smooth, unit, given_in
 
 
 @program.command(

@@ -66,8 +66,19 @@ def table_of(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge
 
 @contextmanager
 def progress_bar() -> Iterator[Callable[[float], object]]:
-    """Show a bar on a terminal, for long paths."""
+    """Show a bar on a terminal, for plans that take long."""
     from tqdm import tqdm
 
-    with tqdm(total=100, desc="plan", unit="%", leave=False, delay=1.0, disable=not sys.stderr.isatty()) as bar:
-        yield lambda share: bar.update(100 * share - bar.n)
+    from planner.planning.progress import Share
+
+    style = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}"
+    with tqdm(
+        total=100, leave=False, delay=1.0, miniters=0, bar_format=style, disable=not sys.stderr.isatty()
+    ) as bar:
+
+        def show(share: float) -> None:
+            if isinstance(share, Share):
+                bar.set_description_str(share.stage, refresh=False)
+                bar.update(100 * min(share.done, 1.0) - bar.n)
+
+        yield show

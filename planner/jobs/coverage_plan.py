@@ -10,7 +10,7 @@ from planner.paths.obstacles import FreeSpace
 from planner.paths.units import in_lab
 from planner.planning.planned import Plan
 from sim.arrays import Floats
-from sim.io.notebook import as_html
+from sim.io.notebook import as_html, given_axes
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
@@ -70,15 +70,13 @@ class CoveragePlan:
         Args:
             ax: default: axes of a new figure.
         """
-        from planner.planning.picture import draw_regions, draw_swath  # loads matplotlib
-        from sim.io.notebook import given_axes
+        from planner.jobs.coverage_picture import draw_field, draw_swath  # loads matplotlib
 
         ax = given_axes(ax)
         length = self.plan.robot.tail_length
         draw_swath(ax, self.plan.track, self.width, length)
         ax = self.plan.plot(ax)
-        for region in (self.field.outline, *self.field.holes):
-            draw_regions(ax, FreeSpace((region,)), length, filled=False)
+        draw_field(ax, self.field, length)
         return ax
 
     def to_dict(self) -> dict[str, Any]:

@@ -46,7 +46,7 @@ class Field:
 
 def across(field: Field, angle: float) -> float:
     """Compute the extent of a region across a direction."""
-    return float(np.ptp(_corners(field.outline) @ np.array([-np.sin(angle), np.cos(angle)])))
+    return float(np.ptp(corners(field.outline) @ np.array([-np.sin(angle), np.cos(angle)])))
 
 
 def lanes(field: Field, width: float, angle: float, *, apart: float) -> Floats:
@@ -60,8 +60,8 @@ def lanes(field: Field, width: float, angle: float, *, apart: float) -> Floats:
     """
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, s], [-s, c]])  # to the frame of the lanes
-    corners = _corners(field.outline) @ turn.T
-    low, high = corners.min(0), corners.max(0)
+    outline = corners(field.outline) @ turn.T
+    low, high = outline.min(0), outline.max(0)
     count = max(1, int(np.ceil((high[1] - low[1]) / width)))
     spacing = (high[1] - low[1]) / count
     step = width / 10
@@ -89,7 +89,8 @@ def share_covered(field: Field, track: Floats, width: float) -> float:
     return float((distance_to(track, points) <= width / 2).mean())
 
 
-def _corners(region: Region) -> Floats:
+def corners(region: Region) -> Floats:
+    """Return the corners (n, 2) of a region; those of a polygon of many sides for a circle."""
     if isinstance(region, Polygon):
         return region.corners
     assert isinstance(region, Circle)

@@ -16,7 +16,7 @@ from planner.goal.dubins import TURNS, DubinsPaths, words
 from planner.goal.lattice import RouteLimits
 from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.tractrix import Drift
-from planner.planning.declared_path import AS_DRAWN
+from planner.planning.feasible import AS_DRAWN
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats, Integers

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import PatchCollection
-from matplotlib.patches import Circle as Patch
-from matplotlib.patches import Polygon as Outline
 
 from planner.paths.obstacles import Circle, FreeSpace
 from sim.arrays import Floats
 from sim.io.units import format_length
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 RAW, DECLARED, PREDICTED, REPLAYED = "#b0b0b0", "#1a1a1a", "#2a7fba", "#c8452f"
-KEEP_OUT, SWATH = "#d8b365", "#d5ead6"
-_DISCS = 3_000  # of a swath
+KEEP_OUT = "#d8b365"
+_ROUND = 121  # points of a circle
 
 
 def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, tail_length: float) -> None:
@@ -47,29 +46,19 @@ def draw_prediction(axes: Axes, track: Floats, tail_length: float) -> None:
     axes.plot(*points[0], "o", color=DECLARED, ms=5)
 
 
-def draw_regions(axes: Axes, free_space: FreeSpace, tail_length: float, *, filled: bool = True) -> None:
-    """Draw regions, given in l, as areas or outlines, and walls as lines, on axes in cm; `tail_length`: l in m."""
+def draw_regions(axes: Axes, free_space: FreeSpace, tail_length: float) -> None:
+    """Draw obstacles, given in l, as areas, and walls as lines, on axes in cm; `tail_length` is l in m."""
     cm = 100 * tail_length
-    style: dict[str, Any] = (
-        {"facecolor": KEEP_OUT, "lw": 0} if filled else {"facecolor": "none", "edgecolor": DECLARED, "ls": "--"}
-    )
     for region in free_space.regions:
         if isinstance(region, Circle):
-            axes.add_patch(Patch((cm * region.x, cm * region.y), cm * region.radius, **style))
+            turn = np.linspace(0, 2 * np.pi, _ROUND)
+            x, y = region.x + region.radius * np.cos(turn), region.y + region.radius * np.sin(turn)
+            axes.fill(cm * x, cm * y, color=KEEP_OUT, lw=0)
         else:
-            axes.add_patch(Outline(cm * region.corners, **style))
+            axes.fill(*(cm * region.corners.T), color=KEEP_OUT, lw=0)
     if free_space.walls is not None:
         corners = cm * free_space.walls.corners
         axes.plot(*np.concatenate([corners, corners[:1]]).T, color=KEEP_OUT, lw=3)
-    axes.autoscale_view()
-
-
-def draw_swath(axes: Axes, track: Floats, width: float, tail_length: float) -> None:
-    """Draw what a round footprint covers along a track, both given in l, on axes in cm."""
-    cm = 100 * tail_length
-    every = max(1, len(track) // _DISCS)
-    discs = [Patch((x, y), cm * width / 2) for x, y in (cm * track[::every]).tolist()]
-    axes.add_collection(PatchCollection(discs, color=SWATH, lw=0))
 
 
 def _band(polyline: Floats, width: float) -> Floats:

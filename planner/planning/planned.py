@@ -9,9 +9,10 @@ from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planner.paths.path import Path2D
-from planner.paths.units import in_lab
+from planner.paths.units import in_lab, time_in_lab
 from planner.planning.declared_path import Declared
 from planner.planning.errors import FEEDBACK_EVERY, PlanErrors
 from planner.planning.kept_clear import KeptClear
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 GUARANTEE = "guaranteed_error_over_l"  # of plan.json; null where it is not known
+WIDE = 0.25  # turn radii; a predicted track that is further from the declared path gets a warning
 # Attributes of a plan by their old names, for one release.
 _MOVED = {
     "point": "tracked.point",
@@ -151,7 +153,18 @@ class Plan:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know, in words."""
-        return (*self.declared.warnings, *self.tracked.warnings)
+        return (*self.declared.warnings, *self._zigzag_warnings(), *self.tracked.warnings)
+
+    def _zigzag_warnings(self) -> tuple[str, ...]:
+        """Warn of a predicted track that is far from the declared path."""
+        if self.predicted_max <= WIDE * self.tracked.vehicle.turn_radius:
+            return ()
+        turn = math.degrees(self.minimum_dwell * self.tracked.vehicle.yaw_rate)
+        return (
+            f"the predicted track is up to {in_lab(self.predicted_max, self.robot)} from the declared path: in "
+            f"dwells of {time_in_lab(self.minimum_dwell, self.robot)} the robot turns by {turn:.0f} degrees; "
+            "shorter ones keep it nearer",
+        )
 
     def schedule(self, robot: Robot | None = None) -> Schedule:
         """Return the schedule for `sim.motion.replay`.
@@ -203,7 +216,7 @@ class Plan:
         Args:
             ax: default: axes of a new figure.
         """
-        from planner.planning.picture import draw_prediction, draw_regions, draw_tracks  # loads matplotlib
+        from planner.planning.picture import draw_prediction, draw_regions, draw_tracks
 
         ax = given_axes(ax)
         length = self.robot.tail_length
@@ -213,6 +226,24 @@ class Plan:
             draw_regions(ax, self.kept_clear.free_space, length)
         return ax
 
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return the columns of `to_frame`, each (M,)."""
+        start = np.concatenate([[0.0], np.cumsum(self.dwells)[:-1]])
+        x, y, heading = self.poses[:-1].T
+        cm = 100 * self.robot.tail_length
+        return {
+            "start_s": start * self.robot.time_scale,
+            "direction": self.first_direction * (-1) ** np.arange(len(self.dwells)),
+            "dwell_s": self.seconds,
+            "x_cm": x * cm,
+            "y_cm": y * cm,
+            "heading_deg": np.degrees(heading),
+            "dwell_bar": self.dwells,
+            "x_over_l": x,
+            "y_over_l": y,
+            "heading_rad": heading,
+        }
+
     def to_frame(self) -> pd.DataFrame:
         """Tabulate the dwells: start, direction of the motor, length, and predicted pose at the start; M rows.
 
@@ -220,23 +251,7 @@ class Plan:
         """
         import pandas as pd  # a plan is made without it
 
-        start = np.concatenate([[0.0], np.cumsum(self.dwells)[:-1]])
-        x, y, heading = self.poses[:-1].T
-        cm = 100 * self.robot.tail_length
-        frame = pd.DataFrame(
-            {
-                "start_s": start * self.robot.time_scale,
-                "direction": self.first_direction * (-1) ** np.arange(len(self.dwells)),
-                "dwell_s": self.seconds,
-                "x_cm": x * cm,
-                "y_cm": y * cm,
-                "heading_deg": np.degrees(heading),
-                "dwell_bar": self.dwells,
-                "x_over_l": x,
-                "y_over_l": y,
-                "heading_rad": heading,
-            }
-        )
+        frame = pd.DataFrame(self.columns())
         frame.attrs["units"] = column_units(frame)
         return frame
 

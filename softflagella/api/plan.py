@@ -21,6 +21,7 @@ from planner.jobs.tour_plan import TourPlan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.path_files import Drawing, read_path
+from planner.paths.units import hinting_at_units
 from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest, RequestOptions
@@ -54,8 +55,8 @@ def plan(
     """Plan the motor's switching times for a path.
 
     Args:
-        path: (n, 2) points or a Path2D, lengths in tail lengths l; or what `read_path` reads, or its file. Where
-            a file says its unit, its lengths are converted.
+        path: (n, 2) points or a Path2D, lengths in tail lengths l; or what `read_path` reads, or its file; or a
+            shape in words, such as "polygon:6:3". Where a file says its unit, its lengths are converted.
         robot: the robot, its robot.toml, or the name of a preset; its motor speed is used in both directions.
         lookup: trained table, or the table of this one robot. Default: the one that comes with the package. Where
             that one does not know the robot, the robot's own table is simulated, and kept beside its file.
@@ -93,13 +94,15 @@ def plan(
         (True, True)
     """
     swims, table, known = planned_robot(robot, lookup, knowledge)
-    drawn, request, space = _in_tails(path, swims), PlanRequest(**options), FreeSpace.of(keep_out, walls)
+    drawn, given_in = _in_tails(path, swims)
+    request, space = PlanRequest(**options), FreeSpace.of(keep_out, walls)
     tracked = tracked_vehicle(swims, table, request.point, known)
-    if space.empty:
-        return make_plan(drawn, tracked, request, progress)
-    from planner.jobs.clear_plan import plan_clear  # loads SciPy's graphs
+    with hinting_at_units(drawn, swims, tracked.vehicle.turn_radius, given_in):
+        if space.empty:
+            return make_plan(drawn, tracked, request, progress)
+        from planner.jobs.clear_plan import plan_clear  # loads SciPy's graphs
 
-    return plan_clear(drawn, tracked, request, space, feedback=feedback, progress=progress)
+        return plan_clear(drawn, tracked, request, space, feedback=feedback, progress=progress)
 
 
 def planned_robot(
@@ -112,12 +115,14 @@ def planned_robot(
     return swims, lookup or table_for(swims, source, known), known
 
 
-def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot) -> Path2D:
-    """Read a path where a file is given; convert one that has a unit to tail lengths."""
+def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot) -> tuple[Path2D, tuple[str, ...]]:
+    """Read a path where a file is given, and convert it to tail lengths; return the unit of bare numbers, too."""
     drawing = read_path(path) if isinstance(path, str | Path) else path
     if not isinstance(drawing, Drawing):
-        return drawing if isinstance(drawing, Path2D) else Path2D.of(drawing)
-    return drawing.path if drawing.unit is None else drawing.path.scaled(drawing.unit / robot.tail_length)
+        return drawing if isinstance(drawing, Path2D) else Path2D.of(drawing), ("l",)
+    if drawing.unit is None:
+        return drawing.path, ("l",)
+    return drawing.path.scaled(drawing.unit / robot.tail_length), ()
 
 
 def check(
