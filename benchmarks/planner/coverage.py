@@ -1,52 +1,58 @@
-"""How often a robot is as near to its path as the tracker says, with and without a current.
+"""Coverage of four regions: share and time as planned, and share in the simulator.
 
-Robots are drawn within the plan's uncertainty. They move as the planner's vehicle does.
+Usage: python -m benchmarks coverage [REPLAYED] [PICTURE]
 
-Usage: python -m benchmarks coverage [ROBOTS]
+The first REPLAYED plans are replayed.
 
-Takes 5 minutes.
+Takes 10 minutes.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
+import time
 
-import numpy as np
+from matplotlib.figure import Figure
 
-from benchmarks.parallel import in_parallel
-from benchmarks.planner.feedback import eight
-from planner.paths.path import circle
-from planner.planning.plan import plan
-from planner.planning.planned import Plan
-from planner.tracking.tracker import Tracker
+from planner.jobs.cover import cover
+from planner.jobs.region import Field, share_covered
+from planner.paths.obstacles import Circle, FreeSpace, Polygon
+from planner.planning.picture import REPLAYED
+from planner.planning.request import PlanRequest
+from planner.vehicle.tracked_point import tracked_vehicle
+from sim.io.files import whole_file
 from sim.model.presets import PRESETS
-from tests.planner.swimming import Camera, rms, swum
+from sim.motion.replay import replay
 
-CURRENTS = (0.0, 0.001, 0.002)  # l per time unit; the net speed is 0.016
-
-
-def covered(planned: Plan, seed: int, current: float) -> tuple[float, float, float]:
-    """Return the share of the time within the bound, the mean bound, and the error of one robot."""
-    rng, car = np.random.default_rng(seed), planned.tracked.vehicle
-    twist, lag, angle = car.twist.copy(), car.lag.copy(), rng.uniform(0, 2 * math.pi)
-    for mode, z in zip(car.modes, rng.standard_normal(len(car.modes)), strict=True):
-        twist += z * mode.twist
-        lag += z * mode.lag[:, None, None, :]
-    flow = current * np.array([math.cos(angle), math.sin(angle)])
-    truth = replace(car, twist=twist, lag=lag, current=flow)
-    camera = Camera(rng=rng, every=float(rng.choice([0.5, 1.0, 3.0])))
-    result = swum(Tracker(planned), planned, truth, camera)
-    return float((result.distance <= result.errors).mean()), float(result.errors.mean()), rms(result.distance)
+_BOX = Polygon.of([[0, 0], [4, 0], [4, 3], [0, 3]])
+_ROCK = Circle(2, 1.5, 0.3)
+_BENT = Polygon.of([[0.0, 0.0], [5.0, 0.0], [5.0, 1.5], [2.5, 2.0], [2.0, 4.0], [0.0, 3.5]])
+_WALLS = Polygon.of([[-2.5, -2.5], [6.5, -2.5], [6.5, 5.5], [-2.5, 5.5]])
+_CASES = (
+    ("rectangle", Field(_BOX), FreeSpace()),
+    ("rock and walls", Field(_BOX, (_ROCK,)), FreeSpace((_ROCK,), _WALLS)),
+    ("bent, with a hole", Field(_BENT, (Circle(1.5, 1.5, 0.5),)), FreeSpace()),
+    ("disc", Field(Circle(0, 0, 2)), FreeSpace()),
+)
+_WIDTH = 0.5  # l
 
 
-def main(robots: str = "10") -> None:
-    for name, path in (("circle of radius 2 l", circle(2.0)), ("eight of 12 l", eight(12.0))):
-        planned = plan(path, PRESETS["paper-control"])
-        for current in CURRENTS:
-            cases = [(planned, seed, current) for seed in range(int(robots))]
-            share, bound, error = np.array(in_parallel(covered, cases, quiet=True)).T
-            print(
-                f"{name:21}current {current:.3f}: within {share.mean():.1%} of the time "
-                f"({share.min():.1%} to {share.max():.1%}), bound {bound.mean():.4f}, error {error.mean():.4f} l"
-            )
+def main(replayed: str = "4", picture: str = "docs/coverage.png") -> None:
+    robot = PRESETS["paper-control"]
+    tracked = tracked_vehicle(robot, None, "head_centre", None)
+    figure = Figure(figsize=(4 * len(_CASES), 4), layout="constrained")
+    print(f"{'region':18}{'lanes':>6}{'share':>8}{'sure':>8}{'replayed':>10}{'time':>8}{'bound':>8}{'s':>6}")
+    for k, (axes, (name, field, space)) in enumerate(zip(figure.subplots(1, len(_CASES)), _CASES, strict=True)):
+        began = time.process_time()
+        swept = cover(field, _WIDTH, tracked, PlanRequest(), space)
+        spent = time.process_time() - began
+        swept.plot(axes)
+        found = ""
+        if k < int(replayed):
+            track = replay([swept.plan.schedule()])[0][["x_over_l", "y_over_l"]].to_numpy(float)
+            axes.plot(*(100 * robot.tail_length * track.T), color=REPLAYED, lw=0.6, label="replayed")
+            found = f"{share_covered(field, track, _WIDTH):.1%}"
+        print(f"{name:18}{len(swept.lanes):6d}{swept.share:8.1%}{swept.sure:8.1%}{found:>10}"
+              f"{swept.plan.duration:8.0f}{swept.bound:8.0f}{spent:6.1f}", flush=True)  # fmt: skip
+    with whole_file(picture) as part:
+        figure.savefig(part, format="png", dpi=110)
+    print(f"-> {picture}")
