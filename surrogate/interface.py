@@ -13,6 +13,7 @@ from typing import Protocol
 
 from sim.arrays import Floats
 from sim.model.response import Responses
+from surrogate.table.error_modes import ErrorModes
 
 
 class LookupTable(Protocol):
@@ -44,6 +45,17 @@ class LookupTable(Protocol):
 
         They are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`, `theta_deg` and
         `tail_gap`.
+
+        Raises:
+            InputError: a robot that cannot be, or one outside the domain.
+        """
+        ...
+
+    def error_modes(self, columns: Mapping[str, Floats]) -> ErrorModes:
+        """Return independent errors of the motion and the response of one robot.
+
+        Args:
+            columns: the robot by column name; its first row counts.
 
         Raises:
             InputError: a robot that cannot be, or one outside the domain.

@@ -32,10 +32,12 @@ from sim.model.response import DWELLS, LAGS, Responses, at_equal_dwells
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.networks.ensemble import Ensemble
+from surrogate.table.curve_errors import NORMAL_90, CurveErrors
+from surrogate.table.error_modes import STEADY, ErrorModes, error_modes, joined
 from surrogate.table.errors import RELATIVE, error_scale
 from surrogate.table.intervals import Intervals
 from surrogate.table.jacobian import slopes
-from surrogate.table.response_table import ResponseTable, between_dwells
+from surrogate.table.response_table import ResponseTable, between_dwells, curve_speeds
 from surrogate.table.support import Support
 from surrogate.table.tensor_file import digest, write
 from surrogate.table.wrench_table import WrenchTable, motion_sensitivity, network_index
@@ -83,6 +85,7 @@ class NeuralTable:
     ranges: dict[str, tuple[float, float]]  # of the robots that were learned, by input
     errors: dict[str, dict[str, float]]  # output -> held-out error, see `surrogate.table.errors`
     provenance: dict[str, Any]
+    curve_errors: CurveErrors | None = None  # of the response; None: only the sizes in `errors` are known
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
@@ -141,6 +144,20 @@ class NeuralTable:
         _check_flips(values)
         motions = self.motions(values, flag=flag)
         return self._responses(motions, steady_outputs(motions, self.tails))
+
+    def error_modes(self, columns: Mapping[str, Floats]) -> ErrorModes:
+        """Return the errors of motion and response at one robot; see `LookupTable.error_modes`."""
+        values = check_columns({name: np.asarray(values)[:1] for name, values in columns.items()})
+        motions = self.motions(values)
+        steady = steady_outputs(motions, self.tails)
+        motion = {name: float(values[0]) for name, values in steady.items()}
+        if self.intervals is None or self.curve_errors is None:
+            return error_modes(self.errors, motion)
+        ends = self._intervals(motions, steady)
+        sizes = [float(ends[f"{name}_high"][0] - ends[f"{name}_low"][0]) / (2 * NORMAL_90) for name in STEADY]
+        speeds = curve_speeds(motions.heads, motions.motion).numpy()
+        curves = self.curve_errors.modes(self.width_features(motions).numpy(), speeds, self.curves.bases)
+        return joined(np.diag(sizes), curves)
 
     def jacobian(
         self, columns: Mapping[str, Floats], parameters: Sequence[str], *, flag: bool = False
