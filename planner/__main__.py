@@ -32,6 +32,14 @@ _DWELLS = (
     argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
     argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
 )
+_OBSTACLES = (
+    argument("--keep-out", action="append", default=[], metavar="REGION",
+             help="circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; may be given again"),
+    argument("--walls", metavar="REGION", help="what the robot must stay within: box:…, or a CSV or SVG outline"),
+    argument("--feedback", action="store_true",
+             help="the pose will be measured every 20 flips: the margin around obstacles is the stated error with "
+             "feedback"),
+)  # fmt: skip
 _PLANNING = (
     argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE"),
     ROBOT,
@@ -52,6 +60,7 @@ _PLANNING = (
     argument("--objective", default="error", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: error)"),
     *_DWELLS,
+    *_OBSTACLES,
 )  # fmt: skip
 
 
@@ -99,6 +108,8 @@ def _say(result: Plan) -> None:
         for value in (result.predicted_rms, result.predicted_max, result.stated_error, result.feedback_error)
     )
     print(f"predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}")
+    for line in () if result.kept_clear is None else result.kept_clear.lines(robot):
+        print(line)
 
 
 @program.command(
@@ -110,22 +121,17 @@ def _say(result: Plan) -> None:
              help="of the head's centre at the start, at rest (default: 0 0 0)"),
     argument("--via", nargs=2, type=float, action="append", default=[], metavar=("X", "Y"),
              help="a place that the pivot passes; may be given again"),
-    argument("--keep-out", action="append", default=[], metavar="REGION",
-             help="circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; may be given again"),
-    argument("--walls", metavar="REGION", help="what the robot must stay within: box:…, or a CSV or SVG outline"),
+    *_OBSTACLES,
     argument("--unit", choices=("l", *UNITS), default="l", help="unit of all lengths (default: tail lengths)"),
     ROBOT,
     MODEL,
     argument("--objective", default="time", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: time)"),
-    argument("--feedback", action="store_true",
-             help="the pose will be measured every 20 flips: the margin is the stated error with feedback"),
     *_DWELLS,
     out("folder"),
 )  # fmt: skip
 def _goal(arguments: Namespace) -> None:
-    from planner.files.goal_files import read_region, write_goal_plan
-    from planner.goal.obstacles import Polygon
+    from planner.files.goal_files import read_free_space, write_goal_plan
     from planner.goal.to_goal import to_goal
     from planner.vehicle.calibration_table import read_knowledge
     from sim.inputs import load_robot
@@ -136,17 +142,15 @@ def _goal(arguments: Namespace) -> None:
         (scale * x, scale * y, math.radians(math.fmod(angle, 360)))
         for x, y, angle in (arguments.start, arguments.goal)
     )
-    walls = None if arguments.walls is None else read_region(arguments.walls, unit, robot)
-    if walls is not None and not isinstance(walls, Polygon):
-        raise InputError(f"--walls {arguments.walls!r}; give a box or an outline")
+    space = read_free_space(arguments.keep_out, arguments.walls, scale, robot)
     knowledge = read_knowledge(arguments.robot)
     goal_plan = to_goal(
         start,
         goal,
         robot,
         via=[(scale * x, scale * y) for x, y in arguments.via],
-        keep_out=[read_region(words, unit, robot) for words in arguments.keep_out],
-        walls=walls,
+        keep_out=space.regions,
+        walls=space.walls,
         lookup=_table(arguments, robot, knowledge),
         objective=arguments.objective,
         minimum_dwell=arguments.min_dwell,
@@ -199,7 +203,8 @@ def _track(arguments: Namespace) -> None:
 
 def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     """Make the plan that the command asks for, and return it with the request."""
-    from planner.planning.plan import make_plan
+    from planner.files.goal_files import read_free_space
+    from planner.jobs.clear_plan import plan_clear
     from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import read_knowledge
     from planner.vehicle.dwell_choice import dwells_for
@@ -208,7 +213,8 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     from sim.inputs import load_robot
 
     robot = load_robot(arguments.robot)
-    path, unit_known = _path(arguments, robot)
+    path, unit, unit_known = _path(arguments, robot)
+    space = read_free_space(arguments.keep_out, arguments.walls, unit, robot)
     print(f"path: {describe(path, robot)}")
     request = PlanRequest(
         point=arguments.point,
@@ -226,7 +232,8 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
         speed = zigzag(tracked.vehicle, dwell, tracked.offset).speed
         check_unstated_unit(path, robot, tracked.vehicle.turn_radius, speed)
     with _progress() as progress:
-        return make_plan(path, tracked, request, progress), request
+        result = plan_clear(path, tracked, request, space, feedback=arguments.feedback, progress=progress)
+    return result, request
 
 
 def _table(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge) -> LookupTable:
@@ -246,8 +253,8 @@ def _progress() -> Iterator[Callable[[float], object]]:
         yield lambda share: bar.update(100 * share - bar.n)
 
 
-def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, bool]:
-    """Make the path that the command asks for, in tail lengths, and say whether it has a unit."""
+def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, float, bool]:
+    """Make the path that the command asks for, in l; return the unit of its numbers, and whether it is known."""
     from planner.paths.path import circle, polygon, smoothed
     from planner.paths.path_files import Drawing, read_path
 
@@ -279,10 +286,10 @@ def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, bool]:
         raise InputError(f"--scale {arguments.scale}; give a number above 0")
     path = drawing.path.scaled(scale)
     if arguments.smooth is None:
-        return path, unit_known
+        return path, unit, unit_known
     smooth, moved = smoothed(path, arguments.smooth)
     print(f"smoothed over {in_lab(arguments.smooth, robot)}, which moves the path by up to {in_lab(moved, robot)}")
-    return smooth, unit_known
+    return smooth, unit, unit_known
 
 
 @program.command(

@@ -6,8 +6,8 @@ from calibration.verdict.verdict import Verdict as Verdict
 from planner.files.plan_json import load_plan as load_plan
 from planner.files.tracking_error import TrackingError as TrackingError
 from planner.goal.goal_plan import GoalPlan as GoalPlan
-from planner.goal.obstacles import Circle as Circle
 from planner.goal.to_goal import to_goal as to_goal
+from planner.paths.obstacles import Circle as Circle
 from planner.paths.path import Path2D as Path2D
 from planner.paths.path import circle as circle
 from planner.paths.path import polygon as polygon

@@ -21,7 +21,7 @@ ROOMS = {
     "dataset": ["rows", "storage", "report", "workers", "build", "__main__"],
     "surrogate": ["networks", "interface", "input_ranges", "loops", "wrench", "one_robot", "table", "training",
                   "export", "compile_loops", "__main__"],
-    "planner": ["paths", "vehicle", "planning", "goal", "tracking", "files", "__main__"],
+    "planner": ["paths", "vehicle", "planning", "goal", "jobs", "tracking", "files", "__main__"],
     "calibration": ["statistics", "attribution", "verdict", "swimmer", "report", "examples", "__main__"],
     "softflagella": ["shadowing", "api", "replanning", "demo_figures", "demo_files", "demo_page", "demo",
                      "__init__", "__main__"],

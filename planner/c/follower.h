@@ -2,6 +2,7 @@
 #define TRACKER_SIN sinf
 #define TRACKER_COS cosf
 #define TRACKER_ATAN atanf
+#define TRACKER_ATAN2 atan2f
 #define TRACKER_SQRT sqrtf
 #define TRACKER_FLOOR floorf
 #define TRACKER_FABS fabsf
@@ -9,6 +10,7 @@
 #define TRACKER_SIN sin
 #define TRACKER_COS cos
 #define TRACKER_ATAN atan
+#define TRACKER_ATAN2 atan2
 #define TRACKER_SQRT sqrt
 #define TRACKER_FLOOR floor
 #define TRACKER_FABS fabs
@@ -37,8 +39,8 @@ typedef struct {
     int kept, latest; /* dwells in past; index of the latest one */
     double now, flip_at;
     int ends, finished, rejected, scored, alarm;
-    tracker_real twist[2][3], lag_angle, current[2], slip[3]; /* the robot as it is learned */
-    tracker_real share, error, last_error, bias;
+    tracker_real twist[2][3], lag_angle, current[2], drift[3]; /* the robot as it is learned */
+    tracker_real share, error, last_error, bias, lean;
     int place, reached;
 } tracker;
 
@@ -152,9 +154,10 @@ static void tracker_apply(tracker *t)
     t->lag_angle = t->state[7];
     t->current[0] = tracker_current[0] + t->state[8];
     t->current[1] = tracker_current[1] + t->state[9];
-    t->slip[0] = tracker_sideways(t) / TRACKER_NET_SPEED;
-    t->slip[1] = t->state[8] / TRACKER_NET_SPEED;
-    t->slip[2] = t->state[9] / TRACKER_NET_SPEED;
+    tracker_real speed = TRACKER_NET_SPEED * (1 + t->state[5]);
+    t->drift[0] = (TRACKER_NET_DRIFT + tracker_sideways(t)) / speed;
+    t->drift[1] = t->current[0] / speed;
+    t->drift[2] = t->current[1] / speed;
 }
 
 /* ---- when to flip -------------------------------------------------------------------------------------------- */
@@ -170,7 +173,7 @@ static tracker_real tracker_step(int i, tracker_real *dx, tracker_real *dy)
 static tracker_real tracker_look(tracker *t, const tracker_real pose[3], int sense)
 {
     tracker_real c = TRACKER_COS(pose[2]), s = TRACKER_SIN(pose[2]);
-    tracker_real heading = pose[2] + TRACKER_ATAN(t->slip[0] - t->slip[1] * s + t->slip[2] * c);
+    tracker_real heading = pose[2] - t->lean;
     tracker_real x = pose[0] + TRACKER_OFFSET * c, y = pose[1] + TRACKER_OFFSET * s;
     tracker_real dx, dy, away_x, away_y, square, share;
     int i = t->place, came = 0;

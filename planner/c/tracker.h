@@ -13,19 +13,6 @@ static void tracker_plan_flip(tracker *t)
     if (t->flip_at < least) t->flip_at = least;
 }
 
-/* Adds the mean error of the last two dwells to the integral. */
-static void tracker_learn(tracker *t, int sense)
-{
-    tracker_real pose[3] = {t->state[0], t->state[1], t->state[2]}, way = 0, dx, dy;
-    tracker_look(t, pose, sense);
-    for (int i = t->reached; i < t->place; i++) way += TRACKER_SQRT(tracker_step(i, &dx, &dy));
-    for (int i = t->place; i < t->reached; i++) way -= TRACKER_SQRT(tracker_step(i, &dx, &dy));
-    t->reached = t->place;
-    t->bias += (t->error + t->last_error) * way / (4 * TRACKER_AHEAD * TRACKER_AHEAD);
-    t->bias = tracker_smaller(tracker_larger(t->bias, -TRACKER_MOST_BIAS), TRACKER_MOST_BIAS);
-    t->last_error = t->error;
-}
-
 static void tracker_flip(tracker *t)
 {
     tracker_dwell done = t->dwell;

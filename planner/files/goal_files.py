@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 from planner.files.plan_files import EXTRA, FILES, write_plan_files
 from planner.goal.goal_plan import GoalPlan
-from planner.goal.obstacles import Circle, Polygon, Region
+from planner.paths.obstacles import Circle, FreeSpace, Polygon, Region
 from planner.paths.path_files import read_path
-from planner.paths.units import in_tails
 from sim.io.errors import InputError, naming
 from sim.io.files import files_together, write_text
 from sim.model.robot import Robot
@@ -17,18 +17,17 @@ from sim.model.robot import Robot
 _SHAPES = {"circle": "circle:X,Y,RADIUS", "box": "box:LEFT,LOW,RIGHT,HIGH"}
 
 
-def read_region(words: str, unit: str, robot: Robot) -> Region:
+def read_region(words: str, scale: float, robot: Robot) -> Region:
     """Read a region, in tail lengths.
 
     Args:
         words: circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG with a closed outline.
-        unit: of the numbers: "l", "m", "cm" or "mm"; a drawing with physical units has its own.
+        scale: length of one unit of the numbers, in l; a drawing with physical units has its own.
         robot: its tail length.
 
     Raises:
         InputError: the words are no region.
     """
-    scale = in_tails(unit, robot)
     shape, _, numbers = words.partition(":")
     if shape in _SHAPES and numbers:
         try:
@@ -45,6 +44,18 @@ def read_region(words: str, unit: str, robot: Robot) -> Region:
     unit_length = scale if drawing.unit is None else drawing.unit / robot.tail_length
     with naming(words):
         return Polygon.of(drawing.path.scaled(unit_length))
+
+
+def read_free_space(keep_out: Sequence[str], walls: str | None, scale: float, robot: Robot) -> FreeSpace:
+    """Read what a robot must keep out of, and what it must stay within; see `read_region`.
+
+    Raises:
+        InputError: the words are no regions, or the walls are round.
+    """
+    outline = None if walls is None else read_region(walls, scale, robot)
+    if outline is not None and not isinstance(outline, Polygon):
+        raise InputError(f"--walls {walls!r}; give a box or an outline")
+    return FreeSpace(tuple(read_region(words, scale, robot) for words in keep_out), outline)
 
 
 def write_goal_plan(goal_plan: GoalPlan, folder: str | Path) -> list[Path]:

@@ -17,13 +17,13 @@ import numpy as np
 from planner.paths.path import arc_length
 from planner.planning import line_of_sight
 from planner.planning.planned import Plan
-from planner.tracking import kalman_filter, tracker
+from planner.tracking import guidance, kalman_filter, tracker
 from planner.tracking.kalman_filter import prior
 from planner.vehicle.vehicle import BEFORE_KNOTS, STEP
 from sim.arrays import Floats
 
 _CODE = Path(__file__).parents[1] / "c"
-_PARTS = ("follower.h", "estimate.h", "tracker.h")
+_PARTS = ("follower.h", "estimate.h", "guidance.h", "tracker.h")
 _PER_LINE = 12  # numbers of a table
 _LARGEST = 32_767
 _FLOAT_EXACT = 3e-6  # rad; in single precision a smaller angle is lost in the rounding
@@ -135,7 +135,9 @@ def _numbers(result: Plan) -> str:
         "SWING": result.guidance.swing,
         "SWING_ERROR": result.predicted_max,
         "PIVOT_RADIUS": result.tracked.vehicle.pivot_radius,
-        "NET_SPEED": result.straight.net_speed,
+        "NET_SPEED": float(result.straight.speed),
+        "NET_DRIFT": float(result.straight.drift),
+        "SHORTEST_ROD": guidance.SHORTEST_ROD,
         "LARGEST_STEP": line_of_sight.LARGEST_STEP,
         "TURNS": line_of_sight.TURNS,
         "MOST_BIAS": line_of_sight.MOST_BIAS,

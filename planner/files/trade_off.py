@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from matplotlib.figure import Figure
 
+from planner.jobs.clear_plan import plan_clear
+from planner.paths.obstacles import FreeSpace
 from planner.planning.picture import DECLARED, PREDICTED, RAW, REPLAYED
-from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.dwell_choice import QUICK, longest_dwell
@@ -38,9 +39,11 @@ def trade_off(chosen: Plan, request: PlanRequest) -> TradeOff:
         request: what it was made for.
     """
     tracked, plans = chosen.tracked, []
+    space = FreeSpace() if chosen.kept_clear is None else chosen.kept_clear.free_space
     for dwell in np.geomspace(QUICK, longest_dwell(tracked.vehicle, QUICK), _COUNT).tolist():
         try:
-            plans.append(make_plan(chosen.drawn, tracked, replace(request, dwell=dwell, tolerance=None)))
+            shorter = replace(request, dwell=dwell, tolerance=None)
+            plans.append(plan_clear(chosen.drawn, tracked, shorter, space))
         except InputError:  # such dwells do not get the robot around the path
             continue
     return TradeOff(tuple(plans), chosen)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from planner.goal.obstacles import Circle, Footprint, FreeSpace
+from planner.paths.obstacles import Footprint, FreeSpace
 from planner.paths.units import in_lab
 from planner.planning.planned import Plan
 from sim.io.deprecated import old_attributes
@@ -67,7 +67,8 @@ class GoalPlan:
         Args:
             ax: default: axes of a new figure.
         """
-        from planner.goal.picture import draw_places, draw_regions  # loads matplotlib
+        from planner.goal.picture import draw_places  # loads matplotlib
+        from planner.planning.picture import draw_regions
 
         ax = self.plan.plot(ax)
         length = self.plan.robot.tail_length
@@ -82,19 +83,12 @@ class GoalPlan:
     def to_dict(self) -> dict[str, Any]:
         """Return the content of goal.json: what was asked for, what is predicted. Lengths in l, angles in rad."""
         finite = self.clearance if self.clearance < float("inf") else None
-        walls = self.free_space.walls
         return {
             "format": FORMAT,
             "start": self.plan.start,
             "goal": self.goal,
             "via": self.via,
-            "keep_out": [
-                {"circle": [region.x, region.y, region.radius]}
-                if isinstance(region, Circle)
-                else {"polygon": region.corners.tolist()}
-                for region in self.free_space.regions
-            ],
-            "walls": None if walls is None else walls.corners.tolist(),
+            **self.free_space.to_dict(),
             "predicted_end": self.end,
             "end_error_over_l": self.end_error[0],
             "end_error_rad": self.end_error[1],

@@ -17,7 +17,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from planner.goal.dubins import DubinsPaths, shortest_paths
-from planner.goal.obstacles import Footprint, FreeSpace, Map
+from planner.paths.obstacles import Footprint, FreeSpace, Map
 from planner.paths.tractrix import Drift, slips
 from sim.arrays import Flags, Floats, Integers
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, words
 from planner.goal.lattice import Lattice, RouteLimits
-from planner.goal.obstacles import FreeSpace
+from planner.paths.obstacles import FreeSpace
 from sim.arrays import Floats
 from sim.io.errors import InputError
 
@@ -28,7 +28,7 @@ _PLACES = 40  # on a leg, between which shorter joints are sought
 _ENOUGH = 1.005  # a chain at most this much longer than the shortest one without obstacles needs no lattice
 _THIN = 3  # of the courses at a stop, every third one is joined to the lattice
 _MOST_CHECKS = 300  # chains of words
-_AROUND = 6.0  # radii that the lattice reaches beyond stops and obstacles
+AROUND = 6.0  # radii that the lattice reaches beyond stops and obstacles
 
 
 class NoWayError(InputError):
@@ -169,7 +169,7 @@ def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | 
             track = DubinsPaths(starts[came : came + 1], TURNS[word : word + 1], leg[came, at, word][None])
             chain.append((track, length, (came, at, word)))
             at = came
-        joined = _chain([track for track, _, _ in chain[::-1]], limits.radius)
+        joined = chained([track for track, _, _ in chain[::-1]], limits.radius)
         free = np.ones(len(chain), dtype=bool) if limits.space.empty else limits.free(joined.tracks, margin)[::-1]
         if free.all():
             return joined
@@ -179,14 +179,15 @@ def _chosen(stops: list[Floats], limits: RouteLimits, margin: float) -> Route | 
     return None
 
 
-def _chain(parts: list[DubinsPaths], radius: float) -> Route:
+def chained(parts: list[DubinsPaths], radius: float) -> Route:
+    """Join tracks, one after another."""
     return Route(DubinsPaths(*(np.concatenate([part[i] for part in parts]) for i in range(3))), radius)
 
 
 def _lattice(stops: list[Floats], limits: RouteLimits, spacing: float, courses: int) -> Lattice:
     """Make a lattice that reaches around all obstacles, or to the walls."""
     boxes = [*limits.space.boxes(), *(stop[:, :2] for stop in stops)]
-    reach = _AROUND * limits.radius + limits.body.reach
+    reach = AROUND * limits.radius + limits.body.reach
     low = np.min([box.min(0) for box in boxes], 0) - reach
     high = np.max([box.max(0) for box in boxes], 0) + reach
     if limits.space.walls is not None:
@@ -208,12 +209,12 @@ def _around(stops: list[Floats], lattice: Lattice, margin: float) -> Route | Non
     parts: list[DubinsPaths] = []
     for ways, stop in zip(reversed(chains), reversed(stops[:-1]), strict=True):
         leg = ways[at]
-        parts.insert(0, _shorter(shortest_paths(leg[:-1], leg[1:], limits.radius), lattice, margin))
+        parts.insert(0, shortened(shortest_paths(leg[:-1], leg[1:], limits.radius), lattice, margin))
         at = int(np.abs(stop - leg[0]).sum(1).argmin())
-    return _chain(parts, limits.radius)
+    return chained(parts, limits.radius)
 
 
-def _shorter(leg: DubinsPaths, lattice: Lattice, margin: float) -> DubinsPaths:
+def shortened(leg: DubinsPaths, lattice: Lattice, margin: float) -> DubinsPaths:
     """Shorten a leg by joints between places on it, where one is free and shorter than that part of the leg."""
     limits = lattice.limits
     for round_number in range(_ROUNDS):
@@ -241,7 +242,7 @@ def _shorter(leg: DubinsPaths, lattice: Lattice, margin: float) -> DubinsPaths:
             row = choice[k]
             parts.append(places.take(np.array([k - 1])) if row < 0 else tracks.take(np.array([row])))
             k = k - 1 if row < 0 else int(i[row])
-        leg = _chain(parts[::-1], limits.radius).tracks
+        leg = chained(parts[::-1], limits.radius).tracks
     return leg
 
 

@@ -21,10 +21,10 @@ from numpy.typing import ArrayLike
 from planner.goal.final_dwells import end_at_goal
 from planner.goal.goal_plan import GoalPlan, Pose
 from planner.goal.lattice import RouteLimits
-from planner.goal.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.goal.route import COURSES, Lattices, NoWayError, Route, route
+from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.path import Path2D
-from planner.paths.tractrix import Drift, Reference, slips
+from planner.paths.tractrix import Drift, Reference, slips, slips_at_heading
 from planner.paths.units import LONGEST, in_lab, time_in_lab
 from planner.planning.declared_path import Declared
 from planner.planning.errors import plan_errors
@@ -35,13 +35,11 @@ from planner.planning.schedule import Start, follow
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import Objective, check_least, dwells_for
 from planner.vehicle.from_table import OWN_TABLE
-from planner.vehicle.rollout import Switches, pose_changes
+from planner.vehicle.rollout import predicted_poses
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
-from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
 from sim.arrays import Floats
 from sim.io.errors import InputError
-from sim.mechanics import planar
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
 
@@ -108,10 +106,8 @@ def to_goal(
     )
     first, last = _pose(start, "start"), _pose(goal, "goal")
     places = tuple(_place(place) for place in via)
-    regions = tuple(shape if isinstance(shape, Circle | Polygon) else Polygon.of(shape) for shape in keep_out)
-    outline = walls if isinstance(walls, Polygon) or walls is None else Polygon.of(walls)
     tracked = tracked_vehicle(robot, lookup, "head_centre", knowledge)
-    task = _Task(tracked, first, last, places, FreeSpace(regions, outline), request, feedback)
+    task = _Task(tracked, first, last, places, FreeSpace.of(keep_out, walls), request, feedback)
     dwells = dwells_for(tracked.vehicle, objective, request.least_dwell(robot))
     refusal: InputError | None = None
     for dwell in (dwells[i] for i in np.unique(np.linspace(0, len(dwells) - 1, _DWELLS).astype(int))):
@@ -204,7 +200,7 @@ class _Task:
         """Return place and course of the pivot: its direction of motion while the robot has this heading."""
         x, y, heading = pose
         a = self.tracked.vehicle.pivot_distance
-        course = heading + float(_slip_at(np.array(heading), drift))
+        course = heading + float(slips_at_heading(np.array(heading), drift))
         return np.array([x - a * math.cos(heading), y - a * math.sin(heading), course])
 
     def _follow(self, track: Route, drift: Drift, straight: Zigzag, dwell: float, margin: float) -> GoalPlan:
@@ -225,7 +221,7 @@ class _Task:
         clearance = math.inf
         if not self.free_space.empty:
             body = Footprint.of(tracked.robot, 0.0)
-            clearance = float(body.clearance(_predicted_poses(vehicle, switches), self.free_space).min())
+            clearance = float(body.clearance(predicted_poses(vehicle, switches), self.free_space).min())
         end = (x, y, heading)
         return GoalPlan(plan, self.goal, end, self.via, self.free_space, track.length, margin, clearance)
 
@@ -245,20 +241,3 @@ class _Task:
         turning = np.flatnonzero(np.abs(turns) > 1e-9)
         sense = 1 if not len(turning) or turns[turning[0]] > 0 else -1
         return Declared(Reference(p, q, heading, arc, False), 0.0, 0.0, 0.0, ()), sense
-
-
-def _slip_at(heading: Floats, drift: Drift) -> Floats:
-    """Compute the angle from a heading to the direction of motion."""
-    course = heading
-    for _ in range(30):
-        course = heading + slips(course, drift)
-    return np.asarray(course - heading)
-
-
-def _predicted_poses(vehicle: Vehicle, switches: Switches) -> Floats:
-    """Predict poses (K, 3) of the head's centre, several a dwell."""
-    times = switches.dwells[:, None] * np.arange(0, 9) / 8
-    changes = pose_changes(vehicle, switches.first_direction, switches.dwells, times)
-    poses = planar.compose(switches.poses[:-1, None], changes)
-    poses[..., :2] += vehicle.current * times[..., None]
-    return np.asarray(poses.reshape(-1, 3))

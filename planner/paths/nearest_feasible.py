@@ -25,6 +25,7 @@ is linear in the length of the path. On a closed path the last pose is a neighbo
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +45,11 @@ _SHORTEST_STEP = 0.25  # of the steps, as a share of the spacing
 _POINTS_A_POSE = 4  # points of the path for each pose
 _ROUNDS = 12  # of growing weights
 _LEAST = 0.01  # share of the mean weight that every point keeps
+_HINDERED = (30.0, 30.0, 30.0, 100.0, 100.0, 300.0, 300.0, 1000.0)  # the same as _WEIGHTS, with a hindrance
+_BENDING = 1.0  # l a rad, that a turn counts where there is a hindrance: straighter ways are smoother
+_PINNED = 1e6  # weight of the ends of a part of a path
+
+Hindrance = Callable[[Floats], tuple[Floats, Floats]]
 
 
 def nearest_path(
@@ -80,6 +86,45 @@ def nearest_path(
         poses = _minimax(poses, task)
     if turn is not None:
         poses = _whole_lap(poses, turn)
+    points = tracked_points(poses, pivot_distance)
+    return Path2D.of(points[:-1] if raw.closed else points, closed=raw.closed)
+
+
+def nearest_poses(
+    poses: Floats,
+    target: Floats,
+    pivot_distance: float,
+    radius: float,
+    *,
+    drift: Drift = STILL,
+    shares: Floats,
+    hindrance: Hindrance,
+) -> Floats:
+    """Move poses (m, 3) of the pivot as near to points (m, 2) as the robot can follow and a hindrance allows.
+
+    The tracked point stays where it is at the first and at the last pose.
+
+    Args:
+        poses: x, y and heading, on the same side of every obstacle as the result.
+        target: where the tracked point should be.
+        pivot_distance: from the pivot to the tracked point; at least 0.
+        radius: smallest radius of the pivot's track.
+        drift: what carries the robot off its heading.
+        shares: (m,), how much the distance of each point counts.
+        hindrance: residuals (m, r) of poses, zero where they are allowed, and derivatives (m, r, 3).
+    """
+    shares = np.concatenate([[_PINNED], shares[1:-1], [_PINNED]])
+    spacing = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).mean())
+    task = _Task(
+        target, _sides(target, closed=False), shares, pivot_distance, radius, drift, spacing, 0.0, None, hindrance
+    )
+    for weight in _HINDERED:
+        poses = _descend(poses, task, weight)
+    return poses
+
+
+def tracked_points(poses: Floats, pivot_distance: float) -> Floats:
+    """Interpolate between poses (m, 3) of the pivot, and return the points (k, 2) of the tracked point."""
     at = np.arange(_POINTS_A_POSE * (len(poses) - 1) + 1) / _POINTS_A_POSE
     x, y, heading = (np.interp(at, np.arange(len(poses)), column) for column in poses.T)
     # Between two poses the pivot moves on an arc, which lies off its chord.
@@ -87,8 +132,7 @@ def nearest_path(
     chord = np.append(np.repeat(np.hypot(*np.diff(poses[:, :2], axis=0).T), _POINTS_A_POSE), 0.0)
     off = -turned * chord * (at % 1) * (1 - at % 1) / 2
     points = np.stack([x - off * np.sin(heading), y + off * np.cos(heading)], 1)
-    points += pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
-    return Path2D.of(points[:-1] if raw.closed else points, closed=raw.closed)
+    return points + pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
 
 
 def _start(target: Floats, pivot_distance: float, *, closed: bool) -> tuple[Floats, float | None]:
@@ -138,6 +182,7 @@ class _Task(NamedTuple):
     spacing: float  # of the target's points
     time_weight: float  # of the length of the pivot's track
     turn: float | None  # of the heading in a lap; None: an open path
+    hindrance: Hindrance | None = None  # what else the robot cannot do
 
 
 def _minimax(poses: Floats, task: _Task) -> Floats:
@@ -193,16 +238,20 @@ def _descend(poses: Floats, task: _Task, weight: float) -> Floats:
 
 
 def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Floats], Floats, Floats]:
-    """Compute residuals of poses (m, 2) and of steps (k, 5), and derivatives (m, 2, 3) and (k, 5, 6).
+    """Compute residuals of poses (m, r) and of steps (k, 5), and derivatives (m, r, 3) and (k, 5, 6).
 
     There are k = m − 1 steps on an open path, and m on a closed one.
     """
-    target, sides, shares, distance, radius, drift, spacing, time_weight, lap = task
+    target, sides, shares, distance, radius, drift, spacing, time_weight, lap, hindrance = task
     root = np.sqrt(shares)
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     sides = root[:, None, None] * sides
     pose_residual = np.einsum("kri,ki->kr", sides, poses[:, :2] + distance * np.stack([c, s], 1) - target)
     single = np.concatenate([sides, (sides @ (distance * np.stack([-s, c], 1))[..., None])], -1)
+    if hindrance is not None:
+        broken, slopes = hindrance(poses)
+        pose_residual = np.concatenate([pose_residual, weight * broken], 1)
+        single = np.concatenate([single, weight * slopes], 1)
     if lap is not None:
         poses = _whole_lap(poses, lap)
     move = np.diff(poses[:, :2], axis=0)
@@ -213,7 +262,8 @@ def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Fl
     cx, cy = drift.current
     way = 1 + cx * c + cy * s
     slip = (drift.sideways - cx * s + cy * c) / way
-    steps, pair = np.zeros((len(move), 5)), np.zeros((len(move), 5, 6))
+    kinds = 5 if hindrance is None else 6
+    steps, pair = np.zeros((len(move), kinds)), np.zeros((len(move), kinds, 6))
 
     def put(row: int, forward_part: Floats, sideways_part: Floats, turning: Floats) -> None:
         """Store a residual's derivatives by forward part, sideways part and turn of the step."""
@@ -223,7 +273,6 @@ def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Fl
         pair[:, row, 3], pair[:, row, 4], pair[:, row, 5] = dx, dy, swing + turning
 
     ones, zeros = np.ones(len(move)), np.zeros(len(move))
-    broken: Floats
     steps[:, 0] = weight * (aside - slip * forward)
     put(0, np.asarray(-weight * slip, dtype=np.float64), weight * ones, zeros)
     sense = np.sign(turn)
@@ -240,6 +289,9 @@ def _system(poses: Floats, task: _Task, weight: float) -> tuple[tuple[Floats, Fl
     length = np.maximum(forward, _SHORTEST_STEP * spacing)
     steps[:, 4] = np.sqrt(time_weight / spacing * length)
     put(4, np.asarray(steps[:, 4] / (2 * length) * (length == forward), dtype=np.float64), zeros, zeros)
+    if hindrance is not None:
+        steps[:, 5] = _BENDING * turn
+        put(5, zeros, zeros, _BENDING * ones)
     return (pose_residual, steps), single, pair
 
 

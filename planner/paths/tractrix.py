@@ -120,6 +120,14 @@ def slips(direction: Floats, drift: Drift) -> Floats:
     return slip
 
 
+def slips_at_heading(heading: Floats, drift: Drift) -> Floats:
+    """Compute the angles (...) from headings (...) to the direction of motion."""
+    course = heading
+    for _ in range(30):
+        course = heading + slips(course, drift)
+    return np.asarray(course - heading)
+
+
 def _ratio(heading: float, drift: Drift) -> float:
     """Compute the ratio of sideways to forward motion, (u + c·n)/(V + c·e)."""
     cx, cy = drift.current

@@ -62,21 +62,15 @@ class LineOfSight:
         self._lag = vehicle.lag.tolist()
         self._rest = vehicle.rest.tolist()
         self._current: list[float] = vehicle.current.tolist()
-        self._lag_angle, self._slip = 0.0, (0.0, 0.0, 0.0)
+        self._lag_angle = 0.0
+        self._lean = 0.0  # angle by which the reference is turned about the tracked point
         self.place = 0
         self.share = 0.0  # of the step at the place
         self._error = self._last_error = self._bias = self._reached = 0.0
 
-    def update_vehicle(
-        self, twist: list[list[float]], lag_angle: float, current: list[float], slip: tuple[float, float, float]
-    ) -> None:
-        """Update the vehicle: twists (2, 3), an offset added to all lag angles, and a current (2,).
-
-        `slip` is the drift that the reference does not account for, as shares of the net speed: to the left of the
-        heading, and along x and y. The robot then moves at an angle to its heading, so the reference's heading and
-        pivot are turned about the tracked point by that angle.
-        """
-        self._twist, self._lag_angle, self._current, self._slip = twist, lag_angle, current, slip
+    def update_vehicle(self, twist: list[list[float]], lag_angle: float, current: list[float]) -> None:
+        """Update the vehicle: twists (2, 3), an offset added to all lag angles, and a current (2,)."""
+        self._twist, self._lag_angle, self._current = twist, lag_angle, current
 
     def pose_after(
         self, pose: tuple[float, float, float], sense: int, before: float | None, time: float
@@ -132,8 +126,7 @@ class LineOfSight:
     def _excess(self, pose: tuple[float, float, float], sense: int) -> float:
         """Compute σ(φ − φ_d) − h, which is zero at a flip; move the place to the step nearest to the pivot."""
         c, s = math.cos(pose[2]), math.sin(pose[2])
-        aside, along_x, along_y = self._slip
-        heading = pose[2] + math.atan(aside - along_x * s + along_y * c)
+        heading = pose[2] - self._lean
         x, y = pose[0] + self._offset * c, pose[1] + self._offset * s  # tracked point
         x -= self._rod * math.cos(heading)
         y -= self._rod * math.sin(heading)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Circle as Patch
 
+from planner.paths.obstacles import Circle, FreeSpace
 from sim.arrays import Floats
 from sim.io.units import format_length
 
 RAW, DECLARED, PREDICTED, REPLAYED = "#b0b0b0", "#1a1a1a", "#2a7fba", "#c8452f"
+KEEP_OUT = "#d8b365"
 
 
 def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, tail_length: float) -> None:
@@ -37,6 +40,19 @@ def draw_prediction(axes: Axes, track: Floats, tail_length: float) -> None:
     points = 100 * tail_length * track
     axes.plot(*points.T, color=PREDICTED, lw=0.8, label="predicted")
     axes.plot(*points[0], "o", color=DECLARED, ms=5)
+
+
+def draw_regions(axes: Axes, free_space: FreeSpace, tail_length: float) -> None:
+    """Draw obstacles, given in l, as areas, and walls as lines, on axes in cm; `tail_length` is l in m."""
+    cm = 100 * tail_length
+    for region in free_space.regions:
+        if isinstance(region, Circle):
+            axes.add_patch(Patch((cm * region.x, cm * region.y), cm * region.radius, color=KEEP_OUT, lw=0))
+        else:
+            axes.fill(*(cm * region.corners.T), color=KEEP_OUT, lw=0)
+    if free_space.walls is not None:
+        corners = cm * free_space.walls.corners
+        axes.plot(*np.concatenate([corners, corners[:1]]).T, color=KEEP_OUT, lw=3)
 
 
 def _band(polyline: Floats, width: float) -> Floats:

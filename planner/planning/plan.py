@@ -16,7 +16,7 @@ path is reported from both sides.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Unpack
 
 import numpy as np
@@ -43,6 +43,8 @@ from sim.model.robot import Robot
 from surrogate.interface import LookupTable
 
 _DOMINATED = 1.2  # a stated error over the predicted one, below which nothing is gained by fewer flips
+# Plans from what declares the path, the drift, and what follows a declared path.
+Redirect = Callable[[Callable[[], Declared], Drift, Callable[[Declared], Plan]], Plan]
 
 
 def plan(
@@ -80,9 +82,21 @@ def plan(
 
 
 def make_plan(
-    drawn: Path2D, tracked: TrackedVehicle, request: PlanRequest, progress: Callable[[float], object] | None = None
+    drawn: Path2D,
+    tracked: TrackedVehicle,
+    request: PlanRequest,
+    progress: Callable[[float], object] | None = None,
+    redirect: Redirect | None = None,
 ) -> Plan:
-    """Plan for a path, a vehicle and a request; see `plan`."""
+    """Plan for a path, a vehicle and a request; see `plan`.
+
+    Args:
+        drawn: the path as drawn.
+        tracked: the vehicle and its tracked point.
+        request: corners, dwells, tolerance.
+        progress: called now and then with the share of the path that is done.
+        redirect: plans for another path than the nearest one that can be followed.
+    """
     vehicle = tracked.vehicle
     check_size(drawn, tracked.robot, vehicle.turn_radius)
     least = request.least_dwell(tracked.robot)
@@ -98,12 +112,18 @@ def make_plan(
 
     def with_dwell(dwell: float) -> Plan:
         straight = zigzag(vehicle, dwell, tracked.offset)
-        declared = declared_path(zigzag_drift(tracked, straight, dwell))
-        guidance = choose_guidance(vehicle, declared, straight, dwell)
-        switches = follow(declared.reference, vehicle, guidance, tracked.offset, progress=progress)
-        bound = guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
-        errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed)
-        return Plan(tracked, request.objective, drawn, declared, straight, guidance, switches, errors)
+        drift = zigzag_drift(tracked, straight, dwell)
+
+        def follow_declared(declared: Declared) -> Plan:
+            guidance = choose_guidance(vehicle, declared, straight, dwell)
+            switches = follow(declared.reference, vehicle, guidance, tracked.offset, progress=progress)
+            bound = guaranteed(vehicle, tracked.rod, straight.swing, guidance.ahead)
+            errors = plan_errors(tracked, drawn, declared, switches, guaranteed=bound, seed=request.seed)
+            return Plan(tracked, request.objective, drawn, declared, straight, guidance, switches, errors)
+
+        if redirect is not None:
+            return redirect(partial(declared_path, drift), drift, follow_declared)
+        return follow_declared(declared_path(drift))
 
     first = with_dwell(dwells[0])
     if request.dwell is None and request.objective == "error":

@@ -14,6 +14,7 @@ from planner.paths.path import Path2D
 from planner.paths.units import in_lab
 from planner.planning.declared_path import Declared
 from planner.planning.errors import FEEDBACK_EVERY, PlanErrors
+from planner.planning.kept_clear import KeptClear
 from planner.planning.line_of_sight import Guidance
 from planner.vehicle.dwell_choice import Objective
 from planner.vehicle.rollout import Switches
@@ -74,6 +75,7 @@ class Plan:
     guidance: Guidance  # when the motor flips
     switches: Switches  # the schedule
     errors: PlanErrors  # how far from the paths it leads
+    kept_clear: KeptClear | None = None  # walls and regions that it avoids; None: there are none
 
     @property
     def robot(self) -> Robot:
@@ -186,6 +188,8 @@ class Plan:
             f"  start at x = {x * cm:.4g} cm, y = {y * cm:.4g} cm, heading {math.degrees(heading):.1f} degrees, "
             f"motor {self.first_direction:+d}",
         ]
+        if self.kept_clear is not None:
+            lines += [f"  {line}" for line in self.kept_clear.lines(robot)]
         if self.warnings:
             lines.append(f"  {len(self.warnings)} warnings, the first: {self.warnings[0][:200]}")
         return "\n".join(lines)
@@ -199,12 +203,14 @@ class Plan:
         Args:
             ax: default: axes of a new figure.
         """
-        from planner.planning.picture import draw_prediction, draw_tracks  # loads matplotlib
+        from planner.planning.picture import draw_prediction, draw_regions, draw_tracks  # loads matplotlib
 
         ax = given_axes(ax)
         length = self.robot.tail_length
         draw_tracks(ax, self.drawn.polyline(), self.reference, self.stated_error, length)
         draw_prediction(ax, self.track, length)
+        if self.kept_clear is not None:
+            draw_regions(ax, self.kept_clear.free_space, length)
         return ax
 
     def to_frame(self) -> pd.DataFrame:
@@ -281,6 +287,7 @@ class Plan:
             "closure_over_l": self.errors.closure,
             "model": self.tracked.model,
             "warnings": list(self.warnings),
+            **({} if self.kept_clear is None else {"kept_clear": self.kept_clear.to_dict()}),
         }
 
     if not TYPE_CHECKING:

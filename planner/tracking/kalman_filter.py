@@ -20,8 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.planning.line_of_sight import LineOfSight, arc_terms
+from planner.planning.line_of_sight import arc_terms
 from planner.planning.planned import Plan
+from planner.tracking.guidance import LearnedDrift, TrackerGuidance
 from planner.vehicle.vehicle import interpolated
 
 POSE = tuple[float, float, float]
@@ -54,10 +55,10 @@ class Estimate:
         noise: standard deviations of a pose: of x and y [l], of the heading [rad].
     """
 
-    def __init__(self, plan: Plan, law: LineOfSight, noise: tuple[float, float]):
+    def __init__(self, plan: Plan, law: TrackerGuidance, noise: tuple[float, float]):
         self._twist: ROWS = plan.tracked.vehicle.twist.tolist()
         self._current: list[float] = plan.tracked.vehicle.current.tolist()
-        self._speed = plan.straight.net_speed
+        self._speed, self._drift = float(plan.straight.speed), float(plan.straight.drift)
         self._law = law
         self._noise = (noise[0] ** 2, noise[0] ** 2, noise[1] ** 2)
         self._most = most(plan)
@@ -71,12 +72,11 @@ class Estimate:
     def apply(self) -> None:
         """Let the guidance law use the learned robot."""
         state = self.state
-        self._law.update_vehicle(
-            [self._learned(0), self._learned(1)],
-            state[7],
-            [self._current[0] + state[8], self._current[1] + state[9]],
-            (self._sideways() / self._speed, state[8] / self._speed, state[9] / self._speed),
-        )
+        current_x, current_y = self._current[0] + state[8], self._current[1] + state[9]
+        self._law.update_vehicle([self._learned(0), self._learned(1)], state[7], [current_x, current_y])
+        speed = self._speed * (1 + state[5])
+        sideways = self._drift + self._sideways()
+        self._law.update_drift(LearnedDrift(sideways / speed, current_x / speed, current_y / speed))
 
     def advance(self, dwell: Dwell) -> None:
         """Advance to the flip at the end of a dwell."""

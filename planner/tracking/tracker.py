@@ -29,8 +29,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from scipy.stats import chi2
 
 from planner.paths.units import in_lab
-from planner.planning.line_of_sight import LineOfSight
 from planner.planning.planned import Plan
+from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate
 from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
@@ -90,8 +90,7 @@ class Tracker:
     ):
         self.shortest = plan.minimum_dwell
         self._plan = plan
-        tracked = plan.tracked
-        self._law = LineOfSight(plan.declared.reference, tracked.vehicle, plan.guidance, tracked.offset)
+        self._law = TrackerGuidance(plan)
         self._estimate = Estimate(plan, self._law, noise)
         self._latency = latency
         self._swing_error = plan.predicted_max

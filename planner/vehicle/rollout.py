@@ -42,6 +42,15 @@ def trace(vehicle: Vehicle, switches: Switches, offset: float, *, samples: int =
     return planar.compose(poses, np.array([offset, 0.0, 0.0]))[:, :2]
 
 
+def predicted_poses(vehicle: Vehicle, switches: Switches) -> Floats:
+    """Predict poses (K, 3) of the head's centre, several a dwell."""
+    times = switches.dwells[:, None] * np.arange(0, 9) / 8
+    changes = pose_changes(vehicle, switches.first_direction, switches.dwells, times)
+    poses = planar.compose(switches.poses[:-1, None], changes)
+    poses[..., :2] += vehicle.current * times[..., None]
+    return np.asarray(poses.reshape(-1, 3))
+
+
 def pose_changes(vehicle: Vehicle, first_direction: int, dwells: Floats, times: Floats) -> Floats:
     """Predict the pose changes (M, K, 3) of each dwell after times (M, K), from rest."""
     before = np.concatenate([dwells[:1], dwells[:-1]])[:, None] + np.zeros_like(times)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -15,12 +15,14 @@ from planner.files.plan_files import write_plan as write_plan_files
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import TrackingError, tracking_error
 from planner.goal.goal_plan import GoalPlan
+from planner.jobs.clear_plan import plan_clear
+from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.path_files import Drawing, read_path
-from planner.planning.plan import plan as plan_path
 from planner.planning.planned import Plan
-from planner.planning.request import RequestOptions
+from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
+from planner.vehicle.tracked_point import tracked_vehicle
 from sim.io.errors import InputError, naming
 from sim.io.tables import read_table
 from sim.model.robot import Robot
@@ -38,6 +40,9 @@ def plan(
     lookup: LookupTable | None = None,
     knowledge: CalibrationKnowledge | None = None,
     progress: Callable[[float], object] | None = None,
+    keep_out: Sequence[Circle | Path2D | ArrayLike] = (),
+    walls: Path2D | ArrayLike | None = None,
+    feedback: bool = False,
     **options: Unpack[RequestOptions],
 ) -> Plan:
     """Plan the motor's switching times for a path.
@@ -50,6 +55,11 @@ def plan(
             that one does not know the robot, the robot's own table is simulated, and kept beside its file.
         knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
         progress: called now and then with the share of the path that is done.
+        keep_out: circles, and polygons as (n, 2) corners [l], that the robot's body must not touch. Where they
+            stand on the path, a way around is chosen; `Plan.kept_clear` has it.
+        walls: a polygon (n, 2) that the body must not leave.
+        feedback: the pose will be measured every 20 flips, so the margin around obstacles is the stated error with
+            feedback.
         options: any of
 
             - point: which point must follow the path: "head_centre" (default), "head_tip" or "pivot".
@@ -67,8 +77,8 @@ def plan(
             - seed: of the random robots from which the stated error is computed.
 
     Raises:
-        InputError: the path is bad or too tight, the dwell too short, the tolerance too small, or the robot
-            cannot be simulated.
+        InputError: the path is bad or too tight, the dwell too short, the tolerance too small, there is no way
+            around an obstacle, or the robot cannot be simulated.
 
     Example:
         >>> import softflagella as sf
@@ -80,14 +90,16 @@ def plan(
     source = None if isinstance(robot, Robot) else str(robot)
     known = knowledge or (CalibrationKnowledge() if source is None else read_knowledge(source))
     table = lookup or table_for(swims, source, known)
-    return plan_path(_in_tails(path, swims), swims, lookup=table, knowledge=known, progress=progress, **options)
+    drawn, request, space = _in_tails(path, swims), PlanRequest(**options), FreeSpace.of(keep_out, walls)
+    tracked = tracked_vehicle(swims, table, request.point, known)
+    return plan_clear(drawn, tracked, request, space, feedback=feedback, progress=progress)
 
 
-def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot) -> Path2D | ArrayLike:
+def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot) -> Path2D:
     """Read a path where a file is given; convert one that has a unit to tail lengths."""
     drawing = read_path(path) if isinstance(path, str | Path) else path
     if not isinstance(drawing, Drawing):
-        return drawing
+        return drawing if isinstance(drawing, Path2D) else Path2D.of(drawing)
     return drawing.path if drawing.unit is None else drawing.path.scaled(drawing.unit / robot.tail_length)
 
 

@@ -21,7 +21,7 @@ from tests.planner.compiled import compile_c
 from tests.processes import LIMIT
 
 RUN = ("sh", "python")
-LONG = {"tutorial/calibration.md", "tutorial/schedule.md", "howto/cluster.md", "howto/goal.md"}
+LONG = {"tutorial/calibration.md", "tutorial/schedule.md", "howto/cluster.md", "howto/goal.md", "howto/jobs.md"}
 SHOWN = {*RUN, "toml", "text", "c", "js"}
 
 

@@ -32,6 +32,7 @@ from planner.files.goal_files import read_region
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import tracking_error
 from planner.paths.path_files import read_path
+from planner.paths.units import in_tails
 from planner.vehicle.calibration_table import read_knowledge
 from sim.inputs import check_columns, load_robot
 from sim.io.errors import InputError, naming
@@ -271,7 +272,7 @@ FORMATS: dict[str, FileFormat] = {
     "drawing": FileFormat(file("path.svg", lambda: SVG), _read_path, SVG_TOKENS),
     "region": FileFormat(
         file("region.csv", lambda: text({"x": [0, 1, 1, 0], "y": [0, 0, 1, 1]})),
-        lambda path: read_region(str(path), "cm", ROBOT), TABLE,
+        lambda path: read_region(str(path), in_tails("cm", ROBOT), ROBOT), TABLE,
     ),
     "plan": FileFormat(file("plan.json", plan_file), _read_plan, JSON),
     "replayed track": FileFormat(file("track.csv", replayed, plan_json=plan_file), _read_track, TABLE),

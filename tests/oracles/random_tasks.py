@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from planner.goal.goal_plan import GoalPlan
-from planner.goal.obstacles import Circle, Footprint, Polygon
+from planner.paths.obstacles import Circle, Footprint, Polygon
 from sim.motion.replay import replay
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,57 +25,122 @@ class Tracks(Protocol):
 
 @dataclass
 class Camera:
-    """Standard deviations of poses [l, rad], time between poses, delay, and shares of gaps and of wrong poses."""
+    """What a camera does to the true poses.
+
+    Standard deviations of poses [l, rad], time between poses, delay, shares of gaps and of wrong poses, the place
+    of the marker in the robot (forward, left), and what another robot does that is taken for this one.
+    """
 
     noise: tuple[float, float] = (0.01, 0.01)
     every: float = 1.0
     delay: float = 0.0
     gaps: float = 0.0
     wrong: float = 0.0
+    marker: tuple[float, float] = (0.0, 0.0)
+    other: Callable[[float], Any] | None = None  # pose of another robot at a time
+    swapped: Callable[[float], bool] = lambda time: False  # whether it is taken for this one
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
 
-    def sees(self, pose: np.ndarray) -> Any:
+    def sees(self, pose: np.ndarray, when: float) -> Any:
         if self.rng.random() < self.gaps:
             return None
         if self.rng.random() < self.wrong:
             return (float(self.rng.normal(0, 5)), float(self.rng.normal(0, 5)), float(self.rng.uniform(-3, 3)))
+        if self.other is not None and self.swapped(when):
+            pose = self.other(when)
+        pose = planar.compose(pose, np.array([*self.marker, 0.0]))
         x, y, heading = (pose + self.rng.normal(size=3) * [self.noise[0], self.noise[0], self.noise[1]]).tolist()
         return x, y, (heading + np.pi) % (2 * np.pi) - np.pi
 
 
-def _moved(car: Vehicle, pose: np.ndarray, sense: int, before: float | None, start: float, time: float) -> Any:
-    moved = planar.compose(pose, car.motion(sense, before, time - start))
-    return moved + np.append(car.current * (time - start), 0.0)
+@dataclass(frozen=True)
+class Swum:
+    """Where the robot was at many instants, what was ordered, and what the tracker said."""
+
+    times: np.ndarray  # (K,)
+    poses: np.ndarray  # (K, 3) of the head's centre
+    distance: np.ndarray  # (K,) of the tracked point from the declared path
+    errors: np.ndarray  # (K,) the last bound that the tracker gave before
+    dwells: list[float]
+    alarms: list[float]  # when an alarm began
+    finished: bool
+
+
+class _Swimmer:
+    """A vehicle under a tracker's orders, and what is kept of its motion."""
+
+    def __init__(self, tracker: Tracks, truth: Vehicle, start: Any):
+        self.tracker, self.car, self.pose = tracker, truth, np.array(start)
+        self.before: float | None = None  # length of the last dwell
+        self.began = self.kept = 0.0
+        self.command = tracker.update(0.0)
+        self.dwells: list[float] = []
+        self.alarms: list[float] = []
+        self.times: list[float] = []
+        self.poses: list[np.ndarray] = []
+        self.errors: list[float] = []
+
+    def at(self, time: float) -> np.ndarray:
+        """Return the pose at a time of the present dwell."""
+        time -= self.began
+        pose = planar.compose(self.pose, self.car.motion(self.command.direction, self.before, time))
+        return np.asarray(pose + np.append(self.car.current * time, 0.0))
+
+    def update(self, now: float, *seen: Any) -> None:
+        """Tell the tracker the time, and a pose if there is one."""
+        self.keep(now)
+        alarm, self.command = self.command.alarm, self.tracker.update(now, *seen)
+        self.alarms += [now] if self.command.alarm and not alarm else []
+
+    def keep(self, until: float) -> None:
+        """Keep some instants up to a time, with the bound that holds there."""
+        for share in (0.25, 0.5, 0.75, 1.0) if until > self.kept else ():
+            self.times.append(self.kept + share * (until - self.kept))
+            self.poses.append(self.at(self.times[-1]))
+            self.errors.append(self.command.error)
+        self.kept = max(self.kept, until)
+
+    def flip(self) -> None:
+        """Carry out the announced flip."""
+        now = self.command.flip_at
+        pose, dwell = self.at(now), now - self.began
+        self.dwells.append(dwell)
+        self.update(now)
+        self.pose, self.before, self.began = pose, dwell, now
+
+
+def swum(tracker: Tracks, plan: Plan, truth: Vehicle, camera: Camera, *, changes_to: Vehicle | None = None,
+         start: Any = None, most: int = 5000) -> Swum:  # fmt: skip
+    """Swim from `start`, by default the plan's, and return all that can be told of it."""
+    swimmer = _Swimmer(tracker, truth, plan.start if start is None else start)
+    seen, waiting = 0.0, []
+    half = len(plan.dwells) // 2
+    while not swimmer.command.finished and len(swimmer.dwells) < most:
+        if changes_to is not None and len(swimmer.dwells) > half:
+            swimmer.car = changes_to
+        look, arrival = seen + camera.every, waiting[0][0] if waiting else np.inf
+        if arrival <= min(swimmer.command.flip_at, look):
+            swimmer.update(*waiting.pop(0))
+        elif look <= swimmer.command.flip_at:
+            seen = look
+            measured = camera.sees(swimmer.at(seen), seen)
+            if measured is not None:
+                waiting.append((seen + camera.delay, measured, seen))
+                waiting.sort(key=lambda item: item[0])
+        else:
+            swimmer.flip()
+    poses = np.array(swimmer.poses)
+    followed = planar.compose(poses, np.array([plan.tracked.offset, 0.0, 0.0]))
+    distance, errors = distance_to(plan.reference, followed[:, :2]), np.array(swimmer.errors)
+    finished = swimmer.command.finished
+    return Swum(np.array(swimmer.times), poses, distance, errors, swimmer.dwells, swimmer.alarms, finished)
 
 
 def swim(tracker: Tracks, plan: Plan, truth: Vehicle, camera: Camera, *, changes_to: Vehicle | None = None,
          most: int = 5000) -> tuple[np.ndarray, list[float]]:  # fmt: skip
     """Swim; return distances from the declared path at many instants, and the dwells that were ordered."""
-    pose, last_dwell, start, seen, waiting = np.array(plan.start), None, 0.0, 0.0, []
-    command, dwells, track = tracker.update(0.0), [], []
-    half = len(plan.dwells) // 2
-    while not command.finished and len(dwells) < most:
-        sense, known = command.direction, command.flip_at
-        car = changes_to if changes_to is not None and len(dwells) > half else truth
-
-        at = partial(_moved, car, pose, sense, last_dwell, start)
-        while seen + camera.every <= known or (waiting and waiting[0][0] <= known):
-            if waiting and waiting[0][0] <= min(known, seen + camera.every):
-                when, measured, taken_at = waiting.pop(0)
-                command = tracker.update(when, measured, taken_at)
-            else:
-                seen += camera.every
-                measured = camera.sees(at(seen))
-                if measured is not None:
-                    waiting.append((seen + camera.delay, measured, seen))
-                    waiting.sort(key=lambda item: item[0])
-            known = command.flip_at
-        track += [at(start + share * (known - start)) for share in np.linspace(0.2, 1, 5)]
-        dwells.append(known - start)
-        pose, last_dwell, start = at(known), known - start, known
-        command = tracker.update(known)
-    followed = planar.compose(np.array(track), np.array([plan.tracked.offset, 0.0, 0.0]))
-    return distance_to(plan.reference, followed[:, :2]), dwells
+    result = swum(tracker, plan, truth, camera, changes_to=changes_to, most=most)
+    return result.distance, result.dwells
 
 
 def rms(distance: np.ndarray) -> float:

@@ -7,8 +7,8 @@ import pytest
 
 from planner.goal.dubins import words
 from planner.goal.lattice import RouteLimits
-from planner.goal.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.goal.route import COURSES, NoWayError, route
+from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.tractrix import STILL
 from sim.arrays import Floats
 

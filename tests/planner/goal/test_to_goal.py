@@ -12,9 +12,9 @@ import pytest
 
 from planner.files.plan_json import load_plan
 from planner.goal.goal_plan import GoalPlan
-from planner.goal.obstacles import Circle, Polygon
 from planner.goal.route import NoWayError
 from planner.goal.to_goal import to_goal
+from planner.paths.obstacles import Circle, Polygon
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.rollout import Switches, poses_at_flips
 from sim.io.errors import InputError

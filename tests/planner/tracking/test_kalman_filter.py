@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from planner.paths.path import circle
-from planner.planning.line_of_sight import LineOfSight
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
+from planner.tracking.guidance import TrackerGuidance
 from planner.tracking.kalman_filter import MOST, STATES, Dwell, Estimate
 from sim.mechanics import planar
 from sim.model.presets import PRESETS
@@ -27,9 +27,7 @@ def planned() -> Plan:
 
 @pytest.fixture
 def estimate(planned: Plan) -> Estimate:
-    tracked = planned.tracked
-    law = LineOfSight(planned.declared.reference, tracked.vehicle, planned.guidance, tracked.offset)
-    found = Estimate(planned, law, (0.01, 0.01))
+    found = Estimate(planned, TrackerGuidance(planned), (0.01, 0.01))
     found.state = list(STATE)
     return found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planner.goal.obstacles import Circle, FreeSpace, Polygon
+from planner.paths.obstacles import Circle, FreeSpace, Polygon
 from sim.io.errors import InputError
 
 

@@ -7,7 +7,9 @@ distance of any disc from any region, negative inside. Lengths in l.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -106,6 +108,15 @@ class FreeSpace:
     regions: tuple[Region, ...] = ()  # that the body must not touch
     walls: Polygon | None = None  # that it must stay within; None: there are none
 
+    @staticmethod
+    def of(
+        keep_out: Sequence[Circle | Polygon | Path2D | ArrayLike] = (),
+        walls: Polygon | Path2D | ArrayLike | None = None,
+    ) -> FreeSpace:
+        """Make free space from regions and walls; polygons may be given as points (n, 2)."""
+        regions = tuple(shape if isinstance(shape, Circle | Polygon) else Polygon.of(shape) for shape in keep_out)
+        return FreeSpace(regions, walls if isinstance(walls, Polygon) or walls is None else Polygon.of(walls))
+
     @property
     def empty(self) -> bool:
         return not self.regions and self.walls is None
@@ -122,6 +133,18 @@ class FreeSpace:
     def boxes(self) -> list[Floats]:
         """List the corners (2, 2) of the boxes around the regions and walls."""
         return [region.box for region in (*self.regions, *([self.walls] if self.walls else []))]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content for a JSON file: `keep_out` and `walls`, in l."""
+        return {
+            "keep_out": [
+                {"circle": [region.x, region.y, region.radius]}
+                if isinstance(region, Circle)
+                else {"polygon": region.corners.tolist()}
+                for region in self.regions
+            ],
+            "walls": None if self.walls is None else self.walls.corners.tolist(),
+        }
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,335 @@
+"""Ways around obstacles that stand on a declared path.
+
+A stretch of the path is blocked where the robot's body would come nearer than the margin to what it must keep
+clear of. A way around leaves the path before the stretch and joins it again behind. Among the places where it may
+leave and join, and among all ways of the lattice between them (`planner.goal.lattice`), it makes
+
+    length of the way + length of the path that is not followed
+
+smallest: it neither leaves the path early nor goes far from it. The way is then shortened by direct joints, and
+moved as near to the path as the body's margin and the robot's turns allow (`planner.paths.nearest_feasible`). Its
+turns are wider than the robot's narrowest one, as those of a path that is followed as drawn. Lengths in l.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.goal.dubins import shortest_paths
+from planner.goal.lattice import Lattice, RouteLimits
+from planner.goal.route import AROUND, LEVELS, Route, shortened
+from planner.jobs.hindered import Hindered
+from planner.jobs.pivot_track import pivot_reference
+from planner.paths.distance import nearest
+from planner.paths.nearest_feasible import nearest_poses, tracked_points
+from planner.paths.obstacles import Footprint, FreeSpace
+from planner.paths.path import Path2D, arc_length
+from planner.paths.tractrix import Drift, Reference, slips_at_heading
+from planner.paths.tractrix import reference as follow_path
+from planner.paths.units import in_lab, place_in_lab
+from planner.planning.declared_path import AS_DRAWN, TIGHTEST
+from planner.planning.kept_clear import Detour
+from planner.vehicle.tracked_point import TrackedVehicle
+from sim.arrays import Flags, Floats
+from sim.io.errors import InputError
+
+_REACH = 6.0  # radii before and behind a blocked stretch, within which a way around leaves and joins
+_STEP = 0.35  # radii between two such places
+_SPACING = 0.02  # of the points of a way around
+_POSES = 0.2  # radii between the poses that are moved towards the path
+_SLACKS = (0.01, 0.03, 0.06)  # beyond the margin: the moved poses touch it, and what is between them crosses it
+_BLOCKED = 0.05  # share that distances from a blocked stretch count: it cannot be kept near
+_BESIDE = 3.0  # radii of the path before and behind a way around that may move, too
+_OFF = 0.02  # from the path: farther points belong to a way around
+_FAR = 0.05  # that it reaches at least
+_APART = 1.0  # between two ways around
+
+
+class BlockedError(InputError):
+    """There is no way around what stands on the path; `hopeless`: not even without a margin."""
+
+    hopeless = False
+
+
+class Stretch(NamedTuple):
+    """A blocked part of a reference, and the parts where a way around may leave and join; indices."""
+
+    leave_from: int
+    first: int  # blocked
+    last: int  # blocked
+    join_until: int
+
+
+class Way(NamedTuple):
+    """A way around: the points of the reference where it leaves and joins, and the part between."""
+
+    leave: int
+    join: int
+    part: Reference
+
+
+class Detours:
+    """Finds ways around, and remembers the lattices that it made.
+
+    Args:
+        tracked: the vehicle and its tracked point.
+        space: walls and regions.
+        drift: what carries the robot off its heading.
+    """
+
+    def __init__(self, tracked: TrackedVehicle, space: FreeSpace, drift: Drift):
+        body = Footprint.of(tracked.robot, -tracked.vehicle.pivot_distance)
+        self.tracked, self.drift = tracked, drift
+        self.limits = RouteLimits(tracked.vehicle.pivot_radius / AS_DRAWN, body, space, drift)
+        self._lattices: dict[tuple[float, ...], Lattice] = {}
+
+    def clearance(self, reference: Reference) -> Floats:
+        """Compute the distance (m,) of the body from what is not free, at the points of a reference."""
+        return self.limits.body.clearance(_poses(reference), self.limits.space)
+
+    def around(self, reference: Reference, margin: float) -> tuple[Reference, tuple[Detour, ...]]:
+        """Replace the blocked stretches of a reference by ways around.
+
+        Raises:
+            BlockedError: there is no way around, or the path begins or ends where it is blocked.
+        """
+        blocked = self.clearance(reference) < margin
+        if not blocked.any():
+            return reference, ()
+        if reference.closed:
+            reference = _turned(reference, blocked)
+            blocked = self.clearance(reference) < margin
+        stretches = _stretches(blocked, reference.arc, self.limits.radius)
+        self._check_ends(reference, stretches, margin)
+        ways = [self._way(reference, stretch, margin) for stretch in stretches]
+        for slack in _SLACKS:
+            changed = self._nearest(reference, ways, stretches, margin + slack)
+            too_sharp = np.abs(changed.curvature).max() * self.tracked.vehicle.pivot_radius > TIGHTEST
+            if not too_sharp and self.clearance(changed).min() >= margin:
+                break
+        else:
+            changed = _with_ways(reference, ways)
+        return changed, _compared(reference, changed)
+
+    def _nearest(
+        self, reference: Reference, ways: list[Way], stretches: list[Stretch], margin: float
+    ) -> Reference:
+        """Move ways around as near to the path as possible."""
+        rod, done = max(self.tracked.rod, 0.0), 0
+        parts: list[Floats] = []
+        for way, stretch in zip(ways, stretches, strict=True):
+            beside = _BESIDE * self.limits.radius
+            first = max(stretch.leave_from, int(np.searchsorted(reference.arc, reference.arc[way.leave] - beside)))
+            last = min(stretch.join_until, int(np.searchsorted(reference.arc, reference.arc[way.join] + beside)))
+            rows = (slice(first, way.leave), slice(way.join + 1, last + 1))
+            q, heading = (
+                np.concatenate([getattr(reference, name)[rows[0]], getattr(way.part, name),
+                                getattr(reference, name)[rows[1]]])
+                for name in ("q", "heading")
+            )  # fmt: skip
+            heading = np.unwrap(heading)
+            progress = np.concatenate(
+                [
+                    reference.arc[rows[0]],
+                    np.interp(way.part.arc, way.part.arc[[0, -1]], reference.arc[[way.leave, way.join]]),
+                    reference.arc[rows[1]],
+                ]
+            )
+            arc = arc_length(q)
+            at = np.linspace(0, arc[-1], max(3, math.ceil(arc[-1] / (_POSES * self.limits.radius)) + 1))
+            x, y, angle, place = (np.interp(at, arc, values) for values in (*q.T, heading, progress))
+            target = np.stack([np.interp(place, reference.arc, reference.p[:, i]) for i in (0, 1)], 1)
+            inside = (place > reference.arc[stretch.first]) & (place < reference.arc[stretch.last])
+            shares = np.where(inside, _BLOCKED, 1.0)
+            poses = nearest_poses(
+                np.stack([x, y, angle], 1), target, rod, self.limits.radius, drift=self.drift, shares=shares,
+                hindrance=Hindered(self.limits.body, self.limits.space, margin, angle[[0, -1]]),
+            )  # fmt: skip
+            parts += [reference.p[done:first], tracked_points(poses, rod)]
+            done = last + 1
+        points = np.concatenate([*parts, reference.p[done:]])
+        path = Path2D.of(points, closed=reference.closed)
+        return follow_path(path, rod, _SPACING, self.drift)
+
+    def _check_ends(self, reference: Reference, stretches: list[Stretch], margin: float) -> None:
+        for index, at, name in ((0, 0, "begins"), (-1, len(reference.q) - 1, "ends")):
+            if at in (stretches[index].first, stretches[index].last):
+                room = float(self.clearance(_cut(reference, at, at + 1))[0])
+                robot = self.tracked.robot
+                place, free = place_in_lab(*_place(reference.p[at]), robot), in_lab(max(room, 0.0), robot)
+                raise BlockedError(
+                    f"the path {name} at {place}, where the robot has {free} around it; it needs "
+                    f"{in_lab(margin, robot)}, the stated error"
+                )
+
+    def _way(self, reference: Reference, stretch: Stretch, margin: float) -> Way:
+        """Find a way around one stretch.
+
+        Raises:
+            BlockedError: there is none.
+        """
+        leaves = _places(reference.arc, stretch.first - 1, stretch.leave_from, _STEP * self.limits.radius)
+        joins = _places(reference.arc, stretch.last + 1, stretch.join_until, _STEP * self.limits.radius)
+        starts, ends = (self._courses(_poses(reference)[rows]) for rows in (leaves, joins))
+        before = reference.arc[stretch.first] - reference.arc[leaves]
+        behind = reference.arc[joins] - reference.arc[stretch.last]
+        near = np.concatenate([starts, ends, self._courses(_poses(reference)[stretch.first : stretch.last + 1])])
+        tried: list[Lattice] = []
+        for whole in (False, True):
+            for spacing, courses in LEVELS:
+                lattice = self._lattice(near, spacing, courses, margin, whole=whole)
+                if lattice in tried:
+                    continue
+                tried.append(lattice)
+                costs, ways = lattice.ways(starts, before, ends, margin)
+                if np.isfinite(costs).any():
+                    best = int((costs + behind).argmin())
+                    poses = ways[best]
+                    leave = int(leaves[np.abs(starts - poses[0]).sum(1).argmin()])
+                    tracks = shortest_paths(poses[:-1], poses[1:], self.limits.radius)
+                    route = Route(shortened(tracks, lattice, margin), self.limits.radius)
+                    part = pivot_reference(
+                        route.poses(_SPACING), self.tracked.rod, self.drift, float(reference.heading[leave])
+                    )
+                    return Way(leave, int(joins[best]), part)
+        robot = self.tracked.robot
+        first, last = (place_in_lab(*_place(reference.p[i]), robot) for i in (stretch.first, stretch.last))
+        raise BlockedError(
+            f"the path is blocked from {first} to {last}, and there is no way around that leaves "
+            f"{in_lab(margin, robot)}, the stated error, around the robot and turns with a radius of "
+            f"{in_lab(self.limits.radius, robot)}"
+        )
+
+    def _lattice(self, near: Floats, spacing: float, courses: int, margin: float, *, whole: bool) -> Lattice:
+        """Make a lattice around poses (k, 3) and the regions that block them, or around everything."""
+        space, limits = self.limits.space, self.limits
+        boxes = [near[:, :2]]
+        for region in space.regions:
+            part = FreeSpace((region,))
+            if whole or (limits.clearance(near, part) < margin).any():
+                boxes.append(region.box)
+        reach = AROUND * limits.radius + limits.body.reach
+        low = np.min([box.min(0) for box in boxes], 0) - reach
+        high = np.max([box.max(0) for box in boxes], 0) + reach
+        if space.walls is not None:
+            low, high = np.maximum(low, space.walls.box[0]), np.minimum(high, space.walls.box[1])
+        # Rounded outward, so that a slightly larger margin finds the lattice again.
+        low, high = np.floor(low / limits.radius) * limits.radius, np.ceil(high / limits.radius) * limits.radius
+        key = (*low.tolist(), *high.tolist(), spacing)
+        if key not in self._lattices:
+            self._lattices[key] = Lattice(limits, low, high, spacing * limits.radius, courses)
+        return self._lattices[key]
+
+    def _courses(self, poses: Floats) -> Floats:
+        """Turn headings into courses: the directions of the pivot's motion."""
+        course = poses[:, 2] + slips_at_heading(poses[:, 2], self.drift)
+        return np.stack([poses[:, 0], poses[:, 1], course], 1)
+
+
+def _poses(reference: Reference) -> Floats:
+    return np.concatenate([reference.q, reference.heading[:, None]], 1)
+
+
+def _place(point: Floats) -> tuple[float, float]:
+    x, y = point.tolist()
+    return x, y
+
+
+def _turned(reference: Reference, blocked: Flags) -> Reference:
+    """Begin a closed reference in the middle of its longest clear stretch.
+
+    Raises:
+        BlockedError: it is blocked everywhere.
+    """
+    count = len(reference.q) - 1
+    at = np.flatnonzero(blocked[:count])
+    gaps = np.diff(np.append(at, at[0] + count))
+    longest = int(gaps.argmax())
+    if gaps[longest] < 2:
+        raise BlockedError("the path is blocked everywhere; draw it elsewhere")
+    begin = (int(at[longest]) + int(gaps[longest]) // 2) % count
+    order = np.concatenate([np.arange(begin, count), np.arange(begin + 1)])
+    lap = reference.heading[-1] - reference.heading[0]
+    heading = reference.heading[order] + np.where(np.arange(count + 1) < count - begin, 0.0, lap)
+    q = reference.q[order]
+    return Reference(reference.p[order], q, heading, arc_length(q), True)
+
+
+def _stretches(blocked: Flags, arc: Floats, radius: float) -> list[Stretch]:
+    """Find blocked stretches; those that are near one another are one."""
+    runs: list[tuple[int, int]] = []
+    for first, last in _runs(blocked):
+        if runs and arc[first] - arc[runs[-1][1]] < 2 * radius:
+            runs[-1] = (runs[-1][0], last)
+        else:
+            runs.append((first, last))
+    stretches = []
+    for k, (first, last) in enumerate(runs):
+        middle_before = 0 if k == 0 else _halfway(arc, runs[k - 1][1], first)
+        middle_behind = len(arc) - 1 if k == len(runs) - 1 else _halfway(arc, last, runs[k + 1][0]) - 1
+        leave_from = max(middle_before, int(np.searchsorted(arc, arc[first] - _REACH * radius)))
+        join_until = min(middle_behind, int(np.searchsorted(arc, arc[last] + _REACH * radius)))
+        stretches.append(Stretch(leave_from, first, last, join_until))
+    return stretches
+
+
+def _halfway(arc: Floats, first: int, last: int) -> int:
+    return int(np.searchsorted(arc, (arc[first] + arc[last]) / 2))
+
+
+def _places(arc: Floats, near: int, far: int, step: float) -> Floats:
+    """Choose indices between two ones, about `step` of arc length apart."""
+    count = max(1, math.ceil(abs(float(arc[far] - arc[near])) / step)) + 1
+    rows = np.searchsorted(arc, np.linspace(arc[near], arc[far], count))
+    return np.unique(np.clip(rows, min(near, far), max(near, far)))
+
+
+def _cut(reference: Reference, first: int, end: int) -> Reference:
+    """Return the points first, …, end − 1 of a reference."""
+    part = slice(first, end)
+    return Reference(reference.p[part], reference.q[part], reference.heading[part], reference.arc[part], False)
+
+
+def _with_ways(reference: Reference, ways: list[Way]) -> Reference:
+    """Replace parts of a reference by ways around."""
+    parts, done, turned = [], 0, 0.0
+    for way in ways:
+        before, part = _cut(reference, done, way.leave), way.part
+        parts += [replace(before, heading=before.heading + turned), replace(part, heading=part.heading + turned)]
+        turned += 2 * math.pi * round((part.heading[-1] - reference.heading[way.join]) / (2 * math.pi))
+        done = way.join + 1
+    rest = _cut(reference, done, len(reference.q))
+    parts.append(replace(rest, heading=rest.heading + turned))
+    p, q, heading = (np.concatenate([getattr(part, name) for part in parts]) for name in ("p", "q", "heading"))
+    return Reference(p, q, heading, arc_length(q), reference.closed)
+
+
+def _compared(reference: Reference, changed: Reference) -> tuple[Detour, ...]:
+    """List the parts of a changed reference that are off the original one."""
+    distance, segment, _ = nearest(reference.p, changed.p)
+    arc = arc_length(changed.p)
+    runs: list[tuple[int, int]] = []
+    for first, last in _runs(distance > _OFF):
+        if runs and arc[first] - arc[runs[-1][1]] < _APART:
+            runs[-1] = (runs[-1][0], last)
+        else:
+            runs.append((first, last))
+    detours = []
+    for first, last in runs:
+        a, b = max(first - 1, 0), min(last + 1, len(arc) - 1)
+        farthest = float(distance[a : b + 1].max())
+        if farthest > _FAR:
+            replaced = float(arc_length(reference.p[segment[a] : segment[b] + 1])[-1])
+            places = _place(changed.p[a]), _place(changed.p[b])
+            detours.append(Detour(*places, float(arc[b] - arc[a]), replaced, farthest))
+    return tuple(detours)
+
+
+def _runs(flags: Flags) -> list[tuple[int, int]]:
+    """List first and last index of each run of true flags."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True))

@@ -1,0 +1,61 @@
+"""The tracker's guidance: its reference changes with the drift that the tracker learns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from planner.paths.path import Path2D
+from planner.planning.plan import plan
+from planner.planning.planned import Plan
+from planner.tracking.guidance import LearnedDrift, TrackerGuidance
+from planner.tracking.tracker import Tracker
+from planner.vehicle.calibration_table import CalibrationKnowledge
+from sim.model.presets import PRESETS
+from tests.planner.swimming import Camera, rms, swim
+
+ROBOT = PRESETS["paper-control"]
+CURRENT = (0.0, 0.0015)  # l per time unit, a tenth of the net speed
+
+
+@cache
+def eight(current: tuple[float, float] = (0.0, 0.0)) -> Plan:
+    t = np.linspace(0, 2 * math.pi, 401)[:-1]
+    path = Path2D.of(np.stack([2.05 * np.sin(t), 1.13 * np.sin(2 * t)], 1), closed=True)
+    x, y = (value * ROBOT.tail_length / ROBOT.time_scale for value in current)
+    return plan(path, ROBOT, minimum_dwell=0.7, knowledge=CalibrationKnowledge(current=(x, y)))
+
+
+def test_a_learned_current_is_used() -> None:
+    """It was learned to 1 %, yet the error stayed at three times that of a plan that knows it."""
+    truth = replace(eight().tracked.vehicle, current=np.array(CURRENT))
+    learning, _ = swim(Tracker(eight()), eight(), truth, Camera())
+    knowing, _ = swim(Tracker(eight(CURRENT)), eight(CURRENT), truth, Camera())
+    half = len(learning) // 2
+    assert rms(knowing) < 0.015
+    assert rms(learning[half:]) < 1.2 * rms(knowing)
+    assert rms(learning) < 1.5 * rms(knowing)
+
+
+def test_a_drift_that_the_plan_knows_does_not_turn_the_reference() -> None:
+    planned = eight(CURRENT)
+    guidance = TrackerGuidance(planned)
+    for place in (50, 200, 350):
+        guidance.place = place
+        guidance.integrate(planned.start, 1)
+    assert guidance._lean == pytest.approx(0.0, abs=1e-15)
+
+
+def test_on_a_straight_line_the_reference_turns_against_the_slip() -> None:
+    """The other side: the robot heads into the current by the angle at which the two velocities add up."""
+    share = np.linspace(0, 1, 100)
+    line = plan(np.stack([12 * share, 0 * share], 1), ROBOT, minimum_dwell=0.7)
+    guidance = TrackerGuidance(line)
+    guidance.update_drift(LearnedDrift(0.0, 0.0, 0.2))
+    for x in np.linspace(0, 11, 300):
+        guidance.integrate((float(x), 0.0, 0.0), 1)
+    assert math.sin(-guidance._lean) == pytest.approx(0.2, rel=1e-3)
