@@ -155,9 +155,10 @@ class NeuralTable:
             return error_modes(self.errors, motion)
         ends = self._intervals(motions, steady)
         sizes = [float(ends[f"{name}_high"][0] - ends[f"{name}_low"][0]) / (2 * NORMAL_90) for name in STEADY]
-        speeds = curve_speeds(motions.heads, motions.motion).numpy()
-        curves = self.curve_errors.modes(self.width_features(motions).numpy(), speeds, self.curves.bases)
-        return joined(np.diag(sizes), curves)
+        speeds = curve_speeds(motions.heads, torch.as_tensor(motions.motion)).numpy()
+        curves = self.curve_errors.modes(self.width_features(motions).numpy(), speeds)
+        own = [self.curve_errors.simulator * float(error_scale(name, motion)) for name in STEADY]
+        return joined(np.diag(np.hypot(sizes, own)), curves)
 
     def jacobian(
         self, columns: Mapping[str, Floats], parameters: Sequence[str], *, flag: bool = False
