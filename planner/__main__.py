@@ -32,6 +32,11 @@ _DWELLS = (
     argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
     argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
 )
+_TABLE = (
+    MODEL,
+    argument("--own-table", action="store_true",
+             help="simulate a look-up table of this robot, once; it is more accurate on long paths"),
+)  # fmt: skip
 _OBSTACLES = (
     argument("--keep-out", action="append", default=[], metavar="REGION",
              help="circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; may be given again"),
@@ -43,7 +48,7 @@ _OBSTACLES = (
 _PLANNING = (
     argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE"),
     ROBOT,
-    MODEL,
+    *_TABLE,
     argument("--unit", choices=("l", *UNITS), help="unit of the path's numbers (default: tail lengths)"),
     argument("--scale", type=float, default=1.0, help="multiply the path's coordinates"),
     argument("--shape", help="which path of an SVG with several"),
@@ -124,7 +129,7 @@ def _say(result: Plan) -> None:
     *_OBSTACLES,
     argument("--unit", choices=("l", *UNITS), default="l", help="unit of all lengths (default: tail lengths)"),
     ROBOT,
-    MODEL,
+    *_TABLE,
     argument("--objective", default="time", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: time)"),
     *_DWELLS,
@@ -241,7 +246,9 @@ def _table(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge) 
     from planner.files.own_table import table_for
     from surrogate.table.model_file import load_table
 
-    return load_table(arguments.model) if arguments.model else table_for(robot, arguments.robot, knowledge)
+    return load_table(arguments.model) if arguments.model else table_for(
+        robot, arguments.robot, knowledge, own=arguments.own_table
+    )
 
 
 @contextmanager

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 GUARANTEE = "guaranteed_error_over_l"  # of plan.json; null where it is not known
 # Attributes of a plan by their old names, for one release.
+_DOMINATED = 1.7  # a stated error over the predicted one: the errors of the table are the larger part
 _MOVED = {
     "point": "tracked.point",
     "offset": "tracked.offset",
@@ -151,7 +152,17 @@ class Plan:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know, in words."""
-        return (*self.declared.warnings, *self.tracked.warnings)
+        return (*self.declared.warnings, *self.tracked.warnings, *self._of_the_table)
+
+    @property
+    def _of_the_table(self) -> tuple[str, ...]:
+        """Propose the robot's own table where the errors of the look-up table decide the stated error."""
+        if self.tracked.own_table or self.stated_error < _DOMINATED * self.predicted_max:
+            return ()
+        return (
+            f"the stated error is mostly that of the look-up table, over {len(self.dwells)} flips: simulate this "
+            "robot's own table (--own-table, own_table=True), or measure poses on the way",
+        )
 
     def schedule(self, robot: Robot | None = None) -> Schedule:
         """Return the schedule for `sim.motion.replay`.

@@ -38,6 +38,7 @@ def plan(
     robot: OneRobot,
     *,
     lookup: LookupTable | None = None,
+    own_table: bool = False,
     knowledge: CalibrationKnowledge | None = None,
     progress: Callable[[float], object] | None = None,
     keep_out: Sequence[Circle | Path2D | ArrayLike] = (),
@@ -53,6 +54,8 @@ def plan(
         robot: the robot, its robot.toml, or the name of a preset; its motor speed is used in both directions.
         lookup: trained table, or the table of this one robot. Default: the one that comes with the package. Where
             that one does not know the robot, the robot's own table is simulated, and kept beside its file.
+        own_table: simulate the robot's own table in any case. For long paths it is the better model, since the
+            errors of a table add up over the flips.
         knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
         progress: called now and then with the share of the path that is done.
         keep_out: circles, and polygons as (n, 2) corners [l], that the robot's body must not touch. Where they
@@ -89,7 +92,7 @@ def plan(
     swims = one_robot(robot)
     source = None if isinstance(robot, Robot) else str(robot)
     known = knowledge or (CalibrationKnowledge() if source is None else read_knowledge(source))
-    table = lookup or table_for(swims, source, known)
+    table = lookup or table_for(swims, source, known, own=own_table)
     drawn, request, space = _in_tails(path, swims), PlanRequest(**options), FreeSpace.of(keep_out, walls)
     tracked = tracked_vehicle(swims, table, request.point, known)
     return plan_clear(drawn, tracked, request, space, feedback=feedback, progress=progress)
