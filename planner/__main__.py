@@ -78,10 +78,13 @@ _PLANNING = (
 )
 def _plan(arguments: Namespace) -> None:
     from planner.files.plan_files import write_plan
-    from planner.files.trade_off import draw_trade_off, trade_off
 
     result, request = _planned(arguments)
-    pictures = {"trade_off.svg": draw_trade_off(trade_off(result, request))} if arguments.trade_off else {}
+    pictures = {}
+    if arguments.trade_off:
+        from planner.files.trade_off import draw_trade_off, trade_off
+
+        pictures["trade_off.svg"] = draw_trade_off(trade_off(result, request))
     paths = write_plan(result, arguments.out, pictures=pictures)
     _say(result)
     robot, errors = result.robot, result.errors
@@ -246,8 +249,10 @@ def _table(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge) 
     from planner.files.own_table import table_for
     from surrogate.table.model_file import load_table
 
-    return load_table(arguments.model) if arguments.model else table_for(
-        robot, arguments.robot, knowledge, own=arguments.own_table
+    return (
+        load_table(arguments.model)
+        if arguments.model
+        else table_for(robot, arguments.robot, knowledge, own=arguments.own_table)
     )
 
 

@@ -15,7 +15,7 @@ def compile_all() -> float:
     Returns:
         The time that it took, in seconds.
     """
-    stages = (("look-up table", lambda: load().query(draw_robots(16, 0, wide=False), flag=True)),)
+    stages = (("look-up table", lambda: load().query(draw_robots(16, 0, wide=False), intervals=True, flag=True)),)
     seconds = run_stages("surrogate", stages, FOLDER)
     mark_all_compiled(FOLDER)
     return seconds

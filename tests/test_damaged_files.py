@@ -14,8 +14,8 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import numpy as np
 import pytest
-import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -190,8 +190,8 @@ FORGED = [
     ("table of one robot, sealed", _set("steady.other", 3.0)),
     ("table of one robot, sealed", _set("lag.0.0.0", 1e308)),
     ("model, sealed", _set("support.2.factor", True)),
-    ("model, sealed", _set("support.2.shift", torch.zeros(3, dtype=torch.float64))),
-    ("model, sealed", _set("intervals.middle", torch.zeros(1, dtype=torch.float64))),
+    ("model, sealed", _set("support.2.shift", np.zeros(3))),
+    ("model, sealed", _set("intervals.middle", np.zeros(1))),
     ("model, sealed", _set("errors.v_x.rms", "x")),
     ("model, sealed", _set("ranges.N", [float("nan"), float("nan")])),
 ]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-import torch
+from threadpoolctl import threadpool_limits
 
 from planner.goal.goal_plan import GoalPlan
 from planner.goal.route import NoWayError
@@ -32,7 +32,7 @@ def planned(case: Callable[[np.random.Generator], dict[str, Any]], seeds: range,
         seeds: of the generators, one for each case.
         heads: of the columns that the caller prints.
     """
-    torch.set_num_threads(1)
+    threadpool_limits(1)
     robot, lookup = PRESETS["paper-control"], load()
     print(f" seed{heads}")
     for seed in seeds:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import torch
+from threadpoolctl import threadpool_limits
 
 from benchmarks.planner.tracking import CASES
 from planner.files.tracking_error import tracking_error
@@ -115,7 +115,7 @@ def _rules(result: Plan, name: str) -> dict[str, Rule]:
 
 
 def main() -> None:
-    torch.set_num_threads(1)
+    threadpool_limits(1)
     lookup = load()
     print(f"{'path':30}{'rule':20}{'rms':>9}{'max':>9}{'minutes':>9}{'flips':>7}")
     for title, path, robot in CASES:

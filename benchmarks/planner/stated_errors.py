@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-import torch
+from threadpoolctl import threadpool_limits
 
 from benchmarks.markdown import heading, row
 from benchmarks.parallel import in_parallel
@@ -98,7 +98,7 @@ def random_path(rng: np.random.Generator, radius: float) -> Path2D:
 
 def swum(seed: int) -> Swum | str:
     """Plan and replays of one seed, or why there are none."""
-    torch.set_num_threads(1)
+    threadpool_limits(1)
     rng = np.random.default_rng(seed)
     robot = random_robot(rng)
     knowledge = CalibrationKnowledge(COEFFICIENTS, SIGMA**2 * np.eye(3))

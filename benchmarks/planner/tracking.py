@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 
 import pandas as pd
-import torch
+from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from planner.files.tracking_error import tracking_error
@@ -29,7 +29,7 @@ CASES = (
 
 
 def main() -> None:
-    torch.set_num_threads(1)
+    threadpool_limits(1)
     lookup = load()
     plans, spent = [], []
     for _, path, robot in CASES:

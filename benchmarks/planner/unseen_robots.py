@@ -2,7 +2,7 @@
 
 Robots are drawn from the domain of the shipped table as labs have them: two to five tails of 7 to 13 cm. Paths are
 circles, eights, smooth closed curves and polygons; every third one is enlarged until its plan has more than 2,000
-dwells. Each plan is made as by default, and carried out by the vehicle of the robot's own table, which is simulated
+dwells. Each plan is made as by default, and carried out by the robot's own table, which is simulated
 with a tenth of the tolerance. Some are replayed in time steps, too. A stated error must hold in 95 % of the plans,
 and in 90 % in each third of the robots by their remoteness: their distance from the middle of what the table has
 learned.
@@ -87,7 +87,7 @@ def lab_path(rng: np.random.Generator) -> Path2D:
         return Path2D.of(radius * np.stack([np.sin(angle), np.sin(2 * angle) / 2], 1), closed=True)
     if kind == 2:
         waves = (rng.normal() * 0.12 / k * np.cos(k * angle + rng.uniform(0, 6)) for k in (2, 3, 4))
-        size = radius * (1 + sum(waves))
+        size = radius * (1 + np.sum(list(waves), axis=0))
         return Path2D.of(size[:, None] * np.stack([np.cos(angle), np.sin(angle)], 1), closed=True)
     return polygon(int(rng.integers(3, 7)), radius)
 

@@ -11,7 +11,6 @@ Takes a minute.
 from __future__ import annotations
 
 import time
-from dataclasses import fields, replace
 
 import numpy as np
 import torch
@@ -27,26 +26,23 @@ EDGES = 16
 _STEPS = 20
 
 
-def robots(count: int, device: str) -> Groups:
+def robots(count: int) -> Groups:
     """Repeat the paper's control robot `count` times."""
     values = PRESETS["paper-control"].group_values()
-    groups = Groups.from_columns({k: np.full(count, v) for k, v in values.items()})
-    moved = {f.name: getattr(groups, f.name).to(device) for f in fields(groups) if f.name not in ("N", "effects")}
-    return replace(groups, **moved)
+    return Groups.from_columns({k: np.full(count, v) for k, v in values.items()})
 
 
 def robot_step(count: int, device: str) -> tuple[float, TensorState]:
     """Time one robot's step in a batch, in seconds; return where the batch is after 2 × 20 steps, too."""
-    groups = robots(count, device)
-    batch = tensor_robots(groups, edges=EDGES)
-    dt = torch.full_like(groups.omega_bar, 0.02)
+    batch = tensor_robots(robots(count), edges=EDGES, device=device)
+    dt = torch.full_like(batch.body.omega, 0.02)
     state = at_rest(batch)
     for _round in range(2):  # the first is for warming up
         if device == "cuda":
             torch.cuda.synchronize()
         begin = time.perf_counter()
         for _ in range(_STEPS):
-            state = step(batch, state, groups.omega_bar, dt)
+            state = step(batch, state, batch.body.omega, dt)
         if device == "cuda":
             torch.cuda.synchronize()
         spent = time.perf_counter() - begin

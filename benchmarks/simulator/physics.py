@@ -14,7 +14,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import torch
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
@@ -62,7 +61,7 @@ def curves(tails: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], np
     drag = 6 * math.pi * float(groups.C_t[0]) * R  # steady: what drags the head is the net thrust on it
     spin_drag = 8 * math.pi * float(groups.C_r[0]) * R**3
     simulated = {"thrust": drag * motion.v_z, "torque": spin_drag * np.abs(motion.omega_h), "yaw": motion.omega_yr}
-    theory = [linear_motion(groups.select(torch.tensor([i]))) for i in range(len(SPEEDS))]
+    theory = [linear_motion(groups.select(np.array([i]))) for i in range(len(SPEEDS))]
     linear = {
         "thrust": np.array([drag * t.v_z for t in theory]),
         "torque": np.array([t.torque for t in theory]),

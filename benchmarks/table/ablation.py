@@ -19,13 +19,16 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from scipy.spatial.distance import cdist
 from torch import Tensor
 
 from benchmarks.table.shipped_table import kept
 from dataset.report.figures import plain_logarithms
+from sim.arrays import Floats
 from surrogate.networks import training_loop
 from surrogate.networks.checkpoints import TrainingContext
-from surrogate.networks.ensemble import Ensemble
+from surrogate.networks.ensemble import SHARED, Ensemble
+from surrogate.networks.trainable import TrainableEnsemble
 from surrogate.networks.training_loop import _HARDEST, Problem, Settings
 from surrogate.training import fit_wrench
 from surrogate.training.fit_wrench import WrenchSamples, learnable, wrench_samples
@@ -48,8 +51,8 @@ def main(*words: str) -> None:
     torch.set_num_threads(1)
     learned, tested = (_several(kept(options.work, name)) for name in ("tails", "widths"))
     tested = tested.at((tested.gap >= 1) & (tested.motion[:, 2] < 0.6 * tested.motion[:, 4]))
-    tested = tested.at(torch.arange(min(_TESTED, len(tested.motion))))
-    samples = learned.at(torch.arange(options.rows))
+    tested = tested.at(np.arange(min(_TESTED, len(tested.motion))))
+    samples = learned.at(np.arange(options.rows))
     results = [_network("as shipped, smaller", samples, tested)]
     power, training_loop._POWER = training_loop._POWER, 1.0
     results.append(_network("least squares", samples, tested))
@@ -65,8 +68,8 @@ def main(*words: str) -> None:
     results.append(_network("inputs scaled alike", samples, tested))
     fit_wrench.SMOOTHNESS = smooth  # type: ignore[attr-defined]
     results.append(_network("single precision", samples, tested, single=True))
-    results.append(_network("half the rows", samples.at(torch.arange(options.rows // 2)), tested))
-    results.append(_kernel("Gaussian process", samples.at(torch.arange(min(_CENTRES, options.rows))), tested))
+    results.append(_network("half the rows", samples.at(np.arange(options.rows // 2)), tested))
+    results.append(_kernel("Gaussian process", samples.at(np.arange(min(_CENTRES, options.rows))), tested))
     results.append(_nearest("nearest row", samples, tested))
     print(f"{options.rows} rows, {len(tested.motion)} fresh robots; errors in %")
     print(f"{'':26}{'train s':>8}{'query µs':>9}{'numbers':>9}{'ω_yr median':>12}{'95 %':>8}{'v_z':>8}{'95 %':>8}")
@@ -80,18 +83,17 @@ def main(*words: str) -> None:
 def _several(rows: SimulatedRobots) -> WrenchSamples:
     rows = rows.at(rows.robots["N"] > 2)
     samples = wrench_samples(rows.robots, rows.motion)
-    return samples.at(torch.as_tensor(np.flatnonzero(learnable(samples))))
+    return samples.at(learnable(samples))
 
 
 def _judge(
-    name: str, rows: WrenchSamples, numbers: Callable[[Tensor], Tensor], seconds: float, size: float
+    name: str, rows: WrenchSamples, numbers: Callable[[Floats], Floats], seconds: float, size: float
 ) -> Result:
     began = time.process_time()
     motion, _ = solve(rows.heads, rows.tails, numbers)
     query = 1e6 * (time.process_time() - began) / len(motion)
-    errors = [(motion[:, i] / rows.motion[:, i] - 1).abs().nan_to_num(9.0) * 100 for i in (2, 1)]
-    levels = torch.tensor([0.5, 0.95], dtype=torch.float64)
-    return name, seconds, query, size, tuple(float(q) for error in errors for q in error.quantile(levels))
+    errors = [np.nan_to_num(np.abs(motion[:, i] / rows.motion[:, i] - 1), nan=9.0) * 100 for i in (2, 1)]
+    return name, seconds, query, size, tuple(float(q) for e in errors for q in np.quantile(e, [0.5, 0.95]))
 
 
 def _network(
@@ -101,12 +103,13 @@ def _network(
     learn: Callable[..., Ensemble] = fit_wrench._learn_wrench
     network = learn(rows, settings, TrainingContext(), 3)
     if single:
-        network = network.float().double()  # the weights rounded
-    size = sum(part.numel() for part in network.parameters())
+        state = {part: array.astype(np.float32).astype(float) for part, array in network.state.items()}
+        network = Ensemble.from_state(state)  # the weights rounded
+    size = sum(array.size for part, array in network.state.items() if part not in SHARED)
     return _judge(name, tested, network, time.process_time() - began, size)
 
 
-def _lbfgs(network: Ensemble, k: int, problem: Problem, iterations: int, *others: object) -> None:
+def _lbfgs(network: TrainableEnsemble, k: int, problem: Problem, iterations: int, *others: object) -> None:
     """Minimise with the last 80 steps only, not the whole matrix."""
     alone = network.member(k).requires_grad_(True)
     optimiser = torch.optim.LBFGS(
@@ -128,40 +131,40 @@ def _kernel(name: str, rows: WrenchSamples, tested: WrenchSamples) -> Result:
     """Fit a Gaussian process with the same prior smoothness to y from the wrench (y_4 = y_5 = 0)."""
     began = time.process_time()
     inputs, wanted = tail_inputs(rows.tails, rows.motion), _numbers(rows)
-    shift, scale = inputs.mean(0), inputs.std(0) * torch.tensor(SMOOTHNESS)
+    shift, scale = inputs.mean(0), inputs.std(0) * SMOOTHNESS
     scale[-1] = 1e9
     mean, spread = wanted.mean(0), wanted.std(0) + 1e-12
 
-    def kernel(a: Tensor, b: Tensor) -> Tensor:
-        return torch.exp(-0.5 * torch.cdist((a - shift) / scale, (b - shift) / scale).square())
+    def kernel(a: Floats, b: Floats) -> Floats:
+        return np.asarray(np.exp(-0.5 * cdist((a - shift) / scale, (b - shift) / scale) ** 2))
 
-    matrix = kernel(inputs, inputs) + 1e-8 * torch.eye(len(inputs), dtype=torch.float64)
-    weights = torch.linalg.solve(matrix, (wanted - mean) / spread)
+    matrix = kernel(inputs, inputs) + 1e-8 * np.eye(len(inputs))
+    weights = np.linalg.solve(matrix, (wanted - mean) / spread)
     seconds = time.process_time() - began
     return _judge(
-        name, tested, lambda x: kernel(x[:, :7], inputs) @ weights * spread + mean, seconds, weights.numel()
+        name, tested, lambda x: kernel(x[:, :7], inputs) @ weights * spread + mean, seconds, weights.size
     )
 
 
 def _nearest(name: str, rows: WrenchSamples, tested: WrenchSamples) -> Result:
     inputs, wanted = tail_inputs(rows.tails, rows.motion), _numbers(rows)
-    scale = inputs.std(0) * torch.tensor(SMOOTHNESS)
+    scale = inputs.std(0) * SMOOTHNESS
     scale[-1] = 1e9
     return _judge(
         name,
         tested,
-        lambda x: wanted[torch.cdist(x[:, :7] / scale, inputs / scale).argmin(1)],
+        lambda x: wanted[cdist(x[:, :7] / scale, inputs / scale).argmin(1)],
         0.0,
-        wanted.numel(),
+        wanted.size,
     )
 
 
-def _numbers(rows: WrenchSamples) -> Tensor:
+def _numbers(rows: WrenchSamples) -> Floats:
     """Compute y (M, 6) of rows with y_4 = y_5 = 0."""
     wrench = (rows.heads.resistance @ rows.motion[..., None])[..., 0]
     remainder = wrench - straight_wrench(rows.tails, rows.motion)
-    units = wrench_slopes(rows.tails, rows.motion)[:, :, :4].diagonal(dim1=1, dim2=2)
-    return torch.cat([remainder / units, torch.zeros(len(remainder), 2, dtype=torch.float64)], 1)
+    units = wrench_slopes(rows.tails, rows.motion)[:, :, :4].diagonal(axis1=1, axis2=2)
+    return np.concatenate([remainder / units, np.zeros((len(remainder), 2))], 1)
 
 
 def _draw(results: list[Result], path: str) -> None:

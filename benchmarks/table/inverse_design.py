@@ -13,7 +13,7 @@ from __future__ import annotations
 import time
 
 import numpy as np
-import torch
+from threadpoolctl import threadpool_limits
 
 from benchmarks.table.shipped_table import as_reached
 from sim.motion.batches import steady_columns
@@ -79,7 +79,7 @@ def backwards(lookup: NeuralTable, rows: SimulatedRobots, title: str) -> None:
 
 
 def main(count: str = "100") -> None:
-    torch.set_num_threads(1)
+    threadpool_limits(1)
     lookup = load()
     rows = targets(lookup, int(count))
     for title in KINDS:

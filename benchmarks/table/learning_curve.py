@@ -52,17 +52,17 @@ def usable(rows: SimulatedRobots) -> tuple[SimulatedRobots, WrenchSamples]:
     rows = rows.at(rows.robots["N"] > 1)
     samples = wrench_samples(rows.robots, rows.motion)
     good = np.flatnonzero(learnable(samples))
-    return rows.at(good), samples.at(torch.as_tensor(good))
+    return rows.at(good), samples.at(good)
 
 
 def test_errors(
     table: WrenchTable, tested: SimulatedRobots, rows: WrenchSamples
 ) -> dict[str, tuple[float, float]]:
     """Median and 95 % of the relative errors, in %, by output."""
-    motion = torch.from_numpy(table.solve(rows.heads, rows.tails)[0])
+    motion = table.solve(rows.heads, rows.tails)[0]
     values = table.outputs(rows.heads, motion, table.tail_gap(rows.tails, motion))
     names = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "tail_gap")
-    answer = {name: value.numpy() for name, value in zip(names, values, strict=True)}
+    answer = dict(zip(names, values, strict=True))
     deviations = relative_errors(answer, with_radius(tested.motion))
     deviations["v_z"] = answer["v_z"] / tested.motion["v_z"] - 1  # of itself
     sizes = {name: 100 * np.abs(np.nan_to_num(deviations[name], nan=1.0)) for name in _NAMES}
@@ -114,7 +114,7 @@ def main(*words: str) -> None:
     curves = []
     for name, settings in SETTINGS.items():
         for share in PARTS:
-            samples = rows.at(torch.arange(round(share * len(learned))))
+            samples = rows.at(np.arange(round(share * len(learned))))
             began = time.process_time()
             table = fit_wrench(samples, settings, TrainingContext())
             spent = time.process_time() - began

@@ -8,7 +8,7 @@ Takes 10 seconds.
 from __future__ import annotations
 
 import numpy as np
-import torch
+from threadpoolctl import threadpool_limits
 
 from benchmarks.timing import processor_time
 from sim.motion.batches import steady_columns
@@ -20,7 +20,7 @@ ROWS, SIMULATED, REPEATS = 16384, 64, 20
 
 
 def main() -> None:
-    torch.set_num_threads(1)
+    threadpool_limits(1)
     lookup = load()
     rows = lookup.provenance["rows"]
     print(f"\nShipped look-up table: {rows['train']} rows learned, errors on {rows['held_out']} others")

@@ -20,7 +20,7 @@ import time
 from dataclasses import replace
 
 import numpy as np
-import torch
+from threadpoolctl import threadpool_limits
 
 from planner.vehicle.from_table import table_vehicle
 from sim.arrays import Floats
@@ -119,7 +119,7 @@ def _lags(body: Body, reverse: Body, tails: int, dwell: float, mesh: Resolution)
 
 
 def main(*effects: str) -> None:
-    torch.set_num_threads(1)
+    threadpool_limits(1)
     compile_once()
     tabulate(PRESETS["paper-control"])  # load the machine code
     print(f"{'':24}{'s':>6}{'steady':>8}{'':4}error of the net motion [%], dwells "

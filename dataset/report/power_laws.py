@@ -86,7 +86,7 @@ def linear_rows(columns: Mapping[str, Floats], *, seed: int = 0) -> tuple[np.nda
     values_by_row = []
     for i in range(len(rows)):
         groups = Groups.from_columns({name: column[i : i + 1] for name, column in values.items()})
-        motion, perpendicular = linear_motion(groups), float(tail_coefficients(groups.l_over_r0)[1])
+        motion, perpendicular = linear_motion(groups), tail_coefficients(groups.l_over_r0)[1].item()
         values_by_row.append(
             (motion.omega_t, motion.omega_yr, motion.v_x, motion.v_z, perpendicular * motion.omega_t)
         )

@@ -29,7 +29,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import LinAlgError, solveh_banded
 
 from planner.paths.path import Path2D, resample
 from planner.paths.tractrix import STILL, Drift
@@ -206,6 +205,8 @@ def _distances(poses: Floats, task: _Task) -> Floats:
 
 def _descend(poses: Floats, task: _Task, weight: float) -> Floats:
     """Minimise by Gauss-Newton with Levenberg's damping, for one weight of the constraints."""
+    from scipy.linalg import LinAlgError, solveh_banded  # slow to import, and only tight places need it
+
     damping = 1e-3
     place = _places(len(poses), closed=task.turn is not None)
     residual, single, pair = _system(poses, task, weight)

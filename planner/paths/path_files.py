@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from planner.paths.path import Path2D
 from planner.paths.svg_drawing import read_svg
 from sim.arrays import Floats
 from sim.io.errors import InputError, naming
-from sim.io.quantities import numbers_of
-from sim.io.tables import read_table
 from sim.io.units import split, to_si
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,9 @@ def _read_columns(source: str | Path) -> tuple[Floats, float | None]:
     Raises:
         InputError: the table has no x and y, only one of them has a unit, or a value is no number.
     """
+    from sim.io.quantities import numbers_of  # these load pandas, and a drawing or a circle needs none of it
+    from sim.io.tables import read_table
+
     table = read_table(source, names=False)
     if all(isinstance(column, int) for column in table):
         names, units = list(table.columns[:2]), []

@@ -26,8 +26,6 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from scipy.stats import chi2
-
 from planner.paths.units import in_lab
 from planner.planning.planned import Plan
 from planner.tracking.guidance import TrackerGuidance
@@ -42,8 +40,8 @@ if TYPE_CHECKING:
 
 FALSE_ALARM = 1e-3  # probability of an alarm per WINDOW poses, for a robot of the model
 WINDOW = 40
-ALARM_AT = float(chi2.ppf(1 - FALSE_ALARM, 3 * WINDOW))
-GATE = float(chi2.ppf(0.9999, 3))
+ALARM_AT = 173.6174364561601  # quantile 1 − FALSE_ALARM of χ² with 3 × WINDOW degrees of freedom
+GATE = 21.107513466160444  # quantile 0.9999 of χ² with 3 degrees of freedom
 KEPT = 12  # dwells that are remembered for late poses
 SLACK = 1e-6  # time units; a time this close before the announced flip is the flip's own, rounded
 LONGEST_GAP = 1e5  # time units; a clock that jumps further is not believed

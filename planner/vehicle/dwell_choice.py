@@ -31,9 +31,9 @@ def dwells_for(vehicle: Vehicle, objective: Objective, least: float | None) -> l
 
     Args:
         vehicle: both directions.
-        objective: "error": the shortest dwell that costs at most 10 % of the speed, then shorter ones (see also
-            `longer_dwells`); "time": the fastest, then shorter ones; "flips": the longest that costs at most 5 % of
-            the speed, then shorter ones.
+        objective: "error": the shortest dwell that costs at most 10 % of the speed, then shorter ones (see
+            `longer_dwells`, too); "time": the fastest, then shorter ones; "flips": the longest that costs at most
+            5 % of the speed, then shorter ones.
         least: the shortest dwell that the motor or the user allows; None: QUICK.
 
     Raises:

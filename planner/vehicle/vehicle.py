@@ -20,8 +20,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
+from planner.vehicle.cubic_spline import spline_at
 from sim.arrays import Floats, Integers
 from sim.mechanics import planar
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED
@@ -137,7 +137,8 @@ def resampled(curve: Floats) -> Floats:
 
     Below the shortest dwell the curve is a straight line to zero; after SETTLED it is constant.
     """
-    spline = CubicSpline(np.log(DWELLS), curve, axis=-2)(np.log(np.maximum(TIMES, DWELLS[0])))
+    places = np.log(np.maximum(TIMES, DWELLS[0]))
+    spline = np.moveaxis(spline_at(np.log(DWELLS), np.moveaxis(curve, -2, 0), places), 0, -2)
     return np.asarray(spline * np.minimum(TIMES / DWELLS[0], 1.0)[:, None])
 
 
@@ -150,6 +151,6 @@ def lag_table(lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
         before: (B,).
     """
     knots = np.log(np.append(before, FORGOTTEN))
-    known = np.concatenate([memory, np.zeros_like(memory[..., :1, :, :])], -3)
-    fine = CubicSpline(knots, known, axis=-3, bc_type=("not-a-knot", "clamped"))(np.log(BEFORE_KNOTS))
+    known = np.moveaxis(np.concatenate([memory, np.zeros_like(memory[..., :1, :, :])], -3), -3, 0)
+    fine = np.moveaxis(spline_at(knots, known, np.log(BEFORE_KNOTS), flat_end=True), 0, -3)
     return resampled(lag[..., None, :, :] + fine)

@@ -13,18 +13,17 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from sim.arrays import Floats
 from sim.model.effect import Effect
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from sim.model.body import Body
     from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class AnisotropicHeadDrag(Effect):
-    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
+    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
         return body.with_resistance({(1, 1): size * 6 * math.pi * groups.C_t / groups.l_over_R})
 
 

@@ -13,18 +13,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from sim.arrays import Floats
 from sim.model.effect import Effect
 from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class ContactLine(Effect):
-    def number(self, size: Tensor, groups: Groups) -> Tensor:
+    def number(self, size: Floats, groups: Groups) -> Floats:
         scale = (groups.l_over_r0 / CONTROL.l_over_r0) ** 4 / (groups.l_over_R / CONTROL.l_over_R) ** 2
         return 0.1 * size * scale
 

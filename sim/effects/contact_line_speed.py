@@ -13,20 +13,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from sim.arrays import Floats
 from sim.model.effect import Effect
 from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class ContactLineSpeed(Effect):
-    def number(self, size: Tensor, groups: Groups) -> Tensor:
+    def number(self, size: Floats, groups: Groups) -> Floats:
         scale = (groups.l_over_r0 / CONTROL.l_over_r0) ** 4 / (groups.l_over_R / CONTROL.l_over_R)
-        return (size.exp() - 1) * scale
+        return (np.exp(size) - 1) * scale
 
 
 EFFECT = ContactLineSpeed(

@@ -13,12 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from sim.arrays import Floats
+from sim.linear.complex_step import magnitude
 from sim.model.effect import Effect, Factors
 from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from sim.model.groups import Groups
 
 _CONTROL_SPEED = CONTROL.omega_bar / CONTROL.l_over_r0**4
@@ -26,8 +26,8 @@ _CONTROL_SPEED = CONTROL.omega_bar / CONTROL.l_over_r0**4
 
 @dataclass(frozen=True)
 class Inertia(Effect):
-    def scales(self, size: Tensor, groups: Groups) -> Factors:
-        speed = groups.omega_bar.abs() / groups.l_over_r0**4 / _CONTROL_SPEED
+    def scales(self, size: Floats, groups: Groups) -> Factors:
+        speed = magnitude(groups.omega_bar) / groups.l_over_r0**4 / _CONTROL_SPEED
         return Factors(drag=1 + size * speed)
 
 

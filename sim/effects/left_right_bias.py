@@ -12,20 +12,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from sim.arrays import Floats
+from sim.linear.complex_step import sign
 from sim.model.effect import Effect
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from sim.model.body import Body
     from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class LeftRightBias(Effect):
-    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
+    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
         R, L = 1 / groups.l_over_R, groups.L_over_R / groups.l_over_R
-        return body.with_resistance({(2, 4): -size * groups.omega_bar.sign() * R * L**2 / 2})
+        return body.with_resistance({(2, 4): -size * sign(groups.omega_bar) * R * L**2 / 2})
 
 
 EFFECT = LeftRightBias(

@@ -12,18 +12,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from sim.arrays import Floats
 from sim.model.effect import Effect
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from sim.model.body import Body
     from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class MotorDroop(Effect):
-    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
+    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
         return body.plus(droop=size)
 
 

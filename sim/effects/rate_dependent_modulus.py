@@ -12,18 +12,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from sim.arrays import Floats
 from sim.model.effect import Effect
 from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class RateDependentModulus(Effect):
-    def number(self, size: Tensor, groups: Groups) -> Tensor:
+    def number(self, size: Floats, groups: Groups) -> Floats:
         return size * (CONTROL.l_over_r0 / groups.l_over_r0) ** 4
 
 

@@ -21,8 +21,6 @@ from sim.arrays import Floats
 from sim.model.effect import Effect
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from sim.model.groups import Groups
 
 _FIRM = 500.0  # EI/l³, force per length at an overlap of 2 % and ε = 1: five softness lengths, so 5 F
@@ -32,7 +30,7 @@ _KEPT = 0.98  # gap that contact keeps
 
 @dataclass(frozen=True)
 class TailContact(Effect):
-    def number(self, size: Tensor, groups: Groups) -> Tensor:
+    def number(self, size: Floats, groups: Groups) -> Floats:
         return _FIRM * (_BASE**size - 1) / (_BASE - 1)
 
 

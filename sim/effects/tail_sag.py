@@ -14,23 +14,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from sim.arrays import Floats
 from sim.model.effect import Effect
 from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from sim.model.body import Body
     from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class TailSag(Effect):
-    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
+    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
         heavier = (groups.l_over_r0 / CONTROL.l_over_r0) ** 2 * groups.l_over_R / CONTROL.l_over_R
-        load = body.tail_load.clone()
-        load[1] = load[1] - 8 * size * heavier
-        return body._replace(tail_load=load)
+        none = 0.0 * size
+        return body.plus(tail_load=np.stack([none, -8 * size * heavier, none]))
 
 
 EFFECT = TailSag(

@@ -13,17 +13,16 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from sim.arrays import Floats
 from sim.model.effect import Effect
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class TailSpinDrag(Effect):
-    def number(self, size: Tensor, groups: Groups) -> Tensor:
+    def number(self, size: Floats, groups: Groups) -> Floats:
         return size * 4 * math.pi / groups.l_over_r0**2
 
 

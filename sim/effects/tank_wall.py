@@ -13,18 +13,17 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from sim.arrays import Floats
 from sim.model.effect import Driver, Effect
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from sim.model.body import Body
     from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class TankWall(Effect):
-    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
+    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
         factor = 1 / (1 - 2.104 * size + 2.089 * size**3 - 0.948 * size**5)
         lever = groups.L_over_R / groups.l_over_R / 2
         more = 6 * math.pi * groups.C_t / groups.l_over_R * (factor - 1)

@@ -12,18 +12,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from sim.arrays import Floats
 from sim.model.effect import Driver, Effect, Factors
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from sim.model.groups import Groups
 
 
 @dataclass(frozen=True)
 class ViscosityDrift(Effect):
-    def scales(self, size: Tensor, groups: Groups) -> Factors:
-        return Factors(viscosity=(-size).exp())
+    def scales(self, size: Floats, groups: Groups) -> Factors:
+        return Factors(viscosity=np.exp(-size))
 
 
 EFFECT = ViscosityDrift(

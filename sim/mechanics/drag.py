@@ -22,37 +22,38 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from sim.linear.vectors import Matrix, Vector, dot, formula, minus, outer, plus, plus_identity, times
 
 
-def tail_coefficients(l_over_r0: Tensor) -> tuple[Tensor, Tensor]:
-    """Compute the drag coefficients per length (ζ∥, ζ⊥) in units of μ0; same shape as `l_over_r0`."""
-    log_slenderness = torch.log(l_over_r0)
+@formula
+def tail_coefficients(l_over_r0: Any) -> tuple[Any, Any]:
+    """Compute the drag coefficients per length (ζ∥, ζ⊥) in units of μ0."""
+    log_slenderness = np.log(l_over_r0)
     return 2 * math.pi / (log_slenderness - 0.5), 4 * math.pi / (log_slenderness + 0.5)
 
 
-def head_resistance(C_t: Tensor, C_r: Tensor, C_yr: Tensor, head_radius: Tensor, head_length: Tensor) -> Tensor:
-    """Compute R of the head about J in the paper's model, (4, 5, B).
+@formula
+def head_resistance(
+    C_t: Any, C_r: Any, C_yr: Any, head_radius: Any, head_length: Any
+) -> tuple[tuple[Any, ...], ...]:
+    """Compute R of the head about J in the paper's model: four rows of five entries.
 
     Args:
-        C_t, C_r, C_yr: drag, spin and side-force coefficients, (B,).
-        head_radius, head_length: R/l and L/l, (B,).
+        C_t, C_r, C_yr: drag, spin and side-force coefficients.
+        head_radius, head_length: R/l and L/l.
     """
     lever = head_length / 2
     translation = 6 * math.pi * C_t * head_radius
     spin = 8 * math.pi * C_r * head_radius**3
     side = C_yr * head_radius * head_length
-    none = torch.zeros_like(translation)
-    return torch.stack(
-        [
-            torch.stack([translation, none, translation * lever, side, none]),
-            torch.stack([none, translation, none, none, none]),
-            torch.stack([translation * lever, none, translation * lever**2, side * lever, none]),
-            torch.stack([none, none, none, spin, none]),
-        ]
+    none = 0.0 * translation
+    return (
+        (translation, none, translation * lever, side, none),
+        (none, translation, none, none, none),
+        (translation * lever, none, translation * lever**2, side * lever, none),
+        (none, none, none, spin, none),
     )
 
 

@@ -1,6 +1,6 @@
 """The numbers of one robot: everything that its balance of forces depends on.
 
-`Body` is the only list of these numbers. `sim.solve.assembly` fills it for a batch of robots as tensors, with
+`Body` is the only list of these numbers. `sim.solve.assembly` fills it for a batch of robots as arrays, with
 effects. The compiled loops get it as numbers, one robot at a time. Packing, unpacking and derivatives follow from
 its fields.
 
@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
+
+import numpy as np
 
 
 class Meaning(NamedTuple):
@@ -44,7 +46,7 @@ class Body(NamedTuple):
 
     def with_resistance(self, entries: Mapping[tuple[int, int], Any]) -> Body:
         """Add `entries` (row, column) to the resistance of head and disc."""
-        resistance = self.resistance.clone()
+        resistance = self.resistance.astype(np.result_type(self.resistance, *entries.values()))
         for place, value in entries.items():
             resistance[place] = resistance[place] + value
         return self._replace(resistance=resistance)

@@ -10,7 +10,7 @@ So adding an effect is adding its file. An effect
    whether it keeps dynamic similarity, the sizes that are plausible by its source (outside, a claim is "in form
    like" the effect), what drives it from run to run, and the effect that it needs beside it to be seen, if any.
    An effect with a second number (exponent, time) has it as another effect beside it, with a `grid`;
-3. acts in one of three ways, all differentiable in ε:
+3. acts in one of three ways, all analytic in ε and the groups (`sim.linear.complex_step`):
    - `adds` returns the body with terms added, which must not depend on what is there already;
    - `scales` returns factors on drag, which multiply;
    - a non-local effect (`reach`) has a number of its own in `Body.nonlocal_terms`, from `number`, and its formula
@@ -24,9 +24,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-if TYPE_CHECKING:
-    from torch import Tensor
+from sim.arrays import Floats
 
+if TYPE_CHECKING:
     from sim.model.body import Body
     from sim.model.groups import Groups
 
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 class Factors(NamedTuple):
     """What an effect multiplies, each (B,) or 1."""
 
-    viscosity: Tensor | float = 1.0  # everything that drags, and the flow that a force makes
-    drag: Tensor | float = 1.0  # drag of head, disc and tails
+    viscosity: Floats | float = 1.0  # everything that drags, and the flow that a force makes
+    drag: Floats | float = 1.0  # drag of head, disc and tails
 
 
 @dataclass(frozen=True)
@@ -79,14 +79,14 @@ class Effect:
     beside: str = ""  # the effect without which this one shows nothing
     grid: tuple[float, ...] = ()  # sizes at which a calibration looks for `beside`, whose second number this is
 
-    def adds(self, size: Tensor, groups: Groups, body: Body) -> Body:
+    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
         """Add this effect's terms to the body."""
         return body
 
-    def scales(self, size: Tensor, groups: Groups) -> Factors:
+    def scales(self, size: Floats, groups: Groups) -> Factors:
         """Return what this effect multiplies."""
         return Factors()
 
-    def number(self, size: Tensor, groups: Groups) -> Tensor:
+    def number(self, size: Floats, groups: Groups) -> Floats:
         """Return the number of a non-local effect in `Body.nonlocal_terms`, in the simulator's units."""
         return size

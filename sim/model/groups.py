@@ -16,15 +16,12 @@ import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from sim.arrays import Flags, Floats, Integers
 from sim.io.errors import InputError
-
-if TYPE_CHECKING:
-    from torch import Tensor
 
 MOTOR_SPEED = "motor speed, tails relative to head"  # what omega_bar is
 GROUP_COLUMNS = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar", "N")
@@ -37,21 +34,21 @@ _POSITIVE = ("C_t", "C_r", "l_over_R", "L_over_R", "a_over_R")
 
 @dataclass(frozen=True)
 class Groups:
-    """Dimensionless robots, B of them with the same number of tails N; tensors are (B,), float64."""
+    """Dimensionless robots, B of them with the same number of tails N; arrays are (B,)."""
 
-    C_t: Tensor
-    C_r: Tensor
-    C_yr: Tensor
-    l_over_R: Tensor
-    L_over_R: Tensor
-    l_over_r0: Tensor
-    omega_bar: Tensor
-    a_over_R: Tensor
+    C_t: Floats
+    C_r: Floats
+    C_yr: Floats
+    l_over_R: Floats
+    L_over_R: Floats
+    l_over_r0: Floats
+    omega_bar: Floats
+    a_over_R: Floats
     N: int
-    effects: Mapping[str, Tensor] = field(default_factory=dict)
+    effects: Mapping[str, Floats] = field(default_factory=dict)
 
     def __len__(self) -> int:
-        return self.omega_bar.shape[0]
+        return len(self.omega_bar)
 
     @staticmethod
     def from_columns(columns: Mapping[str, Any]) -> Groups:
@@ -63,18 +60,16 @@ class Groups:
         Raises:
             InputError: a missing column, a number that is not finite or out of its range.
         """
-        import torch
-
         values = checked_values(columns)
         counts = np.unique(values["N"])
         if len(counts) != 1:
             raise InputError(f"a batch has one N; these rows have {counts.astype(int).tolist()}: split them")
-        tensors = {name: torch.tensor(array, dtype=torch.float64) for name, array in values.items() if name != "N"}
-        groups = {name: tensors.pop(name) for name in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS) if name != "N"}
-        return Groups(**groups, N=int(counts[0]), effects=tensors)
+        sizes = {name: array.copy() for name, array in values.items() if name != "N"}
+        groups = {name: sizes.pop(name) for name in (*GROUP_COLUMNS, *OPTIONAL_COLUMNS) if name != "N"}
+        return Groups(**groups, N=int(counts[0]), effects=sizes)
 
-    def select(self, rows: Tensor) -> Groups:
-        """Select the robots at `rows`."""
+    def select(self, rows: Integers | Flags) -> Groups:
+        """Select the robots at indices or flags."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         picked: dict[str, Any] = {k: v[rows] for k, v in values.items() if k not in ("N", "effects")}
         return replace(self, **picked, effects={name: size[rows] for name, size in self.effects.items()})

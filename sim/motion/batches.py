@@ -12,8 +12,6 @@ from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
-import torch
-from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
@@ -77,6 +75,8 @@ def run_batches(
         if count <= 1:
             done = map(task, jobs_to_do)
         else:
+            from joblib import Parallel, delayed  # slow to import, and one job needs none of it
+
             parallel = Parallel(
                 n_jobs=count, return_as="generator", pre_dispatch="2*n_jobs", prefer="threads" if threads else None
             )
@@ -89,14 +89,9 @@ def run_batches(
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Let tensor and matrix operations of this process use one thread each."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        with threadpool_limits(1, user_api="blas"):
-            yield
-    finally:
-        torch.set_num_threads(threads)
+    """Let matrix operations of this process use one thread each."""
+    with threadpool_limits(1, user_api="blas"):
+        yield
 
 
 def _single_threaded(work: Callable[[Job], Result], job: Job) -> Result:

@@ -38,7 +38,7 @@ def solve_orbits(
     """Solve for the orbits of robots with N tails.
 
     Args:
-        rows: (B, K'), the robots' numbers (`sim.solve.assembly.numbers`, transposed).
+        rows: (B, K'), the robots' numbers (`sim.solve.assembly.numbers`).
         tails: N.
         directions: (B, K, K'), directions of the derivatives (none by default).
         phases: number of phases to begin with.

@@ -1,30 +1,26 @@
 """Derivatives of the steady motion in every input and effect size, by the implicit function theorem.
 
 The orbit depends on a robot's numbers (`sim.solve.derivative`). These depend on its inputs and effect sizes
-(`sim.solve.assembly`), and that part is differentiated automatically. So an effect needs no code for its
-derivative. Derivatives are extrapolated in the mesh, like the means.
+(`sim.solve.assembly`), and that part is differentiated by the complex step (`sim.linear.complex_step`). So an
+effect needs no code for its derivative. Derivatives are extrapolated in the mesh, like the means.
 """
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.io.errors import InputError
+from sim.linear.complex_step import derivative
 from sim.model.groups import Groups
 from sim.model.slopes import SLOPE_INPUTS, SLOPE_OUTPUTS
 from sim.motion.orbits import solve_orbits
 from sim.solve.assembly import numbers
 from sim.solve.refinement import MANY
-
-_FORWARD = threading.Lock()  # torch has one level of forward differentiation for all threads together
 
 
 @dataclass(frozen=True)
@@ -53,7 +49,7 @@ def sensitivities(groups: Groups, parameters: Sequence[str], *, phases: int = MA
         if name not in SLOPE_INPUTS and name not in catalogue():
             allowed = ", ".join((*SLOPE_INPUTS, *catalogue()))
             raise InputError(f"no parameter {name!r} to differentiate in; there are {allowed}")
-    rows = np.ascontiguousarray(numbers(groups).detach().numpy().T)
+    rows = numbers(groups)
     moved = [_direction(groups, name) for name in names]
     scales = np.stack([scale for _, scale in moved], 1) if names else np.empty((len(groups), 0))
     directions = np.stack([d for d, _ in moved], 1) if names else np.empty((len(groups), 0, rows.shape[1]))
@@ -77,18 +73,16 @@ def _direction(groups: Groups, name: str) -> tuple[Floats, Floats]:
     """Compute the derivative of the robots' numbers in parameter/scale, (B, K'), and the scale, (B,)."""
     if name in SLOPE_INPUTS:
         value = getattr(groups, name)
-        size = value.abs()
+        size = np.abs(value)
 
-        def changed_numbers(changed: Tensor) -> Tensor:
+        def changed_numbers(changed: Floats) -> Floats:
             return numbers(replace(groups, **{name: changed}))  # type: ignore[arg-type]
     else:
         effect = catalogue()[name]
-        value = groups.effects.get(name, torch.full_like(groups.omega_bar, effect.null))
-        size = torch.full_like(value, abs(effect.typical - effect.null))
+        value = groups.effects.get(name, np.full(len(groups), effect.null))
+        size = np.full(len(groups), abs(effect.typical - effect.null))
 
-        def changed_numbers(changed: Tensor) -> Tensor:
+        def changed_numbers(changed: Floats) -> Floats:
             return numbers(replace(groups, effects={**groups.effects, name: changed}))
 
-    with _FORWARD:
-        direction: Tensor = torch.func.jvp(changed_numbers, (value,), (size,))[1]
-    return direction.T.numpy(), size.numpy()
+    return derivative(changed_numbers, value, size), size

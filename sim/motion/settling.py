@@ -17,7 +17,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from sim.arrays import Floats
 from sim.mechanics.balance import motor_gain
@@ -159,6 +158,8 @@ def _means(time: Floats, poses: Floats, omega: float, tails: int) -> tuple[Float
     if oldest < phase[first] or len(phase) - first < 4:
         return unknown
     start = max(first, int(np.searchsorted(phase, oldest)) - 4)
+    from scipy.interpolate import CubicSpline  # slow to import, and most steady motions are not stepped
+
     table = np.column_stack([time, poses[:, _MEANS]])[start:]
     marks = CubicSpline(phase[start:], table)([end, end - window, end - shift, oldest])
     if marks[3, 0] < SETTLED:

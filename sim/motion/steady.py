@@ -12,7 +12,6 @@ meshes and steps. Units: l, μ0 l⁴/EI.
 from __future__ import annotations
 
 import numpy as np
-import torch
 
 from sim.arrays import Floats, Integers, Words
 from sim.effects import check_size
@@ -76,7 +75,7 @@ def _with_stepped(motion: Steady, groups: Groups, rows: Integers, notes: Words) 
 
 
 def _rows(groups: Groups, rows: Integers) -> Groups:
-    return groups.select(torch.as_tensor(rows))
+    return groups.select(rows)
 
 
 def orbits(groups: Groups, *, phases: int = FEW) -> Steady:
@@ -86,8 +85,7 @@ def orbits(groups: Groups, *, phases: int = FEW) -> Steady:
 
 def _orbits(groups: Groups, phases: int, *, stability: bool) -> tuple[Steady, Floats]:
     """Solve directly, and compute how fast tails in contact leave the solution, (B,)."""
-    rows = np.ascontiguousarray(numbers(groups).detach().cpu().numpy().T)
-    solution = solve_orbits(rows, groups.N, phases=phases, stability=stability)
+    solution = solve_orbits(numbers(groups), groups.N, phases=phases, stability=stability)
     means = solution.means.T
     solved = solution.ended == SOLVED
     motion = Steady(

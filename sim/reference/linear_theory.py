@@ -56,10 +56,10 @@ def linear_filament(S: float) -> tuple[float, float, float]:
 
 def linear_motion(groups: Groups) -> LinearMotion:
     """Apply linear theory to the one robot in `groups` (effects are left out)."""
-    parallel, perp = (float(c) for c in tail_coefficients(groups.l_over_r0))
-    R, omega, tails = 1 / float(groups.l_over_R), float(groups.omega_bar), groups.N
-    length, a = float(groups.L_over_R) * R, float(groups.a_over_R) * R
-    spin_drag = 8 * math.pi * float(groups.C_r) * R**3
+    parallel, perp = (c.item() for c in tail_coefficients(groups.l_over_r0))
+    R, omega, tails = 1 / groups.l_over_R.item(), groups.omega_bar.item(), groups.N
+    length, a = groups.L_over_R.item() * R, groups.a_over_R.item() * R
+    spin_drag = 8 * math.pi * groups.C_r.item() * R**3
     speed = abs(omega)
 
     def torque(omega_t: float) -> float:
@@ -67,7 +67,7 @@ def linear_motion(groups: Groups) -> LinearMotion:
 
     omega_t = float(brentq(lambda w: torque(w) - spin_drag * (speed - w), 0.0, speed))
     thrust = tails * (perp - parallel) * omega_t * a**2 * linear_filament(perp * omega_t)[0]
-    drag = 6 * math.pi * float(groups.C_t) * R
+    drag = 6 * math.pi * groups.C_t.item() * R
     surge = thrust / (drag + tails * parallel)
     lever = length / 2
     # Across the axis, about J: head at +L/2, straight tails from 0 to −l.
@@ -75,7 +75,7 @@ def linear_motion(groups: Groups) -> LinearMotion:
         [[drag + tails * perp, drag * lever - tails * perp / 2],
          [drag * lever - tails * perp / 2, drag * lever**2 + tails * perp / 3]]
     )  # fmt: skip
-    push = float(groups.C_yr) * R * length * (speed - omega_t)
+    push = groups.C_yr.item() * R * length * (speed - omega_t)
     sway, yaw = np.linalg.solve(across, push * np.array([1, lever]))
     sense = math.copysign(1.0, omega)
     return LinearMotion(

@@ -1,6 +1,7 @@
 """From robots to the numbers of their balance (`Body`): the paper's model, and the effects of the robots.
 
-Everything here is differentiable. So torch gives the derivatives of a robot's numbers in any input or effect size.
+Everything here is analytic. So the complex step (`sim.linear.complex_step`) gives the derivatives of a robot's
+numbers in any input or effect size.
 Source of the base model: Du, Miller, Jawed (arXiv 2103.05712).
 """
 
@@ -11,8 +12,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from sim.arrays import Floats
 from sim.effects import catalogue, effect_named
@@ -26,14 +25,14 @@ _SHAPES = {"resistance": (4, 5), "tail_load": (3,)}  # of the entries that are n
 
 
 def assemble(groups: Groups) -> Body:
-    """Assemble the numbers of B robots as tensors, effects included; single ones are (B,).
+    """Assemble the numbers of B robots as arrays, effects included; single ones are (B,).
 
     Raises:
         InputError: an unknown effect.
     """
     R = 1 / groups.l_over_R
     L = groups.L_over_R * R
-    none = torch.zeros_like(R)
+    none = np.zeros(R.shape)
     zeta_parallel, zeta_perp = tail_coefficients(groups.l_over_r0)
     body = Body(
         omega=groups.omega_bar,
@@ -42,12 +41,12 @@ def assemble(groups: Groups) -> Body:
         head_length=L,
         tail_radius=1 / groups.l_over_r0,
         axial_stiffness=4 * groups.l_over_r0**2,
-        viscosity=torch.ones_like(R),
+        viscosity=np.ones(R.shape),
         zeta_parallel=zeta_parallel,
         zeta_perp=zeta_perp,
-        resistance=head_resistance(groups.C_t, groups.C_r, groups.C_yr, R, L),
+        resistance=np.array(head_resistance(groups.C_t, groups.C_r, groups.C_yr, R, L)),
         droop=none,
-        tail_load=torch.stack([none] * 3),
+        tail_load=np.zeros((3, *R.shape)),
         nonlocal_terms=Nonlocal(*[none] * len(Nonlocal._fields)),
     )
     return with_effects(body, groups)
@@ -60,7 +59,8 @@ def with_effects(body: Body, groups: Groups) -> Body:
         InputError: an unknown effect.
     """
     terms = body.nonlocal_terms._asdict()
-    viscosity = drag = torch.ones_like(groups.omega_bar)
+    viscosity: Any = np.ones(len(groups))
+    drag = np.ones(len(groups))
     for name, size in groups.effects.items():
         effect = effect_named(name)
         if effect.reach == "nonlocal":
@@ -79,16 +79,16 @@ def with_effects(body: Body, groups: Groups) -> Body:
     )
 
 
-def numbers(groups: Groups) -> Tensor:
-    """Return the numbers of B robots as rows, (K, B), in the order of `Body`; differentiable."""
+def numbers(groups: Groups) -> Floats:
+    """Return the numbers of B robots, (B, K), in the order of `Body`."""
     body = assemble(groups)
     parts = [getattr(body, name) for name in body._fields[:-1]] + list(body.nonlocal_terms)
-    return torch.cat([part.reshape(-1, len(groups)) for part in parts])
+    return np.ascontiguousarray(np.concatenate([part.reshape(-1, len(groups)) for part in parts]).T)
 
 
 def bodies(groups: Groups) -> list[Body]:
     """Return the robots for the compiled loops, one by one."""
-    return unpacked(numbers(groups).detach().cpu().numpy().T)
+    return unpacked(numbers(groups))
 
 
 def reversed_bodies(groups: Groups) -> list[Body]:
@@ -97,7 +97,7 @@ def reversed_bodies(groups: Groups) -> list[Body]:
 
 
 def unpacked(rows: Floats) -> list[Body]:
-    """Return robots for the compiled loops from their `numbers`, transposed: (B, K)."""
+    """Return robots for the compiled loops from their `numbers`, (B, K)."""
     columns: list[Any] = []
     at = 0
     for name in Body._fields[:-1]:

@@ -14,8 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from sim.arrays import Floats
 from sim.inputs import check_columns
@@ -72,11 +70,10 @@ class SmallCopy:
         if DWELL in columns and self.has_response:
             inputs = response_inputs(motions.tails, motions.motion)
             parts = [_network(self.arrays, name)(inputs) for name in NETWORKS[4:]]
-            mean, basis = (torch.tensor(self.arrays[f"curves.{name}"]).double() for name in ("mean", "basis"))
-            flat = (mean + torch.cat(parts, -1) @ basis).reshape(-1, len(DWELLS), 3)
-            lag = (flat * curve_speeds(motions.heads, motions.motion)[:, None, :]).numpy()
-            lag = between_dwells(lag, columns[DWELL])
-            twist = twists(result["v_z"], result["v_x"], result["omega_yr_bar"], motions.heads.sense.numpy())
+            mean, basis = (self.arrays[f"curves.{name}"].astype(float) for name in ("mean", "basis"))
+            flat = (mean + np.concatenate(parts, -1) @ basis).reshape(-1, len(DWELLS), 3)
+            lag = between_dwells(flat * curve_speeds(motions.heads, motions.motion)[:, None, :], columns[DWELL])
+            twist = twists(result["v_z"], result["v_x"], result["omega_yr_bar"], motions.heads.sense)
             speed = planar.net_speed(twist, lag, columns[DWELL])
             answers = zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True)
             result |= {name: np.where(values["N"] > 1, answer, np.nan) for name, answer in answers}
@@ -175,12 +172,12 @@ def _arrays(
     last = [f"{kind}.{network.shape['depth']}" for kind in ("weights", "biases")]
     exact = (*EXACT, *last) if last_exact else EXACT
     arrays: Arrays = {}
-    for part, tensor in network.state_dict().items():
-        values = tensor if part in EXACT else tensor[0]
+    for part, array in network.state.items():
+        values = array if part in EXACT else array[0]
         if part in ("bypass", "mean", "spread", *last):
             values = values[..., :outputs]
         kind = np.float16 if half and part not in exact else np.float32
-        arrays[f"{name}.{part}"] = np.ascontiguousarray(values.detach().numpy(), dtype=kind)
+        arrays[f"{name}.{part}"] = np.ascontiguousarray(values, dtype=kind)
     return arrays
 
 
@@ -191,18 +188,17 @@ def _curve_arrays(table: NeuralTable) -> Arrays:
     arrays: Arrays = {}
     for name, network in zip(NETWORKS[4:], table.curves.networks, strict=True):
         arrays |= _arrays(name, network.member(0), half=True, outputs=count)
-    vectors = torch.cat([lag.vectors[:count], _at_equal_dwells(memory.vectors[:count])])
+    vectors = np.concatenate([lag.vectors[:count], _at_equal_dwells(memory.vectors[:count])])
     mean = lag.mean + _at_equal_dwells(memory.mean[None])[0]
     return arrays | {
-        "curves.mean": mean.numpy().astype(np.float32),
-        "curves.basis": vectors.numpy().astype(np.float16),
+        "curves.mean": mean.astype(np.float32),
+        "curves.basis": vectors.astype(np.float16),
     }
 
 
-def _at_equal_dwells(flat: Tensor) -> Tensor:
+def _at_equal_dwells(flat: Floats) -> Floats:
     """Return memories (C, K D 3) where the dwell before is as long as the dwell, (C, D 3)."""
-    whole = flat.reshape(-1, *SHAPES["memory"]).numpy()
-    return torch.tensor(at_equal_dwells(whole)).reshape(len(flat), -1)
+    return at_equal_dwells(flat.reshape(-1, *SHAPES["memory"])).reshape(len(flat), -1)
 
 
 def network_depth(arrays: Arrays, name: str) -> int:
@@ -211,10 +207,6 @@ def network_depth(arrays: Arrays, name: str) -> int:
 
 def _network(arrays: Arrays, name: str) -> Ensemble:
     """Return the network of a name, in double precision."""
-    inputs, outputs = arrays[f"{name}.bypass"].shape
-    width = arrays[f"{name}.weights.0"].shape[1]
-    network = Ensemble(inputs, outputs, width=width, depth=network_depth(arrays, name), members=1, seed=0)
-    state = {part.removeprefix(f"{name}."): torch.tensor(array).double() for part, array in arrays.items()
-           if part.startswith(f"{name}.")}  # fmt: skip
-    network.load_state_dict({part: value if part in EXACT else value[None] for part, value in state.items()})
-    return network.requires_grad_(False)
+    state = {part.removeprefix(f"{name}."): array.astype(float) for part, array in arrays.items()
+             if part.startswith(f"{name}.")}  # fmt: skip
+    return Ensemble.from_state({part: value if part in EXACT else value[None] for part, value in state.items()})

@@ -1,88 +1,125 @@
-"""Networks of the look-up table: small multilayer perceptrons in double precision.
+"""Networks of the look-up table: small multilayer perceptrons in double precision, as trained.
 
     h_0 = x,   h_i = tanh(W_i h_{i−1} + b_i),   y = W h + b + A x
 
 K members are evaluated side by side; their mean is the answer. Inputs are shifted and scaled first. A scale
 larger than the spread says that the output changes slowly along this input; the first weights are then small.
 This is prior knowledge of the problem, and training gains much from it (docs/explanation/lookup.md).
+
+`surrogate.networks.compiled` evaluates the mean, one robot at a time. Here are all members at once, also for
+inputs that carry a derivative (`sim.linear.complex_step`). `surrogate.networks.trainable` trains.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
-import torch
-from torch import Tensor, nn
+import numpy as np
+
+from sim.arrays import Floats
+from surrogate.networks.compiled import Packed
+
+SHARED = ("shift", "scale", "mean", "spread")  # what the members have in common
 
 
-class Ensemble(nn.Module):
+def perceptrons(
+    x: Any, weights: Sequence[Any], biases: Sequence[Any], bypass: Any, tanh: Callable[[Any], Any]
+) -> Any:
+    """Return y of the module's head for every member, (K, M, O), at inputs (K, M, F) or (M, F).
+
+    Args:
+        weights, biases: layer by layer, (K, I, O) and (K, 1, O), arrays or tensors.
+        bypass: A, (K, F, O).
+        tanh: of such arrays or tensors.
+    """
+    hidden = x
+    for weight, bias in zip(weights[:-1], biases[:-1], strict=True):
+        hidden = tanh(hidden @ weight + bias)
+    return hidden @ weights[-1] + biases[-1] + x @ bypass
+
+
+@dataclass(frozen=True)
+class Ensemble:
     """K perceptrons, each plus a linear map; inputs (M, F), outputs (M, O)."""
 
-    shift: Tensor
-    scale: Tensor
-    mean: Tensor
-    spread: Tensor
+    weights: tuple[Floats, ...]  # of the layers, (K, I, O)
+    biases: tuple[Floats, ...]  # of the layers, (K, 1, O)
+    bypass: Floats  # (K, F, O)
+    shift: Floats  # (F,)
+    scale: Floats  # (F,)
+    mean: Floats  # (O,)
+    spread: Floats  # (O,)
 
-    def __init__(self, inputs: int, outputs: int, *, width: int, depth: int, members: int, seed: int):
-        super().__init__()
-        generator = torch.Generator().manual_seed(seed)
-        sizes = [inputs, *[width] * depth, outputs]
+    @staticmethod
+    def from_state(state: Mapping[str, Floats]) -> Ensemble:
+        """Return the network of arrays by name, see `state_shapes`."""
+        depth = sum(name.startswith("weights.") for name in state)
+        layers = {kind: tuple(state[f"{kind}.{k}"] for k in range(depth)) for kind in ("weights", "biases")}
+        return Ensemble(**layers, **{name: state[name] for name in ("bypass", *SHARED)})  # type: ignore[arg-type]
 
-        def random(*shape: int) -> Tensor:
-            return torch.randn(*shape, generator=generator, dtype=torch.float64)
-
-        pairs = list(pairwise(sizes))
-        self.weights = nn.ParameterList(
-            [nn.Parameter(random(members, i, o) / i**0.5 * (0.3 if k == depth else 1.0))
-             for k, (i, o) in enumerate(pairs)]
-        )  # fmt: skip
-        self.biases = nn.ParameterList([nn.Parameter(0.3 * random(members, 1, o)) for _, o in pairs])
-        self.bypass = nn.Parameter(torch.zeros(members, inputs, outputs, dtype=torch.float64))
-        for name, size, value in (("shift", inputs, 0.0), ("scale", inputs, 1.0),
-                                  ("mean", outputs, 0.0), ("spread", outputs, 1.0)):  # fmt: skip
-            self.register_buffer(name, torch.full((size,), value, dtype=torch.float64))
+    @property
+    def state(self) -> dict[str, Floats]:
+        """All arrays by name."""
+        layers = {f"weights.{k}": weight for k, weight in enumerate(self.weights)}
+        layers |= {f"biases.{k}": bias for k, bias in enumerate(self.biases)}
+        return {**layers, "bypass": self.bypass, **{name: getattr(self, name) for name in SHARED}}
 
     @property
     def shape(self) -> dict[str, int]:
-        """Arguments that make a network of this form."""
-        return {
-            "inputs": self.bypass.shape[1],
-            "outputs": self.bypass.shape[2],
-            "width": self.weights[0].shape[2],
-            "depth": len(self.weights) - 1,
-            "members": self.bypass.shape[0],
-        }
+        """Numbers of inputs, outputs and members; width and number of the hidden layers."""
+        members, inputs, outputs = self.bypass.shape
+        width, depth = self.weights[0].shape[2], len(self.weights) - 1
+        return {"inputs": inputs, "outputs": outputs, "width": width, "depth": depth, "members": members}
 
     def member(self, k: int) -> Ensemble:
-        """Return a network of one member: a copy of member k."""
-        alone = Ensemble(**{**self.shape, "members": 1}, seed=0).to(self.shift.device)
-        state = self.state_dict()
-        parameters = {name for name, _ in self.named_parameters()}
-        alone.load_state_dict(
-            {name: part[k : k + 1] if name in parameters else part for name, part in state.items()}
-        )
-        return alone
+        """Return the network of member k alone."""
+        state = self.state
+        return Ensemble.from_state({n: part if n in SHARED else part[k : k + 1] for n, part in state.items()})
 
-    def replace_member(self, k: int, alone: Ensemble) -> None:
-        """Take the numbers of a network of one member as member k."""
-        with torch.no_grad():
-            for mine, other in zip(self.parameters(), alone.parameters(), strict=True):
-                mine[k] = other[0]
-
-    def standardised(self, x: Tensor) -> Tensor:
-        """Return outputs of every member before `mean` and `spread`, (K, M, O), for standardised inputs (M, F)."""
-        first = x.expand(self.bypass.shape[0], -1, -1)
-        hidden = first
-        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
-            hidden = torch.tanh(torch.matmul(hidden, weight) + bias)
-        return torch.matmul(hidden, self.weights[-1]) + self.biases[-1] + torch.matmul(first, self.bypass)
-
-    def members_at(self, inputs: Tensor) -> Tensor:
+    def members_at(self, inputs: Floats) -> Floats:
         """Return outputs of every member, (K, M, O); of more inputs than it has, a network takes the first."""
-        return (
-            self.standardised((inputs[..., : len(self.shift)] - self.shift) / self.scale) * self.spread + self.mean
+        x = (inputs[..., : len(self.shift)] - self.shift) / self.scale
+        y = perceptrons(x, self.weights, self.biases, self.bypass, _tanh)
+        return np.asarray(y * self.spread + self.mean)
+
+    def __call__(self, inputs: Floats) -> Floats:
+        """Return the mean of the members, (M, O)."""
+        return np.asarray(self.members_at(inputs).mean(0))
+
+    @cached_property
+    def packed(self) -> Packed:
+        """The same numbers for the compiled loops."""
+        shape, parts = self.shape, []
+        for k in range(shape["members"]):
+            for weight, bias in zip(self.weights, self.biases, strict=True):
+                parts += [weight[k].ravel(), bias[k].ravel()]
+            parts.append(self.bypass[k].ravel())
+        return Packed(
+            *(self.shift, self.scale, self.mean, self.spread, np.concatenate(parts)),
+            *(shape["width"], shape["depth"], shape["members"]),
         )
 
-    def forward(self, inputs: Tensor) -> Tensor:
-        """Return the mean of the members, (M, O)."""
-        return self.members_at(inputs).mean(0)
+
+def state_shapes(*, inputs: int, outputs: int, width: int, depth: int, members: int) -> dict[str, tuple[int, ...]]:
+    """Return the shape of every array in the state of a network."""
+    pairs = list(pairwise([inputs, *[width] * depth, outputs]))
+    return {
+        **{f"weights.{k}": (members, i, o) for k, (i, o) in enumerate(pairs)},
+        **{f"biases.{k}": (members, 1, o) for k, (_, o) in enumerate(pairs)},
+        "bypass": (members, inputs, outputs),
+        "shift": (inputs,),
+        "scale": (inputs,),
+        "mean": (outputs,),
+        "spread": (outputs,),
+    }
+
+
+def _tanh(x: Any) -> Any:
+    if np.isrealobj(x):
+        return np.tanh(x)
+    value = np.tanh(x.real)
+    return value + 1j * (1 - value * value) * x.imag

@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from surrogate.networks.bfgs import Minimiser
 from surrogate.networks.checkpoints import Checkpoint, State, TrainingContext
-from surrogate.networks.ensemble import Ensemble
+from surrogate.networks.trainable import TrainableEnsemble
 
 Bar = Any  # tqdm is generic for type checkers only
 Residual = Callable[..., Tensor]  # y (K, m, O), and data of the same m rows -> r (K, m, D)
@@ -58,11 +58,11 @@ class Problem:
     weights: Tensor  # (M,)
     residual: Residual
 
-    def errors(self, network: Ensemble, rows: Tensor) -> Tensor:
+    def errors(self, network: TrainableEnsemble, rows: Tensor) -> Tensor:
         """Compute |r| of rows (m,), (K, m)."""
         return self._residuals(network, rows).norm(dim=-1)
 
-    def loss(self, network: Ensemble, rows: Tensor, soft: float) -> Tensor:
+    def loss(self, network: TrainableEnsemble, rows: Tensor, soft: float) -> Tensor:
         """Return the loss over rows (m,), summed over the members."""
         weighted = self._residuals(network, rows) * self.weights[rows, None]
         return ((weighted.square().sum(-1) + soft**2) ** _POWER).mean(1).sum()
@@ -71,13 +71,13 @@ class Problem:
         """Return indices of all rows, (M,)."""
         return torch.arange(len(self.x), device=self.x.device)
 
-    def _residuals(self, network: Ensemble, rows: Tensor) -> Tensor:
+    def _residuals(self, network: TrainableEnsemble, rows: Tensor) -> Tensor:
         y = network.standardised(self.x[rows]) * network.spread + network.mean
         return self.residual(y, *(part[rows] for part in self.data))
 
 
 def fit(
-    network: Ensemble,
+    network: TrainableEnsemble,
     inputs: Tensor,
     data: Sequence[Tensor],
     residual: Residual,
@@ -135,7 +135,7 @@ class Watch:
     bar: Bar
     unit: str
 
-    def look(self, network: Ensemble) -> None:
+    def look(self, network: TrainableEnsemble) -> None:
         """Advance the bar and show the error that 95 % of the learned rows do not reach."""
         if self.bar.disable:
             return
@@ -150,7 +150,7 @@ class Watch:
         self.checkpoint.write(state)
 
 
-def _adam(network: Ensemble, problem: Problem, settings: Settings, watch: Watch, state: State) -> None:
+def _adam(network: TrainableEnsemble, problem: Problem, settings: Settings, watch: Watch, state: State) -> None:
     """Train in small batches, all members side by side."""
     network.requires_grad_(True)
     generator = torch.Generator().manual_seed(settings.seed)
@@ -175,7 +175,9 @@ def _adam(network: Ensemble, problem: Problem, settings: Settings, watch: Watch,
         watch.keep(lambda now=now: now | _states({"network": network, **parts}))  # type: ignore[misc]
 
 
-def _polish(network: Ensemble, k: int, problem: Problem, iterations: int, watch: Watch, state: State) -> None:
+def _polish(
+    network: TrainableEnsemble, k: int, problem: Problem, iterations: int, watch: Watch, state: State
+) -> None:
     """Train one member on all rows at once."""
     alone = network.member(k).requires_grad_(True)
     parameters, everything = list(alone.parameters()), problem.every()

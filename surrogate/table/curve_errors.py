@@ -2,8 +2,8 @@
 
 The errors of held-out robots are projected on the principal components of the curves
 (`surrogate.table.response_table`): what is outside them is the noise of the simulator's time steps, and does not
-count. Over the speeds and the local size of each axis, they have a covariance over axis, dwell and dwell before. Its
-principal components are the modes. The sizes are learned as widths of intervals (`surrogate.table.intervals`): of
+count. Over the speeds and the local size of each axis, they have a covariance over axis, dwell and dwell before.
+Its principal components are the modes. The sizes are learned as widths of intervals (`surrogate.table.intervals`): of
 robots that the table knows less well, errors are larger. An error of more than _OUTLIER sizes counts as this many.
 """
 
@@ -16,20 +16,13 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.model.response import LAGS
-from sim.model.response import BEFORE, DWELLS
 from surrogate.table.intervals import Intervals
 from surrogate.table.response_table import Basis
 
-import torch
-
-
-def _t(x):
-    return torch.as_tensor(np.asarray(x))
-
-
+CURVE_ERRORS = "curve_errors"  # the entry of a model file; files of earlier versions lack it
 KINDS = ("lag", "memory")
 NORMAL_90 = 1.6449  # half of an interval that holds 90 % of a normal distribution, in standard deviations
-_SIZES = LAGS  # the names of the sizes among the widths
+SIZES = LAGS  # the names of the sizes among the widths
 _OUTLIER = 2.5
 _KEPT = 0.99  # share of the variance
 
@@ -84,9 +77,9 @@ def _within(errors: Floats, vectors: Floats) -> Floats:
 
 
 def _named(sizes: Floats) -> dict[str, Floats]:
-    return dict(zip(_SIZES, sizes.T, strict=True))
+    return dict(zip(SIZES, sizes.T, strict=True))
 
 
 def _sizes(widths: Intervals, features: Floats) -> Floats:
     """Return one standard deviation of the errors of each axis, (M, 3)."""
-    return np.stack([widths.half_widths(name, features, 1.0) for name in _SIZES], -1) / NORMAL_90
+    return np.stack([widths.half_widths(name, features, 1.0) for name in SIZES], -1) / NORMAL_90

@@ -1,11 +1,11 @@
 """The error of a table at one robot, as independent modes of one standard deviation each.
 
-A steady error is a number. An error of the response to a flip is a curve: it depends on the dwell and on the dwell
-before, so it does not cancel between the unequal dwells of a turn, and adds up over many flips. Where only the size
-of this error is known, it is taken as a Gaussian process over ln T and ln S (dwell and dwell before) with the
-squared exponential kernel of unit length, which is a factor of e in either dwell:
+A steady error is a number. An error of the response to a flip is a curve: it depends on the dwell T and on the
+dwell before S, so it does not cancel between the unequal dwells of a turn, and adds up over many flips. Where only
+the size of this error is known, it is taken as a Gaussian process with the squared exponential kernel of length λ
+in the logarithms of the dwells:
 
-    k = exp(−(ln T/T')²/2 − (ln S/S')²/2)
+    k = exp(−(ln T/T')²/2λ² − (ln S/S')²/2λ²)
 
 Its modes are the principal components of k on the knots of the curves. Source: Rasmussen and Williams, Gaussian
 Processes for Machine Learning (2006), ch. 4.

@@ -18,13 +18,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-import torch
-from torch import Tensor
+import numpy as np
+
+from sim.arrays import Floats, Integers
 
 COVERAGE = 0.90
 _TINY = 1e-9  # of the scale of an output
 _RIDGE = 1e-3
-_HALVED = (0, 3, 5)  # features whose halves make the octants: drag number, deflection, forward motion
+_HALVED = [0, 3, 5]  # features whose halves make the octants: drag number, deflection, forward motion
 _ONE_TAIL = -1  # the width feature that is 1 for one tail
 PARTS = 2 ** len(_HALVED) + 1
 _FEWEST = 40  # robots in a part, for a q of its own
@@ -35,80 +36,78 @@ _FIRMEST, _SOFTEST = 0.002, 0.998  # s is held between these quantiles of itself
 class Intervals:
     """Half-widths of the outputs, as learned."""
 
-    shift: Tensor  # (F,)
-    scale: Tensor  # (F,)
-    weights: Mapping[str, Tensor]  # output -> (P,)
+    shift: Floats  # (F,)
+    scale: Floats  # (F,)
+    weights: Mapping[str, Floats]  # output -> (P,)
     bounds: Mapping[str, tuple[float, float]]  # output -> smallest and largest ln s
-    middle: Tensor  # (3,), the halves meet here
-    factor: Mapping[str, Tensor]  # output -> q of each part, (PARTS,)
+    middle: Floats  # (3,), the halves meet here
+    factor: Mapping[str, Floats]  # output -> q of each part, (PARTS,)
 
-    def half_widths(self, name: str, features: Tensor, sizes: Tensor) -> Tensor:
+    def half_widths(self, name: str, features: Floats, sizes: Floats | float) -> Floats:
         """Return half of the width of the interval of one output, (M,).
 
         Args:
             features: (M, F), see `surrogate.table.lookup`.
-            sizes: (M,), what errors of this output are relative to.
+            sizes: (M,) or one number, what errors of this output are relative to.
         """
         return self.factor[name][self.part(features)] * self._local(name, features) * sizes
 
-    def part(self, features: Tensor) -> Tensor:
+    def part(self, features: Floats) -> Integers:
         """Return which part each robot belongs to, (M,): 0 to 7 for octants, 8 for one tail."""
-        high = (features[:, list(_HALVED)] > self.middle).long()
-        octant = (high * 2 ** torch.arange(len(_HALVED))).sum(1)
-        return torch.where(features[:, _ONE_TAIL] > 0.5, PARTS - 1, octant)
+        octant = (features[:, _HALVED] > self.middle) @ 2 ** np.arange(len(_HALVED))
+        return np.where(features[:, _ONE_TAIL] > 0.5, PARTS - 1, octant)
 
-    def _local(self, name: str, features: Tensor) -> Tensor:
+    def _local(self, name: str, features: Floats) -> Floats:
         low, high = self.bounds[name]
-        return torch.exp((_design((features - self.shift) / self.scale) @ self.weights[name]).clamp(low, high))
+        return np.exp(np.clip(_design((features - self.shift) / self.scale) @ self.weights[name], low, high))
 
     @staticmethod
     def learned(
-        features: Tensor, errors: Mapping[str, Tensor], more_features: Tensor, more_errors: Mapping[str, Tensor]
+        features: Floats, errors: Mapping[str, Floats], more_features: Floats, more_errors: Mapping[str, Floats]
     ) -> Intervals:
         """Learn from relative errors by output, (M,), of robots for s and of more robots, (M',), for q."""
-        shift, scale = features.mean(0), torch.clamp(features.std(0), min=1e-6)
+        shift, scale = features.mean(0), np.maximum(features.std(0, ddof=1), 1e-6)
         design = _design((features - shift) / scale)
         weights, bounds, factor = {}, {}, {}
         for name, error in errors.items():
-            known = torch.isfinite(error)
+            known = np.isfinite(error)
             if not known.any():  # nothing to learn from: the interval is infinite
-                weights[name] = torch.zeros(design.shape[1], dtype=design.dtype)
+                weights[name] = np.zeros(design.shape[1])
                 bounds[name] = (0.0, 0.0)
                 continue
-            logs, rows = torch.log(error[known].abs() + _TINY), design[known]
-            matrix = rows.T @ rows + _RIDGE * len(rows) * torch.eye(rows.shape[1], dtype=rows.dtype)
-            weights[name] = torch.linalg.solve(matrix, rows.T @ logs)
-            low, high = (rows @ weights[name]).quantile(torch.tensor([_FIRMEST, _SOFTEST], dtype=rows.dtype))
+            logs, rows = np.log(np.abs(error[known]) + _TINY), design[known]
+            matrix = rows.T @ rows + _RIDGE * len(rows) * np.eye(rows.shape[1])
+            weights[name] = np.asarray(np.linalg.solve(matrix, rows.T @ logs), dtype=float)
+            low, high = np.quantile(rows @ weights[name], [_FIRMEST, _SOFTEST])
             bounds[name] = (float(low), float(high))
         several = features[features[:, _ONE_TAIL] < 0.5]
-        middle = (several if len(several) else features)[:, list(_HALVED)].median(0).values
+        middle = np.quantile((several if len(several) else features)[:, _HALVED], 0.5, axis=0, method="lower")
         plain = Intervals(shift, scale, weights, bounds, middle, {})
         part = plain.part(more_features)
         for name, error in more_errors.items():
-            known = torch.isfinite(error)
-            scores = error[known].abs() / plain._local(name, more_features[known])
+            known = np.isfinite(error)
+            scores = np.abs(error[known]) / plain._local(name, more_features[known])
             each = [scores[part[known] == k] for k in range(PARTS)]
-            factor[name] = torch.tensor(
+            factor[name] = np.array(
                 [
                     _conformal_quantile(part_scores if len(part_scores) >= _FEWEST else scores)
                     for part_scores in each
-                ],
-                dtype=torch.float64,
+                ]
             )
         return replace(plain, factor=factor)
 
 
-def _design(x: Tensor) -> Tensor:
+def _design(x: Floats) -> Floats:
     """Assemble 1, x and all products of two, (M, P), with x held to five standard deviations."""
-    x = x.clamp(-5, 5)
-    first, second = torch.triu_indices(x.shape[1], x.shape[1]).unbind(0)
-    return torch.cat([torch.ones_like(x[:, :1]), x, x[:, first] * x[:, second]], 1)
+    x = np.clip(x, -5, 5)
+    first, second = np.triu_indices(x.shape[1])
+    return np.concatenate([np.ones((len(x), 1)), x, x[:, first] * x[:, second]], 1)
 
 
-def _conformal_quantile(scores: Tensor) -> float:
+def _conformal_quantile(scores: Floats) -> float:
     """Return the smallest score that covers a new row with a probability of at least COVERAGE."""
     count = len(scores)
     if not count:
         return math.inf
-    rank = min(int(torch.ceil(torch.tensor((count + 1) * COVERAGE))), count)
-    return float(scores.sort().values[rank - 1])
+    rank = min(math.ceil((count + 1) * COVERAGE), count)
+    return float(np.sort(scores)[rank - 1])

@@ -18,8 +18,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
@@ -32,7 +30,7 @@ from sim.model.response import DWELLS, LAGS, Responses, at_equal_dwells
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.networks.ensemble import Ensemble
-from surrogate.table.curve_errors import NORMAL_90, CurveErrors
+from surrogate.table.curve_errors import CURVE_ERRORS, NORMAL_90, CurveErrors
 from surrogate.table.error_modes import STEADY, ErrorModes, error_modes, joined
 from surrogate.table.errors import RELATIVE, error_scale
 from surrogate.table.intervals import Intervals
@@ -69,7 +67,7 @@ class Motions(NamedTuple):
 
     heads: Heads
     tails: Tails
-    motion: Tensor  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor
+    motion: Floats  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor
     inputs: Floats  # (M, 7) of the networks, see `surrogate.wrench.tails.tail_inputs`
     reason: list[str]  # why a robot is outside; else empty
 
@@ -123,7 +121,7 @@ class NeuralTable:
         result: dict[str, Any] = steady_outputs(motions, self.tails)
         if DWELL in columns:
             dwells = _checked_dwells(columns[DWELL])
-            result |= _at_dwells(self._responses(motions, result), result, dwells, motions.heads.sense.numpy())
+            result |= _at_dwells(self._responses(motions, result), result, dwells, motions.heads.sense)
         if intervals:
             result |= self._intervals(motions, result)
         if flag:
@@ -155,8 +153,8 @@ class NeuralTable:
             return error_modes(self.errors, motion)
         ends = self._intervals(motions, steady)
         sizes = [float(ends[f"{name}_high"][0] - ends[f"{name}_low"][0]) / (2 * NORMAL_90) for name in STEADY]
-        speeds = curve_speeds(motions.heads, torch.as_tensor(motions.motion)).numpy()
-        curves = self.curve_errors.modes(self.width_features(motions).numpy(), speeds)
+        speeds = curve_speeds(motions.heads, motions.motion)
+        curves = self.curve_errors.modes(self.width_features(motions), speeds)
         own = [self.curve_errors.simulator * float(error_scale(name, motion)) for name in STEADY]
         return joined(np.diag(np.hypot(sizes, own)), curves)
 
@@ -224,42 +222,41 @@ class NeuralTable:
         motion, converged = self.tails.solve(heads, tails)
         inputs = inputs_rows(pack_tails(tails), motion)
         known = converged & self._within_ranges(values)
-        reasons = self._reasons(network_index(tails.number).numpy(), motion, inputs, known)
+        reasons = self._reasons(network_index(tails.number), motion, inputs, known)
         if any(reasons) and not flag:
             row, reason = next((row, reason) for row, reason in enumerate(reasons) if reason)
             raise InputError(self._refusal(values, row, reason))
-        return Motions(heads, tails, torch.from_numpy(motion), inputs, reasons)
+        return Motions(heads, tails, motion, inputs, reasons)
 
-    def width_features(self, motions: Motions) -> Tensor:
+    def width_features(self, motions: Motions) -> Floats:
         """Return what the width of an interval may depend on, (M, 11)."""
         heads, tails, motion = motions.heads, motions.tails, motions.motion
-        inputs = torch.from_numpy(motions.inputs)
-        novelty, spread = torch.zeros(len(motion)).double(), torch.zeros(len(motion)).double()
+        inputs = motions.inputs
+        novelty, spread = np.zeros(len(motion)), np.zeros(len(motion))
         weight = motion_sensitivity(heads, tails, motion) @ wrench_slopes(tails, motion)
         kind = network_index(tails.number)
         for k, network in enumerate(self.tails.wrench):
-            rows = torch.nonzero(kind == k)[:, 0]
+            rows = np.flatnonzero(kind == k)
             support = self.support[k]
             if len(rows) and network is not None and support is not None:
-                novelty[rows] = torch.from_numpy(support.novelty(motions.inputs[rows.numpy()]))
-                members = network.members_at(torch.cat([inputs[rows], tails.head[rows]], -1))
+                novelty[rows] = support.novelty(inputs[rows])
+                members = network.members_at(np.concatenate([inputs[rows], tails.head[rows]], -1))
                 apart = (weight[rows] @ (members - members.mean(0))[..., None])[..., 0]
-                spread[rows] = apart.norm(dim=-1).mean(0)
+                spread[rows] = np.linalg.norm(apart, axis=-1).mean(0)
         extra = [
-            torch.log(novelty + 1e-12),
-            torch.log(spread + 1e-9),
-            torch.log(tails.number),
-            (kind == 0).double(),
+            np.log(novelty + 1e-12),
+            np.log(spread + 1e-9),
+            np.log(tails.number),
+            kind == 0,
         ]
-        return torch.nan_to_num(torch.cat([inputs, torch.stack(extra, -1)], -1))
+        return np.nan_to_num(np.column_stack([inputs, *extra]))
 
     def _intervals(self, motions: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
         if self.intervals is None:
             raise InputError("this look-up table has no intervals; train it again")
         features, added = self.width_features(motions), {}
         for name in [name for name in result if name in self.intervals.factor]:
-            size = torch.tensor(np.broadcast_to(error_scale(name, result), result[name].shape))
-            half = self.intervals.half_widths(name, features, size).numpy()
+            half = self.intervals.half_widths(name, features, error_scale(name, result))
             half = np.where(np.isfinite(result[name]), half, 0.0)
             added[f"{name}_low"], added[f"{name}_high"] = result[name] - half, result[name] + half
         return added
@@ -297,7 +294,7 @@ class NeuralTable:
 
     def _responses(self, motions: Motions, steady: Mapping[str, Floats]) -> Responses:
         curves = self.curves.curves(motions.heads, motions.tails, motions.motion)
-        sense = motions.heads.sense.numpy()
+        sense = motions.heads.sense
         twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
         speed = net_speeds(twist, curves["lag"], curves["memory"])
         none = np.zeros(len(sense), dtype=bool)
@@ -330,7 +327,7 @@ def _check_flips(values: Mapping[str, Floats]) -> None:
 def steady_outputs(motions: Motions, tails: WrenchTable) -> dict[str, Floats]:
     """Return STEADY_OUTPUTS of motions."""
     values = tails.outputs(motions.heads, motions.motion, tails.quick_gap(motions.tails, motions.inputs))
-    return {name: np.asarray(value.numpy()) for name, value in zip(STEADY_OUTPUTS, values, strict=True)}
+    return dict(zip(STEADY_OUTPUTS, values, strict=True))
 
 
 def _checked_dwells(dwells: Floats) -> Floats:
@@ -355,28 +352,38 @@ def _at_dwells(
 
 
 def table_content(lookup: NeuralTable) -> dict[str, Any]:
-    """Return a table as nested dictionaries and lists of tensors and plain values."""
-    intervals = lookup.intervals
-    return {
+    """Return a table as nested dictionaries and lists of arrays and plain values."""
+    content = {
         "wrench": [None if network is None else _stored(network) for network in lookup.tails.wrench],
         "gap": _stored(lookup.tails.gap),
         "curves": [_stored(network) for network in lookup.curves.networks],
         "bases": {name: {"mean": b.mean, "vectors": b.vectors} for name, b in lookup.curves.bases.items()},
         "support": [None if support is None else vars(support) for support in lookup.support],
-        "intervals": None if intervals is None else {k: _plain(v) for k, v in vars(intervals).items()},
+        "intervals": None if lookup.intervals is None else _widths(lookup.intervals),
         "ranges": {name: list(ends) for name, ends in lookup.ranges.items()},
         "errors": lookup.errors,
         "provenance": lookup.provenance,
     }
+    errors = lookup.curve_errors
+    if errors is not None:
+        content[CURVE_ERRORS] = {
+            "widths": _widths(errors.widths),
+            "curves": errors.curves,
+            "simulator": errors.simulator,
+        }
+    return content
+
+
+def _widths(intervals: Intervals) -> dict[str, Any]:
+    return {name: _plain(value) for name, value in vars(intervals).items()}
 
 
 def _stored(network: Ensemble) -> dict[str, Any]:
-    state = {name: part.detach() for name, part in network.state_dict().items()}
-    return {"shape": network.shape, "state": state}
+    return {"shape": network.shape, "state": network.state}
 
 
 def _plain(value: Any) -> Any:
     """Return mappings as dictionaries, and pairs as lists."""
-    if isinstance(value, Tensor):
+    if isinstance(value, np.ndarray):
         return value
     return {name: list(part) if isinstance(part, tuple) else part for name, part in dict(value).items()}

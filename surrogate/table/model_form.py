@@ -1,4 +1,4 @@
-"""The form of the content of a model file: which entries, which tensors, of which shapes.
+"""The form of the content of a model file: which entries, which arrays, of which shapes.
 
 Compiled loops do not check the bounds of arrays. So a content of another form must be refused before it is used.
 """
@@ -9,11 +9,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import torch
-from torch import Tensor
+import numpy as np
 
+from sim.model.response import BEFORE
 from surrogate.input_ranges import ROBOT
-from surrogate.networks.ensemble import Ensemble
+from surrogate.networks.ensemble import state_shapes
+from surrogate.table.curve_errors import CURVE_ERRORS, SIZES
 from surrogate.table.intervals import PARTS as INTERVAL_PARTS
 from surrogate.table.response_table import PARTS, SHAPES
 from surrogate.table.support import monomial_count
@@ -56,6 +57,8 @@ def check_form(content: Mapping[str, Any]) -> None:
             _check_support(part)
     if content["intervals"] is not None:
         _check_intervals(content["intervals"])
+    if CURVE_ERRORS in content:
+        _check_curve_errors(content[CURVE_ERRORS])
 
 
 def _check_numbers(content: Mapping[str, Any]) -> None:
@@ -73,7 +76,7 @@ def _check_numbers(content: Mapping[str, Any]) -> None:
     widths = content["intervals"] or {}
     if not _all_finite([*numbers, *(widths[name] for name in widths if name != "factor")]):
         raise IncompleteError("some of its numbers are not finite")
-    if any(bool(torch.isnan(part).any()) for part in widths.get("factor", {}).values()):  # infinite: no rows
+    if any(np.isnan(part).any() for part in widths.get("factor", {}).values()):  # infinite: no rows
         raise IncompleteError("some of its intervals are no numbers")
 
 
@@ -86,15 +89,15 @@ def _check_network(stored: Mapping[str, Any], inputs: tuple[int, ...], outputs: 
         raise IncompleteError("a network has another shape than is said")
     if shape["inputs"] not in inputs or shape["outputs"] != outputs:
         raise IncompleteError("a network has other inputs or outputs than are needed")
-    for name, tensor in Ensemble(**shape, seed=0).state_dict().items():
-        _check_tensor(state[name], tuple(tensor.shape))
+    for name, expected in state_shapes(**shape).items():
+        _check_array(state[name], expected)
 
 
 def _check_curves(networks: list[Any], bases: Mapping[str, Any]) -> None:
     for name, basis in bases.items():
         points = math.prod(SHAPES[name])
-        _check_tensor(basis["mean"], (points,))
-        _check_tensor(basis["vectors"], (len(basis["vectors"]), points))
+        _check_array(basis["mean"], (points,))
+        _check_array(basis["vectors"], (len(basis["vectors"]), points))
     for names, network in zip(PARTS, networks, strict=True):
         _check_network(network, (_CURVE_INPUTS,), sum(len(bases[name]["vectors"]) for name in names))
 
@@ -102,7 +105,7 @@ def _check_curves(networks: list[Any], bases: Mapping[str, Any]) -> None:
 def _check_support(part: Mapping[str, Any]) -> None:
     size = monomial_count(len(INPUTS))
     for name, shape in (("shift", (len(INPUTS),)), ("scale", (len(INPUTS),)), ("factor", (size, size))):
-        _check_tensor(part[name], shape)
+        _check_array(part[name], shape)
     if not isinstance(part["limit"], float) or not part["limit"] > 0:
         raise IncompleteError("its domain has no limit")
 
@@ -110,23 +113,37 @@ def _check_support(part: Mapping[str, Any]) -> None:
 def _check_intervals(part: Mapping[str, Any]) -> None:
     terms = 1 + _WIDTH_FEATURES + _WIDTH_FEATURES * (_WIDTH_FEATURES + 1) // 2
     for name, shape in (("shift", (_WIDTH_FEATURES,)), ("scale", (_WIDTH_FEATURES,)), ("middle", (3,))):
-        _check_tensor(part[name], shape)
+        _check_array(part[name], shape)
     if not set(part["factor"]) <= set(part["weights"]) & set(part["bounds"]):
         raise IncompleteError("its intervals are incomplete")
     for name, factor in part["factor"].items():
-        _check_tensor(factor, (INTERVAL_PARTS,))
-        _check_tensor(part["weights"][name], (terms,))
+        _check_array(factor, (INTERVAL_PARTS,))
+        _check_array(part["weights"][name], (terms,))
         low, high = part["bounds"][name]
         if not low <= high:
             raise IncompleteError("its intervals have no bounds")
 
 
-def _check_tensor(part: Any, shape: tuple[int, ...]) -> None:
-    if not isinstance(part, Tensor) or part.dtype != torch.float64 or tuple(part.shape) != shape:
+def _check_curve_errors(part: Mapping[str, Any]) -> None:
+    _check_intervals(part["widths"])
+    curves, simulator = part["curves"], part["simulator"]
+    if not set(SIZES) <= set(part["widths"]["factor"]):
+        raise IncompleteError("the errors of its response have no sizes")
+    _check_array(curves, (len(curves), len(BEFORE) + 1, *SHAPES["lag"]))
+    if (
+        not isinstance(simulator, float)
+        or not 0 <= simulator < math.inf
+        or not _all_finite([part["widths"], curves])
+    ):
+        raise IncompleteError("the errors of its response are no finite numbers")
+
+
+def _check_array(part: Any, shape: tuple[int, ...]) -> None:
+    if not isinstance(part, np.ndarray) or part.dtype != np.float64 or part.shape != shape:
         raise IncompleteError(f"an array is not one of {' × '.join(map(str, shape))} numbers")
 
 
 def _all_finite(part: Any) -> bool:
     if isinstance(part, Mapping | list):
         return all(_all_finite(own) for own in (part.values() if isinstance(part, Mapping) else part))
-    return part is None or bool(torch.isfinite(torch.as_tensor(part)).all())
+    return part is None or bool(np.isfinite(part).all())

@@ -21,11 +21,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from sim.arrays import Floats
 from sim.model.response import BEFORE, DWELLS
+from surrogate.networks.compiled import evaluate_rows
 from surrogate.networks.ensemble import Ensemble
 from surrogate.wrench.heads import Heads
 from surrogate.wrench.tails import Tails, tail_inputs
@@ -44,8 +43,8 @@ _OF_HEAD = [0, 1, 2, 3, 5, 6]  # of the inputs of the head: all but the coupling
 class Basis(NamedTuple):
     """Principal components of one kind of curve, flattened: curve = mean + c · vectors."""
 
-    mean: Tensor  # (D,)
-    vectors: Tensor  # (C, D)
+    mean: Floats  # (D,)
+    vectors: Floats  # (C, D)
 
 
 @dataclass(frozen=True)
@@ -55,34 +54,34 @@ class ResponseTable:
     networks: tuple[Ensemble, ...]  # one for each of PARTS
     bases: Mapping[str, Basis]
 
-    def curves(self, heads: Heads, tails: Tails, motion: Tensor) -> dict[str, Floats]:
+    def curves(self, heads: Heads, tails: Tails, motion: Floats) -> dict[str, Floats]:
         """Return lag, memory, rest and spread, each (M, …, 3) as in SHAPES, in l, l, rad, for a positive motor."""
         inputs, speeds = response_inputs(tails, motion), curve_speeds(heads, motion)
         curves = {}
         for names, network in zip(PARTS, self.networks, strict=True):
-            sizes = [len(self.bases[name].vectors) for name in names]
-            for name, components in zip(names, network(inputs).split(sizes, -1), strict=True):
+            ends = np.cumsum([len(self.bases[name].vectors) for name in names])[:-1]
+            answer = evaluate_rows(network.packed, inputs)
+            for name, components in zip(names, np.split(answer, ends, axis=1), strict=True):
                 curve = self.bases[name].mean + components @ self.bases[name].vectors
-                scaled = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name])
-                curves[name] = np.asarray(scaled.numpy())
+                curves[name] = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name])
         curves["spread"] = np.maximum(curves["spread"], 0.0)
         return curves
 
 
-def response_inputs(tails: Tails, motion: Tensor) -> Tensor:
+def response_inputs(tails: Tails, motion: Floats) -> Floats:
     """Return inputs of the network, (M, 15)."""
-    extra = [torch.log(tails.number), (tails.number == 2).double()]
-    return torch.cat([tail_inputs(tails, motion), tails.head[:, _OF_HEAD], torch.stack(extra, -1)], -1)
+    two = (tails.number == 2).astype(float)
+    return np.column_stack([tail_inputs(tails, motion), tails.head[:, _OF_HEAD], np.log(tails.number), two])
 
 
-def curve_speeds(heads: Heads, motion: Tensor) -> Tensor:
+def curve_speeds(heads: Heads, motion: Floats) -> Floats:
     """Return (w, v_x, ω_yr) of the head's centre, (M, 3): what the curves are divided by."""
     v_x, v_z, yaw = motion[:, 0], motion[:, 1], motion[:, 2]
     sway = v_x + yaw * heads.length / 2
-    return torch.stack([torch.hypot(v_z, _SMALL_SURGE * sway), sway, yaw], -1)
+    return np.column_stack([np.hypot(v_z, _SMALL_SURGE * sway), sway, yaw])
 
 
-def along_axes(speeds: Tensor, shape: tuple[int, ...]) -> Tensor:
+def along_axes(speeds: Floats, shape: tuple[int, ...]) -> Floats:
     """Return speeds (M, 3) with axes of length 1 between, to multiply curves (M, *shape)."""
     return speeds.reshape(len(speeds), *[1] * (len(shape) - 1), 3)
 

@@ -14,8 +14,6 @@ from functools import cache
 from itertools import combinations_with_replacement
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from sim.arrays import Floats, Integers
 from sim.compiling import compiled
@@ -30,27 +28,27 @@ _REGULAR = 1e-9
 class Support:
     """Where a table has learned."""
 
-    shift: Tensor  # (F,)
-    scale: Tensor  # (F,)
-    factor: Tensor  # (P, P): the Cholesky factor of M
+    shift: Floats  # (F,)
+    scale: Floats  # (F,)
+    factor: Floats  # (P, P): the Cholesky factor of M
     limit: float
 
     @staticmethod
-    def learned(inputs: Tensor) -> Support:
+    def learned(inputs: Floats) -> Support:
         """Learn the support of rows (M, F)."""
-        low, high = inputs.min(0).values, inputs.max(0).values
-        shift, scale = (low + high) / 2, torch.clamp((high - low) / 2, min=1e-6)
+        low, high = inputs.min(0), inputs.max(0)
+        shift, scale = (low + high) / 2, np.maximum((high - low) / 2, 1e-6)
         features = _monomials((inputs - shift) / scale)
         moments = features.T @ features / len(inputs)
-        moments = moments + _REGULAR * torch.eye(len(moments), dtype=moments.dtype)
-        plain = Support(shift, scale, torch.linalg.cholesky(moments), 1.0)
-        limit = _SLACK * float(np.quantile(plain.novelty(inputs.numpy()), _KEPT))
+        moments = moments + _REGULAR * np.eye(len(moments))
+        plain = Support(shift, scale, np.asarray(np.linalg.cholesky(moments), dtype=float), 1.0)
+        limit = _SLACK * float(np.quantile(plain.novelty(inputs), _KEPT))
         return Support(shift, scale, plain.factor, limit)
 
     def novelty(self, inputs: Floats) -> Floats:
         """Return q over its limit, (M,), at inputs (M, F): at most 1 inside."""
-        shift, scale, factor = (np.asarray(part.numpy()) for part in (self.shift, self.scale, self.factor))
-        return _novelty_rows(shift, scale, factor, *_products(len(shift)), inputs) / self.limit
+        parents, last = _products(len(self.shift))
+        return _novelty_rows(self.shift, self.scale, self.factor, parents, last, inputs) / self.limit
 
 
 def monomial_count(inputs: int) -> int:
@@ -74,12 +72,12 @@ def _products(inputs: int) -> tuple[Integers, Integers]:
     return np.array(parents), np.array(last)
 
 
-def _monomials(x: Tensor) -> Tensor:
+def _monomials(x: Floats) -> Floats:
     """Return all monomials up to DEGREE of x (M, F), (M, P)."""
-    columns = [torch.ones_like(x[:, 0])]
+    columns = [np.ones(len(x))]
     for parent, factor in list(zip(*_products(x.shape[1]), strict=True))[1:]:
         columns.append(columns[parent] * x[:, factor])
-    return torch.stack(columns, -1)
+    return np.column_stack(columns)
 
 
 @compiled

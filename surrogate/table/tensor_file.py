@@ -1,4 +1,4 @@
-"""Nested content in one safetensors file: the tensors, and a manifest in JSON for everything else.
+"""Nested content in one safetensors file: arrays as tensors, and a manifest in JSON for everything else.
 
 A safetensors file is a header in JSON and then plain numbers; reading it runs no code. The header's metadata have
 one text, `manifest`, in JSON:
@@ -18,10 +18,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import safetensors.torch
-import torch
+import numpy as np
+import safetensors.numpy
 from safetensors import SafetensorError
-from torch import Tensor
 
 from sim.io.errors import InputError
 from sim.io.files import whole_file
@@ -31,7 +30,7 @@ _PICKLED = (b"PK\x03\x04", b"\x80\x02")  # how torch's own files begin
 
 
 def write(path: str | Path, content: Mapping[str, Any], version: int) -> None:
-    """Write nested dictionaries and lists of tensors and plain values, completely or not at all."""
+    """Write nested dictionaries and lists of arrays and plain values, completely or not at all."""
     data = packed(content, version)
     with whole_file(path) as part:
         part.write_bytes(data)
@@ -39,10 +38,10 @@ def write(path: str | Path, content: Mapping[str, Any], version: int) -> None:
 
 def packed(content: Mapping[str, Any], version: int) -> bytes:
     """Return the bytes of a file."""
-    tensors: dict[str, Tensor] = {}
+    tensors: dict[str, Any] = {}
     plain = _without_tensors(content, "", tensors)
     manifest = {"format": version, "hash": digest(content), "content": plain}
-    return safetensors.torch.save(tensors, {"manifest": _text(manifest)})
+    return safetensors.numpy.save(tensors, {"manifest": _text(manifest)})
 
 
 def read(path: str | Path, version: int, remedy: str) -> dict[str, Any]:
@@ -58,7 +57,7 @@ def read(path: str | Path, version: int, remedy: str) -> dict[str, Any]:
     if data.startswith(_PICKLED):
         raise InputError(f"{path} is a model of an older version; {remedy}")
     try:
-        tensors = safetensors.torch.load(data)
+        tensors = safetensors.numpy.load(data)
         metadata = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])["__metadata__"]
         manifest = json.loads(metadata["manifest"])
         found_version, written, plain = manifest["format"], manifest["hash"], manifest["content"]
@@ -84,13 +83,13 @@ def read(path: str | Path, version: int, remedy: str) -> dict[str, Any]:
 
 
 def digest(content: Any) -> str:
-    """Return the hash of nested dictionaries and lists of tensors and plain values."""
+    """Return the hash of nested dictionaries and lists of arrays and plain values."""
     total = hashlib.sha256()
 
     def take(part: Any) -> None:
-        if isinstance(part, Tensor):
-            total.update(str((part.dtype, tuple(part.shape))).encode())
-            total.update(part.detach().contiguous().numpy().tobytes())
+        if isinstance(part, np.ndarray):
+            total.update(f"(torch.{part.dtype}, {part.shape})".encode())  # the words of the first files
+            total.update(part.tobytes())
         elif isinstance(part, Mapping):
             for key in sorted(part):
                 total.update(json.dumps(key).encode())
@@ -110,10 +109,10 @@ def _text(manifest: Any) -> str:
     return json.dumps(manifest, sort_keys=True)
 
 
-def _without_tensors(part: Any, name: str, tensors: dict[str, Tensor]) -> Any:
-    """Return `part` as JSON; its tensors are put into `tensors` under their places."""
-    if isinstance(part, Tensor):
-        tensors[name] = part.detach().to("cpu", copy=True, memory_format=torch.contiguous_format)
+def _without_tensors(part: Any, name: str, tensors: dict[str, Any]) -> Any:
+    """Return `part` as JSON; its arrays are put into `tensors` under their places."""
+    if isinstance(part, np.ndarray):
+        tensors[name] = np.ascontiguousarray(part)
         return {_REFERENCE: name}
     if isinstance(part, Mapping):
         return {key: _without_tensors(value, f"{name}.{key}".lstrip("."), tensors) for key, value in part.items()}
@@ -122,11 +121,11 @@ def _without_tensors(part: Any, name: str, tensors: dict[str, Tensor]) -> Any:
     return part
 
 
-def _with_tensors(part: Any, tensors: Mapping[str, Tensor], names: set[str]) -> Any:
+def _with_tensors(part: Any, tensors: Mapping[str, Any], names: set[str]) -> Any:
     """Rebuild the content; the names of its tensors are put into `names`."""
     if isinstance(part, dict) and set(part) == {_REFERENCE}:
         names.add(part[_REFERENCE])
-        return tensors[part[_REFERENCE]]
+        return tensors[part[_REFERENCE]].copy()  # one that can be written to, as compiled loops need them
     if isinstance(part, dict):
         return {key: _with_tensors(value, tensors, names) for key, value in part.items()}
     if isinstance(part, list):

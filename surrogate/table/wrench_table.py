@@ -6,17 +6,15 @@ The networks are fitted by `surrogate.training.fit_wrench`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-import torch
-from torch import Tensor
 
-from sim.arrays import Flags, Floats
+from sim.arrays import Flags, Floats, Integers
+from sim.linear.complex_step import angle, length, magnitude
 from surrogate.loops import compile_once
-from surrogate.networks.compiled import Packed, evaluate_rows, packed
+from surrogate.networks.compiled import evaluate_rows
 from surrogate.networks.ensemble import Ensemble
-from surrogate.wrench.balance import solve_rows
+from surrogate.wrench.balance import inverse_rows, solve_rows
 from surrogate.wrench.heads import Heads, straight_resistance
 from surrogate.wrench.tails import Tails, linear_torque, pack_tails, tail_inputs
 
@@ -24,9 +22,9 @@ CLASSES = (1, 2, 3)  # networks for N = 1, N = 2, and three or more tails
 _LEAST_SURGE = 0.05  # of the speed: errors of v_z are relative to this at least
 
 
-def network_index(count: Tensor) -> Tensor:
+def network_index(count: Floats) -> Integers:
     """Return the index in CLASSES of robots with N tails, (M,)."""
-    return torch.clamp(count, max=float(CLASSES[-1])).long() - 1
+    return np.minimum(count, CLASSES[-1]).astype(np.int64) - 1
 
 
 @dataclass(frozen=True)
@@ -41,72 +39,65 @@ class WrenchTable:
         compile_once()
         motion = np.full((len(tails.number), 5), np.nan)
         converged = np.zeros(len(motion), dtype=bool)
-        speeds, drags = torch.stack([heads.speed, heads.gain], 1).numpy(), pack_tails(tails)
-        resistances = heads.resistance.contiguous().numpy()
-        kind = network_index(tails.number).numpy()
-        for k, network in enumerate(self._packed):
+        speeds, drags = np.column_stack([heads.speed, heads.gain]), pack_tails(tails)
+        kind = network_index(tails.number)
+        for k, network in enumerate(self.wrench):
             rows = np.flatnonzero(kind == k)
             if len(rows) and network is not None:
-                motion[rows], converged[rows] = solve_rows(network, speeds[rows], resistances[rows], drags[rows])
+                motion[rows], converged[rows] = solve_rows(
+                    network.packed, speeds[rows], heads.resistance[rows], drags[rows]
+                )
         return motion, converged
 
-    @cached_property
-    def _packed(self) -> list[Packed | None]:
-        return [None if network is None else packed(network) for network in self.wrench]
-
-    @cached_property
-    def _packed_gap(self) -> Packed:
-        return packed(self.gap)
-
-    def outputs(self, heads: Heads, motion: Tensor, gap: Tensor) -> tuple[Tensor, ...]:
+    def outputs(self, heads: Heads, motion: Floats, gap: Floats) -> tuple[Floats, ...]:
         """Compute ω_t, ω_h, ω_yr, v_x and v_z of the head's centre, R_yr, θ in degrees, and the gap, each (M,)."""
         yaw, surge = heads.sense * motion[:, 2], motion[:, 1]
         sway = heads.sense * (motion[:, 0] + motion[:, 2] * heads.length / 2)
-        radius = torch.sqrt(sway**2 + surge**2) / yaw.abs()
-        angle = torch.rad2deg(torch.atan2(sway.abs(), surge))
+        radius = length(sway, surge) / magnitude(yaw)
+        slip = angle(magnitude(sway), surge) * (180 / np.pi)
         spins = heads.sense * motion[:, 4], heads.sense * motion[:, 3]
-        return (*spins, yaw, sway, surge, radius, angle, gap)
+        return (*spins, yaw, sway, surge, radius, slip, gap)
 
-    def quick_gap(self, tails: Tails, inputs: Floats) -> Tensor:
+    def quick_gap(self, tails: Tails, inputs: Floats) -> Floats:
         """Return `tail_gap` with known inputs (M, 7) of the networks; without derivatives."""
-        inputs = np.column_stack([inputs, np.log(tails.number.numpy())])
-        return _gap(tails, torch.from_numpy(evaluate_rows(self._packed_gap, inputs)[:, 0]))
+        inputs = np.column_stack([inputs, np.log(tails.number)])
+        return _gap(tails, evaluate_rows(self.gap.packed, inputs)[:, 0])
 
-    def tail_gap(self, tails: Tails, motion: Tensor) -> Tensor:
+    def tail_gap(self, tails: Tails, motion: Floats) -> Floats:
         """Return the smallest distance between tails over 2 r0, (M,); infinite for one tail."""
         return _gap(tails, self.gap(gap_inputs(tails, motion))[:, 0])
 
 
-def _gap(tails: Tails, share: Tensor) -> Tensor:
+def _gap(tails: Tails, share: Floats) -> Floats:
     """Return the gap over 2 r0 from its share of the distance of the clamps."""
-    return torch.where(tails.number > 1, share * clamp_distance(tails) / (2 * tails.radius), torch.inf)
+    return np.where(tails.number > 1, share * clamp_distance(tails) / (2 * tails.radius), np.inf)
 
 
-def motion_sensitivity(heads: Heads, tails: Tails, motion: Tensor) -> Tensor:
+def motion_sensitivity(heads: Heads, tails: Tails, motion: Floats) -> Floats:
     """Return ∂(relative motion)/∂(wrench) with the drag of straight tails, (M, 4, 4)."""
-    matrix = heads.resistance[:, :, :4].clone()
+    matrix = heads.resistance[:, :, :4].copy()
     matrix[:, :, 3] += heads.gain[:, None] * heads.resistance[:, :, 4]
     matrix[:, :3, :3] += straight_resistance(tails)
     drag_number = tails.zeta_perp * motion[:, 4]
     torque = tails.number * tails.zeta_perp * tails.offset**2 * linear_torque(drag_number)
     matrix[:, 3, 3] += heads.gain * torque
-    v_x, v_z, yaw, head_spin, spin = motion.unbind(-1)
-    speed = torch.hypot(v_x, v_z)
-    size = torch.stack(
+    v_x, v_z, yaw, head_spin, spin = motion.T
+    speed = np.hypot(v_x, v_z)
+    size = np.stack(
         [
-            torch.hypot(v_x, yaw / 2),
-            torch.maximum(v_z.abs(), _LEAST_SURGE * speed),
-            yaw.abs(),
-            torch.minimum(head_spin.abs(), spin) / 3,
+            np.hypot(v_x, yaw / 2),
+            np.maximum(np.abs(v_z), _LEAST_SURGE * speed),
+            np.abs(yaw),
+            np.minimum(np.abs(head_spin), spin) / 3,
         ],
         -1,
     )
-    return torch.linalg.inv_ex(matrix)[0] / size[:, :, None]
+    return inverse_rows(matrix) / size[:, :, None]
 
 
-def clamp_distance(tails: Tails) -> Tensor:
-    return 2 * tails.offset * torch.sin(torch.pi / torch.clamp(tails.number, min=2.0))
+def clamp_distance(tails: Tails) -> Floats:
+    return 2 * tails.offset * np.sin(np.pi / np.maximum(tails.number, 2.0))
 
 
-def gap_inputs(tails: Tails, motion: Tensor) -> Tensor:
-    return torch.cat([tail_inputs(tails, motion), torch.log(tails.number)[:, None]], -1)
+def gap_inputs(tails: Tails, motion: Floats) -> Floats:
+    return np.concatenate([tail_inputs(tails, motion), np.log(tails.number)[:, None]], -1)

@@ -20,9 +20,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from sim.arrays import Flags, Floats
+from sim.arrays import Flags, Floats, Integers
 from surrogate.networks.checkpoints import TrainingContext
 from surrogate.networks.ensemble import Ensemble
+from surrogate.networks.trainable import TrainableEnsemble
 from surrogate.networks.training_loop import Settings, fit
 from surrogate.table.wrench_table import (
     CLASSES,
@@ -54,10 +55,10 @@ class WrenchSamples(NamedTuple):
 
     heads: Heads
     tails: Tails
-    motion: Tensor  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), positive motor
-    gap: Tensor  # (M,)
+    motion: Floats  # (M, 5): (v_x of J, v_z, ω_yr, ω_h, ω_t), positive motor
+    gap: Floats  # (M,)
 
-    def at(self, rows: Tensor) -> WrenchSamples:
+    def at(self, rows: Integers | Flags) -> WrenchSamples:
         """Return the rows at indices or flags (M',)."""
         return WrenchSamples(self.heads.at(rows), self.tails.at(rows), self.motion[rows], self.gap[rows])
 
@@ -65,7 +66,7 @@ class WrenchSamples(NamedTuple):
 def wrench_samples(robots: Mapping[str, Floats], motion: Mapping[str, Floats]) -> WrenchSamples:
     """Return samples from columns of robots, effects included, and of their steady motion, each (M,)."""
     heads, tails = heads_and_tails(robots)
-    columns = {name: torch.as_tensor(np.asarray(motion[name]), dtype=torch.float64) for name in
+    columns = {name: np.asarray(motion[name], dtype=float) for name in
              ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap")}  # fmt: skip
     sense, yaw = heads.sense, columns["omega_yr_bar"]
     at_disc = columns["v_x"] - yaw * heads.length / 2
@@ -76,13 +77,13 @@ def wrench_samples(robots: Mapping[str, Floats], motion: Mapping[str, Floats]) -
         sense * columns["omega_h_bar"],
         sense * columns["omega_t_bar"],
     ]
-    return WrenchSamples(heads, tails, torch.stack(parts, -1), columns["tail_gap"])
+    return WrenchSamples(heads, tails, np.stack(parts, -1), columns["tail_gap"])
 
 
 def learnable(rows: WrenchSamples) -> Flags:
     """Return rows that a table may learn, (M,): tails that turn with the motor, faster than the robot yaws."""
-    _, _, yaw, _, spin = rows.motion.unbind(-1)
-    return np.asarray(((spin > 0) & (yaw > 0) & (yaw < TURNS * spin)).numpy())
+    _, _, yaw, _, spin = rows.motion.T
+    return (spin > 0) & (yaw > 0) & (yaw < TURNS * spin)
 
 
 def fit_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext) -> WrenchTable:
@@ -106,35 +107,36 @@ def _learn_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext
     matrix = weight @ wrench_slopes(rows.tails, rows.motion)
     wrench = (rows.heads.resistance @ rows.motion[..., None])[..., 0]
     wanted = (weight @ (wrench - straight_wrench(rows.tails, rows.motion))[..., None])[..., 0]
-    mean, spread = (torch.tensor(part, dtype=torch.float64) for part in TYPICAL)
-    size = torch.linalg.matrix_norm(matrix * spread)
-    share = torch.clamp(_OUTLIER * size.median() / size, max=1.0)
+    mean, spread = np.array(TYPICAL)
+    size = np.linalg.norm(matrix * spread, axis=(1, 2))
+    share = np.minimum(_OUTLIER * np.quantile(size, 0.5, method="lower") / size, 1.0)
     network = _new(settings, inputs, outputs=len(mean))
     _prepare(network, mean, spread, count)
 
     def residual(y: Tensor, matrix: Tensor, wanted: Tensor) -> Tensor:
         return (matrix @ y[..., None])[..., 0] - wanted
 
-    fit(network, inputs, (matrix, wanted), residual, settings, work, weights=share, unit="% of their motion")
-    return network
+    x, weights, *data = (torch.from_numpy(part) for part in (inputs, share, matrix, wanted))
+    fit(network, x, data, residual, settings, work, weights=weights, unit="% of their motion")
+    return network.trained()
 
 
-def _prepare(network: Ensemble, mean: Tensor, spread: Tensor, count: int) -> None:
-    network.mean.copy_(mean)
-    network.spread.copy_(spread)
+def _prepare(network: TrainableEnsemble, mean: Floats, spread: Floats, count: int) -> None:
+    network.mean.copy_(torch.from_numpy(mean))
+    network.spread.copy_(torch.from_numpy(spread))
     smoothness = (*SMOOTHNESS, *HEAD_SMOOTHNESS)[: len(network.scale)]
     network.scale.mul_(torch.tensor(smoothness, dtype=torch.float64) / 1.5)
     if count == CLASSES[-1]:
         network.scale[-1] = 1e9  # the head's spin drag plays no part
 
 
-def _new(settings: Settings, inputs: Tensor, outputs: int) -> Ensemble:
-    network = Ensemble(
+def _new(settings: Settings, inputs: Floats, outputs: int) -> TrainableEnsemble:
+    network = TrainableEnsemble(
         inputs.shape[1], outputs, width=settings.width, depth=settings.depth, members=settings.members,
         seed=settings.seed,
     )  # fmt: skip
-    network.shift.copy_(inputs.mean(0))
-    network.scale.copy_(torch.clamp(inputs.std(0), min=1e-6))
+    network.shift.copy_(torch.from_numpy(inputs.mean(0)))
+    network.scale.copy_(torch.from_numpy(np.maximum(inputs.std(0, ddof=1), 1e-6)))
     return network
 
 
@@ -148,5 +150,6 @@ def _learn_gap(rows: WrenchSamples, settings: Settings, work: TrainingContext) -
     def residual(y: Tensor, share: Tensor) -> Tensor:
         return y - share[:, None]
 
-    fit(network, inputs, (share,), residual, settings, work, unit="% of the distance between the clamps")
-    return network
+    x, wanted = torch.from_numpy(inputs), torch.from_numpy(share)
+    fit(network, x, (wanted,), residual, settings, work, unit="% of the distance between the clamps")
+    return network.trained()

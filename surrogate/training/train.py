@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from dataset.storage.data_set import read_manifest
-from sim.arrays import Floats, Integers
+from sim.arrays import Flags, Floats, Integers
 from sim.io.errors import InputError
 from sim.io.provenance import fingerprint, provenance
 from surrogate.input_ranges import ROBOT
+from surrogate.loops import compile_once
 from surrogate.networks.checkpoints import TrainingContext, device_named
 from surrogate.networks.training_loop import Settings
 from surrogate.table.curve_errors import KINDS, CurveErrors
@@ -141,6 +141,7 @@ def learn(
         source: more provenance.
         work: device, progress bars, and where states are kept.
     """
+    compile_once()
     wrench_settings, response_settings = settings or Settings(), curve_settings or SETTINGS
     if flips_held_out is None:
         tenth = np.arange(len(flipped)) % 10 == 9
@@ -169,7 +170,7 @@ def learn(
         tails=table,
         curves=response,
         support=tuple(
-            Support.learned(inputs[kind == k]) if bool((kind == k).any()) else None for k in range(len(CLASSES))
+            Support.learned(inputs[kind == k]) if (kind == k).any() else None for k in range(len(CLASSES))
         ),
         intervals=None,
         ranges={name: _range(learned.robots[name]) for name in learned.robots if name in ROBOT},
@@ -190,7 +191,7 @@ def _judged(
     apart = held_out.motion["tail_gap"][inside] >= 1
     several = held_out.robots["N"][inside] > 1
     several = several if several.any() else ~several
-    report = summary({name: error.numpy()[several] for name, error in errors.items()}, apart[several])
+    report = summary({name: error[several] for name, error in errors.items()}, apart[several])
     flips = flips.at(np.abs(flips.motion["omega_yr_bar"]) < BRANCHES * np.abs(flips.motion["omega_t_bar"]))
     response = lookup.response(flips.robots, flag=True)
     truth = {**flips.motion, **flips.curves}
@@ -210,15 +211,17 @@ def held_out_curve_errors(lookup: NeuralTable, flips: SimulatedRobots) -> CurveE
     if known.sum() < _FEWEST_FLIPS:
         return None
     response = lookup.response(flips.robots, flag=True)
-    speeds = curve_speeds(motions.heads, motions.motion).numpy()
+    speeds = curve_speeds(motions.heads, motions.motion)
     errors = {
         kind: ((getattr(response, kind) - flips.curves[kind]) / along_axes(speeds, SHAPES[kind]))[known]
         for kind in KINDS
     }
-    return CurveErrors.learned(lookup.width_features(motions).numpy()[known], errors, lookup.curves.bases)
+    return CurveErrors.learned(
+        lookup.width_features(motions)[known], errors, lookup.curves.bases, flips.motion["error"][known]
+    )
 
 
-def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[torch.Tensor, dict[str, torch.Tensor], Floats]:
+def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[str, Floats], Flags]:
     """Return features and relative errors of rows inside the domain, and which those are."""
     motions = lookup.motions(rows.robots, flag=True)
     inside = np.array([not reason for reason in motions.reason])
@@ -227,8 +230,8 @@ def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[torch.Tensor, d
     truth = with_radius(rows.motion)
     errors = relative_errors(steady_outputs(motions, lookup.tails), truth)
     return (
-        lookup.width_features(motions)[torch.as_tensor(inside)],
-        {name: torch.tensor(error[inside]) for name, error in errors.items()},
+        lookup.width_features(motions)[inside],
+        {name: error[inside] for name, error in errors.items()},
         inside,
     )
 
@@ -248,7 +251,7 @@ def with_radius(motion: dict[str, Floats]) -> dict[str, Floats]:
 def _learnable(rows: SimulatedRobots) -> WrenchSamples:
     samples = wrench_samples(rows.robots, rows.motion)
     good = learnable(samples)
-    kept = samples.at(torch.as_tensor(np.flatnonzero(good)))
+    kept = samples.at(good)
     counts = [int((network_index(kept.tails.number) == k).sum()) for k in range(len(CLASSES))]
     for count, number in zip(counts, ("N = 1", "N = 2", "N = 3 and more"), strict=True):
         if 0 < count < _FEWEST_OF_A_CLASS:

@@ -1,11 +1,10 @@
 """Motions in balance as compiled loops, one robot at a time.
 
-The equations are those of `surrogate.wrench.heads` and `surrogate.wrench.tails`, written for one robot instead of
-for tensors. They are solved by Broyden's method. Its first derivative holds the network's numbers y fixed, so it
-needs no evaluation of the network; five or six evaluations are enough. The table of a single tail has second
-solutions near the true one. So there the equations are solved again with the exact first derivative, and of two
-different solutions that counts whose surge is nearer to the first guess (linear theory). Units: l, μ0 l⁴/EI,
-EI/l².
+The equations are those of `surrogate.wrench.heads` and `surrogate.wrench.tails`. They are solved by Broyden's
+method. Its first derivative holds the network's numbers y fixed, so it needs no evaluation of the network; five or
+six evaluations are enough. The table of a single tail has second solutions near the true one. So there the
+equations are solved again with the exact first derivative, and of two different solutions that counts whose surge
+is nearer to the first guess (linear theory). Units: l, μ0 l⁴/EI, EI/l².
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from sim.arrays import Flags, Floats
 from sim.compiling import compiled
 from sim.linear.dense import solve_dense
 from surrogate.networks.compiled import Packed, evaluate
-from surrogate.wrench.tails import SMALL_DEFLECTION, SMALL_SURGE, SOFT, TINY, linear_thrust, linear_torque
+from surrogate.wrench.tails import inputs_of_tail, linear_thrust, linear_torque, wrench_terms
 
 STEPS, CORRECTION = 60, 1e-9  # of Broyden's method; the correction is relative
 _DIFFERENCE, _LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
@@ -52,6 +51,16 @@ def solve_rows(network: Packed, heads: Floats, resistances: Floats, tails: Float
 
 
 @compiled
+def inverse_rows(matrices: Floats) -> Floats:
+    """Invert matrices (M, n, n); numbers that are not finite where there is no inverse."""
+    inverses = np.empty_like(matrices)
+    for row in range(len(matrices)):
+        inverses[row] = np.eye(matrices.shape[1])
+        solve_dense(matrices[row].copy(), inverses[row])
+    return inverses
+
+
+@compiled
 def inputs_rows(tails: Floats, motions: Floats) -> Floats:
     """Return `surrogate.wrench.tails.tail_inputs`, (M, 7), of tails (M, 13) that move so (M, 5)."""
     x = np.empty((len(tails), 7))
@@ -62,39 +71,21 @@ def inputs_rows(tails: Floats, motions: Floats) -> Floats:
 
 @compiled
 def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
-    """Write `surrogate.wrench.tails.tail_inputs` of one robot to x (7,), or `inputs_with_head` to x (14,)."""
-    v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
-    drag_number = tail[0] * spin
-    deflection = np.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
-    x[0] = np.log(drag_number)
-    x[1] = np.log(tail[2])
-    x[2] = -np.log(tail[3])
-    x[3] = np.arcsinh(deflection / SMALL_DEFLECTION)
-    x[4] = np.arctan2(v_x, yaw)
-    x[5] = np.arcsinh(v_z / (tail[2] * spin) / SMALL_SURGE)
-    x[6] = np.log(tail[5] / (tail[4] * tail[0] * tail[2] ** 2))
+    """Write `surrogate.wrench.tails.INPUTS` of one robot to x (7,), or HEAD_INPUTS after them to x (14,)."""
+    beta = np.arctan2(motion[0], motion[2])
+    x[:7] = inputs_of_tail(tail[0], tail[2], tail[3], tail[4], tail[5], motion, beta)
     for i in range(7, len(x)):
         x[i] = tail[i - 1]
 
 
 @compiled
-def _unbalanced(
-    head: Floats, resistance: Floats, tail: Floats, motion: Floats, y: Floats, residual: Floats
-) -> None:
+def _unbalanced(resistance: Floats, tail: Floats, motion: Floats, y: Floats, residual: Floats) -> None:
     """Write `surrogate.wrench.heads.unbalanced` for numbers y of the tails to residual (4,)."""
-    v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
-    perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
-    S = perp * spin
-    sideways = np.sqrt(v_x**2 + yaw**2 + TINY)
-    squared = (sideways / (a * spin)) ** 2
-    couple = number * spin * a**2
-    across = number * perp
-    residual[0] = across * (yaw / 2 - v_x + sideways * y[0])
-    residual[1] = -number * parallel * v_z + (perp - parallel) * couple * linear_thrust(S) * (
-        y[1] + squared * y[4]
-    )
-    residual[2] = across * (v_x / 2 - yaw / 3 + sideways * y[2])
-    residual[3] = -perp * couple * linear_torque(S) * (y[3] + squared * y[5])
+    side, along, turn, force, thrust, torque, squared = wrench_terms(tail[0], tail[1], tail[2], tail[4], motion)
+    residual[0] = side + force * y[0]
+    residual[1] = along + thrust * (y[1] + squared * y[4])
+    residual[2] = turn + force * y[2]
+    residual[3] = torque * (y[3] + squared * y[5])
     for i in range(4):
         for j in range(5):
             residual[i] -= resistance[i, j] * motion[j]
@@ -140,7 +131,7 @@ def _solve(
     slope, inverse = np.empty((4, 4)), np.eye(4)
     inputs_at(tail, motion, x)
     evaluate(network, x, y)
-    _unbalanced(head, resistance, tail, motion, y, residual)
+    _unbalanced(resistance, tail, motion, y, residual)
     largest = 0.0
     for j in range(4):
         largest = max(largest, abs(motion[j]))
@@ -152,7 +143,7 @@ def _solve(
         if exact:
             inputs_at(tail, moved, x)
             evaluate(network, x, y)
-        _unbalanced(head, resistance, tail, moved, y, before)
+        _unbalanced(resistance, tail, moved, y, before)
         for i in range(4):
             slope[i, j] = (before[i] - residual[i]) / width
     solve_dense(slope, inverse)
@@ -180,7 +171,7 @@ def _solve(
             return False
         inputs_at(tail, motion, x)
         evaluate(network, x, y)
-        _unbalanced(head, resistance, tail, motion, y, residual)
+        _unbalanced(resistance, tail, motion, y, residual)
         for i in range(4):
             change[i] = residual[i] - before[i]
         _update(inverse, step, change)

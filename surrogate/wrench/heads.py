@@ -18,40 +18,41 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-import torch
-from torch import Tensor
 
-from sim.arrays import Floats
+from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
 from sim.io.errors import InputError
+from sim.linear.complex_step import derivative, magnitude, sign
 from sim.model.groups import Groups
 from sim.solve.assembly import assemble
 from surrogate.wrench.tails import Tails, head_inputs, inputs_with_head, total_wrench
 
 Numbers = Callable[
-    [Tensor], Tensor
+    [Floats], Floats
 ]  # inputs with those of the head (M, 14) -> y (M, 6) of `surrogate.wrench.tails`
 
 _ON_TAILS = ("tail_sag",)  # local, but on the tails
-_SENSES = (-1.0, 1.0, -1.0, -1.0, -1.0)  # mirror image of (v_x, v_z, ω_yr, ω_h, ω_t)
+_SENSES = np.array([-1.0, 1.0, -1.0, -1.0, -1.0])  # mirror image of (v_x, v_z, ω_yr, ω_h, ω_t)
 
 
 class Heads(NamedTuple):
     """Head, disc and motor of M robots, in the mirror image if the motor is reversed."""
 
-    speed: Tensor  # (M,) |ω|
-    gain: Tensor  # (M,) ∂ω_t/∂ω_h
-    resistance: Tensor  # (M, 4, 5)
-    length: Tensor  # (M,) L
-    sense: Tensor  # (M,) sign of ω
+    speed: Floats  # (M,) |ω|
+    gain: Floats  # (M,) ∂ω_t/∂ω_h
+    resistance: Floats  # (M, 4, 5)
+    length: Floats  # (M,) L
+    sense: Floats  # (M,) sign of ω
 
-    def at(self, rows: Tensor) -> Heads:
+    def at(self, rows: Integers | Flags) -> Heads:
         """Return the heads of the robots at indices or flags (M',)."""
         return Heads(*[part[rows] for part in self])
 
 
-def heads_and_tails(columns: Mapping[str, Floats | Tensor], keep: Collection[str] = ()) -> tuple[Heads, Tails]:
-    """Return heads and tails of robots by column name, each (M,), a_over_R and effects included; differentiable.
+def heads_and_tails(columns: Mapping[str, Floats], keep: Collection[str] = ()) -> tuple[Heads, Tails]:
+    """Return heads and tails of robots by column name, each (M,), a_over_R and effects included.
+
+    Columns may carry a derivative (`sim.linear.complex_step`).
 
     Args:
         columns: robots.
@@ -60,10 +61,10 @@ def heads_and_tails(columns: Mapping[str, Floats | Tensor], keep: Collection[str
     Raises:
         InputError: an effect changes the tails themselves.
     """
-    tensors = {name: as_tensor(values) for name, values in columns.items()}
-    count = tensors.pop("N")
-    groups = {name: tensors.pop(name) for name in Groups.__dataclass_fields__ if name in tensors}
-    effects = {name: size for name, size in tensors.items() if name in keep or bool((size != 0).any())}
+    sizes = dict(columns)
+    count = sizes.pop("N")
+    groups = {name: sizes.pop(name) for name in Groups.__dataclass_fields__ if name in sizes}
+    effects = {name: size for name, size in sizes.items() if name in keep or size.any()}
     for name in effects:
         if not needs_no_learning(name):
             raise InputError(
@@ -72,20 +73,17 @@ def heads_and_tails(columns: Mapping[str, Floats | Tensor], keep: Collection[str
             )
     tails_of_each: Any = count  # a batch of the simulator has one N, formulas take N by row as well
     body = assemble(Groups(**groups, N=tails_of_each, effects=effects))
-    sense = torch.sign(body.omega)
-    mirror = torch.where(sense[:, None] < 0, torch.tensor(_SENSES, dtype=torch.float64), 1.0)
-    resistance = body.resistance.permute(2, 0, 1) * mirror[:, :4, None] * mirror[:, None, :]
-    heads = Heads(body.omega.abs(), 1 + body.droop * resistance[:, 3, 3], resistance, body.head_length, sense)
+    sense = sign(body.omega)
+    mirror = np.where(sense[:, None] < 0, _SENSES, 1.0)
+    resistance = np.ascontiguousarray(
+        body.resistance.transpose(2, 0, 1) * mirror[:, :4, None] * mirror[:, None, :]
+    )
+    heads = Heads(magnitude(body.omega), 1 + body.droop * resistance[:, 3, 3], resistance, body.head_length, sense)
     around = head_inputs(resistance, body.head_length, count * body.zeta_perp)
     tails = Tails(
         body.zeta_perp, body.zeta_parallel, body.offset, body.tail_radius, count, resistance[:, 3, 3], around
     )
     return heads, tails
-
-
-def as_tensor(values: Floats | Tensor) -> Tensor:
-    """Return tensors as they are, arrays copied."""
-    return values if isinstance(values, Tensor) else torch.tensor(np.asarray(values), dtype=torch.float64)
 
 
 def needs_no_learning(effect: str) -> bool:
@@ -94,33 +92,26 @@ def needs_no_learning(effect: str) -> bool:
     return entry.reach == "local" and effect not in _ON_TAILS
 
 
-def full_motion(heads: Heads, u: Tensor) -> Tensor:
+def full_motion(heads: Heads, u: Floats) -> Floats:
     """Return (v_x, v_z, ω_yr, ω_h, ω_t), (M, 5), from the four velocities u (M, 4)."""
-    return torch.cat([u, (heads.speed + heads.gain * u[:, 3])[:, None]], 1)
+    return np.concatenate([u, (heads.speed + heads.gain * u[:, 3])[:, None]], 1)
 
 
-def unbalanced(heads: Heads, tails: Tails, u: Tensor, numbers: Numbers) -> Tensor:
+def unbalanced(heads: Heads, tails: Tails, u: Floats, numbers: Numbers) -> Floats:
     """Return W − R (v_x, v_z, ω_yr, ω_h, ω_t), (M, 4)."""
     motion = full_motion(heads, u)
     wrench = total_wrench(tails, motion, numbers(inputs_with_head(tails, motion)))
     return wrench - (heads.resistance @ motion[..., None])[..., 0]
 
 
-def straight_resistance(tails: Tails) -> Tensor:
+def straight_resistance(tails: Tails) -> Floats:
     """Return the resistance of straight tails to (v_x, v_z, ω_yr), (M, 3, 3)."""
     across, along = tails.number * tails.zeta_perp, tails.number * tails.zeta_parallel
-    none = torch.zeros_like(across)
+    none = np.zeros(len(across))
     rows = [[across, none, -across / 2], [none, along, none], [-across / 2, none, across / 3]]
-    return torch.stack([torch.stack(row, -1) for row in rows], -2)
+    return np.stack([np.stack(row, -1) for row in rows], -2)
 
 
-def value_and_slope(function: Callable[[Tensor], Tensor], u: Tensor) -> tuple[Tensor, Tensor]:
-    """Return f(u) (M, 4) and ∂f/∂u (M, 4, 4) of a function that takes every row alone."""
-    unit = torch.eye(u.shape[1], dtype=u.dtype)
-
-    def along(direction: Tensor) -> Tensor:
-        change: Tensor = torch.func.jvp(function, (u,), (direction.expand_as(u),))[1]
-        return change
-
-    slope = torch.func.vmap(along, out_dims=-1)(unit)
-    return function(u), slope
+def slope_at(function: Callable[[Floats], Floats], u: Floats) -> Floats:
+    """Return ∂f/∂u (M, 4, 4) at u (M, 4) of a function that takes every row alone."""
+    return np.stack([derivative(function, u, unit) for unit in np.eye(u.shape[1])], -1)

@@ -34,10 +34,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import torch
-from torch import Tensor
 
-from sim.arrays import Floats
+from sim.arrays import Flags, Floats, Integers
+from sim.linear.complex_step import angle
 from sim.linear.vectors import formula
 
 INPUTS = ("ln S", "ln a", "ln 1/r0", "asinh δ", "β", "asinh v_z", "ln spin drag of head over tails")
@@ -56,25 +55,25 @@ TINY = 1e-30
 class Tails(NamedTuple):
     """The tails of M robots; each (M,) where nothing else is said."""
 
-    zeta_perp: Tensor
-    zeta_parallel: Tensor
-    offset: Tensor  # a
-    radius: Tensor  # r0
-    number: Tensor  # N
-    head_spin_drag: Tensor  # moment on the head per ω_h
-    head: Tensor  # (M, 7) HEAD_INPUTS; drag over that of the tails
+    zeta_perp: Floats
+    zeta_parallel: Floats
+    offset: Floats  # a
+    radius: Floats  # r0
+    number: Floats  # N
+    head_spin_drag: Floats  # moment on the head per ω_h
+    head: Floats  # (M, 7) HEAD_INPUTS; drag over that of the tails
 
-    def at(self, rows: Tensor) -> Tails:
+    def at(self, rows: Integers | Flags) -> Tails:
         """Return the tails of the robots at indices or flags (M',)."""
         return Tails(*[part[rows] for part in self])
 
 
 def pack_tails(tails: Tails) -> Floats:
     """Return the fields as columns, (M, 13)."""
-    return np.asarray(torch.cat([torch.stack(list(tails[:-1]), 1), tails.head], 1).numpy())
+    return np.column_stack(tails)
 
 
-def head_inputs(resistance: Tensor, length: Tensor, across: Tensor) -> Tensor:
+def head_inputs(resistance: Floats, length: Floats, across: Floats) -> Floats:
     """Return HEAD_INPUTS, (M, 7).
 
     Args:
@@ -83,14 +82,14 @@ def head_inputs(resistance: Tensor, length: Tensor, across: Tensor) -> Tensor:
         across: N ζ⊥, (M,).
     """
     sway, surge, turn, spin = (resistance[:, i, i] for i in range(4))
-    return torch.stack(
+    return np.stack(
         [
-            torch.log(sway / across),
-            torch.log(surge / across),
-            torch.log(turn / across),
-            torch.log(length),
-            resistance[:, 0, 2] / torch.sqrt(sway * turn),
-            torch.log(resistance[:, 0, 3] / across),
+            np.log(sway / across),
+            np.log(surge / across),
+            np.log(turn / across),
+            np.log(length),
+            resistance[:, 0, 2] / np.sqrt(sway * turn),
+            np.log(resistance[:, 0, 3] / across),
             resistance[:, 3, 4] / spin,
         ],
         -1,
@@ -109,62 +108,92 @@ def linear_torque(S: Any) -> Any:
     return (1 + (S / 6) ** 2) ** -0.125
 
 
-def tail_inputs(tails: Tails, motion: Tensor) -> Tensor:
-    """Return INPUTS, (M, 7).
+@formula
+def inputs_of_tail(
+    perp: Any, offset: Any, radius: Any, number: Any, spin_drag: Any, motion: Any, beta: Any
+) -> tuple[Any, ...]:
+    """Return INPUTS.
 
     Args:
-        motion: (v_x of J, v_z, ω_yr, ω_h, ω_t), (M, 5), for a positive motor.
+        perp, offset, radius, number, spin_drag: ζ⊥, a, r0, N and the moment on the head per ω_h.
+        motion: (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor.
+        beta: the angle β.
     """
-    v_x, v_z, yaw, _, spin = motion.unbind(-1)
-    drag_number, clamp = tails.zeta_perp * spin, tails.offset * spin
-    deflection = torch.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
-    return torch.stack(
-        [
-            torch.log(drag_number),
-            torch.log(tails.offset),
-            -torch.log(tails.radius),
-            torch.asinh(deflection / SMALL_DEFLECTION),
-            torch.atan2(v_x, yaw),
-            torch.asinh(v_z / clamp / SMALL_SURGE),
-            torch.log(tails.head_spin_drag / (tails.number * tails.zeta_perp * tails.offset**2)),
-        ],
-        -1,
+    v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
+    drag_number = perp * spin
+    deflection = np.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
+    return (
+        np.log(drag_number),
+        np.log(offset),
+        -np.log(radius),
+        np.arcsinh(deflection / SMALL_DEFLECTION),
+        beta,
+        np.arcsinh(v_z / (offset * spin) / SMALL_SURGE),
+        np.log(spin_drag / (number * perp * offset**2)),
     )
 
 
-def inputs_with_head(tails: Tails, motion: Tensor) -> Tensor:
+@formula
+def wrench_terms(perp: Any, parallel: Any, offset: Any, number: Any, motion: Any) -> tuple[Any, ...]:
+    """Return the terms of the tails' wrench.
+
+    Returns:
+        F_x, F_z and M_y of straight tails; then what y multiplies: the side force (F_x and M_y), thrust and torque
+        at small m, and m².
+    """
+    v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
+    drag_number, across = perp * spin, number * perp
+    sideways = np.sqrt(v_x**2 + yaw**2 + TINY)
+    couple = number * spin * offset**2
+    return (
+        across * (yaw / 2 - v_x),
+        -number * parallel * v_z,
+        across * (v_x / 2 - yaw / 3),
+        across * sideways,
+        (perp - parallel) * couple * linear_thrust(drag_number),
+        -perp * couple * linear_torque(drag_number),
+        (sideways / (offset * spin)) ** 2,
+    )
+
+
+def tail_inputs(tails: Tails, motion: Floats) -> Floats:
+    """Return INPUTS, (M, 7), for motions (v_x of J, v_z, ω_yr, ω_h, ω_t), (M, 5), of a positive motor."""
+    perp, _, offset, radius, number, spin_drag, _ = tails
+    beta = angle(motion[:, 0], motion[:, 2])
+    return np.stack(inputs_of_tail(perp, offset, radius, number, spin_drag, motion.T, beta), -1)
+
+
+def inputs_with_head(tails: Tails, motion: Floats) -> Floats:
     """Return INPUTS and HEAD_INPUTS, (M, 14)."""
-    return torch.cat([tail_inputs(tails, motion), tails.head], -1)
+    return np.concatenate([tail_inputs(tails, motion), tails.head], -1)
 
 
-def straight_wrench(tails: Tails, motion: Tensor) -> Tensor:
+def straight_wrench(tails: Tails, motion: Floats) -> Floats:
     """Return (F_x, F_z, M_y, M_z) about J of straight tails at zero spin, (M, 4)."""
-    v_x, v_z, yaw, _, _ = motion.unbind(-1)
-    across = tails.number * tails.zeta_perp
-    side, turn = across * (yaw / 2 - v_x), across * (v_x / 2 - yaw / 3)
-    return torch.stack([side, -tails.number * tails.zeta_parallel * v_z, turn, torch.zeros_like(side)], -1)
+    side, along, turn, *_ = _terms(tails, motion)
+    return np.stack([side, along, turn, np.zeros(len(side))], -1)
 
 
-def wrench_slopes(tails: Tails, motion: Tensor) -> Tensor:
+def wrench_slopes(tails: Tails, motion: Floats) -> Floats:
     """Return ∂(wrench)/∂y at a motion, (M, 4, 6)."""
-    v_x, _, yaw, _, spin = motion.unbind(-1)
-    drag_number = tails.zeta_perp * spin
-    sideways = torch.sqrt(v_x**2 + yaw**2 + TINY)
-    squared = (sideways / (tails.offset * spin)) ** 2
-    couple = tails.number * spin * tails.offset**2
-    force = tails.number * tails.zeta_perp * sideways
-    thrust = (tails.zeta_perp - tails.zeta_parallel) * couple * linear_thrust(drag_number)
-    torque = -tails.zeta_perp * couple * linear_torque(drag_number)
-    none = torch.zeros_like(force)
+    _, _, _, force, thrust, torque, squared = _terms(tails, motion)
+    none = np.zeros(len(force))
     rows = [
         [force, none, none, none, none, none],
         [none, thrust, none, none, thrust * squared, none],
         [none, none, force, none, none, none],
         [none, none, none, torque, none, torque * squared],
     ]
-    return torch.stack([torch.stack(row, -1) for row in rows], -2)
+    return np.stack([np.stack(row, -1) for row in rows], -2)
 
 
-def total_wrench(tails: Tails, motion: Tensor, y: Tensor) -> Tensor:
+def total_wrench(tails: Tails, motion: Floats, y: Floats) -> Floats:
     """Return (F_x, F_z, M_y, M_z) of all tails on the disc about J, (M, 4), for the network's numbers y (M, 6)."""
     return straight_wrench(tails, motion) + (wrench_slopes(tails, motion) @ y[..., None])[..., 0]
+
+
+def _terms(tails: Tails, motion: Floats) -> tuple[Floats, ...]:
+    terms: tuple[Floats, ...] = wrench_terms(
+        tails.zeta_perp, tails.zeta_parallel, tails.offset, tails.number, motion.T
+    )
+    return terms

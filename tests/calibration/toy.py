@@ -65,15 +65,15 @@ def _robots(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     groups = Groups.from_columns(columns)
     R = 1 / groups.l_over_R
     body = assemble(groups)
-    resistance = np.moveaxis(body.resistance.numpy(), -1, 0)  # (B, 4, 5)
+    resistance = np.moveaxis(body.resistance, -1, 0)  # (B, 4, 5)
     head = resistance[:, :, :4].copy()
     head[:, :, 3] += resistance[:, :, 4]
-    parallel, perp, viscosity = (v.numpy() for v in (body.zeta_parallel, body.zeta_perp, body.viscosity))
-    a, n, omega = (groups.a_over_R * R).numpy(), groups.N, groups.omega_bar.numpy()
+    parallel, perp, viscosity = body.zeta_parallel, body.zeta_perp, body.viscosity
+    a, n, omega = groups.a_over_R * R, groups.N, groups.omega_bar
     terms = body.nonlocal_terms
-    time = UNIT_OF_TIME * body.tail_radius.numpy() ** 4 * np.exp(terms.shear_thinning_time.numpy())
-    rate = np.abs(omega) * a / body.tail_radius.numpy()  # at the clamps
-    thinned = (1 + (time * rate) ** 2) ** (-terms.shear_thinning.numpy() / 2)
+    time = UNIT_OF_TIME * body.tail_radius**4 * np.exp(terms.shear_thinning_time)
+    rate = np.abs(omega) * a / body.tail_radius  # at the clamps
+    thinned = (1 + (time * rate) ** 2) ** (-terms.shear_thinning / 2)
     parallel, perp = parallel * thinned, perp * thinned
     bent = 1 / (1 + 0.05 * viscosity * np.abs(omega))
     tails = np.zeros_like(head)
@@ -86,7 +86,7 @@ def _robots(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     tails[:, 1, 3] = -thrust * np.sign(omega)
     push = (tails[:, :, 3] + resistance[:, :, 4]) * omega[:, None]
     u = np.linalg.solve(head + tails, -push[..., None])[..., 0]
-    sway, surge, yaw, spin = u[:, 0] + u[:, 2] * (groups.L_over_R * R).numpy() / 2, u[:, 1], u[:, 2], u[:, 3]
+    sway, surge, yaw, spin = u[:, 0] + u[:, 2] * groups.L_over_R * R / 2, u[:, 1], u[:, 2], u[:, 3]
     return {
         "omega_h_bar": spin,
         "omega_t_bar": spin + omega,

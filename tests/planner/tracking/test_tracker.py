@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import chi2
 
 from planner.paths.path import circle, polygon
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
+from planner.tracking import tracker
 from planner.tracking.tracker import Command, Tracker
 from planner.vehicle.vehicle import Vehicle
 from sim.model.presets import PRESETS
@@ -151,3 +153,8 @@ def test_it_never_flips_before_the_shortest_dwell(events: list[tuple[float, floa
         assert math.isfinite(command.flip_at)
         assert command.flip_at - began >= planned().minimum_dwell * (1 - 1e-12)
         last = command
+
+
+def test_the_gates_are_quantiles() -> None:
+    assert pytest.approx(chi2.ppf(1 - tracker.FALSE_ALARM, 3 * tracker.WINDOW), rel=1e-12) == tracker.ALARM_AT
+    assert pytest.approx(chi2.ppf(0.9999, 3), rel=1e-12) == tracker.GATE

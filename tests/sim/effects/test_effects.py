@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 import sim.effects
 from dataset.rows.simulate import simulate
@@ -87,7 +86,7 @@ def test_the_order_of_effects_does_not_matter(seed: int) -> None:
     sizes = {name: catalogue()[name].typical for name in names}
     shuffled = [names[i] for i in np.random.default_rng(seed).permutation(len(names))]
     one, other = (numbers(control(**{name: sizes[name] for name in order})) for order in (names, shuffled))
-    assert torch.allclose(one, other, rtol=1e-13, atol=0)
+    assert np.allclose(one, other, rtol=1e-13, atol=0)
     disc, both = assemble(control(disc_drag=0.4)), assemble(control(inertia=0.1, disc_drag=0.4))
     assert float(both.resistance[3, 4, 0]) == pytest.approx(1.1 * float(disc.resistance[3, 4, 0]))
 
@@ -122,7 +121,7 @@ def test_declaration(name: str) -> None:
 
 @pytest.mark.parametrize("name", list(catalogue()))
 def test_null_is_exactly_the_base_model(name: str) -> None:
-    assert torch.equal(numbers(control(**{name: catalogue()[name].null})), numbers(control()))
+    assert np.array_equal(numbers(control(**{name: catalogue()[name].null})), numbers(control()))
 
 
 @pytest.mark.parametrize("name", list(catalogue()))
@@ -136,7 +135,7 @@ def test_symmetry_visibility_and_dissipation(name: str) -> None:
     values = {o: getattr(motion, o) for o in OUTPUTS}
     change = max(abs(values[o][1] / values[o][0] - 1) for o in OUTPUTS)
     if change < 1e-3:  # what steady swimming hardly shows, switching must
-        response = switch_response(groups.select(torch.tensor([0, 1])), np.full(2, 0.5))
+        response = switch_response(groups.select(np.array([0, 1])), np.full(2, 0.5))
         change = abs(response.net_speed[1] / response.net_speed[0] - 1)
     assert change > 1e-3
     mirrored = {"omega_t": -1, "omega_yr": -1, "v_x": -1, "v_z": 1}
@@ -152,14 +151,14 @@ def test_a_dissipative_effect_takes_power_and_gives_none(name: str, share: float
     for end in effect.bounds:
         size = effect.null + share * (end - effect.null)
         body = assemble(control(C_yr=0.0, **{name: size}))
-        assert float(body.zeta_parallel) > 0
-        assert float(body.zeta_perp) > 0
-        assert float(body.droop) >= 0
+        assert body.zeta_parallel.item() > 0
+        assert body.zeta_perp.item() > 0
+        assert body.droop.item() >= 0
         # Torque, bending viscosity and friction; their power: see tests/sim/mechanics.
         terms = body.nonlocal_terms._asdict()
-        assert all(float(number) >= 0 for name, number in terms.items() if not catalogue()[name].grid)
+        assert all(number.item() >= 0 for name, number in terms.items() if not catalogue()[name].grid)
         R = body.resistance[..., 0]
-        on_head = torch.linalg.eigvalsh((R[:, :4] + R[:, :4].T) / 2)
+        on_head = np.linalg.eigvalsh((R[:, :4] + R[:, :4].T) / 2)
         assert on_head.min() > -1e-12
         assert (R[:3, 4] == 0).all()
         assert R[3, 4] >= 0  # the disc's own drag

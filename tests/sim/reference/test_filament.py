@@ -96,7 +96,7 @@ def test_force_converges_at_second_order_in_edges() -> None:
 def test_thrust_matches_linear_theory(drag_number: float) -> None:
     """A small offset a: thrust/[(ζ⊥ − ζ∥) ω a²] and tip offset/a depend on S = ζ⊥ ω alone."""
     offset, slenderness = 1e-3, 34.375
-    parallel, perp = (float(v) for v in tail_coefficients(torch.tensor([slenderness])))
+    parallel, perp = (v.item() for v in tail_coefficients(np.array([slenderness])))
     omega = drag_number / perp
     robots, _ = single_filament(24, omega, slenderness, offset)
     state = relaxed(robots, omega)

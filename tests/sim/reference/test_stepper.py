@@ -26,8 +26,8 @@ def test_total_force_and_moment_vanish_to_round_off(tails: int) -> None:
     state = at_rest(robots)
     dt = torch.full((3,), 0.004, dtype=torch.float64)
     for _ in range(30):
-        state = step(robots, state, groups.omega_bar, dt, tolerance=1e-12)
-    tail, head = fluid_wrench(robots, state.x, state.x_dot, state.pose[PHASE], state.u, groups.omega_bar)
+        state = step(robots, state, robots.body.omega, dt, tolerance=1e-12)
+    tail, head = fluid_wrench(robots, state.x, state.x_dot, state.pose[PHASE], state.u, robots.body.omega)
     assert (tail + head).abs().max() < 1e-11 * tail.abs().max()
     assert tail.abs().max() > 0.1
 
@@ -49,7 +49,9 @@ def test_compiled_steps_equal_steps_with_tensors(tails: int, omega: float) -> No
     assert advance(body, state, dt, steps, 1e-10, poses, np.empty((0, *state.x.shape)))
     tensors = at_rest(robots)
     for i in range(steps):
-        tensors = step(robots, tensors, groups.omega_bar, torch.tensor([dt], dtype=torch.float64), tolerance=1e-10)
+        tensors = step(
+            robots, tensors, robots.body.omega, torch.tensor([dt], dtype=torch.float64), tolerance=1e-10
+        )
         assert poses[i] == pytest.approx(tensors.pose[:, 0].numpy(), rel=1e-8, abs=1e-10)
     assert state.u == pytest.approx(tensors.u[:, 0].numpy(), rel=1e-8, abs=1e-9)
     assert state.x[:, 0] == pytest.approx(tensors.x[:, :, 0, 0].numpy(), abs=1e-9)
@@ -68,7 +70,7 @@ def yaw_after(steps: int, *, edges: int = 12, time: float = 1.5) -> float:
     state = at_rest(robots)
     dt = torch.tensor([time / steps], dtype=torch.float64)
     for _ in range(steps):
-        state = step(robots, state, groups.omega_bar, dt, tolerance=1e-9)
+        state = step(robots, state, robots.body.omega, dt, tolerance=1e-9)
     return float(state.pose[YAW])
 
 
@@ -92,8 +94,8 @@ def test_one_robot_that_breaks_down_does_not_disturb_the_others() -> None:
     state, good = at_rest(broken), at_rest(robots)
     dt = torch.full((2,), 0.02, dtype=torch.float64)
     for _ in range(5):
-        state = step(broken, state, groups.omega_bar, dt)
-        good = step(robots, good, groups.omega_bar, dt)
+        state = step(broken, state, robots.body.omega, dt)
+        good = step(robots, good, robots.body.omega, dt)
     assert state.failed.tolist() == [False, True]
     assert float(state.pose[YAW, 0]) == pytest.approx(float(good.pose[YAW, 0]), rel=1e-6)
     assert torch.isfinite(state.pose).all()
@@ -118,7 +120,7 @@ def test_tensors_find_the_compiled_orbit_in_balance(tails: int) -> None:
         turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
         shape[:, :, j] = np.einsum("ab,kmb->kam", turn, x[:, later])
         rate[:, :, j] = np.einsum("ab,kmb->kam", turn, derivative[:, later])
-    omega = groups.omega_bar[instants]
+    omega = robots.body.omega
     velocity = torch.tensor(u.T)
     x_dot = torch.tensor(rate) * robots.omega_t(velocity, omega)
     phase = torch.tensor(FIRST_PHASE + 2 * np.pi * np.arange(len(instants)) / phases)

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 from scipy.interpolate import CubicSpline
 
 from sim.linear.spectral import with_phases
@@ -32,7 +31,7 @@ ROBOTS = {
 
 
 def with_contact(groups: Groups, size: float = 1.0) -> Groups:
-    return replace(groups, effects={**groups.effects, "tail_contact": torch.full_like(groups.omega_bar, size)})
+    return replace(groups, effects={**groups.effects, "tail_contact": np.full(len(groups), size)})
 
 
 def axes(x: np.ndarray, offset: float, tails: int) -> np.ndarray:
@@ -121,7 +120,7 @@ def test_time_steps_settle_to_the_orbit(name: str) -> None:
 @pytest.mark.parametrize("size", [0.3, 1.0])
 def test_sensitivities_are_differences(size: float) -> None:
     def yaw(size: float, C_t: float) -> float:
-        groups = replace(with_contact(ROBOTS["measured"], size), C_t=torch.tensor([C_t]).double())
+        groups = replace(with_contact(ROBOTS["measured"], size), C_t=np.array([C_t]))
         return float(orbits(groups, phases=MANY).omega_yr[0])
 
     C_t, width = float(ROBOTS["measured"].C_t), 1e-3

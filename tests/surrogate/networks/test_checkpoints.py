@@ -17,7 +17,7 @@ from torch.utils._pytree import tree_leaves
 import surrogate.networks.checkpoints
 from sim.io.errors import InputError
 from surrogate.networks.checkpoints import Checkpoint, TrainingContext, device_named, remove_states
-from surrogate.networks.ensemble import Ensemble
+from surrogate.networks.trainable import TrainableEnsemble
 from surrogate.networks.training_loop import Problem, Settings, Watch, _adam, fit
 from tests.processes import LIMIT
 from tests.surrogate.small import table
@@ -53,7 +53,8 @@ halves = held.at(np.arange(len(held)) % 2 == 0)
 context = checkpoints.TrainingContext("train", folder=Path(sys.argv[1]))
 found = learn(rows(), halves, held, flips(), TAILS, CURVES, work=context)
 print(found.identity)
-loops = (compiled.evaluate_rows, balance.solve_rows, balance.inputs_rows, support._novelty_rows)
+loops = (compiled.evaluate_rows, balance.solve_rows, balance.inputs_rows, balance.inverse_rows)
+loops += (support._novelty_rows,)
 print(sum(loop.stats.cache_hits.total() for loop in loops), sum(loop.stats.cache_misses.total() for loop in loops))
 """
 
@@ -86,9 +87,11 @@ def problem(count: int = 64) -> tuple[torch.Tensor, torch.Tensor]:
     return x, torch.stack([x[:, 0].sin(), x[:, 1] * x[:, 2]], -1)
 
 
-def trained(work: TrainingContext, settings: Settings = SMALL, wanted: torch.Tensor | None = None) -> Ensemble:
+def trained(
+    work: TrainingContext, settings: Settings = SMALL, wanted: torch.Tensor | None = None
+) -> TrainableEnsemble:
     x, y = problem()
-    network = Ensemble(
+    network = TrainableEnsemble(
         3, 2, width=settings.width, depth=settings.depth, members=settings.members, seed=settings.seed
     )
     fit(network, x, (y if wanted is None else wanted,), lambda y, wanted: y - wanted, settings, work)
@@ -105,7 +108,7 @@ def test_training_that_is_killed_twice_goes_on_to_the_same_bytes(tmp_path: Path)
     done = run(folder, 10**9)
     assert done.returncode == 0, done.stderr
     assert "goes on after iteration 30 of 60, member 2 of 2" in done.stderr
-    assert done.stdout.split() == [table().identity, "4", "0"]  # loops are read from disk, not compiled here
+    assert done.stdout.split() == [table().identity, "5", "0"]  # loops are read from disk, not compiled here
     again = run(folder, 10**9)
     assert again.stdout == done.stdout
     assert "tails of N = 3 and more: was finished before" in again.stderr
@@ -182,7 +185,7 @@ def test_a_device_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) 
 def test_no_tensor_of_the_training_stays_on_the_processor() -> None:
     """Tried on the device "meta", which every torch has: its tensors have no numbers."""
     x, y = (part.to("meta") for part in problem())
-    network = Ensemble(3, 2, width=8, depth=2, members=2, seed=1).to("meta")
+    network = TrainableEnsemble(3, 2, width=8, depth=2, members=2, seed=1).to("meta")
     with OneDevice(), pytest.raises(AssertionError):
         network.standardised(problem()[0])
     own = Problem(x, (y,), torch.ones(len(x), dtype=x.dtype, device="meta"), lambda y, wanted: y - wanted)

@@ -4,47 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
-import torch
-from torch import Tensor
 
+from sim.arrays import Flags, Floats
 from surrogate.table.intervals import Intervals
 from tests.surrogate.small import rows, table
 
 
-def sampled(count: int, generator: torch.Generator, size: Callable[[Tensor], Tensor]) -> tuple[Tensor, Tensor]:
+def sampled(count: int, random: np.random.Generator, size: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
     """Draw features with values from 0 to 1, a fifth of them with one tail, and errors of that size."""
-    features = torch.rand(count, 8, generator=generator).double()
-    features[:, -1] = (features[:, -1] < 0.2).double()
-    return features, size(features) * torch.randn(count, generator=generator).double()
+    features = random.uniform(size=(count, 8))
+    features[:, -1] = features[:, -1] < 0.2
+    return features, size(features) * random.standard_normal(count)
 
 
-def covered(size: Callable[[Tensor], Tensor]) -> tuple[Intervals, Tensor, Tensor]:
+def covered(size: Callable[[Floats], Floats]) -> tuple[Intervals, Floats, Flags]:
     """Learn intervals from such errors; return fresh features, and which of their errors are inside."""
-    generator = torch.Generator().manual_seed(2)
-    (x, error), (more, other), (test, last) = (sampled(n, generator, size) for n in (3000, 3000, 20000))
+    random = np.random.default_rng(2)
+    (x, error), (more, other), (test, last) = (sampled(n, random, size) for n in (3000, 3000, 20000))
     found = Intervals.learned(x, {"v": error}, more, {"v": other})
-    inside = last.abs() <= found.half_widths("v", test, torch.ones(len(test)).double())
-    return found, test, inside.double()
+    return found, test, np.abs(last) <= found.half_widths("v", test, 1.0)
 
 
 def test_intervals_cover_as_they_say() -> None:
     """Errors whose size depends on an input: 90 % are covered, on the loud side and on the quiet side."""
-    _, test, inside = covered(lambda x: torch.exp(3 * x[:, 0]))
-    assert float(inside.mean()) == pytest.approx(0.9, abs=0.02)
+    _, test, inside = covered(lambda x: np.exp(3 * x[:, 0]))
+    assert inside.mean() == pytest.approx(0.9, abs=0.02)
     for side in (test[:, 0] < 0.3, test[:, 0] > 0.7):
-        assert 0.86 < float(inside[side].mean()) < 0.94
+        assert 0.86 < inside[side].mean() < 0.94
 
 
 def test_intervals_cover_in_each_part() -> None:
     """Errors that are large in one octant and for one tail only, which the local width cannot follow."""
-    found, test, inside = covered(
-        lambda x: 1 + 8 * (x[:, [0, 3, 5]] > 0.5).all(1).double() + 20 * (x[:, -1] > 0.5).double()
-    )
+    found, test, inside = covered(lambda x: 1 + 8 * (x[:, [0, 3, 5]] > 0.5).all(1) + 20 * (x[:, -1] > 0.5))
     part = found.part(test)
     assert sorted(set(part.tolist())) == list(range(9))
     for k in range(9):
-        assert 0.85 < float(inside[part == k].mean()) < 0.95
+        assert 0.85 < inside[part == k].mean() < 0.95
 
 
 def test_a_query_gives_intervals_around_its_answer() -> None:
