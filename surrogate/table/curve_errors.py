@@ -3,8 +3,9 @@
 The errors of held-out robots are projected on the principal components of the curves
 (`surrogate.table.response_table`): what is outside them is the noise of the simulator's time steps, and does not
 count. Over the speeds and the local size of each axis, they have a covariance over axis, dwell and dwell before.
-Its principal components are the modes. The sizes are learned as widths of intervals (`surrogate.table.intervals`): of
-robots that the table knows less well, errors are larger. An error of more than _OUTLIER sizes counts as this many.
+Its principal components are the modes. The sizes are learned as widths of intervals (`surrogate.table.intervals`):
+of robots that the table knows less well, errors are larger. An error of more than _OUTLIER sizes counts as this
+many.
 """
 
 from __future__ import annotations
