@@ -1,13 +1,15 @@
-"""Draw the picture of docs/reference/signs.md: the robot from above and from behind, and a camera's picture.
+"""Draw the pictures of docs/reference/signs.md: the robot from above and from behind, and a camera's picture.
 
-The robot is the paper's control robot (`sim.motion.robot_views`). A test compares docs/signs.svg with the drawing.
+The robot is the paper's control robot (`sim.motion.robot_views`). Each picture can be read on a screen 390 pixels
+wide. A test compares the files in docs with the drawings.
 
-Usage: python docs/draw_signs.py [OUT.svg]
+Usage: python docs/draw_signs.py [FOLDER]
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +29,8 @@ from sim.motion.robot_views import (
     draw_from_behind,
     scene,
 )
+
+WIDTH = 4.4  # inches, of a picture
 
 
 def draw_camera(axes: Any) -> None:
@@ -48,25 +52,29 @@ def draw_camera(axes: Any) -> None:
     axes.set_ylim(-2.7, 0.2)
 
 
-def draw(shown: Scene) -> Figure:
-    """Draw the three views."""
-    figure = Figure(figsize=(9.6, 5.6), layout="constrained")
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.75, 1), height_ratios=(1.15, 1))
-    views = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
-    draw_from_above(views[0], shown)
-    draw_from_behind(views[1], shown)
-    draw_camera(views[2])
-    for axes in views:
+def draw(shown: Scene) -> dict[str, Figure]:
+    """Draw the three views, by the names of their files."""
+    views: dict[str, tuple[float, Callable[[Any], None]]] = {  # file -> height over width, what draws it
+        "signs-from-above.svg": (0.67, lambda axes: draw_from_above(axes, shown)),
+        "signs-from-behind.svg": (0.8, lambda axes: draw_from_behind(axes, shown)),
+        "signs-camera.svg": (0.72, draw_camera),
+    }
+    figures = {}
+    for name, (height, draw_view) in views.items():
+        figures[name] = Figure(figsize=(WIDTH, height * WIDTH + 0.3), layout="constrained")
+        axes = figures[name].add_subplot()
+        draw_view(axes)
         axes.set_aspect("equal")
         axes.axis("off")
-    return figure
+    return figures
 
 
-def write(out: Path) -> None:
-    """Write the picture as SVG."""
+def write(folder: Path) -> None:
+    """Write the pictures as SVG."""
     with matplotlib.rc_context({"svg.hashsalt": "signs"}):
-        draw(scene(PRESETS["paper-control"])).savefig(out, format="svg", metadata={"Date": None})
+        for name, figure in draw(scene(PRESETS["paper-control"])).items():
+            figure.savefig(folder / name, format="svg", metadata={"Date": None})
 
 
 if __name__ == "__main__":
-    write(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_name("signs.svg"))
+    write(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)

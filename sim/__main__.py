@@ -97,7 +97,7 @@ def _replay(arguments: Namespace) -> None:
     from tqdm import tqdm
 
     from sim.io.files import write_csv
-    from sim.io.units import format_length
+    from sim.io.units import format_length, format_time
     from sim.model.schedule import load_schedule
     from sim.motion.replay import replay, replay_error
 
@@ -113,10 +113,11 @@ def _replay(arguments: Namespace) -> None:
         in_lab = f"{size:.2g} l" if length is None else f"{format_length(size * length)} ({size:.2g} l)"
         error = f", the simulator's own error is {in_lab} at most"
     end = track.iloc[-1]
-    print(
-        f"{len(schedule.dwells)} dwells, {end.time_s:.1f} s, "
-        f"ends at ({end.x_over_l:.3f}, {end.y_over_l:.3f}) l{error} -> {arguments.out}"
-    )
+    place = f"({end.x_over_l:.3f}, {end.y_over_l:.3f}) l"
+    if "x_cm" in track:
+        place = f"({end.x_cm:.2f}, {end.y_cm:.2f}) cm = {place}"
+    time = format_time(end.time_s)
+    print(f"{len(schedule.dwells)} dwells, {time}, ends at {place}{error} -> {arguments.out}")
 
 
 @program.command(

@@ -3,10 +3,10 @@ from calibration.report.robot_verdict import RobotVerdict as RobotVerdict
 from calibration.swimmer.synthetic_table import make_table as make_table
 from calibration.verdict.sequential_test import Decision as Decision
 from calibration.verdict.verdict import Verdict as Verdict
+from planner.files.goal_json import load_goal as load_goal
 from planner.files.plan_json import load_plan as load_plan
 from planner.files.tracking_error import TrackingError as TrackingError
 from planner.goal.goal_plan import GoalPlan as GoalPlan
-from planner.goal.to_goal import to_goal as to_goal
 from planner.paths.obstacles import Circle as Circle
 from planner.paths.path import Path2D as Path2D
 from planner.paths.path import circle as circle
@@ -29,6 +29,7 @@ from sim.model.schedule import load_schedule as load_schedule
 from softflagella.api.calibrate import calibrate as calibrate
 from softflagella.api.calibrate import decide as decide
 from softflagella.api.calibrate import tracks as tracks
+from softflagella.api.goal import to_goal as to_goal
 from softflagella.api.plan import check as check
 from softflagella.api.plan import plan as plan
 from softflagella.api.plan import write_plan as write_plan

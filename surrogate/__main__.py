@@ -145,7 +145,7 @@ def _inverse(arguments: Namespace) -> None:
     with naming(arguments.targets):
         table = inverse_table(load(arguments.model), points, names, where=arguments.targets)
     write_csv(table, arguments.out)
-    print(f"{len(table)} solutions of {len(points)} targets -> {arguments.out}")
+    print(f"solutions: {len(table)}, targets: {len(points)} -> {arguments.out}")
 
 
 @program.command("errors", "print the stored held-out errors", MODEL)

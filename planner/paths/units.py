@@ -24,7 +24,7 @@ _SENSIBLE = (3.0, 300.0)  # length in l
 
 def in_lab(value: float, robot: Robot) -> str:
     """Write a length given in tail lengths: 3.52 cm (0.32 l)."""
-    return f"{format_length(value * robot.tail_length)} ({value:.3g} l)"
+    return f"{format_length(value * robot.tail_length)} ({_tails(value)} l)"
 
 
 def time_in_lab(value: float, robot: Robot) -> str:
@@ -35,14 +35,25 @@ def time_in_lab(value: float, robot: Robot) -> str:
 def place_in_lab(x: float, y: float, robot: Robot) -> str:
     """Write a place given in tail lengths: (3.52, 1.1) cm = (0.32, 0.1) l."""
     cm = 100 * robot.tail_length
-    return f"({cm * x:.2f}, {cm * y:.2f}) cm = ({x:.3f}, {y:.3f}) l"
+    lab, tails = (", ".join(_fixed(s * value, n) for value in (x, y)) for s, n in ((cm, 2), (1.0, 3)))
+    return f"({lab}) cm = ({tails}) l"
+
+
+def _fixed(value: float, places: int) -> str:
+    """Write a number with some decimals, and zero without a sign."""
+    return f"{round(value, places) + 0.0:.{places}f}"
+
+
+def _tails(value: float) -> str:
+    """Write a length in tail lengths: 0.32, 12, 1200."""
+    return f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
 def describe(path: Path2D, robot: Robot) -> str:
     """Describe length and extent of a path."""
     width, height = extent(path)
     across = [format_length(value * robot.tail_length) for value in (width, height)]
-    return f"{in_lab(path.length, robot)} long, {' by '.join(across)} ({width:.3g} by {height:.3g} l)"
+    return f"{in_lab(path.length, robot)} long, {' by '.join(across)} ({_tails(width)} by {_tails(height)} l)"
 
 
 def in_tails(unit: str, robot: Robot) -> float:
@@ -90,18 +101,24 @@ def check_unstated_unit(path: Path2D, robot: Robot, turn_radius: float, speed: f
         raise InputError(
             f"the path is {describe(path, robot)} if its numbers are tail lengths: {circles:.0f} of the robot's "
             f"circles across, about {format_time(seconds)}; say its unit, --unit l if this is meant"
-            f"{_hint(path, robot)}"
+            f"{_hint(path, robot, given='l')}"
         )
 
 
-def _hint(path: Path2D, robot: Robot) -> str:
-    """Suggest the units with which the numbers of the path would make sense."""
+def _hint(path: Path2D, robot: Robot, given: str | None = None) -> str:
+    """Suggest the units with which the numbers of the path would make sense.
+
+    Args:
+        path: in tail lengths.
+        robot: its tail length.
+        given: the unit of the numbers, where it is known.
+    """
     scales = {unit: in_tails(unit, robot) for unit in ("l", *UNITS)}
-    # The path may have been given in any of these units: undo it, then try the others.
+    # Else the path may have been given in any of these units: undo it, then try the others.
     hints = []
-    for given, scale in scales.items():
+    for unit in scales if given is None else (given,):
         for meant, meant_scale in scales.items():
-            length = path.length / scale * meant_scale
-            if given != meant and _SENSIBLE[0] <= length <= _SENSIBLE[1]:
-                hints.append(f"if you gave {given} and mean {meant}, it is {length:.3g} l: --unit {meant}")
+            length = path.length / scales[unit] * meant_scale
+            if unit != meant and _SENSIBLE[0] <= length <= _SENSIBLE[1]:
+                hints.append(f"if you gave {unit} and mean {meant}, it is {length:.3g} l: --unit {meant}")
     return "; " + "; or ".join(hints[:2]) if hints else "; scale it"

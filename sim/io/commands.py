@@ -14,9 +14,9 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
-from sim.io.errors import run_command
+from sim.io.errors import InputError, run_command
 
 Run = Callable[[Namespace], None]
 
@@ -43,6 +43,14 @@ JOBS = argument("--jobs", type=int, help="processes or threads (default: all pro
 MODEL = argument("--model", help="look-up table (default: the one that comes with the package)")
 
 
+class Parser(ArgumentParser):
+    """A parser that refuses wrong words in one line, as all bad input is refused."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with exit status 2."""
+        raise InputError(f"{message}; {self.prog} --help lists what can be given")
+
+
 class Command(NamedTuple):
     """A command of a program."""
 
@@ -60,7 +68,7 @@ class Command(NamedTuple):
 
     def parser(self, prog: str) -> ArgumentParser:
         """Return a parser of this command alone."""
-        parser = ArgumentParser(prog=prog, description=_sentence(self.help))
+        parser = Parser(prog=prog, description=_sentence(self.help))
         self.add_arguments(parser)
         return parser
 
@@ -90,7 +98,7 @@ class Program:
 
     def parser(self) -> ArgumentParser:
         """Return the parser of all commands."""
-        parser = ArgumentParser(prog=self.prog, description=self.about)
+        parser = Parser(prog=self.prog, description=self.about)
         subparsers = parser.add_subparsers(required=True, metavar="COMMAND")
         for command in self.commands.values():
             command.add_arguments(

@@ -21,6 +21,7 @@ MOST_TEXT = 16 * 2**20  # bytes of a drawing
 MOST_JSON = 256 * 2**20  # bytes of a plan, a table of one robot or a verdict
 _MOST_PARTS = 50  # of a dotted key of TOML; the parser takes a time that grows with their square
 _PART = r"""(?:"[^"\n]*"|'[^'\n]*'|(?<![\w-])[\w-]++)"""
+_DECIMAL_COMMA = re.compile(r"^[ \t]*+[\w-]++[ \t]*+=[ \t]*+([+-]?\d{1,20}),(\d{1,20})[ \t]*+(?:#.*+)?$", re.M)
 _LONG_KEY = re.compile(rf"(?:{_PART}[ \t]*+\.[ \t]*+){{{_MOST_PARTS}}}")
 
 
@@ -80,7 +81,13 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     text = read_text(path, MOST_SETTINGS)
     if _LONG_KEY.search(text):
         raise InputError(f"{path} is not TOML that is read here: a key has more than {_MOST_PARTS} parts")
-    return _parsed(path, "TOML", lambda: tomllib.loads(text))
+    try:
+        return _parsed(path, "TOML", lambda: tomllib.loads(text))
+    except ContentError as broken:
+        comma = _DECIMAL_COMMA.search(text)
+        if comma is None:
+            raise
+        raise ContentError(f"{broken}; write {comma[1]}.{comma[2]} for {comma[1]},{comma[2]}") from None
 
 
 def read_json(path: str | Path, **options: Any) -> Any:

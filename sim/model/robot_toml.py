@@ -192,4 +192,4 @@ _SI = {"length": "m", "pressure": "Pa", "viscosity": "Pa_s", "angular velocity":
 
 
 def _line(text: str, comment: str) -> str:
-    return f"{text:<34}# {comment}" if comment else text
+    return f"{text:<33} # {comment}" if comment else text

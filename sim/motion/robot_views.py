@@ -123,14 +123,14 @@ def draw_from_above(axes: Any, shown: Scene) -> None:
     side = "left" if turning > 0 else "right"
     text = {"fontsize": SIZE, "zorder": 7}
     axes.text(*polar(HEADING / 2, 0.83), "heading ψ", color=INK, va="center", **text)
-    axes.text(*polar(HEADING, 1.04), "axis, from the\ntails to the head", color=INK, va="center", **text)
-    axes.text(*polar(HEADING + 0.7 * way, 0.55), "slip angle θ", color=TURN, **text)
+    axes.text(*polar(HEADING + 0.08, 1.07), "axis, from the\ntails to the head", color=INK, va="center", **text)
+    axes.text(*polar(HEADING + 0.84 * way, 0.59), "slip angle θ", color=TURN, **text)
     axes.text(*polar(HEADING + way, 0.86), "velocity v\n(along the path)", color=PATH, ha="center", **text)
     axes.text(0.12, -0.3, "(x, y): the head's centre", color=INK, va="top", **text)
     axes.plot([0.11, 0.02], [-0.31, -0.05], color=INK, lw=0.7, zorder=6)
     middle = (centre + track[-60]) / 2
     axes.text(middle[0] + 0.04, middle[1] + 0.05, "$R_{yr}$", color=PATH, **text)
-    axes.text(*(centre - [0.08, 0.02]), f"motor at +1:\nit turns {side}", color=PATH, ha="right", va="top", **text)
+    axes.text(*(centre - [0.03, 0.03]), f"motor at +1:\nit turns {side}", color=PATH, ha="right", va="top", **text)
     tip = shown.seen_from_above(shown.at(0.0), shown.tails[0, -1])
     axes.text(*(tip - [0.02, 0.14]), "tails", color=TAIL, ha="center", va="top", **text)
     corner = np.array([-1.75, -1.05])
@@ -138,8 +138,8 @@ def draw_from_above(axes: Any, shown: Scene) -> None:
         arrow(axes, corner, corner + end, INK, 1.3)
         axes.text(*corner + np.array(end) * 1.12, name, ha=align, va="center", **text)
     axes.set_title("from above: the frame of the lab", fontsize=SIZE + 1.5)
-    axes.set_xlim(-2.0, 1.75)
-    axes.set_ylim(-1.2, 1.95)
+    axes.set_xlim(-1.9, 2.05)
+    axes.set_ylim(-1.2, 1.45)
 
 
 def draw_from_behind(axes: Any, shown: Scene) -> None:
@@ -147,7 +147,7 @@ def draw_from_behind(axes: Any, shown: Scene) -> None:
     R = 1.0
     axes.add_patch(Circle((0, 0), R, facecolor="#dfe9f1", edgecolor=HEAD, lw=1.5))
     axes.plot([-2.2, 2.2], [0.72, 0.72], color=PALE, lw=1.0)
-    axes.text(2.2, 0.78, "surface", color=PALE, fontsize=SIZE - 1, ha="right", va="bottom")
+    axes.text(2.2, 0.78, "surface", color=PALE, fontsize=SIZE, ha="right", va="bottom")
     for root in shown.tails[:, 0]:
         angle = np.array(math.atan2(root[1], root[0]))
         axes.add_patch(Circle(tuple(from_behind(angle, 0.72)), 0.11, color=TAIL, zorder=4))

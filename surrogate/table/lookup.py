@@ -289,7 +289,7 @@ class NeuralTable:
                 break
         return (
             f"the robot in row {row + 1} is outside the look-up table: {reason}; change the robot, or simulate it "
-            "(softflagella sim steady, softflagella surrogate robot)"
+            "(softflagella steady, softflagella surrogate robot)"
         )
 
     def _responses(self, motions: Motions, steady: Mapping[str, Floats]) -> Responses:

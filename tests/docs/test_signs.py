@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 import softflagella as sf
 from calibration.swimmer.camera_tracks import measure_tracks
@@ -172,6 +174,11 @@ def test_five_seconds_at_plus_one_turn_left_on_the_bench() -> None:
             assert f"turns by {math.degrees(turned):.0f}°, and its head moves {moved:.0f} cm" in PAGE
 
 
+def said(figures: dict[str, Figure]) -> set[str]:
+    """Return the words of the pictures."""
+    return {text.get_text() for figure in figures.values() for axes in figure.axes for text in axes.texts}
+
+
 def test_the_picture_shows_the_simulated_senses() -> None:
     """Its words and arrows follow from the simulation: of a robot with C_yr < 0 it draws a right turn."""
     drawing = module_of_docs("draw_signs")
@@ -181,18 +188,35 @@ def test_the_picture_shows_the_simulated_senses() -> None:
     right, up = (from_behind(np.array(angle), 1.0) for angle in (math.pi, math.pi / 2))
     assert right == pytest.approx([1, 0])
     assert up == pytest.approx([0, 1])
-    words = {text.get_text() for axes in drawing.draw(shown).axes for text in axes.texts}
+    words = said(drawing.draw(shown))
     assert {"motor at +1:\nit turns left", "tails: clockwise", "head: counter-clockwise"} <= words
     mirrored = shown._replace(twist=shown.twist * [1, -1, -1], spins=(-shown.spins[0], -shown.spins[1]))
-    words = {text.get_text() for axes in drawing.draw(mirrored).axes for text in axes.texts}
+    words = said(drawing.draw(mirrored))
     assert {"motor at +1:\nit turns right", "tails: counter-clockwise", "head: clockwise"} <= words
 
 
-def test_the_picture_is_what_is_drawn(tmp_path: Path) -> None:
-    module_of_docs("draw_signs").write(tmp_path / "signs.svg")
+def test_the_pictures_are_what_is_drawn(tmp_path: Path) -> None:
+    module_of_docs("draw_signs").write(tmp_path)
     number = re.compile(r"-?\d+\.\d+")
-    kept, drawn = ((folder / "signs.svg").read_text() for folder in (DOCS, tmp_path))
-    assert number.sub("#", kept) == number.sub("#", drawn)
-    assert [float(n) for n in number.findall(kept)] == pytest.approx(
-        [float(n) for n in number.findall(drawn)], abs=0.01
-    )
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {path.name for path in DOCS.glob("signs*.svg")}
+    for name in names:
+        assert f"](../{name})" in PAGE
+        kept, drawn = ((folder / name).read_text() for folder in (DOCS, tmp_path))
+        assert number.sub("#", kept) == number.sub("#", drawn)
+        assert [float(n) for n in number.findall(kept)] == pytest.approx(
+            [float(n) for n in number.findall(drawn)], abs=0.01
+        )
+
+
+def test_each_picture_can_be_read_on_a_narrow_screen() -> None:
+    """At 340 px, the width of the text on a screen of 390 px, letters have 10 px or more; nothing sticks out."""
+    for name, figure in module_of_docs("draw_signs").draw(scene(ROBOT)).items():
+        figure.canvas = FigureCanvasAgg(figure)
+        figure.canvas.draw()
+        points_wide = 72 * figure.get_figwidth()
+        texts = [*figure.axes[0].texts, figure.axes[0].title]
+        for text in texts:
+            assert text.get_fontsize() * 340 / points_wide >= 10, (name, text.get_text())
+            box = text.get_window_extent()
+            assert 0 <= box.x0 <= box.x1 <= figure.bbox.width, (name, text.get_text())

@@ -22,7 +22,10 @@ from dataset.rows.version import rows_version
 from dataset.storage.data_set import ROWS, SWEEP, manifest_content, write_manifest
 from dataset.storage.shards import shard_name, write_shard
 from dataset.storage.storage import open_storage
+from planner.files.goal_files import write_goal_plan
 from planner.files.plan_files import write_plan
+from planner.goal.to_goal import to_goal
+from planner.paths.obstacles import Circle
 from planner.paths.path import circle
 from planner.planning.plan import plan
 from planner.vehicle.calibration_table import CalibrationKnowledge, knowledge_toml
@@ -162,6 +165,14 @@ def sealed_model(content: Any) -> bytes:
 def plan_file() -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         return write_plan(plan(circle(1.0), ROBOT), folder)[0].read_bytes()
+
+
+@cache
+def goal_file() -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        trip = to_goal((0, 0, 0), (3, 1, 1), ROBOT, keep_out=[Circle(1.0, -1.5, 0.3)])
+        write_goal_plan(trip, folder)
+        return Path(folder, "goal.json").read_bytes()
 
 
 def replayed() -> bytes:

@@ -29,6 +29,7 @@ from dataset.storage.data_set import MANIFEST, ROWS, SWEEP, batches
 from dataset.storage.shards import BadShardError, Shard, check_shard, shard_name
 from dataset.storage.storage import open_storage
 from planner.files.goal_files import read_region
+from planner.files.goal_json import load_goal
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import tracking_error
 from planner.paths.path_files import read_path
@@ -52,6 +53,7 @@ from tests.oracles.example_files import (
     Files,
     corrected,
     file,
+    goal_file,
     json_of,
     model_content,
     of_data_set,
@@ -210,6 +212,11 @@ def _read_plan(path: Path) -> None:
     _finite(schedule.dwells, schedule.start, content["stated_error_over_l"])
 
 
+def _read_goal(path: Path) -> None:
+    content = load_goal(path)
+    _finite(content["start"], content["goal"], content["predicted_end"], content["margin_over_l"])
+
+
 def _read_track(path: Path) -> None:
     content = load_plan(path.with_name("plan.json"))
     with naming(path):
@@ -275,6 +282,7 @@ FORMATS: dict[str, FileFormat] = {
         lambda path: read_region(str(path), in_tails("cm", ROBOT), ROBOT), TABLE,
     ),
     "plan": FileFormat(file("plan.json", plan_file), _read_plan, JSON),
+    "goal": FileFormat(file("goal.json", goal_file), _read_goal, JSON),
     "replayed track": FileFormat(file("track.csv", replayed, plan_json=plan_file), _read_track, TABLE),
     "measured runs": FileFormat(file("table.csv", lambda: text(runs())), _read_runs, TABLE),
     "camera tracks": FileFormat(

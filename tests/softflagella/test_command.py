@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 import softflagella as sf
@@ -44,6 +45,33 @@ def test_a_word_runs_its_command(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "no-such-path.csv" in capsys.readouterr().err
     assert run_command(main, ["sweep", "--config", "none.toml", "--out", str(tmp_path / "out")]) == 2
     assert "none.toml" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["plan", "square:3"], "required: --robot, --out; softflagella plan --help"),
+        (["plan", "square:3", "--robot", "r", "--out", "o", "--objective", "speed"], "invalid choice: 'speed'"),
+        (["planner", "goal", "--goal", "3", "0"], "expected 3 arguments; softflagella planner goal --help"),
+        (["planner", "fly"], "invalid choice: 'fly'"),
+        (["sim"], "required: COMMAND; softflagella sim --help"),
+    ],
+)
+def test_wrong_words_end_in_one_line(words: list[str], expected: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command(main, words) == 2
+    captured = capsys.readouterr()
+    (line,) = captured.err.splitlines()
+    assert line.startswith("error: ")
+    assert expected in line
+    assert captured.out == ""
+
+
+def test_a_replay_says_its_end_in_lab_units(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sf.write_plan(sf.plan(sf.circle(1.0), "paper-control", objective="flips"), tmp_path)
+    assert run_command(main, ["replay", str(tmp_path / "plan.json"), "--out", str(tmp_path / "track.csv")]) == 0
+    said = capsys.readouterr().out
+    end = pd.read_csv(tmp_path / "track.csv").iloc[-1]
+    assert f" dwells, {end.time_s / 60:.3g} min, ends at ({end.x_cm:.2f}, {end.y_cm:.2f}) cm = " in said
 
 
 def test_the_command_runs_what_the_package_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -36,6 +36,14 @@ def test_a_path_in_tail_lengths_that_nobody_stated_is_asked_about(
     assert "94.2 cm (8.57 l) long" in capsys.readouterr().out
 
 
+def test_tail_lengths_are_not_taken_for_metres() -> None:
+    """The numbers of this path are tail lengths, so only other units are suggested."""
+    with pytest.raises(InputError, match=r"--unit l if this is meant; if you gave l and mean cm") as caught:
+        check_unstated_unit(circle(23.0), CONTROL, 0.3, 0.05)
+    assert "if you gave m" not in str(caught.value)
+    assert str(caught.value).count("--unit l") == 1
+
+
 def test_a_stated_unit_is_not_asked_about() -> None:
     path = circle(60.0)
     with pytest.raises(InputError, match="of the robot's circles across"):
@@ -48,3 +56,5 @@ def test_a_stated_unit_is_not_asked_about() -> None:
 def test_lengths_in_messages_are_in_a_laboratory_s_units_first() -> None:
     assert in_lab(0.32, CONTROL) == "3.52 cm (0.32 l)"
     assert place_in_lab(1.0, -0.5, CONTROL) == "(11.00, -5.50) cm = (1.000, -0.500) l"
+    assert place_in_lab(-1e-9, 0.0, CONTROL) == "(0.00, 0.00) cm = (0.000, 0.000) l"
+    assert in_lab(1200.0, CONTROL) == "132 m (1200 l)"

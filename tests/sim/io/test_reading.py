@@ -101,3 +101,13 @@ def test_a_table_of_nothing_is_no_table(tmp_path: Path) -> None:
     pd.DataFrame({"a": []}).to_csv(tmp_path / "a.csv", index=False)
     with pytest.raises(InputError, match="has no rows"):
         read_table(tmp_path / "a.csv")
+
+
+def test_a_decimal_comma_in_toml_is_pointed_out(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text("[tails]\nyoungs_modulus_MPa = 1,1 # measured\n")
+    with pytest.raises(InputError, match=r"is not TOML: .*; write 1\.1 for 1,1$"):
+        read_toml(tmp_path / "robot.toml")
+    (tmp_path / "list.toml").write_text("range = [1,1]\nbroken\n")
+    with pytest.raises(InputError, match="is not TOML") as caught:
+        read_toml(tmp_path / "list.toml")
+    assert "write" not in str(caught.value)

@@ -140,3 +140,10 @@ def test_what_is_written_is_read_back_to_the_last_bit(
     tables = tomllib.loads(robot_toml(robot))
     name = tables.pop("name")
     assert Robot(name=name, **read_robot(tables, "robot.toml")) == robot
+
+
+def test_a_comment_stands_apart_from_a_number_of_any_length() -> None:
+    robot = replace(PRESETS["paper-control"], disc_offset=0.015065219030606398)
+    lines = [line for line in robot_toml(robot).splitlines() if "disc_offset" in line]
+    assert all(" # " in line.removeprefix("# ") for line in lines)
+    assert lines

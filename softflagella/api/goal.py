@@ -1,0 +1,81 @@
+"""Plan from one pose to another: `softflagella.to_goal`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypedDict, Unpack
+
+from numpy.typing import ArrayLike
+
+from planner.files.own_table import table_for
+from planner.goal.goal_plan import GoalPlan
+from planner.goal.to_goal import to_goal as plan_to_goal
+from planner.paths.obstacles import Circle, Polygon
+from planner.paths.path import Path2D
+from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
+from planner.vehicle.dwell_choice import Objective
+from sim.model.robot import Robot
+from softflagella.api.robots import OneRobot, one_robot
+from surrogate.interface import LookupTable
+
+
+class GoalOptions(TypedDict, total=False):
+    """Keyword arguments of `to_goal` besides the table and what a calibration found."""
+
+    via: Sequence[Sequence[float]]
+    keep_out: Sequence[Circle | Polygon | Path2D | ArrayLike]
+    walls: Polygon | Path2D | ArrayLike | None
+    objective: Objective
+    minimum_dwell: float | None
+    minimum_seconds: float | None
+    tolerance: float | None
+    feedback: bool
+    seed: int
+
+
+def to_goal(
+    start: Sequence[float],
+    goal: Sequence[float],
+    robot: OneRobot,
+    *,
+    lookup: LookupTable | None = None,
+    knowledge: CalibrationKnowledge | None = None,
+    **options: Unpack[GoalOptions],
+) -> GoalPlan:
+    """Plan the motor's switching times from one pose to another.
+
+    Args:
+        start: x, y [l] and heading [rad] of the head's centre, at rest.
+        goal: the same at the end.
+        robot: the robot, its robot.toml, or the name of a preset; its motor speed is used in both directions.
+        lookup: trained table, or the table of this one robot. Default: the one that comes with the package. Where
+            that one does not know the robot, the robot's own table is simulated, and kept beside its file.
+        knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
+        options: any of
+
+            - via: places x, y [l] that the pivot passes on its way, in this order.
+            - keep_out: circles, and polygons as (n, 2) corners, that the robot's body must not touch.
+            - walls: a polygon that it must not leave.
+            - objective: what decides the dwell: short "time" (default), small "error", or few "flips".
+            - minimum_dwell: shortest time between flips [μ0 l⁴/EI] that the motor allows.
+            - minimum_seconds: the same in seconds; the larger one counts.
+            - tolerance: largest acceptable stated error [l].
+            - feedback: the robot's pose will be measured every 20 flips (`Tracker`), so the margin around
+              obstacles is the stated error with feedback.
+            - seed: of the random robots from which the stated error is computed.
+
+    Raises:
+        NoWayError: there is no way to the goal; it is an `InputError`.
+        InputError: a pose or a region is bad, or the robot cannot be simulated.
+
+    Example:
+        >>> import softflagella as sf
+        >>> trip = sf.to_goal((0, 0, 0), (4, 1, 0), "paper-control")
+        >>> trip.end_error[0] < 0.01
+        True
+    """
+    swims = one_robot(robot)
+    source = None if isinstance(robot, Robot) else str(robot)
+    known = knowledge or (CalibrationKnowledge() if source is None else read_knowledge(source))
+    table = lookup or table_for(swims, source, known)
+    return plan_to_goal(start, goal, swims, lookup=table, knowledge=known, **options)
