@@ -42,6 +42,7 @@ from sim.io.errors import InputError
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
 
+_WORTH = 0.8  # of the stated error: a longer dwell, which swings further, must leave at most this
 _DOMINATED = 1.2  # a stated error over the predicted one, below which nothing is gained by fewer flips
 # Plans from what declares the path, the drift, and what follows a declared path.
 Redirect = Callable[[Callable[[], Declared], Drift, Callable[[Declared], Plan]], Plan]
@@ -134,7 +135,7 @@ def make_plan(
 
 
 def _least_stated(first: Plan, longer: list[float], with_dwell: Callable[[float], Plan]) -> Plan:
-    """Lengthen the dwells where this makes the stated error smaller.
+    """Lengthen the dwells where this makes the stated error smaller by a fifth or more.
 
     What is uncertain of each flip adds up, so it shrinks with their number. The predicted error grows with the
     dwell; where it alone is above the best stated error, longer dwells cannot be better.
@@ -149,7 +150,7 @@ def _least_stated(first: Plan, longer: list[float], with_dwell: Callable[[float]
             break
         if candidate.predicted_max >= best.stated_error:
             break
-        if candidate.stated_error < best.stated_error:
+        if candidate.stated_error < _WORTH * best.stated_error:
             best = candidate
     return best
 
