@@ -5,50 +5,36 @@ from __future__ import annotations
 import math
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from planner.paths.units import UNITS, check_unstated_unit, describe, in_lab, in_tails, place_in_lab
-from sim.io.commands import MODEL, ROBOT, Program, argument, out
+from planner.command_line import DWELLS, OBSTACLES, TABLE, progress_bar, say, table_of
+from planner.job_commands import JOBS
+from planner.paths.units import (
+    UNITS,
+    check_unstated_unit,
+    describe,
+    hinting_at_units,
+    in_lab,
+    in_tails,
+    place_in_lab,
+)
+from sim.io.commands import ROBOT, Program, argument, out
 from sim.io.errors import InputError, naming
-from sim.io.units import format_time
 
 if TYPE_CHECKING:
     from planner.paths.path import Path2D
     from planner.planning.planned import Plan
     from planner.planning.request import PlanRequest
-    from planner.vehicle.calibration_table import CalibrationKnowledge
     from sim.model.robot import Robot
-    from surrogate.interface import LookupTable
 
 program = Program("planner", "Plan switching schedules for paths, without simulating.")
 main = program.main
-_SHAPES = {"circle": 0, "triangle": 3, "square": 4}  # number of corners
 
-
-_DWELLS = (
-    argument("--min-dwell", type=float, help="shortest dwell, in time units μ0 l⁴/EI"),
-    argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
-    argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
-)
-_TABLE = (
-    MODEL,
-    argument("--own-table", action="store_true",
-             help="simulate a look-up table of this robot, once; it is more accurate on long paths"),
-)  # fmt: skip
-_OBSTACLES = (
-    argument("--keep-out", action="append", default=[], metavar="REGION",
-             help="circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; may be given again"),
-    argument("--walls", metavar="REGION", help="what the robot must stay within: box:…, or a CSV or SVG outline"),
-    argument("--feedback", action="store_true",
-             help="the pose will be measured every 20 flips: the margin around obstacles is the stated error with "
-             "feedback"),
-)  # fmt: skip
 _PLANNING = (
-    argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE"),
+    argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE, polygon:CORNERS:SIDE "
+             "(polygon:6:2)"),
     ROBOT,
-    *_TABLE,
+    *TABLE,
     argument("--unit", choices=("l", *UNITS), help="unit of the path's numbers (default: tail lengths)"),
     argument("--scale", type=float, default=1.0, help="multiply the path's coordinates"),
     argument("--shape", help="which path of an SVG with several"),
@@ -64,8 +50,8 @@ _PLANNING = (
              "whole path (default: 0; 0.03 cuts a little)"),
     argument("--objective", default="error", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: error)"),
-    *_DWELLS,
-    *_OBSTACLES,
+    *DWELLS,
+    *OBSTACLES,
 )  # fmt: skip
 
 
@@ -86,7 +72,7 @@ def _plan(arguments: Namespace) -> None:
 
         pictures["trade_off.svg"] = draw_trade_off(trade_off(result, request))
     paths = write_plan(result, arguments.out, pictures=pictures)
-    _say(result)
+    say(result)
     robot, errors = result.robot, result.errors
     rms, largest, missed = (
         in_lab(value, robot) for value in (errors.drawn_rms, errors.drawn_max, result.declared.missed)
@@ -98,28 +84,6 @@ def _plan(arguments: Namespace) -> None:
     print(f"-> {', '.join(map(str, paths))}")
 
 
-def _say(result: Plan) -> None:
-    """Print warnings, start, dwells and errors."""
-    for warning in result.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
-    robot = result.robot
-    x, y, heading = result.start
-    place = place_in_lab(x, y, robot)
-    print(f"start: put the head's centre at {place}, heading {math.degrees(heading):.1f} degrees, at rest")
-    shortest = format_time(result.minimum_dwell * robot.time_scale)
-    print(
-        f"{len(result.dwells)} dwells of {shortest} ({result.minimum_dwell:.2f} time units) or more, "
-        f"{format_time(float(result.seconds.sum()))} in all"
-    )
-    rms, largest, stated, feedback = (
-        in_lab(value, robot)
-        for value in (result.predicted_rms, result.predicted_max, result.stated_error, result.feedback_error)
-    )
-    print(f"predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}")
-    for line in () if result.kept_clear is None else result.kept_clear.lines(robot):
-        print(line)
-
-
 @program.command(
     "goal",
     "plan the way from one pose to another, around obstacles; exit status 3 where there is none",
@@ -129,13 +93,13 @@ def _say(result: Plan) -> None:
              help="of the head's centre at the start, at rest (default: 0 0 0)"),
     argument("--via", nargs=2, type=float, action="append", default=[], metavar=("X", "Y"),
              help="a place that the pivot passes; may be given again"),
-    *_OBSTACLES,
+    *OBSTACLES,
     argument("--unit", choices=("l", *UNITS), default="l", help="unit of all lengths (default: tail lengths)"),
     ROBOT,
-    *_TABLE,
+    *TABLE,
     argument("--objective", default="time", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: time)"),
-    *_DWELLS,
+    *DWELLS,
     out("folder"),
 )  # fmt: skip
 def _goal(arguments: Namespace) -> None:
@@ -159,7 +123,7 @@ def _goal(arguments: Namespace) -> None:
         via=[(scale * x, scale * y) for x, y in arguments.via],
         keep_out=space.regions,
         walls=space.walls,
-        lookup=_table(arguments, robot, knowledge),
+        lookup=table_of(arguments, robot, knowledge),
         objective=arguments.objective,
         minimum_dwell=arguments.min_dwell,
         minimum_seconds=arguments.min_dwell_s,
@@ -168,7 +132,7 @@ def _goal(arguments: Namespace) -> None:
         knowledge=knowledge,
     )
     paths = write_goal_plan(goal_plan, arguments.out)
-    _say(goal_plan.plan)
+    say(goal_plan.plan)
     off, turned = goal_plan.end_error
     x, y, heading = goal_plan.end
     place = place_in_lab(x, y, robot)
@@ -212,7 +176,7 @@ def _track(arguments: Namespace) -> None:
 def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     """Make the plan that the command asks for, and return it with the request."""
     from planner.files.goal_files import read_free_space
-    from planner.jobs.clear_plan import plan_clear
+    from planner.planning.plan import make_plan
     from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import read_knowledge
     from planner.vehicle.dwell_choice import dwells_for
@@ -221,7 +185,7 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     from sim.inputs import load_robot
 
     robot = load_robot(arguments.robot)
-    path, unit, unit_known = _path(arguments, robot)
+    path, unit, given_in = _path(arguments, robot)
     space = read_free_space(arguments.keep_out, arguments.walls, unit, robot)
     print(f"path: {describe(path, robot)}")
     request = PlanRequest(
@@ -234,55 +198,26 @@ def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
         tolerance=arguments.tolerance,
     )
     knowledge = read_knowledge(arguments.robot)
-    tracked = tracked_vehicle(robot, _table(arguments, robot, knowledge), request.point, knowledge)
-    if not unit_known:
+    tracked = tracked_vehicle(robot, table_of(arguments, robot, knowledge), request.point, knowledge)
+    if given_in and arguments.unit is None:
         dwell = dwells_for(tracked.vehicle, request.objective, request.least_dwell(robot))[0]
         speed = zigzag(tracked.vehicle, dwell, tracked.offset).speed
         check_unstated_unit(path, robot, tracked.vehicle.turn_radius, speed)
-    with _progress() as progress:
-        result = plan_clear(path, tracked, request, space, feedback=arguments.feedback, progress=progress)
-    return result, request
+    with hinting_at_units(path, robot, tracked.vehicle.turn_radius, given_in), progress_bar() as progress:
+        if space.empty:
+            return make_plan(path, tracked, request, progress), request
+        from planner.jobs.clear_plan import plan_clear  # loads SciPy's graphs
+
+        return plan_clear(path, tracked, request, space, feedback=arguments.feedback, progress=progress), request
 
 
-def _table(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge) -> LookupTable:
-    """Load the table that the command names, or the one that fits the robot."""
-    from planner.files.own_table import table_for
-    from surrogate.table.model_file import load_table
+def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, float, tuple[str, ...]]:
+    """Make the path that the command asks for, in l; return the unit of its numbers, and its name."""
+    from planner.paths.path import smoothed
+    from planner.paths.path_files import read_path
 
-    return (
-        load_table(arguments.model)
-        if arguments.model
-        else table_for(robot, arguments.robot, knowledge, own=arguments.own_table)
-    )
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[float], object]]:
-    """Show a bar on a terminal, for long paths."""
-    from tqdm import tqdm
-
-    with tqdm(total=100, desc="plan", unit="%", leave=False, delay=1.0, disable=not sys.stderr.isatty()) as bar:
-        yield lambda share: bar.update(100 * share - bar.n)
-
-
-def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, float, bool]:
-    """Make the path that the command asks for, in l; return the unit of its numbers, and whether it is known."""
-    from planner.paths.path import circle, polygon, smoothed
-    from planner.paths.path_files import Drawing, read_path
-
-    shape, _, size = arguments.path.partition(":")
-    if shape in _SHAPES and size:
-        try:
-            length = float(size)
-        except ValueError:
-            raise InputError(f"{arguments.path!r}; write for example circle:2 or square:3") from None
-        if not 0 < length < float("inf"):
-            raise InputError(f"{arguments.path!r}; its size must be above 0")
-        drawing = Drawing(polygon(_SHAPES[shape], length) if _SHAPES[shape] else circle(length), None)
-    else:
-        closed = True if arguments.closed else None
-        drawing = read_path(arguments.path, closed=closed, shape=arguments.shape)
-    unit_known = drawing.unit is not None or arguments.unit is not None
+    drawing = read_path(arguments.path, closed=True if arguments.closed else None, shape=arguments.shape)
+    given_in = (arguments.unit or "l",) if drawing.unit is None else ()
     if drawing.unit is None:
         unit = in_tails(arguments.unit or "l", robot)
     elif arguments.unit is None:
@@ -298,10 +233,10 @@ def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, float, bool]:
         raise InputError(f"--scale {arguments.scale}; give a number above 0")
     path = drawing.path.scaled(scale)
     if arguments.smooth is None:
-        return path, unit, unit_known
+        return path, unit, given_in
     smooth, moved = smoothed(path, arguments.smooth)
     print(f"smoothed over {in_lab(arguments.smooth, robot)}, which moves the path by up to {in_lab(moved, robot)}")
-    return smooth, unit, unit_known
+    return smooth, unit, given_in
 
 
 @program.command(
@@ -331,6 +266,10 @@ def _check(arguments: Namespace) -> None:
         with whole_file(arguments.out) as part:
             figure.savefig(part, format="png", dpi=130, bbox_inches="tight")
         print(f"-> {arguments.out}")
+
+
+for job in JOBS:
+    program.command(job.name, job.help, *job.arguments)(job.run)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from sim.io.errors import run_command
 WORDS = {  # the most important commands -> package and command
     "steady": ("sim", "steady"),
     "plan": ("planner", "plan"),
+    "tour": ("planner", "tour"),
     "sweep": ("dataset", "build"),
     "train": ("surrogate", "train"),
     "calibrate": ("calibration", "calibrate"),

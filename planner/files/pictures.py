@@ -7,6 +7,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from planner.goal.goal_plan import GoalPlan
+from planner.jobs.tour_plan import TourPlan
 from planner.paths.units import in_lab
 from planner.planning.planned import Plan
 from sim.io.files import whole_file
@@ -41,6 +42,16 @@ def draw_goal_plan(goal_plan: GoalPlan) -> Figure:
     robot = goal_plan.plan.robot
     way, stated = in_lab(goal_plan.length, robot), in_lab(goal_plan.plan.stated_error, robot)
     axes.set_title(f"{_schedule(goal_plan.plan)}\nway {way}, stated error {stated}", fontsize=10, parse_math=False)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, fontsize=8, frameon=False)
+    return figure
+
+
+def draw_tour(tour: TourPlan) -> Figure:
+    """Draw a tour with the numbers of its places."""
+    figure = Figure(figsize=(6, 6))
+    axes = tour.plot(figure.add_subplot())
+    stated = in_lab(tour.plan.stated_error, tour.plan.robot)
+    axes.set_title(f"{_schedule(tour.plan)}\nstated error {stated}", fontsize=10, parse_math=False)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, fontsize=8, frameon=False)
     return figure
 

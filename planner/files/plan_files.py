@@ -27,7 +27,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FILES = ("plan.json", "plan.csv", "schedule.h", "tracker.h", "plan.svg")
-EXTRA = ("trade_off.svg", "goal.json", "goal.svg")  # of a folder that was planned into
+EXTRA = (
+    "trade_off.svg",
+    "goal.json",
+    "goal.svg",
+    "tour.json",
+    "tour.svg",
+    "cover.json",
+    "cover.svg",
+)  # of a folder that was planned into
 _MOST_MS = 65_535
 _CHECKPOINTS = 32
 

@@ -31,7 +31,7 @@ from planner.paths.path import Path2D, arc_length
 from planner.paths.tractrix import Drift, Reference, slips_at_heading
 from planner.paths.tractrix import reference as follow_path
 from planner.paths.units import in_lab, place_in_lab
-from planner.planning.declared_path import AS_DRAWN, TIGHTEST
+from planner.planning.feasible import AS_DRAWN, TIGHTEST
 from planner.planning.kept_clear import Detour
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.arrays import Flags, Floats

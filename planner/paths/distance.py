@@ -9,8 +9,11 @@ from scipy.spatial import cKDTree
 
 from sim.arrays import Floats, Integers
 
+TIE = 1e-12  # difference of distances that are equal
 _FINE = 4  # candidates a point
-_MOST_POINTS = 400_000  # of the refined polyline
+_LEAST_POINTS = 1_000  # of the refined polyline
+_MOST_POINTS = 400_000
+_BLOCK = 16_384  # points at a time, which bounds the memory
 
 
 def distance_to(polyline: Floats, points: Floats) -> Floats:
@@ -21,13 +24,17 @@ def distance_to(polyline: Floats, points: Floats) -> Floats:
 def nearest(polyline: Floats, points: Floats) -> tuple[Floats, Integers, Floats]:
     """Find the place on a polyline (m, 2) that is nearest to each point: distance, segment and share of it (M,).
 
+    Of segments whose distances differ by less than TIE the lowest number counts. At a vertex two are equally near:
+    without a rule, rounding and the order of the points in the tree would choose the side of the path.
+
     The tree holds the polyline's points, and points between them at most s apart. The nearest place is one
     of the former, or it is within s/2 of one of the latter, along its segment: so that point's distance
     is at most √(d² + s²/4). All segments with points that near are tried.
     """
     start, direction = polyline[:-1], np.diff(polyline, axis=0)
     length = np.hypot(direction[:, 0], direction[:, 1])
-    step = max(float(np.median(length)), float(length.sum()) / _MOST_POINTS, 1e-300)
+    total = float(length.sum())
+    step = max(min(float(np.median(length)), total / _LEAST_POINTS), total / _MOST_POINTS, 1e-300)
     pieces = np.maximum(1, np.ceil(length / step)).astype(int)
     owner = np.repeat(np.arange(len(start)), pieces)
     part = np.arange(len(owner)) - (np.cumsum(pieces) - pieces)[owner]
@@ -37,30 +44,35 @@ def nearest(polyline: Floats, points: Floats) -> tuple[Floats, Integers, Floats]
     tree = cKDTree(np.concatenate([places, polyline[-1:]]))
     half = float((length / pieces).max()) / 2
     count = min(_FINE, len(owner))
-    neighbours = tree.query(points, k=count)
-    gap, points_near = (np.reshape(part, (len(points), count)) for part in neighbours)
-    candidates = np.concatenate([owner[points_near], previous[points_near]], 1)
-    distance, segment, place = _closest(start, direction, points, candidates)
-    unsure = np.flatnonzero((gap[:, -1] ** 2 < distance**2 + half**2) & (count < len(owner)))
-    for i in unsure.tolist():
-        reach = math.hypot(float(distance[i]), half) * (1 + 1e-9)
-        near = tree.query_ball_point(points[i], reach)
-        close = np.unique(np.concatenate([owner[near], previous[near]]))
-        closest = _closest(start, direction, points[i : i + 1], close[None])
-        distance[i], segment[i], place[i] = (float(part[0]) for part in closest)
+    distance, segment, place = np.empty(len(points)), np.empty(len(points), dtype=int), np.empty(len(points))
+    for first in range(0, len(points), _BLOCK):
+        block = slice(first, first + _BLOCK)
+        some = points[block]
+        neighbours = tree.query(some, k=count)
+        gap, near = (np.reshape(part, (len(some), count)) for part in neighbours)
+        candidates = np.concatenate([owner[near], previous[near]], 1)
+        distance[block], segment[block], place[block] = _closest(start, direction, some, candidates)
+        reach = np.hypot(distance[block] + TIE, half) * (1 + 1e-9)
+        unsure = np.flatnonzero((gap[:, -1] <= reach) & (count < len(owner)))
+        for i in unsure.tolist():
+            near = tree.query_ball_point(some[i], reach[i])
+            close = np.unique(np.concatenate([owner[near], previous[near]]))
+            closest = _closest(start, direction, some[i : i + 1], close[None])
+            distance[first + i], segment[first + i], place[first + i] = (part[0] for part in closest)
     return distance, segment, place
 
 
 def _closest(
     start: Floats, direction: Floats, points: Floats, candidates: Integers
 ) -> tuple[Floats, Integers, Floats]:
-    """Choose the nearest of the candidate segments (M, k) of each point."""
+    """Choose the nearest of the candidate segments (M, k) of each point; of equally near ones the first."""
     chosen = direction[candidates]
     away = points[:, None] - start[candidates]
     square = np.maximum((chosen**2).sum(-1), 1e-300)
     share = np.clip((away * chosen).sum(-1) / square, 0, 1)
     gap = np.hypot(*np.moveaxis(away - share[..., None] * chosen, -1, 0))
-    best = gap.argmin(1)
+    tied = gap < gap.min(1, keepdims=True) + TIE
+    best = np.where(tied, candidates, len(start)).argmin(1)
     rows = np.arange(len(points))
     return gap[rows, best], candidates[rows, best], share[rows, best]
 

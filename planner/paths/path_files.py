@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.paths.path import Path2D
+from planner.paths.shapes import SHAPES, like_a_shape, shape_of
 from planner.paths.svg_drawing import read_svg
 from sim.arrays import Floats
 from sim.io.errors import InputError, naming
@@ -35,15 +36,15 @@ class Drawing:
 
 
 def read_path(source: str | Path, *, closed: bool | None = None, shape: str | None = None) -> Drawing:
-    """Read a path from a table with columns x, y (or x_mm, y_mm and so on), or from an SVG file.
+    """Read a path from a table with columns x, y (or x_mm, y_mm and so on), from an SVG file, or from words.
 
     Args:
-        source: the file.
+        source: the file, or a shape: circle:RADIUS, square:SIDE, triangle:SIDE or polygon:CORNERS:SIDE.
         closed: join the end to the start; by default as in the file.
         shape: name of the path, for an SVG with several; without it the error message lists the names.
 
     Raises:
-        InputError: the file has no path, or several and none is chosen.
+        InputError: the file has no path, or several and none is chosen; or there is no such file or shape.
 
     Example:
         >>> import tempfile
@@ -54,6 +55,12 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
         ...     read_path(file.name).path.points.tolist()
         [[0.0, 0.0], [6.0, 0.0], [6.0, 8.0]]
     """
+    words = str(source)
+    path = shape_of(words)
+    if path is not None:
+        return Drawing(path, None)
+    if like_a_shape(words) and not Path(source).exists():
+        raise InputError(f"{words}: no such file or shape; shapes are {SHAPES}")
     with naming(source):
         if Path(source).suffix.lower() == ".svg":
             return Drawing(*read_svg(Path(source), closed, shape))

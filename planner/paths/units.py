@@ -5,6 +5,8 @@ A message gives lengths in mm, cm or m first and in tail lengths l second.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from sim.io.errors import InputError
@@ -15,10 +17,12 @@ if TYPE_CHECKING:  # the command needs UNITS before it loads NumPy
     from sim.model.robot import Robot
 
 UNITS = ("m", "cm", "mm")
+ANY_UNIT = ("l", *UNITS)
 LONGEST = 1500.0  # l
 SMALLEST = 0.25  # of the radius of the robot's circle, largest extent of a path
 MOST_CIRCLES = 30.0  # of the robot, across a path whose unit is not stated
 MOST_SECONDS = 4 * 3600.0  # that such a path may take
+_LITTLE = 2.0  # turn radii across: a path whose unit may be wrong
 _SENSIBLE = (3.0, 300.0)  # length in l
 
 
@@ -75,11 +79,11 @@ def check_size(path: Path2D, robot: Robot, turn_radius: float) -> None:
     """
     if path.length > LONGEST:
         raise InputError(f"the path is {describe(path, robot)}; at most {LONGEST:g} l can be planned"
-                         f"{_hint(path, robot)}")  # fmt: skip
+                         f"{_remedy(path, robot, ANY_UNIT)}")  # fmt: skip
     if max(extent(path)) < SMALLEST * turn_radius:
         raise InputError(
             f"the path is {describe(path, robot)}: too small, the robot's circle has a radius of "
-            f"{in_lab(turn_radius, robot)}{_hint(path, robot)}"
+            f"{in_lab(turn_radius, robot)}{_remedy(path, robot, ANY_UNIT)}"
         )
 
 
@@ -101,24 +105,51 @@ def check_unstated_unit(path: Path2D, robot: Robot, turn_radius: float, speed: f
         raise InputError(
             f"the path is {describe(path, robot)} if its numbers are tail lengths: {circles:.0f} of the robot's "
             f"circles across, about {format_time(seconds)}; say its unit, --unit l if this is meant"
-            f"{_hint(path, robot, given='l')}"
+            f"{_remedy(path, robot, ('l',))}"
         )
 
 
-def _hint(path: Path2D, robot: Robot, given: str | None = None) -> str:
-    """Suggest the units with which the numbers of the path would make sense.
+class TooTightError(InputError):
+    """A path is too tight for a robot."""
+
+
+@contextmanager
+def hinting_at_units(path: Path2D, robot: Robot, turn_radius: float, given_in: tuple[str, ...]) -> Iterator[None]:
+    """Add a hint at its unit where a path is too tight, and not much larger than the robot's circle.
 
     Args:
         path: in tail lengths.
         robot: its tail length.
-        given: the unit of the numbers, where it is known.
+        turn_radius: of the robot's circle, in l.
+        given_in: units in which the user may have given the numbers; none: the path has a size of its own.
+
+    Raises:
+        TooTightError: with the hint.
     """
-    scales = {unit: in_tails(unit, robot) for unit in ("l", *UNITS)}
-    # Else the path may have been given in any of these units: undo it, then try the others.
+    try:
+        yield
+    except TooTightError as refusal:
+        hint = unit_hint(path, robot, given_in) if max(extent(path)) < _LITTLE * turn_radius else ""
+        raise TooTightError(f"{refusal}; or, {hint}" if hint else str(refusal)) from None
+
+
+def unit_hint(path: Path2D, robot: Robot, given_in: tuple[str, ...]) -> str:
+    """Suggest at most two units with which the numbers of a path would make sense; empty if there is none.
+
+    Args:
+        path: in tail lengths.
+        robot: its tail length.
+        given_in: units in which the user may have given the numbers; none: the path has a size of its own.
+    """
     hints = []
-    for unit in scales if given is None else (given,):
-        for meant, meant_scale in scales.items():
-            length = path.length / scales[unit] * meant_scale
-            if unit != meant and _SENSIBLE[0] <= length <= _SENSIBLE[1]:
-                hints.append(f"if you gave {unit} and mean {meant}, it is {length:.3g} l: --unit {meant}")
-    return "; " + "; or ".join(hints[:2]) if hints else "; scale it"
+    for given in given_in:
+        for meant in ANY_UNIT:
+            length = path.length / in_tails(given, robot) * in_tails(meant, robot)
+            if given != meant and _SENSIBLE[0] <= length <= _SENSIBLE[1]:
+                hints.append(f"if you gave {given} and mean {meant}, it is {length:.3g} l: --unit {meant}")
+    return "; or ".join(hints[:2])
+
+
+def _remedy(path: Path2D, robot: Robot, given_in: tuple[str, ...]) -> str:
+    """Suggest units that would make sense, or another scale."""
+    return f"; {unit_hint(path, robot, given_in) or 'scale it'}"

@@ -25,8 +25,9 @@ from numpy.typing import ArrayLike
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift
 from planner.paths.units import check_size, in_lab, time_in_lab
-from planner.planning.declared_path import Declared, Feasibility, declare
+from planner.planning.declared_path import Declared, declare
 from planner.planning.errors import plan_errors
+from planner.planning.feasible import Feasibility
 from planner.planning.line_of_sight import Guidance
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest, RequestOptions
@@ -109,7 +110,7 @@ def make_plan(
     @cache
     def declared_path(drift: Drift) -> Declared:
         feasibility = Feasibility(tracked.robot, vehicle, tracked.rod, drift, request.corner, request.time_weight)
-        return declare(drawn, feasibility)
+        return declare(drawn, feasibility, progress)
 
     def with_dwell(dwell: float) -> Plan:
         straight = zigzag(vehicle, dwell, tracked.offset)

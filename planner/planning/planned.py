@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.paths.path import Path2D
-from planner.paths.units import in_lab
+from planner.paths.units import in_lab, time_in_lab
 from planner.planning.declared_path import Declared
 from planner.planning.errors import FEEDBACK_EVERY, PlanErrors
 from planner.planning.kept_clear import KeptClear
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 GUARANTEE = "guaranteed_error_over_l"  # of plan.json; null where it is not known
+WIDE = 0.25  # turn radii; a predicted track that is further from the declared path gets a warning
 # Attributes of a plan by their old names, for one release.
 _DOMINATED = 1.7  # a stated error over the predicted one: the errors of the table are the larger part
 _MOVED = {
@@ -152,16 +153,27 @@ class Plan:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know, in words."""
-        return (*self.declared.warnings, *self.tracked.warnings, *self._of_the_table)
+        own = (*self._zigzag_warnings(), *self._table_warnings())
+        return (*self.declared.warnings, *own, *self.tracked.warnings)
 
-    @property
-    def _of_the_table(self) -> tuple[str, ...]:
+    def _table_warnings(self) -> tuple[str, ...]:
         """Propose the robot's own table where the errors of the look-up table decide the stated error."""
         if self.tracked.own_table or self.stated_error < _DOMINATED * self.predicted_max:
             return ()
         return (
             f"the stated error is mostly that of the look-up table, over {len(self.dwells)} flips: simulate this "
             "robot's own table (--own-table, own_table=True), or measure poses on the way",
+        )
+
+    def _zigzag_warnings(self) -> tuple[str, ...]:
+        """Warn of a predicted track that is far from the declared path."""
+        if self.predicted_max <= WIDE * self.tracked.vehicle.turn_radius:
+            return ()
+        turn = math.degrees(self.minimum_dwell * self.tracked.vehicle.yaw_rate)
+        return (
+            f"the predicted track is up to {in_lab(self.predicted_max, self.robot)} from the declared path: in "
+            f"dwells of {time_in_lab(self.minimum_dwell, self.robot)} the robot turns by {turn:.0f} degrees; "
+            "shorter ones keep it nearer",
         )
 
     def schedule(self, robot: Robot | None = None) -> Schedule:

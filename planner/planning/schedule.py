@@ -21,13 +21,13 @@ does not depend on the length of the path: the place on it is remembered, and mo
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from planner.paths.tractrix import Reference
 from planner.planning.line_of_sight import Guidance, LineOfSight, hysteresis
+from planner.planning.progress import FOLLOWING, Progress, tell
 from planner.vehicle.rollout import Switches
 from planner.vehicle.vehicle import Vehicle
 from sim.io.errors import InputError
@@ -52,7 +52,7 @@ def follow(
     offset: float = 0.0,
     *,
     start: Start | None = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Progress | None = None,
 ) -> Switches:
     """Choose dwell times that keep the tracked point on the reference.
 
@@ -96,8 +96,8 @@ def follow(
             )
         if len(dwells) >= MOST_SWITCHES:
             raise InputError(f"the path needs more than {MOST_SWITCHES} switches; split it")
-        if progress is not None and len(dwells) % _EVERY == 0:
-            progress(law.place / len(reference.q))
+        if len(dwells) % _EVERY == 0:
+            tell(progress, FOLLOWING, law.place / len(reference.q))
 
 
 def start_at_rest(reference: Reference, vehicle: Vehicle, offset: float, swing: float) -> Start:

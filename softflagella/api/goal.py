@@ -7,15 +7,14 @@ from typing import TypedDict, Unpack
 
 from numpy.typing import ArrayLike
 
-from planner.files.own_table import table_for
 from planner.goal.goal_plan import GoalPlan
 from planner.goal.to_goal import to_goal as plan_to_goal
 from planner.paths.obstacles import Circle, Polygon
 from planner.paths.path import Path2D
-from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
+from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import Objective
-from sim.model.robot import Robot
-from softflagella.api.robots import OneRobot, one_robot
+from softflagella.api.plan import planned_robot
+from softflagella.api.robots import OneRobot
 from surrogate.interface import LookupTable
 
 
@@ -74,8 +73,5 @@ def to_goal(
         >>> trip.end_error[0] < 0.01
         True
     """
-    swims = one_robot(robot)
-    source = None if isinstance(robot, Robot) else str(robot)
-    known = knowledge or (CalibrationKnowledge() if source is None else read_knowledge(source))
-    table = lookup or table_for(swims, source, known)
+    swims, table, known = planned_robot(robot, lookup, knowledge)
     return plan_to_goal(start, goal, swims, lookup=table, knowledge=known, **options)

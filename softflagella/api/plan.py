@@ -10,15 +10,18 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from planner.files.goal_files import write_goal_plan
+from planner.files.job_files import write_tour
 from planner.files.own_table import table_for
 from planner.files.plan_files import write_plan as write_plan_files
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import TrackingError, tracking_error
 from planner.goal.goal_plan import GoalPlan
-from planner.jobs.clear_plan import plan_clear
+from planner.jobs.tour_plan import TourPlan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.path_files import Drawing, read_path
+from planner.paths.units import hinting_at_units
+from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
@@ -49,8 +52,8 @@ def plan(
     """Plan the motor's switching times for a path.
 
     Args:
-        path: (n, 2) points or a Path2D, lengths in tail lengths l; or what `read_path` reads, or its file. Where
-            a file says its unit, its lengths are converted.
+        path: (n, 2) points or a Path2D, lengths in tail lengths l; or what `read_path` reads, or its file; or a
+            shape in words, such as "polygon:6:3". Where a file says its unit, its lengths are converted.
         robot: the robot, its robot.toml, or the name of a preset; its motor speed is used in both directions.
         lookup: trained table, or the table of this one robot. Default: the one that comes with the package. Where
             that one does not know the robot, the robot's own table is simulated, and kept beside its file.
@@ -89,25 +92,44 @@ def plan(
         >>> len(result.dwells) > 100, result.predicted_rms < 0.03
         (True, True)
     """
+    swims, table, known = planned_robot(robot, lookup, knowledge, own_table=own_table)
+    drawn, given_in = _in_tails(path, swims)
+    request, space = PlanRequest(**options), FreeSpace.of(keep_out, walls)
+    tracked = tracked_vehicle(swims, table, request.point, known)
+    with hinting_at_units(drawn, swims, tracked.vehicle.turn_radius, given_in):
+        if space.empty:
+            return make_plan(drawn, tracked, request, progress)
+        from planner.jobs.clear_plan import plan_clear  # loads SciPy's graphs
+
+        return plan_clear(drawn, tracked, request, space, feedback=feedback, progress=progress)
+
+
+def planned_robot(
+    robot: OneRobot,
+    lookup: LookupTable | None,
+    knowledge: CalibrationKnowledge | None,
+    *,
+    own_table: bool = False,
+) -> tuple[Robot, LookupTable, CalibrationKnowledge]:
+    """Return a robot with the look-up table that knows it, and what a calibration found besides."""
     swims = one_robot(robot)
     source = None if isinstance(robot, Robot) else str(robot)
     known = knowledge or (CalibrationKnowledge() if source is None else read_knowledge(source))
-    table = lookup or table_for(swims, source, known, own=own_table)
-    drawn, request, space = _in_tails(path, swims), PlanRequest(**options), FreeSpace.of(keep_out, walls)
-    tracked = tracked_vehicle(swims, table, request.point, known)
-    return plan_clear(drawn, tracked, request, space, feedback=feedback, progress=progress)
+    return swims, lookup or table_for(swims, source, known, own=own_table), known
 
 
-def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot) -> Path2D:
-    """Read a path where a file is given; convert one that has a unit to tail lengths."""
+def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot) -> tuple[Path2D, tuple[str, ...]]:
+    """Read a path where a file is given, and convert it to tail lengths; return the unit of bare numbers, too."""
     drawing = read_path(path) if isinstance(path, str | Path) else path
     if not isinstance(drawing, Drawing):
-        return drawing if isinstance(drawing, Path2D) else Path2D.of(drawing)
-    return drawing.path if drawing.unit is None else drawing.path.scaled(drawing.unit / robot.tail_length)
+        return drawing if isinstance(drawing, Path2D) else Path2D.of(drawing), ("l",)
+    if drawing.unit is None:
+        return drawing.path, ("l",)
+    return drawing.path.scaled(drawing.unit / robot.tail_length), ()
 
 
 def check(
-    plan: Plan | GoalPlan | Mapping[str, Any] | str | Path, track: pd.DataFrame | str | Path
+    plan: Plan | GoalPlan | TourPlan | Mapping[str, Any] | str | Path, track: pd.DataFrame | str | Path
 ) -> TrackingError:
     """Compare a replayed or measured track with its plan.
 
@@ -130,7 +152,7 @@ def check(
         >>> error.rms < error.largest < error.stated
         True
     """
-    if isinstance(plan, GoalPlan):
+    if isinstance(plan, GoalPlan | TourPlan):
         plan = plan.plan
     content = (
         load_plan(plan) if isinstance(plan, str | Path) else plan if isinstance(plan, Mapping) else plan.to_dict()
@@ -140,12 +162,13 @@ def check(
 
 
 def write_plan(
-    result: Plan | GoalPlan, folder: str | Path, *, pictures: Mapping[str, Figure] | None = None
+    result: Plan | GoalPlan | TourPlan, folder: str | Path, *, pictures: Mapping[str, Figure] | None = None
 ) -> list[Path]:
     """Write the files of a plan, all or none, and return their paths.
 
     Args:
-        result: a plan, or a plan from pose to pose, which has goal.json and a picture besides.
+        result: a plan; or a plan from pose to pose or of a job, which has goal.json, tour.json and so on, and a
+            picture besides.
         folder: it is made if it is missing.
         pictures: of a plan, more pictures, by the name of their file, such as "trade_off.svg".
 
@@ -159,8 +182,8 @@ def write_plan(
         ...     [path.name for path in write_plan(plan(circle(2.0), "paper-control"), folder)]
         ['plan.json', 'plan.csv', 'schedule.h', 'tracker.h', 'plan.svg']
     """
-    if not isinstance(result, GoalPlan):
+    if isinstance(result, Plan):
         return write_plan_files(result, folder, pictures=pictures)
     if pictures:
-        raise InputError("a plan from pose to pose takes no further pictures; write its plan: result.plan")
-    return write_goal_plan(result, folder)
+        raise InputError("a goal or a job takes no further pictures; write its plan: result.plan")
+    return write_goal_plan(result, folder) if isinstance(result, GoalPlan) else write_tour(result, folder)

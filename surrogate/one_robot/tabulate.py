@@ -28,7 +28,7 @@ from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.one_robot.robot_table import RobotTable
 
 _STEP = 0.02  # in the logarithm of a group and in units of an effect's typical size, for derivatives
-_TOLERANCE = 1e-4  # of a time step of the curves, in l
+TOLERANCE = 1e-4  # of a time step of the curves, in l
 _CHECKED = 24  # dwells of the random schedule
 _RANGE = (0.35, 1.8)  # of their lengths
 
@@ -56,7 +56,7 @@ def tabulate(robot: Robot) -> RobotTable:
     motion = steady(groups)
     if not motion.converged.all():
         raise InputError(f"{robot.name} has no steady motion to tabulate: {motion.note[0]}")
-    response = responses(groups, motion, tolerance=_TOLERANCE)
+    response = responses(groups, motion, tolerance=TOLERANCE)
     if response.failed.any():
         raise InputError(f"{robot.name}: a simulated flip broke down; a slower motor may help")
     columns = motion.columns()

@@ -24,20 +24,18 @@ from surrogate.input_ranges import ROBOT
 from surrogate.loops import compile_once
 from surrogate.networks.checkpoints import TrainingContext, device_named
 from surrogate.networks.training_loop import Settings
-from surrogate.table.curve_errors import KINDS, CurveErrors
 from surrogate.table.errors import curve_errors, relative_errors, summary
 from surrogate.table.intervals import Intervals
 from surrogate.table.lookup import BRANCHES, NeuralTable, steady_outputs
-from surrogate.table.response_table import SHAPES, along_axes, curve_speeds
 from surrogate.table.support import Support
 from surrogate.table.wrench_table import CLASSES, network_index
 from surrogate.training.fit_response import SETTINGS, fit_response
 from surrogate.training.fit_wrench import WrenchSamples, fit_wrench, learnable, wrench_samples
+from surrogate.training.response_errors import held_out_curve_errors
 from surrogate.training.simulated import SimulatedRobots, join_robots, read_robots, simulate_robots
 from surrogate.wrench.tails import tail_inputs
 
 _FEWEST_INSIDE = 10
-_FEWEST_FLIPS = 200  # robots, for the covariance of the errors of the response
 _FEWEST_ROWS, _FEWEST_OF_A_CLASS = 64, 16
 _QUIET = TrainingContext()
 
@@ -197,28 +195,6 @@ def _judged(
     truth = {**flips.motion, **flips.curves}
     report |= summary(curve_errors(response, truth), flips.motion["tail_gap"] >= 1)
     return replace(lookup, intervals=intervals, errors=report, curve_errors=held_out_curve_errors(lookup, flips))
-
-
-def held_out_curve_errors(lookup: NeuralTable, flips: SimulatedRobots) -> CurveErrors | None:
-    """Learn the errors of the response from robots that were not learned; None where they are too few.
-
-    Args:
-        lookup: the table.
-        flips: held-out robots with curves.
-    """
-    motions = lookup.motions(flips.robots, flag=True)
-    known = np.array([not reason for reason in motions.reason]) & (flips.motion["tail_gap"] >= 1)
-    if known.sum() < _FEWEST_FLIPS:
-        return None
-    response = lookup.response(flips.robots, flag=True)
-    speeds = curve_speeds(motions.heads, motions.motion)
-    errors = {
-        kind: ((getattr(response, kind) - flips.curves[kind]) / along_axes(speeds, SHAPES[kind]))[known]
-        for kind in KINDS
-    }
-    return CurveErrors.learned(
-        lookup.width_features(motions)[known], errors, lookup.curves.bases, flips.motion["error"][known]
-    )
 
 
 def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[str, Floats], Flags]:

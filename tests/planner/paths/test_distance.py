@@ -44,3 +44,20 @@ def test_a_missed_corner_is_seen_from_the_other_side() -> None:
     off, missed = two_sided(inscribed, square)
     assert off == pytest.approx(1 - np.sqrt(0.5), rel=1e-2)
     assert missed == pytest.approx(np.sqrt(2) - 1, rel=1e-2)
+
+
+def test_of_equally_near_segments_the_first_counts() -> None:
+    """Outside a corner both sides are equally near; the sides of a hairpin are, too."""
+    angle = np.linspace(0, 2 * np.pi, 13)
+    ring = np.stack([np.cos(angle), np.sin(angle)], 1)
+    _, segment, share = nearest(ring, 2 * ring[1:-1])
+    assert segment.tolist() == list(range(11))
+    assert share == pytest.approx(np.ones(11))
+    hairpin = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 0.0], [0.0, 0.0]])
+    assert nearest(hairpin, np.array([[0.3, 1.0], [1.5, -0.2]]))[1].tolist() == [0, 1]
+
+
+def test_more_points_than_a_block_holds() -> None:
+    rng = np.random.default_rng(3)
+    polyline, points = rng.normal(size=(40, 2)), rng.normal(size=(40_000, 2))
+    assert distance_to(polyline, points) == pytest.approx(all_with_all(polyline, points), rel=1e-9, abs=1e-9)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import softflagella as sf
 from planner.paths.path import Path2D, circle, smoothed
 from planner.planning.plan import plan
 from sim.io.errors import InputError
@@ -29,6 +30,28 @@ def test_a_noisy_path_is_told_how_to_be_smoothed_and_that_works() -> None:
         plan(noisy, CONTROL)
     smooth, _ = smoothed(noisy, float(str(caught.value).rsplit(" ", 1)[1]))
     assert np.abs(plan(smooth, CONTROL).reference[:, 1]).max() < 0.06
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.2])
+def test_the_smoothing_that_a_very_noisy_path_is_told_works(noise: float) -> None:
+    """A path smoothed as the message said used to be refused with the same words."""
+    rng = np.random.default_rng(0)
+    angle = np.arange(0, 2 * np.pi, 0.005)
+    ring = 2 * np.stack([np.cos(angle), np.sin(angle)], 1)
+    noisy = Path2D.of(ring + noise * rng.normal(size=ring.shape))
+    with pytest.raises(InputError, match=r"it looks noisy: .* give --smooth") as caught:
+        plan(noisy, CONTROL)
+    smooth, _ = smoothed(noisy, float(str(caught.value).rsplit(" ", 1)[1]))
+    assert plan(smooth, CONTROL).predicted_rms < 0.1
+
+
+def test_a_small_path_is_not_noisy_and_may_be_in_another_unit() -> None:
+    hint = r"scale the path by 3.5; or, if you gave l and mean m, it is 11.4 l: --unit m$"
+    with pytest.raises(InputError, match=hint) as caught:
+        sf.plan(circle(0.2), CONTROL)
+    assert "noisy" not in str(caught.value)
+    with pytest.raises(InputError, match=r"scale the path by 3.5$"):  # its size is known
+        sf.plan(sf.Drawing(circle(0.2 * CONTROL.tail_length), 1.0), CONTROL)
 
 
 def test_a_line_and_back_ends_with_a_line() -> None:

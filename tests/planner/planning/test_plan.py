@@ -177,3 +177,20 @@ def test_a_small_circle_is_small_not_noisy() -> None:
         plan(circle(0.2), CONTROL)
     assert "noisy" not in str(refusal.value)
     assert "small" in str(refusal.value) or "tight" in str(refusal.value)
+
+
+def test_dwells_that_are_far_too_long_get_a_warning() -> None:
+    """Dwells of 100 s turn the robot by 127 degrees; nobody was told that the path is lost."""
+    result = plan(circle(3.0), CONTROL, minimum_seconds=100.0)
+    assert result.predicted_max > 0.9
+    (warning,) = result.warnings
+    for part in ("the predicted track is up to 10.3 cm", "dwells of 1.67 min", "turns by 127 degrees"):
+        assert part in warning
+    assert plan(circle(3.0), CONTROL, minimum_seconds=5.0).warnings == ()
+
+
+def test_progress_is_called_with_numbers_that_do_not_fall() -> None:
+    shares: list[float] = []
+    plan(polygon(4, 3.0), CONTROL, progress=shares.append)
+    assert shares
+    assert shares == sorted(shares)

@@ -1,0 +1,230 @@
+"""tour(places, robot): the order in which a robot visits places, and one plan that visits them all.
+
+The tracked point passes every place; its heading there is free. The order is the one in which this vehicle needs
+the least time (`planner.jobs.travel_times`, `planner.jobs.shortest_order`), with COURSES directions of motion at
+each place. Then the directions are refined. The tracks between the places are joined to one reference, which is
+followed as every declared path is. Obstacles are left to the ways around (`planner.jobs.detours`); where a track
+is blocked, the order is chosen as if that took some turn radii more. Lengths in l, times in μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from planner.goal.route import Route
+from planner.jobs.planned_track import pivot_poses, plan_track
+from planner.jobs.shortest_order import EXACT, shortest_order
+from planner.jobs.tour_plan import TourPlan
+from planner.jobs.travel_times import SLACK, Travel
+from planner.paths.distance import distance_to
+from planner.paths.obstacles import FreeSpace
+from planner.paths.tractrix import Drift
+from planner.paths.units import in_lab, place_in_lab
+from planner.planning.plan import zigzag_drift
+from planner.planning.planned import Plan
+from planner.planning.request import PlanRequest
+from planner.vehicle.dwell_choice import dwells_for
+from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.zigzag import zigzag
+from sim.arrays import Floats
+from sim.io.errors import InputError
+
+COURSES = 16  # directions of motion at a place
+_SPACING = 0.02  # of the reference's points
+_FINER = 4  # refinements of the directions
+_MARGINS = 3  # around obstacles, with which orders are sought
+_MISSED = 0.05  # l; a place that a way around leaves further aside is refused
+
+
+def tour(
+    places: Sequence[Sequence[float]],
+    tracked: TrackedVehicle,
+    request: PlanRequest,
+    space: FreeSpace | None = None,
+    *,
+    any_start: bool = False,
+    back: bool = False,
+    feedback: bool = False,
+    progress: Callable[[float], object] | None = None,
+) -> TourPlan:
+    """Plan a tour of places.
+
+    Args:
+        places: x, y of each.
+        tracked: the vehicle, and the point that passes the places.
+        request: dwells, tolerance.
+        space: what the robot's body must keep clear of.
+        any_start: begin at any place, not at the first one.
+        back: return to the first one at the end.
+        feedback: the pose will be measured every 20 flips, so the margin is the stated error with feedback.
+        progress: called now and then with the share of the path that is done.
+
+    Raises:
+        InputError: a place is no pair of finite numbers, is there twice, or cannot be reached.
+    """
+    task = _Tour(
+        _checked(places), tracked, FreeSpace() if space is None else space, any_start=any_start, back=back
+    )
+    dwell = request.dwell or dwells_for(tracked.vehicle, request.objective, request.least_dwell(tracked.robot))[0]
+    straight = zigzag(tracked.vehicle, dwell, tracked.offset)
+    drift, margin = zigzag_drift(tracked, straight, dwell), 1.5 * straight.largest
+    for _ in range(_MARGINS):
+        found = task.ordered(Travel.of(tracked, straight, task.space, drift, margin))
+        track = partial(task.track, found)
+        plan = plan_track(tracked, request, task.space, track, drift, feedback=feedback, progress=progress)
+        if plan.kept_clear is None or not plan.kept_clear.detours or plan.kept_clear.margin <= margin:
+            break
+        margin = plan.kept_clear.margin
+    return task.result(plan, found)
+
+
+def _checked(places: Sequence[Sequence[float]]) -> Floats:
+    """Check the places, (n, 2)."""
+    try:
+        table = np.array([[float(value) for value in place] for place in places])
+    except (TypeError, ValueError):
+        table = np.zeros((0, 0))
+    if table.ndim != 2 or len(table) < 2 or table.shape[1] != 2 or not (np.abs(table) < 1e6).all():
+        raise InputError("places: give two or more, each as x and y, finite numbers")
+    for index, place in enumerate(table):
+        same = np.flatnonzero(np.hypot(*(table[:index] - place).T) < 1e-6)
+        if len(same):
+            raise InputError(f"places {same[0] + 1} and {index + 1} are the same; leave one out")
+    return table
+
+
+@dataclass(frozen=True)
+class _Ordered:
+    """An order of places with a direction of motion at each."""
+
+    order: tuple[int, ...]  # indices of places
+    courses: Floats
+    estimate: float
+    exact: bool
+    gap: float
+    travel: Travel
+
+
+@dataclass
+class _Tour:
+    """The places of a tour, and the vehicle that visits them."""
+
+    places: Floats
+    tracked: TrackedVehicle
+    space: FreeSpace
+    any_start: bool = field(kw_only=True)
+    back: bool = field(kw_only=True)
+
+    def ordered(self, travel: Travel) -> _Ordered:
+        """Find the order, and refine the directions of motion."""
+        count = len(self.places)
+        turns = 2 * math.pi * np.arange(COURSES) / COURSES
+        courses = np.broadcast_to(turns, (count, COURSES))
+        poses = pivot_poses(self.places[:, None], courses, self.tracked, travel.limits.drift)
+        blocked = np.flatnonzero((travel.limits.clearance(poses) < travel.margin + SLACK).all(1))
+        if len(blocked):
+            x, y = self.places[blocked[0]].tolist()
+            raise InputError(
+                f"place {blocked[0] + 1} at {place_in_lab(x, y, self.tracked.robot)} cannot be visited: with "
+                "every heading the robot touches what it must keep clear of; move the place away from it"
+            )
+        flat = poses.reshape(-1, 3)
+        rows, columns = (part.ravel() for part in np.indices((len(flat), len(flat))))
+        costs = travel.times(flat[rows], flat[columns]).reshape((count, COURSES, count, COURSES))
+        if self.any_start:
+            free = travel.limits.clearance(poses) >= travel.margin + SLACK
+            start, visits = np.where(free, 0.0, np.inf), np.arange(count)
+        else:
+            start, visits = costs[0, :, 1:].min(0), np.arange(1, count)
+        end = np.zeros((len(visits), COURSES))
+        if self.back and not self.any_start:
+            end = costs[1:, :, 0].min(-1)
+        best = shortest_order(costs[np.ix_(visits, np.arange(COURSES), visits, np.arange(COURSES))], start, end)
+        order = [int(visits[k]) for k in best.visits]
+        order = order if self.any_start else [0, *order]
+        order += order[:1] if self.back else []
+        courses, estimate = self._refined(order, travel)
+        exact = len(visits) <= EXACT and self.space.empty
+        return _Ordered(tuple(order), courses, estimate, exact, best.gap, travel)
+
+    def _refined(self, order: list[int], travel: Travel) -> tuple[Floats, float]:
+        """Find the directions of motion with which an order takes the least time."""
+        places = self.places[order]
+        step = 2 * math.pi / COURSES
+        choices = np.tile(step * np.arange(COURSES), (len(order), 1))
+        for _ in range(_FINER + 1):
+            poses = pivot_poses(places[:, None], choices, self.tracked, travel.limits.drift)
+            courses, total = _quickest(poses, travel)
+            step /= 3
+            choices = courses[:, None] + step * np.arange(-3, 4)
+        return courses, total
+
+    def track(self, found: _Ordered, drift: Drift) -> Route:
+        """Join the places by tracks of the pivot."""
+        travel = replace(found.travel, limits=replace(found.travel.limits, drift=drift))
+        poses = pivot_poses(self.places[list(found.order)], found.courses, self.tracked, drift)
+        return Route(travel.tracks(poses[:-1], poses[1:]), travel.radius)
+
+    def result(self, plan: Plan, found: _Ordered) -> TourPlan:
+        """Compare the predicted track with the places.
+
+        Raises:
+            InputError: a way around leaves a place aside.
+        """
+        visited = self.places[list(found.order)]
+        aside = distance_to(plan.reference, visited)
+        if aside.max() > _MISSED:
+            worst = int(aside.argmax())
+            x, y = visited[worst].tolist()
+            raise InputError(
+                f"place {found.order[worst] + 1} at {place_in_lab(x, y, plan.robot)} cannot be visited: the way "
+                f"around obstacles passes it at {in_lab(float(aside[worst]), plan.robot)}; move it away from them"
+            )
+        samples = (len(plan.track) - 1) // len(plan.dwells)
+        times = np.concatenate([[0.0], np.cumsum(np.repeat(plan.dwells / samples, samples))])
+        reached, distance = _passed(plan.track, times, visited, before=plan.predicted_max)
+        return TourPlan(plan, self.places, found.order, found.exact, found.gap, found.estimate, reached, distance)
+
+
+def _quickest(poses: Floats, travel: Travel) -> tuple[Floats, float]:
+    """Choose among poses (k, C, 3) at each stop those of the quickest chain; return courses (k,) and its time."""
+    total, back = np.zeros(poses.shape[1]), []
+    for here, there in pairwise(poses):
+        rows, columns = (part.ravel() for part in np.indices((len(here), len(there))))
+        sums = total[:, None] + travel.times(here[rows], there[columns]).reshape(len(here), len(there))
+        back.append(sums.argmin(0))
+        total = sums.min(0)
+    options = [int(total.argmin())]
+    for came in reversed(back):
+        options.append(int(came[options[-1]]))
+    return poses[np.arange(len(poses)), options[::-1], 2], float(total.min())
+
+
+def _passed(track: Floats, times: Floats, visited: Floats, *, before: float) -> tuple[Floats, Floats]:
+    """Find when a track (S, 2) passes places (k, 2) in their order, and how near.
+
+    The track may come near to one place several times: the first time after the place before counts, unless it
+    comes nearer by more than `before` later.
+    """
+    reached, distance, first = [], [], 0
+    for index, place in enumerate(visited):
+        away = np.hypot(*(track[first:] - place).T)
+        if index == 0:
+            nearest = 0
+        elif index == len(visited) - 1:
+            nearest = len(away) - 1 - int(away[::-1].argmin())
+        else:
+            near = away <= away.min() + before
+            begin = int(near.argmax())
+            end = begin + int((~near[begin:]).argmax()) if not near[begin:].all() else len(near)
+            nearest = begin + int(away[begin:end].argmin())
+        first += nearest
+        reached.append(float(times[first]))
+        distance.append(float(np.hypot(*(track[first] - place))))
+    return np.array(reached), np.array(distance)

@@ -1,0 +1,92 @@
+"""How long this vehicle takes between poses: Dubins' words, with its own speeds on straight lines and in turns.
+
+In a turn the motor rarely flips, so the pivot moves nearly at its own speed; on a straight line the robot zigzags
+and loses speed with every flip. Among obstacles the quickest of the first WORDS words that is free counts; where
+none is free, a way around is assumed to take DETOUR turn radii more. Poses whose body is not free are not reached.
+Times in μ0 l⁴/EI, lengths in l.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.goal.dubins import TURNS, DubinsPaths, words
+from planner.goal.lattice import RouteLimits
+from planner.paths.obstacles import Footprint, FreeSpace
+from planner.paths.tractrix import Drift
+from planner.planning.feasible import AS_DRAWN
+from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.zigzag import Zigzag
+from sim.arrays import Floats, Integers
+
+WORDS = 3  # tried among obstacles
+DETOUR = 6.0  # turn radii that a blocked track counts longer
+_BLOCK = 50_000  # pairs of poses at once
+_STEP = 0.15  # l, between the places where a track is checked
+SLACK = 0.02  # l, by which clearances between these places may be smaller
+
+
+@dataclass(frozen=True)
+class Travel:
+    """The pivot's turns, its speeds, and what its tracks must keep clear of."""
+
+    limits: RouteLimits  # its turn radius is wider than the narrowest one, as for a path that is followed as drawn
+    margin: float  # around the body
+    straight: float  # speed on straight lines
+    turning: float  # speed in turns
+
+    @staticmethod
+    def of(tracked: TrackedVehicle, zigzag: Zigzag, space: FreeSpace, drift: Drift, margin: float) -> Travel:
+        """Take the vehicle's radius and speeds."""
+        vehicle = tracked.vehicle
+        body = Footprint.of(tracked.robot, -vehicle.pivot_distance)
+        own = float(np.abs(vehicle.twist[:, 0]).mean())
+        straight = zigzag.net_speed
+        limits = RouteLimits(vehicle.pivot_radius / AS_DRAWN, body, space, drift)
+        return Travel(limits, margin, straight, straight + AS_DRAWN * (own - straight))
+
+    @property
+    def radius(self) -> float:
+        return self.limits.radius
+
+    def times(self, start: Floats, goal: Floats) -> Floats:
+        """Compute the shortest times (M,) between M pairs of poses (M, 3): places and courses of the pivot."""
+        blocks = [slice(i, i + _BLOCK) for i in range(0, len(start), _BLOCK)]
+        margin = self.margin + SLACK  # so that tracks which are chosen for their times are free for certain
+        return np.concatenate([self._best(start[rows], goal[rows], margin)[1] for rows in blocks])
+
+    def tracks(self, start: Floats, goal: Floats) -> DubinsPaths:
+        """Find the quickest tracks between M pairs of poses."""
+        return self._best(start, goal, self.margin)[0]
+
+    def time(self, tracks: DubinsPaths) -> float:
+        """Compute the time of a chain of tracks."""
+        return float((tracks.lengths / self._speed(tracks.turns)).sum())
+
+    def _best(self, start: Floats, goal: Floats, margin: float) -> tuple[DubinsPaths, Floats]:
+        lengths = words(start, goal, self.radius)
+        times = (lengths / self._speed(TURNS)).sum(-1)
+        order = times.argsort(-1)
+        rows = np.arange(len(start))
+        word = order[:, 0].copy()
+        time = times[rows, word]
+        if not self.limits.space.empty:
+            blocked = rows
+            for k in range(WORDS):
+                tried = order[blocked, k]
+                tracks = DubinsPaths(start[blocked], TURNS[tried], lengths[blocked, tried])
+                exists = np.isfinite(times[blocked, tried])
+                free = np.zeros(len(blocked), dtype=bool)
+                free[exists] = self.limits.free(tracks.take(np.flatnonzero(exists)), margin, step=_STEP)
+                word[blocked[free]] = tried[free]
+                time[blocked[free]] = times[blocked[free], tried[free]]
+                blocked = blocked[~free]
+            time[blocked] = times[blocked, order[blocked, 0]] + DETOUR * self.radius / self.straight
+            unreached = (self.limits.clearance(goal) < margin) | (self.limits.clearance(start) < margin)
+            time[unreached] = np.inf
+        return DubinsPaths(start, TURNS[word], lengths[rows, word]), time
+
+    def _speed(self, turns: Integers) -> Floats:
+        return np.where(turns == 0, self.straight, self.turning)

@@ -1,0 +1,177 @@
+"""Paths that a robot can follow, near a path that it cannot follow as it was drawn.
+
+A candidate is accepted if its pivot turns no tighter than the robot can, with a margin, and if it keeps the shape
+of the drawn path. The nearest path is sought several times, each time with a wider turn: a wider turn leaves more
+margin, and the coarser poses that belong to it converge where finer ones do not. Lengths in l.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.paths.distance import two_sided
+from planner.paths.fillets import CORNER, fillet, kinks, largest_fillet
+from planner.paths.nearest_feasible import nearest_path, pose_spacing
+from planner.paths.path import Path2D, smoothed
+from planner.paths.tractrix import Drift, Reference, reference
+from planner.paths.units import extent, place_in_lab
+from planner.planning.progress import DECLARING, Progress, tell
+from planner.planning.request import Corner
+from planner.vehicle.vehicle import Vehicle
+from sim.io.errors import InputError
+from sim.model.robot import Robot
+
+AS_DRAWN = 0.85  # share of the pivot's largest curvature up to which a path is followed as it was drawn
+ROOMS = (0.92, 0.85, 0.7, 0.55, 0.35, 0.2)  # shares of it that the nearest path may use
+TIGHTEST = 0.95  # a reference that needs more than this share is refused
+LOST = 0.3  # share of the drawn path's extent; a declared path that is further off is refused
+ROUNDED = 0.0  # the way that rounds corners
+Way = float  # ROUNDED, or a share of ROOMS
+_SMALL = 0.1  # of the path's extent: what smoothing may move a path that is noisy
+_NOISY = 1.5  # ratio of a path's length to that of the smoothed path
+_FEWEST_POSES = 5  # of the nearest path; a path with fewer is too small for such turns
+_FILLET_ROOM = 0.7
+_SPACING = 0.02  # of points on the reference, in l
+_MOST_POINTS = 150_000
+_MINIMAX = 3.4  # cost of the minimax distance over that of the root mean square
+_POINTS_A_POSE = 80  # points of a reference that cost as much as one pose of the nearest path
+
+
+class Feasibility(NamedTuple):
+    """What decides whether a path can be followed, and which one is declared if it cannot."""
+
+    robot: Robot  # whose lengths messages are in
+    vehicle: Vehicle  # its pivot radius limits the curvature
+    rod: float  # from the pivot to the tracked point
+    drift: Drift  # what carries the robot off its heading
+    corner: Corner  # what to do with places that are too tight
+    time_weight: float = 0.0  # as in `planner.paths.nearest_feasible` [l²]
+
+    @property
+    def ways(self) -> tuple[Way, ...]:
+        """Ways to change a path, in order of preference."""
+        return {"error": (), "fillet": (ROUNDED,)}.get(self.corner, ROOMS)
+
+
+class Accepted(NamedTuple):
+    """A path that the robot can follow."""
+
+    reference: Reference  # the path, and its tractrix
+    off_drawn: float  # largest distance of its points from the drawn path
+    missed: float  # largest distance of a drawn point from it
+
+
+def feasible(raw: Path2D, feasibility: Feasibility, progress: Progress | None = None) -> Accepted | None:
+    """Find the path to declare: the first way that is accepted; None if there is none.
+
+    Raises:
+        InputError: corners are not allowed, and the path has one.
+    """
+    accepted = as_drawn(raw, feasibility)
+    if accepted is not None or smoothing_of_noise(raw, feasibility.vehicle) is not None:
+        return accepted
+    for way in feasibility.ways:
+        accepted = changed(raw, feasibility, way, progress)
+        if accepted is not None:
+            return accepted
+    return None
+
+
+def as_drawn(raw: Path2D, feasibility: Feasibility) -> Accepted | None:
+    """Take the path as it was drawn, if the robot can follow it.
+
+    Raises:
+        InputError: corners are not allowed, and the path has one.
+    """
+    drawn = reference(raw, feasibility.rod, spacing(raw), feasibility.drift)
+    sharpest = float(np.abs(drawn.curvature).max()) * feasibility.vehicle.pivot_radius
+    if sharpest <= AS_DRAWN and not feasibility.time_weight:
+        return _accepted(raw, drawn, feasibility)
+    if feasibility.corner != "error":
+        return None
+    _refuse_corner(raw, feasibility.robot)
+    return _accepted(raw, drawn, feasibility)
+
+
+def changed(raw: Path2D, feasibility: Feasibility, way: Way, progress: Progress | None = None) -> Accepted | None:
+    """Change a path in one way so that the robot can follow it; None if that fails, or loses the shape."""
+    vehicle, rod, drift, corner = feasibility.vehicle, feasibility.rod, feasibility.drift, feasibility.corner
+    if way == ROUNDED:
+        path = _rounded(raw, feasibility)
+    elif raw.length < _FEWEST_POSES * pose_spacing(raw, vehicle.pivot_radius / way):
+        return None
+    else:
+        path = nearest_path(
+            raw, max(rod, 0.0), vehicle.pivot_radius / way, drift=drift, minimax=corner == "minimax",
+            time_weight=feasibility.time_weight, progress=lambda share: tell(progress, DECLARING, share),
+        )  # fmt: skip
+    return _accepted(raw, reference(path, rod, spacing(path), drift), feasibility)
+
+
+def _accepted(raw: Path2D, followed: Reference, feasibility: Feasibility) -> Accepted | None:
+    """Accept a reference that turns wide enough and keeps the shape of the drawn path."""
+    if np.abs(followed.curvature).max() > TIGHTEST / feasibility.vehicle.pivot_radius:
+        return None
+    off_drawn, missed = two_sided(followed.p, raw.polyline())
+    lost = min(LOST * max(extent(raw)), feasibility.vehicle.turn_radius)
+    return None if max(off_drawn, missed) > lost else Accepted(followed, off_drawn, missed)
+
+
+def smoothing_of_noise(raw: Path2D, vehicle: Vehicle) -> float | None:
+    """Return the length over which a noisy path is to be smoothed; None: it is not noisy.
+
+    A noisy path is much longer than after smoothing, and no scale helps. A path that smoothing changes as a whole
+    is small, not noisy.
+    """
+    length = float(f"{vehicle.turn_radius / 2:.2g}")
+    if not length < raw.length / 2:
+        return None
+    smooth, moved = smoothed(raw, length)
+    noisy = raw.length >= _NOISY * smooth.length and moved <= _SMALL * max(extent(raw))
+    return length if noisy else None
+
+
+def cost(raw: Path2D, feasibility: Feasibility, way: Way) -> float:
+    """Estimate the work of `changed`, in poses of the nearest path."""
+    points = raw.length / spacing(raw) / _POINTS_A_POSE
+    if way == ROUNDED:
+        return 14 * points
+    poses = raw.length / pose_spacing(raw, feasibility.vehicle.pivot_radius / way)
+    return points + poses * (_MINIMAX if feasibility.corner == "minimax" else 1.0)
+
+
+def spacing(path: Path2D) -> float:
+    """Choose the spacing of the reference's points."""
+    return max(_SPACING, path.length / _MOST_POINTS)
+
+
+def _refuse_corner(raw: Path2D, robot: Robot) -> None:
+    """Refuse a path with a sharp corner, and name the corner."""
+    angle = np.abs(kinks(raw))
+    sharpest = int(angle.argmax())
+    if angle[sharpest] > CORNER:
+        x, y = raw.points[sharpest]
+        raise InputError(
+            f"corner of {math.degrees(angle[sharpest]):.0f} degrees at {place_in_lab(x, y, robot)}; "
+            "round it, or allow corner = nearest"
+        )
+
+
+def _rounded(raw: Path2D, feasibility: Feasibility) -> Path2D:
+    """Round corners by the smallest radius that leaves the pivot some room."""
+    limit = _FILLET_ROOM / feasibility.vehicle.pivot_radius
+    low, high = 0.0, min(largest_fillet(raw), math.hypot(feasibility.rod, 1 / limit))
+
+    def tightest(radius: float) -> float:
+        path = fillet(raw, radius)
+        return float(np.abs(reference(path, feasibility.rod, spacing(path), feasibility.drift).curvature).max())
+
+    if tightest(high) > limit:
+        return fillet(raw, high)
+    for _ in range(12):
+        middle = (low + high) / 2
+        low, high = (low, middle) if tightest(middle) <= limit else (middle, high)
+    return fillet(raw, high)

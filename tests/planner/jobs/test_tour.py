@@ -1,0 +1,154 @@
+"""Tours visit all places, in the quickest order, also in the simulator and with a tracker."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from itertools import pairwise, permutations
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.jobs.tour import tour
+from planner.jobs.travel_times import Travel
+from planner.paths.distance import distance_to
+from planner.paths.obstacles import Circle, FreeSpace
+from planner.paths.tractrix import STILL
+from planner.planning.request import PlanRequest
+from planner.tracking.tracker import Tracker
+from planner.vehicle.dwell_choice import dwells_for
+from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
+from planner.vehicle.zigzag import zigzag
+from sim.io.errors import InputError, run_command
+from sim.model.presets import PRESETS
+from sim.motion.replay import replay
+from tests.planner.swimming import Camera, swim
+
+CONTROL = PRESETS["paper-control"]
+PLACES = [(0.0, 0.0), (4.0, 0.0), (2.0, 1.0), (3.0, 3.0), (-1.0, 2.0)]
+QUICK = PlanRequest(objective="time")
+
+
+@pytest.fixture(scope="module")
+def tracked() -> TrackedVehicle:
+    return tracked_vehicle(CONTROL, None, "head_centre", None)
+
+
+def fixed_order(order: list[int], tracked: TrackedVehicle) -> float:
+    """Compute the time of an order of places, with 72 directions of motion at each, one leg after another."""
+    dwell = dwells_for(tracked.vehicle, "time", None)[0]
+    travel = Travel.of(tracked, zigzag(tracked.vehicle, dwell), FreeSpace(), STILL, 0.0)
+    course = 2 * np.pi * np.arange(72) / 72
+    axis = np.stack([np.cos(course), np.sin(course)], 1)
+    poses = [np.concatenate([PLACES[i] - tracked.rod * axis, course[:, None]], 1) for i in order]
+    total = np.zeros(72)
+    for here, there in pairwise(poses):
+        times = travel.times(np.repeat(here, 72, 0), np.tile(there, (72, 1))).reshape(72, 72)
+        total = (total[:, None] + times).min(0)
+    return float(total.min())
+
+
+def test_no_other_order_of_the_places_takes_less_time(tracked: TrackedVehicle) -> None:
+    best = tour(PLACES, tracked, QUICK)
+    assert best.exact
+    assert best.order[0] == 0
+    assert sorted(best.order) == [0, 1, 2, 3, 4]
+    assert best.estimate == pytest.approx(best.plan.duration, rel=0.05)
+    for rest in permutations(range(1, 5)):
+        rival = fixed_order([0, *rest], tracked)
+        assert best.estimate <= rival * 1.001
+        assert (rival < best.estimate * 1.001) == (list(rest) == list(best.order[1:]))
+
+
+def test_every_place_is_on_the_declared_path(tracked: TrackedVehicle) -> None:
+    result = tour(PLACES, tracked, PlanRequest())
+    assert distance_to(result.plan.reference, np.array(PLACES)).max() < 0.005
+    assert result.distance.max() <= result.plan.predicted_max + 0.005
+    assert (np.diff(result.reached) > 0).all()
+
+
+def test_a_tour_returns_or_begins_anywhere(tracked: TrackedVehicle) -> None:
+    there = tour(PLACES, tracked, QUICK)
+    back = tour(PLACES, tracked, QUICK, back=True)
+    free = tour(PLACES, tracked, QUICK, any_start=True)
+    assert back.order[0] == back.order[-1] == 0
+    assert len(back.order) == 6
+    assert back.estimate > there.estimate
+    assert free.estimate <= there.estimate
+    assert sorted(free.order) == [0, 1, 2, 3, 4]
+
+
+def test_the_point_that_is_asked_for_passes(tracked: TrackedVehicle) -> None:
+    by_pivot = tracked_vehicle(CONTROL, None, "pivot", None)
+    result = tour(PLACES[:3], by_pivot, QUICK)
+    assert distance_to(result.plan.declared.reference.q, np.array(PLACES[:3])).max() < 0.005
+
+
+def test_among_obstacles_it_keeps_clear(tracked: TrackedVehicle) -> None:
+    space = FreeSpace.of([Circle(2.0, 2.3, 0.4), Circle(1.0, 0.6, 0.3)])
+    result = tour(PLACES, tracked, PlanRequest(), space)
+    kept = result.plan.kept_clear
+    assert kept is not None
+    assert kept.margin >= result.plan.stated_error
+    assert kept.clearance > 0
+    assert not result.exact
+    assert distance_to(result.plan.reference, np.array(PLACES)).max() < 0.05
+
+
+def test_the_simulator_visits_all_places(tracked: TrackedVehicle) -> None:
+    result = tour(PLACES[:4], tracked, QUICK)
+    track = replay([result.plan.schedule()])[0]
+    points = track[["x_over_l", "y_over_l"]].to_numpy(float)
+    assert distance_to(points, np.array(PLACES[:4])).max() < result.plan.stated_error + 0.05
+
+
+def test_a_tracked_robot_with_wrong_coefficients_visits_all(tracked: TrackedVehicle) -> None:
+    result = tour(PLACES[:3], tracked, PlanRequest())
+    twist = tracked.vehicle.twist * np.array([1.02, 1.0, 1.02])
+    car = replace(tracked.vehicle, twist=twist)
+    distances, _ = swim(Tracker(result.plan), result.plan, car, Camera((0.005, 0.005)))
+    assert distances.max() < 0.08
+
+
+@pytest.mark.parametrize(
+    ("places", "options", "expected"),
+    [
+        (["0,0"], [], "two or more"),
+        (["0,0", "1,1", "0,0"], [], "places 1 and 3 are the same"),
+        (["0,0", "one,1"], [], "write X,Y"),
+        (["0,0", "2,0", "4,0"], ["--keep-out", "circle:2,0,0.5"], "place 2 at"),
+        (["0,0", "nan,0"], [], "finite"),
+    ],
+)
+def test_the_command_refuses_in_one_line(
+    places: list[str], options: list[str], expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from planner.__main__ import main
+
+    words = ["tour", *places, "--robot", "paper-control", "--out", str(tmp_path / "out"), *options]
+    assert run_command(main, words) == 2
+    error = capsys.readouterr().err
+    assert expected in error
+    assert len(error.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_reads_places_from_words_and_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from planner.__main__ import main
+
+    cm = 100 * CONTROL.tail_length
+    (tmp_path / "places.csv").write_text("x_cm,y_cm\n" + "".join(f"{cm * x},{cm * y}\n" for x, y in PLACES[:3]))
+    common = ["--robot", "paper-control", "--objective", "time", "--out"]
+    assert run_command(main, ["tour", str(tmp_path / "places.csv"), *common, str(tmp_path / "one")]) == 0
+    assert "order: 1 3 2; no other order is quicker" in capsys.readouterr().out
+    assert run_command(main, ["tour", "0,0", "4,0", "2,1", *common, str(tmp_path / "two")]) == 0
+    one, two = (json.loads((tmp_path / name / "tour.json").read_text()) for name in ("one", "two"))
+    assert one["order"] == two["order"] == [0, 2, 1]
+    assert np.array(one["places"]) == pytest.approx(np.array(two["places"]))
+    assert {"plan.json", "schedule.h", "tour.svg"} <= {path.name for path in (tmp_path / "one").iterdir()}
+
+
+def test_bad_places_are_refused_in_python(tracked: TrackedVehicle) -> None:
+    with pytest.raises(InputError, match="two or more"):
+        tour([(0, 0, 0), (1, 1, 1)], tracked, QUICK)
