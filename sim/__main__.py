@@ -34,8 +34,6 @@ def _steady(arguments: Namespace) -> None:
 
 def _steady_robot(arguments: Namespace) -> None:
     """Print the motion of one robot in lab units, beside the dimensionless numbers."""
-    import pandas as pd
-
     from sim.inputs import group_columns, load_robot
     from sim.io.files import write_csv
     from sim.motion.batches import steady_columns
@@ -48,6 +46,8 @@ def _steady_robot(arguments: Namespace) -> None:
     if motion["note"][0]:
         print(f"note: {motion['note'][0]}", file=sys.stderr)
     if arguments.out:
+        import pandas as pd
+
         table = pd.DataFrame({"robot": [robot.name], **lab_motion([robot], motion), **motion})
         write_csv(table, arguments.out)
         print(f"-> {arguments.out}")

@@ -82,8 +82,6 @@ def _query(arguments: Namespace) -> None:
 
 def _query_robot(arguments: Namespace) -> None:
     """Print the answer for one robot in lab units, beside the dimensionless numbers."""
-    import pandas as pd
-
     from sim.inputs import group_columns, load_robot
     from sim.io.files import write_csv
     from sim.motion.lab_units import describe_motion, lab_motion
@@ -99,6 +97,8 @@ def _query_robot(arguments: Namespace) -> None:
     if arguments.flag and answer.get("outside", [False])[0]:
         print("note: the robot is outside the domain of the look-up table", file=sys.stderr)
     if arguments.out:
+        import pandas as pd
+
         rows = pd.DataFrame({"robot": [robot.name], **lab_motion([robot], answer), **answer})
         write_csv(rows, arguments.out)
         print(f"-> {arguments.out}")

@@ -1,4 +1,4 @@
-"""Pictures of plans and replays: the path as given, the declared path, the predicted track, the replayed track."""
+"""Pictures beside those of plans, by matplotlib: a way from pose to pose, and how a figure is written."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from planner.files.plan_picture import schedule_words
 from planner.goal.goal_plan import GoalPlan
 from planner.jobs.tour_plan import TourPlan
 from planner.paths.units import in_lab
-from planner.planning.planned import Plan
 from sim.io.files import whole_file
-from sim.io.units import format_time
 
 
 def write_svg(figure: Figure, path: Path, identity: str) -> None:
@@ -20,28 +19,15 @@ def write_svg(figure: Figure, path: Path, identity: str) -> None:
         figure.savefig(part, format="svg", bbox_inches="tight", metadata={"Date": None, "Identifier": identity})
 
 
-def draw_plan(result: Plan) -> Figure:
-    """Draw the plan over its path, with the stated error."""
-    figure = Figure(figsize=(6, 6))
-    axes = figure.add_subplot()
-    result.plot(axes)
-    rms, stated = (in_lab(error, result.robot) for error in (result.predicted_rms, result.stated_error))
-    axes.set_title(
-        f"{_schedule(result)}\npredicted error {rms} rms, stated error {stated}",
-        fontsize=10,
-        parse_math=False,
-    )
-    axes.legend(loc="center", fontsize=8, frameon=False)
-    return figure
-
-
 def draw_goal_plan(goal_plan: GoalPlan) -> Figure:
     """Draw a plan from pose to pose, with what the robot must keep out of."""
     figure = Figure(figsize=(6, 6))
     axes = goal_plan.plot(figure.add_subplot())
     robot = goal_plan.plan.robot
     way, stated = in_lab(goal_plan.length, robot), in_lab(goal_plan.plan.stated_error, robot)
-    axes.set_title(f"{_schedule(goal_plan.plan)}\nway {way}, stated error {stated}", fontsize=10, parse_math=False)
+    axes.set_title(
+        f"{schedule_words(goal_plan.plan)}\nway {way}, stated error {stated}", fontsize=10, parse_math=False
+    )
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, fontsize=8, frameon=False)
     return figure
 
@@ -51,10 +37,6 @@ def draw_tour(tour: TourPlan) -> Figure:
     figure = Figure(figsize=(6, 6))
     axes = tour.plot(figure.add_subplot())
     stated = in_lab(tour.plan.stated_error, tour.plan.robot)
-    axes.set_title(f"{_schedule(tour.plan)}\nstated error {stated}", fontsize=10, parse_math=False)
+    axes.set_title(f"{schedule_words(tour.plan)}\nstated error {stated}", fontsize=10, parse_math=False)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, fontsize=8, frameon=False)
     return figure
-
-
-def _schedule(result: Plan) -> str:
-    return f"{result.robot.name}: {len(result.dwells)} dwells, {format_time(float(result.seconds.sum()))}"

@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from planner.files.plan_picture import plan_svg
 from planner.files.tracker_header import DIRECTIONS, c_part, safe_name, tracker_header
 from planner.planning.planned import Plan
 from sim.io.errors import InputError
-from sim.io.files import files_together, write_csv, write_text
+from sim.io.files import files_together, write_numbers, write_text
 from sim.io.provenance import code_version
 
 if TYPE_CHECKING:
@@ -58,26 +59,26 @@ def write_plan(result: Plan, folder: str | Path, *, pictures: Mapping[str, Figur
         ...     [path.name for path in write_plan(plan(circle(2.0), load_robot("paper-control")), folder)]
         ['plan.json', 'plan.csv', 'schedule.h', 'tracker.h', 'plan.svg']
     """
-    from planner.files.pictures import write_svg  # loads matplotlib
-
     with files_together(folder, (*FILES, *EXTRA)) as temporary:
         identity = write_plan_files(result, temporary)
-        for name, figure in (pictures or {}).items():
-            write_svg(figure, temporary / name, identity)
+        if pictures:
+            from planner.files.pictures import write_svg  # loads matplotlib
+
+            for name, figure in pictures.items():
+                write_svg(figure, temporary / name, identity)
     return [Path(folder, name) for name in (*FILES, *(pictures or ()))]
 
 
 def write_plan_files(result: Plan, folder: Path) -> str:
     """Write the five files of a plan into a folder, one after the other, and return the plan's identity."""
-    from planner.files.pictures import draw_plan, write_svg
-
     record = result.to_dict()
     identity = record["id"]
     write_text(folder / "plan.json", json.dumps({**record, "code_version": code_version()}) + "\n")
-    write_csv(result.to_frame().assign(plan_id=identity), folder / "plan.csv")
+    columns = {name: values.tolist() for name, values in result.columns().items()}
+    write_numbers({**columns, "plan_id": [identity] * len(result.dwells)}, folder / "plan.csv")
     write_text(folder / "schedule.h", controller_header(result, identity))
     write_text(folder / "tracker.h", tracker_header(result, identity))
-    write_svg(draw_plan(result), folder / "plan.svg", identity)
+    write_text(folder / "plan.svg", plan_svg(result, identity))
     return identity
 
 

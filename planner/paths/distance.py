@@ -1,11 +1,14 @@
-"""Distances between points and polylines, in time linear in both: a tree finds the candidates."""
+"""Distances between points and polylines, in time linear in both: a tree finds the candidates.
+
+For a few million pairs all distances take less time than importing the tree of scipy.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from sim.arrays import Floats, Integers
 
@@ -14,6 +17,8 @@ _FINE = 4  # candidates a point
 _LEAST_POINTS = 1_000  # of the refined polyline
 _MOST_POINTS = 400_000
 _BLOCK = 16_384  # points at a time, which bounds the memory
+_FEW_PAIRS = 4_000_000  # of points and candidates
+_PAIRS = 250_000  # at a time
 
 
 def distance_to(polyline: Floats, points: Floats) -> Floats:
@@ -41,7 +46,7 @@ def nearest(polyline: Floats, points: Floats) -> tuple[Floats, Integers, Floats]
     places = start[owner] + (part / pieces[owner])[:, None] * direction[owner]
     owner = np.append(owner, len(start) - 1)
     previous = np.maximum(owner - np.append(part == 0, False), 0)  # the segment that ends here
-    tree = cKDTree(np.concatenate([places, polyline[-1:]]))
+    tree = _tree(np.concatenate([places, polyline[-1:]]), len(points))
     half = float((length / pieces).max()) / 2
     count = min(_FINE, len(owner))
     distance, segment, place = np.empty(len(points)), np.empty(len(points), dtype=int), np.empty(len(points))
@@ -60,6 +65,44 @@ def nearest(polyline: Floats, points: Floats) -> tuple[Floats, Integers, Floats]
             closest = _closest(start, direction, some[i : i + 1], close[None])
             distance[first + i], segment[first + i], place[first + i] = (part[0] for part in closest)
     return distance, segment, place
+
+
+def _tree(places: Floats, queries: int) -> Any:
+    """Return what finds the nearest of the places for so many points."""
+    if len(places) * queries <= _FEW_PAIRS:
+        return _AllDistances(places)
+    from scipy.spatial import cKDTree
+
+    return cKDTree(places)
+
+
+class _AllDistances:
+    """The two methods of scipy's tree that `nearest` calls, by all distances."""
+
+    def __init__(self, places: Floats):
+        self._places = places
+
+    def query(self, points: Floats, k: int) -> tuple[Floats, Integers]:
+        """Return distances and indices of the k nearest places of points (M, 2), both (M, k), nearest first."""
+        rows = max(1, _PAIRS // len(self._places))
+        squares, indices = np.empty((len(points), k)), np.empty((len(points), k), dtype=np.int64)
+        for first in range(0, len(points), rows):
+            block = slice(first, first + rows)
+            square = self._squares(points[block])
+            nearest_places = np.argpartition(square, k - 1, axis=1)[:, :k]
+            square = np.take_along_axis(square, nearest_places, 1)
+            order = np.argsort(square, axis=1)
+            squares[block] = np.take_along_axis(square, order, 1)
+            indices[block] = np.take_along_axis(nearest_places, order, 1)
+        return np.sqrt(squares), indices
+
+    def query_ball_point(self, point: Floats, reach: float) -> Integers:
+        """Return the indices of the places within reach of a point (2,)."""
+        return np.flatnonzero(self._squares(point[None])[0] <= reach**2)
+
+    def _squares(self, points: Floats) -> Floats:
+        away = points[:, None, 0] - self._places[:, 0], points[:, None, 1] - self._places[:, 1]
+        return np.asarray(away[0] ** 2 + away[1] ** 2)
 
 
 def _closest(

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.patches import Circle as Patch
 
 from planner.paths.obstacles import Circle, FreeSpace
 from sim.arrays import Floats
 from sim.io.units import format_length
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 RAW, DECLARED, PREDICTED, REPLAYED = "#b0b0b0", "#1a1a1a", "#2a7fba", "#c8452f"
 KEEP_OUT = "#d8b365"
+_ROUND = 121  # points of a circle
 
 
 def draw_tracks(axes: Axes, raw: Floats, declared: Floats, stated: float, tail_length: float) -> None:
@@ -47,7 +51,9 @@ def draw_regions(axes: Axes, free_space: FreeSpace, tail_length: float) -> None:
     cm = 100 * tail_length
     for region in free_space.regions:
         if isinstance(region, Circle):
-            axes.add_patch(Patch((cm * region.x, cm * region.y), cm * region.radius, color=KEEP_OUT, lw=0))
+            turn = np.linspace(0, 2 * np.pi, _ROUND)
+            x, y = region.x + region.radius * np.cos(turn), region.y + region.radius * np.sin(turn)
+            axes.fill(cm * x, cm * y, color=KEEP_OUT, lw=0)
         else:
             axes.fill(*(cm * region.corners.T), color=KEEP_OUT, lw=0)
     if free_space.walls is not None:

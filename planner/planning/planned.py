@@ -9,6 +9,7 @@ from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planner.paths.path import Path2D
 from planner.paths.units import in_lab, time_in_lab
@@ -226,7 +227,7 @@ class Plan:
         Args:
             ax: default: axes of a new figure.
         """
-        from planner.planning.picture import draw_prediction, draw_regions, draw_tracks  # loads matplotlib
+        from planner.planning.picture import draw_prediction, draw_regions, draw_tracks
 
         ax = given_axes(ax)
         length = self.robot.tail_length
@@ -236,6 +237,24 @@ class Plan:
             draw_regions(ax, self.kept_clear.free_space, length)
         return ax
 
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return the columns of `to_frame`, each (M,)."""
+        start = np.concatenate([[0.0], np.cumsum(self.dwells)[:-1]])
+        x, y, heading = self.poses[:-1].T
+        cm = 100 * self.robot.tail_length
+        return {
+            "start_s": start * self.robot.time_scale,
+            "direction": self.first_direction * (-1) ** np.arange(len(self.dwells)),
+            "dwell_s": self.seconds,
+            "x_cm": x * cm,
+            "y_cm": y * cm,
+            "heading_deg": np.degrees(heading),
+            "dwell_bar": self.dwells,
+            "x_over_l": x,
+            "y_over_l": y,
+            "heading_rad": heading,
+        }
+
     def to_frame(self) -> pd.DataFrame:
         """Tabulate the dwells: start, direction of the motor, length, and predicted pose at the start; M rows.
 
@@ -243,23 +262,7 @@ class Plan:
         """
         import pandas as pd  # a plan is made without it
 
-        start = np.concatenate([[0.0], np.cumsum(self.dwells)[:-1]])
-        x, y, heading = self.poses[:-1].T
-        cm = 100 * self.robot.tail_length
-        frame = pd.DataFrame(
-            {
-                "start_s": start * self.robot.time_scale,
-                "direction": self.first_direction * (-1) ** np.arange(len(self.dwells)),
-                "dwell_s": self.seconds,
-                "x_cm": x * cm,
-                "y_cm": y * cm,
-                "heading_deg": np.degrees(heading),
-                "dwell_bar": self.dwells,
-                "x_over_l": x,
-                "y_over_l": y,
-                "heading_rad": heading,
-            }
-        )
+        frame = pd.DataFrame(self.columns())
         frame.attrs["units"] = column_units(frame)
         return frame
 

@@ -11,11 +11,11 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 from sim.io.errors import InputError
 
@@ -103,6 +103,16 @@ def write_csv(table: DataFrame, path: str | Path, *, digits: int = 8) -> None:
     """Write a table as CSV with so many digits, completely or not at all."""
     with whole_file(path) as part:
         table.to_csv(part, index=False, float_format=f"%.{digits}g")
+
+
+def write_numbers(columns: Mapping[str, Any], path: str | Path, *, digits: int = 8) -> None:
+    """Write columns of finite numbers and plain words as `write_csv` would, without loading pandas."""
+    texts = [
+        [f"{value:.{digits}g}" if isinstance(value, float) else str(value) for value in values]
+        for values in columns.values()
+    ]
+    rows = [",".join(columns), *map(",".join, zip(*texts, strict=True))]
+    write_text(path, "\n".join(rows) + "\n")
 
 
 def write_text(path: str | Path, text: str) -> None:

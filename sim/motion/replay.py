@@ -8,9 +8,9 @@ head's centre, seen from above. Lengths are in l, times in μ0 l⁴/EI and in se
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from sim.inputs import check_columns
 from sim.io.errors import InputError
@@ -21,6 +21,9 @@ from sim.motion.resolution import COARSER, MOST_REPLAY_WORK, Resolution
 from sim.motion.run import Run
 from sim.solve.assembly import bodies, reversed_bodies
 from sim.solve.march import YAW, X, Y
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _SAMPLES = 12  # track points in a dwell, at most
 
@@ -107,6 +110,8 @@ def _replay(
 
 @np.errstate(over="ignore")  # seconds of an absurd time scale
 def _track(schedule: Schedule, rows: list[tuple[float, ...]]) -> pd.DataFrame:
+    import pandas as pd  # slow to import, and batches of steady motions need no track
+
     table = np.array(rows)
     pose = planar.compose(np.array(schedule.start), table[:, 1:4])
     lab = {}

@@ -14,12 +14,13 @@ from planner.planning.plan import plan
 from sim.model.presets import PRESETS
 from tests.processes import LIMIT
 
-SLOW = ("torch", "scipy.stats", "scipy.interpolate", "scipy.optimize", "joblib")
+SLOW = ("torch", "scipy.stats", "scipy.interpolate", "scipy.optimize", "scipy.spatial", "matplotlib", "joblib")
+TABLES = ("pandas", "pyarrow")
 COMMAND = "import sys; from softflagella.__main__ import main; main(sys.argv[1:]); "
 SAY = "print('\\nloaded:', *(name for name in {slow} if name in sys.modules))"
 
 
-def loaded(code: str, *words: str, slow: tuple[str, ...] = SLOW) -> list[str]:
+def loaded(code: str, *words: str, slow: tuple[str, ...] = (*SLOW, *TABLES)) -> list[str]:
     """Return which of the slow libraries a process has loaded at the end of some code."""
     done = subprocess.run(
         [sys.executable, "-c", code + SAY.format(slow=slow), *words],
@@ -40,7 +41,10 @@ def test_a_command_loads_no_torch(words: tuple[str, ...], tmp_path: Path) -> Non
 
 def test_a_replay_loads_no_torch(tmp_path: Path) -> None:
     write_plan(plan(circle(1.0), PRESETS["paper-control"]), tmp_path)
-    assert loaded(COMMAND, "replay", str(tmp_path / "plan.json"), "--out", str(tmp_path / "track.csv")) == []
+    assert (
+        loaded(COMMAND, "replay", str(tmp_path / "plan.json"), "--out", str(tmp_path / "track.csv"), slow=SLOW)
+        == []
+    )
     assert (tmp_path / "track.csv").exists()
 
 
@@ -56,4 +60,4 @@ table.response(columns)
 table.jacobian(columns, ["C_t", "disc_drag"])
 sf.Tracker(sf.plan(sf.circle(2.0), robot)).update(0.0)
 """
-    assert loaded(code) == []
+    assert loaded(code, slow=("torch", "scipy.stats", "scipy.interpolate", "scipy.optimize", "joblib")) == []

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
-from planner.files.pictures import draw_plan
 from planner.files.plan_files import milliseconds, write_plan
 from planner.paths.path import circle, polygon
 from planner.planning.plan import plan
@@ -89,7 +89,7 @@ def test_all_files_name_the_same_plan_and_another_plan_replaces_them(tmp_path: P
     """Two plans in one folder used to mix: plan.json of one beside schedule.h of the other."""
     small, large = plan(circle(2.0), CONTROL), plan(circle(2.5), CONTROL)
     (tmp_path / "goal.json").write_text("{}")
-    write_plan(small, tmp_path, pictures={"trade_off.svg": draw_plan(small)})
+    write_plan(small, tmp_path, pictures={"trade_off.svg": Figure()})
     first = identities(tmp_path)
     assert not (tmp_path / "goal.json").exists()
     write_plan(large, tmp_path)
@@ -104,10 +104,10 @@ def test_a_plan_that_cannot_be_drawn_leaves_the_plan_before(
     write_plan(plan(circle(2.0), CONTROL), tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
 
-    def broken(_: object) -> None:
+    def broken(*_: object) -> None:
         raise RuntimeError
 
-    monkeypatch.setattr("planner.files.pictures.draw_plan", broken)
+    monkeypatch.setattr("planner.files.plan_files.plan_svg", broken)
     with pytest.raises(RuntimeError):
         write_plan(plan(circle(2.5), CONTROL), tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planner.paths import distance
 from planner.paths.distance import distance_to, nearest, two_sided
 
 
@@ -17,22 +20,24 @@ def all_with_all(polyline: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.asarray(np.hypot(*np.moveaxis(away - share[..., None] * along, -1, 0)).min(1))
 
 
-@given(st.integers(0, 10_000), st.integers(2, 60), st.floats(0.01, 30.0))
+@given(st.integers(0, 10_000), st.integers(2, 60), st.floats(0.01, 30.0), st.booleans())
 @settings(max_examples=150, deadline=None)
-def test_distances_are_exact(seed: int, count: int, spread: float) -> None:
-    """Any polyline: short and long steps, crossings, hairpins, points near and far."""
+def test_distances_are_exact(seed: int, count: int, spread: float, tree: bool) -> None:
+    """Any polyline: short and long steps, crossings, hairpins, points near and far; with a tree and without."""
     rng = np.random.default_rng(seed)
     polyline = np.cumsum(rng.normal(size=(count, 2)) * 10 ** rng.uniform(-2, 1, (count, 1)), 0)
     if seed % 3 == 0:
         polyline = np.concatenate([polyline, polyline[::-1]])
     points = polyline[rng.integers(count, size=30)] + spread * rng.normal(size=(30, 2))
-    assert distance_to(polyline, points) == pytest.approx(all_with_all(polyline, points), rel=1e-9, abs=1e-9)
+    with patch.object(distance, "_FEW_PAIRS", 0 if tree else 10**9):
+        found = distance_to(polyline, points)
+    assert found == pytest.approx(all_with_all(polyline, points), rel=1e-9, abs=1e-9)
 
 
 def test_the_nearest_place_is_on_the_polyline() -> None:
     polyline = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 3.0]])
-    distance, segment, share = nearest(polyline, np.array([[0.5, 0.4], [2.5, 1.5]]))
-    assert distance == pytest.approx([0.4, 0.5])
+    gap, segment, share = nearest(polyline, np.array([[0.5, 0.4], [2.5, 1.5]]))
+    assert gap == pytest.approx([0.4, 0.5])
     assert segment.tolist() == [0, 1]
     assert share == pytest.approx([0.25, 0.5])
 

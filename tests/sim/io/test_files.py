@@ -9,11 +9,12 @@ import sys
 import threading
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from sim.io.errors import CLOSED_PIPE, INTERRUPTED, InputError, run_command
-from sim.io.files import files_together, whole_file, write_csv, write_text
+from sim.io.files import files_together, whole_file, write_csv, write_numbers, write_text
 from tests.processes import LIMIT
 
 ROOT = Path(__file__).parents[3]
@@ -158,3 +159,11 @@ def test_a_reader_that_goes_ends_the_command_without_a_word() -> None:
     assert process.stderr.read() == ""
     assert process.wait(timeout=LIMIT) == CLOSED_PIPE == 141
     process.stderr.close()
+
+
+def test_numbers_are_written_as_a_table_is(tmp_path: Path) -> None:
+    numbers = [0.0, -0.0, 1.0, -1.5, 1 / 3, 1e-12, 123456789.0, -2.5e300]
+    columns = {"x": numbers, "count": list(range(8)), "name": ["a1"] * 8, "y": np.array(numbers[::-1])}
+    write_csv(pd.DataFrame(columns), tmp_path / "table.csv")
+    write_numbers(columns, tmp_path / "numbers.csv")
+    assert (tmp_path / "numbers.csv").read_bytes() == (tmp_path / "table.csv").read_bytes()

@@ -1,0 +1,90 @@
+"""Processor time from the shell to the answer of `plan`, `steady` and `query`, and its parts.
+
+Usage: python -m benchmarks startup [RUNS]
+
+The first column is the whole command. The others are parts of a process that does the same from Python: start of
+the interpreter and imports; reading the look-up table and compiled loops, that is the first answer less a second
+one; a second answer. The least of RUNS runs each (default: 5).
+
+Takes 30 seconds.
+"""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+_MARKED = """
+import time
+{imports}
+marks = [time.process_time()]
+for _ in range(2):
+    {answer}
+    marks.append(time.process_time())
+print(*marks)
+"""
+_PLAN = (
+    """
+import sys
+from planner.files.plan_files import write_plan
+from planner.paths.path import circle
+from planner.planning.plan import plan
+from sim.model.presets import PRESETS
+""",
+    "write_plan(plan(circle(1.5), PRESETS['paper-control']), sys.argv[1])",
+)
+_STEADY = (
+    """
+from sim.inputs import group_columns, load_robot
+from sim.motion.batches import steady_columns
+from sim.motion.lab_units import describe_motion
+""",
+    "describe_motion(load_robot('paper-control'), steady_columns(group_columns([load_robot('paper-control')])))",
+)
+_QUERY = (
+    """
+from functools import cache
+from sim.inputs import group_columns, load_robot
+from surrogate.table.answers import answer_with_error
+from surrogate.table.model_file import load_table
+read = cache(load_table)
+""",
+    "answer_with_error(read(), group_columns([load_robot('paper-control')]))",
+)
+
+
+def main(*words: str) -> None:
+    runs = int(words[0]) if words else 5
+    print(f"{'processor time [s]':20}{'command':>9}{'imports':>9}{'loading':>9}{'answer':>9}")
+    with TemporaryDirectory() as folder:
+        commands = {
+            "plan circle:1.5": (["plan", "circle:1.5", "--robot", "paper-control", "--out", folder], _PLAN),
+            "steady": (["steady", "paper-control"], _STEADY),
+            "query": (["query", "paper-control"], _QUERY),
+        }
+        for name, (command, (imports, answer)) in commands.items():
+            whole = min(_spent(["-m", "softflagella", *command])[0] for _ in range(runs))
+            code = _MARKED.format(imports=imports, answer=answer)
+            marks = [_spent(["-c", code, folder])[1].split()[-3:] for _ in range(runs)]
+            parts = [_parts([float(mark) for mark in run]) for run in marks]
+            print(f"{name:20}{whole:9.2f}" + "".join(f"{min(part):9.3f}" for part in zip(*parts, strict=True)))
+
+
+def _spent(words: Sequence[str]) -> tuple[float, str]:
+    """Run the interpreter; return its processor time in s, and what it printed."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(
+        [sys.executable, *words], cwd=Path(__file__).parents[2], capture_output=True, text=True, check=True
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout
+
+
+def _parts(marks: Sequence[float]) -> tuple[float, float, float]:
+    """Return imports, loading and answer from the times after imports, first and second answer."""
+    imported, first, second = marks
+    return imported, (first - imported) - (second - first), second - first
