@@ -9,11 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from sim.arrays import Floats
 from sim.model.response import Responses
-from surrogate.table.error_modes import ErrorModes
+
+
+class ErrorModes(NamedTuple):
+    """P independent errors of one standard deviation, for a positive motor; curves are those of `sim.model.response`."""
+
+    twist: Floats  # (P, 3), of v_z, v_x and ω_yr
+    lag: Floats  # (P, D, 3)
+    memory: Floats  # (P, K, D, 3), after dwells BEFORE
 
 
 class LookupTable(Protocol):

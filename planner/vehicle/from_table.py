@@ -18,8 +18,7 @@ from sim.effects.tail_contact import least_gap
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.robot import Robot
-from surrogate.interface import LookupTable
-from surrogate.table.error_modes import ErrorModes
+from surrogate.interface import ErrorModes, LookupTable
 
 _STEADY = ("v_z", "v_x", "omega_yr_bar")
 _ODD = 0.2  # share of a table's error that has opposite signs in the two directions

@@ -26,7 +26,8 @@ from sim.model.response import DWELLS, Responses
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.input_ranges import ROBOT
-from surrogate.table.error_modes import ErrorModes, error_modes
+from surrogate.interface import ErrorModes
+from surrogate.table.error_modes import error_modes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,25 +15,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, LAGS
+from surrogate.interface import ErrorModes
 from surrogate.table.errors import Errors, error_scale
 
 LENGTH = 1.0  # of the kernel, in the logarithm of a dwell
 STEADY = ("v_z", "v_x", "omega_yr_bar")
 _KEPT = 0.999  # share of the variance
-
-
-class ErrorModes(NamedTuple):
-    """P modes of error for a positive motor; curves are those of `sim.model.response`."""
-
-    twist: Floats  # (P, 3), of v_z, v_x and ω_yr
-    lag: Floats  # (P, D, 3)
-    memory: Floats  # (P, K, D, 3), after dwells BEFORE
 
 
 def error_modes(errors: Errors, motion: Mapping[str, float]) -> ErrorModes:
