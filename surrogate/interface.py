@@ -16,7 +16,7 @@ from sim.model.response import Responses
 
 
 class ErrorModes(NamedTuple):
-    """P independent errors of one standard deviation, for a positive motor; curves are those of `sim.model.response`."""
+    """P independent errors of one standard deviation, for a positive motor; curves as in `sim.model.response`."""
 
     twist: Floats  # (P, 3), of v_z, v_x and ω_yr
     lag: Floats  # (P, D, 3)

@@ -25,9 +25,9 @@ from sim.io.reading import ContentError, read_json
 from sim.model.response import DWELLS, Responses
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.error_modes import error_modes
 from surrogate.input_ranges import ROBOT
 from surrogate.interface import ErrorModes
-from surrogate.table.error_modes import error_modes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

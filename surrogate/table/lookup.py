@@ -29,10 +29,10 @@ from sim.model.groups import DWELL
 from sim.model.response import DWELLS, LAGS, Responses, at_equal_dwells
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.error_modes import STEADY, error_modes, joined
 from surrogate.interface import ErrorModes
 from surrogate.networks.ensemble import Ensemble
 from surrogate.table.curve_errors import CURVE_ERRORS, NORMAL_90, CurveErrors
-from surrogate.table.error_modes import STEADY, error_modes, joined
 from surrogate.table.errors import RELATIVE, error_scale
 from surrogate.table.intervals import Intervals
 from surrogate.table.jacobian import slopes

@@ -1,4 +1,4 @@
-"""Unseen robots and paths as labs have them, planned with the shipped table and carried out by their own tables."""
+"""Unseen robots and paths as labs have them, planned with the shipped table, carried out by their own tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors of a table as modes: their sizes, how they differ between dwells, what is learned from held-out robots."""
+"""Errors of a table as modes: sizes, how they differ between dwells, what is learned from held-out robots."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 
 from sim.model.presets import PRESETS
 from sim.model.response import BEFORE, DWELLS
+from surrogate.error_modes import STEADY, error_modes
 from surrogate.table.curve_errors import CurveErrors
-from surrogate.table.error_modes import STEADY, error_modes
 from surrogate.table.errors import error_scale
 from surrogate.table.model_file import load
 from surrogate.table.response_table import Basis

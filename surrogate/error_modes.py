@@ -21,21 +21,22 @@ import numpy as np
 from sim.arrays import Floats
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, LAGS
 from surrogate.interface import ErrorModes
-from surrogate.table.errors import Errors, error_scale
 
 LENGTH = 1.0  # of the kernel, in the logarithm of a dwell
 STEADY = ("v_z", "v_x", "omega_yr_bar")
 _KEPT = 0.999  # share of the variance
 
 
-def error_modes(errors: Errors, motion: Mapping[str, float]) -> ErrorModes:
+def error_modes(errors: Mapping[str, Mapping[str, float]], motion: Mapping[str, float]) -> ErrorModes:
     """Return the modes of errors of which only the sizes are known.
 
     Args:
         errors: relative errors by output, each with its "rms", see `surrogate.table.errors`.
         motion: the robot's steady motion, by output.
     """
-    sizes = {name: float(np.abs(errors[name]["rms"] * error_scale(name, motion))) for name in (*STEADY, *LAGS)}
+    speed, yaw = float(np.hypot(motion["v_x"], motion["v_z"])), abs(motion["omega_yr_bar"])
+    scale = {"v_x": abs(motion["v_x"]), "omega_yr_bar": yaw, "lag_psi_rad": yaw}
+    sizes = {name: errors[name]["rms"] * scale.get(name, speed) for name in (*STEADY, *LAGS)}
     lag, functions = [sizes[name] for name in LAGS], _process()
     count = len(functions)
     curves = np.zeros((3 * count, *functions.shape[1:], 3))
