@@ -1,7 +1,8 @@
-"""The commands for jobs of a laboratory: a tour of places."""
+"""The commands for jobs of a laboratory: a tour of places, the coverage of a region."""
 
 from __future__ import annotations
 
+import math
 from argparse import Namespace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -66,6 +67,31 @@ def _tour(arguments: Namespace) -> None:
     print(f"-> {', '.join(map(str, paths))}")
 
 
+def _cover(arguments: Namespace) -> None:
+    from planner.files.goal_files import read_free_space
+    from planner.files.job_files import read_field, read_length, write_cover
+    from planner.jobs.cover import cover
+    from planner.jobs.region import Field
+    from sim.inputs import load_robot
+
+    robot = load_robot(arguments.robot)
+    field, scale = read_field(arguments.region, arguments.hole, arguments.unit, robot)
+    space = read_free_space(arguments.keep_out, arguments.walls, scale, robot)
+    field = Field(field.outline, (*field.holes, *space.regions))
+    width = read_length(arguments.width, scale, robot, "--width")
+    tracked, request = _tracked(arguments, robot)
+    angle = None if arguments.angle is None else math.radians(math.fmod(arguments.angle, 360))
+    with progress_bar() as progress:
+        result = cover(
+            field, width, tracked, request, space, angle=angle, feedback=arguments.feedback, progress=progress
+        )
+    paths = write_cover(result, arguments.out)
+    say(result.plan)
+    for line in result.lines():
+        print(line)
+    print(f"-> {', '.join(map(str, paths))}")
+
+
 def _tracked(arguments: Namespace, robot: Robot) -> tuple[TrackedVehicle, PlanRequest]:
     """Load the table of the robot, and make the vehicle and the request."""
     from planner.planning.request import PlanRequest
@@ -93,6 +119,19 @@ JOBS = (
                      help="X,Y of each, or one CSV or SVG with a point for each; the tour begins at the first"),
             argument("--return", dest="back", action="store_true", help="end where the tour began"),
             argument("--any-start", action="store_true", help="begin at any of the places"),
+            *_COMMON,
+        ),
+    ),
+    Job(
+        "cover",
+        "sweep a region with a camera, magnet or sampler under the robot",
+        _cover,
+        (
+            argument("region", help="circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline"),
+            argument("--width", required=True, help="width of what is swept, such as 4cm"),
+            argument("--hole", action="append", default=[], metavar="REGION",
+                     help="a part that need not be swept, and may be crossed; may be given again"),
+            argument("--angle", type=float, help="direction of the lanes, in degrees (default: the quickest)"),
             *_COMMON,
         ),
     ),

@@ -7,6 +7,7 @@ from planner.files.goal_json import load_goal as load_goal
 from planner.files.plan_json import load_plan as load_plan
 from planner.files.tracking_error import TrackingError as TrackingError
 from planner.goal.goal_plan import GoalPlan as GoalPlan
+from planner.jobs.coverage_plan import CoveragePlan as CoveragePlan
 from planner.jobs.tour_plan import TourPlan as TourPlan
 from planner.paths.obstacles import Circle as Circle
 from planner.paths.path import Path2D as Path2D
@@ -31,6 +32,7 @@ from softflagella.api.calibrate import calibrate as calibrate
 from softflagella.api.calibrate import decide as decide
 from softflagella.api.calibrate import tracks as tracks
 from softflagella.api.goal import to_goal as to_goal
+from softflagella.api.jobs import cover as cover
 from softflagella.api.jobs import tour as tour
 from softflagella.api.plan import check as check
 from softflagella.api.plan import plan as plan

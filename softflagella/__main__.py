@@ -13,6 +13,7 @@ WORDS = {  # the most important commands -> package and command
     "steady": ("sim", "steady"),
     "plan": ("planner", "plan"),
     "tour": ("planner", "tour"),
+    "cover": ("planner", "cover"),
     "sweep": ("dataset", "build"),
     "train": ("surrogate", "train"),
     "calibrate": ("calibration", "calibrate"),

@@ -60,7 +60,7 @@ static void tracker_identity(tracker_real D[3][TRACKER_STATES])
         for (int k = 0; k < TRACKER_STATES; k++) D[i][k] = i == k;
 }
 
-/* Pose at the time `when` and its derivatives; 0 if it is too long ago. */
+/* What is seen at the time `when` and its derivatives; 0 if it is too long ago. */
 static int tracker_seen_from(const tracker *t, double when, tracker_real pose[3], tracker_real D[3][TRACKER_STATES])
 {
     const tracker_dwell *dwell = &t->dwell;
@@ -83,7 +83,36 @@ static int tracker_seen_from(const tracker *t, double when, tracker_real pose[3]
     tracker_change_of(t, pose[2], dwell, (tracker_real)(when - dwell->start), &change);
     for (int i = 0; i < 3; i++) pose[i] += change.move[i];
     tracker_through(D, &change, 0);
+    tracker_real c = TRACKER_COS(pose[2]), s = TRACKER_SIN(pose[2]);
+    tracker_real marker_x = c * t->state[10] - s * t->state[11], marker_y = s * t->state[10] + c * t->state[11];
+    for (int k = 0; k < TRACKER_STATES; k++) {
+        D[0][k] -= marker_y * D[2][k];
+        D[1][k] += marker_x * D[2][k];
+    }
+    D[0][10] += c;
+    D[0][11] -= s;
+    D[1][10] += s;
+    D[1][11] += c;
+    pose[0] += marker_x;
+    pose[1] += marker_y;
     return 1;
+}
+
+/* One pose less another; the difference of the headings is between -pi and pi. */
+static void tracker_difference(const tracker_real pose[3], const tracker_real expected[3], tracker_real left[3])
+{
+    for (int i = 0; i < 3; i++) left[i] = pose[i] - expected[i];
+    left[2] -= 2 * TRACKER_PI * TRACKER_FLOOR((left[2] + TRACKER_PI) / (2 * TRACKER_PI));
+}
+
+/* Puts the robot at another pose, known like a measured one; what was learned stays. */
+static void tracker_relocate(tracker *t, const tracker_real pose[3])
+{
+    for (int i = 0; i < 3; i++) {
+        t->state[i] = pose[i];
+        for (int j = 0; j < TRACKER_STATES; j++) t->covariance[i][j] = t->covariance[j][i] = 0;
+        t->covariance[i][i] = t->noise[i];
+    }
 }
 
 static void tracker_advance(tracker *t, const tracker_dwell *done)

@@ -3,6 +3,7 @@
 #define TRACKER_COS cosf
 #define TRACKER_ATAN atanf
 #define TRACKER_ATAN2 atan2f
+#define TRACKER_ACOS acosf
 #define TRACKER_SQRT sqrtf
 #define TRACKER_FLOOR floorf
 #define TRACKER_FABS fabsf
@@ -11,6 +12,7 @@
 #define TRACKER_COS cos
 #define TRACKER_ATAN atan
 #define TRACKER_ATAN2 atan2
+#define TRACKER_ACOS acos
 #define TRACKER_SQRT sqrt
 #define TRACKER_FLOOR floor
 #define TRACKER_FABS fabs
@@ -22,7 +24,7 @@ typedef struct {
     double flip_at;     /* time of the next flip, or of the end [s] */
     int finished;
     int alarm;          /* 1: the robot behaves like no robot of this model: calibrate again */
-    tracker_real error; /* 95 % of the distance from the path that is now possible [tail lengths] */
+    tracker_real error; /* the robot stays this close to the path until the next flip, in 95 % of the time [tail lengths] */
 } tracker_advice;
 
 typedef struct {
@@ -31,17 +33,35 @@ typedef struct {
     int sense;
 } tracker_dwell;
 
+typedef struct { /* an arc or a straight line of the way back */
+    tracker_real x, y, course, curvature, length;
+} tracker_segment;
+
+typedef struct { /* place on path and way; the path follows the last segment */
+    int place, leg;
+    tracker_real share, along;
+} tracker_where;
+
+typedef struct { /* the second pose: where the robot is if it has been moved */
+    tracker_real pose[3], score;
+    int agreed, flips, seen;
+} tracker_moved_robot;
+
 typedef struct {
-    tracker_real state[TRACKER_STATES]; /* pose at the last flip; yaw rates, surge, sway, lag angle, current */
+    /* pose at the last flip; yaw rates, surge, sway, lag angle, current, place of the marker */
+    tracker_real state[TRACKER_STATES];
     tracker_real covariance[TRACKER_STATES][TRACKER_STATES];
     tracker_real noise[3], score;
     tracker_dwell dwell, past[TRACKER_KEPT];
     int kept, latest; /* dwells in past; index of the latest one */
-    double now, flip_at;
-    int ends, finished, rejected, scored, alarm;
+    double now, flip_at, refused_first, refused_last;
+    int ends, finished, rejected, scored, alarm, refused, believed;
     tracker_real twist[2][3], lag_angle, current[2], drift[3]; /* the robot as it is learned */
-    tracker_real share, error, last_error, bias, lean;
-    int place, reached;
+    tracker_real error, last_error, bias, lean, turns, bound;
+    tracker_where where;
+    int reached, on_way, target;
+    tracker_segment way[TRACKER_SEGMENTS];
+    tracker_moved_robot moved;
 } tracker;
 
 typedef struct { /* what a time in a dwell adds to a pose */
@@ -169,14 +189,20 @@ static tracker_real tracker_step(int i, tracker_real *dx, tracker_real *dy)
     return *dx * *dx + *dy * *dy;
 }
 
+static tracker_real tracker_look(tracker *t, const tracker_real pose[3], int sense);
+static tracker_real tracker_hysteresis(tracker_real curvature)
+{
+    return TRACKER_SWING * (1 + tracker_smaller(TRACKER_FABS(curvature) * TRACKER_PIVOT_RADIUS, 1)) / 2;
+}
+
 /* sigma (phi - phi_d) - h; moves the place to the nearest one */
-static tracker_real tracker_look(tracker *t, const tracker_real pose[3], int sense)
+static tracker_real tracker_look_at_path(tracker *t, const tracker_real pose[3], int sense)
 {
     tracker_real c = TRACKER_COS(pose[2]), s = TRACKER_SIN(pose[2]);
     tracker_real heading = pose[2] - t->lean;
     tracker_real x = pose[0] + TRACKER_OFFSET * c, y = pose[1] + TRACKER_OFFSET * s;
     tracker_real dx, dy, away_x, away_y, square, share;
-    int i = t->place, came = 0;
+    int i = t->where.place, came = 0;
     x -= TRACKER_ROD * TRACKER_COS(heading);
     y -= TRACKER_ROD * TRACKER_SIN(heading);
     for (;;) {
@@ -194,19 +220,21 @@ static tracker_real tracker_look(tracker *t, const tracker_real pose[3], int sen
             break;
         }
     }
-    t->place = i;
-    t->share = share;
+    t->where.place = i;
+    t->where.share = share;
     t->error = square > 0 ? (dx * away_y - dy * away_x) / TRACKER_SQRT(square) : 0;
     tracker_real wanted = TRACKER_REAL(tracker_path_heading, i);
     tracker_real turn = TRACKER_REAL(tracker_path_heading, i + 1) - wanted;
     wanted += tracker_smaller(tracker_larger(share, 0), 1) * turn;
     wanted -= TRACKER_ATAN(t->error / TRACKER_AHEAD) + t->bias;
-    tracker_real curvature = TRACKER_FABS(turn / tracker_larger(TRACKER_SQRT(square), (tracker_real)1e-9));
-    tracker_real bend = tracker_smaller(curvature * TRACKER_PIVOT_RADIUS, 1);
-    return sense * (heading - wanted) - TRACKER_SWING * (1 + bend) / 2;
+    turn /= tracker_larger(TRACKER_SQRT(square), (tracker_real)1e-9);
+    return sense * (heading - wanted) - tracker_hysteresis(turn);
 }
 
-static int tracker_ended(const tracker *t) { return t->place >= TRACKER_POINTS - 2 && t->share >= 1; }
+static int tracker_ended(const tracker *t)
+{
+    return t->where.leg == TRACKER_SEGMENTS && t->where.place >= TRACKER_POINTS - 2 && t->where.share >= 1;
+}
 
 static tracker_real tracker_look_after(tracker *t, const tracker_begin_of_dwell *from, tracker_real time)
 {
@@ -248,11 +276,12 @@ static tracker_real tracker_end(tracker *t, const tracker_begin_of_dwell *from, 
     return high;
 }
 
-/* Length of the dwell; *ends: whether the path ends in it. The shortest one where the robot turns in circles. */
-static tracker_real tracker_next(tracker *t, const tracker_begin_of_dwell *from, int *ends)
+/* Length of the dwell, of which some time has elapsed; *ends: whether the path ends in it. The shortest one where
+ * the robot turns in circles. */
+static tracker_real tracker_next(tracker *t, const tracker_begin_of_dwell *from, tracker_real elapsed, int *ends)
 {
     tracker_real rate = TRACKER_FABS(t->twist[from->sense > 0 ? 0 : 1][2]), longest = TRACKER_TURNS / rate;
-    tracker_real time = TRACKER_SHORTEST, low = 0, low_value = 0, slope = rate;
+    tracker_real time = tracker_larger(TRACKER_SHORTEST, elapsed), low = 0, low_value = 0, slope = rate;
     tracker_real value = tracker_look_after(t, from, time);
     int looked = 0;
     *ends = 0;

@@ -3,11 +3,21 @@
 static void tracker_plan_flip(tracker *t)
 {
     tracker_begin_of_dwell from = {{t->state[0], t->state[1], t->state[2]}, t->dwell.before, t->dwell.sense};
-    int place = t->place;
+    tracker_where where = t->where;
+    tracker_real present[3], elapsed = tracker_larger((tracker_real)(t->now - t->dwell.start), 0);
     double start = t->dwell.start, least;
+    int off;
     tracker_apply(t);
-    t->flip_at = start + tracker_next(t, &from, &t->ends);
-    t->place = place;
+    for (int i = 0; i < 3; i++) present[i] = from.pose[i];
+    if (elapsed > 0) tracker_moved(t, &from, elapsed, present);
+    off = tracker_is_off(t, present);
+    t->where = where;
+    if (off) {
+        tracker_plan_way(t, present);
+        where = t->where;
+    }
+    t->flip_at = start + tracker_next(t, &from, elapsed, &t->ends);
+    t->where = where;
     least = t->ends ? start : start + TRACKER_SHORTEST;
     if (t->flip_at < t->now) t->flip_at = t->now;
     if (t->flip_at < least) t->flip_at = least;
@@ -21,6 +31,7 @@ static void tracker_flip(tracker *t)
         return;
     }
     done.length = (tracker_real)(t->flip_at - done.start);
+    tracker_advance_moved(t, &done);
     tracker_advance(t, &done);
     tracker_apply(t);
     tracker_learn(t, done.sense);
@@ -48,41 +59,71 @@ static void tracker_judge(tracker *t, tracker_real size)
 /* 1 if something was learned from the pose. */
 static int tracker_see(tracker *t, const tracker_real pose[3], double when)
 {
-    tracker_real left[3], H[3][TRACKER_STATES], size;
-    if (!tracker_seen_from(t, when, left, H)) return 0;
-    for (int i = 0; i < 3; i++) left[i] = pose[i] - left[i];
-    left[2] -= 2 * TRACKER_PI * TRACKER_FLOOR((left[2] + TRACKER_PI) / (2 * TRACKER_PI));
+    tracker_real seen[3], left[3], H[3][TRACKER_STATES], size;
+    if (!tracker_seen_from(t, when, seen, H)) return 0;
+    tracker_difference(pose, seen, left);
     size = tracker_update(t, left, H);
     if (size <= TRACKER_GATE) {
         t->rejected = 0;
+        tracker_forget_moved(t);
         tracker_judge(t, size);
         return 1;
     }
     t->rejected++;
-    if (t->rejected >= TRACKER_LOST) { /* many in a row: it is the estimate that is wrong */
-        t->rejected = 0;
-        t->alarm = 1;
-        for (int i = 0; i < 3; i++) t->covariance[i][i] += TRACKER_DISPLACED * TRACKER_DISPLACED;
+    if (t->rejected >= TRACKER_LOST) t->alarm = 1;
+    if (!tracker_see_moved(t, pose, when)) return 0;
+    tracker_relocate(t, t->moved.pose);
+    tracker_forget_moved(t);
+    t->rejected = t->scored = 0;
+    t->score = 0;
+    return 1;
+}
+
+/* Bounds the distance of the tracked point from the path until the next flip. */
+static tracker_real tracker_bound(tracker *t)
+{
+    tracker_real D[3][TRACKER_STATES], pose[3], ends[2], spread = 0, direction, g[TRACKER_STATES], row, lever;
+    tracker_where where = t->where;
+    tracker_change change;
+    for (int end = 0; end < 2; end++) {
+        double when = end == 0 ? t->now : t->flip_at;
+        if (when < t->dwell.start) when = t->dwell.start;
+        tracker_change_of(t, t->state[2], &t->dwell, (tracker_real)(when - t->dwell.start), &change);
+        for (int i = 0; i < 3; i++) pose[i] = t->state[i] + change.move[i];
+        tracker_identity(D);
+        tracker_through(D, &change, 0);
+        ends[end] = tracker_distance(t, pose, &direction);
+        t->where = where;
+        lever = TRACKER_OFFSET * TRACKER_SIN(direction - pose[2]);
+        for (int k = 0; k < TRACKER_STATES; k++)
+            g[k] = TRACKER_COS(direction) * D[0][k] + TRACKER_SIN(direction) * D[1][k] + lever * D[2][k];
+        spread = 0;
+        for (int i = 0; i < TRACKER_STATES; i++) {
+            row = tracker_dot(t->covariance[i], g);
+            spread += row * g[i];
+        }
     }
-    return 0;
+    tracker_real half = (ends[0] - ends[1]) / 2;
+    return TRACKER_FABS((ends[0] + ends[1]) / 2) + TRACKER_SPREADS * TRACKER_SQRT(half * half / 3 + tracker_larger(spread, 0));
 }
 
 /* The same answer again. */
 static inline tracker_advice tracker_answer(const tracker *t)
 {
-    tracker_real spread = tracker_larger(t->covariance[0][0] + t->covariance[1][1], 0) / 2;
     tracker_advice advice;
     advice.direction = t->finished ? 0 : t->dwell.sense;
     advice.flip_at = t->flip_at * TRACKER_TIME_SCALE;
     advice.finished = t->finished;
     advice.alarm = t->alarm;
-    advice.error = TRACKER_SWING_ERROR + TRACKER_QUANTILE * TRACKER_SQRT(spread);
+    advice.error = t->bound;
     return advice;
 }
 
-/* The robot is at rest at the plan's start, and the motor starts at `begin` [s]. Noise is one standard deviation of
- * a pose: of x and y [tail lengths], of the heading [rad]. */
-static inline void tracker_begin(tracker *t, tracker_real noise, tracker_real noise_heading, double begin)
+/* The robot is at rest at `start`, from where the tracker plans the way to the path, or if that is 0 at the plan's
+ * start, and the motor starts at `begin` [s]. Noise is one standard deviation of a pose: of x and y [tail lengths],
+ * of the heading [rad]. */
+static inline void tracker_begin_at(tracker *t, tracker_real noise, tracker_real noise_heading, double begin,
+                                    const tracker_real *start)
 {
     memset(t, 0, sizeof *t);
     for (int i = 0; i < 3; i++) t->state[i] = tracker_start[i];
@@ -90,23 +131,36 @@ static inline void tracker_begin(tracker *t, tracker_real noise, tracker_real no
         for (int j = 0; j < TRACKER_STATES; j++) t->covariance[i][j] = TRACKER_REAL(tracker_prior, i * TRACKER_STATES + j);
     t->noise[0] = t->noise[1] = noise * noise;
     t->noise[2] = noise_heading * noise_heading;
+    if (start) tracker_relocate(t, start);
     t->latest = TRACKER_KEPT - 1;
-    t->now = t->dwell.start = begin / TRACKER_TIME_SCALE;
+    t->where.leg = TRACKER_SEGMENTS;
+    t->now = t->dwell.start = t->flip_at = begin / TRACKER_TIME_SCALE;
     t->dwell.before = -1;
     t->dwell.sense = TRACKER_FIRST_DIRECTION;
     tracker_plan_flip(t);
+    if (tracker_first_turn(t) == -t->dwell.sense) {
+        t->dwell.sense = -t->dwell.sense;
+        tracker_plan_flip(t);
+    }
+    t->bound = tracker_bound(t);
 }
 
-/* Tell the time [s], and a pose if there is one (else 0) with the time at which it was true [s]. A time that goes
- * back, jumps too far or is not finite is taken for the last one. */
+/* The robot is at rest at the plan's start. */
+static inline void tracker_begin(tracker *t, tracker_real noise, tracker_real noise_heading, double begin)
+{
+    tracker_begin_at(t, noise, noise_heading, begin, 0);
+}
+
+/* Tell the time [s], and a pose if there is one (else 0) with the time at which it was true [s]. A time that is not
+ * finite, goes back or jumps too far is taken for the last one, until it is confirmed twice. */
 static inline tracker_advice tracker_feed(tracker *t, double now, const tracker_real *pose, double seen)
 {
-    now /= TRACKER_TIME_SCALE;
     seen /= TRACKER_TIME_SCALE;
-    if (t->now < now && now < t->now + TRACKER_LONGEST_GAP) t->now = now;
+    tracker_tell(t, now / TRACKER_TIME_SCALE);
     if (!t->finished && t->now >= t->flip_at - TRACKER_SLACK) tracker_flip(t);
-    if (pose && !t->finished && isfinite(pose[0]) && isfinite(pose[1]) && isfinite(pose[2]) && isfinite(seen) &&
-        seen <= t->now && tracker_see(t, pose, seen))
+    if (pose && !t->finished && t->believed && isfinite(pose[0]) && isfinite(pose[1]) && isfinite(pose[2]) &&
+        isfinite(seen) && seen <= t->now && tracker_see(t, pose, seen))
         tracker_plan_flip(t);
+    t->bound = tracker_bound(t);
     return tracker_answer(t);
 }

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from planner.files.plan_picture import schedule_words
 from planner.goal.goal_plan import GoalPlan
+from planner.jobs.coverage_plan import CoveragePlan
 from planner.jobs.tour_plan import TourPlan
 from planner.paths.units import in_lab
 from sim.io.files import whole_file
@@ -38,5 +39,16 @@ def draw_tour(tour: TourPlan) -> Figure:
     axes = tour.plot(figure.add_subplot())
     stated = in_lab(tour.plan.stated_error, tour.plan.robot)
     axes.set_title(f"{schedule_words(tour.plan)}\nstated error {stated}", fontsize=10, parse_math=False)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, fontsize=8, frameon=False)
+    return figure
+
+
+def draw_cover(cover: CoveragePlan) -> Figure:
+    """Draw a region and what is covered of it."""
+    figure = Figure(figsize=(6, 6))
+    axes = cover.plot(figure.add_subplot())
+    axes.set_title(
+        f"{schedule_words(cover.plan)}\ncovers {100 * cover.share:.1f} %", fontsize=10, parse_math=False
+    )
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, fontsize=8, frameon=False)
     return figure

@@ -14,16 +14,19 @@ from pathlib import Path
 
 import numpy as np
 
+from planner.goal.dubins import ROUNDING
 from planner.paths.path import arc_length
 from planner.planning import line_of_sight
 from planner.planning.planned import Plan
-from planner.tracking import guidance, kalman_filter, tracker
+from planner.tracking import clock, displacement, guidance, kalman_filter, tracker, way_back
 from planner.tracking.kalman_filter import prior
 from planner.vehicle.vehicle import BEFORE_KNOTS, STEP
 from sim.arrays import Floats
 
 _CODE = Path(__file__).parents[1] / "c"
-_PARTS = ("follower.h", "estimate.h", "guidance.h", "tracker.h")
+_PARTS = (
+    "follower.h", "estimate.h", "guidance.h", "way_back.h", "displacement.h", "clock.h", "tracker.h",
+)  # fmt: skip
 _PER_LINE = 12  # numbers of a table
 _LARGEST = 32_767
 _FLOAT_EXACT = 3e-6  # rad; in single precision a smaller angle is lost in the rounding
@@ -80,9 +83,10 @@ def _intro(result: Plan, identity: str) -> str:
  * Tables: {table_bytes(result)} bytes in single precision; on AVR they are in flash.
  *
  *     static tracker keeper;
+ *     tracker_real pose[3] = {{x, y, heading}}, start[3] = {{0, 0, 0}};
  *     tracker_begin(&keeper, 0.01, 0.01, now);          noise of a pose, the time at which the motor starts
+ *     tracker_begin_at(&keeper, 0.01, 0.01, now, start);                     at rest at any pose
  *     tracker_advice advice = tracker_feed(&keeper, now, 0, 0);              no pose
- *     tracker_real pose[3] = {{x, y, heading}};
  *     advice = tracker_feed(&keeper, now, pose, seen);                       a pose that was true at `seen`
  *
  * Turn the motor in advice.direction and flip it at advice.flip_at. Call tracker_feed after each flip, so that the
@@ -103,14 +107,16 @@ def _intro(result: Plan, identity: str) -> str:
 #endif
 #define TRACKER_SLACK {_FLOAT_SLACK!r}
 #else
-#define TRACKER_SLACK {tracker.SLACK!r}
+#define TRACKER_SLACK {clock.SLACK!r}
 #endif
 #ifdef TRACKER_FLOAT
 typedef float tracker_real;
 #define TRACKER_EXACT ((tracker_real){_FLOAT_EXACT!r})
+#define TRACKER_ROUNDING ((tracker_real){_FLOAT_EXACT!r})
 #else
 typedef double tracker_real;
 #define TRACKER_EXACT {line_of_sight.EXACT!r}
+#define TRACKER_ROUNDING {ROUNDING!r}
 #endif
 """
 
@@ -123,8 +129,10 @@ def _numbers(result: Plan) -> str:
         "TIMES": result.tracked.vehicle.rest.shape[1], "KNOTS": len(BEFORE_KNOTS),
         "HALVINGS": line_of_sight.HALVINGS, "MOST_LOOKS": line_of_sight.MOST_LOOKS,
         "KEPT": tracker.KEPT, "LOST": tracker.LOST, "WINDOW": tracker.WINDOW,
+        "SEGMENTS": way_back.SEGMENTS, "STRIDE": guidance.stride(result),
+        "AGREED": displacement.AGREED, "FLIPS": displacement.FLIPS, "CONFIRMED": clock.CONFIRMED,
     }  # fmt: skip
-    times = {"TIME_SCALE": result.robot.time_scale, "LONGEST_GAP": tracker.LONGEST_GAP}
+    times = {"TIME_SCALE": result.robot.time_scale, "LATE": clock.LATE, "EARLY": clock.EARLY}
     reals = {
         "TAIL_LENGTH_M": result.robot.tail_length,
         "STEP": STEP,
@@ -133,7 +141,6 @@ def _numbers(result: Plan) -> str:
         "ROD": result.tracked.rod,
         "OFFSET": result.tracked.offset,
         "SWING": result.guidance.swing,
-        "SWING_ERROR": result.predicted_max,
         "PIVOT_RADIUS": result.tracked.vehicle.pivot_radius,
         "NET_SPEED": float(result.straight.speed),
         "NET_DRIFT": float(result.straight.drift),
@@ -143,8 +150,17 @@ def _numbers(result: Plan) -> str:
         "MOST_BIAS": line_of_sight.MOST_BIAS,
         "GATE": tracker.GATE,
         "ALARM_AT": tracker.ALARM_AT,
-        "DISPLACED": tracker.DISPLACED,
-        "QUANTILE": tracker.QUANTILE,
+        "SPREADS": tracker.SPREADS,
+        "PIVOT_DISTANCE": result.tracked.vehicle.pivot_distance,
+        "WAY_AHEAD": guidance.way_ahead(result),
+        "LIMIT": guidance.limit(result),
+        "AWAY": guidance.AWAY,
+        "STRAIGHT": guidance.STRAIGHT,
+        "ROOM": way_back.ROOM,
+        "LEFT_OUT": way_back.LEFT_OUT,
+        "MODEL": displacement.MODEL,
+        "LARGEST": displacement.LARGEST,
+        "MEAN": displacement.MEAN,
         "WALK": kalman_filter.WALK,
     }
     lines = [f"#define TRACKER_{name} ({value})" for name, value in counts.items()]

@@ -16,7 +16,7 @@ from sim.arrays import Floats, Integers
 
 TURNS = np.array([[1, 0, 1], [-1, 0, -1], [1, 0, -1], [-1, 0, 1], [-1, 1, -1], [1, -1, 1]])
 _CIRCLE = 2 * np.pi
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
 
 
 class DubinsPaths(NamedTuple):
@@ -61,12 +61,12 @@ def words(start: Floats, goal: Floats, radius: float) -> Floats:
         square = 2 + d**2 - 2 * cab + side * 2 * d * (sa - sb)
         angle = np.arctan2(side * (cb - ca), d + side * (sa - sb))
         p = np.sqrt(np.maximum(square, 0.0))
-        put(word, square >= -_ROUNDING, side * (angle - a), p, side * (b - angle))
+        put(word, square >= -ROUNDING, side * (angle - a), p, side * (b - angle))
     for word, side in ((2, 1.0), (3, -1.0)):
         square = d**2 - 2 + 2 * cab + side * 2 * d * (sa + sb)
         p = np.sqrt(np.maximum(square, 0.0))
         angle = np.arctan2(-side * (ca + cb), d + side * (sa + sb)) - np.arctan2(-side * 2.0, p)
-        put(word, square >= -_ROUNDING, side * (angle - a), p, side * (angle - b))
+        put(word, square >= -ROUNDING, side * (angle - a), p, side * (angle - b))
     for word, side in ((4, 1.0), (5, -1.0)):
         cosine = (6 - d**2 + 2 * cab + side * 2 * d * (sa - sb)) / 8
         p = _CIRCLE - np.arccos(np.clip(cosine, -1.0, 1.0))
@@ -86,7 +86,7 @@ def shortest_paths(start: Floats, goal: Floats, radius: float) -> DubinsPaths:
 def _turn(angle: Floats) -> Floats:
     """Reduce an angle to [0, 2π); a whole turn that comes from rounding is none."""
     angle = angle % _CIRCLE
-    return np.asarray(np.where(angle > _CIRCLE - _ROUNDING, 0.0, angle))
+    return np.asarray(np.where(angle > _CIRCLE - ROUNDING, 0.0, angle))
 
 
 def _moved(pose: Floats, curvature: Floats, way: Floats) -> Floats:

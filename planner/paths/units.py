@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # the command needs UNITS before it loads NumPy
 
 UNITS = ("m", "cm", "mm")
 ANY_UNIT = ("l", *UNITS)
-LONGEST = 1500.0  # l
+LONGEST = 12_000.0  # l
 SMALLEST = 0.25  # of the radius of the robot's circle, largest extent of a path
 MOST_CIRCLES = 30.0  # of the robot, across a path whose unit is not stated
 MOST_SECONDS = 4 * 3600.0  # that such a path may take

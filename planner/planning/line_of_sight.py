@@ -155,22 +155,26 @@ class LineOfSight:
     def _ended(self) -> bool:
         return self.place >= self._last and self.share >= 1
 
-    def next_dwell(self, pose: tuple[float, float, float], sense: int, before: float | None) -> tuple[float, bool]:
-        """Compute the length of the dwell that begins at `pose`, and whether the path ends in it.
+    def next_dwell(
+        self, pose: tuple[float, float, float], sense: int, before: float | None, elapsed: float = 0.0
+    ) -> tuple[float, bool]:
+        """Compute the length of the dwell that began at `pose`, and whether the path ends in it.
 
-        The last dwell is trimmed. If it were too short for the motor, it is the shortest one or none at all,
-        whichever ends nearer to the path's end.
+        `elapsed` is the time since then: the motor cannot flip before it. The last dwell is trimmed. If it were
+        too short for the motor, it is the shortest one or none at all, whichever ends nearer to the path's end.
         """
-        time, ended = self.next_flip(pose, sense, before)
+        time, ended = self.next_flip(pose, sense, before, elapsed)
         if ended and time < self._dwell and before is not None:
             time = self._dwell if 2 * time > self._dwell else 0.0
         return time, ended
 
-    def next_flip(self, pose: tuple[float, float, float], sense: int, before: float | None) -> tuple[float, bool]:
-        """Compute the length of the dwell that begins at `pose`, and whether the path ends in it."""
+    def next_flip(
+        self, pose: tuple[float, float, float], sense: int, before: float | None, elapsed: float = 0.0
+    ) -> tuple[float, bool]:
+        """Compute the length of the dwell that began at `pose`, and whether the path ends in it."""
         rate = abs(self._twist[0 if sense > 0 else 1][2])
         longest, largest = TURNS / rate, LARGEST_STEP / rate
-        time = self._dwell
+        time = max(self._dwell, elapsed)
         value = self._excess(self.pose_after(pose, sense, before, time), sense)
         low, low_value, slope = 0.0, None, rate
         for _ in range(MOST_LOOKS):

@@ -32,7 +32,7 @@ from planner.vehicle.rollout import Switches
 from planner.vehicle.vehicle import Vehicle
 from sim.io.errors import InputError
 
-MOST_SWITCHES = 200_000
+MOST_SWITCHES = 2_000_000
 _PATIENCE = 30.0  # lengths of the robot's motion that may pass without progress along the path
 _EVERY = 2_000  # switches between two calls of `progress`
 

@@ -1,13 +1,17 @@
-"""The tracker's guidance: line of sight about a reference that changes with the drift that the tracker learns.
+"""The tracker's guidance: line of sight about a reference that changes, and a way back to it.
 
 The reference of a plan holds the drift that the plan knows (`planner.paths.tractrix`). A robot that drifts
 otherwise has another heading where its tracked point is on the path. The difference ε of the headings obeys, in
 first order along the pivot's way σ,
 
-    dε/dσ = −(ε + r)/a,   r = slip of the learned drift − slip of the plan's drift,
+    dε/dσ = −(ε + r)/a,   r = slip of the learned drift − slip of the plan's drift + κ (a′ − a),
 
-with a the distance from the pivot to the tracked point: on a straight line ε goes to −r, on a curve it lags
-behind. The reference is turned by ε about the tracked point. `planner/c/guidance.h` does the same in C.
+with a the distance from the pivot to the tracked point, a′ the learned one, and κ the reference's curvature: on a
+straight line ε goes to −r, on a curve it lags behind. The reference is turned by ε about the tracked point.
+
+A robot that is farther from its reference than `limit`, or turned away from the wanted heading by more than AWAY,
+gets a way back (`planner.tracking.way_back`). The pivot follows it by line of sight. Where it ends the robot is on
+the reference again. `planner/c/guidance.h` does the same in C.
 """
 
 from __future__ import annotations
@@ -15,10 +19,20 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from planner.planning.line_of_sight import LineOfSight
 from planner.planning.planned import Plan
+from planner.planning.stated_error import look_ahead
+from planner.tracking.way_back import ROOM, SEGMENTS, STRIDE, Way, shortest_way
+from sim.arrays import Floats
 
 SHORTEST_ROD = 1e-9  # l
+AWAY = 1.0  # rad
+STRAIGHT = 1e-6  # l; shorter arcs do not decide to which side the robot turns first
+_NEAR = 0.5  # of the pivot's turn radius: the distance within which the guidance steers back to its reference
+_ERRORS = 4.0  # or of the largest predicted error
+POSE = tuple[float, float, float]
 
 
 class LearnedDrift(NamedTuple):
@@ -33,25 +47,194 @@ class LearnedDrift(NamedTuple):
         c, s = math.cos(heading), math.sin(heading)
         return math.atan2(self.sideways - self.x * s + self.y * c, 1 + self.x * c + self.y * s)
 
+    def slips(self, heading: Floats) -> Floats:
+        """Compute the same for headings (m,)."""
+        c, s = np.cos(heading), np.sin(heading)
+        return np.asarray(np.arctan2(self.sideways - self.x * s + self.y * c, 1 + self.x * c + self.y * s))
+
 
 class TrackerGuidance(LineOfSight):
-    """Line of sight about the plan's reference, turned by the learned drift."""
+    """Line of sight about the plan's reference, turned by the learned drift, or about a way back to it."""
 
     def __init__(self, plan: Plan):
         tracked, straight = plan.tracked, plan.straight
         super().__init__(plan.declared.reference, tracked.vehicle, plan.guidance, tracked.offset)
         x, y = (tracked.vehicle.current / straight.speed).tolist()
         self._planned = self._drift = LearnedDrift(straight.drift / straight.speed, x, y)
+        self._turns = 0.0  # whole turns by which headings differ from those of the reference
+        self._pivot_distance = tracked.vehicle.pivot_distance
+        self._pivot_radius = tracked.vehicle.pivot_radius
+        self._swing = plan.guidance.swing
+        self._way_ahead = way_ahead(plan)
+        self._limit, self._stride = limit(plan), stride(plan)
+        self._way: Way | None = None
+        self._leg, self._along = SEGMENTS, 0.0  # of the way; the path follows its last segment
+
+    @property
+    def on_way(self) -> bool:
+        """Whether the robot is on a way back."""
+        return self._way is not None
 
     def update_drift(self, drift: LearnedDrift) -> None:
         """Update the drift with what was learned."""
         self._drift = drift
 
-    def integrate(self, pose: tuple[float, float, float], sense: int) -> None:
+    def integrate(self, pose: POSE, sense: int) -> None:
         """Add to the integral, and turn the reference as the drift asks after the way since the last flip."""
         before = self._reached
+        if self._way is not None:
+            self._excess(pose, sense)
+            if self._leg < SEGMENTS:
+                return
+            self._way = None
+            before = self._reached = self._arc[self.place]
+            self._last_error = 0.0
         super().integrate(pose, sense)
         way = max(self._reached - before, 0.0) / max(self._rod, SHORTEST_ROD)
-        heading = self._heading[self.place]
-        slip = self._drift.slip(heading + self._lean) - self._planned.slip(heading)
-        self._lean = (self._lean + slip) / (1 + way + way * way / 2) - slip
+        heading, lean = self._heading[self.place], self._lean - self._turns
+        slip = self._drift.slip(heading + lean) - self._planned.slip(heading)
+        (_, a, b), (_, c, d) = self._twist
+        longer = (abs(a) + abs(c)) / (abs(b) + abs(d)) - self._pivot_distance
+        slip += longer * self._bend()[0]
+        self._lean = (lean + slip) / (1 + way + way * way / 2) - slip + self._turns
+
+    def where(self) -> tuple[int, float, int, float]:
+        """Return the place on path and way, which `go_to` takes."""
+        return self.place, self.share, self._leg, self._along
+
+    def go_to(self, where: tuple[int, float, int, float]) -> None:
+        self.place, self.share, self._leg, self._along = where
+
+    def is_off(self, pose: POSE) -> bool:
+        """Tell whether a pose is too far from path or way for the line of sight."""
+        deviation = self._excess(pose, 1)
+        if self._leg < SEGMENTS:
+            return abs(self._error) > self._limit or abs(deviation + self._way_hysteresis()) > AWAY
+        i, share = self.place, self.share
+        _, step = self._bend()
+        beyond = step * max(share - 1, -share, 0.0)
+        off = self._error * self._error + beyond * beyond > self._limit * self._limit
+        return off or abs(deviation + self._hysteresis[i]) > AWAY
+
+    def distance(self, pose: POSE) -> tuple[float, float]:
+        """Compute the distance of the tracked point from the path, and the direction [rad] in which it is.
+
+        On the way back it is the distance from the place where the way ends.
+        """
+        value = self._excess(pose, 1)
+        i, rod = self.place, self._rod
+        if self._leg < SEGMENTS:
+            heading = self._heading[i]
+            x = pose[0] + self._offset * math.cos(pose[2]) - self._x[i] - rod * math.cos(heading)
+            y = pose[1] + self._offset * math.sin(pose[2]) - self._y[i] - rod * math.sin(heading)
+            return math.sqrt(x * x + y * y), math.atan2(y, x)
+        turn, step = self._bend()
+        turned = value + self._hysteresis[i] - math.atan(self._error / self._ahead) - self._bias
+        slip = self._planned.slip(self._heading[i])
+        tangent = math.atan2(math.sin(slip) + rod * turn, math.cos(slip))  # from the heading, where all is well
+        ahead = rod * (math.cos(turned) - 1)
+        aside = self._error + rod * math.sin(turned)
+        across = math.cos(tangent) * aside - math.sin(tangent) * ahead
+        beyond = step * max(self.share - 1, -self.share, 0.0)
+        normal = pose[2] - turned + tangent + math.pi / 2
+        return math.copysign(math.sqrt(across * across + beyond * beyond), across), normal
+
+    def plan_way(self, pose: POSE) -> None:
+        """Plan the way back from a pose to the path that remains after the place."""
+        place = self._way.target if self._way is not None else self.place
+        drift, planned, rod = self._drift, self._planned, self._rod
+        heading = np.array(self._heading[place:])
+        known = planned.slips(heading)
+        course, lean = heading + known, known - drift.slips(heading)
+        x = np.array(self._x[place:]) + rod * (np.cos(heading) - np.cos(heading + lean))
+        y = np.array(self._y[place:]) + rod * (np.sin(heading) - np.sin(heading + lean))
+        left_out = np.array(self._arc[place:]) - self._arc[place]
+        start = self._pivot(pose)
+        way = shortest_way(start, np.stack([x, y, course], 1), left_out, self._stride, self._radius())
+        at = min(place + way.target, self._last)
+        turns = round((way.course - course[way.target]) / (2 * math.pi))
+        self._way = Way(way.segments, at)
+        self._leg, self._along = 0, 0.0
+        self.place, self.share = at, 0.0
+        self._turns = 2 * math.pi * turns
+        self._lean = float(lean[way.target]) + self._turns
+
+    @property
+    def first_turn(self) -> int:
+        """Side to which the way turns first: +1, −1, or 0 for a straight way."""
+        if self._way is not None:
+            for segment in self._way.segments:
+                if segment.curvature != 0 and segment.length > STRAIGHT:
+                    return 1 if segment.curvature > 0 else -1
+        return 0
+
+    @property
+    def _ended(self) -> bool:
+        return self._leg >= SEGMENTS and self.place >= self._last and self.share >= 1
+
+    def _bend(self) -> tuple[float, float]:
+        """Return the curvature of the reference at the place, and the length of its step."""
+        i = self.place
+        dx, dy = self._x[i + 1] - self._x[i], self._y[i + 1] - self._y[i]
+        step = math.sqrt(dx * dx + dy * dy)
+        return (self._heading[i + 1] - self._heading[i]) / max(step, SHORTEST_ROD), step
+
+    def _radius(self) -> float:
+        """Return the radius of arcs on the way, for the learned robot in the learned current."""
+        tightest = max(abs(forward / rate) for forward, _, rate in self._twist)
+        return tightest * (1 + math.sqrt(self._drift.x**2 + self._drift.y**2)) / ROOM
+
+    def _pivot(self, pose: POSE) -> POSE:
+        """Return place and course of the pivot."""
+        x, y, heading = pose
+        a = self._pivot_distance
+        return x - a * math.cos(heading), y - a * math.sin(heading), heading + self._drift.slip(heading)
+
+    def _way_hysteresis(self) -> float:
+        assert self._way is not None
+        bend = min(abs(self._way.segments[self._leg].curvature) * self._pivot_radius, 1.0)
+        return self._swing * (1 + bend) / 2
+
+    def _excess(self, pose: POSE, sense: int) -> float:
+        """Compute σ(φ − φ_d) − h about the way, or after it about the path."""
+        way, moved = self._way, 0
+        if way is None:
+            return super()._excess(pose, sense)
+        if self._leg == SEGMENTS:
+            value = super()._excess(pose, sense)
+            if self.place > way.target or (self.place == way.target and self.share >= 0):
+                return value
+            self._leg, self._along, moved = SEGMENTS - 1, way.segments[-1].length, -1
+        self.place = way.target
+        x, y, course = self._pivot(pose)
+        while True:
+            segment = way.segments[self._leg]
+            along, error = segment.project(x, y, self._along)
+            if along > segment.length and moved >= 0:
+                self._leg, self._along, moved = self._leg + 1, 0.0, 1
+                if self._leg == SEGMENTS:
+                    return super()._excess(pose, sense)
+            elif along < 0 and self._leg > 0 and moved <= 0:
+                self._leg, self._along, moved = self._leg - 1, way.segments[self._leg - 1].length, -1
+            else:
+                break
+        self._along, self._error = along, error
+        wanted = segment.course + segment.curvature * along - math.atan(error / self._way_ahead)
+        return sense * (course - wanted) - self._way_hysteresis()
+
+
+def way_ahead(plan: Plan) -> float:
+    """Return the look-ahead on a way back."""
+    return float(look_ahead(plan.tracked.vehicle, 0.0, plan.straight))
+
+
+def limit(plan: Plan) -> float:
+    """Return the distance from the reference up to which the line of sight leads back."""
+    return max(_NEAR * plan.tracked.vehicle.pivot_radius, _ERRORS * plan.predicted_max)
+
+
+def stride(plan: Plan) -> int:
+    """Return the points of the reference from one target of a way back to the next."""
+    arc = plan.declared.reference.arc
+    spacing = float(arc[-1]) / (len(arc) - 1)
+    return max(round(STRIDE * plan.tracked.vehicle.pivot_radius / max(spacing, 1e-9)), 1)

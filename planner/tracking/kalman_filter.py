@@ -1,10 +1,11 @@
-"""Kalman filter of the tracker: ten numbers of the robot and their covariance, estimated from poses.
+"""Kalman filter of the tracker: twelve numbers of the robot and their covariance, estimated from poses.
 
     x, y, heading    of the head's centre at the last flip
     yaw rates        relative errors of the plan's, left and right
     surge, sway      relative errors of the speeds forward and to the side
     lag angle        error of the angle that a flip adds to the heading
     current x, y     beside the plan's
+    marker x, y      its place in the robot, forward and left of the head's centre: poses are those of the marker
 
 A dwell moves the pose by lag and arc of the robot as estimated so far. The estimates follow a random walk, a small
 step in each dwell, so that changes are tracked. All derivatives are exact, and only arithmetic, sin, cos and sqrt
@@ -28,13 +29,15 @@ from planner.vehicle.vehicle import interpolated
 POSE = tuple[float, float, float]
 ROWS = list[list[float]]
 NAMES = ("x", "y", "heading", "yaw rate, left", "yaw rate, right", "surge", "sway", "lag angle",
-         "current x", "current y")  # fmt: skip
+         "current x", "current y", "marker, forward", "marker, left")  # fmt: skip
 STATES = len(NAMES)
 PRIOR = (0.03, 0.03, 0.03, 0.03)  # standard deviations beside the plan's own: yaw rates, surge, sway
 CHANGES = (1.5e-3, 1.5e-3, 5e-4, 5e-4)  # their process noise, standard deviation per dwell
 WALK = 3e-4  # process noise of the pose per dwell [l, rad]
 MOST = (0.5, 0.5, 0.5, 0.5, 0.3)  # bounds of the estimated yaw rates, surge, sway, lag angle
 MOST_CURRENT = 0.5  # of the net speed
+MARKER = (0.05, 0.05)  # standard deviations of the marker's place before the first pose [l]
+MOST_MARKER = 0.5  # l
 
 
 class Dwell(NamedTuple):
@@ -47,23 +50,26 @@ class Dwell(NamedTuple):
 
 
 class Estimate:
-    """State (10,) and covariance (10, 10) at the last flip.
+    """State (12,) and covariance (12, 12) at the last flip.
 
     Args:
         plan: gives the robot and where it starts.
         law: guidance of the same plan; its vehicle is updated with the estimates.
         noise: standard deviations of a pose: of x and y [l], of the heading [rad].
+        start: pose at rest if it is not the plan's; known like a measured one.
     """
 
-    def __init__(self, plan: Plan, law: TrackerGuidance, noise: tuple[float, float]):
+    def __init__(self, plan: Plan, law: TrackerGuidance, noise: tuple[float, float], start: POSE | None = None):
         self._twist: ROWS = plan.tracked.vehicle.twist.tolist()
         self._current: list[float] = plan.tracked.vehicle.current.tolist()
         self._speed, self._drift = float(plan.straight.speed), float(plan.straight.drift)
         self._law = law
-        self._noise = (noise[0] ** 2, noise[0] ** 2, noise[1] ** 2)
+        self.noise = (noise[0] ** 2, noise[0] ** 2, noise[1] ** 2)  # variances
         self._most = most(plan)
         self.state: list[float] = [*plan.start, *[0.0] * (STATES - 3)]
         self.covariance = prior(plan)
+        if start is not None:
+            self.relocate(start)
 
     @property
     def pose(self) -> POSE:
@@ -86,7 +92,24 @@ class Estimate:
             self.state[i] += change.move[i]
 
     def seen_from(self, when: float, now: Dwell, past: Sequence[Dwell]) -> tuple[POSE, ROWS] | None:
-        """Predict the pose at `when`, and its derivatives (3, 10) in the state; None if it is too long ago.
+        """Predict what is seen at `when`, and its derivatives (3, 12) in the state; None if it is too long ago.
+
+        Args: as for `pose_at`.
+        """
+        prediction = self.pose_at(when, now, past)
+        if prediction is None:
+            return None
+        (x, y, heading), D = prediction
+        c, s, (forward, left) = math.cos(heading), math.sin(heading), self.state[10:]
+        marker_x, marker_y = c * forward - s * left, s * forward + c * left
+        for k in range(STATES):
+            D[0][k], D[1][k] = D[0][k] - marker_y * D[2][k], D[1][k] + marker_x * D[2][k]
+        D[0][10], D[0][11] = D[0][10] + c, D[0][11] - s
+        D[1][10], D[1][11] = D[1][10] + s, D[1][11] + c
+        return (x + marker_x, y + marker_y, heading), D
+
+    def pose_at(self, when: float, now: Dwell, past: Sequence[Dwell]) -> tuple[POSE, ROWS] | None:
+        """Predict the pose at `when`, and its derivatives (3, 12) in the state; None if it is too long ago.
 
         Args:
             when: the time.
@@ -105,14 +128,56 @@ class Estimate:
             x, y = x - change.move[0], y - change.move[1]
             D = _before(D, change)
         change = self._change(heading, dwell, when - dwell.start)
-        return (x + change.move[0], y + change.move[1], heading + change.move[2]), _after(D, change)
+        x, y, heading = x + change.move[0], y + change.move[1], heading + change.move[2]
+        return (x, y, heading), _after(D, change)
+
+    def residual(self, pose: POSE, when: float, now: Dwell, past: Sequence[Dwell], base: POSE) -> POSE | None:
+        """Subtract from a pose what would be seen if the robot had been at `base` at the last flip."""
+        own, self.state[:3] = self.state[:3], base
+        prediction = self.seen_from(when, now, past)
+        self.state[:3] = own
+        return None if prediction is None else difference(pose, prediction[0])
+
+    def turned_back(self, pose: POSE, when: float, now: Dwell, past: Sequence[Dwell]) -> POSE | None:
+        """Return the pose at the last flip from which `pose` would be seen."""
+        prediction = self.seen_from(when, now, past)
+        if prediction is None:
+            return None
+        (x, y, heading), turn = self.pose, pose[2] - prediction[0][2]
+        c, s, dx, dy = math.cos(turn), math.sin(turn), x - prediction[0][0], y - prediction[0][1]
+        return pose[0] + c * dx - s * dy, pose[1] + s * dx + c * dy, heading + turn
+
+    def spread(self, D: ROWS, direction: float, lever: float) -> float:
+        """Compute the standard deviation of a point in a direction.
+
+        Args:
+            D: derivatives (3, 12) of the pose.
+            direction: in the lab [rad].
+            lever: what a turn of the robot by one rad moves the point in this direction.
+        """
+        x, y = math.cos(direction), math.sin(direction)
+        g = [x * D[0][k] + y * D[1][k] + lever * D[2][k] for k in range(STATES)]
+        return math.sqrt(max(_dot([_dot(row, g) for row in self.covariance], g), 0.0))
+
+    def moved(self, pose: POSE, dwell: Dwell) -> POSE:
+        """Return the pose after a dwell that began at `pose`."""
+        x, y, turned = self._change(pose[2], dwell, dwell.length).move
+        return pose[0] + x, pose[1] + y, pose[2] + turned
+
+    def relocate(self, pose: POSE) -> None:
+        """Put the robot at another pose, known like a measured one; what was learned stays."""
+        self.state[:3] = pose
+        for i in range(3):
+            for j in range(STATES):
+                self.covariance[i][j] = self.covariance[j][i] = 0.0
+            self.covariance[i][i] = self.noise[i]
 
     def update(self, residual: POSE, H: ROWS, largest: float) -> float:
         """Update the state with a measured pose, unless its squared residual exceeds `largest`.
 
         Args:
             residual: measured pose less the expected one.
-            H: derivatives (3, 10) of the expected pose.
+            H: derivatives (3, 12) of the expected pose.
             largest: squared size above which the pose is rejected.
 
         Returns:
@@ -123,7 +188,7 @@ class Estimate:
         for m in range(3):
             h = H[m]
             gain = [_dot(row, h) for row in P]
-            spread = _dot(h, gain) + self._noise[m]
+            spread = _dot(h, gain) + self.noise[m]
             innovation = residual[m] - _dot(h, moved)
             size += innovation * innovation / spread
             for i in range(STATES):
@@ -180,7 +245,7 @@ class Estimate:
 
 
 class _Change(NamedTuple):
-    """What is added to a pose; its derivatives in the heading before (x, y), and in the state (3, 10)."""
+    """What is added to a pose; its derivatives in the heading before (x, y), and in the state (3, 12)."""
 
     move: POSE
     lever: tuple[float, float]
@@ -188,9 +253,10 @@ class _Change(NamedTuple):
 
 
 def prior(plan: Plan) -> ROWS:
-    """Compute the covariance (10, 10) before the first pose, from what is uncertain of the start and the plan."""
+    """Compute the covariance (12, 12) before the first pose, from what is uncertain of the start and the plan."""
     vehicle = plan.tracked.vehicle
-    P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in PRIOR), 1e-6, 1e-12, 1e-12])
+    P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in PRIOR), 1e-6, 1e-12, 1e-12,
+                 *(s**2 for s in MARKER)])  # fmt: skip
     speed = np.hypot(vehicle.twist[0, 0], vehicle.twist[0, 1])
     dwell = plan.minimum_dwell
     for mode in vehicle.modes:
@@ -201,7 +267,7 @@ def prior(plan: Plan) -> ROWS:
         )
         if mode.lag is not None:
             direction[7] = interpolated(mode.lag[0], dwell, dwell)[2]
-        direction[8:] = mode.current
+        direction[8:10] = mode.current
         P += np.outer(direction, direction)
     P[8, 8] += (0.05 * speed) ** 2 / 4
     P[9, 9] += (0.05 * speed) ** 2 / 4
@@ -209,8 +275,16 @@ def prior(plan: Plan) -> ROWS:
 
 
 def most(plan: Plan) -> tuple[float, ...]:
-    """Return the largest absolute values (7,) of the learned numbers."""
-    return *MOST, MOST_CURRENT * plan.straight.net_speed, MOST_CURRENT * plan.straight.net_speed
+    """Return the largest absolute values (9,) of the learned numbers."""
+    current = MOST_CURRENT * plan.straight.net_speed
+    return *MOST, current, current, MOST_MARKER, MOST_MARKER
+
+
+def difference(pose: POSE, expected: POSE) -> POSE:
+    """Subtract two poses; the difference of the headings is between −π and π."""
+    angle = pose[2] - expected[2]
+    angle -= 2 * math.pi * math.floor((angle + math.pi) / (2 * math.pi))
+    return pose[0] - expected[0], pose[1] - expected[1], angle
 
 
 def _identity() -> ROWS:

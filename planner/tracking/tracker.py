@@ -5,10 +5,12 @@
     command = tracker.update(now, (x, y, heading), seen_at)    # a pose, and when it was true
 
 Every call returns the direction of the motor and the time of the next flip. At most one flip can have happened
-since the last call: the one that was announced. The tracker estimates ten numbers of the robot
+since the last call: the one that was announced. The tracker estimates twelve numbers of the robot
 (`planner.tracking.kalman_filter`). A pose may be late: it is compared with the predicted pose at its own time.
-Implausible poses, values that are not finite, and timestamps that run backwards are ignored. Long gaps between
-poses only increase the error.
+Implausible poses, values that are not finite, and times that cannot be (`planner.tracking.clock`) are ignored.
+Long gaps between poses only increase the error. Implausible poses that agree with each other are those of a robot
+that has been moved (`planner.tracking.displacement`). From afar the tracker plans a way back
+(`planner.tracking.guidance`).
 
 The alarm means that the robot is incompatible with the model. It compares WINDOW accepted poses with the predicted
 ones: for a robot of the model the sum of their squared residuals is below a limit with probability 1 −
@@ -28,8 +30,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planner.paths.units import in_lab
 from planner.planning.planned import Plan
+from planner.tracking.clock import SLACK, Clock
+from planner.tracking.displacement import Displacement
 from planner.tracking.guidance import TrackerGuidance
-from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate
+from planner.tracking.kalman_filter import NAMES, POSE, Dwell, Estimate, difference
 from sim.io.deprecated import old_attributes
 from sim.io.errors import InputError
 from sim.io.notebook import as_html
@@ -43,11 +47,8 @@ WINDOW = 40
 ALARM_AT = 173.6174364561601  # quantile 1 − FALSE_ALARM of χ² with 3 × WINDOW degrees of freedom
 GATE = 21.107513466160444  # quantile 0.9999 of χ² with 3 degrees of freedom
 KEPT = 12  # dwells that are remembered for late poses
-SLACK = 1e-6  # time units; a time this close before the announced flip is the flip's own, rounded
-LONGEST_GAP = 1e5  # time units; a clock that jumps further is not believed
-LOST = 10  # consecutive rejected poses after which the pose counts as unknown
-DISPLACED = 0.3  # standard deviation of the pose then [l, rad]
-QUANTILE = 1.96
+LOST = 10  # consecutive rejected poses after which there is an alarm
+SPREADS = 1.25  # standard deviations added to the mean distance until the flip: measured by `benchmarks coverage`
 
 
 class Command(NamedTuple):
@@ -63,7 +64,7 @@ class Command(NamedTuple):
     flip_at: float  # time of the next flip, or of the end
     finished: bool  # the path has ended
     alarm: bool  # the robot is incompatible with the model: calibrate again
-    error: float  # 95 % bound on the present distance from the path, zigzag included [l]
+    error: float  # the robot stays this close to the path until the next flip, in 95 % of the time [l]
 
 
 class Tracker:
@@ -74,6 +75,8 @@ class Tracker:
         noise: standard deviations of a pose: of x and y [l], of the heading [rad].
         latency: time from when a pose is true to when it is fed, if `seen_at` is not given.
         begin: time at which the motor starts.
+        start: pose of the head's centre at rest, if it is not the plan's start; the tracker plans the way from
+            there to the path.
 
     Example:
         >>> from softflagella import Tracker, circle, load_robot, plan
@@ -84,15 +87,21 @@ class Tracker:
     """
 
     def __init__(
-        self, plan: Plan, *, noise: tuple[float, float] = (0.01, 0.01), latency: float = 0.0, begin: float = 0.0
+        self,
+        plan: Plan,
+        *,
+        noise: tuple[float, float] = (0.01, 0.01),
+        latency: float = 0.0,
+        begin: float = 0.0,
+        start: POSE | None = None,
     ):
         self.shortest = plan.minimum_dwell
         self._plan = plan
         self._law = TrackerGuidance(plan)
-        self._estimate = Estimate(plan, self._law, noise)
+        self._estimate = Estimate(plan, self._law, noise, start)
         self._latency = latency
-        self._swing_error = plan.predicted_max
-        self._now = begin
+        self._clock = Clock(begin)
+        self._displacement = Displacement()
         self._dwell = Dwell(begin, plan.first_direction, None, 0.0)
         self._past: deque[Dwell] = deque(maxlen=KEPT)
         self._finished = False
@@ -101,20 +110,26 @@ class Tracker:
         self.alarm = False
         self._flip_at, self._ends = begin, False
         self._plan_flip()
+        turn = self._law.first_turn
+        if turn == -self._dwell.sense:
+            self._dwell = self._dwell._replace(sense=turn)
+            self._plan_flip()
 
     def update(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command:
         """Advance to time `now`, and fuse a pose measurement if there is one.
 
         Args:
-            now: the time; one that goes back, jumps too far or is not finite is taken for the last one.
+            now: the time. One that is not finite, goes back, or is later than the next flip can be told is taken
+                for the last one; three of them that agree are a clock that was set, which is followed.
             pose: x, y [l] and heading [rad] of the head's centre.
             seen_at: when the pose was true; default: `latency` ago.
         """
-        if self._now < now < self._now + LONGEST_GAP:
-            self._now = now
+        shift = self._clock.tell(now, self._flip_at)
+        if shift:
+            self._shift(shift)
         if not self._finished and self._now >= self._flip_at - SLACK:
             self._flip()
-        if pose is not None and not self._finished:
+        if pose is not None and not self._finished and self._clock.believed:
             when = self._now - self._latency if seen_at is None else seen_at
             possible = len(pose) == 3 and all(map(math.isfinite, (*pose, when))) and when <= self._now
             if possible and self._see(pose, when):
@@ -124,10 +139,8 @@ class Tracker:
     @property
     def command(self) -> Command:
         """Return the present command again."""
-        P = self._estimate.covariance
-        error = self._swing_error + QUANTILE * math.sqrt(max(P[0][0] + P[1][1], 0.0) / 2)
         return Command(
-            0 if self._finished else self._dwell.sense, self._flip_at, self._finished, self.alarm, error
+            0 if self._finished else self._dwell.sense, self._flip_at, self._finished, self.alarm, self._error()
         )
 
     if not TYPE_CHECKING:
@@ -182,12 +195,23 @@ class Tracker:
         """Estimates by name, see `planner.tracking.kalman_filter.NAMES`."""
         return dict(zip(NAMES, self._estimate.state, strict=True))
 
+    @property
+    def _now(self) -> float:
+        return self._clock.now
+
+    def _shift(self, shift: float) -> None:
+        """Move all times with a clock that was set."""
+        self._flip_at += shift
+        self._dwell = self._dwell._replace(start=self._dwell.start + shift)
+        self._past = deque((dwell._replace(start=dwell.start + shift) for dwell in self._past), KEPT)
+
     def _flip(self) -> None:
         """Carry out the announced flip, or end the path."""
         if self._ends:
             self._finished = True
             return
         done = self._dwell._replace(length=self._flip_at - self._dwell.start)
+        self._displacement.advance(self._estimate, done)
         self._estimate.advance(done)
         self._estimate.apply()
         self._law.integrate(self._estimate.pose, done.sense)
@@ -199,14 +223,37 @@ class Tracker:
     def _plan_flip(self) -> None:
         """Compute the time of the next flip, and whether the path ends there."""
         self._estimate.apply()
-        place = self._law.place
+        law, pose, dwell = self._law, self._estimate.pose, self._dwell
+        elapsed = max(self._now - dwell.start, 0.0)
+        where = law.where()
+        present = law.pose_after(pose, dwell.sense, dwell.before, elapsed) if elapsed else pose
+        off = law.is_off(present)
+        law.go_to(where)
+        if off:
+            law.plan_way(present)
+            where = law.where()
         try:
-            length, self._ends = self._law.next_dwell(self._estimate.pose, self._dwell.sense, self._dwell.before)
-        except InputError:  # far off the path: swim on
+            length, self._ends = law.next_dwell(pose, dwell.sense, dwell.before, elapsed)
+        except InputError:  # the robot turns in circles: swim on
             length, self._ends = self.shortest, False
-        self._law.place = place
+        law.go_to(where)
         start = self._dwell.start
         self._flip_at = max(start + length, self._now, start + (0.0 if self._ends else self.shortest))
+
+    def _error(self) -> float:
+        """Bound the distance of the tracked point from the path until the next flip."""
+        law, dwell, offset = self._law, self._dwell, self._plan.tracked.offset
+        where, ends, spread = law.where(), [], 0.0
+        for when in (max(self._now, dwell.start), max(self._flip_at, dwell.start)):
+            prediction = self._estimate.pose_at(when, dwell, ())
+            assert prediction is not None
+            pose, D = prediction
+            distance, direction = law.distance(pose)
+            law.go_to(where)
+            ends.append(distance)
+            spread = self._estimate.spread(D, direction, offset * math.sin(direction - pose[2]))
+        middle, half = (ends[0] + ends[1]) / 2, (ends[0] - ends[1]) / 2
+        return abs(middle) + SPREADS * math.sqrt(half * half / 3 + spread * spread)
 
     def _see(self, pose: POSE, when: float) -> bool:
         """Update the estimate with a pose; return false if the pose was rejected."""
@@ -214,18 +261,19 @@ class Tracker:
         if prediction is None:
             return False
         expected, H = prediction
-        residual = (pose[0] - expected[0], pose[1] - expected[1], _wrapped(pose[2] - expected[2]))
-        size = self._estimate.update(residual, H, GATE)
+        size = self._estimate.update(difference(pose, expected), H, GATE)
         if size <= GATE:
             self._rejected = 0
+            self._displacement.forget()
             self._judge(size)
             return True
         self._rejected += 1
-        if self._rejected >= LOST:  # many in a row: it is the estimate that is wrong
-            self._rejected = 0
-            self.alarm = True
-            for i in range(3):
-                self._estimate.covariance[i][i] += DISPLACED**2
+        self.alarm |= self._rejected >= LOST
+        if self._displacement.see(self._estimate, pose, when, self._dwell, self._past):
+            self._estimate.relocate(self._displacement.pose)
+            self._displacement.forget()
+            self._rejected, self._score, self._scored = 0, 0.0, 0
+            return True
         return False
 
     def _judge(self, size: float) -> None:
@@ -235,7 +283,3 @@ class Tracker:
         if self._scored == WINDOW:
             self.alarm = self._score > ALARM_AT
             self._score, self._scored = 0.0, 0
-
-
-def _wrapped(angle: float) -> float:
-    return angle - 2 * math.pi * math.floor((angle + math.pi) / (2 * math.pi))

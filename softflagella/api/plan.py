@@ -10,12 +10,13 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from planner.files.goal_files import write_goal_plan
-from planner.files.job_files import write_tour
+from planner.files.job_files import write_cover, write_tour
 from planner.files.own_table import table_for
 from planner.files.plan_files import write_plan as write_plan_files
 from planner.files.plan_json import load_plan
 from planner.files.tracking_error import TrackingError, tracking_error
 from planner.goal.goal_plan import GoalPlan
+from planner.jobs.coverage_plan import CoveragePlan
 from planner.jobs.tour_plan import TourPlan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
@@ -34,6 +35,9 @@ from surrogate.interface import LookupTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+AnyPlan = Plan | GoalPlan | TourPlan | CoveragePlan
 
 
 def plan(
@@ -129,7 +133,8 @@ def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot) -> 
 
 
 def check(
-    plan: Plan | GoalPlan | TourPlan | Mapping[str, Any] | str | Path, track: pd.DataFrame | str | Path
+    plan: Plan | GoalPlan | TourPlan | CoveragePlan | Mapping[str, Any] | str | Path,
+    track: pd.DataFrame | str | Path,
 ) -> TrackingError:
     """Compare a replayed or measured track with its plan.
 
@@ -152,7 +157,7 @@ def check(
         >>> error.rms < error.largest < error.stated
         True
     """
-    if isinstance(plan, GoalPlan | TourPlan):
+    if isinstance(plan, GoalPlan | TourPlan | CoveragePlan):
         plan = plan.plan
     content = (
         load_plan(plan) if isinstance(plan, str | Path) else plan if isinstance(plan, Mapping) else plan.to_dict()
@@ -162,7 +167,10 @@ def check(
 
 
 def write_plan(
-    result: Plan | GoalPlan | TourPlan, folder: str | Path, *, pictures: Mapping[str, Figure] | None = None
+    result: Plan | GoalPlan | TourPlan | CoveragePlan,
+    folder: str | Path,
+    *,
+    pictures: Mapping[str, Figure] | None = None,
 ) -> list[Path]:
     """Write the files of a plan, all or none, and return their paths.
 
@@ -186,4 +194,6 @@ def write_plan(
         return write_plan_files(result, folder, pictures=pictures)
     if pictures:
         raise InputError("a goal or a job takes no further pictures; write its plan: result.plan")
-    return write_goal_plan(result, folder) if isinstance(result, GoalPlan) else write_tour(result, folder)
+    if isinstance(result, GoalPlan):
+        return write_goal_plan(result, folder)
+    return write_tour(result, folder) if isinstance(result, TourPlan) else write_cover(result, folder)

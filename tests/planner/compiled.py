@@ -32,7 +32,7 @@ _LIBRARY = """#include "tracker.h"
 #ifdef __cplusplus
 extern "C" {
 #endif
-void begin(double noise, double heading);
+void begin(double noise, double heading, const double *start);
 void feed(double now, const double *pose, double seen, double *out);
 int memory(void);
 #ifdef __cplusplus
@@ -45,9 +45,12 @@ static void told(tracker_advice advice, double *out)
     out[4] = advice.error;
     for (int i = 0; i < TRACKER_STATES; i++) out[5 + i] = keeper.state[i];
 }
-void begin(double noise, double heading)
+void begin(double noise, double heading, const double *start)
 {
-    tracker_begin(&keeper, (tracker_real)noise, (tracker_real)heading, 0.0);
+    tracker_real own[3] = {0, 0, 0};
+    for (int i = 0; i < 3 && start; i++) own[i] = (tracker_real)start[i];
+    if (start) tracker_begin_at(&keeper, (tracker_real)noise, (tracker_real)heading, 0.0, own);
+    else tracker_begin(&keeper, (tracker_real)noise, (tracker_real)heading, 0.0);
 }
 void feed(double now, const double *pose, double seen, double *out)
 {
@@ -81,14 +84,15 @@ class CompiledTracker:
         flags = ("-shared", "-fPIC", *(["-DTRACKER_FLOAT"] if single else []), *MEMORIES[memory])
         compile_c(folder / "library.c", out, *flags, language=language)
         self._library = ctypes.CDLL(str(out))
-        self._library.begin.argtypes = [ctypes.c_double] * 2
+        self._library.begin.argtypes = [ctypes.c_double, ctypes.c_double, ctypes.c_void_p]
         self._library.feed.argtypes = [ctypes.c_double, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
         self._scale = plan.robot.time_scale
         self.memory: int = self._library.memory()
         self.restart()
 
-    def restart(self) -> None:
-        self._library.begin(0.01, 0.01)
+    def restart(self, start: tuple[float, float, float] | None = None) -> None:
+        place = None if start is None else np.array(start, dtype=float)
+        self._library.begin(0.01, 0.01, None if place is None else place.ctypes.data)
         self.state = np.zeros(STATES)
 
     def update(

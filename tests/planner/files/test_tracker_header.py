@@ -14,10 +14,11 @@ from planner.files.tracker_header import rounded, table_bytes, tracker_header
 from planner.paths.path import circle
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
-from planner.tracking.tracker import POSE, SLACK, Command, Tracker
+from planner.tracking.clock import SLACK
+from planner.tracking.tracker import POSE, Command, Tracker
 from sim.model.presets import PRESETS
 from tests.planner.compiled import CompiledTracker, compile_c
-from tests.planner.swimming import Camera, rms, swim
+from tests.planner.swimming import Camera, rms, swim, swum
 
 # A difference in the last digit grows, because each flip decides the later ones. So answers are compared up to
 # SHORT; after it the two are only as good as each other.
@@ -40,16 +41,18 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> CompiledTracker:
 class Both:
     """Feeds the trackers in Python and in C, compares their answers, and holds them to the shortest dwell."""
 
-    def __init__(self, one: Tracker, other: CompiledTracker):
-        self.one, self.other, self.calls = one, other, 0
-        other.restart()
+    def __init__(self, one: Tracker, other: CompiledTracker, start: POSE | None = None):
+        self.one, self.other, self.calls, self.over = one, other, 0, False
+        other.restart(start)
         self.last, self.told, self.flipped_at = one.command, other.update(0.0), 0.0
 
     def update(self, now: float, pose: POSE | None = None, seen_at: float | None = None) -> Command:
         seen = now if seen_at is None else seen_at
         flips = now >= self.last.flip_at - SLACK
+        announced = self.last.flip_at - self.one._clock.set_by
         expected = self.one.update(now, pose, seen)
-        if self.one._now > SHORT:
+        self.over |= self.one._now > SHORT
+        if self.over:
             self.last = expected
             return expected
         answer = self.other.update(max(now, self.told.flip_at) if flips else now, pose, seen)
@@ -64,8 +67,8 @@ class Both:
             self.other.state.tolist(), rel=ROUNDING, abs=ROUNDING
         )
         if expected.direction == -self.last.direction != 0:  # the flip that was announced has happened
-            assert self.last.flip_at - self.flipped_at >= planned().minimum_dwell * (1 - 1e-12)
-            self.flipped_at = self.last.flip_at
+            assert announced - self.flipped_at >= planned().minimum_dwell * (1 - 1e-12)
+            self.flipped_at = announced
         self.calls, self.last, self.told = self.calls + 1, expected, answer
         return expected
 
@@ -87,6 +90,18 @@ def test_the_same_orders_as_in_python(compiled: CompiledTracker, camera: Camera)
     swim(both, planned(), truth, camera)
     assert both.calls > 50
     assert both.one.command.finished
+
+
+@pytest.mark.parametrize("told", [True, False], ids=["told", "seen"])
+def test_the_same_way_back_as_in_python(compiled: CompiledTracker, told: bool) -> None:
+    """From 0.6 l beside the start: the way is planned at once, or when the camera has seen where the robot is."""
+    x, y, heading = planned().start
+    start = x - 0.6 * math.sin(heading), y + 0.6 * math.cos(heading), heading + 1.0
+    both = Both(Tracker(planned(), start=start if told else None), compiled, start if told else None)
+    result = swum(both, planned(), planned().tracked.vehicle, Camera(every=0.7), start=start)
+    assert both.calls > 50
+    assert both.one._law._way is not None or both.one.command.finished
+    assert result.distance[-50:].max() < 0.1
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -118,8 +133,8 @@ def test_in_c_the_robot_stays_on_its_path_as_well(tmp_path: Path, precise: bool)
 
 def test_memory_is_what_the_documentation_says(tmp_path: Path, compiled: CompiledTracker) -> None:
     single = CompiledTracker(planned(), tmp_path, single=True)
-    assert single.memory <= 900
-    assert compiled.memory <= 1600
+    assert single.memory <= 1250
+    assert compiled.memory <= 2150
     assert table_bytes(planned()) == 2 * (2 * 33 * 101 * 3 + 2 * 101 * 3) + 12 * len(
         planned().declared.reference.q
     )

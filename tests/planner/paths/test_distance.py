@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from unittest.mock import patch
 
 import numpy as np
@@ -64,5 +65,17 @@ def test_of_equally_near_segments_the_first_counts() -> None:
 
 def test_more_points_than_a_block_holds() -> None:
     rng = np.random.default_rng(3)
-    polyline, points = rng.normal(size=(40, 2)), rng.normal(size=(40_000, 2))
+    polyline, points = rng.normal(size=(8, 2)), rng.normal(size=(20_000, 2))
     assert distance_to(polyline, points) == pytest.approx(all_with_all(polyline, points), rel=1e-9, abs=1e-9)
+
+
+def test_memory_does_not_grow_with_all_candidates() -> None:
+    """Points are handled in blocks: only what is returned grows, 24 bytes a point."""
+    angle = np.linspace(0, 2 * np.pi, 200_001)
+    points = np.stack([np.cos(angle), np.sin(angle)], 1)
+    polyline = 1.01 * points[::2_000]
+    tracemalloc.start()
+    nearest(polyline, points)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 24 * len(points) + 40e6

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from planner.__main__ import main
-from planner.paths.path import circle
-from planner.paths.units import check_unstated_unit, in_lab, place_in_lab
+from planner.paths.path import Path2D, circle
+from planner.paths.units import check_size, check_unstated_unit, in_lab, place_in_lab
 from planner.planning.plan import plan
 from sim.io.errors import InputError, run_command
 from sim.model.presets import PRESETS
@@ -58,3 +58,9 @@ def test_lengths_in_messages_are_in_a_laboratory_s_units_first() -> None:
     assert place_in_lab(1.0, -0.5, CONTROL) == "(11.00, -5.50) cm = (1.000, -0.500) l"
     assert place_in_lab(-1e-9, 0.0, CONTROL) == "(0.00, 0.00) cm = (0.000, 0.000) l"
     assert in_lab(1200.0, CONTROL) == "132 m (1200 l)"
+
+
+def test_long_paths_pass_if_they_are_not_absurd() -> None:
+    check_size(Path2D.of([[0, 0], [10_000, 0]]), CONTROL, 0.9)
+    with pytest.raises(InputError, match="at most 12000 l can be planned"):
+        check_size(Path2D.of([[0, 0], [13_000, 0]]), CONTROL, 0.9)

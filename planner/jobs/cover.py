@@ -1,0 +1,197 @@
+"""cover(region, width, robot): tracks and turns of this robot that sweep a region with a round footprint.
+
+The region is cut into parallel lanes, as far apart as the footprint is wide, less what the zigzag needs. Among the
+directions of its edges and DIRECTIONS others the one is taken whose lanes and turns are estimated to take least
+time. The lanes are then visited, each from either end, in the order in which the ways between them take the least
+time (`planner.jobs.shortest_order`). So the robot skips lanes where its turns are wider than a lane. Lengths in l,
+times in μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.goal.dubins import DubinsPaths
+from planner.goal.route import Route, chained
+from planner.jobs.coverage_plan import CoveragePlan
+from planner.jobs.planned_track import pivot_poses, plan_track
+from planner.jobs.region import Field, across, lanes, share_covered
+from planner.jobs.shortest_order import EXACT, MOST, Order, shortest_order
+from planner.jobs.travel_times import SLACK, Travel
+from planner.paths.obstacles import Circle, FreeSpace
+from planner.paths.tractrix import Drift
+from planner.paths.units import in_lab
+from planner.planning.plan import zigzag_drift
+from planner.planning.request import PlanRequest
+from planner.vehicle.dwell_choice import dwells_for
+from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.zigzag import zigzag
+from sim.arrays import Floats
+from sim.io.errors import InputError
+
+DIRECTIONS = 12
+_CROSSED = 3.0  # turn radii; a shorter hole is crossed, which is quicker than to turn
+_LONGER = (0.0, 0.3, 0.6, 1.0, 1.5, -0.3, -0.6, -1.0)  # l, by which ends of lanes are moved outward
+_LEFT_OUT = 10.0  # times that a lane which cannot be swum counts when directions are compared
+_MOST_EDGES = 12  # whose directions are tried
+
+
+class _Cut(NamedTuple):
+    """Lanes that can be swum, and the length of those that cannot."""
+
+    ends: Floats  # (k, 2, 2)
+    left_out: float
+
+
+class _Lanes(NamedTuple):
+    """Lanes in an order, each with the end at which it begins."""
+
+    ends: Floats  # (k, 2, 2), in the order and direction in which they are swum
+    order: Order
+
+
+def cover(
+    field: Field,
+    width: float,
+    tracked: TrackedVehicle,
+    request: PlanRequest,
+    space: FreeSpace | None = None,
+    *,
+    angle: float | None = None,
+    feedback: bool = False,
+    progress: Callable[[float], object] | None = None,
+) -> CoveragePlan:
+    """Plan a track that covers a region.
+
+    Args:
+        field: the region and its holes.
+        width: of the footprint about the tracked point.
+        tracked: the vehicle, and the point that carries the footprint.
+        request: dwells, tolerance.
+        space: what the robot's body must keep clear of.
+        angle: direction of the lanes; default: the quickest one.
+        feedback: the pose will be measured every 20 flips. It counts for the margin around obstacles, and for the
+            share that is covered within the stated error.
+        progress: called now and then with the share of the path that is done.
+
+    Raises:
+        InputError: the width is too small for this robot's zigzag, the region needs too many lanes, or an obstacle
+            cannot be passed.
+    """
+    space = space or FreeSpace()
+    vehicle, robot = tracked.vehicle, tracked.robot
+    dwell = request.dwell or dwells_for(vehicle, request.objective, request.least_dwell(robot))[0]
+    straight = zigzag(vehicle, dwell, tracked.offset)
+    swath = width - 2 * straight.largest
+    if not (math.isfinite(width) and swath > 0.3 * width):
+        zigzags = in_lab(2 * straight.largest, robot)
+        raise InputError(
+            f"width {in_lab(width, robot)}: the robot's zigzag alone is {zigzags} wide; give a larger width, or "
+            "shorter dwells"
+        )
+    drift = zigzag_drift(tracked, straight, dwell)
+    travel = Travel.of(tracked, straight, space, drift, 0.0)
+    apart = _CROSSED * travel.radius
+    angles = _angles(field) if angle is None else [angle]
+    angles = [each for each in angles if across(field, each) < MOST * swath]
+    if not angles:
+        raise InputError(f"the region needs more than {MOST} lanes: widen them, or cover it in parts")
+    cut = min(
+        (_clear(lanes(field, swath, each, apart=apart), travel, tracked, drift) for each in angles),
+        key=partial(_estimate, travel),
+    ).ends
+    if not len(cut):
+        raise InputError("no lane of the region is clear of obstacles and walls; give a region further from them")
+    if len(cut) > MOST:
+        raise InputError(
+            f"the region needs {len(cut)} lanes; at most {MOST} can be ordered: widen them, or cover it in parts"
+        )
+    ordered = _ordered(cut, travel, tracked, drift)
+    track = partial(_track, ordered.ends, travel, tracked)
+    plan = plan_track(tracked, request, space, track, drift, feedback=feedback, progress=progress)
+    stated = plan.feedback_error if feedback else plan.stated_error
+    points, cell = field.raster(width / 20)
+    return CoveragePlan(
+        plan=plan,
+        field=field,
+        width=width,
+        lanes=ordered.ends,
+        share=share_covered(field, plan.track, width),
+        sure=share_covered(field, plan.reference, width - 2 * stated) if width > 2 * stated else 0.0,
+        bound=len(points) * cell / (width * straight.net_speed),
+        exact=len(cut) <= EXACT and space.empty,
+        gap=ordered.order.gap,
+    )
+
+
+def _angles(field: Field) -> list[float]:
+    """List directions of lanes to try."""
+    angles = [math.pi * k / DIRECTIONS for k in range(DIRECTIONS)]
+    if isinstance(field.outline, Circle):
+        return angles[:1]
+    edges = np.diff(np.concatenate([field.outline.corners, field.outline.corners[:1]]), axis=0)
+    longest = np.argsort(-np.hypot(*edges.T))[:_MOST_EDGES]
+    return [*np.arctan2(edges[longest, 1], edges[longest, 0]).tolist(), *angles]
+
+
+def _estimate(travel: Travel, cut: _Cut) -> float:
+    """Estimate the time of lanes and of the turns between them; lanes that cannot be swum count many times."""
+    length = float(np.hypot(*(cut.ends[:, 1] - cut.ends[:, 0]).T).sum()) + _LEFT_OUT * cut.left_out
+    return length / travel.straight + len(cut.ends) * 1.5 * math.pi * travel.radius / travel.turning
+
+
+def _clear(cut: Floats, travel: Travel, tracked: TrackedVehicle, drift: Drift) -> _Cut:
+    """Move the ends of lanes to where the robot is clear, and leave out those for which there is no such place."""
+    if travel.limits.space.empty:
+        return _Cut(cut, 0.0)
+    length = np.hypot(*(cut[:, 1] - cut[:, 0]).T)
+    along = (cut[:, 1] - cut[:, 0]) / length[:, None]
+    result, found = cut.copy(), np.zeros(len(cut), dtype=bool)
+    for more in _LONGER:
+        moved = np.stack([cut[:, 0] - more * along, cut[:, 1] + more * along], 1)
+        begin, end = _ends(moved, tracked, drift)
+        room = np.minimum(travel.limits.clearance(begin), travel.limits.clearance(end))
+        better = (room > travel.margin + SLACK).any(1) & ~found & (length + 2 * more > 0)
+        result[better], found = moved[better], found | better
+    return _Cut(result[found], float(length[~found].sum()))
+
+
+def _ends(cut: Floats, tracked: TrackedVehicle, drift: Drift) -> tuple[Floats, Floats]:
+    """Return the pivot's poses (k, 2, 3) at the begin and at the end of lanes, swum forwards and backwards."""
+    along = cut[:, 1] - cut[:, 0]
+    course = np.arctan2(along[:, 1], along[:, 0])
+    courses = np.stack([course, course + math.pi], 1)
+    begin = pivot_poses(cut, courses, tracked, drift)
+    end = pivot_poses(cut[:, ::-1], courses, tracked, drift)
+    return begin, end
+
+
+def _ordered(cut: Floats, travel: Travel, tracked: TrackedVehicle, drift: Drift) -> _Lanes:
+    """Order the lanes, and choose the end at which each begins."""
+    begin, end = _ends(cut, tracked, drift)
+    count = len(cut)
+    starts, goals = end.reshape(-1, 3), begin.reshape(-1, 3)
+    rows, columns = (part.ravel() for part in np.indices((2 * count, 2 * count)))
+    costs = travel.times(starts[rows], goals[columns]).reshape(count, 2, count, 2)
+    order = shortest_order(costs, np.zeros((count, 2)), np.zeros((count, 2)))
+    ends = [cut[k] if option == 0 else cut[k, ::-1] for k, option in zip(order.visits, order.options, strict=True)]
+    return _Lanes(np.array(ends), order)
+
+
+def _track(ends: Floats, travel: Travel, tracked: TrackedVehicle, drift: Drift) -> Route:
+    """Join lanes by the quickest tracks between them."""
+    begin, end = (poses[:, 0] for poses in _ends(ends, tracked, drift))
+    length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+    parts = []
+    for k in range(len(ends)):
+        parts.append(
+            DubinsPaths(begin[k : k + 1], np.zeros((1, 3), dtype=np.int64), np.array([[length[k], 0, 0]]))
+        )
+        if k + 1 < len(ends):
+            parts.append(travel.tracks(end[k : k + 1], begin[k + 1 : k + 2]))
+    return chained(parts, travel.radius)
