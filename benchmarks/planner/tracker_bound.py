@@ -32,7 +32,7 @@ def covered(planned: Plan, seed: int, current: float) -> tuple[float, float, flo
     twist, lag, angle = car.twist.copy(), car.lag.copy(), rng.uniform(0, 2 * math.pi)
     for mode, z in zip(car.modes, rng.standard_normal(len(car.modes)), strict=True):
         twist += z * mode.twist
-        lag += z * mode.lag[:, None, None, :]
+        lag += 0.0 if mode.lag is None else z * mode.lag
     flow = current * np.array([math.cos(angle), math.sin(angle)])
     truth = replace(car, twist=twist, lag=lag, current=flow)
     camera = Camera(rng=rng, every=float(rng.choice([0.5, 1.0, 3.0])))

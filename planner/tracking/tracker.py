@@ -48,9 +48,7 @@ ALARM_AT = 173.6174364561601  # quantile 1 − FALSE_ALARM of χ² with 3 × WIN
 GATE = 21.107513466160444  # quantile 0.9999 of χ² with 3 degrees of freedom
 KEPT = 12  # dwells that are remembered for late poses
 LOST = 10  # consecutive rejected poses after which there is an alarm
-SPREADS = (
-    1.25  # standard deviations added to the mean distance until the flip: measured by `benchmarks tracker_bound`
-)
+SPREADS = 1.25  # standard deviations added to the mean distance until the flip, by `benchmarks tracker_bound`
 
 
 class Command(NamedTuple):

@@ -113,7 +113,8 @@ def swum(tracker: Tracks, plan: Plan, truth: Vehicle, camera: Camera, *, changes
          start: Any = None, most: int = 5000) -> Swum:  # fmt: skip
     """Swim from `start`, by default the plan's, and return all that can be told of it."""
     swimmer = _Swimmer(tracker, truth, plan.start if start is None else start)
-    seen, waiting = 0.0, []
+    seen = 0.0
+    waiting: list[tuple[float, Any, float]] = []
     half = len(plan.dwells) // 2
     while not swimmer.command.finished and len(swimmer.dwells) < most:
         if changes_to is not None and len(swimmer.dwells) > half:

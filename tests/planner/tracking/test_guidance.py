@@ -68,7 +68,7 @@ def drawn(rng: np.random.Generator, current: float) -> Vehicle:
     twist, lag = car.twist.copy(), car.lag.copy()
     for mode, z in zip(car.modes, rng.standard_normal(len(car.modes)), strict=True):
         twist += z * mode.twist
-        lag += z * mode.lag[:, None, None, :]
+        lag += 0.0 if mode.lag is None else z * mode.lag
     return replace(car, twist=twist, lag=lag, current=current * np.array([math.cos(angle), math.sin(angle)]))
 
 
