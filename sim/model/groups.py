@@ -92,17 +92,20 @@ def checked_values(columns: Mapping[str, Any]) -> dict[str, Floats]:
     if not len(values["N"]):
         raise InputError("no rows: give at least one robot")
     values.setdefault("a_over_R", np.ones_like(values["N"]))
-    for name, array in values.items():
-        for row in np.flatnonzero(~np.isfinite(array))[:1]:
-            raise InputError(f"{name} = {array[row]} in row {row + 1}; it must be a finite number")
-    for name in _POSITIVE:
-        for row in np.flatnonzero(values[name] <= 0)[:1]:
-            raise InputError(f"{name} = {values[name][row]:g} in row {row + 1}; it must be above 0")
+    if not np.isfinite(np.concatenate([array.ravel() for array in values.values()])).all():
+        for name, array in values.items():
+            for row in np.flatnonzero(~np.isfinite(array))[:1]:
+                raise InputError(f"{name} = {array[row]} in row {row + 1}; it must be a finite number")
+    if (np.concatenate([values[name].ravel() for name in _POSITIVE]) <= 0).any():
+        for name in _POSITIVE:
+            for row in np.flatnonzero(values[name] <= 0)[:1]:
+                raise InputError(f"{name} = {values[name][row]:g} in row {row + 1}; it must be above 0")
     for row in np.flatnonzero(values["l_over_r0"] <= LEAST_SLENDERNESS)[:1]:
         check_slenderness(float(values["l_over_r0"][row]))
-    for row in np.flatnonzero(values["omega_bar"] == 0)[:1]:
+    if not values["omega_bar"].all():
+        row = np.flatnonzero(values["omega_bar"] == 0)[0]
         raise InputError(f"omega_bar = 0 in row {row + 1}; the motor must turn: give a non-zero speed")
-    for count in np.unique(values["N"]):
+    for count in sorted(set(values["N"].ravel().tolist())):
         check_tails(count)
     return values
 

@@ -20,13 +20,18 @@ from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.groups import DWELL
-from sim.model.response import DWELLS, at_equal_dwells
+from sim.model.response import DWELLS
 from sim.motion.net_speed import twists
 from surrogate.input_ranges import ROBOT
 from surrogate.networks.ensemble import Ensemble
 from surrogate.table.errors import COMPARED, error_scale, relative_errors
 from surrogate.table.lookup import RESPONSE_OUTPUTS, NeuralTable, steady_outputs
-from surrogate.table.response_table import SHAPES, between_dwells, curve_speeds, response_inputs
+from surrogate.table.response_table import (
+    between_dwells,
+    curve_speeds,
+    memory_at_equal_dwells,
+    response_inputs,
+)
 from surrogate.table.wrench_table import WrenchTable
 from surrogate.training.simulated import draw_robots
 
@@ -188,17 +193,12 @@ def _curve_arrays(table: NeuralTable) -> Arrays:
     arrays: Arrays = {}
     for name, network in zip(NETWORKS[4:], table.curves.networks, strict=True):
         arrays |= _arrays(name, network.member(0), half=True, outputs=count)
-    vectors = np.concatenate([lag.vectors[:count], _at_equal_dwells(memory.vectors[:count])])
-    mean = lag.mean + _at_equal_dwells(memory.mean[None])[0]
+    vectors = np.concatenate([lag.vectors[:count], memory_at_equal_dwells(memory.vectors[:count])])
+    mean = lag.mean + memory_at_equal_dwells(memory.mean[None])[0]
     return arrays | {
         "curves.mean": mean.astype(np.float32),
         "curves.basis": vectors.astype(np.float16),
     }
-
-
-def _at_equal_dwells(flat: Floats) -> Floats:
-    """Return memories (C, K D 3) where the dwell before is as long as the dwell, (C, D 3)."""
-    return at_equal_dwells(flat.reshape(-1, *SHAPES["memory"])).reshape(len(flat), -1)
 
 
 def network_depth(arrays: Arrays, name: str) -> int:

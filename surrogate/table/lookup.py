@@ -26,17 +26,20 @@ from sim.io.errors import InputError
 from sim.io.notebook import as_html, given_axes
 from sim.mechanics import planar
 from sim.model.groups import DWELL
-from sim.model.response import DWELLS, LAGS, Responses, at_equal_dwells
+from sim.model.response import DWELLS, LAGS, Responses
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.error_modes import STEADY, error_modes, joined
+from surrogate.interface import ErrorModes
 from surrogate.networks.ensemble import Ensemble
+from surrogate.table.curve_errors import CURVE_ERRORS, NORMAL_90, CurveErrors
 from surrogate.table.errors import RELATIVE, error_scale
 from surrogate.table.intervals import Intervals
 from surrogate.table.jacobian import slopes
-from surrogate.table.response_table import ResponseTable, between_dwells
+from surrogate.table.response_table import ResponseTable, between_dwells, curve_speeds
 from surrogate.table.support import Support
 from surrogate.table.tensor_file import digest, write
-from surrogate.table.wrench_table import WrenchTable, motion_sensitivity, network_index
+from surrogate.table.wrench_table import WrenchTable, motion_sensitivity, network_index, rows_by_network
 from surrogate.wrench.balance import inputs_rows
 from surrogate.wrench.heads import Heads, heads_and_tails, needs_no_learning
 from surrogate.wrench.tails import Tails, pack_tails, wrench_slopes
@@ -81,6 +84,7 @@ class NeuralTable:
     ranges: dict[str, tuple[float, float]]  # of the robots that were learned, by input
     errors: dict[str, dict[str, float]]  # output -> held-out error, see `surrogate.table.errors`
     provenance: dict[str, Any]
+    curve_errors: CurveErrors | None = None  # of the response; None: only the sizes in `errors` are known
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
@@ -118,7 +122,8 @@ class NeuralTable:
         result: dict[str, Any] = steady_outputs(motions, self.tails)
         if DWELL in columns:
             dwells = _checked_dwells(columns[DWELL])
-            result |= _at_dwells(self._responses(motions, result), result, dwells, motions.heads.sense)
+            lags = self.curves.lag_at_equal_dwells(motions.heads, motions.tails, motions.motion)
+            result |= _at_dwells(lags, result, dwells, motions.heads.sense)
         if intervals:
             result |= self._intervals(motions, result)
         if flag:
@@ -139,6 +144,21 @@ class NeuralTable:
         _check_flips(values)
         motions = self.motions(values, flag=flag)
         return self._responses(motions, steady_outputs(motions, self.tails))
+
+    def error_modes(self, columns: Mapping[str, Floats]) -> ErrorModes:
+        """Return the errors of motion and response at one robot; see `LookupTable.error_modes`."""
+        values = check_columns({name: np.asarray(values)[:1] for name, values in columns.items()})
+        motions = self.motions(values)
+        steady = steady_outputs(motions, self.tails)
+        motion = {name: float(values[0]) for name, values in steady.items()}
+        if self.intervals is None or self.curve_errors is None:
+            return error_modes(self.errors, motion)
+        ends = self._intervals(motions, steady)
+        sizes = [float(ends[f"{name}_high"][0] - ends[f"{name}_low"][0]) / (2 * NORMAL_90) for name in STEADY]
+        speeds = curve_speeds(motions.heads, motions.motion)
+        curves = self.curve_errors.modes(self.width_features(motions), speeds)
+        own = [self.curve_errors.simulator * float(error_scale(name, motion)) for name in STEADY]
+        return joined(np.diag(np.hypot(sizes, own)), curves)
 
     def jacobian(
         self, columns: Mapping[str, Floats], parameters: Sequence[str], *, flag: bool = False
@@ -217,10 +237,9 @@ class NeuralTable:
         novelty, spread = np.zeros(len(motion)), np.zeros(len(motion))
         weight = motion_sensitivity(heads, tails, motion) @ wrench_slopes(tails, motion)
         kind = network_index(tails.number)
-        for k, network in enumerate(self.tails.wrench):
-            rows = np.flatnonzero(kind == k)
-            support = self.support[k]
-            if len(rows) and network is not None and support is not None:
+        for k, rows in rows_by_network(kind):
+            network, support = self.tails.wrench[k], self.support[k]
+            if network is not None and support is not None:
                 novelty[rows] = support.novelty(inputs[rows])
                 members = network.members_at(np.concatenate([inputs[rows], tails.head[rows]], -1))
                 apart = (weight[rows] @ (members - members.mean(0))[..., None])[..., 0]
@@ -245,22 +264,19 @@ class NeuralTable:
 
     def _within_ranges(self, values: Mapping[str, Floats]) -> Flags:
         """Return whether tails and motor speed are within the learned ranges; heads may be any."""
-        within = np.ones(len(values["N"]), dtype=bool)
-        for name in _NOT_OF_HEAD:
-            low, high = self.ranges[name]
-            size = np.abs(values[name])
-            within &= (low * (1 - 1e-9) <= size) & (size <= high * (1 + 1e-9))
-        return within
+        low, high = np.array([self.ranges[name] for name in _NOT_OF_HEAD]).T
+        sizes = np.abs(np.stack([values[name] for name in _NOT_OF_HEAD], -1))
+        return np.asarray(((low * (1 - 1e-9) <= sizes) & (sizes <= high * (1 + 1e-9))).all(1))
 
     def _reasons(self, kind: Integers, motion: Floats, inputs: Floats, known: Flags) -> list[str]:
-        novelty, learned = np.full(len(motion), np.nan), np.zeros(len(motion), dtype=bool)
-        for k, support in enumerate(self.support):
-            rows = np.flatnonzero(kind == k)
-            if len(rows) and support is not None:
-                novelty[rows], learned[rows] = support.novelty(inputs[rows]), True
-        with np.errstate(divide="ignore", invalid="ignore"):
-            quick = np.abs(motion[:, 2] / motion[:, 4])
-        which = np.select([~learned, ~known, ~(novelty <= 1), quick > BRANCHES], [1, 2, 3, 4])
+        which = np.ones(len(motion), dtype=np.int64)
+        quick = np.abs(motion[:, 2]) > BRANCHES * np.abs(motion[:, 4])
+        for k, rows in rows_by_network(kind):
+            support = self.support[k]
+            if support is not None:
+                outside = np.where(support.novelty(inputs[rows]) <= 1, 0, 3)
+                outside[(outside == 0) & quick[rows]] = 4
+                which[rows] = np.where(known[rows], outside, 2)
         return [_REASONS[number] for number in which.tolist()]
 
     def _refusal(self, values: Mapping[str, Floats], row: int, reason: str) -> str:
@@ -322,12 +338,9 @@ def _checked_dwells(dwells: Floats) -> Floats:
     return dwells
 
 
-def _at_dwells(
-    response: Responses, steady: Mapping[str, Floats], dwells: Floats, sense: Floats
-) -> dict[str, Floats]:
+def _at_dwells(lags: Floats, steady: Mapping[str, Floats], dwells: Floats, sense: Floats) -> dict[str, Floats]:
     """Return RESPONSE_OUTPUTS at one dwell for each robot, when all dwells are equal."""
-    curves = response.lag + at_equal_dwells(response.memory)
-    lag = between_dwells(curves, dwells)
+    lag = between_dwells(lags, dwells)
     twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
     speed = planar.net_speed(twist, lag, dwells)
     return dict(zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True))
@@ -335,18 +348,29 @@ def _at_dwells(
 
 def table_content(lookup: NeuralTable) -> dict[str, Any]:
     """Return a table as nested dictionaries and lists of arrays and plain values."""
-    intervals = lookup.intervals
-    return {
+    content = {
         "wrench": [None if network is None else _stored(network) for network in lookup.tails.wrench],
         "gap": _stored(lookup.tails.gap),
         "curves": [_stored(network) for network in lookup.curves.networks],
         "bases": {name: {"mean": b.mean, "vectors": b.vectors} for name, b in lookup.curves.bases.items()},
         "support": [None if support is None else vars(support) for support in lookup.support],
-        "intervals": None if intervals is None else {k: _plain(v) for k, v in vars(intervals).items()},
+        "intervals": None if lookup.intervals is None else _widths(lookup.intervals),
         "ranges": {name: list(ends) for name, ends in lookup.ranges.items()},
         "errors": lookup.errors,
         "provenance": lookup.provenance,
     }
+    errors = lookup.curve_errors
+    if errors is not None:
+        content[CURVE_ERRORS] = {
+            "widths": _widths(errors.widths),
+            "curves": errors.curves,
+            "simulator": errors.simulator,
+        }
+    return content
+
+
+def _widths(intervals: Intervals) -> dict[str, Any]:
+    return {name: _plain(value) for name, value in vars(intervals).items()}
 
 
 def _stored(network: Ensemble) -> dict[str, Any]:

@@ -18,12 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats
-from sim.model.response import BEFORE, DWELLS
+from sim.model.response import BEFORE, DWELLS, at_equal_dwells
 from surrogate.networks.compiled import evaluate_rows
 from surrogate.networks.ensemble import Ensemble
 from surrogate.wrench.heads import Heads
@@ -56,16 +57,41 @@ class ResponseTable:
 
     def curves(self, heads: Heads, tails: Tails, motion: Floats) -> dict[str, Floats]:
         """Return lag, memory, rest and spread, each (M, …, 3) as in SHAPES, in l, l, rad, for a positive motor."""
-        inputs, speeds = response_inputs(tails, motion), curve_speeds(heads, motion)
-        curves = {}
-        for names, network in zip(PARTS, self.networks, strict=True):
-            ends = np.cumsum([len(self.bases[name].vectors) for name in names])[:-1]
-            answer = evaluate_rows(network.packed, inputs)
-            for name, components in zip(names, np.split(answer, ends, axis=1), strict=True):
-                curve = self.bases[name].mean + components @ self.bases[name].vectors
-                curves[name] = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name])
+        speeds, curves = curve_speeds(heads, motion), {}
+        for name, components in self._components(tails, motion).items():
+            curve = self.bases[name].mean + components @ self.bases[name].vectors
+            curves[name] = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name])
         curves["spread"] = np.maximum(curves["spread"], 0.0)
         return curves
+
+    def lag_at_equal_dwells(self, heads: Heads, tails: Tails, motion: Floats) -> Floats:
+        """Return lags with the memory of a dwell before of the same length, (M, D, 3), in l, l, rad."""
+        components = self._components(tails, motion)
+        both = np.concatenate([components["lag"], components["memory"]], 1)
+        curve = (self._equal.mean + both @ self._equal.vectors).reshape(-1, *SHAPES["lag"])
+        return np.asarray(curve * curve_speeds(heads, motion)[:, None])
+
+    @cached_property
+    def _equal(self) -> Basis:
+        """The basis of `lag_at_equal_dwells`: the components of the lag, and then those of the memory."""
+        lag, memory = self.bases["lag"], self.bases["memory"]
+        mean = lag.mean + memory_at_equal_dwells(memory.mean[None])[0]
+        return Basis(mean, np.concatenate([lag.vectors, memory_at_equal_dwells(memory.vectors)]))
+
+    def _components(self, tails: Tails, motion: Floats) -> dict[str, Floats]:
+        """Return the components of each kind of curve, (M, C)."""
+        inputs, components = response_inputs(tails, motion), {}
+        for names, network in zip(PARTS, self.networks, strict=True):
+            answer, first = evaluate_rows(network.packed, inputs), 0
+            for name in names:
+                end = first + len(self.bases[name].vectors)
+                components[name], first = answer[:, first:end], end
+        return components
+
+
+def memory_at_equal_dwells(flat: Floats) -> Floats:
+    """Return memories (C, K D 3) where the dwell before is as long as the dwell, (C, D 3)."""
+    return at_equal_dwells(flat.reshape(-1, *SHAPES["memory"])).reshape(len(flat), -1)
 
 
 def response_inputs(tails: Tails, motion: Floats) -> Floats:

@@ -5,6 +5,7 @@ The networks are fitted by `surrogate.training.fit_wrench`.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,13 @@ def network_index(count: Floats) -> Integers:
     return np.minimum(count, CLASSES[-1]).astype(np.int64) - 1
 
 
+def rows_by_network(kind: Integers) -> Iterator[tuple[int, Integers | slice]]:
+    """Yield each index that is there, with its rows: all of them as a slice where there is one index only."""
+    present = sorted(set(kind.tolist()))
+    for k in present:
+        yield k, slice(None) if len(present) == 1 else np.flatnonzero(kind == k)
+
+
 @dataclass(frozen=True)
 class WrenchTable:
     """Mean wrench and gap of tails, one network for each of CLASSES."""
@@ -40,10 +48,9 @@ class WrenchTable:
         motion = np.full((len(tails.number), 5), np.nan)
         converged = np.zeros(len(motion), dtype=bool)
         speeds, drags = np.column_stack([heads.speed, heads.gain]), pack_tails(tails)
-        kind = network_index(tails.number)
-        for k, network in enumerate(self.wrench):
-            rows = np.flatnonzero(kind == k)
-            if len(rows) and network is not None:
+        for k, rows in rows_by_network(network_index(tails.number)):
+            network = self.wrench[k]
+            if network is not None:
                 motion[rows], converged[rows] = solve_rows(
                     network.packed, speeds[rows], heads.resistance[rows], drags[rows]
                 )

@@ -70,7 +70,11 @@ class Tails(NamedTuple):
 
 def pack_tails(tails: Tails) -> Floats:
     """Return the fields as columns, (M, 13)."""
-    return np.column_stack(tails)
+    packed = np.empty((len(tails.number), len(Tails._fields) - 1 + len(HEAD_INPUTS)))
+    for i, part in enumerate(tails[:-1]):
+        packed[:, i] = part
+    packed[:, -len(HEAD_INPUTS) :] = tails.head
+    return packed
 
 
 def head_inputs(resistance: Floats, length: Floats, across: Floats) -> Floats:
