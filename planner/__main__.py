@@ -7,7 +7,7 @@ import sys
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from planner.command_line import DWELLS, OBSTACLES, progress_bar, say, table_of
+from planner.command_line import DWELLS, OBSTACLES, TABLE, progress_bar, say, table_of
 from planner.job_commands import JOBS
 from planner.paths.units import (
     UNITS,
@@ -18,7 +18,7 @@ from planner.paths.units import (
     in_tails,
     place_in_lab,
 )
-from sim.io.commands import MODEL, ROBOT, Program, argument, out
+from sim.io.commands import ROBOT, Program, argument, out
 from sim.io.errors import InputError, naming
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ _PLANNING = (
     argument("path", help="CSV with x, y; SVG; or circle:RADIUS, square:SIDE, triangle:SIDE, polygon:CORNERS:SIDE "
              "(polygon:6:2)"),
     ROBOT,
-    MODEL,
+    *TABLE,
     argument("--unit", choices=("l", *UNITS), help="unit of the path's numbers (default: tail lengths)"),
     argument("--scale", type=float, default=1.0, help="multiply the path's coordinates"),
     argument("--shape", help="which path of an SVG with several"),
@@ -96,7 +96,7 @@ def _plan(arguments: Namespace) -> None:
     *OBSTACLES,
     argument("--unit", choices=("l", *UNITS), default="l", help="unit of all lengths (default: tail lengths)"),
     ROBOT,
-    MODEL,
+    *TABLE,
     argument("--objective", default="time", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: time)"),
     *DWELLS,

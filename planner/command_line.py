@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from planner.paths.units import in_lab, place_in_lab
-from sim.io.commands import argument
+from sim.io.commands import MODEL, argument
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
@@ -24,6 +24,11 @@ DWELLS = (
     argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
     argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
 )
+TABLE = (
+    MODEL,
+    argument("--own-table", action="store_true",
+             help="simulate a look-up table of this robot, once; it is more accurate on long paths"),
+)  # fmt: skip
 OBSTACLES = (
     argument("--keep-out", action="append", default=[], metavar="REGION",
              help="circle:X,Y,RADIUS, box:LEFT,LOW,RIGHT,HIGH, or a CSV or SVG outline; may be given again"),
@@ -61,7 +66,9 @@ def table_of(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge
     from planner.files.own_table import table_for
     from surrogate.table.model_file import load_table
 
-    return load_table(arguments.model) if arguments.model else table_for(robot, arguments.robot, knowledge)
+    if arguments.model:
+        return load_table(arguments.model)
+    return table_for(robot, arguments.robot, knowledge, own=arguments.own_table)
 
 
 @contextmanager

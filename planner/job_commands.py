@@ -6,9 +6,9 @@ import math
 from argparse import Namespace
 from typing import TYPE_CHECKING, NamedTuple
 
-from planner.command_line import DWELLS, OBSTACLES, progress_bar, say, table_of
+from planner.command_line import DWELLS, OBSTACLES, TABLE, progress_bar, say, table_of
 from planner.paths.units import UNITS
-from sim.io.commands import MODEL, ROBOT, Argument, Run, argument, out
+from sim.io.commands import ROBOT, Argument, Run, argument, out
 
 if TYPE_CHECKING:
     from planner.planning.request import PlanRequest
@@ -27,7 +27,7 @@ class Job(NamedTuple):
 
 _COMMON = (
     ROBOT,
-    MODEL,
+    *TABLE,
     argument("--unit", choices=("l", *UNITS), help="unit of all lengths (default: the file's, or tail lengths)"),
     argument("--point", default="head_centre", choices=("head_centre", "head_tip", "pivot"),
              help="which point of the robot does the job (default: head_centre)"),

@@ -86,25 +86,38 @@ def _steady_points(arguments: Namespace) -> None:
 
 
 @program.command(
-    "replay", "simulate a planned schedule", argument("plan", help="plan.json"), out("CSV with the track")
-)
+    "replay",
+    "simulate a planned schedule",
+    argument("plan", help="plan.json"),
+    out("CSV with the track"),
+    argument("--no-error", action="store_true",
+             help="do not estimate the error of the track, which takes more than half as long again"),
+)  # fmt: skip
 def _replay(arguments: Namespace) -> None:
     from tqdm import tqdm
 
     from sim.io.files import write_csv
-    from sim.io.units import format_time
+    from sim.io.units import format_length, format_time
     from sim.model.schedule import load_schedule
-    from sim.motion.replay import replay
+    from sim.motion.replay import replay, replay_error
 
     schedule = load_schedule(arguments.plan)
     with tqdm(total=len(schedule.dwells), desc="replay", unit="dwell", delay=1.0) as bar:
         track = replay([schedule], progress=bar.update)[0]
     write_csv(track, arguments.out)
+    error = ""
+    if not arguments.no_error:
+        with tqdm(total=len(schedule.dwells), desc="on a coarser mesh", unit="dwell", delay=1.0) as bar:
+            size = replay_error(schedule, track, progress=bar.update)
+        length = schedule.tail_length
+        in_lab = f"{size:.2g} l" if length is None else f"{format_length(size * length)} ({size:.2g} l)"
+        error = f", the simulator's own error is {in_lab} at most"
     end = track.iloc[-1]
     place = f"({end.x_over_l:.3f}, {end.y_over_l:.3f}) l"
     if "x_cm" in track:
         place = f"({end.x_cm:.2f}, {end.y_cm:.2f}) cm = {place}"
-    print(f"{len(schedule.dwells)} dwells, {format_time(end.time_s)}, ends at {place} -> {arguments.out}")
+    time = format_time(end.time_s)
+    print(f"{len(schedule.dwells)} dwells, {time}, ends at {place}{error} -> {arguments.out}")
 
 
 @program.command(

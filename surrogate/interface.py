@@ -9,10 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from sim.arrays import Floats
 from sim.model.response import Responses
+
+
+class ErrorModes(NamedTuple):
+    """P independent errors of one standard deviation, for a positive motor; curves as in `sim.model.response`."""
+
+    twist: Floats  # (P, 3), of v_z, v_x and ω_yr
+    lag: Floats  # (P, D, 3)
+    memory: Floats  # (P, K, D, 3), after dwells BEFORE
 
 
 class LookupTable(Protocol):
@@ -44,6 +52,17 @@ class LookupTable(Protocol):
 
         They are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar`, `v_x`, `v_z`, `R_yr_over_l`, `theta_deg` and
         `tail_gap`.
+
+        Raises:
+            InputError: a robot that cannot be, or one outside the domain.
+        """
+        ...
+
+    def error_modes(self, columns: Mapping[str, Floats]) -> ErrorModes:
+        """Return independent errors of the motion and the response of one robot.
+
+        Args:
+            columns: the robot by column name; its first row counts.
 
         Raises:
             InputError: a robot that cannot be, or one outside the domain.

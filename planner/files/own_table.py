@@ -20,28 +20,33 @@ ENDING = ".table.json"
 _TABLES: dict[tuple[tuple[str, float], ...], LookupTable] = {}  # of robots without a file, by their groups
 
 
-def table_for(robot: Robot, source: str | None, knowledge: CalibrationKnowledge) -> LookupTable:
+def table_for(
+    robot: Robot, source: str | None, knowledge: CalibrationKnowledge, *, own: bool = False
+) -> LookupTable:
     """Load the package's table if it knows a robot, else the robot's own; simulate that where there is none.
 
     Args:
         robot: the robot.
         source: its file, or the name of a preset; None: the table is kept in this process alone.
         knowledge: what a calibration found besides the robot.
+        own: take the robot's own table in any case. It is more accurate.
 
     Raises:
         InputError: the robot's motion cannot be simulated.
     """
-    shipped = default_table()
-    try:
-        check_known(robot, shipped, knowledge)
-    except InputError as unknown:
-        reason = str(unknown).partition("; ")[0]
-    else:
-        return shipped
+    reason = ""
+    if not own:
+        shipped = default_table()
+        try:
+            check_known(robot, shipped, knowledge)
+        except InputError as unknown:
+            reason = f"{str(unknown).partition('; ')[0]}: "
+        else:
+            return shipped
     kept = None if source is None or source in PRESETS else Path(source).with_suffix(ENDING)
     table = _kept_table(robot, kept, knowledge)
     if table is None:
-        print(f"{reason}: simulating this robot's own look-up table, for some seconds", file=sys.stderr)
+        print(f"{reason}simulating this robot's own look-up table, for some seconds", file=sys.stderr)
         table = _simulated_table(robot, kept)
     return table
 

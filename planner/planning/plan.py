@@ -34,7 +34,7 @@ from planner.planning.request import PlanRequest, RequestOptions
 from planner.planning.schedule import follow
 from planner.planning.stated_error import guaranteed, look_ahead
 from planner.vehicle.calibration_table import CalibrationKnowledge
-from planner.vehicle.dwell_choice import check_least, dwells_for
+from planner.vehicle.dwell_choice import check_least, dwells_for, longer_dwells
 from planner.vehicle.from_table import OWN_TABLE
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Vehicle
@@ -43,6 +43,8 @@ from sim.io.errors import InputError
 from sim.model.robot import Robot
 from surrogate.interface import LookupTable
 
+_WORTH = 0.8  # of the stated error: a longer dwell, which swings further, must leave at most this
+_DOMINATED = 1.2  # a stated error over the predicted one, below which nothing is gained by fewer flips
 # Plans from what declares the path, the drift, and what follows a declared path.
 Redirect = Callable[[Callable[[], Declared], Drift, Callable[[Declared], Plan]], Plan]
 
@@ -126,9 +128,32 @@ def make_plan(
         return follow_declared(declared_path(drift))
 
     first = with_dwell(dwells[0])
+    if request.dwell is None and request.objective == "error":
+        first = _least_stated(first, longer_dwells(vehicle, first.minimum_dwell), with_dwell)
     if request.tolerance is None or first.stated_error <= request.tolerance:
         return first
     return _shortened(first, dwells, with_dwell, request.tolerance)
+
+
+def _least_stated(first: Plan, longer: list[float], with_dwell: Callable[[float], Plan]) -> Plan:
+    """Lengthen the dwells where this makes the stated error smaller by a fifth or more.
+
+    What is uncertain of each flip adds up, so it shrinks with their number. The predicted error grows with the
+    dwell; where it alone is above the best stated error, longer dwells cannot be better.
+    """
+    best = first
+    if first.stated_error < _DOMINATED * first.predicted_max:
+        return best
+    for dwell in longer:
+        try:
+            candidate = with_dwell(dwell)
+        except InputError:  # too long for this path
+            break
+        if candidate.predicted_max >= best.stated_error:
+            break
+        if candidate.stated_error < _WORTH * best.stated_error:
+            best = candidate
+    return best
 
 
 def _shortened(first: Plan, dwells: list[float], with_dwell: Callable[[float], Plan], tolerance: float) -> Plan:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 GUARANTEE = "guaranteed_error_over_l"  # of plan.json; null where it is not known
 WIDE = 0.25  # turn radii; a predicted track that is further from the declared path gets a warning
 # Attributes of a plan by their old names, for one release.
+_DOMINATED = 1.7  # a stated error over the predicted one: the errors of the table are the larger part
 _MOVED = {
     "point": "tracked.point",
     "offset": "tracked.offset",
@@ -153,7 +154,17 @@ class Plan:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know, in words."""
-        return (*self.declared.warnings, *self._zigzag_warnings(), *self.tracked.warnings)
+        own = (*self._zigzag_warnings(), *self._table_warnings())
+        return (*self.declared.warnings, *own, *self.tracked.warnings)
+
+    def _table_warnings(self) -> tuple[str, ...]:
+        """Propose the robot's own table where the errors of the look-up table decide the stated error."""
+        if self.tracked.own_table or self.stated_error < _DOMINATED * self.predicted_max:
+            return ()
+        return (
+            f"the stated error is mostly that of the look-up table, over {len(self.dwells)} flips: simulate this "
+            "robot's own table (--own-table, own_table=True), or measure poses on the way",
+        )
 
     def _zigzag_warnings(self) -> tuple[str, ...]:
         """Warn of a predicted track that is far from the declared path."""

@@ -25,9 +25,9 @@ import numpy as np
 
 from planner.paths.distance import nearest
 from planner.vehicle.rollout import Switches, pose_changes, poses_at_flips
-from planner.vehicle.vehicle import SHORTEST, STEP, Vehicle
+from planner.vehicle.vehicle import SHORTEST, STEP, Vehicle, interpolated
 from planner.vehicle.zigzag import Zigzag
-from sim.arrays import Floats
+from sim.arrays import Floats, Integers
 from sim.mechanics import planar
 
 LEVEL = 0.95
@@ -138,9 +138,10 @@ def _deviations(vehicle: Vehicle, switches: Switches, edges: Floats) -> tuple[Fl
     side = (np.arange(count) + (first < 0)) % 2
     lag = planar.compose(moves_predicted, planar.inverse(planar.arc(vehicle.twist[side], dwells)))
     deviation, turned = np.zeros((len(edges), len(modes), 2)), np.zeros((len(edges), len(modes)))
+    lags = _mode_lags(vehicle, side, dwells)
     for p, mode in enumerate(modes):
         arc = planar.arc((vehicle.twist + mode.twist)[side], dwells)
-        change = planar.compose(lag + mode.lag[side], arc) - moves_predicted
+        change = planar.compose(lag + lags[p], arc) - moves_predicted
         heading = np.concatenate([[0.0], np.cumsum(change[:, 2])])
         moves = planar.turn(change[:, :2], poses[:-1, 2]) + mode.current * dwells[:, None]
         moves += heading[:-1, None] * _left(np.diff(poses[:, :2], axis=0))
@@ -154,6 +155,22 @@ def _deviations(vehicle: Vehicle, switches: Switches, edges: Floats) -> tuple[Fl
     across = variance[:, :2].mean(1)  # x and y of the body are mixed in the lab
     noise = np.sqrt(np.stack([across, across, variance[:, 2]], 1))
     return poses[edges, :2], deviation, turned, noise
+
+
+def _mode_lags(vehicle: Vehicle, side: Integers, dwells: Floats) -> list[Floats | float]:
+    """Return what each mode adds to the lags (M, 3) of the dwells (M,) in directions `side` (M,)."""
+    before = np.concatenate([dwells[:1], dwells[:-1]])
+    with_lag = [p for p, mode in enumerate(vehicle.modes) if mode.lag is not None]
+    added: list[Floats | float] = [0.0] * len(vehicle.modes)
+    if not with_lag:
+        return added
+    lags = np.empty((len(dwells), len(with_lag), 3))
+    for index in (0, 1):
+        tables = np.stack([vehicle.modes[p].lag[index] for p in with_lag], 2)  # type: ignore[index]
+        lags[side == index] = interpolated(tables, before[side == index], dwells[side == index])
+    for place, p in enumerate(with_lag):
+        added[p] = lags[:, place]
+    return added
 
 
 def _extremes(predicted: Predicted, edges: Floats, samples: int) -> tuple[Floats, Floats, Floats]:

@@ -24,6 +24,7 @@ import numpy as np
 from planner.planning.line_of_sight import arc_terms
 from planner.planning.planned import Plan
 from planner.tracking.guidance import LearnedDrift, TrackerGuidance
+from planner.vehicle.vehicle import interpolated
 
 POSE = tuple[float, float, float]
 ROWS = list[list[float]]
@@ -257,13 +258,15 @@ def prior(plan: Plan) -> ROWS:
     P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in PRIOR), 1e-6, 1e-12, 1e-12,
                  *(s**2 for s in MARKER)])  # fmt: skip
     speed = np.hypot(vehicle.twist[0, 0], vehicle.twist[0, 1])
+    dwell = plan.minimum_dwell
     for mode in vehicle.modes:
         direction = np.zeros(STATES)
         direction[3:5] = mode.twist[:, 2] / vehicle.twist[:, 2]
         direction[5:7] = (
             mode.twist[0, :2] * vehicle.twist[0, :2] / np.maximum(vehicle.twist[0, :2] ** 2, 1e-6 * speed**2)
         )
-        direction[7] = mode.lag[0, 2]
+        if mode.lag is not None:
+            direction[7] = interpolated(mode.lag[0], dwell, dwell)[2]
         direction[8:10] = mode.current
         P += np.outer(direction, direction)
     P[8, 8] += (0.05 * speed) ** 2 / 4

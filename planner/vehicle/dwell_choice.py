@@ -23,6 +23,7 @@ LONGEST = 4.0
 KEPT = {"error": 0.90, "flips": 0.95}  # share of the best net speed that is kept
 _WIDEST = 0.6  # rad that the heading swings to a side
 _COUNT = 100
+_LONGER = 1.3  # from one longer dwell to the next
 
 
 def dwells_for(vehicle: Vehicle, objective: Objective, least: float | None) -> list[float]:
@@ -30,9 +31,9 @@ def dwells_for(vehicle: Vehicle, objective: Objective, least: float | None) -> l
 
     Args:
         vehicle: both directions.
-        objective: "error": the shortest dwell that costs at most 10 % of the speed, then shorter ones; "time": the
-            fastest, then shorter ones; "flips": the longest that costs at most 5 % of the speed, then shorter
-            ones.
+        objective: "error": the shortest dwell that costs at most 10 % of the speed, then shorter ones (see
+            `longer_dwells`, too); "time": the fastest, then shorter ones; "flips": the longest that costs at most
+            5 % of the speed, then shorter ones.
         least: the shortest dwell that the motor or the user allows; None: QUICK.
 
     Raises:
@@ -50,6 +51,13 @@ def dwells_for(vehicle: Vehicle, objective: Objective, least: float | None) -> l
     first = int(good[-1 if objective == "flips" else 0])
     shorter = np.geomspace(least, grid[first], max(2, math.ceil(8 * math.log2(grid[first] / least)) + 1))
     return shorter[::-1].tolist() if first else [least]
+
+
+def longer_dwells(vehicle: Vehicle, dwell: float) -> list[float]:
+    """List longer dwells, up to the longest that is considered. With fewer flips their errors add up to less."""
+    most = longest_dwell(vehicle, dwell)
+    count = math.floor(math.log(most / dwell) / math.log(_LONGER))
+    return [dwell * _LONGER**k for k in range(1, count + 1)]
 
 
 def longest_dwell(vehicle: Vehicle, least: float) -> float:

@@ -18,7 +18,7 @@ from sim.effects.tail_contact import least_gap
 from sim.io.errors import InputError
 from sim.mechanics import planar
 from sim.model.robot import Robot
-from surrogate.interface import LookupTable
+from surrogate.interface import ErrorModes, LookupTable
 
 _STEADY = ("v_z", "v_x", "omega_yr_bar")
 _ODD = 0.2  # share of a table's error that has opposite signs in the two directions
@@ -65,7 +65,10 @@ def table_vehicle(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowl
         lag=lag * mirror[:, None, None],
         rest=resampled(curves.rest) * mirror[:, None],
         spread=resampled(curves.spread),
-        modes=(*_table_modes(twist, lookup), *_coefficient_modes(robot, lookup, twist, knowledge)),
+        modes=(
+            *_table_modes(twist, lookup.error_modes(columns)),
+            *_coefficient_modes(robot, lookup, twist, knowledge),
+        ),
         current=np.asarray(knowledge.current) * unit,
         tail_gap=float(np.min(motion["tail_gap"])),
         least_gap=float(least_gap(robot.effects.get(CONTACT.name, 0.0))),
@@ -96,27 +99,22 @@ def _twists(motion: Mapping[str, Floats]) -> Floats:
     return np.stack([motion[name] for name in _STEADY], -1)
 
 
-def _table_modes(twist: Floats, lookup: LookupTable) -> list[Mode]:
-    """Turn the held-out errors of the table into modes.
+def _table_modes(twist: Floats, errors: ErrorModes) -> list[Mode]:
+    """Turn the errors of the table into modes.
 
     The two directions of a mirror-symmetric robot have the same errors. Those of other robots also have a part of
     opposite signs.
     """
-    error = {name: float(values["rms"]) for name, values in lookup.errors.items()}
-    speed, yaw = float(np.hypot(twist[0, 0], twist[0, 1])), abs(float(twist[0, 2]))
     mirrored = np.allclose(twist[1], twist[0] * planar.MIRROR, rtol=1e-9, atol=0)
-    sides = [np.ones((2, 1))] if mirrored else [np.ones((2, 1)), _ODD * np.array([[1.0], [-1.0]])]
+    mirror = np.stack([np.ones(3), planar.MIRROR])
+    signs = [np.ones(2)] if mirrored else [np.ones(2), _ODD * np.array([1.0, -1.0])]
+    lags = lag_table(errors.lag, errors.memory)
     modes = []
-    for side in sides:
-        for i, name in enumerate(_STEADY):
-            size = np.zeros((2, 3))
-            size[:, i] = twist[:, i] * error[name] if i else error[name] * speed
-            modes.append(Mode(f"table: {name}", side * size, np.zeros((2, 3))))
-        for i, (name, scale) in enumerate((("lag_z", speed), ("lag_x", speed), ("lag_psi_rad", yaw))):
-            forward_lag = np.zeros(3)
-            forward_lag[i] = error[name] * scale
-            lag = np.stack([forward_lag, forward_lag * planar.MIRROR])
-            modes.append(Mode(f"table: {name}", np.zeros((2, 3)), side * lag))
+    for sign in signs:
+        sides = sign[:, None] * mirror
+        for i, move in enumerate(errors.twist):
+            lag = sides[:, None, None] * lags[i] if lags[i].any() else None
+            modes.append(Mode(f"table: {i + 1}", sides * move, lag))
     return modes
 
 
@@ -135,13 +133,13 @@ def _coefficient_modes(
         root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
         for k, column in enumerate(root.T):
             move = np.tensordot(column, slopes, 1)
-            modes.append(Mode(f"coefficients: {k + 1}", move, np.zeros((2, 3))))
+            modes.append(Mode(f"coefficients: {k + 1}", move))
     unit = robot.time_scale / robot.tail_length
     for i, sigma in enumerate(knowledge.current_error):
         if sigma > 0:
             current = np.zeros(2)
             current[i] = sigma * unit
-            modes.append(Mode(f"current {'xy'[i]}", np.zeros((2, 3)), np.zeros((2, 3)), current))
+            modes.append(Mode(f"current {'xy'[i]}", np.zeros((2, 3)), current=current))
     return modes
 
 

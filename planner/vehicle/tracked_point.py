@@ -22,6 +22,7 @@ class TrackedVehicle(NamedTuple):
     point: Point  # the point that follows the path
     offset: float  # from the head's centre forward to the tracked point
     model: str  # hash of the look-up table
+    own_table: bool = True  # whether the table is of this robot alone
 
     @property
     def rod(self) -> float:
@@ -48,7 +49,8 @@ def tracked_vehicle(
     """
     lookup = default_table() if lookup is None else lookup
     vehicle = table_vehicle(robot, lookup, knowledge)
-    return TrackedVehicle(robot, vehicle, point, _offset(point, robot, vehicle), lookup.identity)
+    own = all(low == high for low, high in lookup.domain.values())
+    return TrackedVehicle(robot, vehicle, point, _offset(point, robot, vehicle), lookup.identity, own)
 
 
 def _offset(point: Point, robot: Robot, vehicle: Vehicle) -> float:

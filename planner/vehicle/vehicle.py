@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planner.vehicle.cubic_spline import spline_at
-from sim.arrays import Floats
+from sim.arrays import Floats, Integers
 from sim.mechanics import planar
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, SETTLED
 
@@ -48,20 +48,11 @@ class Vehicle:
     def lag_after(self, sense: int, before: ArrayLike | None, time: ArrayLike) -> Floats:
         """Interpolate the lag (..., 3) after `time` (...) and a dwell `before` (...); None: from rest."""
         side = 0 if sense > 0 else 1
-        time = np.asarray(time, dtype=float)
-        place = np.minimum(np.maximum(time, 0.0) / STEP, len(TIMES) - 1)
-        i = np.minimum(place.astype(int), len(TIMES) - 2)
-        share = (place - i)[..., None]
-        if before is None:
-            table = self.rest[side]
-            return np.asarray((1 - share) * table[i] + share * table[i + 1])
-        before = np.clip(np.broadcast_to(before, time.shape), BEFORE_KNOTS[0], BEFORE_KNOTS[-1])
-        k = np.clip(np.searchsorted(BEFORE_KNOTS, before, side="right") - 1, 0, len(BEFORE_KNOTS) - 2)
-        part = ((before - BEFORE_KNOTS[k]) / (BEFORE_KNOTS[k + 1] - BEFORE_KNOTS[k]))[..., None]
-        table = self.lag[side]
-        near = (1 - share) * table[k, i] + share * table[k, i + 1]
-        far = (1 - share) * table[k + 1, i] + share * table[k + 1, i + 1]
-        return np.asarray((1 - part) * near + part * far)
+        if before is not None:
+            return interpolated(self.lag[side], before, time)
+        i, share = _step_below(np.asarray(time, dtype=float))
+        table = self.rest[side]
+        return np.asarray((1 - share) * table[i] + share * table[i + 1])
 
     def motion(self, sense: int, before: ArrayLike | None, time: ArrayLike) -> Floats:
         """Compute the pose change E_σ(time | before), (..., 3), without the current."""
@@ -110,8 +101,35 @@ class Mode:
 
     name: str  # of the cause
     twist: Floats  # (2, 3)
-    lag: Floats  # (2, 3), to all lags after a flip
+    lag: Floats | None = None  # (2, K, T, 3), to the lags; None: nothing
     current: Floats = field(default_factory=lambda: np.zeros(2))  # (2,), in l per time unit
+
+
+def interpolated(table: Floats, before: ArrayLike, time: ArrayLike) -> Floats:
+    """Interpolate lags (..., 3) or (..., P, 3) after `time` (...) and a dwell `before` (...).
+
+    Args:
+        table: (K, T, 3) or (K, T, P, 3), after dwells of BEFORE_KNOTS, at TIMES.
+        before: the dwell before.
+        time: since the flip.
+    """
+    time = np.asarray(time, dtype=float)
+    i, share = _step_below(time)
+    before = np.clip(np.broadcast_to(before, time.shape), BEFORE_KNOTS[0], BEFORE_KNOTS[-1])
+    k = np.clip(np.searchsorted(BEFORE_KNOTS, before, side="right") - 1, 0, len(BEFORE_KNOTS) - 2)
+    part = ((before - BEFORE_KNOTS[k]) / (BEFORE_KNOTS[k + 1] - BEFORE_KNOTS[k]))[..., None]
+    if table.ndim == 4:
+        share, part = share[..., None], part[..., None]
+    near = (1 - share) * table[k, i] + share * table[k, i + 1]
+    far = (1 - share) * table[k + 1, i] + share * table[k + 1, i + 1]
+    return np.asarray((1 - part) * near + part * far)
+
+
+def _step_below(time: Floats) -> tuple[Integers, Floats]:
+    """Find the step of TIMES below `time` (...), and the share (..., 1) of the way to the next one."""
+    place = np.minimum(np.maximum(time, 0.0) / STEP, len(TIMES) - 1)
+    i = np.minimum(place.astype(int), len(TIMES) - 2)
+    return i, (place - i)[..., None]
 
 
 def resampled(curve: Floats) -> Floats:
@@ -125,8 +143,14 @@ def resampled(curve: Floats) -> Floats:
 
 
 def lag_table(lag: Floats, memory: Floats, before: Floats = BEFORE) -> Floats:
-    """Compute lags (K, T, 3) after dwells of BEFORE_KNOTS, from curves of `sim.model.response`."""
+    """Compute lags (..., K, T, 3) after dwells of BEFORE_KNOTS.
+
+    Args:
+        lag: (..., D, 3), a curve of `sim.model.response`.
+        memory: (..., B, D, 3), what is added to it after dwells `before`.
+        before: (B,).
+    """
     knots = np.log(np.append(before, FORGOTTEN))
-    known = np.concatenate([memory, np.zeros_like(memory[:1])])
-    fine = spline_at(knots, known, np.log(BEFORE_KNOTS), flat_end=True)
-    return resampled(lag + fine)
+    known = np.moveaxis(np.concatenate([memory, np.zeros_like(memory[..., :1, :, :])], -3), -3, 0)
+    fine = np.moveaxis(spline_at(knots, known, np.log(BEFORE_KNOTS), flat_end=True), 0, -3)
+    return resampled(lag[..., None, :, :] + fine)

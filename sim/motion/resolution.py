@@ -19,6 +19,7 @@ from sim.model.body import Body
 
 MOST_WORK = 1e8  # of one robot in a table: about a minute
 MOST_REPLAY_WORK = 3e9  # of one schedule: about half an hour
+COARSER = 1.5  # edges and steps over those of a coarser run
 _LONGEST_STEP = 0.04  # time units: the tails need about 0.7 to turn over
 _FLOW = 3.0  # work for the flow of one node at another, in units of a node's step
 _CONTACT = 500.0  # the same for contact of one tail with another
@@ -60,6 +61,10 @@ class Resolution:
     def finer(self, factor: int) -> Resolution:
         """Multiply edges and steps by `factor`."""
         return Resolution(factor * self.edges, factor * self.steps)
+
+    def coarser(self) -> Resolution:
+        """Return two thirds of the edges and of the steps, at least three of each."""
+        return Resolution(max(3, round(self.edges / COARSER)), max(3, round(self.steps / COARSER)))
 
     def work_of_a_step(self, body: Body, tails: int) -> float:
         """Estimate the work of one step, with the work for flow and contact."""

@@ -31,7 +31,7 @@ from sim.solve.transient import lag_at, transient
 
 _SAME = 1.2  # time units from which the memory is constant
 _MESHES = (6, 9)  # edges; errors go as 1/n², extrapolated
-_TOLERANCE = 1e-3  # of a time step, in l: see `sim.solve.transient`
+TOLERANCE = 1e-3  # of a time step, in l: see `sim.solve.transient`
 _LEAST_INSTANTS = {1: 3, 2: 3}  # by N; with more tails the phase at the flip hardly matters
 
 
@@ -46,7 +46,12 @@ class Curves(NamedTuple):
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
 def responses(
-    groups: Groups, motion: Steady | None = None, *, history: bool = True, before: Floats = BEFORE
+    groups: Groups,
+    motion: Steady | None = None,
+    *,
+    history: bool = True,
+    before: Floats = BEFORE,
+    tolerance: float = TOLERANCE,
 ) -> Responses:
     """Simulate the response of B robots of one N to a flip of the motor.
 
@@ -56,6 +61,8 @@ def responses(
         history: simulate memory and rest, too; it takes four times as long. Without, both are NaN, and so is the
             net speed of dwells shorter than FORGOTTEN.
         before: T̄ of the dwell before, (K,), increasing, below FORGOTTEN.
+        tolerance: on the shape of the tails in one time step, in l; the default leaves 1e-4 to 1e-3 of a turn per
+            time unit in the curves.
     """
     check_groups(groups)
     motion = steady(groups) if motion is None else motion
@@ -63,7 +70,7 @@ def responses(
     robots = bodies(groups)
     by_robot, stepped = [], np.zeros(len(robots), dtype=bool)
     for i, (body, reverse) in enumerate(zip(robots, reversed_bodies(groups), strict=True)):
-        curves = _solved(body, reverse, groups.N, even, history, before)
+        curves = _solved(body, reverse, groups.N, even, history, before, tolerance)
         if curves is None:
             stepped[i] = True
             values = stepped_response(
@@ -83,12 +90,14 @@ def responses(
     return Responses(lag, memory, rest, spread, speed, failed, stepped, before)
 
 
-def _solved(body: Body, reverse: Body, tails: int, even: bool, history: bool, before: Floats) -> Curves | None:
+def _solved(
+    body: Body, reverse: Body, tails: int, even: bool, history: bool, before: Floats, tolerance: float
+) -> Curves | None:
     """Solve for the curves of one robot by transients; None where its motion or a transient has no solution."""
-    coarse = _on_mesh(body, reverse, tails, even, _MESHES[0], before, history=False)
+    coarse = _on_mesh(body, reverse, tails, even, _MESHES[0], before, tolerance, history=False)
     if coarse is None:
         return None
-    fine = _on_mesh(body, reverse, tails, even, _MESHES[1], before, history=history)
+    fine = _on_mesh(body, reverse, tails, even, _MESHES[1], before, tolerance, history=history)
     if fine is None:
         return None
     a, b = _MESHES
@@ -98,7 +107,15 @@ def _solved(body: Body, reverse: Body, tails: int, even: bool, history: bool, be
 
 
 def _on_mesh(
-    body: Body, reverse: Body, tails: int, even: bool, edges: int, before: Floats, *, history: bool
+    body: Body,
+    reverse: Body,
+    tails: int,
+    even: bool,
+    edges: int,
+    before: Floats,
+    tolerance: float,
+    *,
+    history: bool,
 ) -> Curves | None:
     """Solve for the curves on one mesh; memory and rest only with `history`."""
     after = _orbit(body, tails, edges)
@@ -113,7 +130,7 @@ def _on_mesh(
             return None
         reverse_twist = before_flip[2]
         start, first = before_flip[0], before_flip[1] * REVERSED
-    main = transient(body, start.copy(), first.copy(), twist, SETTLED, before, _TOLERANCE)
+    main = transient(body, start.copy(), first.copy(), twist, SETTLED, before, tolerance)
     if not main.solved:
         return None
     dwells = np.minimum(DWELLS, SETTLED)
@@ -126,7 +143,7 @@ def _on_mesh(
     if even:
         shapes = np.array([_mirrored(shape) for shape in shapes])
     else:
-        back = transient(reverse, x.copy(), u * REVERSED, reverse_twist, float(before[-1]), before, _TOLERANCE)
+        back = transient(reverse, x.copy(), u * REVERSED, reverse_twist, float(before[-1]), before, tolerance)
         if not back.solved:
             return None
         shapes = back.shapes
@@ -134,7 +151,7 @@ def _on_mesh(
     curves = np.empty((len(starts), *lag.shape))
     for i, shape in enumerate(starts):
         until = _SAME if i < len(shapes) else SETTLED
-        flip = transient(body, shape, first.copy(), twist, until, np.empty(0), _TOLERANCE)
+        flip = transient(body, shape, first.copy(), twist, until, np.empty(0), tolerance)
         if not flip.solved:
             return None
         curves[i] = lag_at(flip, np.minimum(DWELLS, until)).mean(1)

@@ -45,6 +45,7 @@ def plan(
     robot: OneRobot,
     *,
     lookup: LookupTable | None = None,
+    own_table: bool = False,
     knowledge: CalibrationKnowledge | None = None,
     progress: Callable[[float], object] | None = None,
     keep_out: Sequence[Circle | Path2D | ArrayLike] = (),
@@ -60,6 +61,8 @@ def plan(
         robot: the robot, its robot.toml, or the name of a preset; its motor speed is used in both directions.
         lookup: trained table, or the table of this one robot. Default: the one that comes with the package. Where
             that one does not know the robot, the robot's own table is simulated, and kept beside its file.
+        own_table: simulate the robot's own table in any case. For long paths it is the better model, since the
+            errors of a table add up over the flips.
         knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
         progress: called now and then with the share of the path that is done.
         keep_out: circles, and polygons as (n, 2) corners [l], that the robot's body must not touch. Where they
@@ -93,7 +96,7 @@ def plan(
         >>> len(result.dwells) > 100, result.predicted_rms < 0.03
         (True, True)
     """
-    swims, table, known = planned_robot(robot, lookup, knowledge)
+    swims, table, known = planned_robot(robot, lookup, knowledge, own_table=own_table)
     drawn, given_in = _in_tails(path, swims)
     request, space = PlanRequest(**options), FreeSpace.of(keep_out, walls)
     tracked = tracked_vehicle(swims, table, request.point, known)
@@ -106,13 +109,17 @@ def plan(
 
 
 def planned_robot(
-    robot: OneRobot, lookup: LookupTable | None, knowledge: CalibrationKnowledge | None
+    robot: OneRobot,
+    lookup: LookupTable | None,
+    knowledge: CalibrationKnowledge | None,
+    *,
+    own_table: bool = False,
 ) -> tuple[Robot, LookupTable, CalibrationKnowledge]:
     """Return a robot with the look-up table that knows it, and what a calibration found besides."""
     swims = one_robot(robot)
     source = None if isinstance(robot, Robot) else str(robot)
     known = knowledge or (CalibrationKnowledge() if source is None else read_knowledge(source))
-    return swims, lookup or table_for(swims, source, known), known
+    return swims, lookup or table_for(swims, source, known, own=own_table), known
 
 
 def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot) -> tuple[Path2D, tuple[str, ...]]:

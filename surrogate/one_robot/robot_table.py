@@ -25,7 +25,9 @@ from sim.io.reading import ContentError, read_json
 from sim.model.response import DWELLS, Responses
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.error_modes import error_modes
 from surrogate.input_ranges import ROBOT
+from surrogate.interface import ErrorModes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,6 +89,11 @@ class RobotTable:
         speed = net_speeds(twist, lag, memory, before)
         none = np.zeros(len(side), dtype=bool)
         return Responses(lag, memory, rest, spread, speed, none, none, before)
+
+    def error_modes(self, columns: Mapping[str, Floats]) -> ErrorModes:
+        """Return the errors of this robot's motion and response; see `LookupTable.error_modes`."""
+        self._side(columns)
+        return error_modes(self.errors, {name: values[0] for name, values in self.steady.items()})
 
     def save(self, path: str | Path) -> None:
         """Write the table as JSON, with a hash over everything in it."""

@@ -1,7 +1,7 @@
 """Simulate the table of one robot, see `robot_table`. Any robot: left and right turns may differ.
 
 The table states its own error. A random schedule is replayed in time steps and compared, dwell by dwell, with what
-the table predicts. The mean difference over the dwells, with its standard error, is the table's error of a lag.
+the table predicts. The difference, less what the unknown phase of the disc explains, is the error of a lag.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.one_robot.robot_table import RobotTable
 
 _STEP = 0.02  # in the logarithm of a group and in units of an effect's typical size, for derivatives
+TOLERANCE = 1e-4  # of a time step of the curves, in l
 _CHECKED = 24  # dwells of the random schedule
 _RANGE = (0.35, 1.8)  # of their lengths
 
@@ -55,7 +56,7 @@ def tabulate(robot: Robot) -> RobotTable:
     motion = steady(groups)
     if not motion.converged.all():
         raise InputError(f"{robot.name} has no steady motion to tabulate: {motion.note[0]}")
-    response = responses(groups, motion)
+    response = responses(groups, motion, tolerance=TOLERANCE)
     if response.failed.any():
         raise InputError(f"{robot.name}: a simulated flip broke down; a slower motor may help")
     columns = motion.columns()
@@ -74,10 +75,20 @@ def tabulate(robot: Robot) -> RobotTable:
     errors = {name: {"rms": float(motion.error.max())} for name in ("v_x", "v_z", "omega_yr_bar")}
     forward = {name: values[0] for name, values in table.steady.items()}
     speed, yaw = float(np.hypot(forward["v_x"], forward["v_z"])), abs(forward["omega_yr_bar"])
-    missed = _missed(table) / [speed, speed, yaw]
-    bias = np.sqrt(missed.mean(0) ** 2 + missed.var(0) / len(missed))
-    errors |= {name: {"rms": float(value)} for name, value in zip(LAGS, bias, strict=True)}
+    sizes = _error_sizes(*_missed(table)) / [speed, speed, yaw]
+    errors |= {name: {"rms": float(value)} for name, value in zip(LAGS, sizes, strict=True)}
     return replace(table, errors=errors)
+
+
+def _error_sizes(missed: Floats, spread: Floats) -> Floats:
+    """Return one standard deviation (3,) of the errors of lags, without what the disc's phase explains.
+
+    Args:
+        missed: (M, 3), simulated lags minus the table's.
+        spread: (M, 3), standard deviation of the lag over the phase at the flip, which is no error of the table.
+    """
+    mean = missed.mean(0) ** 2 + missed.var(0) / len(missed)
+    return np.asarray(np.sqrt(np.maximum((missed**2 - spread**2).mean(0), mean)))
 
 
 def _slopes(values: dict[str, float]) -> dict[str, Any]:
@@ -107,15 +118,19 @@ def _ends(name: str, value: float) -> tuple[tuple[float, float], tuple[float, fl
     return (high, high), (low, low)
 
 
-def _missed(table: RobotTable) -> Floats:
-    """Subtract the table's lags (M, 3) from those of a replay in time steps, seen as for a positive motor."""
+def _missed(table: RobotTable) -> tuple[Floats, Floats]:
+    """Subtract the table's lags from those of a replay in time steps, seen as for a positive motor.
+
+    Returns:
+        Differences (M, 3), and the spread (M, 3) of the lag over the disc's phase.
+    """
     dwells = np.exp(np.random.default_rng(0).uniform(math.log(_RANGE[0]), math.log(_RANGE[1]), _CHECKED))
     track = replay([Schedule(table.robot, 1, dwells, (0.0, 0.0, 0.0), 1.0)])[0]
     flips = track.groupby("dwell").last()[["x_over_l", "y_over_l", "heading_rad"]].to_numpy()
     poses = np.concatenate([np.zeros((1, 3)), flips])
     moved = planar.between(poses[:-1], poses[1:])
     lag, memory = np.array(table.lag), np.array(table.memory)
-    missed = []
+    missed, spreads = [], []
     for i in range(1, len(dwells)):
         side = i % 2
         mirror = planar.MIRROR if side else np.ones(3)
@@ -124,4 +139,5 @@ def _missed(table: RobotTable) -> Floats:
         curve = lag[side] + memory_after(memory[side], float(dwells[i - 1]))
         predicted = [np.interp(np.log(dwells[i]), np.log(DWELLS), column) for column in curve.T]
         missed.append(simulated - predicted)
-    return np.array(missed)
+        spreads.append([np.interp(np.log(dwells[i]), np.log(DWELLS), s) for s in np.array(table.spread[side]).T])
+    return np.array(missed), np.array(spreads)

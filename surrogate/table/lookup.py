@@ -29,11 +29,14 @@ from sim.model.groups import DWELL
 from sim.model.response import DWELLS, LAGS, Responses
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
+from surrogate.error_modes import STEADY, error_modes, joined
+from surrogate.interface import ErrorModes
 from surrogate.networks.ensemble import Ensemble
+from surrogate.table.curve_errors import CURVE_ERRORS, NORMAL_90, CurveErrors
 from surrogate.table.errors import RELATIVE, error_scale
 from surrogate.table.intervals import Intervals
 from surrogate.table.jacobian import slopes
-from surrogate.table.response_table import ResponseTable, between_dwells
+from surrogate.table.response_table import ResponseTable, between_dwells, curve_speeds
 from surrogate.table.support import Support
 from surrogate.table.tensor_file import digest, write
 from surrogate.table.wrench_table import WrenchTable, motion_sensitivity, network_index, rows_by_network
@@ -81,6 +84,7 @@ class NeuralTable:
     ranges: dict[str, tuple[float, float]]  # of the robots that were learned, by input
     errors: dict[str, dict[str, float]]  # output -> held-out error, see `surrogate.table.errors`
     provenance: dict[str, Any]
+    curve_errors: CurveErrors | None = None  # of the response; None: only the sizes in `errors` are known
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
@@ -140,6 +144,21 @@ class NeuralTable:
         _check_flips(values)
         motions = self.motions(values, flag=flag)
         return self._responses(motions, steady_outputs(motions, self.tails))
+
+    def error_modes(self, columns: Mapping[str, Floats]) -> ErrorModes:
+        """Return the errors of motion and response at one robot; see `LookupTable.error_modes`."""
+        values = check_columns({name: np.asarray(values)[:1] for name, values in columns.items()})
+        motions = self.motions(values)
+        steady = steady_outputs(motions, self.tails)
+        motion = {name: float(values[0]) for name, values in steady.items()}
+        if self.intervals is None or self.curve_errors is None:
+            return error_modes(self.errors, motion)
+        ends = self._intervals(motions, steady)
+        sizes = [float(ends[f"{name}_high"][0] - ends[f"{name}_low"][0]) / (2 * NORMAL_90) for name in STEADY]
+        speeds = curve_speeds(motions.heads, motions.motion)
+        curves = self.curve_errors.modes(self.width_features(motions), speeds)
+        own = [self.curve_errors.simulator * float(error_scale(name, motion)) for name in STEADY]
+        return joined(np.diag(np.hypot(sizes, own)), curves)
 
     def jacobian(
         self, columns: Mapping[str, Floats], parameters: Sequence[str], *, flag: bool = False
@@ -329,18 +348,29 @@ def _at_dwells(lags: Floats, steady: Mapping[str, Floats], dwells: Floats, sense
 
 def table_content(lookup: NeuralTable) -> dict[str, Any]:
     """Return a table as nested dictionaries and lists of arrays and plain values."""
-    intervals = lookup.intervals
-    return {
+    content = {
         "wrench": [None if network is None else _stored(network) for network in lookup.tails.wrench],
         "gap": _stored(lookup.tails.gap),
         "curves": [_stored(network) for network in lookup.curves.networks],
         "bases": {name: {"mean": b.mean, "vectors": b.vectors} for name, b in lookup.curves.bases.items()},
         "support": [None if support is None else vars(support) for support in lookup.support],
-        "intervals": None if intervals is None else {k: _plain(v) for k, v in vars(intervals).items()},
+        "intervals": None if lookup.intervals is None else _widths(lookup.intervals),
         "ranges": {name: list(ends) for name, ends in lookup.ranges.items()},
         "errors": lookup.errors,
         "provenance": lookup.provenance,
     }
+    errors = lookup.curve_errors
+    if errors is not None:
+        content[CURVE_ERRORS] = {
+            "widths": _widths(errors.widths),
+            "curves": errors.curves,
+            "simulator": errors.simulator,
+        }
+    return content
+
+
+def _widths(intervals: Intervals) -> dict[str, Any]:
+    return {name: _plain(value) for name, value in vars(intervals).items()}
 
 
 def _stored(network: Ensemble) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from surrogate.interface import LookupTable
 from surrogate.networks.ensemble import Ensemble
 from surrogate.one_robot.robot_table import load_robot_table
 from surrogate.table import tensor_file
+from surrogate.table.curve_errors import CURVE_ERRORS, CurveErrors
 from surrogate.table.intervals import Intervals
 from surrogate.table.lookup import FORMAT, NeuralTable
 from surrogate.table.model_form import IncompleteError, check_form
@@ -66,7 +67,8 @@ def load_table(path: str | Path | None = None) -> LookupTable:
 
 def _lookup(content: dict[str, Any]) -> NeuralTable:
     check_form(content)
-    intervals = content["intervals"]
+    intervals, of_curves = content["intervals"], content.get(CURVE_ERRORS)
+    widths = None if of_curves is None else Intervals(**of_curves["widths"])
     return NeuralTable(
         tails=WrenchTable(
             tuple(None if part is None else _network(part) for part in content["wrench"]), _network(content["gap"])
@@ -80,6 +82,7 @@ def _lookup(content: dict[str, Any]) -> NeuralTable:
         ranges={name: (float(low), float(high)) for name, (low, high) in content["ranges"].items()},
         errors=content["errors"],
         provenance=content["provenance"],
+        curve_errors=None if of_curves is None else CurveErrors(**of_curves | {"widths": widths}),
     )
 
 

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from sim.model.response import BEFORE
 from surrogate.input_ranges import ROBOT
 from surrogate.networks.ensemble import state_shapes
+from surrogate.table.curve_errors import CURVE_ERRORS, SIZES
 from surrogate.table.intervals import PARTS as INTERVAL_PARTS
 from surrogate.table.response_table import PARTS, SHAPES
 from surrogate.table.support import monomial_count
@@ -55,6 +57,8 @@ def check_form(content: Mapping[str, Any]) -> None:
             _check_support(part)
     if content["intervals"] is not None:
         _check_intervals(content["intervals"])
+    if CURVE_ERRORS in content:
+        _check_curve_errors(content[CURVE_ERRORS])
 
 
 def _check_numbers(content: Mapping[str, Any]) -> None:
@@ -118,6 +122,20 @@ def _check_intervals(part: Mapping[str, Any]) -> None:
         low, high = part["bounds"][name]
         if not low <= high:
             raise IncompleteError("its intervals have no bounds")
+
+
+def _check_curve_errors(part: Mapping[str, Any]) -> None:
+    _check_intervals(part["widths"])
+    curves, simulator = part["curves"], part["simulator"]
+    if not set(SIZES) <= set(part["widths"]["factor"]):
+        raise IncompleteError("the errors of its response have no sizes")
+    _check_array(curves, (len(curves), len(BEFORE) + 1, *SHAPES["lag"]))
+    if (
+        not isinstance(simulator, float)
+        or not 0 <= simulator < math.inf
+        or not _all_finite([part["widths"], curves])
+    ):
+        raise IncompleteError("the errors of its response are no finite numbers")
 
 
 def _check_array(part: Any, shape: tuple[int, ...]) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from sim.effects import catalogue
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, LAG_PARTS
 from sim.motion.batches import run_batches, split
-from sim.motion.response import responses
+from sim.motion.response import TOLERANCE, responses
 from sim.motion.steady import orbits
 from surrogate.input_ranges import DOMAIN, MOST_TAILS, ROBOT, WIDE
 
@@ -125,17 +126,20 @@ def draw_robots(count: int, seed: int, *, wide: bool) -> dict[str, Floats]:
     return robots
 
 
-def simulate_robots(robots: Mapping[str, Floats], *, curves: bool = False, title: str = "") -> SimulatedRobots:
+def simulate_robots(
+    robots: Mapping[str, Floats], *, curves: bool = False, tolerance: float = TOLERANCE, title: str = ""
+) -> SimulatedRobots:
     """Simulate robots; those without a direct solution are left out.
 
     Args:
         robots: groups and effects, each (M,).
         curves: simulate the response to a flip, too; it takes a hundred times as long.
+        tolerance: of the curves, see `sim.motion.response.responses`.
         title: of the progress bar; empty for none.
     """
     batches = split(np.asarray(robots["N"]), _CURVE_BATCH if curves else _BATCH)
     parts = [{name: array[rows] for name, array in robots.items()} for rows in batches]
-    work = _with_curves if curves else _motion
+    work = partial(_with_curves, tolerance=tolerance) if curves else _motion
     done = run_batches(work, parts, sizes=[len(b) for b in batches], title=title, threads=True)
     order = np.argsort(np.concatenate(batches))
     columns = {name: np.concatenate([part[name] for part in done])[order] for name in done[0]}
@@ -152,10 +156,10 @@ def _motion(robots: dict[str, Floats]) -> dict[str, Any]:
     return {name: columns[name] for name in MOTION} | {"solved": motion.converged}
 
 
-def _with_curves(robots: dict[str, Floats]) -> dict[str, Any]:
+def _with_curves(robots: dict[str, Floats], *, tolerance: float) -> dict[str, Any]:
     groups = Groups.from_columns(robots)
     motion = orbits(groups)
-    response = responses(groups, motion)
+    response = responses(groups, motion, tolerance=tolerance)
     columns = _motion(robots)
     curves = {name: getattr(response, name) for name in ("lag", "memory", "rest", "spread", "net_speed")}
     return columns | curves | {"solved": columns["solved"] & ~response.failed & ~response.stepped}

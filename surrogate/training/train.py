@@ -31,6 +31,7 @@ from surrogate.table.support import Support
 from surrogate.table.wrench_table import CLASSES, network_index
 from surrogate.training.fit_response import SETTINGS, fit_response
 from surrogate.training.fit_wrench import WrenchSamples, fit_wrench, learnable, wrench_samples
+from surrogate.training.response_errors import held_out_curve_errors
 from surrogate.training.simulated import SimulatedRobots, join_robots, read_robots, simulate_robots
 from surrogate.wrench.tails import tail_inputs
 
@@ -193,7 +194,7 @@ def _judged(
     response = lookup.response(flips.robots, flag=True)
     truth = {**flips.motion, **flips.curves}
     report |= summary(curve_errors(response, truth), flips.motion["tail_gap"] >= 1)
-    return replace(lookup, intervals=intervals, errors=report)
+    return replace(lookup, intervals=intervals, errors=report, curve_errors=held_out_curve_errors(lookup, flips))
 
 
 def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[str, Floats], Flags]:

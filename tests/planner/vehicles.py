@@ -53,5 +53,5 @@ def _modes(twist: Floats, errors: float) -> tuple[Mode, ...]:
     for i, share in enumerate(ERRORS):
         size = np.zeros((2, 3))
         size[:, i] = errors * share * twist[:, i]
-        modes.append(Mode(str(i), size, np.zeros((2, 3))))
+        modes.append(Mode(str(i), size))
     return tuple(modes)

@@ -17,8 +17,10 @@ from planner.planning.plan import plan
 from planner.planning.planned import _MOVED
 from planner.planning.request import PlanRequest, RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge
+from planner.vehicle.dwell_choice import dwells_for
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
+from surrogate.one_robot.tabulate import tabulate
 from tests.processes import LIMIT
 
 CONTROL = PRESETS["paper-control"]
@@ -194,3 +196,22 @@ def test_progress_is_called_with_numbers_that_do_not_fall() -> None:
     plan(polygon(4, 3.0), CONTROL, progress=shares.append)
     assert shares
     assert shares == sorted(shares)
+
+
+def test_long_paths_are_planned_with_the_least_stated_error() -> None:
+    """The dwell of the smallest zigzag has a larger stated error, since the errors of more flips add up."""
+    robot = replace(CONTROL, tails=3, tail_length=0.129, C_t=1.56, C_r=1.97, C_yr=1.08)
+    path = circle(6.0)
+    result = plan(path, robot)
+    quick = plan(path, robot, dwell=dwells_for(result.tracked.vehicle, "error", None)[0])
+    assert result.minimum_dwell > quick.minimum_dwell
+    assert result.stated_error < 0.8 * quick.stated_error
+
+
+def test_a_plan_whose_error_is_the_table_s_proposes_the_robot_s_own_table() -> None:
+    robot = replace(CONTROL, tails=3, tail_length=0.129, C_t=1.56, C_r=1.97, C_yr=1.08)
+    result = plan(circle(6.0), robot, dwell=0.3)
+    assert any("own table" in words for words in result.warnings)
+    by_own_table = plan(circle(6.0), robot, dwell=0.3, lookup=tabulate(robot))
+    assert not any("own table" in words for words in by_own_table.warnings)
+    assert by_own_table.stated_error < result.stated_error

@@ -7,7 +7,8 @@ import pytest
 
 from sim.io.errors import InputError
 from sim.model.schedule import Schedule
-from sim.motion.replay import replay
+from sim.motion.replay import replay, replay_error
+from sim.motion.resolution import Resolution
 from sim.motion.steady import steady
 from tests.sim.robots import CONTROL_VALUES, control
 
@@ -43,3 +44,18 @@ def test_a_replay_turns_as_fast_as_the_steady_motion(tails: float, omega_bar: fl
     late = track[track["time_bar"] > 4]
     rate = np.polyfit(late["time_bar"], late["heading_rad"], 1)[0]
     assert rate == pytest.approx(steady(control(N=tails, omega_bar=omega_bar)).omega_yr[0], rel=1e-3)
+
+
+@pytest.mark.parametrize("robot", [
+    pytest.param({**CONTROL_VALUES, "N": 2.0}, id="control"),
+    pytest.param({**CONTROL_VALUES, "N": 4.0, "omega_bar": 30.0}, id="fast", marks=pytest.mark.slow),
+])  # fmt: skip
+def test_the_error_of_a_track_is_that_against_a_much_finer_mesh(robot: dict[str, float]) -> None:
+    """The reference has three times the edges and the steps, so a ninth of the error."""
+    dwells = np.array([1.0, 0.6, 1.4, 0.8, 1.0, 0.5])
+    schedule = Schedule(robot, 1, dwells, (0.0, 0.0, 0.0), 1.0)
+    (track,) = replay([schedule])
+    (finest,) = replay([schedule], resolution=Resolution.for_tracks(robot["omega_bar"]).finer(3))
+    places = [part.groupby("dwell").last()[["x_over_l", "y_over_l"]].to_numpy() for part in (track, finest)]
+    found = np.hypot(*(places[0] - places[1]).T).max()
+    assert 0.5 * found < replay_error(schedule, track) < 2 * found
