@@ -22,8 +22,8 @@ _CELLS = 400  # of the raster, along the longer side
 class Field:
     """A region with holes."""
 
-    outline: Region
-    holes: tuple[Region, ...] = ()
+    outline: Region  # what is to be covered
+    holes: tuple[Region, ...] = ()  # but for these
 
     def contains(self, points: Floats) -> Flags:
         """Tell which points (M, 2) are to be covered."""

@@ -17,7 +17,7 @@ _FINE = 4  # candidates a point
 _LEAST_POINTS = 1_000  # of the refined polyline
 _MOST_POINTS = 400_000
 _BLOCK = 16_384  # points at a time, which bounds the memory
-_FEW_PAIRS = 4_000_000  # of points and candidates
+_FEW_PAIRS = 8_000_000  # of points and candidates
 _PAIRS = 250_000  # at a time
 
 
