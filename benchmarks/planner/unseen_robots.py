@@ -4,7 +4,7 @@ Robots are drawn from the domain of the shipped table as labs have them: two to 
 circles, eights, smooth closed curves and polygons; every third one is enlarged until its plan has more than 2,000
 dwells. Each plan is made as by default, and carried out by the robot's own table, which is simulated
 with a tenth of the tolerance. Some are replayed in time steps, too. A stated error must hold in 95 % of the plans,
-and in 90 % in each third of the robots by their remoteness: their distance from the middle of what the table has
+and in 90 % in each third of the robots by their novelty: the distance from the middle of what the table has
 learned.
 
 Usage: python -m benchmarks unseen_robots [PLANS] [FIRST SEED] [REPLAYS]     (100, 5000 and 30)
@@ -38,7 +38,7 @@ class Outcome(NamedTuple):
 
     seed: int
     flips: int
-    remoteness: float
+    novelty: float
     predicted: float  # largest distance that the plan predicts
     stated: float
     own: float  # largest distance, by the table of the robot itself
@@ -90,14 +90,14 @@ def main(count: str = "100", first: str = "5000", replays: str = "30") -> None:
         print(refused)
     print(heading("carried out by the robot's own table", "plans", "held", "stated / found",
                   "predicted: median / 95 %", "stated", "found", "stated with the own table"))  # fmt: skip
-    ordered = sorted(plans, key=lambda one: one.remoteness)
+    ordered = sorted(plans, key=lambda one: one.novelty)
     cuts = [len(ordered) * k // 3 for k in range(4)]
     classes = [
         ("all", plans),
         (f"up to {LONG} dwells", [one for one in plans if one.flips <= LONG]),
         (f"more than {LONG} dwells", [one for one in plans if one.flips > LONG]),
         *((f"{name} robots", ordered[cuts[k] : cuts[k + 1]])
-          for k, name in enumerate(("nearest", "middle", "most remote"))),
+          for k, name in enumerate(("nearest", "middle", "most novel"))),
     ]  # fmt: skip
     for name, some in classes:
         if some:

@@ -115,7 +115,7 @@ class TooTightError(InputError):
 
 @contextmanager
 def hinting_at_units(path: Path2D, robot: Robot, turn_radius: float, given_in: tuple[str, ...]) -> Iterator[None]:
-    """Add a hint at its unit where a path is too tight, and not much larger than the robot's circle.
+    """Add advice on its unit where a path is too tight, and not much larger than the robot's circle.
 
     Args:
         path: in tail lengths.
@@ -124,7 +124,7 @@ def hinting_at_units(path: Path2D, robot: Robot, turn_radius: float, given_in: t
         given_in: units in which the user may have given the numbers; none: the path has a size of its own.
 
     Raises:
-        TooTightError: with the hint.
+        TooTightError: with the advice.
     """
     try:
         yield

@@ -104,7 +104,7 @@ def export(folder: str | Path, *, table: LookupTable | str | Path | None = None)
         >>> import softflagella as sf
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     print(sf.export(folder)[:8])
-        148.8 kB
+        148.9 kB
     """
     return save_small_copy(_trained(table), folder)
 
