@@ -194,6 +194,23 @@ def goal(made: Path, out: Path) -> str:
     return "end: (33.00, 11.00) cm = (3.000, 1.000) l, heading 90.0 degrees"
 
 
+def tour(made: Path, out: Path) -> str:
+    done("planner", "tour", "0,0", "3,0", "1,2", "--robot", made / "robot.toml", "--out", out / "tour")
+    written = {path.name for path in (out / "tour").iterdir()}
+    assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h", "tracker.h", "tour.json", "tour.svg"}
+    assert json.loads((out / "tour" / "tour.json").read_text())["order"][0] == 0
+    return "order"
+
+
+def cover(made: Path, out: Path) -> str:
+    (out / "tank.csv").write_text("x,y\n0,0\n3,0\n3,2\n0,2\n")
+    words = [out / "tank.csv", "--width", "0.6", "--robot", made / "robot.toml"]
+    done("planner", "cover", *words, "--out", out / "swept")
+    written = {path.name for path in (out / "swept").iterdir()}
+    assert {"plan.json", "plan.csv", "plan.svg", "schedule.h", "tracker.h"} < written
+    return "covers 100.0 %"
+
+
 def check(made: Path, out: Path) -> str:
     done("planner", "check", made / "plan" / "plan.json", made / "track.csv", "--out", out / "overlay.png")
     assert (out / "overlay.png").read_bytes().startswith(b"\x89PNG")
@@ -259,7 +276,7 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("surrogate", "inverse"): inverse, ("planner", "track"): follow,
     ("surrogate", "errors"): errors, ("surrogate", "export"): export,
     ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
-    ("planner", "goal"): goal,
+    ("planner", "goal"): goal, ("planner", "tour"): tour, ("planner", "cover"): cover,
     ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
     ("calibration", "tracks"): tracks, ("calibration", "decide"): decide,
 }  # fmt: skip

@@ -77,6 +77,7 @@ def pack_tails(tails: Tails) -> Floats:
     return packed
 
 
+@np.errstate(all="ignore")  # a robot that cannot be has no motion, and is refused for that
 def head_inputs(resistance: Floats, length: Floats, across: Floats) -> Floats:
     """Return HEAD_INPUTS, (M, 7).
 

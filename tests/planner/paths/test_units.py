@@ -17,8 +17,8 @@ CONTROL = PRESETS["paper-control"]
 
 
 def test_millimetres_taken_for_tail_lengths_are_refused() -> None:
-    with pytest.raises(InputError, match=r"if you gave l and mean mm, it is 27.3 l: --unit mm"):
-        plan([[0, 0], [900, 0], [900, 700], [0, 700], [0, 200]], CONTROL)
+    with pytest.raises(InputError, match=r"if you gave l and mean mm, it is 273 l: --unit mm"):
+        plan([[0, 0], [9000, 0], [9000, 7000], [0, 7000], [0, 2000]], CONTROL)
 
 
 def test_a_path_in_tail_lengths_that_nobody_stated_is_asked_about(

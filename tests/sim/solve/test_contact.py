@@ -123,7 +123,7 @@ def test_sensitivities_are_differences(size: float) -> None:
         groups = replace(with_contact(ROBOTS["measured"], size), C_t=np.array([C_t]))
         return float(orbits(groups, phases=MANY).omega_yr[0])
 
-    C_t, width = float(ROBOTS["measured"].C_t), 1e-3
+    C_t, width = ROBOTS["measured"].C_t.item(), 1e-3
     found = sensitivities(with_contact(ROBOTS["measured"], size), ("tail_contact", "C_t"))
     by_size = (yaw(size + width, C_t) - yaw(size - width, C_t)) / (2 * width)
     by_drag = (yaw(size, C_t + width) - yaw(size, C_t - width)) / (2 * width)
