@@ -97,7 +97,7 @@ def main(count: str = "100", first: str = "5000", replays: str = "30") -> None:
         (f"up to {LONG} dwells", [one for one in plans if one.flips <= LONG]),
         (f"more than {LONG} dwells", [one for one in plans if one.flips > LONG]),
         *((f"{name} robots", ordered[cuts[k] : cuts[k + 1]])
-          for k, name in enumerate(("nearest", "middle", "most novel"))),
+          for k, name in enumerate(("least novel", "middle", "most novel"))),
     ]  # fmt: skip
     for name, some in classes:
         if some:
