@@ -56,7 +56,7 @@ test-rest: $(VENV)/.extras ## run what `make test` leaves out: rates over many t
 test-all: $(VENV)/.extras ## run every test
 	$(RUN) -m pytest $(TWO)
 $(VENV)/.extras: $(STAMP)
-	$(INSTALL) -e '.[clusters]'
+	$(INSTALL) -e '.[clusters,page]'
 	touch $@
 
 quick: $(STAMP) ## run the quick tests, a minute and a half
@@ -64,7 +64,7 @@ quick: $(STAMP) ## run the quick tests, a minute and a half
 
 constraints: $(STAMP) ## pin what pyproject.toml needs, with hashes (UPGRADE=1: the newest versions)
 	$(RUN) -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"])' \
-	| $(UV) pip compile --quiet pyproject.toml - --extra dev --extra clusters --extra docs --universal --generate-hashes \
+	| $(UV) pip compile --quiet pyproject.toml - --extra dev --extra clusters --extra docs --extra page --universal --generate-hashes \
 	--no-annotate --custom-compile-command 'make constraints' $(if $(UPGRADE),--upgrade) -o constraints.txt
 
 lint: $(STAMP) ## style and types

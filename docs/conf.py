@@ -13,9 +13,10 @@ sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 from generate import write_generated_pages  # noqa: E402
 
-from softflagella import __version__  # noqa: E402
+from softflagella import __version__, write_page  # noqa: E402
 
 write_generated_pages(HERE / "reference" / "generated")
+write_page(HERE / "reference" / "generated" / "beside" / "plan.html")
 
 project = "softflagella"
 author = "the softflagella developers"
@@ -41,6 +42,7 @@ napoleon_use_ivar = True
 html_theme = "furo"
 html_title = f"softflagella {release}"
 html_static_path = ["_static"]
+html_extra_path = ["reference/generated/beside"]  # the page that plans
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False

@@ -3,25 +3,40 @@
 from __future__ import annotations
 
 import math
-import sys
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from planner.command_line import DWELLS, OBSTACLES, TABLE, progress_bar, say, table_of
-from planner.job_commands import JOBS
+from planner.command_line import (
+    ARRIVE,
+    DWELLS,
+    OBSTACLES,
+    TABLE,
+    arrival_time,
+    ask_for_unit,
+    ask_for_unit_across,
+    progress_bar,
+    say,
+    say_job,
+    say_written,
+    table_of,
+    vehicle_and_request,
+)
+from planner.fleet_command import FLEET, fleet_command
+from planner.job_commands import JOBS, planned_cover, planned_tour
+from planner.page_command import PAGE
 from planner.paths.units import (
     UNITS,
-    check_unstated_unit,
     describe,
     hinting_at_units,
     in_lab,
     in_tails,
-    place_in_lab,
 )
+from planner.tracking_commands import POSES, REPLAN, START, track, without_robot
 from sim.io.commands import ROBOT, Program, argument, out
 from sim.io.errors import InputError, naming
 
 if TYPE_CHECKING:
+    from planner.goal.goal_plan import GoalPlan
     from planner.paths.path import Path2D
     from planner.planning.planned import Plan
     from planner.planning.request import PlanRequest
@@ -51,7 +66,14 @@ _PLANNING = (
     argument("--objective", default="error", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: error)"),
     *DWELLS,
+    ARRIVE,
+    argument("--loop", action="store_true", help="a closed path is followed lap after lap, until told otherwise"),
     *OBSTACLES,
+)  # fmt: skip
+_TRACKING = (
+    argument("path", help="a path to plan for, as for planner plan; or a plan.json, its folder, or a goal.json, "
+             "tour.json or cover.json beside it"),
+    *without_robot(_PLANNING[1:]),
 )  # fmt: skip
 
 
@@ -81,7 +103,7 @@ def _plan(arguments: Namespace) -> None:
         f"from the path as drawn {rms} rms, {largest} at most; every drawn point is within {missed} of the "
         "declared path"
     )
-    print(f"-> {', '.join(map(str, paths))}")
+    say_written(paths)
 
 
 @program.command(
@@ -94,121 +116,100 @@ def _plan(arguments: Namespace) -> None:
     argument("--via", nargs=2, type=float, action="append", default=[], metavar=("X", "Y"),
              help="a place that the pivot passes; may be given again"),
     *OBSTACLES,
-    argument("--unit", choices=("l", *UNITS), default="l", help="unit of all lengths (default: tail lengths)"),
+    argument("--unit", choices=("l", *UNITS), help="unit of all lengths (default: tail lengths)"),
     ROBOT,
     *TABLE,
     argument("--objective", default="time", choices=("error", "time", "flips"),
              help="what decides the dwell: small error, short time, or few flips (default: time)"),
     *DWELLS,
+    ARRIVE,
     out("folder"),
 )  # fmt: skip
 def _goal(arguments: Namespace) -> None:
-    from planner.files.goal_files import read_free_space, write_goal_plan
+    from planner.files.goal_files import write_goal_plan
+
+    goal_plan = _goal_planned(arguments)
+    say_job(goal_plan, write_goal_plan(goal_plan, arguments.out))
+
+
+def _goal_planned(arguments: Namespace) -> GoalPlan:
+    """Plan the way that the command asks for."""
+    import numpy as np
+
+    from planner.files.goal_files import read_free_space
     from planner.goal.to_goal import to_goal
+    from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import read_knowledge
+    from planner.vehicle.tracked_point import tracked_vehicle
     from sim.inputs import load_robot
 
-    robot, unit = load_robot(arguments.robot), arguments.unit
-    scale = in_tails(unit, robot)
+    seconds = arrival_time(arguments)
+    robot = load_robot(arguments.robot)
+    scale = in_tails(arguments.unit or "l", robot)
     start, goal = (
         (scale * x, scale * y, math.radians(math.fmod(angle, 360)))
         for x, y, angle in (arguments.start, arguments.goal)
     )
     space = read_free_space(arguments.keep_out, arguments.walls, scale, robot)
+    via = [(scale * x, scale * y) for x, y in arguments.via]
     knowledge = read_knowledge(arguments.robot)
-    goal_plan = to_goal(
+    table = table_of(arguments, robot, knowledge)
+    if arguments.unit is None:
+        tracked = tracked_vehicle(robot, table, "head_centre", knowledge)
+        request = PlanRequest(
+            objective=arguments.objective,
+            minimum_dwell=arguments.min_dwell,
+            minimum_seconds=arguments.min_dwell_s,
+        )
+        ask_for_unit_across(np.array([start[:2], *via, goal[:2]]), tracked, request, "start and goal")
+    return to_goal(
         start,
         goal,
         robot,
-        via=[(scale * x, scale * y) for x, y in arguments.via],
+        via=via,
         keep_out=space.regions,
         walls=space.walls,
-        lookup=table_of(arguments, robot, knowledge),
+        lookup=table,
         objective=arguments.objective,
         minimum_dwell=arguments.min_dwell,
         minimum_seconds=arguments.min_dwell_s,
         tolerance=arguments.tolerance,
         feedback=arguments.feedback,
+        arrive_seconds=seconds,
         knowledge=knowledge,
     )
-    paths = write_goal_plan(goal_plan, arguments.out)
-    say(goal_plan.plan)
-    off, turned = goal_plan.end_error
-    x, y, heading = goal_plan.end
-    place = place_in_lab(x, y, robot)
-    print(
-        f"end: {place}, heading {math.degrees(math.remainder(heading, math.tau)):.1f} degrees; "
-        f"from the goal {in_lab(off, robot)} and {math.degrees(turned):.1g} degrees as predicted"
-    )
-    if not goal_plan.free_space.empty:
-        margin, clearance = (in_lab(value, robot) for value in (goal_plan.margin, goal_plan.clearance))
-        print(f"margin {margin} around the body; predicted clearance {clearance}")
-    print(f"-> {', '.join(map(str, paths))}")
 
 
 @program.command(
     "track",
-    "keep a robot on its path: poses come in on a pipe, orders go out (planner.tracking.pipe says how)",
-    *_PLANNING,
-    argument("--noise", type=float, default=0.01, help="standard deviation of x and y, in tail lengths"),
-    argument("--noise-rad", type=float, default=0.01, help="standard deviation of the heading"),
-    argument("--latency", type=float, default=0.0, help="age of a pose when it comes in, in seconds"),
+    "keep a robot on a path or a saved plan: poses come in on a pipe, orders go out (planner.tracking.pipe)",
+    *_TRACKING,
+    START,
+    *POSES,
 )
 def _track(arguments: Namespace) -> None:
-    from contextlib import redirect_stdout
-
-    from planner.tracking.pipe import answers
-    from planner.tracking.tracker import Tracker
-
-    for name in ("noise", "noise_rad"):
-        if not 0 < getattr(arguments, name) < math.inf:
-            raise InputError(f"--{name.replace('_', '-')} {getattr(arguments, name)}; give a number above 0")
-    if not 0 <= arguments.latency < math.inf:
-        raise InputError(f"--latency {arguments.latency}; give a number of seconds, 0 or more")
-    with redirect_stdout(sys.stderr):
-        result, _ = _planned(arguments)
-    scale = result.robot.time_scale
-    tracker = Tracker(result, noise=(arguments.noise, arguments.noise_rad), latency=arguments.latency / scale)
-    for answer in answers(tracker, sys.stdin, scale):
-        print(answer, flush=True)
+    track(arguments, lambda words: _planned(words)[0], _TRACKING)
 
 
 def _planned(arguments: Namespace) -> tuple[Plan, PlanRequest]:
     """Make the plan that the command asks for, and return it with the request."""
     from planner.files.goal_files import read_free_space
-    from planner.planning.plan import make_plan
-    from planner.planning.request import PlanRequest
-    from planner.vehicle.calibration_table import read_knowledge
-    from planner.vehicle.dwell_choice import dwells_for
-    from planner.vehicle.tracked_point import tracked_vehicle
-    from planner.vehicle.zigzag import zigzag
+    from planner.jobs.plan_path import plan_path
     from sim.inputs import load_robot
 
+    seconds = arrival_time(arguments)
     robot = load_robot(arguments.robot)
     path, unit, given_in = _path(arguments, robot)
     space = read_free_space(arguments.keep_out, arguments.walls, unit, robot)
     print(f"path: {describe(path, robot)}")
-    request = PlanRequest(
-        point=arguments.point,
-        corner=arguments.corner,
-        time_weight=arguments.time_weight,
-        objective=arguments.objective,
-        minimum_dwell=arguments.min_dwell,
-        minimum_seconds=arguments.min_dwell_s,
-        tolerance=arguments.tolerance,
-    )
-    knowledge = read_knowledge(arguments.robot)
-    tracked = tracked_vehicle(robot, table_of(arguments, robot, knowledge), request.point, knowledge)
+    tracked, request = vehicle_and_request(arguments, robot)
     if given_in and arguments.unit is None:
-        dwell = dwells_for(tracked.vehicle, request.objective, request.least_dwell(robot))[0]
-        speed = zigzag(tracked.vehicle, dwell, tracked.offset).speed
-        check_unstated_unit(path, robot, tracked.vehicle.turn_radius, speed)
+        ask_for_unit(path, tracked, request)
     with hinting_at_units(path, robot, tracked.vehicle.turn_radius, given_in), progress_bar() as progress:
-        if space.empty:
-            return make_plan(path, tracked, request, progress), request
-        from planner.jobs.clear_plan import plan_clear  # loads SciPy's graphs
-
-        return plan_clear(path, tracked, request, space, feedback=arguments.feedback, progress=progress), request
+        feedback, loop = arguments.feedback, arguments.loop
+        return plan_path(
+            path, tracked, request, space, seconds, loop=loop, feedback=feedback, progress=progress
+        ), request
 
 
 def _path(arguments: Namespace, robot: Robot) -> tuple[Path2D, float, tuple[str, ...]]:
@@ -268,7 +269,18 @@ def _check(arguments: Namespace) -> None:
         print(f"-> {arguments.out}")
 
 
-for job in JOBS:
+@program.command("fleet", "plan several robots in one tank so that they keep apart", *FLEET)
+def _fleet(arguments: Namespace) -> None:
+    planned = {
+        "plan": lambda words: _planned(words)[0],
+        "goal": _goal_planned,
+        "tour": planned_tour,
+        "cover": planned_cover,
+    }
+    fleet_command(arguments, program.commands, planned)
+
+
+for job in (*JOBS, PAGE, REPLAN):
     program.command(job.name, job.help, *job.arguments)(job.run)
 
 

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
 
-from planner.paths.units import in_lab, place_in_lab
+from planner.paths.units import check_unstated_unit, heading_in_degrees, in_lab, place_in_lab, read_time
 from sim.io.commands import MODEL, argument
 from sim.io.units import format_time
 
 if TYPE_CHECKING:
+    from planner.paths.path import Path2D
     from planner.planning.planned import Plan
+    from planner.planning.request import PlanRequest
     from planner.vehicle.calibration_table import CalibrationKnowledge
+    from planner.vehicle.tracked_point import TrackedVehicle
+    from sim.arrays import Floats
     from sim.model.robot import Robot
     from surrogate.interface import LookupTable
 
@@ -23,6 +27,11 @@ DWELLS = (
     argument("--min-dwell", type=float, help="shortest dwell, in time units μ0 l⁴/EI"),
     argument("--min-dwell-s", type=float, help="shortest dwell that the motor allows, in seconds"),
     argument("--tolerance", type=float, help="largest stated error, in tail lengths"),
+)
+ARRIVE = argument(
+    "--arrive",
+    metavar="TIME",
+    help="when the robot is at the end, such as 12min: dwells are changed, or waiting circles added",
 )
 TABLE = (
     MODEL,
@@ -46,7 +55,7 @@ def say(result: Plan) -> None:
     robot = result.robot
     x, y, heading = result.start
     place = place_in_lab(x, y, robot)
-    print(f"start: put the head's centre at {place}, heading {math.degrees(heading):.1f} degrees, at rest")
+    print(f"start: put the head's centre at {place}, heading {heading_in_degrees(heading)}, at rest")
     shortest = format_time(result.minimum_dwell * robot.time_scale)
     print(
         f"{len(result.dwells)} dwells of {shortest} ({result.minimum_dwell:.2f} time units) or more, "
@@ -57,8 +66,37 @@ def say(result: Plan) -> None:
         for value in (result.predicted_rms, result.predicted_max, result.stated_error, result.feedback_error)
     )
     print(f"predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}")
-    for line in () if result.kept_clear is None else result.kept_clear.lines(robot):
+    for line in result.job_lines():
         print(line)
+
+
+class PlannedJob(Protocol):
+    """A plan with what it does for its job."""
+
+    @property
+    def plan(self) -> Plan:
+        """Return the job's plan."""
+
+    def lines(self) -> list[str]:
+        """Return what there is to say of the job."""
+
+
+def say_job(job: PlannedJob, paths: Iterable[Path]) -> None:
+    """Print the job's plan, what there is to say of the job, and the files that were written."""
+    say(job.plan)
+    for line in job.lines():
+        print(line)
+    say_written(paths)
+
+
+def say_written(paths: Iterable[Path]) -> None:
+    """Print the files that were written."""
+    print(f"-> {', '.join(map(str, paths))}")
+
+
+def arrival_time(arguments: Namespace) -> float | None:
+    """Return the time of --arrive in seconds; None where none is asked for."""
+    return None if arguments.arrive is None else read_time(arguments.arrive, "--arrive")
 
 
 def table_of(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge) -> LookupTable:
@@ -69,6 +107,60 @@ def table_of(arguments: Namespace, robot: Robot, knowledge: CalibrationKnowledge
     if arguments.model:
         return load_table(arguments.model)
     return table_for(robot, arguments.robot, knowledge, own=arguments.own_table)
+
+
+def request_of(arguments: Namespace) -> PlanRequest:
+    """Return what the command asks of a plan."""
+    from planner.planning.request import PlanRequest
+
+    of_paths = {name: value for name, value in vars(arguments).items() if name in ("corner", "time_weight")}
+    return PlanRequest(
+        point=arguments.point,
+        objective=arguments.objective,
+        minimum_dwell=arguments.min_dwell,
+        minimum_seconds=arguments.min_dwell_s,
+        tolerance=arguments.tolerance,
+        **of_paths,
+    )
+
+
+def vehicle_and_request(arguments: Namespace, robot: Robot) -> tuple[TrackedVehicle, PlanRequest]:
+    """Load the table that the command names, and return the robot's vehicle and what is asked of the plan."""
+    from planner.vehicle.calibration_table import read_knowledge
+    from planner.vehicle.tracked_point import tracked_vehicle
+
+    request, knowledge = request_of(arguments), read_knowledge(arguments.robot)
+    return tracked_vehicle(robot, table_of(arguments, robot, knowledge), request.point, knowledge), request
+
+
+def ask_for_unit(path: Path2D, tracked: TrackedVehicle, request: PlanRequest, what: str = "path") -> None:
+    """Ask for the unit of lengths that nobody stated, if they make no sense as tail lengths.
+
+    Raises:
+        InputError: the path is very long for this robot.
+    """
+    from planner.vehicle.dwell_choice import dwells_for
+    from planner.vehicle.zigzag import zigzag
+
+    vehicle = tracked.vehicle
+    dwell = dwells_for(vehicle, request.objective, request.least_dwell(tracked.robot))[0]
+    speed = zigzag(vehicle, dwell, tracked.offset).speed
+    check_unstated_unit(path, tracked.robot, vehicle.turn_radius, speed, what)
+
+
+def ask_for_unit_across(points: Floats, tracked: TrackedVehicle, request: PlanRequest, what: str) -> None:
+    """Ask for the unit of points (n, 2) that nobody stated: the way is at least the diagonal of their box.
+
+    Raises:
+        InputError: the points are very far apart for this robot.
+    """
+    import numpy as np  # the help of a command does not need it
+
+    from planner.paths.path import Path2D
+
+    ends = [points.min(0), points.max(0)]
+    if np.isfinite(ends).all() and (ends[0] != ends[1]).any():
+        ask_for_unit(Path2D.of(ends), tracked, request, f"way across {what}")
 
 
 @contextmanager

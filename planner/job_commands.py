@@ -1,4 +1,4 @@
-"""The commands for jobs of a laboratory: a tour of places, the coverage of a region."""
+"""The commands for jobs of a laboratory: a tour of places, the coverage of a region, a place to hold."""
 
 from __future__ import annotations
 
@@ -6,14 +6,22 @@ import math
 from argparse import Namespace
 from typing import TYPE_CHECKING, NamedTuple
 
-from planner.command_line import DWELLS, OBSTACLES, TABLE, progress_bar, say, table_of
-from planner.paths.units import UNITS
+from planner.command_line import (
+    DWELLS,
+    OBSTACLES,
+    TABLE,
+    ask_for_unit_across,
+    progress_bar,
+    say_job,
+    vehicle_and_request,
+)
+from planner.paths.units import UNITS, read_time
 from sim.io.commands import ROBOT, Argument, Run, argument, out
+from sim.io.errors import InputError
 
 if TYPE_CHECKING:
-    from planner.planning.request import PlanRequest
-    from planner.vehicle.tracked_point import TrackedVehicle
-    from sim.model.robot import Robot
+    from planner.jobs.coverage_plan import CoveragePlan
+    from planner.jobs.tour_plan import TourPlan
 
 
 class Job(NamedTuple):
@@ -40,17 +48,27 @@ _COMMON = (
 
 
 def _tour(arguments: Namespace) -> None:
+    from planner.files.job_files import write_tour
+
+    result = planned_tour(arguments)
+    say_job(result, write_tour(result, arguments.out))
+
+
+def planned_tour(arguments: Namespace) -> TourPlan:
+    """Plan the tour that the command asks for."""
     from planner.files.goal_files import read_free_space
-    from planner.files.job_files import read_places, write_tour
+    from planner.files.job_files import read_places
     from planner.jobs.tour import tour
     from sim.inputs import load_robot
 
     robot = load_robot(arguments.robot)
     places, scale = read_places(arguments.places, arguments.unit, robot)
     space = read_free_space(arguments.keep_out, arguments.walls, scale, robot)
-    tracked, request = _tracked(arguments, robot)
+    tracked, request = vehicle_and_request(arguments, robot)
+    if arguments.unit is None and scale == 1.0:
+        ask_for_unit_across(places, tracked, request, "the places")
     with progress_bar() as progress:
-        result = tour(
+        return tour(
             places.tolist(),
             tracked,
             request,
@@ -60,16 +78,21 @@ def _tour(arguments: Namespace) -> None:
             feedback=arguments.feedback,
             progress=progress,
         )
-    paths = write_tour(result, arguments.out)
-    say(result.plan)
-    for line in result.lines():
-        print(line)
-    print(f"-> {', '.join(map(str, paths))}")
 
 
 def _cover(arguments: Namespace) -> None:
+    from planner.files.job_files import write_cover
+
+    result = planned_cover(arguments)
+    say_job(result, write_cover(result, arguments.out))
+
+
+def planned_cover(arguments: Namespace) -> CoveragePlan:
+    """Plan the coverage that the command asks for."""
+    import numpy as np
+
     from planner.files.goal_files import read_free_space
-    from planner.files.job_files import read_field, read_length, write_cover
+    from planner.files.job_files import read_field, read_length
     from planner.jobs.cover import cover
     from planner.jobs.region import Field
     from sim.inputs import load_robot
@@ -79,34 +102,34 @@ def _cover(arguments: Namespace) -> None:
     space = read_free_space(arguments.keep_out, arguments.walls, scale, robot)
     field = Field(field.outline, (*field.holes, *space.regions))
     width = read_length(arguments.width, scale, robot, "--width")
-    tracked, request = _tracked(arguments, robot)
+    tracked, request = vehicle_and_request(arguments, robot)
+    if arguments.unit is None and scale == 1.0:
+        ask_for_unit_across(np.array(field.outline.box), tracked, request, "the region")
     angle = None if arguments.angle is None else math.radians(math.fmod(arguments.angle, 360))
     with progress_bar() as progress:
-        result = cover(
+        return cover(
             field, width, tracked, request, space, angle=angle, feedback=arguments.feedback, progress=progress
         )
-    paths = write_cover(result, arguments.out)
-    say(result.plan)
-    for line in result.lines():
-        print(line)
-    print(f"-> {', '.join(map(str, paths))}")
 
 
-def _tracked(arguments: Namespace, robot: Robot) -> tuple[TrackedVehicle, PlanRequest]:
-    """Load the table of the robot, and make the vehicle and the request."""
-    from planner.planning.request import PlanRequest
-    from planner.vehicle.calibration_table import read_knowledge
-    from planner.vehicle.tracked_point import tracked_vehicle
+def _hold(arguments: Namespace) -> None:
+    from planner.files.goal_files import read_free_space
+    from planner.files.job_files import read_places, write_hold
+    from planner.jobs.hold import hold
+    from sim.inputs import load_robot
 
-    request = PlanRequest(
-        point=arguments.point,
-        objective=arguments.objective,
-        minimum_dwell=arguments.min_dwell,
-        minimum_seconds=arguments.min_dwell_s,
-        tolerance=arguments.tolerance,
-    )
-    knowledge = read_knowledge(arguments.robot)
-    return tracked_vehicle(robot, table_of(arguments, robot, knowledge), request.point, knowledge), request
+    seconds = None if arguments.seconds is None else read_time(arguments.seconds, "--for")
+    robot = load_robot(arguments.robot)
+    if "," not in arguments.place:
+        raise InputError(f"place {arguments.place!r}; write X,Y, for example 3,1.5")
+    (place,), scale = read_places([arguments.place], arguments.unit, robot)
+    space = read_free_space(arguments.keep_out, arguments.walls, scale, robot)
+    tracked, request = vehicle_and_request(arguments, robot)
+    with progress_bar() as progress:
+        result = hold(
+            place.tolist(), tracked, request, seconds, space, feedback=arguments.feedback, progress=progress
+        )
+    say_job(result, write_hold(result, arguments.out))
 
 
 JOBS = (
@@ -132,6 +155,16 @@ JOBS = (
             argument("--hole", action="append", default=[], metavar="REGION",
                      help="a part that need not be swept, and may be crossed; may be given again"),
             argument("--angle", type=float, help="direction of the lanes, in degrees (default: the quickest)"),
+            *_COMMON,
+        ),
+    ),
+    Job(
+        "hold",
+        "stay about a place, on the smallest orbit that the robot can keep",
+        _hold,
+        (
+            argument("place", metavar="PLACE", help="X,Y"),
+            argument("--for", dest="seconds", metavar="TIME", help="such as 30min (default: until told)"),
             *_COMMON,
         ),
     ),

@@ -1,16 +1,18 @@
-"""Command line of the simulator: `steady`, `replay`, `robot`, `check`, `compile`."""
+"""Command line of the simulator: `steady`, `replay`, `film`, `robot`, `check`, `compile`."""
 
 from __future__ import annotations
 
 import sys
 from argparse import Namespace
 from pathlib import Path
+from typing import Any
 
 from sim.io.commands import JOBS, Program, argument, out
 from sim.io.errors import InputError, naming
 
 program = Program("sim", "Simulate swimming robots.")
 main = program.main
+BAR_AFTER = 1.0  # s
 
 
 @program.command(
@@ -102,12 +104,13 @@ def _replay(arguments: Namespace) -> None:
     from sim.motion.replay import replay, replay_error
 
     schedule = load_schedule(arguments.plan)
-    with tqdm(total=len(schedule.dwells), desc="replay", unit="dwell", delay=1.0) as bar:
+    shown: Any = {"unit": "dwell", "delay": BAR_AFTER, "disable": None}  # None: shown on a terminal alone
+    with tqdm(total=len(schedule.dwells), desc="replay", **shown) as bar:
         track = replay([schedule], progress=bar.update)[0]
     write_csv(track, arguments.out)
     error = ""
     if not arguments.no_error:
-        with tqdm(total=len(schedule.dwells), desc="on a coarser mesh", unit="dwell", delay=1.0) as bar:
+        with tqdm(total=len(schedule.dwells), desc="on a coarser mesh", **shown) as bar:
             size = replay_error(schedule, track, progress=bar.update)
         length = schedule.tail_length
         in_lab = f"{size:.2g} l" if length is None else f"{format_length(size * length)} ({size:.2g} l)"
@@ -118,6 +121,31 @@ def _replay(arguments: Namespace) -> None:
         place = f"({end.x_cm:.2f}, {end.y_cm:.2f}) cm = {place}"
     time = format_time(end.time_s)
     print(f"{len(schedule.dwells)} dwells, {time}, ends at {place}{error} -> {arguments.out}")
+
+
+@program.command(
+    "film",
+    "film of a plan: the robot from above with its bent tails, simulated",
+    argument("plan", help="plan.json"),
+    out("the film: .gif, .webp, or .mp4 where ffmpeg is installed"),
+    argument("--speed", type=float,
+             help="how many times faster than the robot (default: so that the film takes about 15 s)"),
+    argument("--width", type=int, default=640, help="pixels (default: 640)"),
+)  # fmt: skip
+def _film(arguments: Namespace) -> None:
+    from tqdm import tqdm
+
+    from sim.model.plan_file import read_plan_file
+    from sim.model.schedule import load_schedule
+    from sim.motion.film import Film, fitting_speed, write_film
+
+    if not 100 <= arguments.width <= 2000:
+        raise InputError(f"--width {arguments.width}; give 100 to 2000 pixels")
+    schedule = load_schedule(arguments.plan)
+    film = Film(arguments.speed or fitting_speed(schedule), width=arguments.width)
+    with tqdm(total=len(schedule.dwells), desc="simulating", unit="dwell", delay=1.0) as bar:
+        count = write_film(read_plan_file(arguments.plan), schedule, arguments.out, film, progress=bar.update)
+    print(f"{count} pictures at {film.speed:g} times the robot's speed -> {arguments.out}")
 
 
 @program.command(

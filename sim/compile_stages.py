@@ -19,6 +19,7 @@ from tqdm import tqdm
 from sim import compiling
 
 Stage = tuple[str, Callable[[], object]]  # what it is, and a call that needs its loops
+_FIRST_USE = "compiling for first use |{bar}| {n_fmt} of at most {total_fmt} loops, {elapsed} so far"
 _BAR = "{desc} |{bar}| {n_fmt} of {total_fmt} loops, {elapsed} so far, {remaining} left"
 
 
@@ -36,13 +37,16 @@ def run_stages(package: str, stages: Sequence[Stage], folder: Path) -> float:
     began = time.perf_counter()
     total = count_loops(package)
     if sys.stderr.isatty():
-        with tqdm(total=total, bar_format=_BAR, leave=False, mininterval=0) as bar, _shown_in(bar, folder):
+        with (
+            tqdm(total=total, bar_format=_BAR, leave=False, mininterval=0) as bar,
+            _shown(lambda: _Count(bar, folder)),
+        ):
             for i, (name, call) in enumerate(stages):
                 bar.set_description_str(f"compiling {i + 1}/{len(stages)}: {name}")
                 call()
                 bar.update(count_ready(folder) - bar.n)
     else:
-        with _shown_in(None, folder):
+        with _shown(lambda: _Count(None, folder)):
             for i, (name, call) in enumerate(stages):
                 ready = f"{count_ready(folder)} of {total} loops are ready"
                 print(f"compiling {i + 1}/{len(stages)}: {name} ({ready}) …", file=sys.stderr, flush=True)
@@ -65,16 +69,50 @@ def count_ready(folder: Path) -> int:
     return len(list(folder.glob("*.nbi")))
 
 
+@contextmanager
+def saying_first_use(package: str, folder: Path) -> Iterator[None]:
+    """Say that loops are being compiled, and of how many, while a call compiles those that it needs.
+
+    Args:
+        package: its name, as in the names of its modules.
+        folder: where the machine code is kept.
+    """
+    if compiling.all_compiled(folder):
+        yield
+        return
+    shown: list[_Count] = []
+
+    def first_loop() -> _Count:
+        if not shown:
+            total = count_loops(package)
+            if not sys.stderr.isatty():
+                print(f"first use: compiling at most {total} loops, about a minute", file=sys.stderr, flush=True)
+            bar = tqdm(
+                total=total, bar_format=_FIRST_USE, initial=count_ready(folder), leave=False, mininterval=0,
+                disable=not sys.stderr.isatty(),
+            )  # fmt: skip
+            shown.append(_Count(bar, folder))
+        return shown[0]
+
+    with _shown(first_loop):
+        try:
+            yield
+        finally:
+            for count in shown:
+                count.update()
+                count.bar.close()
+
+
 class _Count:
     """Takes the place of the bar that the first use of a loop shows."""
 
     def __init__(self, bar: Any, folder: Path):
-        self._bar, self._folder = bar, folder
+        self.bar, self._folder = bar, folder
 
     def update(self) -> None:
         """A loop has been compiled."""
-        if self._bar is not None:
-            self._bar.update(count_ready(self._folder) - self._bar.n)
+        if self.bar is not None:
+            self.bar.update(count_ready(self._folder) - self.bar.n)
 
     def close(self) -> None:
         """The outermost loop has been compiled."""
@@ -82,10 +120,10 @@ class _Count:
 
 
 @contextmanager
-def _shown_in(bar: Any, folder: Path) -> Iterator[None]:
-    """Show compiled loops in this bar, or not at all, rather than in one of their own."""
+def _shown(count: Callable[[], _Count]) -> Iterator[None]:
+    """Show compiled loops in the bar of this count, or not at all, rather than in one of their own."""
     own = vars(compiling)["tqdm"]
-    vars(compiling)["tqdm"] = lambda **_: _Count(bar, folder)
+    vars(compiling)["tqdm"] = lambda **_: count()
     try:
         yield
     finally:

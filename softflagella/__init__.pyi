@@ -5,9 +5,12 @@ from calibration.verdict.sequential_test import Decision as Decision
 from calibration.verdict.verdict import Verdict as Verdict
 from planner.files.goal_json import load_goal as load_goal
 from planner.files.plan_json import load_plan as load_plan
+from planner.files.saved_plan import restore_plan as restore_plan
 from planner.files.tracking_error import TrackingError as TrackingError
 from planner.goal.goal_plan import GoalPlan as GoalPlan
 from planner.jobs.coverage_plan import CoveragePlan as CoveragePlan
+from planner.jobs.fleet_plan import FleetPlan as FleetPlan
+from planner.jobs.hold_plan import HoldPlan as HoldPlan
 from planner.jobs.tour_plan import TourPlan as TourPlan
 from planner.paths.obstacles import Circle as Circle
 from planner.paths.path import Path2D as Path2D
@@ -33,9 +36,13 @@ from softflagella.api.calibrate import decide as decide
 from softflagella.api.calibrate import tracks as tracks
 from softflagella.api.goal import to_goal as to_goal
 from softflagella.api.jobs import cover as cover
+from softflagella.api.jobs import fleet as fleet
+from softflagella.api.jobs import hold as hold
 from softflagella.api.jobs import tour as tour
+from softflagella.api.page import write_page as write_page
 from softflagella.api.plan import check as check
 from softflagella.api.plan import plan as plan
+from softflagella.api.plan import replan as replan
 from softflagella.api.plan import write_plan as write_plan
 from softflagella.api.query import export as export
 from softflagella.api.query import inverse as inverse

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import sys
 from argparse import Namespace
 from importlib import import_module
@@ -14,10 +15,16 @@ WORDS = {  # the most important commands -> package and command
     "plan": ("planner", "plan"),
     "tour": ("planner", "tour"),
     "cover": ("planner", "cover"),
+    "hold": ("planner", "hold"),
+    "fleet": ("planner", "fleet"),
+    "track": ("planner", "track"),
+    "page": ("planner", "page"),
+    "replan": ("planner", "replan"),
     "sweep": ("dataset", "build"),
     "train": ("surrogate", "train"),
     "calibrate": ("calibration", "calibrate"),
     "replay": ("sim", "replay"),
+    "film": ("sim", "film"),
     "query": ("surrogate", "query"),
     "demo": ("softflagella", "demo"),
 }
@@ -54,6 +61,15 @@ def _overview() -> str:
     return "\n".join(lines)
 
 
+def _suggestion(word: str) -> str:
+    """Suggest a command for a word that is none: one of a package, one that is spelt nearly so, or all."""
+    for package in PACKAGES:
+        if word in import_module(f"{package}.__main__").program.commands:
+            return f"it is softflagella {package} {word}"
+    near = difflib.get_close_matches(word, (*WORDS, *PACKAGES), 1)
+    return f"is it {near[0]}?" if near else f"there are {', '.join((*WORDS, *PACKAGES))}"
+
+
 def main(argv: list[str] | None = None) -> None:
     """Run the command that the words name."""
     words = sys.argv[1:] if argv is None else argv
@@ -70,7 +86,7 @@ def main(argv: list[str] | None = None) -> None:
         packaged: Program = import_module(f"{words[0]}.__main__").program
         packaged.main(words[1:])
     else:
-        print(f"error: no command {words[0]!r}; there are {', '.join((*WORDS, *PACKAGES))}", file=sys.stderr)
+        print(f"error: no command {words[0]!r}; {_suggestion(words[0])}", file=sys.stderr)
         raise SystemExit(2)
 
 

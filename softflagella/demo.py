@@ -51,6 +51,7 @@ from sim.motion.steady import steady
 from sim.motion.steady_motion import Steady
 from sim.motion.warm import compile_once
 from softflagella.demo_figures import draw_plans
+from softflagella.demo_files import ROBOT_PAGE
 from softflagella.demo_page import Results, write_page
 from softflagella.replanning import Steered, steer
 from surrogate.table.model_file import load
@@ -87,6 +88,8 @@ def run_demo(out: str | Path) -> None:
     robot, motions = _look(folder)
     print("2/4 plan circle, square and triangle without simulating, and replay them")
     plans = _plan_and_replay(folder)
+    paths = [word for case in CASES for word in ("--path", case.path)]
+    _command("page", *paths, "--out", str(page_path.parent / ROBOT_PAGE))
     print("3/4 a small sweep and a look-up table trained on it")
     data, model = folder / "sweep", folder / "model.safetensors"
     shutil.rmtree(data, ignore_errors=True)  # an earlier demo's rows, perhaps of another version

@@ -14,6 +14,7 @@ _PAGES = (  # of the documentation: name without suffix, title, what it is
     ("reference/signs", "Signs and frames", "which way +1 turns, and a check on the bench"),
     ("howto/tracker", "Keep a robot on its path with a camera", "a schedule with feedback"),
 )
+ROBOT_PAGE = "robot.html"  # the page that plans, beside the demo's page
 PLAN_FILES = {
     "schedule.h": "the schedule for a microcontroller, open loop",
     "tracker.h": "the same with feedback from a camera",

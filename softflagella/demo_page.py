@@ -29,6 +29,7 @@ from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS
 from sim.model.robot import Robot
 from sim.motion.lab_units import RPM, lab_motion
 from sim.motion.steady_motion import Steady
+from sim.reference.control_example import INDEPENDENT
 from softflagella.demo_figures import (
     draw_circles,
     draw_net_speed,
@@ -40,20 +41,11 @@ from softflagella.demo_figures import (
     draw_sweep,
     in_lab_units,
 )
-from softflagella.demo_files import PLAN_FILES, documentation, header_excerpt
+from softflagella.demo_files import PLAN_FILES, ROBOT_PAGE, documentation, header_excerpt
 from softflagella.replanning import Steered, gap_closed
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
 
-_INDEPENDENT = {  # the control robot's motion by an independent solver of the same equations, see `lab_columns`
-    "omega_t_bar": 7.589,
-    "omega_h_bar": -2.411,
-    "omega_yr_bar": 0.0490,
-    "v_x": 0.0425,
-    "v_z": 0.0180,
-    "R_yr_over_l": 0.9415,
-    "theta_deg": 67.1,
-}
 _ERRORS = {  # column of a look-up table -> what it is called
     "omega_t_bar": "tail spin",
     "omega_yr_bar": "yaw rate",
@@ -155,7 +147,7 @@ def _add_motion(page: Page, results: Results) -> None:
         [
             (row[0], row[1], other[1])
             for row, other in zip(
-                _motion_in_words(robot, motion.columns()), _motion_in_words(robot, _INDEPENDENT), strict=True
+                _motion_in_words(robot, motion.columns()), _motion_in_words(robot, INDEPENDENT), strict=True
             )
         ],
     )
@@ -242,6 +234,8 @@ def _add_schedule(page: Page, results: Results, folder: Path) -> None:
     )  # fmt: skip
     page.text("The same for a microcontroller, from `schedule.h` (milliseconds between flips):")
     page.commands(header_excerpt((folder / name / "schedule.h").read_text()))
+    page.links([(ROBOT_PAGE, "Plan in your browser", "draw a path, see what the robot will do, save its schedule; "
+                 "the three paths are there, and their `track.csv` can be dropped on them")])  # fmt: skip
 
 
 def _add_sweep(page: Page, results: Results) -> None:

@@ -87,10 +87,12 @@ def _query_robot(arguments: Namespace) -> None:
     from sim.motion.lab_units import describe_motion, lab_motion
     from surrogate.table.answers import answer_with_error
     from surrogate.table.model_file import load_table
+    from surrogate.table.refusals import refusing_robots
 
     robot, table = load_robot(arguments.robot), load_table(arguments.model)
     columns = group_columns([robot])
-    answer = answer_with_error(table, columns, flag=arguments.flag, certify=arguments.certify)
+    with refusing_robots([robot], table):
+        answer = answer_with_error(table, columns, flag=arguments.flag, certify=arguments.certify)
     print(describe_motion(robot, answer, error="relative error of the look-up table (90 %)"))
     if arguments.certify and "certified_error" in answer:
         print(f"  certified relative error {100 * answer['certified_error'][0]:.2g} %")
@@ -180,16 +182,14 @@ def _robot(arguments: Namespace) -> None:
     "write a look-up table for other programs",
     argument("model", nargs="?", help="look-up table (default: the one that comes with the package)"),
     argument("--onnx", metavar="OUT.onnx", help="no longer written; use --small"),
-    argument(
-        "--small", metavar="FOLDER", help="at most 150 kB, for a web page or a microcontroller, with readers"
-    ),
+    argument("--small", metavar="FOLDER", help="at most 150 kB, for a microcontroller, with a reader in C"),
 )
 def _export(arguments: Namespace) -> None:
     from surrogate.export.small_copy_files import save_small_copy
     from surrogate.table.model_file import load
 
     if arguments.onnx:
-        raise InputError("ONNX files are no longer written; give --small FOLDER for readers in C and JavaScript")
+        raise InputError("ONNX files are no longer written; give --small FOLDER for a reader in C")
     if not arguments.small:
         raise InputError("nothing to write; give --small FOLDER")
     table = load(arguments.model)

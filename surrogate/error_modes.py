@@ -27,21 +27,29 @@ STEADY = ("v_z", "v_x", "omega_yr_bar")
 _KEPT = 0.999  # share of the variance
 
 
-def error_modes(errors: Mapping[str, Mapping[str, float]], motion: Mapping[str, float]) -> ErrorModes:
+def error_modes(
+    errors: Mapping[str, Mapping[str, float]], motion: Mapping[str, float], known: Floats | None = None
+) -> ErrorModes:
     """Return the modes of errors of which only the sizes are known.
 
     Args:
-        errors: relative errors by output, each with its "rms", see `surrogate.table.errors`.
+        errors: relative errors by output, each with its "rms", see `surrogate.table.errors`. "rest", where given,
+            is the part of it that is in no known mode.
         motion: the robot's steady motion, by output.
+        known: modes (Q, K + 1, D, 3) of the lags that are known besides, after dwells BEFORE and after a long one.
     """
     speed, yaw = float(np.hypot(motion["v_x"], motion["v_z"])), abs(motion["omega_yr_bar"])
     scale = {"v_x": abs(motion["v_x"]), "omega_yr_bar": yaw, "lag_psi_rad": yaw}
-    sizes = {name: errors[name]["rms"] * scale.get(name, speed) for name in (*STEADY, *LAGS)}
+    sizes = {
+        name: errors[name].get("rest", errors[name]["rms"]) * scale.get(name, speed) for name in (*STEADY, *LAGS)
+    }
     lag, functions = [sizes[name] for name in LAGS], _process()
     count = len(functions)
     curves = np.zeros((3 * count, *functions.shape[1:], 3))
     for axis in range(3):
         curves[axis * count : (axis + 1) * count, ..., axis] = lag[axis] * functions
+    if known is not None:
+        curves = np.concatenate([known, curves])
     return joined(np.diag([sizes[name] for name in STEADY]), curves)
 
 

@@ -12,7 +12,17 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from sim.arrays import Floats
+from sim.io.errors import InputError
 from sim.model.response import Responses
+
+
+class OutsideError(InputError):
+    """A robot is outside the domain of a look-up table."""
+
+    def __init__(self, message: str, row: int = 0, reason: str = ""):
+        super().__init__(message)
+        self.row = row  # of the robot in the query
+        self.reason = reason  # in words
 
 
 class ErrorModes(NamedTuple):

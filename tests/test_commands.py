@@ -77,6 +77,18 @@ def robot(made: Path, out: Path) -> str:
     return "paper-triangle -> "
 
 
+def film(made: Path, out: Path) -> str:
+    done("sim", "film", made / "plan" / "plan.json", "--out", out / "swim.gif", "--speed", 100, "--width", 160)
+    assert (out / "swim.gif").read_bytes()[:6] == b"GIF89a"
+    return "at 100 times the robot's speed"
+
+
+def page(made: Path, out: Path) -> str:
+    done("planner", "page", "--robot", made / "robot.toml", "--path", "circle:2", "--out", out / "page.html")
+    assert "circle:2" in (out / "page.html").read_text()
+    return "opens in a browser"
+
+
 def check_paper(made: Path, out: Path) -> str:
     done("sim", "check")
     return "this simulator, its fit     0.403"
@@ -211,6 +223,23 @@ def cover(made: Path, out: Path) -> str:
     return "covers 100.0 %"
 
 
+def hold(made: Path, out: Path) -> str:
+    done("planner", "hold", "2,1", "--for", "10min", "--robot", made / "robot.toml", "--out", out / "held")
+    written = {path.name for path in (out / "held").iterdir()}
+    assert written == {"plan.json", "plan.csv", "plan.svg", "schedule.h", "tracker.h", "hold.json", "hold.svg"}
+    return "no schedule stays nearer"
+
+
+def fleet(made: Path, out: Path) -> str:
+    robot = f'[[robot]]\nrobot = "{made / "robot.toml"}"\n'
+    goals = [f"goal = [2, {y}, 0]\nstart = [0, {y}, 0]\n" for y in (0, 2)]
+    (out / "fleet.toml").write_text("".join(robot + goal for goal in goals))
+    done("planner", "fleet", out / "fleet.toml", "--apart", "5cm", "--out", out / "fleet")
+    assert json.loads((out / "fleet" / "fleet.json").read_text())["sure_distance_m"] > 0.05
+    assert {path.name for path in (out / "fleet").iterdir()} == {"robot-1", "robot-2", "fleet.json", "fleet.svg"}
+    return "robot-2: starts at once"
+
+
 def check(made: Path, out: Path) -> str:
     done("planner", "check", made / "plan" / "plan.json", made / "track.csv", "--out", out / "overlay.png")
     assert (out / "overlay.png").read_bytes().startswith(b"\x89PNG")
@@ -244,6 +273,15 @@ def simulate(made: Path, out: Path) -> str:
     return "128 runs -> "
 
 
+def replanned(made: Path, out: Path) -> str:
+    track = pd.read_csv(made / "track.csv")
+    track.head(len(track) // 2).to_csv(out / "half.csv", index=False)
+    done("planner", "replan", made / "plan", out / "half.csv", "--out", out / "rest")
+    whole, rest = load_plan(made / "plan" / "plan.json"), load_plan(out / "rest" / "plan.json")
+    assert len(rest["dwell_s"]) == pytest.approx(len(whole["dwell_s"]) / 2, abs=10)
+    return "the robot goes on from there"
+
+
 def tracks(made: Path, out: Path) -> str:
     track(0).to_csv(out / "tracks.csv", index=False)
     pd.DataFrame({"run": [1], "N": 2, "l_cm": 11.0, "omega_rpm": -150.0}).to_csv(out / "runs.csv", index=False)
@@ -269,6 +307,7 @@ def decide(made: Path, out: Path) -> str:
 
 RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "steady"): steady, ("sim", "replay"): replay, ("sim", "robot"): robot, ("sim", "check"): check_paper,
+    ("sim", "film"): film, ("planner", "page"): page,
     ("sim", "compile"): compiled, ("surrogate", "compile"): compiled_queries,
     ("dataset", "build"): build, ("dataset", "report"): report,
     ("dataset", "verify"): verify, ("dataset", "config"): config,
@@ -277,6 +316,8 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("surrogate", "errors"): errors, ("surrogate", "export"): export,
     ("surrogate", "robot"): own_table, ("planner", "plan"): plan,
     ("planner", "goal"): goal, ("planner", "tour"): tour, ("planner", "cover"): cover,
+    ("planner", "hold"): hold, ("planner", "replan"): replanned,
+    ("planner", "fleet"): fleet,
     ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
     ("calibration", "tracks"): tracks, ("calibration", "decide"): decide,
 }  # fmt: skip

@@ -27,6 +27,7 @@ COSTLY = (
     "camera tracks",
     "runs of camera tracks",
     "replayed track",
+    "plan to track",
     "table of one robot, sealed",
     "model, sealed",
 )

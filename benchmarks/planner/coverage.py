@@ -1,8 +1,8 @@
 """Coverage of four regions: share and time as planned, and share in the simulator.
 
-Usage: python -m benchmarks coverage [REPLAYED] [PICTURE]
+Usage: python -m benchmarks coverage [REPLAYS] [PICTURE]
 
-The first REPLAYED plans are replayed.
+The first REPLAYS plans are replayed.
 
 Takes 10 minutes.
 """
@@ -13,15 +13,13 @@ import time
 
 from matplotlib.figure import Figure
 
+from benchmarks.pictures import draw_replayed, replayed, save_picture
 from planner.jobs.cover import cover
 from planner.jobs.region import Field, share_covered
 from planner.paths.obstacles import Circle, FreeSpace, Polygon
-from planner.planning.picture import REPLAYED
 from planner.planning.request import PlanRequest
 from planner.vehicle.tracked_point import tracked_vehicle
-from sim.io.files import whole_file
 from sim.model.presets import PRESETS
-from sim.motion.replay import replay
 
 _BOX = Polygon.of([[0, 0], [4, 0], [4, 3], [0, 3]])
 _ROCK = Circle(2, 1.5, 0.3)
@@ -36,9 +34,8 @@ _CASES = (
 _WIDTH = 0.5  # l
 
 
-def main(replayed: str = "4", picture: str = "docs/coverage.png") -> None:
-    robot = PRESETS["paper-control"]
-    tracked = tracked_vehicle(robot, None, "head_centre", None)
+def main(replays: str = "4", picture: str = "docs/coverage.png") -> None:
+    tracked = tracked_vehicle(PRESETS["paper-control"], None, "head_centre", None)
     figure = Figure(figsize=(4 * len(_CASES), 4), layout="constrained")
     print(f"{'region':18}{'lanes':>6}{'share':>8}{'sure':>8}{'replayed':>10}{'time':>8}{'bound':>8}{'s':>6}")
     for k, (axes, (name, field, space)) in enumerate(zip(figure.subplots(1, len(_CASES)), _CASES, strict=True)):
@@ -47,12 +44,10 @@ def main(replayed: str = "4", picture: str = "docs/coverage.png") -> None:
         spent = time.process_time() - began
         swept.plot(axes)
         found = ""
-        if k < int(replayed):
-            track = replay([swept.plan.schedule()])[0][["x_over_l", "y_over_l"]].to_numpy(float)
-            axes.plot(*(100 * robot.tail_length * track.T), color=REPLAYED, lw=0.6, label="replayed")
+        if k < int(replays):
+            track = replayed(swept.plan)
+            draw_replayed(axes, swept.plan, track, 0.6)
             found = f"{share_covered(field, track, _WIDTH):.1%}"
         print(f"{name:18}{len(swept.lanes):6d}{swept.share:8.1%}{swept.sure:8.1%}{found:>10}"
               f"{swept.plan.duration:8.0f}{swept.bound:8.0f}{spent:6.1f}", flush=True)  # fmt: skip
-    with whole_file(picture) as part:
-        figure.savefig(part, format="png", dpi=110)
-    print(f"-> {picture}")
+    save_picture(figure, picture)

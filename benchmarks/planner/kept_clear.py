@@ -13,17 +13,16 @@ import time
 
 import numpy as np
 
+from benchmarks.pictures import draw_replayed, save_picture
 from planner.files.tracking_error import tracking_error
 from planner.jobs.clear_plan import plan_clear
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon, Region
 from planner.paths.path import Path2D
-from planner.planning.picture import REPLAYED
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.tracked_point import tracked_vehicle
 from sim.arrays import Floats
 from sim.io.errors import InputError
-from sim.io.files import whole_file
 from sim.model.presets import PRESETS
 from sim.motion.replay import replay
 
@@ -82,8 +81,6 @@ def _draw(shown: list[tuple[Plan, Floats]], picture: str) -> None:
     figure = Figure(figsize=(4 * len(shown), 3.6), layout="constrained")
     for axes, (plan, track) in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
         plan.plot(axes)
-        axes.plot(*(100 * plan.robot.tail_length * track.T), color=REPLAYED, lw=0.8, label="replayed")
+        draw_replayed(axes, plan, track)
     figure.axes[0].legend(fontsize=7, frameon=False, loc="center")
-    with whole_file(picture) as part:
-        figure.savefig(part, format="png", dpi=110)
-    print(f"-> {picture}")
+    save_picture(figure, picture)

@@ -10,22 +10,19 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks.pictures import draw_replayed, replayed, save_picture
 from planner.jobs.tour import tour
 from planner.paths.distance import distance_to
-from planner.planning.picture import REPLAYED
 from planner.planning.request import PlanRequest
 from planner.vehicle.tracked_point import tracked_vehicle
-from sim.io.files import whole_file
 from sim.model.presets import PRESETS
-from sim.motion.replay import replay
 
 _SIZES = (6, 12, 24)  # places of a tour
 _REPLAYED = 6  # tours of as many places are replayed
 
 
 def main(picture: str = "docs/tours.png") -> None:
-    robot = PRESETS["paper-control"]
-    tracked = tracked_vehicle(robot, None, "head_centre", None)
+    tracked = tracked_vehicle(PRESETS["paper-control"], None, "head_centre", None)
     figure = Figure(figsize=(4 * len(_SIZES), 4), layout="constrained")
     print(f"{'places':>7}{'seed':>5}{'time':>9}{'estimate':>10}{'gap':>7}{'off, predicted':>16}{'replayed':>10}")
     for axes, count in zip(figure.subplots(1, len(_SIZES)), _SIZES, strict=True):
@@ -36,12 +33,10 @@ def main(picture: str = "docs/tours.png") -> None:
             if seed == 0:
                 result.plot(axes)
             if seed == 0 and count == _REPLAYED:
-                track = replay([result.plan.schedule()])[0][["x_over_l", "y_over_l"]].to_numpy(float)
-                axes.plot(*(100 * robot.tail_length * track.T), color=REPLAYED, lw=0.8, label="replayed")
+                track = replayed(result.plan)
+                draw_replayed(axes, result.plan, track)
                 axes.legend(fontsize=7, frameon=False)
                 off = f"{distance_to(track, places).max():10.3f}"
             print(f"{count:7d}{seed:5d}{result.plan.duration:9.0f}{result.estimate:10.0f}{result.gap:7.1%}"
                   f"{result.distance.max():16.3f}{off}", flush=True)  # fmt: skip
-    with whole_file(picture) as part:
-        figure.savefig(part, format="png", dpi=110)
-    print(f"-> {picture}")
+    save_picture(figure, picture)

@@ -12,7 +12,8 @@ import numpy as np
 from sim.model.presets import PRESETS
 from sim.motion.batches import steady_columns
 from sim.motion.steady import steady
-from tests.reference.cases import CONTROL, FILAMENT, MEASURED_HEAD_SHARE, STEADY_INPUTS, STEADY_POINTS
+from sim.reference.control_example import INDEPENDENT
+from tests.reference.cases import FILAMENT, MEASURED_HEAD_SHARE, STEADY_INPUTS, STEADY_POINTS
 from tests.sim.robots import extrapolated_loads
 
 _OUTPUTS = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l")
@@ -42,7 +43,7 @@ def robots() -> None:
     control = motion.columns()
     print("\nThe paper's control example (N = 2, C = (3.0, 2.8, 2.0), motor at 10)")
     print("                 here   independent")
-    for name, value in CONTROL.items():
+    for name, value in INDEPENDENT.items():
         print(f"  {name:14} {control[name][0]:9.4f} {value:9.4f}")
     measured = steady(PRESETS["paper-measured"].groups())
     share = float(measured.omega_h[0] / (measured.omega_h[0] - measured.omega_t[0]))

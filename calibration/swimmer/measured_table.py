@@ -34,16 +34,19 @@ from sim.arrays import Floats, Integers
 from sim.io.errors import InputError, naming
 from sim.io.quantities import convert_columns, numbers_of
 from sim.io.tables import read_table
+from sim.io.units import to_si
 
-_RPM = 2 * math.pi / 60
 # Output -> (column, factor to SI, sign relative to the motor's; 0: a magnitude)
 OUTPUTS = {
-    "omega_h": ("omega_h_rpm", _RPM, -1),
-    "omega_t": ("omega_t_rpm", _RPM, 1),
-    "omega_yr": ("omega_yr_rad_s", 1.0, 1),
-    "R_yr": ("R_yr_cm", 0.01, 0),
-    "theta": ("theta_deg", math.pi / 180, 0),
-    "v": ("v_cm_s", 0.01, 0),
+    output: (f"{output}_{unit}", to_si(1.0, unit), sign)
+    for output, unit, sign in (
+        ("omega_h", "rpm", -1),
+        ("omega_t", "rpm", 1),
+        ("omega_yr", "rad_s", 1),
+        ("R_yr", "cm", 0),
+        ("theta", "deg", 0),
+        ("v", "cm_s", 0),
+    )
 }
 _SENSES = {
     "omega_h": "the head turns against the motor",
@@ -105,10 +108,12 @@ def read_measurements(source: str | Path | pd.DataFrame) -> Measurements:
 def _read(source: str | Path | pd.DataFrame) -> Measurements:
     table, where = (source, "the table") if isinstance(source, pd.DataFrame) else (read_table(source), str(source))
     outputs_columns = (column for column, _, _ in OUTPUTS.values())
-    table, converted = convert_columns(table, (*INPUTS, *outputs_columns, *_NOTED, *_SIGMAS), where, SYNONYMS)
-    for name in INPUTS:
+    table, converted = convert_columns(table, INPUTS, where, SYNONYMS)
+    for name in INPUTS:  # before the others: a table without them is no measured table
         if name not in table:
             raise InputError(f"the table has no column {name!r}; it needs {', '.join(INPUTS)}")
+    table, others = convert_columns(table, (*outputs_columns, *_NOTED, *_SIGMAS), where, SYNONYMS)
+    converted = (*converted, *others)
     unknown = [str(c) for c in table if c not in KNOWN_COLUMNS]
     for name in unknown:
         near = difflib.get_close_matches(name, KNOWN_COLUMNS, n=1)
@@ -144,9 +149,8 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         value = good[column].to_numpy(dtype=float) * factor
         columns.append(value if name == "theta" else np.log(np.abs(value)))
     y, outputs, follows = _independent(np.stack(columns, 1), outputs, condition)
-    tails, length, omega = (
-        good[c].to_numpy(dtype=float) * f for c, f in zip(INPUTS, (1, 0.01, _RPM), strict=True)
-    )
+    factors = (1, to_si(1.0, "cm"), to_si(1.0, "rpm"))
+    tails, length, omega = (good[c].to_numpy(dtype=float) * f for c, f in zip(INPUTS, factors, strict=True))
     noted = _noted(good)
     inputs = [tails, np.log(length), np.log(np.abs(omega)), np.sign(omega), *noted.values()]
     return Measurements(

@@ -18,23 +18,26 @@ import numpy as np
 from calibration.swimmer.measured_table import OUTPUTS, Measurements
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.io.units import UNITS as ANY_UNIT
+from sim.io.units import convert, split
 from sim.model.groups import MOST_TAILS
 from sim.model.robot import Robot
 
 SHORTEST, LONGEST, FASTEST = 0.5, 50, 1000  # tails in head radii, ω̄
 OFF, SLIPS = 20.0, 3.0  # factors: of an output, of the spins' sum
 _NEAR = 1.6  # factor between an output in another unit and what the robot does
-_RPM = {"rad/s": math.pi / 30, "degrees per second": 6.0, "turns per second": 1 / 60}
-_LENGTH = {"mm": 10.0, "m": 0.01}
-# What an output's numbers are multiplied by if they are in another unit than the column's.
-UNITS = {
-    "omega_h": _RPM,
-    "omega_t": _RPM,
-    "omega_yr": {"degrees per second": 180 / math.pi, "rpm": 30 / math.pi, "turns per second": 0.5 / math.pi},
-    "R_yr": _LENGTH,
-    "theta": {"radians": math.pi / 180},
-    "v": {"mm/s": 10.0, "m/s": 0.01, "cm/min": 60.0},
-}
+_USUAL = ("rpm", "rad_s", "deg_s", "rps", "mm", "cm", "m", "deg", "rad", "mm_s", "cm_s", "m_s", "cm_min")
+
+
+def _other_units(column: str) -> dict[str, float]:
+    """Return what the numbers of a column are multiplied by if they are in another usual unit."""
+    unit = split(column).unit
+    assert unit is not None
+    others = [ANY_UNIT[suffix] for suffix in _USUAL if suffix != unit.suffix]
+    return {other.text: convert(1.0, unit.suffix, other.suffix) for other in others if other.kind == unit.kind}
+
+
+UNITS = {output: _other_units(column) for output, (column, _, _) in OUTPUTS.items()}
 SETTINGS = ("N", "l_cm", "omega_rpm")
 _LENGTHS = 6
 _SPEEDS = (0.4, 0.7, 1.0)  # of the fastest

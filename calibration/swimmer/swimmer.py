@@ -45,6 +45,7 @@ from calibration.swimmer.observation import Observation
 from calibration.swimmer.possible_runs import Owned, check_inputs, check_outputs, check_owned, possible_settings
 from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue
+from sim.inputs import group_columns
 from sim.io.errors import InputError
 from sim.model.robot import Robot
 from sim.motion.batches import sensitivity_columns, steady_columns
@@ -351,9 +352,8 @@ class SwimmerModel:
         names = {i.effect for i in work if i.effect} | {
             i.parameter.second.name for i in work if i.parameter.second
         }
-        nulls = {name: catalogue()[name].null for name in sorted(names)}
-        rows = [{**nulls, **run.robot.group_values()} for run in runs]
-        columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        nulls = {name: np.full(len(runs), catalogue()[name].null) for name in sorted(names)}
+        columns = {**nulls, **group_columns([run.robot for run in runs])}
         columns["omega_bar"] = columns["omega_bar"] * np.array([run.sign for run in runs])
         return columns
 

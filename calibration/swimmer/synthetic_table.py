@@ -17,6 +17,7 @@ import pandas as pd
 
 from sim.effects import catalogue
 from sim.inputs import group_columns
+from sim.io.errors import InputError
 from sim.model.robot import Robot
 from sim.motion.batches import stepped_columns
 from sim.motion.lab_units import RPM, lab_columns
@@ -47,7 +48,7 @@ def make_table(
         title: of the progress bar; empty for none.
 
     Raises:
-        InputError: the robot cannot be simulated.
+        InputError: the robot cannot be simulated, or does not settle in a steady motion in some of the runs.
 
     Example:
         >>> from softflagella import load_robot, make_table
@@ -62,6 +63,13 @@ def make_table(
     directions = (1, -1) if odd else (1,)  # else a reversed motor mirrors the motion
     both = {k: np.concatenate([d * v if k == "omega_bar" else v for d in directions]) for k, v in columns.items()}
     motion = stepped_columns(both, finer=2, jobs=jobs, title=title)
+    lost = np.flatnonzero(~np.isfinite(motion["omega_yr_bar"]))
+    if lost.size:
+        n, length, rpm = design[lost[0] % len(design)]
+        raise InputError(
+            f"{lost.size} of {len(motion['omega_yr_bar'])} motions do not become steady, for example N = {n}, "
+            f"l = {length:g} cm, {rpm:g} rpm; choose smaller effects or another robot"
+        )
     rng = np.random.default_rng(seed)
     shift = {n: rng.normal(scale=session_noise, size=4) for n in tails}
     rows = []

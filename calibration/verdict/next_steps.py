@@ -61,6 +61,8 @@ def _after_number(result: Verdict) -> list[str]:
         f"again.{unconfirmed if result.held_out_error_falls is False else ''}",
         *_telling_apart(result),
     ]
+    if result.held_out_error_falls is False:
+        return [*steps, "Until then, plan with the robot as given: corrected.toml has the fitted value."]
     return [*steps, f"Until then, corrected.toml has the fitted value. {_PLAN}"]
 
 

@@ -60,6 +60,7 @@ typedef struct {
     tracker_real error, last_error, bias, lean, turns, bound;
     tracker_where where;
     int reached, on_way, target;
+    int last, around, stopping; /* last step of the path; whether it repeats; whether this lap is the last one */
     tracker_segment way[TRACKER_SEGMENTS];
     tracker_moved_robot moved;
 } tracker;
@@ -210,7 +211,7 @@ static tracker_real tracker_look_at_path(tracker *t, const tracker_real pose[3],
         away_x = x - TRACKER_REAL(tracker_path_x, i);
         away_y = y - TRACKER_REAL(tracker_path_y, i);
         share = square > 0 ? (away_x * dx + away_y * dy) / square : 2;
-        if (share > 1 && i < TRACKER_POINTS - 2 && came >= 0) {
+        if (share > 1 && i < t->last && came >= 0) {
             i++;
             came = 1;
         } else if (share < 0 && i > 0 && came <= 0) {
@@ -233,7 +234,7 @@ static tracker_real tracker_look_at_path(tracker *t, const tracker_real pose[3],
 
 static int tracker_ended(const tracker *t)
 {
-    return t->where.leg == TRACKER_SEGMENTS && t->where.place >= TRACKER_POINTS - 2 && t->where.share >= 1;
+    return !t->around && t->where.leg == TRACKER_SEGMENTS && t->where.place >= t->last && t->where.share >= 1;
 }
 
 static tracker_real tracker_look_after(tracker *t, const tracker_begin_of_dwell *from, tracker_real time)

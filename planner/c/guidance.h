@@ -145,6 +145,21 @@ static void tracker_turn_reference(tracker *t, tracker_real way)
     t->lean = (lean + slip) / (1 + way + way * way / 2) - slip + t->turns;
 }
 
+/* Begins the next lap at the end of one. */
+static void tracker_go_around(tracker *t)
+{
+    if (t->around && !t->on_way && t->where.place >= TRACKER_LAP) {
+        t->where.place -= TRACKER_LAP;
+        t->reached -= TRACKER_LAP;
+        t->lean += TRACKER_LAP_TURN;
+        t->turns += TRACKER_LAP_TURN;
+    }
+    if (t->stopping && !t->on_way && t->where.place < TRACKER_LAP) {
+        t->around = 0;
+        t->last = TRACKER_LAP - 1;
+    }
+}
+
 /* Adds the mean error of the last two dwells to the integral, and turns the reference. */
 static void tracker_learn(tracker *t, int sense)
 {
@@ -164,4 +179,5 @@ static void tracker_learn(tracker *t, int sense)
     t->bias = tracker_smaller(tracker_larger(t->bias, -TRACKER_MOST_BIAS), TRACKER_MOST_BIAS);
     t->last_error = t->error;
     tracker_turn_reference(t, tracker_larger(way, 0));
+    tracker_go_around(t);
 }

@@ -79,7 +79,8 @@ static int tracker_see(tracker *t, const tracker_real pose[3], double when)
     return 1;
 }
 
-/* Bounds the distance of the tracked point from the path until the next flip. */
+/* Bounds the distance of the tracked point from the path until the next flip: uniform between its values now and at
+ * the flip, plus a normal error. */
 static tracker_real tracker_bound(tracker *t)
 {
     tracker_real D[3][TRACKER_STATES], pose[3], ends[2], spread = 0, direction, g[TRACKER_STATES], row, lever;
@@ -103,8 +104,13 @@ static tracker_real tracker_bound(tracker *t)
             spread += row * g[i];
         }
     }
-    tracker_real half = (ends[0] - ends[1]) / 2;
-    return TRACKER_FABS((ends[0] + ends[1]) / 2) + TRACKER_SPREADS * TRACKER_SQRT(half * half / 3 + tracker_larger(spread, 0));
+    tracker_real middle = TRACKER_FABS(ends[0] + ends[1]) / 2, uniform = (ends[0] - ends[1]) * (ends[0] - ends[1]) / 12;
+    tracker_real variance = uniform + TRACKER_SPREADS * TRACKER_SPREADS * tracker_larger(spread, 0);
+    tracker_real share = uniform / tracker_larger(variance, (tracker_real)1e-30), deviation = TRACKER_SQRT(variance);
+    share *= share * share;
+    tracker_real within = TRACKER_WITHIN_NORMAL + share * (TRACKER_WITHIN_UNIFORM - TRACKER_WITHIN_NORMAL);
+    tracker_real below = TRACKER_BELOW_NORMAL + share * (TRACKER_BELOW_UNIFORM - TRACKER_BELOW_NORMAL);
+    return tracker_larger(within * deviation, middle + below * deviation);
 }
 
 /* The same answer again. */
@@ -134,6 +140,8 @@ static inline void tracker_begin_at(tracker *t, tracker_real noise, tracker_real
     if (start) tracker_relocate(t, start);
     t->latest = TRACKER_KEPT - 1;
     t->where.leg = TRACKER_SEGMENTS;
+    t->last = TRACKER_POINTS - 2;
+    t->around = TRACKER_LAP > 0;
     t->now = t->dwell.start = t->flip_at = begin / TRACKER_TIME_SCALE;
     t->dwell.before = -1;
     t->dwell.sense = TRACKER_FIRST_DIRECTION;
@@ -149,6 +157,16 @@ static inline void tracker_begin_at(tracker *t, tracker_real noise, tracker_real
 static inline void tracker_begin(tracker *t, tracker_real noise, tracker_real noise_heading, double begin)
 {
     tracker_begin_at(t, noise, noise_heading, begin, 0);
+}
+
+/* Ends a path that repeats at the end of this lap. */
+static inline tracker_advice tracker_finish_lap(tracker *t)
+{
+    t->stopping = TRACKER_LAP > 0;
+    tracker_go_around(t);
+    if (!t->finished) tracker_plan_flip(t);
+    t->bound = tracker_bound(t);
+    return tracker_answer(t);
 }
 
 /* Tell the time [s], and a pose if there is one (else 0) with the time at which it was true [s]. A time that is not

@@ -105,9 +105,9 @@ static void tracker_plan_way(tracker *t, const tracker_real pose[3])
     radius = tracker_larger(TRACKER_FABS(t->twist[0][0] / t->twist[0][2]), TRACKER_FABS(t->twist[1][0] / t->twist[1][2]));
     radius = radius * (1 + TRACKER_SQRT(t->drift[1] * t->drift[1] + t->drift[2] * t->drift[2])) / TRACKER_ROOM;
     tracker_pivot(t, pose, from);
-    target = tracker_cheapest(t, from, radius, first, TRACKER_POINTS - 1, TRACKER_STRIDE, 0);
+    target = tracker_cheapest(t, from, radius, first, t->last + 1, TRACKER_STRIDE, 0);
     low = target - TRACKER_STRIDE + 1 > first ? target - TRACKER_STRIDE + 1 : first;
-    high = target + TRACKER_STRIDE < TRACKER_POINTS ? target + TRACKER_STRIDE - 1 : TRACKER_POINTS - 1;
+    high = target + TRACKER_STRIDE < t->last + 2 ? target + TRACKER_STRIDE - 1 : t->last + 1;
     for (int i = first; i < low; i++) left_out += TRACKER_SQRT(tracker_step(i, &dx, &dy));
     target = tracker_cheapest(t, from, radius, low, high, 1, left_out);
     lean = tracker_target(t, target, to);
@@ -128,7 +128,7 @@ static void tracker_plan_way(tracker *t, const tracker_real pose[3])
         from[2] = course;
     }
     t->on_way = 1;
-    t->target = target < TRACKER_POINTS - 2 ? target : TRACKER_POINTS - 2;
+    t->target = target < t->last ? target : t->last;
     t->where.leg = 0;
     t->where.along = 0;
     t->where.place = t->target;

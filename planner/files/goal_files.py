@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +10,8 @@ from pathlib import Path
 from planner.files.plan_files import EXTRA, FILES, write_plan_files
 from planner.goal.goal_plan import GoalPlan
 from planner.paths.obstacles import Circle, FreeSpace, Polygon, Region
-from planner.paths.path_files import read_path
+from planner.paths.path_files import Drawing, read_path
+from planner.paths.shapes import like_a_shape, shape_of
 from sim.io.errors import InputError, naming
 from sim.io.files import files_together, write_text
 from sim.model.robot import Robot
@@ -40,10 +42,25 @@ def read_region(words: str, scale: float, robot: Robot) -> Region:
             left, low, right, high = values
             return Polygon.of([[left, low], [right, low], [right, high], [left, high]])
         raise InputError(f"{words!r}; write {_SHAPES[shape]}")
-    drawing = read_path(words, closed=True)
+    drawing = read_outline(words)
     unit_length = scale if drawing.unit is None else drawing.unit / robot.tail_length
     with naming(words):
         return Polygon.of(drawing.path.scaled(unit_length))
+
+
+def read_outline(words: str) -> Drawing:
+    """Read a closed outline from a CSV or SVG.
+
+    Raises:
+        InputError: there is no such file, or it has no outline; the words may be a misspelt region.
+    """
+    if like_a_shape(words) and shape_of(words) is None and not Path(words).exists():
+        shape, _, numbers = words.partition(":")
+        near = difflib.get_close_matches(shape.lower(), _SHAPES, 1)
+        guess = f"is it {near[0]}:{numbers}? " if near else ""
+        regions = f"{', '.join(_SHAPES.values())}, or a CSV or SVG outline"
+        raise InputError(f"{words}: no such file or region; {guess}regions are {regions}")
+    return read_path(words, closed=True)
 
 
 def read_free_space(keep_out: Sequence[str], walls: str | None, scale: float, robot: Robot) -> FreeSpace:

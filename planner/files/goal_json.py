@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from planner.goal.goal_plan import FORMAT
-from planner.paths.obstacles import Circle, FreeSpace, Polygon
+from planner.paths.obstacles import FreeSpace
 from sim.io.errors import InputError
 from sim.io.reading import ContentError, read_json
 
@@ -70,11 +70,7 @@ def _check(content: Any) -> None:
     for number in numbers:
         if not math.isfinite(number):
             raise InputError(f"{number} is no finite number")
-    regions = [
-        Circle(*_row(region["circle"], 3)) if "circle" in region else Polygon.of(region["polygon"])
-        for region in content["keep_out"]
-    ]
-    FreeSpace.of(regions, content["walls"])
+    FreeSpace.from_dict(content)
     if not isinstance(content["plan_id"], str):
         raise ValueError("plan_id is no text")
 

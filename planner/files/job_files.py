@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.files.goal_files import read_region
+from planner.files.goal_files import read_outline, read_region
 from planner.files.plan_files import EXTRA, FILES, write_plan_files
 from planner.jobs.coverage_plan import CoveragePlan
+from planner.jobs.hold_plan import HoldPlan
 from planner.jobs.region import Field
 from planner.jobs.tour_plan import TourPlan
 from planner.paths.path_files import read_path
@@ -76,7 +77,7 @@ def read_field(words: str, holes: Sequence[str], unit: str | None, robot: Robot)
     """
     scale = in_tails(unit or "l", robot)
     if words.partition(":")[0] not in ("circle", "box"):
-        drawing = read_path(words, closed=True)
+        drawing = read_outline(words)
         if drawing.unit is not None:
             if unit is not None:
                 raise InputError(f"--unit {unit}: {words} has a unit of its own; leave --unit out")
@@ -109,3 +110,14 @@ def write_cover(result: CoveragePlan, folder: str | Path) -> list[Path]:
         write_text(temporary / "cover.json", json.dumps({**result.to_dict(), "plan_id": identity}) + "\n")
         write_svg(draw_cover(result), temporary / "cover.svg", identity)
     return [Path(folder, name) for name in (*FILES, "cover.json", "cover.svg")]
+
+
+def write_hold(result: HoldPlan, folder: str | Path) -> list[Path]:
+    """Write the files of the plan, hold.json and a picture, all or none; return their paths."""
+    from planner.files.pictures import draw_hold, write_svg
+
+    with files_together(folder, (*FILES, *EXTRA)) as temporary:
+        identity = write_plan_files(result.plan, temporary)
+        write_text(temporary / "hold.json", json.dumps({**result.to_dict(), "plan_id": identity}) + "\n")
+        write_svg(draw_hold(result), temporary / "hold.svg", identity)
+    return [Path(folder, name) for name in (*FILES, "hold.json", "hold.svg")]

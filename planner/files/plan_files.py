@@ -36,6 +36,8 @@ EXTRA = (
     "tour.svg",
     "cover.json",
     "cover.svg",
+    "hold.json",
+    "hold.svg",
 )  # of a folder that was planned into
 _MOST_MS = 65_535
 _CHECKPOINTS = 32
@@ -114,7 +116,7 @@ def controller_header(result: Plan, identity: str) -> str:
     return f"""/* Plan {identity}.
  * Motor schedule for robot "{safe_name(result)}": turn in FIRST_DIRECTION for the first entry,
  * flip, turn for the next, and so on. Milliseconds; an entry of 0 flips twice at once, which
- * lengthens the dwell before it. Stop after the last entry. Look-up table {result.tracked.model}.
+ * lengthens the dwell before it. {_after(result)} Look-up table {result.tracked.model}.
 {DIRECTIONS}
  * Put the head's centre at START_X, START_Y with heading START_HEADING, at rest. Checkpoints say where it should
  * be later. x and y in tail lengths, heading in rad, counter-clockwise from the x axis, seen from above.
@@ -123,7 +125,7 @@ def controller_header(result: Plan, identity: str) -> str:
 #define SCHEDULE_H
 #include <stdint.h>
 #define SCHEDULE_FIRST_DIRECTION ({result.first_direction})
-#define SCHEDULE_COUNT {len(entries)}
+#define SCHEDULE_COUNT {len(entries)}{_repeats(result)}
 #define SCHEDULE_TOTAL_MS {sum(entries)}UL
 #define SCHEDULE_MOTOR_RPM {result.robot.motor_speed * 30 / np.pi:.3f}
 #define SCHEDULE_START_X {x:.6f}
@@ -141,6 +143,16 @@ static const schedule_checkpoint SCHEDULE_TABLE(schedule_checkpoints)[SCHEDULE_C
 }};
 {c_part("schedule.h")}#endif
 """
+
+
+def _after(result: Plan) -> str:
+    """Say what follows the last entry."""
+    return "Stop after the last entry." if result.lap is None else "After the last entry go on with the first."
+
+
+def _repeats(result: Plan) -> str:
+    """Define a macro for a schedule that repeats."""
+    return "" if result.lap is None else "\n#define SCHEDULE_REPEATS 1"
 
 
 def _checkpoints(result: Plan) -> list[str]:

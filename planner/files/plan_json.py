@@ -36,17 +36,24 @@ def load_plan(path: str | Path) -> dict[str, Any]:
         True
     """
     content = read_plan_file(path)
+    check_numbers(content, path)
+    return content
+
+
+def check_numbers(content: dict[str, Any], name: str | Path) -> None:
+    """Check the errors and tables of a plan.json; `name` is that of the file in messages.
+
+    Raises:
+        InputError: one is missing, or has a value that cannot be.
+    """
     try:
-        for name in (*_NUMBERS, *([] if content[GUARANTEE] is None else [GUARANTEE])):
-            if not np.isfinite(float(content[name])):
-                raise InputError(f"{path}: {name} = {content[name]} is no finite number; plan again")
-        for name, width in _TABLES.items():
-            table = np.array(content[name], dtype=float)
+        for key in (*_NUMBERS, *([] if content[GUARANTEE] is None else [GUARANTEE])):
+            if not np.isfinite(float(content[key])):
+                raise InputError(f"{name}: {key} = {content[key]} is no finite number; plan again")
+        for key, width in _TABLES.items():
+            table = np.array(content[key], dtype=float)
             if table.ndim != 2 or table.shape[1] != width or len(table) < 2 or not np.isfinite(table).all():
-                raise InputError(
-                    f"{path}: {name} must have two or more rows of {width} finite numbers; plan again"
-                )
+                raise InputError(f"{name}: {key} must have two or more rows of {width} finite numbers; plan again")
         content["point"]
     except (KeyError, TypeError, ValueError, OverflowError) as broken:
-        raise InputError(f"{path} is not a plan.json of the planner ({broken}); plan again") from None
-    return content
+        raise InputError(f"{name} is not a plan.json of the planner ({broken}); plan again") from None

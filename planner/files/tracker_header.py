@@ -8,6 +8,7 @@ these numbers.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -17,8 +18,10 @@ import numpy as np
 from planner.goal.dubins import ROUNDING
 from planner.paths.path import arc_length
 from planner.planning import line_of_sight
+from planner.planning.lap import turning
 from planner.planning.planned import Plan
 from planner.tracking import clock, displacement, guidance, kalman_filter, tracker, way_back
+from planner.tracking.guidance import tracked_reference
 from planner.tracking.kalman_filter import prior
 from planner.vehicle.vehicle import BEFORE_KNOTS, STEP
 from sim.arrays import Floats
@@ -30,6 +33,7 @@ _PARTS = (
 _PER_LINE = 12  # numbers of a table
 _LARGEST = 32_767
 _FLOAT_EXACT = 3e-6  # rad; in single precision a smaller angle is lost in the rounding
+_PLAN = object()  # stands for a number that the plan decides
 _FLOAT_SLACK = 5e-4  # time units; the same for a time of some thousand units
 
 # Comment of both headers; docs/reference/signs.md defines the signs.
@@ -41,8 +45,21 @@ DIRECTIONS = """\
 
 def tracker_header(result: Plan, identity: str) -> str:
     """Write tracker.h as text; `identity` names the plan."""
+    parts = {
+        "IDENTITY": identity,
+        "NAME": safe_name(result),
+        "MODEL": result.tracked.model,
+        "BYTES": str(table_bytes(result)),
+        **_numbers(result),
+        **_tables(result),
+    }
+    return re.sub(r"@(\w+)@", lambda mark: parts[mark[1]], header_template())
+
+
+def header_template() -> str:
+    """Return tracker.h with @NAME@ in place of each part that a plan decides."""
     code = "\n".join(map(c_part, _PARTS))
-    return f"{_intro(result, identity)}\n{_numbers(result)}\n{c_part('flash.h')}{_tables(result)}\n{code}#endif\n"
+    return f"{_intro()}\n{_macros()}\n{c_part('flash.h')}{_declarations()}\n{code}#endif\n"
 
 
 def rounded(result: Plan) -> Plan:
@@ -51,7 +68,8 @@ def rounded(result: Plan) -> Plan:
     lag, rest = (
         np.round(table / unit) * unit for table in (result.tracked.vehicle.lag, result.tracked.vehicle.rest)
     )
-    rows = np.array([[float(_nine(value)) for value in row] for row in _path(result)])
+    once = replace(result, lap=None)
+    rows = np.array([[float(_nine(value)) for value in row] for row in _path(once)])
     q, heading = rows[:, :2], rows[:, 2]
     guide = replace(result.declared.reference, q=q, heading=heading, arc=arc_length(q))
     tracked = result.tracked._replace(vehicle=replace(result.tracked.vehicle, lag=lag, rest=rest))
@@ -61,7 +79,7 @@ def rounded(result: Plan) -> Plan:
 def table_bytes(result: Plan) -> int:
     """Return the size of the tables in single precision, in bytes."""
     vehicle = result.tracked.vehicle
-    return 2 * (vehicle.lag.size + vehicle.rest.size) + 4 * 3 * len(result.declared.reference.q)
+    return 2 * (vehicle.lag.size + vehicle.rest.size) + 4 * 3 * len(tracked_reference(result).q)
 
 
 def c_part(name: str) -> str:
@@ -74,13 +92,12 @@ def safe_name(result: Plan) -> str:
     return "".join(c for c in result.robot.name if c.isalnum() or c in " -_.")
 
 
-def _intro(result: Plan, identity: str) -> str:
-    name, model = safe_name(result), result.tracked.model
-    return f"""/* Plan {identity}.
- * Tracker for robot "{name}", look-up table {model}: keeps the robot on its plan
+def _intro() -> str:
+    return f"""/* Plan @IDENTITY@.
+ * Tracker for robot "@NAME@", look-up table @MODEL@: keeps the robot on its plan
  * with poses from a camera, and learns the robot. It is softflagella.Tracker in C99 and C++11, with the same
  * formulas in the same order. It needs <math.h>, <stdint.h> and <string.h>, and no heap.
- * Tables: {table_bytes(result)} bytes in single precision; on AVR they are in flash.
+ * Tables: @BYTES@ bytes in single precision; on AVR they are in flash.
  *
  *     static tracker keeper;
  *     tracker_real pose[3] = {{x, y, heading}}, start[3] = {{0, 0, 0}};
@@ -88,6 +105,7 @@ def _intro(result: Plan, identity: str) -> str:
  *     tracker_begin_at(&keeper, 0.01, 0.01, now, start);                     at rest at any pose
  *     tracker_advice advice = tracker_feed(&keeper, now, 0, 0);              no pose
  *     advice = tracker_feed(&keeper, now, pose, seen);                       a pose that was true at `seen`
+ *     advice = tracker_finish_lap(&keeper);                                  ends a path that repeats
  *
  * Turn the motor in advice.direction and flip it at advice.flip_at. Call tracker_feed after each flip, so that the
  * next one is announced. Times are in seconds. x, y and their noise are in tail lengths, the heading and its noise
@@ -121,29 +139,24 @@ typedef double tracker_real;
 """
 
 
-def _numbers(result: Plan) -> str:
+def _macros() -> str:
     """Write the numbers of the code as macros: counts and times as they are, the rest as tracker_real."""
     counts = {
-        "FIRST_DIRECTION": result.first_direction, "STATES": kalman_filter.STATES,
-        "POINTS": len(result.declared.reference.q),
-        "TIMES": result.tracked.vehicle.rest.shape[1], "KNOTS": len(BEFORE_KNOTS),
+        "FIRST_DIRECTION": _PLAN, "STATES": kalman_filter.STATES, "POINTS": _PLAN, "LAP": _PLAN,
+        "TIMES": _PLAN, "KNOTS": len(BEFORE_KNOTS),
         "HALVINGS": line_of_sight.HALVINGS, "MOST_LOOKS": line_of_sight.MOST_LOOKS,
         "KEPT": tracker.KEPT, "LOST": tracker.LOST, "WINDOW": tracker.WINDOW,
-        "SEGMENTS": way_back.SEGMENTS, "STRIDE": guidance.stride(result),
+        "SEGMENTS": way_back.SEGMENTS, "STRIDE": _PLAN,
         "AGREED": displacement.AGREED, "FLIPS": displacement.FLIPS, "CONFIRMED": clock.CONFIRMED,
     }  # fmt: skip
-    times = {"TIME_SCALE": result.robot.time_scale, "LATE": clock.LATE, "EARLY": clock.EARLY}
+    times = {"TIME_SCALE": _PLAN, "LATE": clock.LATE, "EARLY": clock.EARLY}
     reals = {
-        "TAIL_LENGTH_M": result.robot.tail_length,
+        "TAIL_LENGTH_M": _PLAN,
         "STEP": STEP,
-        "SHORTEST": result.minimum_dwell,
-        "AHEAD": result.guidance.ahead,
-        "ROD": result.tracked.rod,
-        "OFFSET": result.tracked.offset,
-        "SWING": result.guidance.swing,
-        "PIVOT_RADIUS": result.tracked.vehicle.pivot_radius,
-        "NET_SPEED": float(result.straight.speed),
-        "NET_DRIFT": float(result.straight.drift),
+        **dict.fromkeys(
+            ("SHORTEST", "AHEAD", "ROD", "OFFSET", "LAP_TURN", "SWING", "PIVOT_RADIUS", "NET_SPEED", "NET_DRIFT"),
+            _PLAN,
+        ),
         "SHORTEST_ROD": guidance.SHORTEST_ROD,
         "LARGEST_STEP": line_of_sight.LARGEST_STEP,
         "TURNS": line_of_sight.TURNS,
@@ -151,9 +164,11 @@ def _numbers(result: Plan) -> str:
         "GATE": tracker.GATE,
         "ALARM_AT": tracker.ALARM_AT,
         "SPREADS": tracker.SPREADS,
-        "PIVOT_DISTANCE": result.tracked.vehicle.pivot_distance,
-        "WAY_AHEAD": guidance.way_ahead(result),
-        "LIMIT": guidance.limit(result),
+        "WITHIN_NORMAL": tracker.WITHIN[0],
+        "WITHIN_UNIFORM": tracker.WITHIN[1],
+        "BELOW_NORMAL": tracker.BELOW[0],
+        "BELOW_UNIFORM": tracker.BELOW[1],
+        **dict.fromkeys(("PIVOT_DISTANCE", "WAY_AHEAD", "LIMIT"), _PLAN),
         "AWAY": guidance.AWAY,
         "STRAIGHT": guidance.STRAIGHT,
         "ROOM": way_back.ROOM,
@@ -163,36 +178,85 @@ def _numbers(result: Plan) -> str:
         "MEAN": displacement.MEAN,
         "WALK": kalman_filter.WALK,
     }
-    lines = [f"#define TRACKER_{name} ({value})" for name, value in counts.items()]
-    lines += [f"#define TRACKER_{name} {value!r}" for name, value in times.items()]
-    lines += [f"#define TRACKER_{name} ((tracker_real){value!r})" for name, value in reals.items()]
+
+    def text(name: str, value: object) -> str:
+        return f"@{name}@" if value is _PLAN else repr(value)
+
+    lines = [f"#define TRACKER_{name} ({text(name, value)})" for name, value in counts.items()]
+    lines += [f"#define TRACKER_{name} {text(name, value)}" for name, value in times.items()]
+    lines += [f"#define TRACKER_{name} ((tracker_real){text(name, value)})" for name, value in reals.items()]
     return "\n".join(lines) + "\n"
 
 
-def _tables(result: Plan) -> str:
-    vehicle, unit = result.tracked.vehicle, _lag_unit(result)
-    most = kalman_filter.most(result)
-    lag, rest = (np.round(table / unit).astype(int) for table in (vehicle.lag, vehicle.rest))
+def _numbers(result: Plan) -> dict[str, str]:
+    """Write the numbers that the plan decides, by the name of their macro."""
+    vehicle, straight = result.tracked.vehicle, result.straight
+    numbers = {
+        "FIRST_DIRECTION": result.first_direction,
+        "POINTS": len(tracked_reference(result).q),
+        "LAP": guidance.lap_points(result),
+        "TIMES": vehicle.rest.shape[1],
+        "STRIDE": guidance.stride(result),
+        "TIME_SCALE": result.robot.time_scale,
+        "TAIL_LENGTH_M": result.robot.tail_length,
+        "SHORTEST": result.minimum_dwell,
+        "AHEAD": result.guidance.ahead,
+        "ROD": result.tracked.rod,
+        "OFFSET": result.tracked.offset,
+        "LAP_TURN": turning(result.declared.reference) if result.lap else 0.0,
+        "SWING": result.guidance.swing,
+        "PIVOT_RADIUS": vehicle.pivot_radius,
+        "NET_SPEED": float(straight.speed),
+        "NET_DRIFT": float(straight.drift),
+        "PIVOT_DISTANCE": vehicle.pivot_distance,
+        "WAY_AHEAD": guidance.way_ahead(result),
+        "LIMIT": guidance.limit(result),
+    }
+    return {name: repr(value) for name, value in numbers.items()}
+
+
+def _declarations() -> str:
+    """Declare the tables."""
     real, short = "static const tracker_real tracker_", "static const int16_t tracker_"
-    x, y, heading = (_table(column, _nine) for column in _path(result).T)
     return "\n".join(
         [
-            f"{real}start[3] = {_row(result.start)};",
-            f"{real}twist[2][3] = {{{', '.join(_row(twist) for twist in vehicle.twist.tolist())}}};",
-            f"{real}current[2] = {_row(vehicle.current.tolist())};",
+            f"{real}start[3] = @start@;",
+            f"{real}twist[2][3] = @twist@;",
+            f"{real}current[2] = @current@;",
             f"{real}changes[4] = {_row(kalman_filter.CHANGES)};",
-            f"{real}most[TRACKER_STATES - 3] = {_row(most)};",
-            f"{real}lag_unit[3] = {_row(unit.tolist())};",
-            f"{real}prior[TRACKER_STATES * TRACKER_STATES] TRACKER_FLASH = {_table(np.array(prior(result)))};",
+            f"{real}most[TRACKER_STATES - 3] = @most@;",
+            f"{real}lag_unit[3] = @lag_unit@;",
+            f"{real}prior[TRACKER_STATES * TRACKER_STATES] TRACKER_FLASH = @prior@;",
             f"{real}knots[TRACKER_KNOTS] TRACKER_FLASH = {_table(BEFORE_KNOTS)};",
-            f"{real}path_x[TRACKER_POINTS] TRACKER_FLASH = {x};",
-            f"{real}path_y[TRACKER_POINTS] TRACKER_FLASH = {y};",
-            f"{real}path_heading[TRACKER_POINTS] TRACKER_FLASH = {heading};",
-            f"{short}rest[2 * TRACKER_TIMES * 3] TRACKER_FLASH = {_table(rest)};",
-            f"{short}lag_left[TRACKER_KNOTS * TRACKER_TIMES * 3] TRACKER_FLASH = {_table(lag[0])};",
-            f"{short}lag_right[TRACKER_KNOTS * TRACKER_TIMES * 3] TRACKER_FLASH = {_table(lag[1])};\n",
+            f"{real}path_x[TRACKER_POINTS] TRACKER_FLASH = @path_x@;",
+            f"{real}path_y[TRACKER_POINTS] TRACKER_FLASH = @path_y@;",
+            f"{real}path_heading[TRACKER_POINTS] TRACKER_FLASH = @path_heading@;",
+            f"{short}rest[2 * TRACKER_TIMES * 3] TRACKER_FLASH = @rest@;",
+            f"{short}lag_left[TRACKER_KNOTS * TRACKER_TIMES * 3] TRACKER_FLASH = @lag_left@;",
+            f"{short}lag_right[TRACKER_KNOTS * TRACKER_TIMES * 3] TRACKER_FLASH = @lag_right@;\n",
         ]
     )
+
+
+def _tables(result: Plan) -> dict[str, str]:
+    """Write the tables that the plan decides, by their names."""
+    vehicle, unit = result.tracked.vehicle, _lag_unit(result)
+    lag, rest = (np.round(table / unit).astype(int) for table in (vehicle.lag, vehicle.rest))
+    x, y, heading = (_table(column, _nine) for column in _path(result).T)
+    return {
+        "start": _row(result.start),
+        "twist": f"{{{', '.join(_row(twist) for twist in vehicle.twist.tolist())}}}",
+        "current": _row(vehicle.current.tolist()),
+        "most": _row(kalman_filter.most(result)),
+        "lag_unit": _row(unit.tolist()),
+        "prior": _table(np.array(prior(result))),
+        "path_x": x,
+        "path_y": y,
+        "path_heading": heading,
+        "rest": _table(rest),
+        "lag_left": _table(lag[0]),
+        "lag_right": _table(lag[1]),
+    }
 
 
 def _lag_unit(result: Plan) -> Floats:
@@ -203,7 +267,8 @@ def _lag_unit(result: Plan) -> Floats:
 
 def _path(result: Plan) -> Floats:
     """Return the reference of the pivot as rows of place and heading, (m, 3)."""
-    return np.column_stack([result.declared.reference.q, result.declared.reference.heading])
+    reference = tracked_reference(result)
+    return np.column_stack([reference.q, reference.heading])
 
 
 def _nine(value: float) -> str:

@@ -15,6 +15,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from planner.paths.distance import distance_to, two_sided
+from planner.paths.units import length_in_lab
 from planner.planning.picture import REPLAYED, draw_tracks
 from sim.arrays import Floats
 from sim.io.errors import InputError
@@ -53,7 +54,7 @@ class TrackingError:
         """The errors in one sentence, in units of length and in l."""
         verdict = "within" if self.largest <= self.stated else "ABOVE"
         rms, largest, stated, raw_rms, raw_largest, missed = (
-            f"{format_length(value * self.tail_length)} ({value:.3g} l)"
+            length_in_lab(value, self.tail_length)
             for value in (self.rms, self.largest, self.stated, self.raw_rms, self.raw_largest, self.missed)
         )
         return (
@@ -71,15 +72,18 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
             time_bar, x_over_l, y_over_l, heading_rad.
 
     Raises:
-        InputError: a column is missing, or a value is no finite number.
+        InputError: a column is missing, a value is no finite number, or time goes back.
     """
-    track = _in_tails(track, plan["robot"])
+    track = track_in_tails(track, plan["robot"])
     values = {name: numbers_of(track[name]).to_numpy() for name in _COLUMNS}
     pose = np.stack([values["x_over_l"], values["y_over_l"], values["heading_rad"]], 1)
     if not (np.abs([*pose.T, values["time_bar"]]) < _LARGEST).all():
         raise InputError("the track has a value that is not a finite number; correct the file")
     if len(pose) < 2 or not np.ptp(values["time_bar"]) > 0:
         raise InputError("the track has no two times; give a row for each time, in order")
+    back = np.flatnonzero(np.diff(values["time_bar"]) < 0)
+    if len(back):
+        raise InputError(f"the track's time goes back at row {back[0] + 2}; give a row for each time, in order")
     offset = np.array([plan.get("offset_over_l", 0.0), 0.0, 0.0])
     tracked = planar.compose(pose, offset)[:, :2]
     declared = distance_to(np.array(plan["reference"]), tracked)
@@ -98,7 +102,7 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
     )
 
 
-def _in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFrame:
+def track_in_tails(track: pd.DataFrame, robot: Mapping[str, Any]) -> pd.DataFrame:
     """Return a track with the columns of a replay."""
     if set(_COLUMNS) <= set(track):
         return track

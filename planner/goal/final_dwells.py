@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from planner.paths.distance import distance_to
 from planner.vehicle.rollout import Switches, poses_at_flips
@@ -62,6 +61,8 @@ class _Ending:
 
     def solved(self) -> tuple[Switches, float]:
         """Return the changed schedule and its cost."""
+        from scipy.optimize import least_squares  # here, for it takes longer to load than most plans to make
+
         first = self._switches.first_direction
         kept, last = self._switches.dwells[: self._kept], self._switches.dwells[self._kept :]
         solution = least_squares(

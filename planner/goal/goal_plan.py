@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from planner.paths.obstacles import Footprint, FreeSpace
-from planner.paths.units import in_lab
+from planner.paths.units import heading_in_degrees, in_lab, place_in_lab
 from planner.planning.planned import Plan
 from sim.io.deprecated import old_attributes
 from sim.io.notebook import as_html
@@ -47,6 +47,18 @@ class GoalPlan:
         """Predicted distance from the goal, and difference of the heading."""
         turn = (self.end[2] - self.goal[2] + math.pi) % (2 * math.pi) - math.pi
         return math.dist(self.end[:2], self.goal[:2]), abs(turn)
+
+    def lines(self) -> list[str]:
+        """Say where the way ends, and what it keeps clear of."""
+        robot, (off, turned), (x, y, heading) = self.plan.robot, self.end_error, self.end
+        lines = [
+            f"end: {place_in_lab(x, y, robot)}, heading {heading_in_degrees(heading)}; "
+            f"from the goal {in_lab(off, robot)} and {math.degrees(turned):.1g} degrees as predicted"
+        ]
+        if not self.free_space.empty:
+            margin, clearance = (in_lab(value, robot) for value in (self.margin, self.clearance))
+            lines.append(f"margin {margin} around the body; predicted clearance {clearance}")
+        return lines
 
     def __repr__(self) -> str:
         robot, (off, turned) = self.plan.robot, self.end_error

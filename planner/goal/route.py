@@ -17,8 +17,10 @@ import numpy as np
 from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, words
 from planner.goal.lattice import Lattice, RouteLimits
 from planner.paths.obstacles import FreeSpace
+from planner.paths.units import in_lab, place_in_lab
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.model.robot import Robot
 
 COURSES = 24  # tried at a stop whose course is free
 LEVELS = ((0.6, 16), (0.3, 32))  # spacing of the lattice, in radii, and number of courses
@@ -63,7 +65,7 @@ class Route:
 Lattices = dict[tuple[float, int], Lattice]
 
 
-def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lattices) -> Route:
+def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lattices, robot: Robot) -> Route:
     """Find a short route through the stops.
 
     Args:
@@ -71,12 +73,13 @@ def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lat
         limits: least radius and free space.
         margin: clearance of the body.
         lattices: cache of the lattices of these limits and stops; new ones are added.
+        robot: its tail length, for lengths in messages.
 
     Raises:
         NoWayError: a stop is not free, or no way was found on the finest lattice.
     """
     for number, stop in enumerate(stops):
-        _check(stop, number, len(stops), limits, margin)
+        _check(stop, number, len(stops), limits, margin, robot)
     direct = _direct(stops, limits, margin)
     if limits.space.empty and direct is not None:
         return direct
@@ -90,27 +93,24 @@ def route(stops: list[Floats], limits: RouteLimits, margin: float, lattices: Lat
         candidates = [candidate for candidate in (direct, around) if candidate is not None]
         if candidates:
             return min(candidates, key=lambda candidate: candidate.length)
+    kept, radius, step = (in_lab(x, robot) for x in (margin, limits.radius, LEVELS[-1][0] * limits.radius))
     raise NoWayError(
-        f"there is no way to the goal that leaves {margin:.3g} l around the robot and turns with a radius of "
-        f"{limits.radius:.3g} l, on a lattice with steps of {LEVELS[-1][0] * limits.radius:.2g} l and "
-        f"{360 / LEVELS[-1][1]:.0f} degrees; move the goal or the obstacles"
+        f"there is no way to the goal that leaves {kept} around the robot and turns with a radius of {radius}, on "
+        f"a lattice with steps of {step} and {360 / LEVELS[-1][1]:.0f} degrees; move the goal or the obstacles"
     )
 
 
-def _check(stop: Floats, number: int, count: int, limits: RouteLimits, margin: float) -> None:
-    clearance = limits.clearance(stop)
-    if clearance.max() >= margin:
+def _check(stop: Floats, number: int, count: int, limits: RouteLimits, margin: float, robot: Robot) -> None:
+    clearance = float(limits.clearance(stop).max())
+    if clearance >= margin:
         return
     name = "start" if number == 0 else "goal" if number == count - 1 else f"place {number} on the way"
-    x, y = stop[0, :2]
+    x, y = stop[0, :2].tolist()
+    pivot, apart = place_in_lab(x, y, robot), in_lab(abs(clearance), robot)
     raise NoWayError(
-        f"there is no way: at the {name}, with its pivot at ({x:.3g}, {y:.3g}) l, the robot is "
-        + (
-            f"{-clearance.max():.2g} l inside"
-            if clearance.max() < 0
-            else f"only {clearance.max():.2g} l away from"
-        )
-        + f" what it must keep out of; it needs {margin:.3g} l, which is the plan's stated error"
+        f"there is no way: at the {name}, with its pivot at {pivot}, the robot is "
+        f"{f'{apart} inside' if clearance < 0 else f'only {apart} away from'} what it must keep out of; it needs "
+        f"{in_lab(margin, robot)}, which is the plan's stated error"
     )
 
 

@@ -14,14 +14,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from planner.goal.arrive import arrive
 from planner.goal.final_dwells import end_at_goal
 from planner.goal.goal_plan import GoalPlan, Pose
 from planner.goal.lattice import RouteLimits
 from planner.goal.route import COURSES, Lattices, NoWayError, Route, route
+from planner.goal.swings import swung_clear
 from planner.paths.obstacles import Circle, Footprint, FreeSpace, Polygon
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Drift, Reference, slips, slips_at_heading
@@ -33,8 +36,8 @@ from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.planning.schedule import Start, follow
 from planner.vehicle.calibration_table import CalibrationKnowledge
+from planner.vehicle.coefficient_modes import OWN_TABLE
 from planner.vehicle.dwell_choice import Objective, check_least, dwells_for
-from planner.vehicle.from_table import OWN_TABLE
 from planner.vehicle.rollout import predicted_poses
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
@@ -65,6 +68,7 @@ def to_goal(
     minimum_seconds: float | None = None,
     tolerance: float | None = None,
     feedback: bool = False,
+    arrive_seconds: float | None = None,
     knowledge: CalibrationKnowledge | None = None,
     seed: int = 0,
 ) -> GoalPlan:
@@ -84,6 +88,7 @@ def to_goal(
         tolerance: largest acceptable stated error [l].
         feedback: the robot's pose will be measured every 20 flips (`planner.tracking.tracker`), so the margin
             around obstacles is the stated error with feedback.
+        arrive_seconds: the time from start to goal; see `planner.goal.arrive`. Default: as the objective says.
         knowledge: what a calibration found besides the robot: covariance, current.
         seed: of the random robots from which the stated error is computed.
 
@@ -104,26 +109,32 @@ def to_goal(
         tolerance=tolerance,
         seed=seed,
     )
+    tracked = tracked_vehicle(robot, lookup, "head_centre", knowledge)
+    space = FreeSpace.of(keep_out, walls)
+    return make_goal_plan(
+        start, goal, tracked, request, space, via=via, feedback=feedback, arrive_seconds=arrive_seconds
+    )
+
+
+def make_goal_plan(
+    start: Sequence[float],
+    goal: Sequence[float],
+    tracked: TrackedVehicle,
+    request: PlanRequest,
+    space: FreeSpace,
+    *,
+    via: Sequence[Sequence[float]] = (),
+    feedback: bool = False,
+    arrive_seconds: float | None = None,
+) -> GoalPlan:
+    """Plan from a pose to a pose for a vehicle and a request; see `to_goal`."""
     first, last = _pose(start, "start"), _pose(goal, "goal")
     places = tuple(_place(place) for place in via)
-    tracked = tracked_vehicle(robot, lookup, "head_centre", knowledge)
-    task = _Task(tracked, first, last, places, FreeSpace.of(keep_out, walls), request, feedback)
-    dwells = dwells_for(tracked.vehicle, objective, request.least_dwell(robot))
-    refusal: InputError | None = None
-    for dwell in (dwells[i] for i in np.unique(np.linspace(0, len(dwells) - 1, _DWELLS).astype(int))):
-        try:
-            trip = task.plan_with(dwell)
-        except NoWayError as no_way:
-            refusal = refusal or no_way
-            continue
-        if tolerance is None or trip.plan.stated_error <= tolerance:
-            return trip
-        refusal = InputError(
-            f"tolerance {in_lab(tolerance, robot)} cannot be kept: with dwells of {time_in_lab(dwell, robot)} the "
-            f"stated error is {in_lab(trip.plan.stated_error, robot)}; allow more"
-        )
-    assert refusal is not None
-    raise refusal
+    task = _Task(tracked, first, last, places, space, request, feedback)
+    if arrive_seconds is None:
+        return task.plan_with(request)
+    trip, arrival = arrive(arrive_seconds, tracked, request, task.plan_with, lambda trip: trip.plan)
+    return replace(trip, plan=replace(trip.plan, arrival=arrival))
 
 
 def _pose(values: Sequence[float], name: str) -> Pose:
@@ -165,7 +176,40 @@ class _Task:
         self.body = Footprint.of(tracked.robot, -tracked.vehicle.pivot_distance)
         self._lattices: dict[Drift, Lattices] = {}
 
-    def plan_with(self, dwell: float) -> GoalPlan:
+    def plan_with(self, request: PlanRequest, longer: float = 0.0) -> GoalPlan:
+        """Plan with the dwell that the request prefers; where there is no way, with shorter ones.
+
+        Args:
+            request: objective or dwell, tolerance.
+            longer: length that a swing adds to the way.
+
+        Raises:
+            NoWayError: there is no way.
+            InputError: the tolerance is not kept.
+        """
+        robot = self.tracked.robot
+        if request.dwell is None:
+            dwells = dwells_for(self.tracked.vehicle, request.objective, request.least_dwell(robot))
+        else:
+            dwells = [request.dwell]
+        refusal: InputError | None = None
+        for dwell in (dwells[i] for i in np.unique(np.linspace(0, len(dwells) - 1, _DWELLS).astype(int))):
+            try:
+                trip = self._plan_with_dwell(dwell, longer)
+            except NoWayError as no_way:
+                refusal = refusal or no_way
+                continue
+            if request.tolerance is None or trip.plan.stated_error <= request.tolerance:
+                return trip
+            refusal = InputError(
+                f"tolerance {in_lab(request.tolerance, robot)} cannot be kept: with dwells of "
+                f"{time_in_lab(dwell, robot)} the stated error is {in_lab(trip.plan.stated_error, robot)}; allow "
+                "more"
+            )
+        assert refusal is not None
+        raise refusal
+
+    def _plan_with_dwell(self, dwell: float, longer: float) -> GoalPlan:
         """Plan with one shortest dwell; raise the margin until it is at least the stated error.
 
         Raises:
@@ -177,8 +221,9 @@ class _Task:
         limits = RouteLimits(vehicle.pivot_radius, self.body, self.free_space, drift)
         margin = 0.0 if self.free_space.empty else 1.5 * straight.largest
         for _ in range(_MARGINS):
-            track = route(self._stops(drift), limits, margin, self._lattices.setdefault(drift, {}))
-            trip = self._follow(track, drift, straight, dwell, margin)
+            lattices = self._lattices.setdefault(drift, {})
+            track = route(self._stops(drift), limits, margin, lattices, self.tracked.robot)
+            trip = self._follow(track, drift, straight, dwell, margin, longer)
             needed = trip.plan.feedback_error if self.feedback else trip.plan.stated_error
             if self.free_space.empty or (needed <= margin and trip.clearance > 0):
                 return trip
@@ -203,10 +248,15 @@ class _Task:
         course = heading + float(slips_at_heading(np.array(heading), drift))
         return np.array([x - a * math.cos(heading), y - a * math.sin(heading), course])
 
-    def _follow(self, track: Route, drift: Drift, straight: Zigzag, dwell: float, margin: float) -> GoalPlan:
+    def _follow(
+        self, track: Route, drift: Drift, straight: Zigzag, dwell: float, margin: float, longer: float
+    ) -> GoalPlan:
         """Plan the schedule that follows a track of the pivot and ends at the goal."""
         tracked, vehicle = self.tracked, self.tracked.vehicle
         declared, sense = self._declared(track, drift)
+        if longer:
+            swinging, swing = swung_clear(declared.reference, longer, tracked, drift, self.free_space, margin)
+            declared = replace(declared, reference=swinging, swing=swing)
         reference = declared.reference
         guidance = choose_guidance(vehicle, declared, straight, dwell)
         switches = follow(reference, vehicle, guidance, tracked.offset, start=Start(self.start, sense))
@@ -228,7 +278,8 @@ class _Task:
     def _declared(self, track: Route, drift: Drift) -> tuple[Declared, int]:
         """Turn a track of the pivot into a declared path, and say to which side it turns first."""
         if track.length > LONGEST:
-            raise InputError(f"the way is {track.length:.3g} l long; at most {LONGEST:g} l can be planned")
+            length = in_lab(track.length, self.tracked.robot)
+            raise InputError(f"the way is {length} long; at most {LONGEST:g} l can be planned")
         poses = track.poses(_SPACING)
         if len(poses) < 2:
             raise InputError("start and goal are the same; nothing to do")

@@ -1,1 +1,1 @@
-"""Jobs of a laboratory: paths that keep clear of obstacles, tours of places, and coverage of regions."""
+"""Jobs of a laboratory: paths clear of obstacles, tours of places, coverage of regions, several robots."""

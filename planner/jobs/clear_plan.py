@@ -24,8 +24,8 @@ from planner.planning.kept_clear import Detour, KeptClear
 from planner.planning.plan import Redirect, make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
+from planner.vehicle.coefficient_modes import OWN_TABLE
 from planner.vehicle.dwell_choice import dwells_for
-from planner.vehicle.from_table import OWN_TABLE
 from planner.vehicle.rollout import predicted_poses
 from planner.vehicle.tracked_point import TrackedVehicle
 
@@ -113,7 +113,7 @@ class Clearing:
             margin = max(_MORE * self._needed(plan), 1.02 * margin)
             reference, detours = self._around(around, declared, margin)
             if detours:
-                plan = follow(_redeclared(declared, reference, self.drawn))
+                plan = follow(redeclared(declared, reference, self.drawn))
             poses = predicted_poses(self.tracked.vehicle, plan.switches)
             clearance = float(body.clearance(poses, self.space).min())
             if self._needed(plan) <= margin and clearance > 0:
@@ -140,8 +140,8 @@ class Clearing:
         return plan.feedback_error if self.feedback else plan.stated_error
 
 
-def _redeclared(declared: Declared, reference: Reference, drawn: Path2D) -> Declared:
+def redeclared(declared: Declared, reference: Reference, drawn: Path2D) -> Declared:
     """Declare a reference in place of the nearest one."""
     off_drawn, missed = two_sided(reference.p, drawn.polyline())
     curvature = float(np.abs(reference.curvature).max())
-    return Declared(reference, curvature, off_drawn, missed, declared.warnings)
+    return replace(declared, reference=reference, curvature=curvature, off_drawn=off_drawn, missed=missed)

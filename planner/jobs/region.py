@@ -64,7 +64,7 @@ def lanes(field: Field, width: float, angle: float, *, apart: float) -> Floats:
     low, high = outline.min(0), outline.max(0)
     count = max(1, int(np.ceil((high[1] - low[1]) / width)))
     spacing = (high[1] - low[1]) / count
-    step = width / 10
+    step = min(width, high[0] - low[0]) / 10
     x = np.arange(low[0], high[0] + step, step)
     found = []
     for k in range(count):
@@ -80,7 +80,7 @@ def lanes(field: Field, width: float, angle: float, *, apart: float) -> Floats:
             else:
                 runs.append([first, last])
         found += [[[first, middle], [max(last, first + step), middle]] for first, last in runs]
-    return np.array(found) @ turn
+    return np.array(found).reshape(-1, 2, 2) @ turn
 
 
 def share_covered(field: Field, track: Floats, width: float) -> float:

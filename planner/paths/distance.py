@@ -5,11 +5,11 @@ For a few million pairs all distances take less time than importing the tree of 
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
+from planner.paths.path import steps_of
 from sim.arrays import Floats, Integers
 
 TIE = 1e-12  # difference of distances that are equal
@@ -128,6 +128,6 @@ def two_sided(first: Floats, second: Floats) -> tuple[float, float]:
 def _filled(polyline: Floats) -> Floats:
     """Add points to a polyline, so that all steps are short compared with its length."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(polyline, axis=0).T))])
-    count = max(2, min(4000, math.ceil(length[-1] / max(float(np.diff(length).min()), length[-1] / 4000))))
+    count = max(2, min(4000, steps_of(length[-1], max(float(np.diff(length).min()), length[-1] / 4000))))
     at = np.union1d(np.linspace(0, length[-1], count), length)
     return np.stack([np.interp(at, length, polyline[:, i]) for i in (0, 1)], 1)

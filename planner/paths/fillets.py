@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from planner.paths.path import Path2D
+from planner.paths.path import Path2D, steps_of
 from sim.arrays import Floats
 
 CORNER = math.radians(15.0)  # larger kinks are corners; smaller ones belong to curves
@@ -53,7 +53,7 @@ def fillet(path: Path2D, radius: float) -> Path2D:
         start = points[i] - reach[i] * into
         inward = math.copysign(1.0, angle[i]) * np.array([-into[1], into[0]])
         centre = start + radius * inward
-        steps = np.linspace(0, angle[i], max(8, math.ceil(abs(angle[i]) / math.radians(2))))
+        steps = np.linspace(0, angle[i], max(8, steps_of(abs(angle[i]), math.radians(2))))
         spoke = start - centre
         c, s = np.cos(steps), np.sin(steps)
         rounded.append(centre + np.stack([c * spoke[0] - s * spoke[1], s * spoke[0] + c * spoke[1]], 1))

@@ -7,7 +7,7 @@ distance of any disc from any region, negative inside. Lengths in l.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -116,6 +116,20 @@ class FreeSpace:
         """Make free space from regions and walls; polygons may be given as points (n, 2)."""
         regions = tuple(shape if isinstance(shape, Circle | Polygon) else Polygon.of(shape) for shape in keep_out)
         return FreeSpace(regions, walls if isinstance(walls, Polygon) or walls is None else Polygon.of(walls))
+
+    @staticmethod
+    def from_dict(content: Mapping[str, Any]) -> FreeSpace:
+        """Read the content that `to_dict` returns.
+
+        Raises:
+            InputError: a region is none.
+            KeyError, TypeError, ValueError: the content is another one.
+        """
+        regions = [
+            Circle(*map(float, region["circle"])) if "circle" in region else Polygon.of(region["polygon"])
+            for region in content["keep_out"]
+        ]
+        return FreeSpace.of(regions, content["walls"])
 
     @property
     def empty(self) -> bool:

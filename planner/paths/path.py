@@ -17,6 +17,7 @@ from sim.io.errors import InputError
 _CIRCLE_POINTS = 720
 _LARGEST = 1e100  # coordinate: squares of larger ones overflow
 _MOST_SMOOTHED = 200_000
+_EVEN = 1e-9  # of a step, that rounding may add to a length
 
 
 @dataclass(frozen=True)
@@ -115,9 +116,14 @@ def arc_length(polyline: Floats) -> Floats:
 def resample(polyline: Floats, spacing: float) -> Floats:
     """Place points at equal arc length, at most `spacing` apart; the ends are kept."""
     lengths = arc_length(polyline)
-    count = max(2, math.ceil(lengths[-1] / spacing) + 1)
+    count = max(2, steps_of(lengths[-1], spacing) + 1)
     at = np.linspace(0, lengths[-1], count)
     return np.stack([np.interp(at, lengths, polyline[:, i]) for i in (0, 1)], 1)
+
+
+def steps_of(length: float, most: float) -> int:
+    """Return the number of equal steps of a length, at most `most` each, whatever the last bits of both are."""
+    return math.ceil(length / most - _EVEN)
 
 
 def smoothed(path: Path2D, length: float) -> tuple[Path2D, float]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.paths.path import Path2D
-from planner.paths.shapes import SHAPES, like_a_shape, shape_of
+from planner.paths.shapes import SHAPES, like_a_shape, nearest_shape, shape_of
 from planner.paths.svg_drawing import read_svg
 from sim.arrays import Floats
 from sim.io.errors import InputError, naming
@@ -60,7 +60,8 @@ def read_path(source: str | Path, *, closed: bool | None = None, shape: str | No
     if path is not None:
         return Drawing(path, None)
     if like_a_shape(words) and not Path(source).exists():
-        raise InputError(f"{words}: no such file or shape; shapes are {SHAPES}")
+        near = nearest_shape(words)
+        raise InputError(f"{words}: no such file or shape; {f'is it {near}? ' if near else ''}shapes are {SHAPES}")
     with naming(source):
         if Path(source).suffix.lower() == ".svg":
             return Drawing(*read_svg(Path(source), closed, shape))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 
@@ -11,6 +12,7 @@ from sim.io.errors import InputError
 SHAPES = "circle:RADIUS, square:SIDE, triangle:SIDE, polygon:CORNERS:SIDE"
 _MOST_CORNERS = 1000
 _CORNERS = {"triangle": 3, "square": 4}
+_ALIKE = 0.75  # least likeness of a misspelt name, see `difflib`
 _LIKE_A_SHAPE = re.compile(r"[A-Za-z]+(:[^/\\]*)?")
 
 
@@ -43,3 +45,13 @@ def shape_of(words: str) -> Path2D | None:
 def like_a_shape(words: str) -> bool:
     """Tell whether words look like a shape, known or not: hexagon:3, or circle without a size."""
     return _LIKE_A_SHAPE.fullmatch(words) is not None
+
+
+def nearest_shape(words: str) -> str:
+    """Correct the name of a misspelt shape: square:3 for squre:3; empty where no shape has such a name."""
+    name, colon, sizes = words.partition(":")
+    names = {shape.partition(":")[0]: shape for shape in SHAPES.split(", ")}
+    near = difflib.get_close_matches(name.lower(), names, 1, _ALIKE)
+    if not near or near[0] == name:
+        return ""
+    return f"{near[0]}:{sizes}" if colon else names[near[0]]

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from planner.paths.path import Path2D
+from planner.paths.path import Path2D, steps_of
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.io.reading import read_bytes
@@ -126,7 +126,8 @@ def _subpaths(elements: list[Any]) -> dict[str, tuple[Floats, bool]]:
         kind = str(element.values.get("tag", type(element).__name__)).lower()
         counts[kind] = counts.get(kind, 0) + 1
         name = str(element.id) if element.id else f"{kind}{counts[kind]}"
-        parts = [_points(SvgPath(part)) for part in SvgPath(element).as_subpaths()]
+        outline = SvgPath(element).reify()  # a turned circle or rectangle still has its transform
+        parts = [_points(SvgPath(part)) for part in outline.as_subpaths()]
         parts = [part for part in parts if len(part[0]) > 1]
         for i, part in enumerate(parts):
             part_name = name if len(parts) == 1 else f"{name}/{i + 1}"
@@ -160,4 +161,4 @@ def _enough(curve: Any) -> int:
     moves = np.diff(probes, axis=0)
     moves = moves[np.hypot(moves[:, 0], moves[:, 1]) > 0]
     turns = np.diff(np.unwrap(np.arctan2(moves[:, 1], moves[:, 0])))
-    return max(_PROBES, math.ceil(_PROBES * float(np.abs(turns).max(initial=0.0)) / _TURN))
+    return max(_PROBES, steps_of(_PROBES * float(np.abs(turns).max(initial=0.0)), _TURN))

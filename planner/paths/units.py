@@ -5,12 +5,14 @@ A message gives lengths in mm, cm or m first and in tail lengths l second.
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from sim.io.errors import InputError
-from sim.io.units import format_length, format_time, to_si
+from sim.io.units import format_length, format_time, of_kind, to_si
 
 if TYPE_CHECKING:  # the command needs UNITS before it loads NumPy
     from planner.paths.path import Path2D
@@ -28,7 +30,12 @@ _SENSIBLE = (3.0, 300.0)  # length in l
 
 def in_lab(value: float, robot: Robot) -> str:
     """Write a length given in tail lengths: 3.52 cm (0.32 l)."""
-    return f"{format_length(value * robot.tail_length)} ({_tails(value)} l)"
+    return length_in_lab(value, robot.tail_length)
+
+
+def length_in_lab(value: float, tail_length: float) -> str:
+    """Write a length given in tail lengths; one of them is `tail_length` in m."""
+    return f"{format_length(value * tail_length)} ({_tails(value)} l)"
 
 
 def time_in_lab(value: float, robot: Robot) -> str:
@@ -36,11 +43,34 @@ def time_in_lab(value: float, robot: Robot) -> str:
     return f"{format_time(value * robot.time_scale)} ({value:.2g} time units)"
 
 
+def read_time(words: str, name: str) -> float:
+    """Read a time such as 12min, 90s or 1h20min, in seconds.
+
+    Raises:
+        InputError: the words are no time above 0; the message begins with `name`.
+    """
+    units = "|".join(of_kind("time"))
+    parts = re.findall(rf"\s*([0-9.]+)\s*({units})(?![a-z])", words)
+    try:
+        seconds = sum(float(to_si(float(number), unit)) for number, unit in parts)
+    except ValueError:
+        seconds = 0.0
+    if not re.fullmatch(rf"(\s*[0-9.]+\s*({units}))+\s*", words) or not 0 < seconds < math.inf:
+        raise InputError(f"{name} {words}; write a time above 0 with its unit, such as 90s, 12min or 1h20min")
+    return seconds
+
+
 def place_in_lab(x: float, y: float, robot: Robot) -> str:
     """Write a place given in tail lengths: (3.52, 1.1) cm = (0.32, 0.1) l."""
     cm = 100 * robot.tail_length
     lab, tails = (", ".join(_fixed(s * value, n) for value in (x, y)) for s, n in ((cm, 2), (1.0, 3)))
     return f"({lab}) cm = ({tails}) l"
+
+
+def heading_in_degrees(heading: float) -> str:
+    """Write a heading given in radians, above −180 and up to 180 degrees: 91.2 degrees."""
+    angle = round(math.degrees(math.remainder(heading, math.tau)), 1)
+    return f"{_fixed(180.0 if angle == -180 else angle, 1)} degrees"
 
 
 def _fixed(value: float, places: int) -> str:
@@ -87,7 +117,7 @@ def check_size(path: Path2D, robot: Robot, turn_radius: float) -> None:
         )
 
 
-def check_unstated_unit(path: Path2D, robot: Robot, turn_radius: float, speed: float) -> None:
+def check_unstated_unit(path: Path2D, robot: Robot, turn_radius: float, speed: float, what: str = "path") -> None:
     """Ask for the unit of a path that is very large if its numbers are tail lengths, which nobody said.
 
     Args:
@@ -95,6 +125,7 @@ def check_unstated_unit(path: Path2D, robot: Robot, turn_radius: float, speed: f
         robot: its tail length and unit of time.
         turn_radius: of the robot's circle, in l.
         speed: net speed along a path, in l per unit of time.
+        what: what the path is, for the message.
 
     Raises:
         InputError: the path is more than MOST_CIRCLES circles across, or takes more than MOST_SECONDS.
@@ -103,7 +134,7 @@ def check_unstated_unit(path: Path2D, robot: Robot, turn_radius: float, speed: f
     seconds = path.length / max(speed, 1e-9) * robot.time_scale
     if circles > MOST_CIRCLES or seconds > MOST_SECONDS:
         raise InputError(
-            f"the path is {describe(path, robot)} if its numbers are tail lengths: {circles:.0f} of the robot's "
+            f"the {what} is {describe(path, robot)} if its numbers are tail lengths: {circles:.0f} of the robot's "
             f"circles across, about {format_time(seconds)}; say its unit, --unit l if this is meant"
             f"{_remedy(path, robot, ('l',))}"
         )

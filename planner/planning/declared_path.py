@@ -17,7 +17,8 @@ import numpy as np
 from planner.paths.path import Path2D
 from planner.paths.tractrix import Reference, reference
 from planner.paths.units import TooTightError, extent, in_lab, place_in_lab
-from planner.planning.feasible import TIGHTEST, Feasibility, feasible, spacing
+from planner.planning.arrival import Swing
+from planner.planning.feasible import TIGHTEST, Feasibility, feasible, place_of_largest, spacing
 from planner.planning.progress import Progress
 from planner.planning.remedy import remedy
 from planner.planning.request import Corner
@@ -35,6 +36,7 @@ class Declared:
     off_drawn: float  # largest distance of a declared point from the drawn path
     missed: float  # largest distance of a drawn point from the declared path
     warnings: tuple[str, ...]  # in words
+    swing: Swing | None = None  # that takes time
 
 
 def declare(raw: Path2D, feasibility: Feasibility, progress: Progress | None = None) -> Declared:
@@ -69,7 +71,7 @@ def _too_tight(raw: Path2D, feasibility: Feasibility, progress: Progress | None)
     robot, vehicle = feasibility.robot, feasibility.vehicle
     drawn = reference(raw, feasibility.rod, spacing(raw), feasibility.drift)
     curvature = np.abs(drawn.curvature)
-    worst = int(curvature.argmax())
+    worst = place_of_largest(curvature)
     x, y = drawn.p[worst]
     return (
         f"path too tight at {place_in_lab(x, y, robot)}: the pivot would turn with radius "

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D
 from planner.planning.declared_path import Declared
-from planner.planning.stated_error import predicted_error, rms_in_time, stated_error
-from planner.vehicle.rollout import Switches, trace
+from planner.planning.error_growth import error_growth
+from planner.planning.stated_error import flips_between, predicted_error, rms_in_time, stated_error
+from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import TrackedVehicle
 from sim.arrays import Floats
 
@@ -22,14 +24,40 @@ class PlanErrors:
     """The predicted track, its distances from the two paths, and what is stated for uncertain robots [l]."""
 
     track: Floats  # (S, 2): predicted tracked point, several samples a dwell
-    predicted_rms: float  # from the declared path, over time
-    predicted_max: float  # largest distance from the declared path
-    drawn_rms: float  # from the path as drawn
-    drawn_max: float  # largest distance from the path as drawn
+    distance: Floats  # (S,), of the track from the declared path
+    dwells: Floats  # (M,)
+    declared: Floats  # (m, 2), the declared path
+    drawn: Path2D  # the path as drawn
     stated: float  # holds for 95 % of the robots that the model's uncertainty allows, open loop
     feedback: float  # the same where the pose is measured, and the rest planned again, every 20 flips
     guaranteed: float | None  # bound for a robot without errors, however long the path; None: not known
     closure: float | None  # from the end of the track to the beginning of a closed path
+
+    @property
+    def predicted_rms(self) -> float:
+        """Distance of the track from the declared path, root mean square over time."""
+        return rms_in_time(self.distance, self.dwells)
+
+    @property
+    def predicted_max(self) -> float:
+        """Largest distance of the track from the declared path."""
+        return float(self.distance.max())
+
+    @property
+    def drawn_rms(self) -> float:
+        """Distance of the track from the path as drawn, root mean square over time."""
+        return rms_in_time(self._from_drawn, self.dwells)
+
+    @property
+    def drawn_max(self) -> float:
+        """Largest distance of the track from the path as drawn."""
+        return float(self._from_drawn.max())
+
+    @cached_property  # a plan that is only compared with others does not need it
+    def _from_drawn(self) -> Floats:
+        path = self.drawn.polyline()
+        same = np.array_equal(path, self.declared)
+        return self.distance if same else distance_to(path, self.track)
 
 
 def plan_errors(
@@ -51,18 +79,21 @@ def plan_errors(
         guaranteed: bound on the error without uncertainty, if there is one.
         seed: of the random robots.
     """
-    vehicle = tracked.vehicle
-    track = trace(vehicle, switches, tracked.offset)
-    predicted = predicted_error(declared.reference.p, track, closed=drawn.closed)
-    from_drawn = distance_to(drawn.polyline(), track)
+    path, count = declared.reference.p, len(switches.dwells)
+    rollout = roll_out(tracked.vehicle, switches, tracked.offset)
+    predicted = predicted_error(path, rollout.track, closed=drawn.closed)
+    flips = np.union1d(flips_between(count), flips_between(count, FEEDBACK_EVERY))
+    growth = error_growth(tracked.vehicle, switches, rollout, flips)
+    stated = stated_error(growth, predicted, seed=seed)
+    feedback = stated_error(growth, predicted, every=FEEDBACK_EVERY, seed=seed)
     return PlanErrors(
-        track=track,
-        predicted_rms=rms_in_time(predicted.distance, switches.dwells),
-        predicted_max=predicted.largest,
-        drawn_rms=rms_in_time(from_drawn, switches.dwells),
-        drawn_max=float(from_drawn.max()),
-        stated=stated_error(vehicle, switches, track, predicted, seed=seed),
-        feedback=stated_error(vehicle, switches, track, predicted, every=FEEDBACK_EVERY, seed=seed),
+        track=rollout.track,
+        distance=predicted.distance,
+        dwells=switches.dwells,
+        declared=path,
+        drawn=drawn,
+        stated=stated,
+        feedback=min(feedback, stated),  # a measured robot may keep to the schedule
         guaranteed=guaranteed,
-        closure=float(np.linalg.norm(track[-1] - declared.reference.p[0])) if drawn.closed else None,
+        closure=float(np.linalg.norm(rollout.track[-1] - path[0])) if drawn.closed else None,
     )

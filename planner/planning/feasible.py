@@ -21,6 +21,7 @@ from planner.paths.units import extent, place_in_lab
 from planner.planning.progress import DECLARING, Progress, tell
 from planner.planning.request import Corner
 from planner.vehicle.vehicle import Vehicle
+from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.model.robot import Robot
 
@@ -37,6 +38,7 @@ _FILLET_ROOM = 0.7
 _SPACING = 0.02  # of points on the reference, in l
 _MOST_POINTS = 150_000
 _MINIMAX = 3.4  # cost of the minimax distance over that of the root mean square
+_ROUNDING = 1e-9  # relative
 _POINTS_A_POSE = 80  # points of a reference that cost as much as one pose of the nearest path
 
 
@@ -151,13 +153,18 @@ def spacing(path: Path2D) -> float:
 def _refuse_corner(raw: Path2D, robot: Robot) -> None:
     """Refuse a path with a sharp corner, and name the corner."""
     angle = np.abs(kinks(raw))
-    sharpest = int(angle.argmax())
+    sharpest = place_of_largest(angle)
     if angle[sharpest] > CORNER:
         x, y = raw.points[sharpest]
         raise InputError(
             f"corner of {math.degrees(angle[sharpest]):.0f} degrees at {place_in_lab(x, y, robot)}; "
             "round it, or allow corner = nearest"
         )
+
+
+def place_of_largest(values: Floats) -> int:
+    """Return the place of the largest value above 0; of values that only rounding tells apart, the first one."""
+    return int(np.flatnonzero(values >= values.max() * (1 - _ROUNDING))[0])
 
 
 def _rounded(raw: Path2D, feasibility: Feasibility) -> Path2D:

@@ -34,8 +34,8 @@ from planner.planning.request import PlanRequest, RequestOptions
 from planner.planning.schedule import follow
 from planner.planning.stated_error import guaranteed, look_ahead
 from planner.vehicle.calibration_table import CalibrationKnowledge
+from planner.vehicle.coefficient_modes import OWN_TABLE
 from planner.vehicle.dwell_choice import check_least, dwells_for, longer_dwells
-from planner.vehicle.from_table import OWN_TABLE
 from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
 from planner.vehicle.vehicle import Vehicle
 from planner.vehicle.zigzag import Zigzag, zigzag
@@ -44,7 +44,7 @@ from sim.model.robot import Robot
 from surrogate.interface import LookupTable
 
 _WORTH = 0.8  # of the stated error: a longer dwell, which swings further, must leave at most this
-_DOMINATED = 1.2  # a stated error over the predicted one, below which nothing is gained by fewer flips
+_LENGTHENED_FROM = 1.2  # stated error over predicted error, below which fewer flips gain nothing
 # Plans from what declares the path, the drift, and what follows a declared path.
 Redirect = Callable[[Callable[[], Declared], Drift, Callable[[Declared], Plan]], Plan]
 
@@ -142,7 +142,7 @@ def _least_stated(first: Plan, longer: list[float], with_dwell: Callable[[float]
     dwell; where it alone is above the best stated error, longer dwells cannot be better.
     """
     best = first
-    if first.stated_error < _DOMINATED * first.predicted_max:
+    if first.stated_error < _LENGTHENED_FROM * first.predicted_max:
         return best
     for dwell in longer:
         try:

@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.paths.path import Path2D
-from planner.paths.units import in_lab, time_in_lab
+from planner.paths.units import heading_in_degrees, in_lab, time_in_lab
+from planner.planning.arrival import Arrival
 from planner.planning.declared_path import Declared
 from planner.planning.errors import FEEDBACK_EVERY, PlanErrors
 from planner.planning.kept_clear import KeptClear
+from planner.planning.lap import Lap
 from planner.planning.line_of_sight import Guidance
 from planner.vehicle.dwell_choice import Objective
 from planner.vehicle.rollout import Switches
@@ -23,6 +25,7 @@ from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats
 from sim.io.deprecated import old_attributes
+from sim.io.errors import InputError
 from sim.io.notebook import as_html, given_axes
 from sim.io.units import column_units, format_time
 from sim.model.plan_file import FORMAT
@@ -35,8 +38,8 @@ if TYPE_CHECKING:
 
 GUARANTEE = "guaranteed_error_over_l"  # of plan.json; null where it is not known
 WIDE = 0.25  # turn radii; a predicted track that is further from the declared path gets a warning
+_OWN_TABLE_FROM = 1.7  # stated error over predicted error, from which a table of its own is proposed
 # Attributes of a plan by their old names, for one release.
-_DOMINATED = 1.7  # a stated error over the predicted one: the errors of the table are the larger part
 _MOVED = {
     "point": "tracked.point",
     "offset": "tracked.offset",
@@ -79,6 +82,8 @@ class Plan:
     switches: Switches  # the schedule
     errors: PlanErrors  # how far from the paths it leads
     kept_clear: KeptClear | None = None  # walls and regions that it avoids; None: there are none
+    arrival: Arrival | None = None  # the duration that was asked for; None: any
+    lap: Lap | None = None  # of a schedule that repeats; None: it is carried out once
 
     @property
     def robot(self) -> Robot:
@@ -159,7 +164,7 @@ class Plan:
 
     def _table_warnings(self) -> tuple[str, ...]:
         """Propose the robot's own table where the errors of the look-up table decide the stated error."""
-        if self.tracked.own_table or self.stated_error < _DOMINATED * self.predicted_max:
+        if self.tracked.own_table or self.stated_error < _OWN_TABLE_FROM * self.predicted_max:
             return ()
         return (
             f"the stated error is mostly that of the look-up table, over {len(self.dwells)} flips: simulate this "
@@ -177,13 +182,19 @@ class Plan:
             "shorter ones keep it nearer",
         )
 
-    def schedule(self, robot: Robot | None = None) -> Schedule:
+    def schedule(self, robot: Robot | None = None, *, laps: int = 1) -> Schedule:
         """Return the schedule for `sim.motion.replay`.
 
         Args:
             robot: the robot that carries it out; default: the one that the plan was made for. Seconds and metres
                 stay as planned, so numbers change where its units of time and length are others.
+            laps: how often a schedule that repeats is carried out.
+
+        Raises:
+            InputError: the schedule does not repeat.
         """
+        if laps != 1 and (self.lap is None or laps < 1):
+            raise InputError(f"{laps} laps of a schedule that is carried out once; plan it with --loop, loop=True")
         swims = robot or self.robot
         time, length = self.robot.time_scale / swims.time_scale, self.robot.tail_length / swims.tail_length
         x, y, heading = self.start
@@ -191,7 +202,7 @@ class Plan:
         return Schedule(
             swims.group_values(),
             self.first_direction,
-            self.dwells * time,
+            np.tile(self.dwells, laps) * time,
             start,
             swims.time_scale,
             swims.tail_length,
@@ -209,11 +220,10 @@ class Plan:
         lines = [
             f"Plan for {robot.name!r}: {path}, {dwells}, {format_time(float(self.seconds.sum()))}",
             f"  predicted error {rms} rms, {largest} at most; stated error {stated}, with feedback {feedback}",
-            f"  start at x = {x * cm:.4g} cm, y = {y * cm:.4g} cm, heading {math.degrees(heading):.1f} degrees, "
+            f"  start at x = {x * cm:.4g} cm, y = {y * cm:.4g} cm, heading {heading_in_degrees(heading)}, "
             f"motor {self.first_direction:+d}",
         ]
-        if self.kept_clear is not None:
-            lines += [f"  {line}" for line in self.kept_clear.lines(robot)]
+        lines += [f"  {line}" for line in self.job_lines()]
         if self.warnings:
             lines.append(f"  {len(self.warnings)} warnings, the first: {self.warnings[0][:200]}")
         return "\n".join(lines)
@@ -236,6 +246,17 @@ class Plan:
         if self.kept_clear is not None:
             draw_regions(ax, self.kept_clear.free_space, length)
         return ax
+
+    def job_lines(self) -> list[str]:
+        """Say what the plan keeps clear of, and when it arrives, if it was asked for."""
+        lines = [] if self.kept_clear is None else self.kept_clear.lines(self.robot)
+        if self.declared.swing is not None:
+            lines.append(self.declared.swing.line(self.robot))
+        if self.arrival is not None:
+            lines.append(self.arrival.line(self.duration, self.robot))
+        if self.lap is not None:
+            lines.append(self.lap.line(self.robot))
+        return lines
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of `to_frame`, each (M,)."""
@@ -311,9 +332,19 @@ class Plan:
             "drawn_rms_over_l": self.errors.drawn_rms,
             "drawn_max_over_l": self.errors.drawn_max,
             "closure_over_l": self.errors.closure,
+            "guidance": {
+                "heading_rad": self.declared.reference.heading.tolist(),
+                "look_ahead_over_l": self.guidance.ahead,
+                "swing_rad": self.guidance.swing,
+                "straight": self.straight.to_dict(),
+            },
             "model": self.tracked.model,
+            "own_table": self.tracked.own_table,
             "warnings": list(self.warnings),
+            **({} if self.tracked.knowledge.empty else {"calibration": self.tracked.knowledge.to_dict()}),
             **({} if self.kept_clear is None else {"kept_clear": self.kept_clear.to_dict()}),
+            **({} if self.arrival is None else {"arrival": self.arrival.to_dict(self.declared.swing, robot)}),
+            **({} if self.lap is None else {"lap": self.lap.to_dict()}),
         }
 
     if not TYPE_CHECKING:

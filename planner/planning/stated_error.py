@@ -3,7 +3,7 @@
 *Stated error*: 95 % of vehicles drawn at random within the uncertainty stay within this distance of the declared
 path when they carry out the schedule open-loop. Uncertain are the modes of the vehicle (held-out errors of the
 look-up table, covariance of a calibration, current) and the phase of the disc at each flip, which adds independent
-noise with every dwell. Deviations are of first order in all of them.
+noise with every dwell. Deviations are of first order in all of them (`planner.planning.error_growth`).
 
 *With feedback*: the same, if every k flips the pose is measured and the remaining path is planned again.
 
@@ -23,12 +23,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.draws import normals
 from planner.paths.distance import nearest
-from planner.vehicle.rollout import Switches, pose_changes, poses_at_flips
-from planner.vehicle.vehicle import SHORTEST, STEP, Vehicle, interpolated
+from planner.planning.error_growth import ErrorGrowth, left
+from planner.vehicle.vehicle import SHORTEST, STEP, Vehicle
 from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats, Integers
-from sim.mechanics import planar
 
 LEVEL = 0.95
 _DRAWS = 400
@@ -81,42 +81,39 @@ def predicted_error(declared: Floats, track: Floats, *, closed: bool) -> Predict
     return Predicted(distance, signed, normal, closed)
 
 
-def stated_error(
-    vehicle: Vehicle, switches: Switches, track: Floats, predicted: Predicted, *, every: int = 0, seed: int = 0
-) -> float:
+def flips_between(count: int, every: int = 0) -> Integers:
+    """Choose the flips of a schedule of `count` dwells between which deviations are drawn, at most _BLOCKS or so.
+
+    Args:
+        count: number of dwells.
+        every: number of flips between measured poses; 0: none is measured.
+    """
+    if every:
+        return np.unique(np.append(np.arange(0, count, max(every, count // _BLOCKS)), count))
+    return np.unique(np.linspace(0, count, min(count, _BLOCKS) + 1).astype(int))
+
+
+def stated_error(growth: ErrorGrowth, predicted: Predicted, *, every: int = 0, seed: int = 0) -> float:
     """Compute the quantile LEVEL of the largest distance from the declared path [l], over random vehicles.
 
     Args:
-        vehicle: with its modes and its spread.
-        switches: the schedule.
-        track: predicted track (M s + 1, 2), s samples a dwell.
-        predicted: its distances from the path.
+        growth: of the errors, at all flips of `flips_between` at least.
+        predicted: distances of the predicted track from the path.
         every: number of flips between measured poses; 0: none is measured.
-        seed: of the random draws.
+        seed: of the random draws, see `planner.draws`.
     """
-    count = len(switches.dwells)
-    edges = np.unique(np.linspace(0, count, min(count, _BLOCKS) + 1).astype(int))
-    if every:
-        edges = np.unique(np.append(np.arange(0, count, max(every, count // _BLOCKS)), count))
-    position, deviation, turned, noise = _deviations(vehicle, switches, edges)
-    samples = (len(track) - 1) // count
-    low, high, normal = _extremes(predicted, edges, samples)
-    rng = np.random.default_rng(seed)
-    z = rng.standard_normal((_DRAWS, len(vehicle.modes)))
+    count = int(growth.flips[-1])
+    growth = growth.at(flips_between(count, every))
+    edges = growth.flips
+    low, high, normal = _extremes(predicted, edges, (len(predicted.distance) - 1) // count)
     if every:  # each window starts from a known pose
-        relative = (
-            deviation[1:] - deviation[:-1] - turned[:-1, :, None] * _left(np.diff(position, axis=0))[:, None]
-        )
+        z, drawn = _draws(growth, 2, seed)
+        tilt = growth.turned[:-1, :, None] * left(np.diff(growth.position, axis=0))[:, None]
         share = np.maximum(every / np.diff(edges), 0.0).clip(max=1.0)
-        moved = np.einsum("dp,kpi->dki", z, relative) * share[:, None]
-        moved += rng.standard_normal((_DRAWS, len(noise), 2)) * noise[:, :2] * np.sqrt(share)[:, None]
+        moved = _sums(z, np.diff(growth.deviation, axis=0) - tilt) * share[:, None]
+        moved += drawn * growth.noise[:, :2] * np.sqrt(share)[:, None]
     else:
-        moved = np.einsum("dp,kpi->dki", z, deviation[1:])
-        steps = rng.standard_normal((_DRAWS, len(noise), 3)) * noise
-        swung = np.cumsum(steps[..., 2], 1)
-        middle = (position[1:] + position[:-1]) / 2
-        lever = swung[..., None] * position[1:] - np.cumsum(steps[..., 2:] * middle, 1)
-        moved += np.cumsum(steps[..., :2], 1) + _left(lever)
+        moved, _ = deviations_open_loop(growth, seed)
     across = np.einsum("dki,ki->dk", moved, normal)
     worst = np.maximum(np.abs(high + across), np.abs(low + across))
     if not predicted.closed:  # past the end of an open path
@@ -126,61 +123,33 @@ def stated_error(
     return float(np.quantile(worst.max(1), LEVEL))
 
 
-def _deviations(vehicle: Vehicle, switches: Switches, edges: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Propagate the modes to the flips `edges` (E,): position (E, 2), deviation (E, P, 2) and turn (E, P).
-
-    The last array is the noise (E − 1, 3) of the blocks between: x and y in the lab, and heading.
-    """
-    poses = poses_at_flips(vehicle, switches)
-    dwells, first = switches.dwells, switches.first_direction
-    moves_predicted = pose_changes(vehicle, first, dwells, dwells[:, None])[:, 0]
-    count, modes = len(dwells), vehicle.modes
-    side = (np.arange(count) + (first < 0)) % 2
-    lag = planar.compose(moves_predicted, planar.inverse(planar.arc(vehicle.twist[side], dwells)))
-    deviation, turned = np.zeros((len(edges), len(modes), 2)), np.zeros((len(edges), len(modes)))
-    lags = _mode_lags(vehicle, side, dwells)
-    for p, mode in enumerate(modes):
-        arc = planar.arc((vehicle.twist + mode.twist)[side], dwells)
-        change = planar.compose(lag + lags[p], arc) - moves_predicted
-        heading = np.concatenate([[0.0], np.cumsum(change[:, 2])])
-        moves = planar.turn(change[:, :2], poses[:-1, 2]) + mode.current * dwells[:, None]
-        moves += heading[:-1, None] * _left(np.diff(poses[:, :2], axis=0))
-        position = np.concatenate([np.zeros((1, 2)), np.cumsum(moves, 0)])
-        deviation[:, p], turned[:, p] = position[edges], heading[edges]
-    spread = np.empty((count, 3))
-    for index in (0, 1):
-        spread[side == index] = vehicle.lag_noise(1 - 2 * index, dwells[side == index])
-    total = np.concatenate([np.zeros((1, 3)), np.cumsum(spread**2, 0)])[edges]
-    variance = np.diff(total, axis=0)
-    across = variance[:, :2].mean(1)  # x and y of the body are mixed in the lab
-    noise = np.sqrt(np.stack([across, across, variance[:, 2]], 1))
-    return poses[edges, :2], deviation, turned, noise
+def deviations_open_loop(growth: ErrorGrowth, seed: int = 0) -> tuple[Floats, Floats]:
+    """Draw deviations at the ends of the blocks: of the place (D, E − 1, 2) and of the heading (D, E − 1)."""
+    z, drawn = _draws(growth, 3, seed)
+    moved, steps = _sums(z, growth.deviation[1:]), drawn * growth.noise
+    swung = np.cumsum(steps[..., 2], 1)
+    middle = (growth.position[1:] + growth.position[:-1]) / 2
+    lever = swung[..., None] * growth.position[1:] - np.cumsum(steps[..., 2:] * middle, 1)
+    moved += np.cumsum(steps[..., :2], 1) + left(lever)
+    return moved, z @ growth.turned[1:].T + swung
 
 
-def _mode_lags(vehicle: Vehicle, side: Integers, dwells: Floats) -> list[Floats | float]:
-    """Return what each mode adds to the lags (M, 3) of the dwells (M,) in directions `side` (M,)."""
-    before = np.concatenate([dwells[:1], dwells[:-1]])
-    with_lag = [p for p, mode in enumerate(vehicle.modes) if mode.lag is not None]
-    added: list[Floats | float] = [0.0] * len(vehicle.modes)
-    if not with_lag:
-        return added
-    lags = np.empty((len(dwells), len(with_lag), 3))
-    for index in (0, 1):
-        tables = np.stack([vehicle.modes[p].lag[index] for p in with_lag], 2)  # type: ignore[index]
-        lags[side == index] = interpolated(tables, before[side == index], dwells[side == index])
-    for place, p in enumerate(with_lag):
-        added[p] = lags[:, place]
-    return added
+def _draws(growth: ErrorGrowth, axes: int, seed: int) -> tuple[Floats, Floats]:
+    """Draw modes (D, P) and noise (D, E − 1, axes): of x and y, or of x, y and heading."""
+    modes, blocks = growth.deviation.shape[1], len(growth.noise)
+    z = normals(seed, 0, _DRAWS * modes).reshape(_DRAWS, modes)
+    return z, normals(seed, _DRAWS * modes, _DRAWS * blocks * axes).reshape(_DRAWS, blocks, axes)
 
 
-def _extremes(predicted: Predicted, edges: Floats, samples: int) -> tuple[Floats, Floats, Floats]:
+def _sums(z: Floats, deviation: Floats) -> Floats:
+    """Add up modes (E, P, 2), z (D, P) standard deviations of each: (D, E, 2)."""
+    flat = np.moveaxis(deviation, 1, 0).reshape(z.shape[1], 2 * len(deviation))
+    return (z @ flat).reshape(len(z), len(deviation), 2)
+
+
+def _extremes(predicted: Predicted, edges: Integers, samples: int) -> tuple[Floats, Floats, Floats]:
     """Find lowest and highest signed distance in each block, (E − 1,), and the normal at its end, (E − 1, 2)."""
     signed = np.copysign(predicted.distance, predicted.signed)
-    starts = (edges[:-1] * samples).astype(int)
+    starts = edges[:-1] * samples
     low, high = np.minimum.reduceat(signed, starts), np.maximum.reduceat(signed, starts)
-    return low, high, predicted.normal[(edges[1:] * samples).astype(int)]
-
-
-def _left(vector: Floats) -> Floats:
-    """Turn vectors (..., 2) by a right angle to the left."""
-    return np.stack([-vector[..., 1], vector[..., 0]], -1)
+    return low, high, predicted.normal[edges[1:] * samples]

@@ -21,6 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.paths.tractrix import Reference
+from planner.planning.lap import overlapped, turning
 from planner.planning.line_of_sight import LineOfSight
 from planner.planning.planned import Plan
 from planner.planning.stated_error import look_ahead
@@ -58,7 +60,10 @@ class TrackerGuidance(LineOfSight):
 
     def __init__(self, plan: Plan):
         tracked, straight = plan.tracked, plan.straight
-        super().__init__(plan.declared.reference, tracked.vehicle, plan.guidance, tracked.offset)
+        super().__init__(tracked_reference(plan), tracked.vehicle, plan.guidance, tracked.offset)
+        self._lap = lap_points(plan)  # points of the reference in a lap; 0: the path is followed once
+        self._lap_turn = turning(plan.declared.reference)
+        self._around, self._stopping = self._lap > 0, False
         x, y = (tracked.vehicle.current / straight.speed).tolist()
         self._planned = self._drift = LearnedDrift(straight.drift / straight.speed, x, y)
         self._turns = 0.0  # whole turns by which headings differ from those of the reference
@@ -97,6 +102,22 @@ class TrackerGuidance(LineOfSight):
         longer = (abs(a) + abs(c)) / (abs(b) + abs(d)) - self._pivot_distance
         slip += longer * self._bend()[0]
         self._lean = (lean + slip) / (1 + way + way * way / 2) - slip + self._turns
+        self._go_around()
+
+    def finish_lap(self) -> None:
+        """End the path at the end of this lap."""
+        self._stopping = self._lap > 0
+        self._go_around()
+
+    def _go_around(self) -> None:
+        """Begin the next lap at the end of one."""
+        if self._around and self._way is None and self.place >= self._lap:
+            self.place -= self._lap
+            self._reached -= self._arc[self._lap]
+            self._lean += self._lap_turn
+            self._turns += self._lap_turn
+        if self._stopping and self._way is None and self.place < self._lap:
+            self._around, self._last = False, self._lap - 1
 
     def where(self) -> tuple[int, float, int, float]:
         """Return the place on path and way, which `go_to` takes."""
@@ -143,12 +164,13 @@ class TrackerGuidance(LineOfSight):
         """Plan the way back from a pose to the path that remains after the place."""
         place = self._way.target if self._way is not None else self.place
         drift, planned, rod = self._drift, self._planned, self._rod
-        heading = np.array(self._heading[place:])
+        rows = slice(place, self._last + 2)
+        heading = np.array(self._heading[rows])
         known = planned.slips(heading)
         course, lean = heading + known, known - drift.slips(heading)
-        x = np.array(self._x[place:]) + rod * (np.cos(heading) - np.cos(heading + lean))
-        y = np.array(self._y[place:]) + rod * (np.sin(heading) - np.sin(heading + lean))
-        left_out = np.array(self._arc[place:]) - self._arc[place]
+        x = np.array(self._x[rows]) + rod * (np.cos(heading) - np.cos(heading + lean))
+        y = np.array(self._y[rows]) + rod * (np.sin(heading) - np.sin(heading + lean))
+        left_out = np.array(self._arc[rows]) - self._arc[place]
         start = self._pivot(pose)
         way = shortest_way(start, np.stack([x, y, course], 1), left_out, self._stride, self._radius())
         at = min(place + way.target, self._last)
@@ -170,7 +192,7 @@ class TrackerGuidance(LineOfSight):
 
     @property
     def _ended(self) -> bool:
-        return self._leg >= SEGMENTS and self.place >= self._last and self.share >= 1
+        return not self._around and self._leg >= SEGMENTS and self.place >= self._last and self.share >= 1
 
     def _bend(self) -> tuple[float, float]:
         """Return the curvature of the reference at the place, and the length of its step."""
@@ -221,6 +243,17 @@ class TrackerGuidance(LineOfSight):
         self._along, self._error = along, error
         wanted = segment.course + segment.curvature * along - math.atan(error / self._way_ahead)
         return sense * (course - wanted) - self._way_hysteresis()
+
+
+def tracked_reference(plan: Plan) -> Reference:
+    """Return the reference of a plan, continued into the next lap where it repeats."""
+    reference = plan.declared.reference
+    return reference if plan.lap is None else overlapped(reference, plan.tracked.vehicle.pivot_radius)
+
+
+def lap_points(plan: Plan) -> int:
+    """Return how many points of the reference are a lap; 0: the path is followed once."""
+    return 0 if plan.lap is None else len(plan.declared.reference.q) - 1
 
 
 def way_ahead(plan: Plan) -> float:

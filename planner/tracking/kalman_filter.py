@@ -257,7 +257,7 @@ def prior(plan: Plan) -> ROWS:
     vehicle = plan.tracked.vehicle
     P = np.diag([0.02**2, 0.02**2, 0.03**2, *(s**2 for s in PRIOR), 1e-6, 1e-12, 1e-12,
                  *(s**2 for s in MARKER)])  # fmt: skip
-    speed = np.hypot(vehicle.twist[0, 0], vehicle.twist[0, 1])
+    speed = math.hypot(vehicle.twist[0, 0], vehicle.twist[0, 1])
     dwell = plan.minimum_dwell
     for mode in vehicle.modes:
         direction = np.zeros(STATES)

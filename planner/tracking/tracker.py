@@ -5,12 +5,13 @@
     command = tracker.update(now, (x, y, heading), seen_at)    # a pose, and when it was true
 
 Every call returns the direction of the motor and the time of the next flip. At most one flip can have happened
-since the last call: the one that was announced. The tracker estimates twelve numbers of the robot
+since the last call: the one that was announced. A call at its time or later, also one with a pose, counts as this
+flip, so the motor must turn in the returned direction. The tracker estimates twelve numbers of the robot
 (`planner.tracking.kalman_filter`). A pose may be late: it is compared with the predicted pose at its own time.
 Implausible poses, values that are not finite, and times that cannot be (`planner.tracking.clock`) are ignored.
 Long gaps between poses only increase the error. Implausible poses that agree with each other are those of a robot
 that has been moved (`planner.tracking.displacement`). From afar the tracker plans a way back
-(`planner.tracking.guidance`).
+(`planner.tracking.guidance`). A plan that repeats is followed lap after lap, until `finish_lap` is called.
 
 The alarm means that the robot is incompatible with the model. It compares WINDOW accepted poses with the predicted
 ones: for a robot of the model the sum of their squared residuals is below a limit with probability 1 −
@@ -28,7 +29,7 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from planner.paths.units import in_lab
+from planner.paths.units import heading_in_degrees, in_lab
 from planner.planning.planned import Plan
 from planner.tracking.clock import SLACK, Clock
 from planner.tracking.displacement import Displacement
@@ -48,7 +49,9 @@ ALARM_AT = 173.6174364561601  # quantile 1 − FALSE_ALARM of χ² with 3 × WIN
 GATE = 21.107513466160444  # quantile 0.9999 of χ² with 3 degrees of freedom
 KEPT = 12  # dwells that are remembered for late poses
 LOST = 10  # consecutive rejected poses after which there is an alarm
-SPREADS = 1.25  # standard deviations added to the mean distance until the flip, by `benchmarks tracker_bound`
+SPREADS = 0.5  # of the filter's standard deviation, which allows for changes; by `benchmarks tracker_bound`
+WITHIN = (1.96, 1.645)  # standard deviations on both sides that hold 95 % of a normal and of a uniform variable
+BELOW = (1.645, 1.559)  # the same for the upper side alone
 
 
 class Command(NamedTuple):
@@ -136,6 +139,13 @@ class Tracker:
                 self._plan_flip()
         return self.command
 
+    def finish_lap(self) -> Command:
+        """End a path that repeats at the end of this lap."""
+        self._law.finish_lap()
+        if not self._finished:
+            self._plan_flip()
+        return self.command
+
     @property
     def command(self) -> Command:
         """Return the present command again."""
@@ -159,7 +169,7 @@ class Tracker:
             [
                 f"Tracker of {robot.name!r} at {when} ({self._now:.4g} time units): {motor}",
                 f"  estimated pose: x = {x * cm:.4g} cm, y = {y * cm:.4g} cm, heading "
-                f"{math.degrees(heading):.1f} degrees; within {in_lab(command.error, robot)} of the path (95 %)",
+                f"{heading_in_degrees(heading)}; within {in_lab(command.error, robot)} of the path (95 %)",
                 f"  alarm: {'calibrate again, the robot is not as the model says' if command.alarm else 'none'}",
             ]
         )
@@ -252,8 +262,7 @@ class Tracker:
             law.go_to(where)
             ends.append(distance)
             spread = self._estimate.spread(D, direction, offset * math.sin(direction - pose[2]))
-        middle, half = (ends[0] + ends[1]) / 2, (ends[0] - ends[1]) / 2
-        return abs(middle) + SPREADS * math.sqrt(half * half / 3 + spread * spread)
+        return bound(ends[0], ends[1], SPREADS * spread)
 
     def _see(self, pose: POSE, when: float) -> bool:
         """Update the estimate with a pose; return false if the pose was rejected."""
@@ -283,3 +292,17 @@ class Tracker:
         if self._scored == WINDOW:
             self.alarm = self._score > ALARM_AT
             self._score, self._scored = 0.0, 0
+
+
+def bound(first: float, last: float, spread: float) -> float:
+    """Bound in 95 % of all cases what is uniform between two values, with a normal error of deviation `spread`.
+
+    The quantile of the sum lies between those of its parts: it goes with the cube of the uniform part of the
+    variance, within 0.013 standard deviations. Far from zero only one side counts.
+    """
+    middle, uniform = abs(first + last) / 2, (first - last) * (first - last) / 12
+    variance = uniform + spread * spread
+    share, deviation = uniform / max(variance, 1e-30), math.sqrt(variance)
+    share *= share * share
+    within, below = ((normal + share * (even - normal)) * deviation for normal, even in (WITHIN, BELOW))
+    return max(within, middle + below)

@@ -44,6 +44,17 @@ class Segment(NamedTuple):
         error = 1 / self.curvature - side * math.sqrt(ahead * ahead + aside * aside)
         return near + turned / self.curvature, error
 
+    def poses(self, spacing: float) -> Floats:
+        """Sample places and courses (m, 3) at most `spacing` apart, both ends included."""
+        along = np.linspace(0.0, self.length, max(math.ceil(self.length / spacing), 1) + 1)
+        course = self.course + self.curvature * along
+        if self.curvature == 0:
+            x, y = along * math.cos(self.course), along * math.sin(self.course)
+        else:
+            x = (np.sin(course) - math.sin(self.course)) / self.curvature
+            y = (math.cos(self.course) - np.cos(course)) / self.curvature
+        return np.stack([self.x + x, self.y + y, course], 1)
+
 
 class Way(NamedTuple):
     """A track of three segments, and the step of the path at which it ends."""
@@ -57,9 +68,23 @@ class Way(NamedTuple):
         last = self.segments[2]
         return last.course + last.curvature * last.length
 
+    @property
+    def length(self) -> float:
+        return sum(segment.length for segment in self.segments)
+
+    def poses(self, spacing: float) -> Floats:
+        """Sample places and courses (m, 3) at most `spacing` apart, from the start to the end."""
+        parts = [segment.poses(spacing) for segment in self.segments if segment.length > 0]
+        return np.concatenate([parts[0][:1], *(part[1:] for part in parts)]) if parts else np.empty((0, 3))
+
 
 def shortest_way(
-    start: tuple[float, float, float], targets: Floats, left_out: Floats, stride: int, radius: float
+    start: tuple[float, float, float],
+    targets: Floats,
+    left_out: Floats,
+    stride: int,
+    radius: float,
+    worth: float = LEFT_OUT,
 ) -> Way:
     """Find the cheapest way.
 
@@ -69,13 +94,14 @@ def shortest_way(
         left_out: length (m,) of the path before each.
         stride: targets between two that are tried first.
         radius: of the arcs.
+        worth: what a length that is left out costs.
     """
 
     def best(rows: Integers) -> tuple[int, Floats, int]:
         lengths = words(np.array(start), targets[rows], radius)
         total = lengths.sum(-1)
         word = total.argmin(-1)
-        row = int((total.min(-1) + LEFT_OUT * left_out[rows]).argmin())
+        row = int((total.min(-1) + worth * left_out[rows]).argmin())
         return int(rows[row]), lengths[row, word[row]], int(word[row])
 
     coarse = best(np.arange(0, len(targets), stride))[0]

@@ -64,6 +64,36 @@ class CalibrationKnowledge:
                 "calibration: the current and its error must be finite numbers, the error not below 0"
             )
 
+    @property
+    def empty(self) -> bool:
+        """Whether nothing is known."""
+        return not (self.names or any((*self.current, *self.current_error)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of the table [calibration]."""
+        return {
+            "names": self.names,
+            "covariance": self.covariance.tolist(),
+            "current_m_s": self.current,
+            "current_error_m_s": self.current_error,
+        }
+
+    @staticmethod
+    def from_dict(table: Any, source: object) -> CalibrationKnowledge:
+        """Read the content of a table [calibration]; `source` names it in messages.
+
+        Raises:
+            InputError: the table is not as described above.
+        """
+        try:
+            names = tuple(str(name) for name in table.get("names", ()))
+            covariance = np.array(table.get("covariance", []), dtype=float).reshape(len(names), len(names))
+            current, error = (_pair(table.get(key, (0.0, 0.0))) for key in ("current_m_s", "current_error_m_s"))
+        except (TypeError, ValueError, AttributeError, OverflowError) as broken:
+            raise InputError(f"{source}: [calibration] cannot be read: {broken}") from None
+        with naming(source):
+            return CalibrationKnowledge(names, covariance, current, error)
+
 
 def read_knowledge(path: str | Path) -> CalibrationKnowledge:
     """Read the table [calibration] of a robot.toml; nothing is known where there is no such file or table.
@@ -73,15 +103,7 @@ def read_knowledge(path: str | Path) -> CalibrationKnowledge:
     """
     if not Path(path).is_file():
         return CalibrationKnowledge()
-    table: Any = read_toml(path).get("calibration", {})
-    try:
-        names = tuple(str(name) for name in table.get("names", ()))
-        covariance = np.array(table.get("covariance", []), dtype=float).reshape(len(names), len(names))
-        current, error = (_pair(table.get(key, (0.0, 0.0))) for key in ("current_m_s", "current_error_m_s"))
-    except (TypeError, ValueError, AttributeError, OverflowError) as broken:
-        raise InputError(f"{path}: [calibration] cannot be read: {broken}") from None
-    with naming(path):
-        return CalibrationKnowledge(names, covariance, current, error)
+    return CalibrationKnowledge.from_dict(read_toml(path).get("calibration", {}), path)
 
 
 def knowledge_toml(knowledge: CalibrationKnowledge) -> str:

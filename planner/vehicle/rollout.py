@@ -7,6 +7,7 @@ the lab in proportion to time.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +31,16 @@ def poses_at_flips(vehicle: Vehicle, switches: Switches) -> Floats:
     return _chain(switches.poses[0], changes, vehicle.current * switches.dwells[:, None])
 
 
-def trace(vehicle: Vehicle, switches: Switches, offset: float, *, samples: int = 8) -> Floats:
-    """Predict the track of the tracked point, (M samples + 1, 2), at equal times within each dwell."""
+class Rollout(NamedTuple):
+    """What a vehicle does on a schedule."""
+
+    changes: Floats  # (M, 3), of the pose in each dwell
+    poses: Floats  # (M + 1, 3), of the head's centre at the flips and the end
+    track: Floats  # (M samples + 1, 2), of the tracked point
+
+
+def roll_out(vehicle: Vehicle, switches: Switches, offset: float, *, samples: int = 8) -> Rollout:
+    """Predict poses at the flips, and the track of the tracked point at equal times within each dwell."""
     share = np.arange(1, samples + 1) / samples
     times = switches.dwells[:, None] * share
     changes = pose_changes(vehicle, switches.first_direction, switches.dwells, times)
@@ -39,7 +48,13 @@ def trace(vehicle: Vehicle, switches: Switches, offset: float, *, samples: int =
     within = planar.compose(flips[:-1, None], changes)
     within[..., :2] += vehicle.current * times[..., None]
     poses = np.concatenate([flips[:1], within.reshape(-1, 3)])
-    return planar.compose(poses, np.array([offset, 0.0, 0.0]))[:, :2]
+    track = planar.compose(poses, np.array([offset, 0.0, 0.0]))[:, :2]
+    return Rollout(changes[:, -1], flips, track)
+
+
+def trace(vehicle: Vehicle, switches: Switches, offset: float, *, samples: int = 8) -> Floats:
+    """Predict the track of the tracked point, (M samples + 1, 2), at equal times within each dwell."""
+    return roll_out(vehicle, switches, offset, samples=samples).track
 
 
 def predicted_poses(vehicle: Vehicle, switches: Switches) -> Floats:

@@ -23,6 +23,7 @@ class TrackedVehicle(NamedTuple):
     offset: float  # from the head's centre forward to the tracked point
     model: str  # hash of the look-up table
     own_table: bool = True  # whether the table is of this robot alone
+    knowledge: CalibrationKnowledge = CalibrationKnowledge()  # what a calibration found besides the robot
 
     @property
     def rod(self) -> float:
@@ -50,7 +51,8 @@ def tracked_vehicle(
     lookup = default_table() if lookup is None else lookup
     vehicle = table_vehicle(robot, lookup, knowledge)
     own = all(low == high for low, high in lookup.domain.values())
-    return TrackedVehicle(robot, vehicle, point, _offset(point, robot, vehicle), lookup.identity, own)
+    known = knowledge or CalibrationKnowledge()
+    return TrackedVehicle(robot, vehicle, point, _offset(point, robot, vehicle), lookup.identity, own, known)
 
 
 def _offset(point: Point, robot: Robot, vehicle: Vehicle) -> float:

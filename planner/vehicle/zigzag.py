@@ -7,7 +7,9 @@ whose two directions differ move at an angle to that mean: they drift sideways. 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -38,6 +40,25 @@ class Zigzag:
     @property
     def net_speed(self) -> float:
         return math.hypot(self.speed, self.drift)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content for plan.json."""
+        return {
+            "dwells_bar": list(self.dwells),
+            "speed_bar": self.speed,
+            "swing_rad": self.swing,
+            "sway_over_l": self.sway,
+            "drift_bar": self.drift,
+            "rms_over_l": self.rms,
+            "largest_over_l": self.largest,
+        }
+
+    @staticmethod
+    def from_dict(content: Mapping[str, Any]) -> Zigzag:
+        """Read the content that `to_dict` returns."""
+        left, right = content["dwells_bar"]
+        names = ("speed_bar", "swing_rad", "sway_over_l", "drift_bar", "rms_over_l", "largest_over_l")
+        return Zigzag((float(left), float(right)), *(float(content[name]) for name in names))
 
 
 def zigzag(vehicle: Vehicle, dwell: float, offset: float = 0.0) -> Zigzag:

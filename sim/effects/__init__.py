@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import pkgutil
 import sys
@@ -39,7 +40,9 @@ def effect_named(name: str) -> Effect:
         InputError: there is no such effect.
     """
     if name not in catalogue():
-        raise InputError(f"unknown effect {name!r}; known are {', '.join(catalogue())}")
+        near = difflib.get_close_matches(name, catalogue(), 1)
+        known = f"is it {near[0]}?" if near else f"known are {', '.join(catalogue())}"
+        raise InputError(f"unknown effect {name!r}; {known}")
     return catalogue()[name]
 
 

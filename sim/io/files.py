@@ -58,8 +58,8 @@ def files_together(folder: str | Path, names: Sequence[str]) -> Iterator[Path]:
 
     Args:
         folder: it is made if it is missing.
-        names: all that such a folder may hold. What the block does not write is removed, since an older file
-            would belong to something else.
+        names: all that such a folder may hold, files in folders of it among them. What the block does not write
+            is removed, since an older file would belong to something else.
 
     Raises:
         InputError: the files cannot be written.
@@ -79,6 +79,7 @@ def files_together(folder: str | Path, names: Sequence[str]) -> Iterator[Path]:
             for name in names:
                 for source, place in ((target / name, old / name), (new / name, target / name)):
                     if source.exists():
+                        place.parent.mkdir(parents=True, exist_ok=True)
                         os.replace(source, place)
                         moved.append((source, place))
         except BaseException:

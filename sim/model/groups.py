@@ -87,7 +87,7 @@ def checked_values(columns: Mapping[str, Any]) -> dict[str, Floats]:
     for name, raw in columns.items():
         try:
             values[name] = np.asarray(raw, dtype=float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError(f"column {name!r} has a value that is no number; give numbers") from None
     if not len(values["N"]):
         raise InputError("no rows: give at least one robot")

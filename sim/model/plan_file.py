@@ -23,22 +23,33 @@ def read_plan_file(path: str | Path) -> dict[str, Any]:
         InputError: the file cannot be read, is no plan.json of this format, has a number that is not finite, or
             a motor speed that cannot be.
     """
+    if Path(path, "plan.json").is_file():
+        raise InputError(f"{path} is the folder of a plan; give {Path(path, 'plan.json')}")
     try:
         content = read_json(path, parse_constant=_finite, parse_float=_finite)
     except ContentError as unreadable:
         reason = str(unreadable).removeprefix(f"{path} ")
         raise InputError(f"{path} is not a plan.json of the planner ({reason}); plan again") from None
+    check_format(content, path)
+    return dict(content)
+
+
+def check_format(content: Any, name: str | Path) -> None:
+    """Check the format of a plan.json, and the speed of its motor; `name` is that of the file in messages.
+
+    Raises:
+        InputError: it is no plan.json of this format, or has a motor speed that cannot be.
+    """
     if not isinstance(content, dict) or "format" not in content:
-        raise InputError(f"{path} is not a plan.json of the planner (it has no format); plan again")
+        raise InputError(f"{name} is not a plan.json of the planner (it has no format); plan again")
     if content["format"] != FORMAT:
-        raise InputError(f"{path} has format {content['format']}, this version reads {FORMAT}: plan again")
+        raise InputError(f"{name} has format {content['format']}, this version reads {FORMAT}: plan again")
     try:
         speed = float(content["robot"]["groups"]["omega_bar"])
     except (KeyError, TypeError, ValueError, OverflowError) as broken:
-        raise InputError(f"{path} is not a plan.json of the planner ({broken}); plan again") from None
+        raise InputError(f"{name} is not a plan.json of the planner ({broken}); plan again") from None
     if not 0 < abs(speed) <= FASTEST:
-        raise InputError(f"{path}: omega_bar is not between 0 and {FASTEST:g}; plan again")
-    return content
+        raise InputError(f"{name}: omega_bar is not between 0 and {FASTEST:g}; plan again")
 
 
 def _finite(text: str) -> float:

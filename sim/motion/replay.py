@@ -72,9 +72,12 @@ def _resolution(schedule: Schedule) -> Resolution:
     return Resolution.for_tracks(schedule.robot["omega_bar"])
 
 
-def _replay(
-    schedule: Schedule, resolution: Resolution | None, progress: Callable[[int], object] | None
-) -> pd.DataFrame:
+def run_at_rest(schedule: Schedule, resolution: Resolution | None = None) -> Run:
+    """Make the run of a schedule's robot, at rest, with the motor in the schedule's first direction.
+
+    Raises:
+        InputError: the robot cannot be simulated, or the schedule asks for too many time steps.
+    """
     values = check_columns({name: np.array([value]) for name, value in schedule.robot.items()})
     groups = Groups.from_columns(values)
     body, reverse = bodies(groups)[0], reversed_bodies(groups)[0]
@@ -87,6 +90,13 @@ def _replay(
             f"the schedule asks for more time steps than a replay may take ({len(schedule.dwells)} dwells, "
             f"{schedule.dwells.sum():g} time units, omega_bar = {body.omega:g}); shorten it or slow the motor down"
         )
+    return run
+
+
+def _replay(
+    schedule: Schedule, resolution: Resolution | None, progress: Callable[[int], object] | None
+) -> pd.DataFrame:
+    run = run_at_rest(schedule, resolution)
     direction, time = schedule.first_direction, 0.0
     rows: list[tuple[float, ...]] = [(0.0, 0.0, 0.0, 0.0, direction, 0)]
     for index, dwell in enumerate(schedule.dwells.tolist()):

@@ -30,7 +30,7 @@ from sim.solve.refinement import CORRECTION, orbit_on_mesh
 from sim.solve.transient import lag_at, transient
 
 _SAME = 1.2  # time units from which the memory is constant
-_MESHES = (6, 9)  # edges; errors go as 1/n², extrapolated
+MESHES = (6, 9)  # edges
 TOLERANCE = 1e-3  # of a time step, in l: see `sim.solve.transient`
 _LEAST_INSTANTS = {1: 3, 2: 3}  # by N; with more tails the phase at the flip hardly matters
 
@@ -52,6 +52,8 @@ def responses(
     history: bool = True,
     before: Floats = BEFORE,
     tolerance: float = TOLERANCE,
+    meshes: tuple[int, int] = MESHES,
+    extrapolated_memory: bool = False,
 ) -> Responses:
     """Simulate the response of B robots of one N to a flip of the motor.
 
@@ -63,6 +65,8 @@ def responses(
         before: T̄ of the dwell before, (K,), increasing, below FORGOTTEN.
         tolerance: on the shape of the tails in one time step, in l; the default leaves 1e-4 to 1e-3 of a turn per
             time unit in the curves.
+        meshes: edges of a tail on the two meshes; errors go as 1/n², extrapolated.
+        extrapolated_memory: extrapolate the memory, too; it takes half as long again.
     """
     check_groups(groups)
     motion = steady(groups) if motion is None else motion
@@ -70,7 +74,7 @@ def responses(
     robots = bodies(groups)
     by_robot, stepped = [], np.zeros(len(robots), dtype=bool)
     for i, (body, reverse) in enumerate(zip(robots, reversed_bodies(groups), strict=True)):
-        curves = _solved(body, reverse, groups.N, even, history, before, tolerance)
+        curves = _solved(body, reverse, groups.N, even, history, before, tolerance, meshes, extrapolated_memory)
         if curves is None:
             stepped[i] = True
             values = stepped_response(
@@ -91,19 +95,30 @@ def responses(
 
 
 def _solved(
-    body: Body, reverse: Body, tails: int, even: bool, history: bool, before: Floats, tolerance: float
+    body: Body,
+    reverse: Body,
+    tails: int,
+    even: bool,
+    history: bool,
+    before: Floats,
+    tolerance: float,
+    meshes: tuple[int, int],
+    extrapolated_memory: bool,
 ) -> Curves | None:
     """Solve for the curves of one robot by transients; None where its motion or a transient has no solution."""
-    coarse = _on_mesh(body, reverse, tails, even, _MESHES[0], before, tolerance, history=False)
+    a, b = meshes
+    both = history and extrapolated_memory
+    coarse = _on_mesh(body, reverse, tails, even, a, before, tolerance, history=both)
     if coarse is None:
         return None
-    fine = _on_mesh(body, reverse, tails, even, _MESHES[1], before, tolerance, history=history)
+    fine = _on_mesh(body, reverse, tails, even, b, before, tolerance, history=history)
     if fine is None:
         return None
-    a, b = _MESHES
-    change = (fine.lag - coarse.lag) * a**2 / (b**2 - a**2)
+    share = a**2 / (b**2 - a**2)
+    change = (fine.lag - coarse.lag) * share
+    memory = fine.memory + (fine.memory - coarse.memory) * share if both else fine.memory
     mirror = planar.MIRROR if body.omega < 0 else np.ones(3)
-    return Curves((fine.lag + change) * mirror, fine.memory * mirror, (fine.rest + change) * mirror, fine.spread)
+    return Curves((fine.lag + change) * mirror, memory * mirror, (fine.rest + change) * mirror, fine.spread)
 
 
 def _on_mesh(
@@ -118,14 +133,14 @@ def _on_mesh(
     history: bool,
 ) -> Curves | None:
     """Solve for the curves on one mesh; memory and rest only with `history`."""
-    after = _orbit(body, tails, edges)
+    after = orbit_with_phases(body, tails, edges)
     if after is None:
         return None
     x, u, twist = after
     if even:
         start, first = _mirrored(x), u
     else:
-        before_flip = _orbit(reverse, tails, edges, instants=u.shape[0])
+        before_flip = orbit_with_phases(reverse, tails, edges, instants=u.shape[0])
         if before_flip is None:
             return None
         reverse_twist = before_flip[2]
@@ -159,7 +174,9 @@ def _on_mesh(
     return Curves(lag, curves[:-1] - same, curves[-1], spread)
 
 
-def _orbit(body: Body, tails: int, edges: int, instants: int = 0) -> tuple[Floats, Floats, Floats] | None:
+def orbit_with_phases(
+    body: Body, tails: int, edges: int, instants: int = 0
+) -> tuple[Floats, Floats, Floats] | None:
     """Solve for x (n, M, 3), u (P, 4) and (v_z, h_x, ω_yr) on as many instants a turn as the response needs."""
     solved, x, u = orbit_on_mesh(body, tails, edges)
     if not solved:

@@ -13,8 +13,8 @@ from planner.paths.obstacles import Circle, Polygon
 from planner.paths.path import Path2D
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from planner.vehicle.dwell_choice import Objective
-from softflagella.api.plan import planned_robot
 from softflagella.api.robots import OneRobot
+from softflagella.api.vehicles import robot_with_table
 from surrogate.interface import LookupTable
 
 
@@ -29,6 +29,7 @@ class GoalOptions(TypedDict, total=False):
     minimum_seconds: float | None
     tolerance: float | None
     feedback: bool
+    arrive_seconds: float | None
     seed: int
 
 
@@ -38,6 +39,7 @@ def to_goal(
     robot: OneRobot,
     *,
     lookup: LookupTable | None = None,
+    own_table: bool = False,
     knowledge: CalibrationKnowledge | None = None,
     **options: Unpack[GoalOptions],
 ) -> GoalPlan:
@@ -49,6 +51,7 @@ def to_goal(
         robot: the robot, its robot.toml, or the name of a preset; its motor speed is used in both directions.
         lookup: trained table, or the table of this one robot. Default: the one that comes with the package. Where
             that one does not know the robot, the robot's own table is simulated, and kept beside its file.
+        own_table: simulate the robot's own table in any case.
         knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
         options: any of
 
@@ -61,6 +64,8 @@ def to_goal(
             - tolerance: largest acceptable stated error [l].
             - feedback: the robot's pose will be measured every 20 flips (`Tracker`), so the margin around
               obstacles is the stated error with feedback.
+            - arrive_seconds: the time from start to goal. Dwells are changed, or swings and waiting circles are
+              added, until the plan takes this time.
             - seed: of the random robots from which the stated error is computed.
 
     Raises:
@@ -73,5 +78,5 @@ def to_goal(
         >>> trip.end_error[0] < 0.01
         True
     """
-    swims, table, known = planned_robot(robot, lookup, knowledge)
+    swims, table, known = robot_with_table(robot, lookup, knowledge, own_table=own_table)
     return plan_to_goal(start, goal, swims, lookup=table, knowledge=known, **options)

@@ -1,4 +1,4 @@
-"""Jobs of a laboratory: `softflagella.tour` and `cover`."""
+"""Jobs of a laboratory: `softflagella.tour`, `cover`, `fleet` and `hold`."""
 
 from __future__ import annotations
 
@@ -7,18 +7,26 @@ from typing import Unpack
 
 from numpy.typing import ArrayLike
 
+from planner.files.fleet_files import distance_apart
+from planner.goal.goal_plan import GoalPlan
 from planner.jobs.cover import cover as sweep_field
 from planner.jobs.coverage_plan import CoveragePlan
+from planner.jobs.fleet import Member
+from planner.jobs.fleet import fleet as keep_apart
+from planner.jobs.fleet_plan import FleetPlan
+from planner.jobs.hold import hold as orbit
+from planner.jobs.hold_plan import HoldPlan
 from planner.jobs.region import Field
 from planner.jobs.tour import tour as plan_tour
 from planner.jobs.tour_plan import TourPlan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
-from planner.planning.request import PlanRequest, RequestOptions
+from planner.planning.planned import Plan
+from planner.planning.request import RequestOptions
 from planner.vehicle.calibration_table import CalibrationKnowledge
-from planner.vehicle.tracked_point import tracked_vehicle
-from softflagella.api.plan import planned_robot
+from sim.io.errors import InputError
 from softflagella.api.robots import OneRobot
+from softflagella.api.vehicles import vehicle_and_request
 from surrogate.interface import LookupTable
 
 
@@ -32,6 +40,7 @@ def tour(
     walls: Path2D | ArrayLike | None = None,
     feedback: bool = False,
     lookup: LookupTable | None = None,
+    own_table: bool = False,
     knowledge: CalibrationKnowledge | None = None,
     progress: Callable[[float], object] | None = None,
     **options: Unpack[RequestOptions],
@@ -49,6 +58,7 @@ def tour(
         feedback: the pose will be measured every 20 flips, so the margin around obstacles is the stated error with
             feedback.
         lookup: trained table, or the table of this one robot; see `plan`.
+        own_table: simulate the robot's own table in any case.
         knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
         progress: called now and then with the share of the path that is done.
         options: point, objective, minimum_dwell, minimum_seconds, dwell, tolerance and seed of `plan`.
@@ -62,9 +72,7 @@ def tour(
         >>> tour.order, tour.exact, len(tour.plan.dwells) > 10
         ((0, 2, 1), True, True)
     """
-    swims, table, known = planned_robot(robot, lookup, knowledge)
-    request = PlanRequest(**options)
-    tracked = tracked_vehicle(swims, table, request.point, known)
+    tracked, request = vehicle_and_request(robot, lookup, knowledge, options, own_table=own_table)
     space = FreeSpace.of(keep_out, walls)
     return plan_tour(places, tracked, request, space, any_start=any_start, back=back, feedback=feedback,
                      progress=progress)  # fmt: skip
@@ -81,6 +89,7 @@ def cover(
     walls: Path2D | ArrayLike | None = None,
     feedback: bool = False,
     lookup: LookupTable | None = None,
+    own_table: bool = False,
     knowledge: CalibrationKnowledge | None = None,
     progress: Callable[[float], object] | None = None,
     **options: Unpack[RequestOptions],
@@ -97,6 +106,7 @@ def cover(
         walls: a polygon (n, 2) that it must not leave.
         feedback: the pose will be measured every 20 flips.
         lookup: trained table, or the table of this one robot; see `plan`.
+        own_table: simulate the robot's own table in any case.
         knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
         progress: called now and then with the share of the path that is done.
         options: point, objective, minimum_dwell, minimum_seconds, dwell, tolerance and seed of `plan`.
@@ -110,10 +120,102 @@ def cover(
         >>> swept.share > 0.97, swept.plan.duration > swept.bound
         (True, True)
     """
-    swims, table, known = planned_robot(robot, lookup, knowledge)
-    request = PlanRequest(**options)
-    tracked = tracked_vehicle(swims, table, request.point, known)
+    tracked, request = vehicle_and_request(robot, lookup, knowledge, options, own_table=own_table)
     space = FreeSpace.of(keep_out, walls)
     (outline,) = FreeSpace.of([region]).regions
     field = Field(outline, (*FreeSpace.of(holes).regions, *space.regions))
     return sweep_field(field, width, tracked, request, space, angle=angle, feedback=feedback, progress=progress)
+
+
+def hold(
+    place: Sequence[float],
+    robot: OneRobot,
+    *,
+    seconds: float | None = None,
+    keep_out: Sequence[Circle | Path2D | ArrayLike] = (),
+    walls: Path2D | ArrayLike | None = None,
+    feedback: bool = False,
+    lookup: LookupTable | None = None,
+    own_table: bool = False,
+    knowledge: CalibrationKnowledge | None = None,
+    progress: Callable[[float], object] | None = None,
+    **options: Unpack[RequestOptions],
+) -> HoldPlan:
+    """Plan the smallest orbit about a place that the robot can keep with a camera; it repeats.
+
+    Args:
+        place: x, y [l].
+        robot: the robot, its robot.toml, or the name of a preset.
+        seconds: for so long; default: until told otherwise.
+        keep_out: circles, and polygons as (n, 2) corners [l], that the robot's body must not touch.
+        walls: a polygon (n, 2) that it must not leave.
+        feedback: the pose will be measured every 20 flips: the margin around obstacles is the stated error with
+            feedback.
+        lookup: trained table, or the table of this one robot; see `plan`.
+        own_table: simulate the robot's own table in any case.
+        knowledge: what a calibration found besides the robot: covariance, current. Default: that of the file.
+        progress: called now and then with the share of the path that is done.
+        options: point, objective, minimum_dwell, minimum_seconds, dwell, tolerance and seed of `plan`.
+
+    Raises:
+        InputError: the place is no pair of finite numbers, the time is not above 0, or the body has no room.
+
+    Example:
+        >>> import softflagella as sf
+        >>> held = sf.hold((2, 1), "paper-control", seconds=1800)
+        >>> round(held.smallest, 2), round(held.radius, 2)
+        (0.94, 0.97)
+    """
+    tracked, request = vehicle_and_request(robot, lookup, knowledge, options, own_table=own_table)
+    space = FreeSpace.of(keep_out, walls)
+    return orbit(place, tracked, request, seconds, space, feedback=feedback, progress=progress)
+
+
+def fleet(
+    plans: Sequence[Plan | GoalPlan | TourPlan | CoveragePlan],
+    apart: float | str,
+    *,
+    names: Sequence[str] | None = None,
+    delays_s: Sequence[float] | None = None,
+    feedback: bool = False,
+    progress: Callable[[float], object] | None = None,
+) -> FleetPlan:
+    """Time plans of several robots in one tank so that their bodies keep apart, open loop or with feedback.
+
+    Each robot keeps its path. Robots give way to those before them: they begin later, or make waiting circles. If
+    that leads nowhere, other orders are tried. Robots that rest at their start or end count, too.
+
+    Args:
+        plans: of two or more robots, in one frame of the tank; the first ones have priority.
+        apart: least distance between bodies, as "10cm"; a number is in tail lengths, if all robots have the same.
+            It is kept although both robots are off by their errors in place.
+        names: of the robots; default: robot-1, robot-2 and so on.
+        delays_s: times before which they do not begin.
+        feedback: the poses will be measured every 20 flips (`Tracker`, with `begin` at the robot's start).
+        progress: called now and then with the share of what is done.
+
+    Raises:
+        InputError: the robots cannot keep apart by waiting; the message says which two, and why.
+
+    Example:
+        >>> import softflagella as sf
+        >>> right = sf.plan([(0, 0), (3, 0)], "paper-control", objective="time")
+        >>> up = sf.plan([(1.5, -2.5), (1.5, 2.5)], "paper-control", objective="time")
+        >>> both = sf.fleet([right, up], apart="5cm")
+        >>> both.sure_m >= 0.05, both.begin_s[0] == 0 or both.begin_s[1] == 0
+        (True, True)
+    """
+    plans = list(plans)
+    names = [f"robot-{k + 1}" for k in range(len(plans))] if names is None else list(names)
+    delays = [0.0] * len(plans) if delays_s is None else list(delays_s)
+    if not len(plans) == len(names) == len(delays):
+        raise InputError(
+            f"{len(plans)} plans, {len(names)} names and {len(delays)} delays; give one of each a robot"
+        )
+    if len(set(names)) < len(names):
+        raise InputError("two robots have the same name; give each a name of its own")
+    members = [Member.of(*member) for member in zip(names, plans, delays, strict=True)]
+    if not members:
+        raise InputError("no robots; a fleet has two or more")
+    distance = distance_apart(apart, None, [member.plan.robot for member in members])
+    return keep_apart(members, distance, feedback=feedback, progress=progress)

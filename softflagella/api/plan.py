@@ -9,35 +9,38 @@ from typing import TYPE_CHECKING, Any, Unpack
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from planner.files.fleet_files import write_fleet
 from planner.files.goal_files import write_goal_plan
-from planner.files.job_files import write_cover, write_tour
-from planner.files.own_table import table_for
+from planner.files.job_files import write_cover, write_hold, write_tour
 from planner.files.plan_files import write_plan as write_plan_files
 from planner.files.plan_json import load_plan
+from planner.files.replan import Trip, replan_from, saved_trip
 from planner.files.tracking_error import TrackingError, tracking_error
 from planner.goal.goal_plan import GoalPlan
 from planner.jobs.coverage_plan import CoveragePlan
+from planner.jobs.fleet_plan import FleetPlan
+from planner.jobs.hold_plan import HoldPlan
+from planner.jobs.plan_path import plan_path
 from planner.jobs.tour_plan import TourPlan
 from planner.paths.obstacles import Circle, FreeSpace
 from planner.paths.path import Path2D
 from planner.paths.path_files import Drawing, read_path
 from planner.paths.units import hinting_at_units
-from planner.planning.plan import make_plan
 from planner.planning.planned import Plan
-from planner.planning.request import PlanRequest, RequestOptions
-from planner.vehicle.calibration_table import CalibrationKnowledge, read_knowledge
-from planner.vehicle.tracked_point import tracked_vehicle
+from planner.planning.request import RequestOptions
+from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.errors import InputError, naming
 from sim.io.tables import read_table
 from sim.model.robot import Robot
-from softflagella.api.robots import OneRobot, one_robot
+from softflagella.api.robots import OneRobot
+from softflagella.api.vehicles import vehicle_and_request
 from surrogate.interface import LookupTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-AnyPlan = Plan | GoalPlan | TourPlan | CoveragePlan
+AnyPlan = Plan | GoalPlan | TourPlan | CoveragePlan | HoldPlan
 
 
 def plan(
@@ -51,6 +54,8 @@ def plan(
     keep_out: Sequence[Circle | Path2D | ArrayLike] = (),
     walls: Path2D | ArrayLike | None = None,
     feedback: bool = False,
+    arrive_seconds: float | None = None,
+    loop: bool = False,
     **options: Unpack[RequestOptions],
 ) -> Plan:
     """Plan the motor's switching times for a path.
@@ -70,6 +75,10 @@ def plan(
         walls: a polygon (n, 2) that the body must not leave.
         feedback: the pose will be measured every 20 flips, so the margin around obstacles is the stated error with
             feedback.
+        arrive_seconds: the time from start to end. Dwells are changed, or swings and waiting circles are added,
+            until the plan takes this time; `Plan.arrival` has it. Default: as the objective says.
+        loop: of a closed path: the schedule repeats until told otherwise; `Plan.lap` says how well a lap closes.
+            Its time is only nearly `arrive_seconds`.
         options: any of
 
             - point: which point must follow the path: "head_centre" (default), "head_tip" or "pivot".
@@ -88,7 +97,7 @@ def plan(
 
     Raises:
         InputError: the path is bad or too tight, the dwell too short, the tolerance too small, there is no way
-            around an obstacle, or the robot cannot be simulated.
+            around an obstacle, no plan is as fast as `arrive_seconds`, or the robot cannot be simulated.
 
     Example:
         >>> import softflagella as sf
@@ -96,30 +105,13 @@ def plan(
         >>> len(result.dwells) > 100, result.predicted_rms < 0.03
         (True, True)
     """
-    swims, table, known = planned_robot(robot, lookup, knowledge, own_table=own_table)
-    drawn, given_in = _in_tails(path, swims)
-    request, space = PlanRequest(**options), FreeSpace.of(keep_out, walls)
-    tracked = tracked_vehicle(swims, table, request.point, known)
-    with hinting_at_units(drawn, swims, tracked.vehicle.turn_radius, given_in):
-        if space.empty:
-            return make_plan(drawn, tracked, request, progress)
-        from planner.jobs.clear_plan import plan_clear  # loads SciPy's graphs
-
-        return plan_clear(drawn, tracked, request, space, feedback=feedback, progress=progress)
-
-
-def planned_robot(
-    robot: OneRobot,
-    lookup: LookupTable | None,
-    knowledge: CalibrationKnowledge | None,
-    *,
-    own_table: bool = False,
-) -> tuple[Robot, LookupTable, CalibrationKnowledge]:
-    """Return a robot with the look-up table that knows it, and what a calibration found besides."""
-    swims = one_robot(robot)
-    source = None if isinstance(robot, Robot) else str(robot)
-    known = knowledge or (CalibrationKnowledge() if source is None else read_knowledge(source))
-    return swims, lookup or table_for(swims, source, known, own=own_table), known
+    tracked, request = vehicle_and_request(robot, lookup, knowledge, options, own_table=own_table)
+    drawn, given_in = _in_tails(path, tracked.robot)
+    space = FreeSpace.of(keep_out, walls)
+    with hinting_at_units(drawn, tracked.robot, tracked.vehicle.turn_radius, given_in):
+        return plan_path(
+            drawn, tracked, request, space, arrive_seconds, loop=loop, feedback=feedback, progress=progress
+        )
 
 
 def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot) -> tuple[Path2D, tuple[str, ...]]:
@@ -133,7 +125,7 @@ def _in_tails(path: Path2D | Drawing | ArrayLike | str | Path, robot: Robot) -> 
 
 
 def check(
-    plan: Plan | GoalPlan | TourPlan | CoveragePlan | Mapping[str, Any] | str | Path,
+    plan: AnyPlan | Mapping[str, Any] | str | Path,
     track: pd.DataFrame | str | Path,
 ) -> TrackingError:
     """Compare a replayed or measured track with its plan.
@@ -157,7 +149,7 @@ def check(
         >>> error.rms < error.largest < error.stated
         True
     """
-    if isinstance(plan, GoalPlan | TourPlan | CoveragePlan):
+    if isinstance(plan, GoalPlan | TourPlan | CoveragePlan | HoldPlan):
         plan = plan.plan
     content = (
         load_plan(plan) if isinstance(plan, str | Path) else plan if isinstance(plan, Mapping) else plan.to_dict()
@@ -167,7 +159,7 @@ def check(
 
 
 def write_plan(
-    result: Plan | GoalPlan | TourPlan | CoveragePlan,
+    result: AnyPlan | FleetPlan,
     folder: str | Path,
     *,
     pictures: Mapping[str, Figure] | None = None,
@@ -176,7 +168,7 @@ def write_plan(
 
     Args:
         result: a plan; or a plan from pose to pose or of a job, which has goal.json, tour.json and so on, and a
-            picture besides.
+            picture besides; a fleet has a folder for each robot.
         folder: it is made if it is missing.
         pictures: of a plan, more pictures, by the name of their file, such as "trade_off.svg".
 
@@ -196,4 +188,50 @@ def write_plan(
         raise InputError("a goal or a job takes no further pictures; write its plan: result.plan")
     if isinstance(result, GoalPlan):
         return write_goal_plan(result, folder)
+    if isinstance(result, HoldPlan):
+        return write_hold(result, folder)
+    if isinstance(result, FleetPlan):
+        return write_fleet(result, folder)
     return write_tour(result, folder) if isinstance(result, TourPlan) else write_cover(result, folder)
+
+
+def replan(
+    plan: AnyPlan | str | Path, track: pd.DataFrame | str | Path, *, lookup: LookupTable | None = None
+) -> Plan | GoalPlan:
+    """Plan the rest of a plan from where a robot is now: the last pose of its track, at rest.
+
+    The track tells which part of the path the robot has followed. Where it is away from its path, the rest begins
+    with a way back, which leaves out as little of the path as is worth its length. Of a trip to a goal the way to
+    the goal is planned again, through the places that are left.
+
+    Args:
+        plan: a plan, or the path of its plan.json or of its folder.
+        track: `time_s`, `x_cm`, `y_cm`, `heading_deg` of the head's centre so far, or in other units, or the
+            columns that `replay` returns; or its file. One row is enough.
+        lookup: the look-up table with which a saved plan was made; see `restore_plan`.
+
+    Returns:
+        A plan whose first dwell begins now; a goal plan for a trip to a goal.
+
+    Raises:
+        InputError: the file is no plan, the track cannot be used or has reached the end, or no way leads on.
+
+    Example:
+        >>> import pandas as pd
+        >>> import softflagella as sf
+        >>> result = sf.plan([[0, 0], [4, 0]], "paper-control")
+        >>> track = pd.DataFrame({"time_s": [600.0], "x_cm": [22.0], "y_cm": [1.0], "heading_deg": [10.0]})
+        >>> rest = sf.replan(result, track)
+        >>> round(rest.start[0], 6), len(rest.dwells) < len(result.dwells)
+        (2.0, True)
+    """
+    old: Plan | Trip
+    if isinstance(plan, str | Path):
+        old = saved_trip(plan, lookup=lookup)
+    elif isinstance(plan, GoalPlan):
+        old = Trip.of(plan)
+    else:
+        old = plan if isinstance(plan, Plan) else plan.plan
+    with naming(track):
+        rest = replan_from(old, track if isinstance(track, pd.DataFrame) else read_table(track))
+    return rest if isinstance(rest, GoalPlan) else rest.plan

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from surrogate.table.answers import answer_with_error
 from surrogate.table.inverse import inverse_table
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load_table
+from surrogate.table.refusals import refusing_robots
 
 
 def query(
@@ -45,7 +47,8 @@ def query(
         [['paper-control', 10.36, 0.23], ['paper-triangle', 10.11, 0.36]]
     """
     rows, lookup = robot_rows(robots), _table(table)
-    answer = answer_with_error(lookup, rows.columns, flag=flag, certify=certify)
+    with refusing_robots(rows.robots, lookup) if rows.robots else nullcontext():
+        answer = answer_with_error(lookup, rows.columns, flag=flag, certify=certify)
     return rows.frame(lab_motion(rows.robots, answer) if rows.robots else {}, answer)
 
 
@@ -87,7 +90,7 @@ def _index(targets: Mapping[str, Any] | pd.DataFrame) -> Any:
 
 
 def export(folder: str | Path, *, table: LookupTable | str | Path | None = None) -> str:
-    """Write a trained look-up table for other programs: at most 150 kB, with readers in C99 and JavaScript.
+    """Write a trained look-up table for other programs: at most 150 kB, with a reader in C99.
 
     Args:
         folder: it is made if it is missing.

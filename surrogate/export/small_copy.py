@@ -1,4 +1,4 @@
-"""A small copy of the look-up table, for a web page or a microcontroller: at most 150 kB of numbers.
+"""A small copy of the look-up table, for a microcontroller: at most 150 kB of numbers.
 
 It has one member of each ensemble. Two tails and more, where the table is most exact, are in single precision. The
 rest is in half precision: one tail (but for its last layer), the gap, and the response to flips with equal dwells.

@@ -3,7 +3,6 @@
 lookup.safetensors  the numbers; its metadata has a manifest in JSON: domain, units, losses, which table it is
 lookup_weights.h    the same numbers for C
 lookup.h            a reader in C99
-lookup.js           a reader for web pages and Node
 vectors.csv         robots and answers, to test a reader with; NaN where a reader has no answer
 """
 

@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +56,7 @@ class RobotTable:
     slopes: dict[str, Any]  # d twist/d ln of a group, or /d size of an effect, (2, 3): forward, left, yaw rate
     errors: dict[str, dict[str, float]]  # output -> {"rms"}, relative, see `surrogate.one_robot.tabulate`
     provenance: dict[str, Any]
+    error_curves: list[Any] = field(default_factory=list)  # (P, K + 1, D, 3): modes of errors of the lags
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
@@ -93,7 +94,8 @@ class RobotTable:
     def error_modes(self, columns: Mapping[str, Floats]) -> ErrorModes:
         """Return the errors of this robot's motion and response; see `LookupTable.error_modes`."""
         self._side(columns)
-        return error_modes(self.errors, {name: values[0] for name, values in self.steady.items()})
+        motion = {name: values[0] for name, values in self.steady.items()}
+        return error_modes(self.errors, motion, np.array(self.error_curves) if self.error_curves else None)
 
     def save(self, path: str | Path) -> None:
         """Write the table as JSON, with a hash over everything in it."""
@@ -168,8 +170,10 @@ def load_robot_table(path: str | Path) -> RobotTable:
         raise InputError(f"{path} has format {str(version)[:20]}, this version reads {FORMAT}; {remedy}")
     if content.pop("hash", "") != _digest(content):
         raise InputError(f"{path} was changed after it was written; {remedy}")
-    lacking = [field.name for field in fields(RobotTable) if field.name not in content]
-    if lacking or len(content) != len(fields(RobotTable)):
+    names = {part.name for part in fields(RobotTable)}
+    needed = [part.name for part in fields(RobotTable) if part.default_factory is MISSING]
+    lacking = [name for name in needed if name not in content]
+    if lacking or not names.issuperset(content):
         first = f": it has no {lacking[0]!r}" if lacking else ""
         raise InputError(f"{path} is no complete table of a robot{first}; {remedy}")
     try:
@@ -197,6 +201,10 @@ def _wrong(table: RobotTable) -> str:
         wanted = tuple(len(table.before) if size < 0 else size for size in shape)
         if curves.shape != wanted or not _all_ordinary(curves):
             return f"it has no curves {name!r} of shape {wanted} in finite numbers"
+    modes = np.array(table.error_curves, dtype=float)
+    wanted = (len(before) + 1, len(DWELLS), 3)
+    if len(modes) and (modes.shape[1:] != wanted or not _all_ordinary(modes)):
+        return f"it has no modes of errors of shape {wanted} in finite numbers"
     missing = [name for name in STEADY_OUTPUTS if name not in table.steady]
     if missing:
         return f"it has no {missing[0]!r}"
@@ -213,7 +221,7 @@ def _wrong(table: RobotTable) -> str:
     slopes = [np.array(slope, dtype=float) for slope in table.slopes.values()]
     if not _all_ordinary(groups) or any(s.shape != (2, 3) or not _all_ordinary(s) for s in slopes):
         return "its robot or its slopes are not finite numbers"
-    if any(not math.isfinite(error["rms"]) for error in table.errors.values()):
+    if not all(math.isfinite(size) for error in table.errors.values() for size in error.values()):
         return "its errors are not finite numbers"
     return ""
 

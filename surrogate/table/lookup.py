@@ -30,7 +30,7 @@ from sim.model.response import DWELLS, LAGS, Responses
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.error_modes import STEADY, error_modes, joined
-from surrogate.interface import ErrorModes
+from surrogate.interface import ErrorModes, OutsideError
 from surrogate.networks.ensemble import Ensemble
 from surrogate.table.curve_errors import CURVE_ERRORS, NORMAL_90, CurveErrors
 from surrogate.table.errors import RELATIVE, error_scale
@@ -227,7 +227,7 @@ class NeuralTable:
         reasons = self._reasons(network_index(tails.number), motion, inputs, known)
         if any(reasons) and not flag:
             row, reason = next((row, reason) for row, reason in enumerate(reasons) if reason)
-            raise InputError(self._refusal(values, row, reason))
+            raise self._refusal(values, row, reason)
         return Motions(heads, tails, motion, inputs, reasons)
 
     def width_features(self, motions: Motions) -> Floats:
@@ -279,16 +279,19 @@ class NeuralTable:
                 which[rows] = np.where(known[rows], outside, 2)
         return [_REASONS[number] for number in which.tolist()]
 
-    def _refusal(self, values: Mapping[str, Floats], row: int, reason: str) -> str:
-        for name, (low, high) in self.ranges.items():
+    def _refusal(self, values: Mapping[str, Floats], row: int, reason: str) -> OutsideError:
+        words = ""
+        for name in dict.fromkeys((*_NOT_OF_HEAD, *self.ranges)):
+            low, high = self.ranges[name]
             value = abs(float(values[name][row]))
             if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
-                reason += f"; {name} = {value:g}, learned were {low:g} to {high:g}"
+                words = f"; {name} = {value:g}, learned were {low:g} to {high:g}"
                 break
-        return (
-            f"the robot in row {row + 1} is outside the look-up table: {reason}; change the robot, or simulate it "
-            "(softflagella steady, softflagella surrogate robot)"
+        message = (
+            f"the robot in row {row + 1} is outside the look-up table: {reason}{words}; change the robot, or "
+            "simulate it (softflagella steady, softflagella surrogate robot)"
         )
+        return OutsideError(message, row, reason)
 
     def _responses(self, motions: Motions, steady: Mapping[str, Floats]) -> Responses:
         curves = self.curves.curves(motions.heads, motions.tails, motions.motion)

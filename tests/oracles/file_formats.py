@@ -31,10 +31,13 @@ from dataset.storage.storage import open_storage
 from planner.files.goal_files import read_region
 from planner.files.goal_json import load_goal
 from planner.files.plan_json import load_plan
+from planner.files.saved_plan import restore_plan
 from planner.files.tracking_error import tracking_error
 from planner.paths.path_files import read_path
 from planner.paths.units import in_tails
+from planner.tracking.tracker import Tracker
 from planner.vehicle.calibration_table import read_knowledge
+from planner.vehicle.from_table import default_table
 from sim.inputs import check_columns, load_robot
 from sim.io.errors import InputError, naming
 from sim.io.tables import read_table
@@ -212,6 +215,11 @@ def _read_plan(path: Path) -> None:
     _finite(schedule.dwells, schedule.start, content["stated_error_over_l"])
 
 
+def _read_saved_plan(path: Path) -> None:
+    command = Tracker(restore_plan(path, lookup=default_table())).command
+    _finite(command.flip_at, command.error)
+
+
 def _read_goal(path: Path) -> None:
     content = load_goal(path)
     _finite(content["start"], content["goal"], content["predicted_end"], content["margin_over_l"])
@@ -282,6 +290,7 @@ FORMATS: dict[str, FileFormat] = {
         lambda path: read_region(str(path), in_tails("cm", ROBOT), ROBOT), TABLE,
     ),
     "plan": FileFormat(file("plan.json", plan_file), _read_plan, JSON),
+    "plan to track": FileFormat(file("plan.json", plan_file), _read_saved_plan, JSON),
     "goal": FileFormat(file("goal.json", goal_file), _read_goal, JSON),
     "replayed track": FileFormat(file("track.csv", replayed, plan_json=plan_file), _read_track, TABLE),
     "measured runs": FileFormat(file("table.csv", lambda: text(runs())), _read_runs, TABLE),

@@ -34,6 +34,7 @@ extern "C" {
 #endif
 void begin(double noise, double heading, const double *start);
 void feed(double now, const double *pose, double seen, double *out);
+void finish(double *out);
 int memory(void);
 #ifdef __cplusplus
 }
@@ -58,6 +59,7 @@ void feed(double now, const double *pose, double seen, double *out)
     for (int i = 0; i < 3 && pose; i++) own[i] = (tracker_real)pose[i];
     told(tracker_feed(&keeper, now, pose ? own : 0, seen), out);
 }
+void finish(double *out) { told(tracker_finish_lap(&keeper), out); }
 int memory(void) { return (int)sizeof(tracker); }
 """
 
@@ -86,6 +88,7 @@ class CompiledTracker:
         self._library = ctypes.CDLL(str(out))
         self._library.begin.argtypes = [ctypes.c_double, ctypes.c_double, ctypes.c_void_p]
         self._library.feed.argtypes = [ctypes.c_double, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p]
+        self._library.finish.argtypes = [ctypes.c_void_p]
         self._scale = plan.robot.time_scale
         self.memory: int = self._library.memory()
         self.restart()
@@ -103,5 +106,13 @@ class CompiledTracker:
         out = np.zeros(5 + STATES)
         address = None if own is None else own.ctypes.data
         self._library.feed(now * self._scale, address, seen * self._scale, out.ctypes.data)
+        return self._command(out)
+
+    def finish_lap(self) -> Command:
+        out = np.zeros(5 + STATES)
+        self._library.finish(out.ctypes.data)
+        return self._command(out)
+
+    def _command(self, out: np.ndarray) -> Command:
         self.state = out[5:]
         return Command(int(out[0]), float(out[1]) / self._scale, bool(out[2]), bool(out[3]), float(out[4]))

@@ -87,10 +87,14 @@ class _Swimmer:
         return np.asarray(pose + np.append(self.car.current * time, 0.0))
 
     def update(self, now: float, *seen: Any) -> None:
-        """Tell the tracker the time, and a pose if there is one."""
+        """Tell the tracker the time, and a pose if there is one; the motor turns as it orders."""
         self.keep(now)
-        alarm, self.command = self.command.alarm, self.tracker.update(now, *seen)
-        self.alarms += [now] if self.command.alarm and not alarm else []
+        last, pose = self.command, self.at(now)
+        self.command = self.tracker.update(now, *seen)
+        self.alarms += [now] if self.command.alarm and not last.alarm else []
+        if self.command.direction != last.direction:
+            self.dwells.append(now - self.began)
+            self.pose, self.before, self.began = pose, now - self.began, now
 
     def keep(self, until: float) -> None:
         """Keep some instants up to a time, with the bound that holds there."""
@@ -99,14 +103,6 @@ class _Swimmer:
             self.poses.append(self.at(self.times[-1]))
             self.errors.append(self.command.error)
         self.kept = max(self.kept, until)
-
-    def flip(self) -> None:
-        """Carry out the announced flip."""
-        now = self.command.flip_at
-        pose, dwell = self.at(now), now - self.began
-        self.dwells.append(dwell)
-        self.update(now)
-        self.pose, self.before, self.began = pose, dwell, now
 
 
 def swum(tracker: Tracks, plan: Plan, truth: Vehicle, camera: Camera, *, changes_to: Vehicle | None = None,
@@ -129,7 +125,7 @@ def swum(tracker: Tracks, plan: Plan, truth: Vehicle, camera: Camera, *, changes
                 waiting.append((seen + camera.delay, measured, seen))
                 waiting.sort(key=lambda item: item[0])
         else:
-            swimmer.flip()
+            swimmer.update(swimmer.command.flip_at)  # the flip
     poses = np.array(swimmer.poses)
     followed = planar.compose(poses, np.array([plan.tracked.offset, 0.0, 0.0]))
     distance, errors = distance_to(plan.reference, followed[:, :2]), np.array(swimmer.errors)

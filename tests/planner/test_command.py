@@ -55,6 +55,57 @@ def test_the_command_says_that_there_is_no_way(tmp_path: Path, capsys: pytest.Ca
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("region", "expected"),
+    [
+        ("boxx:0,0,1,1", "is it box:0,0,1,1? regions are circle:X,Y,RADIUS, box:"),
+        ("ring:0,1", "regions are circle:X"),
+    ],
+)
+@pytest.mark.parametrize("command", [["goal", "--goal", "5", "0", "0", "--keep-out"], ["cover", "--width", "4cm"]])
+def test_a_misspelt_region_is_told_the_nearest_one(
+    command: list[str], region: str, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It used to be told the shapes of paths."""
+    from planner.__main__ import main
+
+    words = [*command, region, "--robot", "paper-control", "--out", str(tmp_path / "out")]
+    assert run_command(main, words) == 2
+    (error,) = capsys.readouterr().err.splitlines()
+    assert f"{region}: no such file or region; {expected}" in error
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("command", "what"),
+    [
+        (["goal", "--goal", "300", "200", "0"], "way across start and goal"),
+        (["tour", "0,0", "300,0", "300,200"], "way across the places"),
+        (["cover", "box:0,0,300,200", "--width", "4cm"], "way across the region"),
+    ],
+)
+def test_lengths_of_a_job_whose_unit_nobody_stated_are_asked_about(
+    command: list[str], what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Places in mm used to be planned as tail lengths: 40 m."""
+    from planner.__main__ import main
+
+    words = [*command, "--robot", "paper-control", "--out", str(tmp_path / "out")]
+    assert run_command(main, words) == 2
+    (error,) = capsys.readouterr().err.splitlines()
+    for part in (f"the {what} is 39.7 m (361 l) long, 33 m by 22 m (300 by 200 l)", "--unit l if this is meant",
+                 "if you gave l and mean mm, it is 3.28 l: --unit mm"):  # fmt: skip
+        assert part in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_goal_whose_unit_is_stated_is_not_asked_about(tmp_path: Path) -> None:
+    from planner.__main__ import main
+
+    words = ["goal", "--goal", "300", "200", "0", "--unit", "mm", "--robot", "paper-control"]
+    assert run_command(main, [*words, "--out", str(tmp_path / "out")]) == 0
+
+
 def test_files_and_units(tmp_path: Path) -> None:
     from planner.__main__ import main
 

@@ -27,17 +27,6 @@ LINEAR_FILAMENT = {1.0: (0.124, 0.998), 10.0: (0.763, 0.840), 30.0: (0.594, 0.60
 
 BEAM_K4 = (12.3624, 485.519)
 
-# The paper's control example: N = 2, C = (3.0, 2.8, 2.0), ω̄ = 10.
-CONTROL = {
-    "omega_t_bar": 7.589,
-    "omega_h_bar": -2.411,
-    "omega_yr_bar": 0.0490,
-    "v_x": 0.0425,
-    "v_z": 0.0180,
-    "R_yr_over_l": 0.9415,
-    "theta_deg": 67.1,
-}
-
 # The paper's measured point: N = 4, l = 11 cm, 143.66 rpm: ω_h = 63.33, ω_t = 80.33 rpm.
 MEASURED_HEAD_SHARE = 63.33 / 143.66
 INDEPENDENT_HEAD_SHARE = 0.403

@@ -48,6 +48,22 @@ def test_a_word_runs_its_command(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 
 @pytest.mark.parametrize(
+    ("word", "answer"),
+    [("goal", "it is softflagella planner goal"), ("report", "it is softflagella dataset report"),
+     ("calibrat", "is it calibrate?"), ("qqq", "there are steady, plan")],
+)  # fmt: skip
+def test_a_word_that_is_no_command_is_told_which_one_is_meant(
+    word: str, answer: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A command of a package used to be answered with a list that does not have it."""
+    with pytest.raises(SystemExit) as ended:
+        main([word])
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"error: no command {word!r}; {answer}")
+
+
+@pytest.mark.parametrize(
     ("words", "expected"),
     [
         (["plan", "square:3"], "required: --robot, --out; softflagella plan --help"),

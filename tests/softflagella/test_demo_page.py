@@ -90,6 +90,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
             (case / file).touch()
     for file in ("robot.toml", "model.md"):
         (out / "demo" / file).touch()
+    (out / "robot.html").touch()
     record, error = plans["square"]
     shares = {"calibrated": 10.0, "corrected": 1.2, "truth known": 1.0}
     groups = ROBOT.groups()
@@ -141,7 +142,7 @@ def test_every_link_leads_to_a_file(folder: Path) -> None:
         assert (folder / file).exists(), file
     assert {
         "demo/robot.toml", "demo/model.md", "demo/square/schedule.h", "demo/triangle/plan.json",
-        "demo/hidden-effect/report.html", "demo/nothing-hidden/corrected.toml",
+        "demo/hidden-effect/report.html", "demo/nothing-hidden/corrected.toml", "robot.html",
     } <= set(files)  # fmt: skip
     assert any(file.endswith(("signs.md", "signs.html")) for file in files)
 

@@ -126,6 +126,7 @@ def test_a_wrong_number_that_does_not_lower_the_error_says_so_first(number: tupl
     assert first.startswith("A nuisance parameter is wrong: ")
     assert first.endswith("does not fall with it (3.00 % without, 3.10 % with it).")
     assert "without measuring it" in next_steps(risen)[0]
+    assert next_steps(risen)[-1].startswith("Until then, plan with the robot as given")
 
 
 @shares_verdicts

@@ -131,6 +131,23 @@ def test_in_c_the_robot_stays_on_its_path_as_well(tmp_path: Path, precise: bool)
     assert min(dwells[:-1]) >= planned().minimum_dwell * (1 - 1e-6)
 
 
+def test_in_single_precision_the_way_back_is_as_short(tmp_path: Path, compiled: CompiledTracker) -> None:
+    """From starts within 4 l: both arrive, and at nearly the same time."""
+    single, (x, y, _) = CompiledTracker(planned(), tmp_path, single=True), planned().start
+    rng = np.random.default_rng(6)
+    for _ in range(6):
+        r, angle = 4 * math.sqrt(rng.random()), rng.uniform(0, 2 * math.pi)
+        start = x + r * math.cos(angle), y + r * math.sin(angle), rng.uniform(-math.pi, math.pi)
+        ends = []
+        for tracker in (single, compiled):
+            tracker.restart()
+            result = swum(tracker, planned(), planned().tracked.vehicle, Camera(), start=start, most=2000)
+            assert result.finished
+            assert result.distance[-1] < 0.1
+            ends.append(result.times[-1])
+        assert ends[0] == pytest.approx(ends[1], rel=0.02)
+
+
 def test_memory_is_what_the_documentation_says(tmp_path: Path, compiled: CompiledTracker) -> None:
     single = CompiledTracker(planned(), tmp_path, single=True)
     assert single.memory <= 1250

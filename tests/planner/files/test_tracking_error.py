@@ -57,6 +57,8 @@ def test_a_track_without_a_column_is_refused(planned: tuple[dict[str, object], p
         tracking_error(record, pd.DataFrame({"time_s": [0.0], "x_cm": [0.0], "y": [0.0], "heading_deg": [0.0]}))
     with pytest.raises(InputError, match="not a finite number"):
         tracking_error(record, track.assign(x_over_l=np.nan))
+    with pytest.raises(InputError, match="time goes back at row 2; give a row for each time, in order"):
+        tracking_error(record, track[::-1])
 
 
 def test_the_table_of_dwells_is_in_centimetres_and_degrees_too() -> None:

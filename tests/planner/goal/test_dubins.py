@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, words
+from planner.goal.dubins import TURNS, DubinsPaths, shortest_paths, three_arcs, words
 from sim.arrays import Floats
 
 RADIUS = 0.37
@@ -38,3 +38,19 @@ def test_no_random_track_is_shorter() -> None:
         track = DubinsPaths(end, np.repeat(turn, 3, 1), np.concatenate([piece, 0 * piece, 0 * piece], 1))
         end, length = track.poses(piece, RADIUS)[:, 0], length + piece[:, 0]
     assert (shortest_paths(start, end, RADIUS).length <= length + 1e-9).all()
+
+
+def test_all_words_of_three_arcs_end_at_the_goal() -> None:
+    rng = np.random.default_rng(3)
+    start, goal = rng.normal(size=(2, 300, 3)) * [1.5, 1.5, 3.0]
+    turns, lengths = three_arcs(start, goal, 0.7)
+    best = words(start, goal, 0.7)[:, 4:].sum(-1)
+    assert lengths.sum(-1)[:, [0, 2]] == pytest.approx(best)
+    for word in range(4):
+        exists = np.isfinite(lengths[:, word]).all(-1)
+        assert exists.sum() > 50
+        track = DubinsPaths(start[exists], np.tile(turns[word], (exists.sum(), 1)), lengths[exists, word])
+        end = track.poses(track.length[:, None], 0.7)[:, 0]
+        assert end[:, :2] == pytest.approx(goal[exists, :2], abs=1e-9)
+        assert np.cos(end[:, 2] - goal[exists, 2]) == pytest.approx(1.0)
+        assert (lengths[exists, word, 1] / 0.7 >= np.pi - 1e-9).all() == (word in (0, 2))

@@ -143,3 +143,20 @@ def test_a_heading_in_degrees_is_not_taken_as_radians() -> None:
         to_goal((0, 0, 0), (4, 1, 90), CONTROL)
     with pytest.raises(InputError, match="start: a heading of -30"):
         to_goal((0, 0, -30), (4, 1, 0), CONTROL)
+
+
+@pytest.mark.parametrize("share", [pytest.param(1.2, marks=pytest.mark.long)])
+def test_a_plan_to_a_goal_arrives_when_it_is_asked_to(share: float) -> None:
+    fastest = to_goal((0, 0, 0), (2.5, 1, 0), CONTROL, minimum_dwell=2.0)
+    seconds = share * float(fastest.plan.seconds.sum())
+    goal_plan = to_goal((0, 0, 0), (2.5, 1, 0), CONTROL, minimum_dwell=2.0, arrive_seconds=seconds)
+    dwell = min(goal_plan.plan.straight.dwells) * CONTROL.time_scale
+    assert float(goal_plan.plan.seconds.sum()) == pytest.approx(seconds, abs=dwell)
+    assert goal_plan.plan.declared.swing is not None
+    assert max(goal_plan.end_error) < 1e-3
+    assert final_pose(goal_plan)[:2] == pytest.approx((2.5, 1.0), abs=1e-3)
+
+
+def test_no_plan_to_a_goal_is_faster_than_the_fastest() -> None:
+    with pytest.raises(InputError, match="the fastest plan takes"):
+        to_goal((0, 0, 0), (2.5, 1, 0), CONTROL, minimum_dwell=2.0, arrive_seconds=30.0)

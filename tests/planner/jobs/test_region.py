@@ -29,6 +29,15 @@ def test_the_share_is_that_of_a_stadium() -> None:
     assert share == pytest.approx((2 * 0.6 + math.pi * 0.09) / 12, rel=0.01)
 
 
+@pytest.mark.parametrize("angle", np.linspace(0, math.pi, 12, endpoint=False))
+def test_a_footprint_wider_than_the_region_needs_one_lane(angle: float) -> None:
+    """A camera that sees the whole region used to end in a traceback."""
+    for width in (5.0, 40.0):
+        (lane,) = lanes(Field(SQUARE), width, angle, apart=0.2)
+        assert np.hypot(*(lane.mean(0) - [2, 1.5])) < 0.6
+        assert share_covered(Field(SQUARE), lane, 2 * width) == 1.0
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.4, math.pi / 2])
 def test_lanes_cover_the_region_and_leave_holes_out(angle: float) -> None:
     field = Field(SQUARE, (Circle(2, 1.5, 0.7),))

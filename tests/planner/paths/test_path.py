@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planner.paths.path import Path2D, circle, smoothed
+from planner.paths.path import Path2D, circle, resample, smoothed
 from planner.planning.plan import plan
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
@@ -28,3 +28,8 @@ def test_smoothing_takes_camera_noise_out_and_says_what_it_moves() -> None:
 def test_an_open_path_keeps_its_ends() -> None:
     found, _ = smoothed(Path2D.of([[0, 0], [2, 0], [2, 3]]), 0.4)
     assert found.points[[0, -1]] == pytest.approx(np.array([[0.0, 0.0], [2.0, 3.0]]))
+
+
+def test_the_last_bit_of_a_length_does_not_choose_the_number_of_points() -> None:
+    for length in (12.0, np.nextafter(12.0, 0.0), np.nextafter(12.0, 20.0)):
+        assert len(resample(np.array([[0.0, 0.0], [length, 0.0]]), 0.02)) == 601

@@ -66,6 +66,13 @@ def test_transforms_of_shapes_and_groups_apply(tmp_path: Path) -> None:
     assert drawn_path(tmp_path, body).points == pytest.approx(np.array([[10, 0], [10, -6]]), abs=1e-9)
 
 
+def test_turned_and_mirrored_shapes_are_where_they_are_drawn(tmp_path: Path) -> None:
+    box = drawn_path(tmp_path, "<rect width='4' height='2' transform='rotate(90)'/>")
+    assert box.points == pytest.approx(np.array([[0, 0], [0, -4], [-2, -4], [-2, 0]]), abs=1e-9)
+    ring = drawn_path(tmp_path, "<circle r='2' cy='5' transform='scale(1,-1)'/>")
+    assert np.linalg.norm(ring.points - [0, 5], axis=1) == pytest.approx(np.full(len(ring.points), 2.0))
+
+
 def test_view_box_and_physical_units(tmp_path: Path) -> None:
     """A hundred units drawn on 5 cm: each is half a millimetre."""
     found = drawn(tmp_path, "<path d='M 0 0 L 100 0'/>", root="width='5cm' height='5cm' viewBox='0 0 100 100'")

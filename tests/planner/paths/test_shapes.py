@@ -28,6 +28,17 @@ def test_an_unknown_shape_is_told_which_there_are(words: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("words", "near"),
+    [("squre:3", "square:3"), ("cirlce:2", "circle:2"), ("Circle:2", "circle:2"), ("poligon:6:2", "polygon:6:2"),
+     ("traingle", "triangle:SIDE")],
+)  # fmt: skip
+def test_a_misspelt_shape_is_told_the_nearest_one(words: str, near: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_path(words)
+    assert str(caught.value) == f"{words}: no such file or shape; is it {near}? shapes are {SHAPES}"
+
+
+@pytest.mark.parametrize(
     "words", ["circle:", "circle:two", "circle:2:3", "polygon:6", "polygon:2:3", "polygon:5.5:3", "polygon:1e9:3",
               "polygon:nan:3", "square:0", "square:inf", "triangle:-1", "polygon:6:nan"],
 )  # fmt: skip

@@ -141,8 +141,16 @@ def test_refusals() -> None:
     refused(polygon(4, 3.0), "needs corner = nearest or minimax", corner="fillet", time_weight=0.1)
     refused(circle(2.0), "below 0.2 time units", minimum_dwell=0.1)
     refused(circle(2.0), "objective", objective="speed")
-    refused(circle(2.0), "outside the look-up table.* omega_bar = 500", robot=CONTROL.with_motor(500.0))
-    refused(circle(2.0), "outside the look-up table.* a_over_R = 0.1", robot=replace(CONTROL, disc_offset=0.0016))
+    refused(
+        circle(2.0),
+        r"outside the look-up table: motor .* rpm \(omega_bar = 500\)",
+        robot=CONTROL.with_motor(500.0),
+    )
+    refused(
+        circle(2.0),
+        r"outside the look-up table: disc offset 1.6 mm \(a_over_R = 0.1\)",
+        robot=replace(CONTROL, disc_offset=0.0016),
+    )
     refused(circle(2.0), "tail_sag .*surrogate robot", robot=replace(CONTROL, effects={"tail_sag": 0.1}))
 
 
@@ -215,3 +223,10 @@ def test_a_plan_whose_error_is_the_table_s_proposes_the_robot_s_own_table() -> N
     by_own_table = plan(circle(6.0), robot, dwell=0.3, lookup=tabulate(robot))
     assert not any("own table" in words for words in by_own_table.warnings)
     assert by_own_table.stated_error < result.stated_error
+
+
+def test_with_few_flips_a_measured_pose_does_no_harm() -> None:
+    """The error with feedback was above the one without, since the two are drawn."""
+    share = np.linspace(0, 1, 100)
+    line = plan(np.stack([12 * share, 0 * share], 1), CONTROL, objective="flips")
+    assert line.feedback_error <= line.stated_error

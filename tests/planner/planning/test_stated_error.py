@@ -12,9 +12,17 @@ import pytest
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
+from planner.planning.error_growth import error_growth
 from planner.planning.schedule import follow
-from planner.planning.stated_error import look_ahead, predicted_error, rms_in_time, stated_error
-from planner.vehicle.rollout import Switches, trace
+from planner.planning.stated_error import (
+    Predicted,
+    flips_between,
+    look_ahead,
+    predicted_error,
+    rms_in_time,
+    stated_error,
+)
+from planner.vehicle.rollout import Rollout, Switches, roll_out, trace
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
 from sim.io.errors import InputError
 from surrogate.table.model_file import load
@@ -22,25 +30,30 @@ from tests.oracles.unseen_robots import carried
 from tests.planner.vehicles import plain_guidance, vehicle
 
 
-def planned(car: Vehicle, path: Path2D) -> tuple[Switches, Reference, np.ndarray]:
+def planned(car: Vehicle, path: Path2D) -> tuple[Switches, Reference, Rollout]:
     ref = reference(path, car.pivot_distance, 0.02)
     ahead = look_ahead(car, float(np.abs(ref.curvature).max()))
     switches = follow(ref, car, plain_guidance(car, 0.8, ahead))
-    return switches, ref, trace(car, switches, 0.0)
+    return switches, ref, roll_out(car, switches, 0.0)
+
+
+def stated_for(car: Vehicle, switches: Switches, rollout: Rollout, error: Predicted, every: int = 0) -> float:
+    growth = error_growth(car, switches, rollout, flips_between(len(switches.dwells), every))
+    return stated_error(growth, error, every=every)
 
 
 @pytest.mark.parametrize(
     "path",
     [
-        pytest.param(circle(2.0), id="circle"),
+        pytest.param(circle(1.0), id="circle"),
         pytest.param(Path2D.of([[0, 0], [25, 0]]), id="line", marks=pytest.mark.long),
     ],
 )
 @pytest.mark.parametrize("errors", [1.0, 4.0])
 def test_it_is_the_quantile_over_drawn_vehicles(path: Path2D, errors: float) -> None:
     car = vehicle(errors=errors)
-    switches, ref, track = planned(car, path)
-    stated = stated_error(car, switches, track, predicted_error(ref.p, track, closed=path.closed))
+    switches, ref, rollout = planned(car, path)
+    stated = stated_for(car, switches, rollout, predicted_error(ref.p, rollout.track, closed=path.closed))
     rng = np.random.default_rng(5)
     worst = []
     for _ in range(300):
@@ -53,9 +66,9 @@ def test_it_is_the_quantile_over_drawn_vehicles(path: Path2D, errors: float) -> 
 def test_errors_of_the_response_add_up_on_curves() -> None:
     """Drawn vehicles have another curve of lags each; what differs between left and right dwells adds up."""
     car = replace(vehicle(), modes=tuple(_wavy_modes()))
-    switches, ref, track = planned(car, circle(2.0))
-    error = predicted_error(ref.p, track, closed=True)
-    stated = stated_error(car, switches, track, error)
+    switches, ref, rollout = planned(car, circle(2.0))
+    error = predicted_error(ref.p, rollout.track, closed=True)
+    stated = stated_for(car, switches, rollout, error)
     rng = np.random.default_rng(5)
     worst = []
     for _ in range(300):
@@ -79,17 +92,17 @@ def _wavy_modes() -> list[Mode]:
 
 def test_without_uncertainty_it_is_the_predicted_error() -> None:
     car = replace(vehicle(), modes=())
-    switches, ref, track = planned(car, circle(2.0))
-    error = predicted_error(ref.p, track, closed=True)
-    assert stated_error(car, switches, track, error) == pytest.approx(error.largest)
+    switches, ref, rollout = planned(car, circle(2.0))
+    error = predicted_error(ref.p, rollout.track, closed=True)
+    assert stated_for(car, switches, rollout, error) == pytest.approx(error.largest)
 
 
 def test_random_phases_add_as_a_walk() -> None:
     """On a line, a heading that jitters by s at each of M flips leads s √(M³/3) steps aside."""
     car = replace(vehicle(errors=0.0), spread=np.tile([0.0, 0.0, 1e-3], (2, len(TIMES), 1)))
-    switches, ref, track = planned(car, Path2D.of([[0, 0], [30, 0]]))
-    error = predicted_error(ref.p, track, closed=False)
-    stated = stated_error(car, switches, track, error)
+    switches, ref, rollout = planned(car, Path2D.of([[0, 0], [30, 0]]))
+    error = predicted_error(ref.p, rollout.track, closed=False)
+    stated = stated_for(car, switches, rollout, error)
     count = len(switches.dwells)
     expected = 1.96 * 1e-3 * np.sqrt(count**3 / 3) * 30 / count
     assert stated - error.largest == pytest.approx(expected, rel=0.2)
@@ -98,10 +111,10 @@ def test_random_phases_add_as_a_walk() -> None:
 def test_feedback_stops_the_growth() -> None:
     car = vehicle(errors=4.0)
     for length, path in ((15.0, Path2D.of([[0, 0], [15, 0]])), (60.0, Path2D.of([[0, 0], [60, 0]]))):
-        switches, ref, track = planned(car, path)
-        error = predicted_error(ref.p, track, closed=False)
-        held = stated_error(car, switches, track, error, every=20)
-        assert held <= stated_error(car, switches, track, error) + 1e-3
+        switches, ref, rollout = planned(car, path)
+        error = predicted_error(ref.p, rollout.track, closed=False)
+        held = stated_for(car, switches, rollout, error, every=20)
+        assert held <= stated_for(car, switches, rollout, error) + 1e-3
         assert held < error.largest + 0.02, length
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import pytest
@@ -10,6 +11,7 @@ from planner.paths.path import circle
 from planner.planning.plan import plan
 from planner.tracking.pipe import answers
 from planner.tracking.tracker import Tracker
+from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 
 
@@ -25,7 +27,7 @@ def test_it_answers_like_the_tracker_in_seconds() -> None:
         "2.5 nan 0 0",
         "3 1",
     ]
-    answered = [line.split() for line in answers(piped, lines, scale)]
+    answered = [line.split() for line in answers(piped, lines, result.robot)]
     expected = [direct.update(0.0), direct.update(1.0 / scale, result.start)]
     expected += [
         direct.update(direct._now),
@@ -48,7 +50,75 @@ def test_a_line_with_the_announced_time_is_the_flip() -> None:
         for _ in range(60):
             yield line
 
-    for answer in answers(Tracker(result), lines(), result.robot.time_scale):
+    for answer in answers(Tracker(result), lines(), result.robot):
         direction, line = answer.split()[:2]
         directions.append(int(direction))
     assert directions == [result.first_direction * (-1) ** k for k in range(60)]
+
+
+def test_the_first_pose_decides_where_the_robot_begins() -> None:
+    result = plan(circle(2.0), PRESETS["paper-control"])
+    scale, pose = result.robot.time_scale, (0.3, -2.5, 1.0)
+
+    def begin(pose: tuple[float, float, float], now: float) -> Tracker:
+        return Tracker(result, begin=now, start=pose)
+
+    lines = ["0", "nonsense", "4 nan 0 0", "5 0.3 -2.5 1.0", "7"]
+    waiting = [line.split() for line in answers(None, lines, result.robot, begin)]
+    assert [words[0] for words in waiting[:3]] == ["0", "0", "0"]
+    assert [float(words[1]) for words in waiting[:3]] == [1.0, 1.0, 5.0]
+    direct = begin(pose, 5 / scale)
+    assert waiting[3][:2] == [f"{direct.command.direction}", f"{direct.command.flip_at * scale:.9f}"]
+    command = direct.update(7 / scale)
+    assert waiting[4][:2] == [f"{command.direction}", f"{command.flip_at * scale:.9f}"]
+
+
+def test_a_line_can_order_a_new_beginning() -> None:
+    result = plan(circle(2.0), PRESETS["paper-control"])
+    scale, pose = result.robot.time_scale, (0.3, -2.5, 1.0)
+
+    def begin(pose: tuple[float, float, float], now: float) -> Tracker:
+        return Tracker(result, begin=now, start=pose)
+
+    lines = ["0", "begin 1 2", "begin", "begin 1.5 inf 0 0", "begin 2.5 0.3 -2.5 1.0"]
+    told = [line.split() for line in answers(Tracker(result), lines, result.robot, begin)]
+    assert all(words == told[0] for words in told[1:3])
+    command = begin(pose, 2.5 / scale).command
+    assert told[4][:2] == [f"{command.direction}", f"{command.flip_at * scale:.9f}"]
+
+
+def test_a_header_says_the_units_of_the_laboratory() -> None:
+    """The same orders as in tail lengths; the error is in the unit of x, and columns may change places."""
+    result = plan(circle(2.0), PRESETS["paper-control"])
+    x, y, heading = result.start
+    cm, degrees = 100 * result.robot.tail_length, math.degrees(heading)
+    plain = ["0", f"1 {x:.9f} {y:.9f} {heading:.9f} 0.5", f"2.1 {x:.9f} {y:.9f} {heading:.9f}", "3"]
+    given = [
+        "time_s,y_mm,x_cm,heading_deg,seen_s",
+        "0",
+        f"1, {10 * cm * y:.9f}, {cm * x:.9f}, {degrees:.9f}, 0.5",
+        f"2.1 {10 * cm * y:.9f} {cm * x:.9f} {degrees:.9f}",
+        "3",
+    ]
+    header, *told = answers(Tracker(result), given, result.robot)
+    assert header == "direction flip_at_s error_cm alarm"
+    for answer, expected in zip(told, answers(Tracker(result), plain, result.robot), strict=True):
+        direction, flip, error, alarm = (float(word) for word in answer.split())
+        wanted = [float(word) for word in expected.split()]
+        assert [direction, flip, alarm] == pytest.approx([wanted[0], wanted[1], wanted[3]], abs=1e-5)
+        assert error == pytest.approx(cm * wanted[2], abs=1e-4 * cm)
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("time_s x_cm y_cm", "give time first, and x, y and heading"),
+        ("time_s x_deg y_cm heading_deg", "'x_deg' needs a unit of length, such as x_cm"),
+        ("time_s x_cm y_cm angle_deg", "'angle_deg' is not one of time, x, y, heading, seen"),
+        ("time_s x_cm x_mm heading_deg", "'x_mm' is there twice"),
+    ],
+)
+def test_a_header_that_cannot_be_is_refused(header: str, message: str) -> None:
+    result = plan(circle(2.0), PRESETS["paper-control"])
+    with pytest.raises(InputError, match=message):
+        list(answers(Tracker(result), [header], result.robot))

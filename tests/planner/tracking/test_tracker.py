@@ -124,6 +124,23 @@ def test_wrong_poses_are_no_alarm() -> None:
     assert not alarmed(changed(), Camera(wrong=0.1))
 
 
+def test_a_pose_at_the_time_of_a_flip_announces_the_next_flip() -> None:
+    """A call at that time counts as the flip, so the motor turns as ordered. It once missed the flip: 0.5 l off.
+
+    Dwells of four units of time end as poses are seen.
+    """
+    share = np.linspace(0, 1, 100)
+    line = plan(np.stack([3 * share, 0 * share], 1), PRESETS["paper-control"], objective="flips")
+    for seed in range(3):
+        camera = Camera(rng=np.random.default_rng(seed))
+        distance, _ = swim(Tracker(line), line, line.tracked.vehicle, camera)
+        assert distance.max() < line.predicted_max + 0.04
+    tracker = Tracker(line)
+    first = tracker.command
+    second = tracker.update(first.flip_at, line.start, first.flip_at - 1.0)
+    assert (second.direction, second.flip_at > first.flip_at + 3.9) == (-first.direction, True)
+
+
 @pytest.mark.parametrize("late", [0.0, 0.01])
 def test_no_flip_just_before_the_end(late: float) -> None:
     """Where the path ended at a flip, the motor was told to turn the other way for no time at all."""
@@ -164,6 +181,17 @@ def test_it_never_flips_before_the_shortest_dwell(events: list[tuple[float, floa
         assert math.isfinite(command.flip_at)
         assert command.flip_at - tracker._clock.set_by - began >= planned().minimum_dwell * (1 - 1e-12)
         last = command
+
+
+def test_the_bound_is_a_quantile() -> None:
+    """Against random draws: from no swing at all to a swing alone, on both sides of the path and on one."""
+    rng = np.random.default_rng(2)
+    uniform, normal = rng.random(200_000), rng.standard_normal(200_000)
+    for first, last, spread in ((0.0, 0.0, 1.0), (-1.0, 1.0, 0.0), (-1.0, 1.0, 0.4), (1.0, 2.0, 0.0),
+                                (1.0, 2.0, 0.5), (-0.1, 1.0, 0.2), (-3.0, -2.0, 1.0)):  # fmt: skip
+        drawn = np.abs(first + uniform * (last - first) + spread * normal)
+        assert 0.935 < np.mean(drawn <= tracker.bound(first, last, spread)) < 0.955
+        assert tracker.bound(-first, -last, spread) == tracker.bound(first, last, spread)
 
 
 def test_the_gates_are_quantiles() -> None:

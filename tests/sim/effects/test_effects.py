@@ -12,8 +12,9 @@ import pytest
 
 import sim.effects
 from dataset.rows.simulate import simulate
-from sim.effects import catalogue
+from sim.effects import catalogue, effect_named
 from sim.effects.tail_contact import least_gap
+from sim.io.errors import InputError
 from sim.motion.steady import orbits, steady
 from sim.motion.switching import switch_response
 from sim.solve.assembly import assemble, numbers
@@ -49,6 +50,12 @@ def test_the_folder_is_the_catalogue() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("name", "told"), [("disc_darg", "is it disc_drag"), ("tumble", "known are anisotropic")])
+def test_a_misspelt_effect_is_told_the_nearest_one(name: str, told: str) -> None:
+    with pytest.raises(InputError, match=f"unknown effect '{name}'; {told}"):
+        effect_named(name)
+
+
 @pytest.mark.parametrize("reach", ["local", "nonlocal"])
 def test_adding_an_effect_is_adding_a_file(reach: str, tmp_path: Path) -> None:
     """Columns, sizes, numbers of the body and candidates of the calibration follow from the file alone."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -33,6 +34,7 @@ BAD_TABLES = {
     "half a tail": (table(N=2.5), "N = 2.5"),
     "nan": (table(C_t="nan"), "C_t = nan"),
     "text": (table(C_t="three"), "C_t"),
+    "integer beyond floats": (table(C_t="1" * 400), "column 'C_t' has a value that is no number"),
     "stout tail": (table(l_over_r0=1.2), "l/r0 = 1.2"),
     "motor at rest": (table(omega_bar=0), "omega_bar = 0"),
     "unknown column": (table(colour=3), "unknown column 'colour'"),
@@ -90,6 +92,31 @@ def test_replay_refuses(text: str, expected: str, tmp_path: Path, capsys: pytest
     assert expected in error
     assert len(error.splitlines()) == 1
     assert [p.name for p in tmp_path.iterdir()] == ["plan.json"]
+
+
+def test_replay_of_a_folder_is_told_the_file_in_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from sim.__main__ import main
+
+    (tmp_path / "plan.json").write_text("{}")
+    assert run_command(main, ["replay", str(tmp_path), "--out", str(tmp_path / "t.csv")]) == 2
+    (error,) = capsys.readouterr().err.splitlines()
+    assert error.endswith(f"is the folder of a plan; give {tmp_path / 'plan.json'}")
+
+
+def test_replay_shows_no_bar_without_a_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A replay of 700 dwells used to write 1,400 bars into a log."""
+    from sim.__main__ import main
+
+    robot = {"groups": PRESETS["paper-control"].group_values(), "time_scale_s": 2.0, "tail_length_m": 0.11}
+    start = {"x_over_l": 0.0, "y_over_l": 0.0, "heading_rad": 0.0}
+    content = {"format": 2, "robot": robot, "start": start, "first_direction": 1, "dwell_bar": [0.3, 0.3]}
+    (tmp_path / "plan.json").write_text(json.dumps(content))
+    monkeypatch.setattr("sim.__main__.BAR_AFTER", 0.0)
+    words = ["replay", str(tmp_path / "plan.json"), "--out", str(tmp_path / "t.csv"), "--no-error"]
+    assert run_command(main, words) == 0
+    assert "replay:" not in capsys.readouterr().err
 
 
 def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:

@@ -83,6 +83,33 @@ def test_what_is_no_robot_is_refused(old: str, new: str, words: str, tmp_path: P
         read(LAB.replace(old, new), tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("[head]\nradius_mm = 16", "[head]\ndiameter_mm = 32", "[head] diameter_mm; give radius_mm, half of it"),
+        ("radius_mm = 3.2", "diameter_in = 0.25", "[tails] diameter_in; give radius_in, half of it"),
+        ("length_cm = 9", "lenght_cm = 9", "[tails] lenght_cm; is it length_cm?"),
+        ("speed_rpm = 90", "sped_Hz = 1.5", "[motor] sped_Hz; is it speed_Hz?"),
+        ("speed_rpm = 90", "speed_V = 6", "[motor] speed_V; is it speed_rpm?"),
+        ("C_t = 3.0", "C_t = 3.0\nlength_mm = 16", "[drag] length_mm; is it [tails] length_mm?"),
+        ("C_t = 3.0", "C_t = 3.0\nC_t_sigma = 0.1", "[drag] C_t_sigma; this number takes no standard deviation"),
+        ("[motor]", "[moter]", "[moter] speed_rpm; is it [motor]?"),
+        ("[motor]", "colour = 1\n[motor]", "[fluid] colour; [fluid] has viscosity_Pa_s, in any usual unit"),
+    ],
+)
+def test_an_unknown_key_is_told_which_one_is_near(old: str, new: str, words: str, tmp_path: Path) -> None:
+    """The answer to a diameter used to be a list of all keys of all tables."""
+    with pytest.raises(InputError) as caught:
+        read(LAB.replace(old, new), tmp_path)
+    assert str(caught.value).endswith(f": unknown entry {words}")
+    assert len(str(caught.value).removeprefix(str(tmp_path))) < 100
+
+
+def test_a_key_above_all_tables_is_told_so(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"length_cm is in no table; a robot has \[tails\], \[head\], \[fluid\]"):
+        read("length_cm = 9\n" + LAB, tmp_path)
+
+
 def test_a_standard_deviation_may_have_a_unit_of_its_own(tmp_path: Path) -> None:
     robot = read(LAB.replace("length_cm = 9", "length_cm = 9\nlength_mm_sigma = 2"), tmp_path)
     assert robot.sigmas == {"tail_length": Sigma(0.002, False)}

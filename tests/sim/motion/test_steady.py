@@ -15,9 +15,9 @@ from sim.motion.orbits import Orbits
 from sim.motion.settling import settle
 from sim.motion.steady import QUICK, orbits, steady
 from sim.motion.steady_motion import DIRECT, STEPPING
+from sim.reference.control_example import INDEPENDENT
 from sim.solve.refinement import LOST, REASONS
 from tests.reference.cases import (
-    CONTROL,
     INDEPENDENT_HEAD_SHARE,
     MEASURED_HEAD_SHARE,
     STEADY_INPUTS,
@@ -43,7 +43,7 @@ def test_control_example_matches_the_independent_solver() -> None:
     motion = steady(control())
     found = motion.columns()
     assert found["converged"].all()
-    check_against(found, {k: np.array([v]) for k, v in CONTROL.items()})
+    check_against(found, {k: np.array([v]) for k, v in INDEPENDENT.items()})
 
 
 def test_points_over_the_domain_match_the_independent_solver() -> None:

@@ -1,10 +1,9 @@
-"""The small copy of the look-up table: its size and loss, and its readers in C and JavaScript."""
+"""The small copy of the look-up table: its size and loss, and its reader in C."""
 
 from __future__ import annotations
 
 import ctypes
 import json
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -44,14 +43,6 @@ int answer(const double *in, double *out)
     for (int i = 0; i < 4; i++) out[8 + i] = other == LOOKUP_NO_ANSWER ? NAN : response[i];
     return state;
 }
-"""
-SCRIPT = """import { readFileSync, writeFileSync } from "node:fs";
-import { readLookup } from "./lookup.mjs";
-const bytes = readFileSync("lookup.safetensors");
-const table = readLookup(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength));
-const answers = JSON.parse(readFileSync("robots.json")).map((robot) => [
-  table.query(robot), table.response(robot, robot.dwell_bar)]);
-writeFileSync("answers.json", JSON.stringify(answers, (key, value) => (value === Infinity ? "inf" : value)));
 """
 
 
@@ -175,30 +166,6 @@ def test_the_reader_in_c_says_when_it_does_not_know(folder: Path) -> None:
         assert np.isnan(answers(made, {**good, name: np.array([value])})[0]["net_speed_bar"][0])
 
 
-def test_the_reader_in_javascript_gives_the_same(folder: Path) -> None:
-    node = shutil.which("node")
-    if node is None:
-        pytest.skip("no node on this machine")
-    wanted = vectors(folder)
-    rows = pd.DataFrame({name: wanted[name] for name in (*ROBOT, DWELL)})
-    strange = rows.iloc[:3].assign(omega_bar=[1e4, 0.0, 5.0], dwell_bar=[1.0, 1.0, 0.1])
-    (folder / "robots.json").write_text(pd.concat([rows, strange]).to_json(orient="records", double_precision=15))
-    (folder / "run.mjs").write_text(SCRIPT)
-    shutil.copyfile(folder / "lookup.js", folder / "lookup.mjs")
-    subprocess.run([node, "run.mjs"], check=True, cwd=folder, timeout=LIMIT)
-    *told, far, still, short = json.loads((folder / "answers.json").read_text())
-    steady = pd.DataFrame([part[0] for part in told])
-    response = pd.DataFrame([part[1] or {} for part in told]).drop(columns="outside")
-    assert not steady["outside"].any()
-    columns = pd.concat([steady, response], axis=1).replace("inf", np.inf)
-    answered = {str(name): columns[name].to_numpy(dtype=float) for name in OUTPUTS}
-    for name, error in apart(answered, wanted).items():
-        assert error.max() < 1e-9, name
-    assert far[0]["outside"]
-    assert still == [None, None]
-    assert short[1] is None
-
-
 def test_a_table_that_learned_some_tails_only(tmp_path: Path) -> None:
     save_small_copy(table(), tmp_path)  # three and more tails, two members
     made, wanted = library(tmp_path), vectors(tmp_path)
@@ -235,7 +202,7 @@ def test_the_command_prints_the_loss(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "omega_yr_bar" in said
     assert "kB; loss against the whole table" in said
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"lookup.safetensors", "lookup_weights.h", "lookup.h", "lookup.js", "vectors.csv"}
+    assert names == {"lookup.safetensors", "lookup_weights.h", "lookup.h", "vectors.csv"}
 
 
 def test_the_command_says_what_it_writes(capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,7 +16,9 @@ from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.response import DWELLS
 from sim.model.robot import Robot
+from sim.motion.longer_memory import longer_memory
 from sim.motion.replay import replay
+from sim.motion.response import responses
 from sim.motion.steady import steady
 from sim.motion.switching import switch_response
 from surrogate.one_robot.robot_table import RobotTable
@@ -77,6 +79,25 @@ def test_a_robot_with_an_effect_is_planned_and_stays_within_the_stated_error(
     error = tracking_error(result.to_dict(), track)
     assert error.largest < error.stated
     assert error.rms < 0.03
+
+
+def test_finer_curves_differ_by_less_than_the_stated_errors(table: RobotTable) -> None:
+    """Meshes half as fine again and a quarter of the tolerance, of a robot that the sizes were not found with."""
+    groups = Groups.from_columns(columns())
+    finer = responses(groups, tolerance=2.5e-5, meshes=(9, 13), extrapolated_memory=True)
+    assert not finer.stepped.any()
+    missed = np.array(table.lag)[0] + np.array(table.memory)[0] - finer.lag[0] - finer.memory[0]
+    stated = np.array(table.error_curves)[:3, :-1]
+    sizes = np.sqrt((stated**2).sum(0).mean((0, 1)))
+    assert (np.sqrt((missed**2).mean((0, 1))) < 2 * sizes).all()
+
+
+def test_what_the_dwells_before_the_last_one_change_is_stated(table: RobotTable) -> None:
+    longer = longer_memory(Groups.from_columns(columns()))[0]
+    modes = table.error_modes(columns())
+    lags = modes.lag[:, None] + modes.memory
+    alike = [bool(np.allclose(mode, longer, rtol=1e-6, atol=1e-12)) for mode in lags]
+    assert sum(alike) == 1
 
 
 def test_another_robot_is_refused(table: RobotTable) -> None:

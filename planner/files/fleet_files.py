@@ -1,0 +1,184 @@
+"""Robots of a fleet from a TOML file, and the files of their plans.
+
+    apart = "10cm"            # least distance between bodies; or --apart
+    unit = "cm"               # options of the planning commands that hold for all robots
+
+    [[robot]]
+    robot = "paper-control"   # robot.toml or the name of a preset
+    path = "right.csv"        # what `softflagella plan` takes
+
+    [[robot]]
+    name = "second"           # of its folder; default: robot-2
+    robot = "second.toml"
+    goal = [60, 20, 90]       # what `planner goal` takes: x, y and degrees, with start = [0, 0, 0]
+    delay_s = 60              # it does not begin before
+
+Instead of path or goal, a robot may have `places = [[0, 0], [40, 0]]` of a tour or a `region` to cover. All other
+keys are options of the command for such a plan, with _ for -. Files are sought beside the TOML file first.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from planner.files.job_files import read_length
+from planner.files.plan_files import EXTRA, FILES, write_plan_files
+from planner.jobs.fleet_plan import FleetPlan
+from planner.paths.units import in_tails
+from sim.io.errors import InputError
+from sim.io.files import files_together, write_text
+from sim.io.reading import read_json, read_toml
+from sim.model.robot import Robot
+
+_JOBS = {"path": "plan", "goal": "goal", "places": "tour", "region": "cover"}  # key -> command
+_OWN = ("robot", "name", "delay_s")
+_OF_ALL = ("apart", "feedback", "robot")
+_FILES = ("robot", "path", "region", "model", "walls", "keep_out", "hole")  # keys whose values may be files
+_NAME = re.compile(r"\w[\w-]*")
+_WRITTEN = ("fleet.json", "fleet.svg")
+
+
+class FleetRobot(NamedTuple):
+    """A robot of the file."""
+
+    name: str
+    command: str  # that plans for it
+    words: tuple[str, ...]  # of this command
+    delay: float  # [s]
+
+
+class FleetFile(NamedTuple):
+    """What the file says."""
+
+    robots: tuple[FleetRobot, ...]
+    apart: str | None  # with its unit, or in the unit of all
+    unit: str | None
+    feedback: bool
+
+
+def read_fleet(path: str | Path) -> FleetFile:
+    """Read the robots of a fleet.
+
+    Raises:
+        InputError: the file cannot be read, or a robot has no plan, or several.
+    """
+    content = read_toml(path)
+    entries = content.get("robot")
+    if not (isinstance(entries, list) and entries and all(isinstance(entry, dict) for entry in entries)):
+        raise InputError(f"{path}: no robots; write a table [[robot]] for each")
+    feedback = content.get("feedback", False)
+    if not isinstance(feedback, bool):
+        raise InputError(f"{path}: feedback = {feedback!r}; write true or false")
+    common = {key: value for key, value in content.items() if key not in _OF_ALL}
+    robots = tuple(
+        _robot(path, number, {**common, **({"feedback": True} if feedback else {}), **entry})
+        for number, entry in enumerate(entries, 1)
+    )
+    names = [robot.name for robot in robots]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{path}: two robots are named {name}; give each a name of its own")
+    apart, unit = content.get("apart"), content.get("unit")
+    return FleetFile(robots, None if apart is None else str(apart), None if unit is None else str(unit), feedback)
+
+
+def _robot(path: str | Path, number: int, entry: Mapping[str, Any]) -> FleetRobot:
+    """Read one robot."""
+    name, delay = entry.get("name", f"robot-{number}"), entry.get("delay_s", 0.0)
+    if not (isinstance(name, str) and _NAME.fullmatch(name)):
+        raise InputError(f"{path}: name = {name!r}; a name has letters, digits, _ and -, as it names a folder")
+    if isinstance(delay, bool) or not isinstance(delay, int | float):
+        raise InputError(f"{path}: {name}: delay_s = {delay!r}; give seconds, 0 or more")
+    jobs = [key for key in _JOBS if key in entry]
+    if len(jobs) != 1 or "robot" not in entry:
+        raise InputError(f"{path}: {name}: give robot, and one of {', '.join(_JOBS)}")
+    folder = Path(path).parent
+    words = ["--robot", _beside(folder, "robot", entry["robot"])]
+    for key, value in entry.items():
+        if key not in (*_OWN, *jobs):
+            words += _option(folder, key, value)
+    (job,) = jobs
+    if job == "goal":
+        words += _option(folder, "goal", entry["goal"])
+    elif job == "places":
+        words += ["--", *_places(folder, entry["places"])]
+    else:
+        words += ["--", _beside(folder, job, entry[job])]
+    return FleetRobot(name, _JOBS[job], tuple(words), float(delay))
+
+
+def _option(folder: Path, key: str, value: Any) -> list[str]:
+    """Write a key as an option of a command."""
+    option = f"--{key.replace('_', '-')}"
+    if isinstance(value, bool):
+        return [option] if value else []
+    if not isinstance(value, list):
+        return [option, _beside(folder, key, value)]
+    if any(isinstance(each, list | str) for each in value):  # given again for each
+        return [word for each in value for word in _option(folder, key, each)]
+    return [option, *map(str, value)]
+
+
+def _places(folder: Path, places: Any) -> list[str]:
+    """Write the places of a tour as words."""
+    if not isinstance(places, list):
+        return [_beside(folder, "path", places)]
+    return [",".join(map(str, place)) if isinstance(place, list) else str(place) for place in places]
+
+
+def _beside(folder: Path, key: str, value: Any) -> str:
+    """Return a value as a word; the name of a file that is beside the TOML file with its folder."""
+    beside = folder / str(value)
+    return str(beside) if key in _FILES and beside.is_file() else str(value)
+
+
+def distance_apart(words: str | float, unit: str | None, robots: Sequence[Robot]) -> float:
+    """Read a distance such as 10cm in m; a bare number has the unit given, or is in tail lengths of all robots.
+
+    Raises:
+        InputError: the words are no length above 0, or the robots have different tail lengths.
+    """
+    text, first = str(words).replace(" ", ""), robots[0]
+    bare = not text.endswith(("m", "l"))
+    relative = text.endswith("l") or (bare and unit in (None, "l"))
+    if relative and any(robot.tail_length != first.tail_length for robot in robots):
+        raise InputError(
+            f"distance apart {words}: the robots have different tail lengths; say its unit, as in 10cm"
+        )
+    return read_length(text, in_tails(unit or "l", first), first, "distance apart") * first.tail_length
+
+
+def write_fleet(fleet: FleetPlan, folder: str | Path) -> list[Path]:
+    """Write a folder for each robot with the files of its plan, fleet.json and a picture, all or none."""
+    from planner.files.pictures import draw_fleet_plan, write_svg
+
+    before = [name for name in _written_before(Path(folder)) if name not in fleet.names]
+    files = [f"{name}/{file}" for name in (*fleet.names, *before) for file in (*FILES, *EXTRA)]
+    with files_together(folder, (*files, *_WRITTEN)) as temporary:
+        for name, plan in zip(fleet.names, fleet.plans, strict=True):
+            (temporary / name).mkdir()
+            write_plan_files(plan, temporary / name)
+        content = fleet.to_dict()
+        write_text(temporary / "fleet.json", json.dumps(content) + "\n")
+        write_svg(
+            draw_fleet_plan(fleet),
+            temporary / "fleet.svg",
+            ", ".join(each["plan_id"] for each in content["robots"]),
+        )
+    for name in before:
+        if not any(Path(folder, name).iterdir()):
+            Path(folder, name).rmdir()
+    return [Path(folder, name) for name in (*fleet.names, *_WRITTEN)]
+
+
+def _written_before(folder: Path) -> list[str]:
+    """List the robots of the fleet that was written into a folder before."""
+    try:
+        names = [str(robot["name"]) for robot in read_json(folder / "fleet.json")["robots"]]
+    except (InputError, KeyError, TypeError):
+        return []
+    return [name for name in names if _NAME.fullmatch(name) and (folder / name).is_dir()]

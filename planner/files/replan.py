@@ -1,0 +1,111 @@
+"""A plan from where a robot is now: the rest of a saved plan, or of a trip to a goal, from its track so far.
+
+A running track is a camera's table: time_s, x_cm, y_cm and heading_deg of the head's centre, or in other units, or
+the columns of a replay. Its last row may still be incomplete. Of a trip to a goal the way to the goal is planned
+again, through the places that are left; of any other plan the rest of its path (`planner.tracking.rest`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from planner.files.goal_json import load_goal
+from planner.files.plan_json import load_plan
+from planner.files.saved_plan import plan_json, restore_plan
+from planner.files.tracking_error import track_in_tails
+from planner.goal.goal_plan import GoalPlan
+from planner.goal.to_goal import make_goal_plan
+from planner.paths.obstacles import FreeSpace
+from planner.planning.planned import Plan
+from planner.planning.request import PlanRequest
+from planner.tracking.rest import Rest, place_reached, rest_of
+from sim.arrays import Floats
+from sim.io.errors import InputError
+from sim.io.quantities import numbers_of
+from sim.model.robot import Robot
+from surrogate.interface import LookupTable
+
+_LARGEST = 1e6  # l, of a place; time units, of a time
+
+
+@dataclass(frozen=True)
+class Trip:
+    """A trip to a goal, in memory or from goal.json."""
+
+    plan: Plan
+    goal: tuple[float, float, float]
+    via: Sequence[Sequence[float]]
+    free_space: FreeSpace
+    margin: float
+
+    @staticmethod
+    def of(trip: GoalPlan) -> Trip:
+        return Trip(trip.plan, trip.goal, trip.via, trip.free_space, trip.margin)
+
+
+def saved_trip(source: str | Path, *, lookup: LookupTable | None = None, own_table: bool = False) -> Plan | Trip:
+    """Read a plan, or the trip to a goal that it belongs to; see `restore_plan`.
+
+    Raises:
+        InputError: the file is no plan, or its robot cannot be simulated.
+    """
+    plan = restore_plan(source, lookup=lookup, own_table=own_table)
+    path = plan_json(source)
+    beside = path.with_name("goal.json")
+    if not beside.is_file():
+        return plan
+    content = load_goal(beside)
+    if content["plan_id"] != load_plan(path)["id"]:
+        return plan
+    x, y, heading = map(float, content["goal"])
+    space, margin = FreeSpace.from_dict(content), float(content["margin_over_l"])
+    return Trip(plan, (x, y, heading), content["via"], space, margin)
+
+
+def replan_from(plan: Plan | Trip, track: pd.DataFrame) -> Rest | GoalPlan:
+    """Plan the rest of a plan or a trip from the last pose of a track, at rest there.
+
+    Raises:
+        InputError: the track cannot be used, it has reached the end, or no way leads on.
+    """
+    if isinstance(plan, Plan):
+        return rest_of(plan, *poses_of(track, plan.robot))
+    trip, plan = plan, plan.plan
+    times, poses = poses_of(track, plan.robot)
+    place, q = place_reached(plan, times, poses), plan.declared.reference.q
+    left: list[Sequence[float]] = []
+    passed = 0
+    for via in trip.via:
+        passed += int(np.hypot(*(q[passed:] - np.array(via)).T).argmin())
+        left += [via] if passed > place else []
+    x, y, heading = poses[-1].tolist()
+    request = PlanRequest(objective=plan.objective, minimum_dwell=plan.minimum_dwell)
+    feedback = not trip.free_space.empty and trip.margin < plan.stated_error
+    start = x, y, math.remainder(heading, math.tau)
+    return make_goal_plan(start, trip.goal, plan.tracked, request, trip.free_space, via=left, feedback=feedback)
+
+
+def poses_of(track: pd.DataFrame, robot: Robot) -> tuple[Floats, Floats]:
+    """Return times (N,) and poses (N, 3) of a track, in time units, l and rad.
+
+    Raises:
+        InputError: a column is missing, a value is no finite number, or times go back.
+    """
+    table = track_in_tails(track, {"tail_length_m": robot.tail_length, "time_scale_s": robot.time_scale})
+    columns = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
+    rows = np.stack([numbers_of(table[name]).to_numpy() for name in columns], 1)
+    if len(rows) > 1 and np.isnan(rows[-1]).any():
+        rows = rows[:-1]  # it is still being written
+    bad = np.flatnonzero(~(np.abs(rows) < _LARGEST).all(1))
+    if len(bad):
+        raise InputError(f"row {bad[0] + 1} of the track has a value that is no finite number; correct the file")
+    back = np.flatnonzero(np.diff(rows[:, 0]) < 0)
+    if len(back):
+        raise InputError(f"the track's time goes back at row {back[0] + 2}; give its rows in order")
+    return rows[:, 0], rows[:, 1:]

@@ -1,0 +1,212 @@
+"""Swings: detours of a track of the pivot that make it longer by a given length.
+
+Waiting circles end in the pose in which they begin, and gain 2 π ρ or more each. For less, a swing leaves the
+track on an arc and joins it further along after three arcs of one radius ρ (`planner.goal.dubins`): on a straight
+track arcs of angles α, 2 α and α replace the length 4 ρ sin α by 4 ρ α. Both are as late on the track as there is
+room: an error of the heading that is left behind then has the least consequences. Lengths in l.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from itertools import chain, pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.goal.dubins import DubinsPaths, three_arcs
+from planner.paths.obstacles import Footprint, FreeSpace
+from planner.paths.path import arc_length
+from planner.paths.tractrix import Drift, Reference, slips, slips_at_heading
+from planner.planning.arrival import Swing
+from planner.vehicle.tracked_point import TrackedVehicle
+from sim.arrays import Floats
+from sim.io.errors import InputError
+
+_SPACING = 0.02  # l, of the points on a swing
+_LONGEST = 4.2  # radii, of the track that a swing replaces
+_STRIDE = 0.5  # radii, between places that are tried
+_MOST_PLACES = 400
+_HALVINGS = 40
+_JUMP = 1.0  # radii; lengths of swings to neighbouring places that differ by more are of another kind
+_ROOM = 1.5  # of the margin of a plan without a swing: what the swing keeps clear
+_CURVED = 0.75  # of the pivot's largest curvature, on the arcs of a swing
+
+Free = Callable[[Floats], bool]  # whether the body keeps clear at poses (m, 3) of the pivot, with headings
+
+
+class NoRoomError(InputError):
+    """There is no room for a swing."""
+
+
+def swung(
+    reference: Reference, longer: float, radius: float, rod: float, drift: Drift, free: Free | None = None
+) -> tuple[Reference, Swing]:
+    """Make a reference longer.
+
+    Args:
+        reference: of the pivot.
+        longer: length that is added.
+        radius: of the arcs.
+        rod: distance from the pivot to the tracked point.
+        drift: what carries the robot off its heading.
+        free: tells whether the body keeps clear; None: there are no obstacles.
+
+    Raises:
+        NoRoomError: the track is too short, or obstacles leave no room.
+    """
+    track = _Track(reference, rod, drift)
+    circle = 2 * math.pi * radius
+    circles = math.floor(longer / circle)
+    ways = [track.swung(longer - circles * circle, circles, radius)]
+    if circles:
+        ways.insert(0, track.circled(circles, longer / (2 * math.pi * circles)))
+    for candidate in chain(*ways):
+        if free is None or free(track.headed(candidate.poses)):
+            return track.joined(candidate)
+    raise NoRoomError(
+        "there is no room for a swing that takes the time: the path is too short, or obstacles are near"
+    )
+
+
+def swung_clear(
+    reference: Reference, longer: float, tracked: TrackedVehicle, drift: Drift, space: FreeSpace, margin: float
+) -> tuple[Reference, Swing]:
+    """Make a vehicle's reference longer, with turns that it can follow well, and clear of obstacles.
+
+    Args:
+        reference: of the pivot.
+        longer: length that is added.
+        tracked: the vehicle.
+        drift: what carries the robot off its heading.
+        space: what its body must keep clear of.
+        margin: around the body, without the swing; the swing keeps some more.
+
+    Raises:
+        NoRoomError: the track is too short, or obstacles leave no room.
+    """
+    vehicle = tracked.vehicle
+    body = Footprint.of(tracked.robot, -vehicle.pivot_distance)
+
+    def free(poses: Floats) -> bool:
+        return bool(body.clearance(poses, space).min() >= _ROOM * margin)
+
+    radius = vehicle.pivot_radius / _CURVED * (1 + math.hypot(*drift.current))
+    return swung(reference, longer, radius, tracked.rod, drift, None if space.empty else free)
+
+
+class _Candidate(NamedTuple):
+    """A swing between two places of a track."""
+
+    leaves: float  # way along the track
+    joins: float
+    poses: Floats  # (k, 3), places and courses between the two, both ends included
+    circles: int
+
+
+class _Track:
+    """A reference as a track of the pivot."""
+
+    def __init__(self, reference: Reference, rod: float, drift: Drift):
+        self._reference, self._rod, self._drift = reference, rod, drift
+        course = reference.heading + slips_at_heading(reference.heading, drift)
+        self._poses = np.column_stack([reference.q, course])
+        self._arc = reference.arc
+
+    def at(self, way: float) -> Floats:
+        """Return the pose (3,) after a way along the track."""
+        return np.array([np.interp(way, self._arc, column) for column in self._poses.T])
+
+    def headed(self, poses: Floats) -> Floats:
+        """Return places and headings (m, 3) of poses with courses."""
+        return np.column_stack([poses[:, :2], poses[:, 2] - slips(poses[:, 2], self._drift)])
+
+    def circled(self, circles: int, radius: float) -> Iterator[_Candidate]:
+        """Yield circles at places from the end of the track to its beginning."""
+        for way in self._places(radius):
+            for side in (1, -1):
+                arc = DubinsPaths(self.at(way)[None], np.array([[side, 0, 0]]),
+                                  np.array([[2 * math.pi * radius * circles, 0.0, 0.0]]))  # fmt: skip
+                yield _Candidate(way, way, _sampled(arc, radius), circles)
+
+    def swung(self, rest: float, circles: int, radius: float) -> Iterator[_Candidate]:
+        """Yield swings that gain `rest` besides their circles, from the end of the track to its beginning."""
+        for leaves in self._places(radius):
+            until = np.searchsorted(self._arc, leaves + _LONGEST * radius)
+            joins = self._arc[np.searchsorted(self._arc, leaves) + 1 : until]
+            if len(joins) < 2:
+                continue
+            joins = self._with_limits(leaves, joins, radius)
+            gained = self._gained(leaves, joins, radius)
+            with np.errstate(invalid="ignore"):  # where there is no swing
+                jumps = np.abs(np.diff(gained, axis=0)) > _JUMP * radius
+                crossed = ((gained[:-1] - rest) * (gained[1:] - rest) <= 0) & ~jumps
+            for row, word in sorted(np.argwhere(crossed).tolist()):
+                joins_at = self._root(leaves, joins[row], joins[row + 1], word, rest, radius)
+                turns, lengths = three_arcs(self.at(leaves), self.at(joins_at), radius)
+                parts = lengths[word] + np.array([2 * math.pi * radius * circles, 0.0, 0.0])
+                path = DubinsPaths(self.at(leaves)[None], turns[word][None], parts[None])
+                yield _Candidate(leaves, joins_at, _sampled(path, radius), circles)
+
+    def joined(self, candidate: _Candidate) -> tuple[Reference, Swing]:
+        """Put a candidate into the track."""
+        before, after = np.searchsorted(self._arc, [candidate.leaves, candidate.joins])
+        old = self._reference
+        start = np.array([np.interp(candidate.leaves, self._arc, column) for column in (*old.p.T, *old.q.T)])
+        headings = self.headed(candidate.poses)[:, 2]
+        first = float(np.interp(candidate.leaves, self._arc, old.heading))
+        headings += 2 * math.pi * round((first - headings[0]) / (2 * math.pi))
+        places = candidate.poses[:, :2]
+        points = places + self._rod * np.stack([np.cos(headings), np.sin(headings)], 1)
+        joined = float(np.interp(candidate.joins, self._arc, old.heading))
+        turned = 2 * math.pi * round((headings[-1] - joined) / (2 * math.pi))
+        q = np.concatenate([old.q[:before], places, old.q[after + 1 :]])
+        p = np.concatenate([old.p[:before], points, old.p[after + 1 :]])
+        heading = np.concatenate([old.heading[:before], headings, old.heading[after + 1 :] + turned])
+        longer = float(arc_length(places)[-1] - (candidate.joins - candidate.leaves))
+        swing = Swing(float(start[0]), float(start[1]), longer, candidate.circles)
+        return Reference(p, q, heading, arc_length(q), old.closed), swing
+
+    def _places(self, radius: float) -> list[float]:
+        """List ways along the track, the last one first."""
+        length = float(self._arc[-1])
+        count = min(max(math.ceil(length / (_STRIDE * radius)), 1), _MOST_PLACES)
+        return np.linspace(length, 0.0, count + 1).tolist()
+
+    def _with_limits(self, leaves: float, joins: Floats, radius: float) -> Floats:
+        """Add places near those up to which there are swings, where their lengths change fast."""
+        exists = np.isfinite(self._gained(leaves, joins, radius))
+        added = [joins]
+        for row, word in np.argwhere(exists[:-1] != exists[1:]).tolist():
+            low, high = joins[row], joins[row + 1]
+            for _ in range(_HALVINGS):
+                middle = (low + high) / 2
+                same = bool(np.isfinite(self._gained(leaves, np.array([middle]), radius)[0, word]))
+                low, high = (middle, high) if same == exists[row, word] else (low, middle)
+                added.append(np.array([middle]))
+        return np.unique(np.concatenate(added))
+
+    def _gained(self, leaves: float, joins: Floats, radius: float) -> Floats:
+        """Compute the lengths (m, 4) that swings between two places gain."""
+        ends = np.stack([np.interp(joins, self._arc, column) for column in self._poses.T], 1)
+        return np.asarray(three_arcs(self.at(leaves), ends, radius)[1].sum(-1) - (joins - leaves)[:, None])
+
+    def _root(self, leaves: float, low: float, high: float, word: int, rest: float, radius: float) -> float:
+        """Find the place to join between two, by bisection."""
+        above = self._gained(leaves, np.array([low]), radius)[0, word] > rest
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            if (self._gained(leaves, np.array([middle]), radius)[0, word] > rest) == above:
+                low = middle
+            else:
+                high = middle
+        return (low + high) / 2
+
+
+def _sampled(path: DubinsPaths, radius: float) -> Floats:
+    """Sample poses (m, 3) of one path at equal steps, with its joints."""
+    parts = path.lengths[0]
+    ends = np.concatenate([[0.0], np.cumsum(parts)])
+    ways = [np.linspace(a, b, max(math.ceil((b - a) / _SPACING), 1) + 1)[1:] for a, b in pairwise(ends) if b > a]
+    return np.asarray(path.poses(np.concatenate([[0.0], *ways])[None], radius)[0])

@@ -1,0 +1,205 @@
+"""Plans of robots that keep apart in one tank, and how they show themselves: text, picture, content of fleet.json.
+
+Robots have different units, so that lengths are in metres and times in seconds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from planner.jobs.separation import Scheduled, distances, instants
+from planner.planning.planned import Plan
+from sim.arrays import Floats
+from sim.io.notebook import as_html
+from sim.io.units import column_units, format_length, format_time
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+FORMAT = 1
+CLOSE = 2.8  # l between bodies: nearer, flow may move a robot by more than 5 % (`benchmarks flow_between_robots`)
+
+
+class Nearest(NamedTuple):
+    """The least distance between two bodies."""
+
+    distance_m: float
+    time_s: float
+    pair: tuple[int, int]  # indices of the robots
+
+
+@dataclass(frozen=True, repr=False)
+class FleetPlan:
+    """Plans that keep apart. Lengths in m, times in s.
+
+    Example:
+        >>> import softflagella as sf
+        >>> right = sf.plan([(0, 0), (4, 0)], "paper-control")
+        >>> up = sf.plan([(1.5, -2.5), (1.5, 3)], "paper-control")
+        >>> both = sf.fleet([right, up], apart="5cm")
+        >>> both.begin_s[0], both.begin_s[1] > 60, both.sure_m >= 0.05
+        (0.0, True, True)
+    """
+
+    names: tuple[str, ...]  # of the robots
+    scheduled: tuple[Scheduled, ...]  # their motions in time
+    order: tuple[int, ...]  # indices of the robots: each one gives way to those before it
+    apart_m: float  # as asked for
+    feedback: bool  # poses are measured every 20 flips
+
+    @property
+    def plans(self) -> tuple[Plan, ...]:
+        """A plan for each robot, with its waiting circles."""
+        return tuple(each.motion.plan for each in self.scheduled)
+
+    @property
+    def begin_s(self) -> tuple[float, ...]:
+        """When the motor of each robot starts."""
+        return tuple(each.begin for each in self.scheduled)
+
+    @property
+    def circles(self) -> tuple[int, ...]:
+        """How many waiting circles each robot makes."""
+        return tuple(len(each.circles) for each in self.scheduled)
+
+    @property
+    def duration_s(self) -> float:
+        """When the last robot stops."""
+        return max(each.end for each in self.scheduled)
+
+    @cached_property
+    def distances(self) -> tuple[Floats, dict[tuple[int, int], tuple[Floats, Floats]]]:
+        """Instants (K,), and of each pair the predicted distances (K,) and those less both errors in place."""
+        times = instants(self.scheduled)
+        places = [each.places(times) for each in self.scheduled]
+        table = {}
+        for first, second in combinations(range(len(places)), 2):
+            predicted = distances(places[first], places[second])
+            table[first, second] = predicted, predicted - places[first].error - places[second].error
+        return times, table
+
+    @property
+    def nearest(self) -> Nearest:
+        """The least predicted distance between two bodies, when it is, and between which robots."""
+        return self._nearest(0)
+
+    @property
+    def sure_m(self) -> float:
+        """The least distance that is left when both robots are off by their errors in place."""
+        return self._nearest(1).distance_m
+
+    def _nearest(self, column: int) -> Nearest:
+        times, table = self.distances
+        pair = min(table, key=lambda pair: float(table[pair][column].min()))
+        k = int(table[pair][column].argmin())
+        return Nearest(float(table[pair][column][k]), float(times[k]), pair)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know, in words."""
+        words = [
+            f"{name}: {warning}"
+            for name, plan in zip(self.names, self.plans, strict=True)
+            for warning in plan.warnings
+        ]
+        longest = max(plan.robot.tail_length for plan in self.plans)
+        if self.nearest.distance_m < CLOSE * longest:
+            words.append(
+                f"robots come within {format_length(self.nearest.distance_m)} of each other: nearer than "
+                f"{format_length(CLOSE * longest)} the flow of one, which is left out, may move the other by more "
+                "than 5 % of its speed"
+            )
+        drifting = [
+            name for name, plan in zip(self.names, self.plans, strict=True) if plan.tracked.vehicle.current.any()
+        ]
+        if drifting:
+            words.append(
+                f"{', '.join(drifting)}: in a current a robot drifts while it rests, and the plans hold it where "
+                "it is; start it when its time has come"
+            )
+        return tuple(words)
+
+    def lines(self) -> list[str]:
+        """Say when each robot starts, how often it circles, and how near the robots come."""
+        lines = []
+        for k in range(len(self.names)):
+            lines.append(f"{self.names[k]}: {self._timing(k)}")
+        one, two = (self.names[k] for k in self.nearest.pair)
+        lines.append(
+            f"least distance {format_length(self.nearest.distance_m)}, between {one} and {two} after "
+            f"{format_time(self.nearest.time_s)}; with the errors in place of both at least "
+            f"{format_length(self.sure_m)}, asked for {format_length(self.apart_m)}"
+        )
+        return lines
+
+    def _timing(self, k: int) -> str:
+        """Say when a robot begins and ends."""
+        begin, count = self.begin_s[k], self.circles[k]
+        starts = "starts at once" if begin == 0 else f"starts after {format_time(begin)}"
+        circles = "" if not count else f", makes {count} waiting circle{'' if count == 1 else 's'}"
+        return f"{starts}{circles}, ends after {format_time(self.scheduled[k].end)}"
+
+    def __repr__(self) -> str:
+        title = f"Plans for {len(self.names)} robots that keep {format_length(self.apart_m)} apart"
+        lines = [title, *(f"  {line}" for line in self.lines())]
+        if self.warnings:
+            lines.append(f"  {len(self.warnings)} warnings, the first: {self.warnings[0][:200]}")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self), self.plot)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw all predicted tracks with marks of time, on axes in cm.
+
+        Args:
+            ax: default: axes of a new figure.
+        """
+        from planner.jobs.fleet_picture import draw_motions  # loads matplotlib
+        from sim.io.notebook import given_axes
+
+        return draw_motions(given_axes(ax), self.names, self.scheduled)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Tabulate the predicted distance between bodies over time, a column for each pair."""
+        import pandas as pd
+
+        times, table = self.distances
+        columns = {"time_s": times}
+        for (first, second), (predicted, sure) in table.items():
+            pair = f"{self.names[first]}_{self.names[second]}"
+            columns |= {f"{pair}_cm": 100 * predicted, f"{pair}_sure_cm": 100 * sure}
+        frame = pd.DataFrame(columns)
+        frame.attrs["units"] = column_units(frame)
+        return frame
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of fleet.json."""
+        return {
+            "format": FORMAT,
+            "robots": [
+                {
+                    "name": name,
+                    "plan_id": each.motion.plan.to_dict()["id"],
+                    "begin_s": each.begin,
+                    "end_s": each.end,
+                    "waiting_circles": len(each.circles),
+                    "error_in_place_m": float(each.motion.error(np.array([each.motion.duration]))[0]),
+                }
+                for name, each in zip(self.names, self.scheduled, strict=True)
+            ],
+            "order": list(self.order),
+            "apart_m": self.apart_m,
+            "feedback": self.feedback,
+            "least_distance_m": self.nearest.distance_m,
+            "least_distance_s": self.nearest.time_s,
+            "least_distance_between": [self.names[k] for k in self.nearest.pair],
+            "sure_distance_m": self.sure_m,
+            "warnings": list(self.warnings),
+        }

@@ -1,0 +1,107 @@
+"""Distances between the bodies of robots that move at the same time. Lengths in m, times in s.
+
+A body is a line with a width (`planner.jobs.timed_motion.Body`), so the distance of two bodies is that of their
+lines, less their widths. Robots are apart at an instant if this distance, less the errors in place of both, is at
+least the distance asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.jobs.timed_motion import Body, TimedMotion
+from planner.jobs.waiting_circles import WaitingCircle
+from sim.arrays import Floats
+
+_ROWS = 200  # of a table of pairs at once
+_FINER = 6  # instants in a dwell
+_MOST = 40_000  # instants
+
+Truth = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Scheduled:
+    """A motion that begins at a time; before, the robot rests at its start, and afterwards at its end."""
+
+    motion: TimedMotion  # that is carried out
+    begin: float  # [s]
+    circles: tuple[WaitingCircle, ...] = ()  # that the motion has more than the plan it was made from
+
+    @property
+    def end(self) -> float:
+        """Time at which the robot stops [s]."""
+        return self.begin + self.motion.duration
+
+    def places(self, times: Floats) -> Places:
+        """Return poses and errors at times (K,) of the fleet."""
+        own = times - self.begin
+        return Places(self.motion.body, self.motion.poses(own), self.motion.error(own))
+
+
+def instants(scheduled: Sequence[Scheduled]) -> Floats:
+    """Choose times (K,) from 0 to the end of the last motion, several in the shortest dwell of any robot."""
+    last = max(each.end for each in scheduled)
+    dwell = min(each.motion.plan.minimum_dwell * each.motion.plan.robot.time_scale for each in scheduled)
+    return np.linspace(0.0, last, min(math.ceil(_FINER * last / dwell), _MOST) + 1)
+
+
+@dataclass(frozen=True)
+class Places:
+    """A body at K poses, with its error in place at each."""
+
+    body: Body
+    poses: Floats  # (K, 3)
+    error: Floats  # (K,)
+
+    def middles(self) -> Floats:
+        """Return the middles (K, 2) of the body's line."""
+        return self.body.ends(self.poses).mean(-2)
+
+
+def distances(first: Places, second: Places) -> Floats:
+    """Compute the distances (K,) of two bodies at the same K instants, negative where they overlap."""
+    lines = line_distance(first.body.ends(first.poses), second.body.ends(second.poses))
+    return np.asarray(lines - first.body.radius - second.body.radius)
+
+
+def too_near(first: Places, second: Places, apart: float) -> Truth:
+    """Tell for all pairs of poses (I, J) whether bodies may be nearer than `apart`."""
+    ends, other_ends = first.body.ends(first.poses), second.body.ends(second.poses)
+    middles, others = first.middles(), second.middles()
+    widths = first.body.radius + second.body.radius + apart
+    halves = (first.body.front - first.body.back + second.body.front - second.body.back) / 2
+    near = np.zeros((len(middles), len(others)), dtype=bool)
+    for begin in range(0, len(middles), _ROWS):
+        rows = slice(begin, begin + _ROWS)
+        needed = widths + first.error[rows, None] + second.error
+        away = np.hypot(middles[rows, None, 0] - others[:, 0], middles[rows, None, 1] - others[:, 1])
+        i, j = np.nonzero(away < needed + halves)
+        near[begin + i, j] = line_distance(ends[begin + i], other_ends[j]) < needed[i, j]
+    return near
+
+
+def line_distance(first: Floats, second: Floats) -> Floats:
+    """Compute the distances (...) of straight lines with ends (..., 2, 2); 0 where they cross."""
+    a, b, c, d = first[..., 0, :], first[..., 1, :], second[..., 0, :], second[..., 1, :]
+    squares = [_to_line(a, c, d), _to_line(b, c, d), _to_line(c, a, b), _to_line(d, a, b)]
+    crossing = (_side(a, b, c) * _side(a, b, d) < 0) & (_side(c, d, a) * _side(c, d, b) < 0)
+    return np.where(crossing, 0.0, np.sqrt(np.minimum.reduce(squares)))
+
+
+def _to_line(point: Floats, begin: Floats, end: Floats) -> Floats:
+    """Compute squared distances (...) of points (..., 2) from lines."""
+    edge, away = end - begin, point - begin
+    share = np.clip((away * edge).sum(-1) / np.maximum((edge**2).sum(-1), 1e-300), 0.0, 1.0)
+    return np.asarray(((away - share[..., None] * edge) ** 2).sum(-1))
+
+
+def _side(begin: Floats, end: Floats, point: Floats) -> Floats:
+    """Tell by the sign on which side of a line points lie."""
+    edge, away = end - begin, point - begin
+    return np.asarray(edge[..., 0] * away[..., 1] - edge[..., 1] * away[..., 0])

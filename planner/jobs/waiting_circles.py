@@ -1,0 +1,104 @@
+"""Waiting circles: whole turns of the pivot that a plan makes at places of its path.
+
+After a whole turn the pivot is where it was, with the same course. The circle becomes a part of the declared path,
+so the guidance leads the robot around it and back, open loop as well as with a tracker, and the stated error
+includes it. A time of arrival that was asked for is not kept. The circle is wider than the robot's narrowest one,
+by 1/ROOM. Lengths in l, times in μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.goal.final_dwells import end_at_goal
+from planner.goal.goal_plan import Pose
+from planner.jobs.clear_plan import redeclared
+from planner.paths.path import arc_length
+from planner.paths.tractrix import Reference, slips, slips_at_heading
+from planner.planning.errors import plan_errors
+from planner.planning.plan import choose_guidance, zigzag_drift
+from planner.planning.planned import Plan
+from planner.planning.schedule import Start, follow
+from planner.planning.stated_error import guaranteed
+
+ROOM = 0.7  # radius of the narrowest circle over that of a waiting circle
+_SPACING = 0.02  # l, of the reference's points
+
+
+class WaitingCircle(NamedTuple):
+    """A whole turn at a place of the path."""
+
+    place: int  # index of a point of the reference
+    side: int  # +1: to the left, −1: to the right
+
+
+def circle_reference(plan: Plan, circle: WaitingCircle) -> Reference:
+    """Make the reference of a waiting circle; it begins and ends at the place, and ends a whole turn further."""
+    reference, tracked = plan.declared.reference, plan.tracked
+    drift = zigzag_drift(tracked, plan.straight, plan.minimum_dwell)
+    radius = tracked.vehicle.pivot_radius / ROOM
+    count = math.ceil(2 * math.pi * radius / _SPACING)
+    turned = circle.side * 2 * math.pi * np.arange(count + 1) / count
+    heading = float(reference.heading[circle.place])
+    course = heading + float(slips_at_heading(np.array(heading), drift))
+    courses = course + turned
+    left = circle.side * radius * np.array([-math.sin(course), math.cos(course)])
+    arms = circle.side * radius * np.stack([np.sin(courses), -np.cos(courses)], 1)
+    q = reference.q[circle.place] + left + arms
+    headings = courses - slips(courses, drift)
+    headings += heading - headings[0]
+    p = q + tracked.rod * np.stack([np.cos(headings), np.sin(headings)], 1)
+    return Reference(p, q, headings, arc_length(q), False)
+
+
+def with_circles(plan: Plan, circles: Sequence[WaitingCircle], goal: Pose | None = None) -> Plan:
+    """Plan again with waiting circles.
+
+    Args:
+        plan: the plan without them.
+        circles: where to wait; those at the same place follow each other.
+        goal: the pose at which the plan ends, if it ends at one.
+
+    Raises:
+        InputError: the robot has no room for a circle.
+    """
+    if not circles:
+        return plan
+    tracked, vehicle = plan.tracked, plan.tracked.vehicle
+    reference = _inserted(plan, circles)
+    declared = redeclared(plan.declared, reference, plan.drawn)
+    if goal is None:
+        guidance = choose_guidance(vehicle, declared, plan.straight, plan.minimum_dwell)
+        start = None
+    else:
+        guidance, start = plan.guidance, Start(plan.start, plan.first_direction)
+    switches = follow(reference, vehicle, guidance, tracked.offset, start=start)
+    if goal is not None:
+        switches = end_at_goal(switches, goal, vehicle, plan.minimum_dwell, reference.q)
+    bound = None if goal else guaranteed(vehicle, tracked.rod, plan.straight.swing, guidance.ahead)
+    errors = plan_errors(tracked, plan.drawn, declared, switches, guaranteed=bound, seed=0)
+    return replace(plan, declared=declared, guidance=guidance, switches=switches, errors=errors, arrival=None)
+
+
+def _inserted(plan: Plan, circles: Sequence[WaitingCircle]) -> Reference:
+    """Insert circles into the reference of a plan."""
+    reference = plan.declared.reference
+    p, q, headings = [], [], []
+    begin, turned = 0, 0.0
+    for circle in sorted(circles):
+        around = circle_reference(plan, circle)
+        rows = slice(begin, circle.place)
+        p += [reference.p[rows], around.p[:-1]]
+        q += [reference.q[rows], around.q[:-1]]
+        headings += [reference.heading[rows] + turned, around.heading[:-1] + turned]
+        begin, turned = circle.place, turned + circle.side * 2 * math.pi
+    p.append(reference.p[begin:])
+    q.append(reference.q[begin:])
+    headings.append(reference.heading[begin:] + turned)
+    pivot = np.concatenate(q)
+    return Reference(np.concatenate(p), pivot, np.concatenate(headings), arc_length(pivot), reference.closed)

@@ -1,0 +1,1 @@
+"""The page that plans: its core in JavaScript, and what Python writes into it."""

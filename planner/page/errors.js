@@ -1,0 +1,39 @@
+/* The errors of a plan: distances of the predicted track from declared and drawn path, and the stated error.
+ *
+ * Mirrors planner/planning/errors.py. Lengths in l. */
+import { largest } from "./arrays.js";
+import { distanceTo } from "./distance.js";
+import { errorGrowth } from "./error_growth.js";
+import { polyline } from "./path.js";
+import { rollOut } from "./rollout.js";
+import { flipsBetween, largestDistance, predictedError, rmsInTime, statedError } from "./stated_error.js";
+
+const FEEDBACK_EVERY = 20; // flips
+
+/* Compute the errors of a schedule: {track, stated, feedback, guaranteed, closure, predictedRms, predictedMax,
+ * drawnRms, drawnMax}. plan_errors
+ *
+ * tracked: see tracked_point.js. drawn: the path as drawn. declared: see declared_path.js. switches: the schedule.
+ * guaranteed: bound on the error without uncertainty. seed: of the random robots. */
+function planErrors(tracked, drawn, declared, switches, guaranteed, seed) {
+  const { vehicle, offset } = tracked, path = declared.reference.p, { dwells } = switches, count = dwells.length;
+  const rollout = rollOut(vehicle, switches, offset), { track } = rollout;
+  const predicted = predictedError(path, track, drawn.closed), fromDrawn = distanceTo(polyline(drawn), track);
+  const flips = [...new Set([...flipsBetween(count), ...flipsBetween(count, FEEDBACK_EVERY)])];
+  const growth = errorGrowth(vehicle, switches, rollout, flips.sort((one, other) => one - other));
+  const stated = statedError(growth, predicted, 0, seed);
+  const [endX, endY] = track[track.length - 1], [startX, startY] = path[0];
+  return {
+    track,
+    stated,
+    feedback: Math.min(stated, statedError(growth, predicted, FEEDBACK_EVERY, seed)), // feedback may be left out
+    guaranteed,
+    closure: drawn.closed ? Math.hypot(endX - startX, endY - startY) : null,
+    predictedRms: rmsInTime(predicted.distance, dwells),
+    predictedMax: largestDistance(predicted),
+    drawnRms: rmsInTime(fromDrawn, dwells),
+    drawnMax: largest(fromDrawn),
+  };
+}
+
+export { FEEDBACK_EVERY, planErrors };

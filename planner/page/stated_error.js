@@ -1,0 +1,191 @@
+/* The error of a plan: predicted, stated with its uncertainty, and guaranteed for paths of any length.
+ *
+ * Mirrors planner/planning/stated_error.py, which explains them. Lengths in l, times in μ0 l⁴/EI. */
+import { largest, linspace, sum } from "./arrays.js";
+import { nearest } from "./distance.js";
+import { normals } from "./draws.js";
+import { growthAt, noiseBetween } from "./error_growth.js";
+import { BEFORE_KNOTS, COUNT, SHORTEST, STEP, pivotRadius } from "./vehicle.js";
+import { zigzagSpeed } from "./zigzag.js";
+
+const LEVEL = 0.95;
+const DRAWS = 400;
+const BLOCKS = 300; // places along the schedule where deviations are drawn
+const TIGHTEST = 0.97;
+const PAIRS_AHEAD = 4; // pairs of dwells
+
+/* Δ = R′/(1 − κ̄ R′), at least the way that the robot makes in some pairs of dwells. look_ahead */
+function lookAhead(vehicle, curvature, straight = null) {
+  const radius = pivotRadius(vehicle), least = radius / (1 - Math.min(curvature * radius, TIGHTEST));
+  if (straight === null) return least;
+  return Math.max(least, PAIRS_AHEAD * zigzagSpeed(straight) * (straight.dwells[0] + straight.dwells[1]));
+}
+
+/* The bound on the distance from the reference for a vehicle without errors; rod: from the pivot to the tracked
+ * point. guaranteed */
+function guaranteedError(vehicle, rod, swing, ahead) {
+  const first = Math.round(SHORTEST / STEP), lag = [0, 0, 0];
+  for (const table of vehicle.lag) {
+    for (let row = 0; row < BEFORE_KNOTS.length * COUNT; row++) {
+      if (row % COUNT < first) continue;
+      for (let axis = 0; axis < 3; axis++) lag[axis] = Math.max(lag[axis], Math.abs(table[3 * row + axis]));
+    }
+  }
+  const flip = Math.sqrt(lag[0] ** 2 + lag[1] ** 2) + (ahead + 2 * rod) * lag[2];
+  return swing * (ahead + 2 * rod) + flip;
+}
+
+/* The rms over time of distances that are sampled equally often in each dwell. */
+function rmsInTime(distance, dwells) {
+  const samples = (distance.length - 1) / dwells.length, squares = distance.map((value) => value * value);
+  const each = Float64Array.from(dwells, (dwell, i) => {
+    return (sum(squares.slice(i * samples + 1, (i + 1) * samples + 1)) / samples) * dwell;
+  });
+  return Math.sqrt(sum(each) / sum(dwells));
+}
+
+/* Distances of a track from the declared path: {distance, signed, normal, closed}; left is positive, and normals
+ * point to the left. predicted_error */
+function predictedError(declared, track, closed) {
+  const { distance, segment, share } = nearest(declared, track), signed = new Float64Array(track.length);
+  const normal = track.map(([x, y], i) => {
+    const [x0, y0] = declared[segment[i]], [x1, y1] = declared[segment[i] + 1], dx = x1 - x0, dy = y1 - y0;
+    const length = Math.max(Math.sqrt(dx * dx + dy * dy), 1e-300), aside = -dy / length, ahead = dx / length;
+    signed[i] = (x - (x0 + share[i] * dx)) * aside + (y - (y0 + share[i] * dy)) * ahead;
+    return [aside, ahead];
+  });
+  return { distance, signed, normal, closed };
+}
+
+/* Choose the flips of a schedule of `count` dwells between which deviations are drawn; every: flips between
+ * measured poses, 0: none is measured. flips_between */
+function flipsBetween(count, every = 0) {
+  const steps = Math.max(every, Math.floor(count / BLOCKS));
+  const flips = every
+    ? [...Array.from({ length: Math.ceil(count / steps) }, (_, i) => i * steps), count]
+    : Array.from(linspace(0, count, Math.min(count, BLOCKS) + 1), Math.trunc);
+  return [...new Set(flips)].sort((one, other) => one - other);
+}
+
+/* The quantile LEVEL of the largest distance from the declared path over random vehicles. stated_error
+ *
+ * growth: at all flips of `flipsBetween` at least. every: see there. seed: of the draws. */
+function statedError(growth, predicted, every = 0, seed = 0) {
+  const count = growth.flips[growth.flips.length - 1], some = growthAt(growth, flipsBetween(count, every));
+  const blocks = extremes(predicted, some.flips, (predicted.distance.length - 1) / count);
+  const modes = some.modes.length, axes = every ? 2 : 3; // of the noise: x and y, or x, y and heading
+  const z = normals(seed, 0, DRAWS * modes), size = blocks.low.length * axes;
+  const drawn = normals(seed, DRAWS * modes, DRAWS * size), worst = new Float64Array(DRAWS);
+  const move = every ? movesFromMeasured(some, every) : movesFromStart(some);
+  for (let draw = 0; draw < DRAWS; draw++) {
+    const ofModes = z.subarray(draw * modes, (draw + 1) * modes);
+    const moved = move(ofModes, drawn.subarray(draw * size, (draw + 1) * size));
+    worst[draw] = farthest(moved, blocks, predicted.closed);
+  }
+  return quantile(worst.sort(), LEVEL);
+}
+
+/* How far vehicles are off at the ends of the blocks, if no pose is measured: a function of z of the modes and of
+ * the numbers of the noise, which gives x and y of each block in turn. */
+function movesFromStart(growth) {
+  const noise = noiseBetween(growth), blocks = noise.length, sigma = Float64Array.from(noise.flat());
+  const position = Float64Array.from(growth.position.flat()), moved = new Float64Array(2 * blocks);
+  const [ofX, ofY] = columnsOfModes(growth.modes.map(({ x, y }) => [x.slice(1), y.slice(1)]), blocks);
+  return (z, drawn) => {
+    let swung = 0, x = 0, y = 0, leverX = 0, leverY = 0;
+    for (let block = 0; block < blocks; block++) {
+      const turn = drawn[3 * block + 2] * sigma[3 * block + 2], at = 2 * block;
+      swung += turn;
+      x += drawn[3 * block] * sigma[3 * block];
+      y += drawn[3 * block + 1] * sigma[3 * block + 1];
+      leverX += (turn * (position[at + 2] + position[at])) / 2;
+      leverY += (turn * (position[at + 3] + position[at + 1])) / 2;
+      moved[at] = product(z, ofX, block) + x - (swung * position[at + 3] - leverY);
+      moved[at + 1] = product(z, ofY, block) + y + (swung * position[at + 2] - leverX);
+    }
+    return moved;
+  };
+}
+
+/* The same, if each block starts from a known pose. */
+function movesFromMeasured(growth, every) {
+  const { flips, position } = growth, noise = noiseBetween(growth), blocks = noise.length;
+  const shares = noise.map((_, block) => Math.min(Math.max(every / (flips[block + 1] - flips[block]), 0), 1));
+  const steps = noise.map((_, i) => [position[i + 1][0] - position[i][0], position[i + 1][1] - position[i][1]]);
+  const relative = growth.modes.map(({ x, y, turned }) => [
+    steps.map(([, dy], i) => x[i + 1] - x[i] + turned[i] * dy),
+    steps.map(([dx], i) => y[i + 1] - y[i] - turned[i] * dx),
+  ]);
+  const [ofX, ofY] = columnsOfModes(relative, blocks), moved = new Float64Array(2 * blocks);
+  const sigma = Float64Array.from(noise, ([across], block) => across * Math.sqrt(shares[block]));
+  return (z, drawn) => {
+    for (let block = 0; block < blocks; block++) {
+      const at = 2 * block;
+      moved[at] = product(z, ofX, block) * shares[block] + drawn[at] * sigma[block];
+      moved[at + 1] = product(z, ofY, block) * shares[block] + drawn[at + 1] * sigma[block];
+    }
+    return moved;
+  };
+}
+
+/* What modes [x, y] add in each block, block by block in one column each. */
+function columnsOfModes(modes, blocks) {
+  return [0, 1].map((axis) => {
+    const values = new Float64Array(blocks * modes.length);
+    modes.forEach((mode, p) => {
+      for (let block = 0; block < blocks; block++) values[block * modes.length + p] = mode[axis][block];
+    });
+    return values;
+  });
+}
+
+/* The sum of the modes in a block, z standard deviations of each. */
+function product(z, values, block) {
+  let total = 0;
+  for (let p = 0, at = block * z.length; p < z.length; p++, at++) total += z[p] * values[at];
+  return total;
+}
+
+/* The largest distance from the path of a vehicle that is so far off at the ends of the blocks. */
+function farthest(moved, { low, high, normal }, closed) {
+  let worst = 0;
+  for (let block = 0; block < low.length; block++) {
+    const x = moved[2 * block], y = moved[2 * block + 1], nx = normal[2 * block], ny = normal[2 * block + 1];
+    const across = x * nx + y * ny;
+    let off = Math.max(Math.abs(high[block] + across), Math.abs(low[block] + across));
+    if (!closed && block === low.length - 1) { // past the end of an open path
+      off = Math.hypot(off, Math.max(x * ny - y * nx, 0));
+    }
+    worst = Math.max(worst, off);
+  }
+  return worst;
+}
+
+/* Lowest and highest signed distance in each block, and the normals at its end, x and y in turn. */
+function extremes({ distance, signed, normal }, flips, samples) {
+  const blocks = flips.length - 1, low = new Float64Array(blocks).fill(Infinity);
+  const high = new Float64Array(blocks).fill(-Infinity);
+  for (let block = 0; block < blocks; block++) {
+    const last = block === blocks - 1 ? distance.length : flips[block + 1] * samples;
+    for (let i = flips[block] * samples; i < last; i++) {
+      const side = signed[i] < 0 || Object.is(signed[i], -0) ? -distance[i] : distance[i];
+      low[block] = Math.min(low[block], side);
+      high[block] = Math.max(high[block], side);
+    }
+  }
+  return { low, high, normal: Float64Array.from(flips.slice(1).flatMap((end) => normal[end * samples])) };
+}
+
+/* The quantile of sorted values, as numpy.quantile. */
+function quantile(values, level) {
+  const place = level * (values.length - 1), below = Math.floor(place), share = place - below;
+  const step = values[below + 1] - values[below];
+  return share >= 0.5 ? values[below + 1] - step * (1 - share) : values[below] + step * share;
+}
+
+/* The largest distance of a predicted track. Predicted.largest */
+function largestDistance({ distance }) {
+  return largest(distance);
+}
+
+export { lookAhead, guaranteedError, rmsInTime, predictedError, flipsBetween, statedError, largestDistance };

@@ -1,0 +1,399 @@
+/* The page: what the user changes, what is planned for it, and what is shown. */
+
+import { byId, element, save, say } from "./dom.js";
+import { inflated } from "../table_data.js";
+import { chart, marker, tradeOff } from "./charts.js";
+import { showCorners } from "./corner_table.js";
+import { connect } from "./controls.js";
+import { askUnit } from "./imports.js";
+import { showTrack } from "./measured.js";
+import { FileProblem, oneFile } from "./one_file.js";
+import { PathEditor, WORDS } from "./path_editor.js";
+import { pictureText } from "./picture.js";
+import { PlanView } from "./plan_view.js";
+import { PlannerClient } from "./planner_client.js";
+import { Player } from "./player.js";
+import { showResults, summary } from "./results.js";
+import { RobotForm, showMotion } from "./robot_form.js";
+import { Runs } from "./runs.js";
+import { History, addressOf, fromAddress, labValues, onGrid, pointsRefusal, wishOf } from "./state.js";
+
+const PAUSE = 120; // ms after the last change until a plan begins
+
+class Page {
+  /* `data` is what Python has written, `planner` the text of the worker. */
+  constructor(data, planner) {
+    this.data = data;
+    this.planner = planner;
+    this.robots = new Map(data.robots.map((robot) => [robot.name, robot]));
+    this.client = new PlannerClient(
+      () => this.worker(),
+      (words) => this.problem(words),
+    );
+    this.view = new PlanView();
+    this.editor = new PathEditor(
+      (points, closed) => this.stroke(points, closed),
+      (points, closed) => this.setPoints(points, closed),
+    );
+    this.view.editor = this.editor;
+    this.player = new Player((pose, time) => this.played(pose, time));
+    this.form = new RobotForm(
+      data.limits,
+      (values, key) => this.setRobot(values, key),
+      () => this.history.settle(),
+    );
+    this.initial = this.firstState();
+    this.plan = null;
+    this.track = null;
+    this.fileProblem = new FileProblem();
+    this.runs = new Runs(
+      (content, use) => this.ask("runs", content, use),
+      () => this.saveFile("robot.toml"),
+    );
+    this.timer = null;
+    this.questions = 0; // that are not answered
+    this.notice = ""; // about the link, until the next change
+  }
+
+  /* Read the address, connect the controls, and plan. */
+  start() {
+    const { state, problem } = this.address();
+    this.history = new History(state);
+    this.notice = problem;
+    connect(this);
+    this.refresh();
+  }
+
+  /* The state that the address holds: {state, problem}. */
+  address() {
+    const shapes = this.data.shapes.map((shape) => shape.name);
+    return fromAddress(location.hash.slice(1), this.initial, shapes);
+  }
+
+  worker() {
+    const worker = new Worker(URL.createObjectURL(new Blob([this.planner], { type: "text/javascript" })));
+    worker.postMessage({ id: 0, what: "start", content: this.data.planner });
+    return worker;
+  }
+
+  firstState() {
+    const { robot, shape, options } = this.data.first;
+    const values = labValues(this.robots.get(robot).fields);
+    const preset = this.data.shapes.find((candidate) => candidate.name === shape);
+    return { robot: { name: robot, values }, path: this.ofShape(preset), options };
+  }
+
+  ofShape({ name, points, closed, size }) {
+    return points ? { points: onGrid(points), closed, name } : { shape: name, size };
+  }
+
+  get state() {
+    return this.history.state;
+  }
+
+  change(part, kind = null) {
+    this.notice = "";
+    if (this.history.change({ ...this.state, ...part }, kind)) this.refresh(kind !== null);
+  }
+
+  /* Show the state in all controls, and plan it. `more`: it changes further, such as by a slider, and the address
+   * waits for the end; browsers refuse more than some changes of it a second. */
+  refresh(more = false) {
+    const { robot, path, options } = this.state;
+    this.form.show(robot.values);
+    byId("robot-name").value = this.robots.has(robot.name) ? robot.name : "";
+    byId("shape").value = path.points
+      ? this.data.shapes.some((shape) => shape.name === path.name)
+        ? path.name
+        : ""
+      : path.shape;
+    const shape = this.data.shapes.find((candidate) => candidate.name === path.shape);
+    byId("size").disabled = !shape;
+    byId("size-words").textContent = shape?.sizeWords ?? "Size";
+    if (byId("size") !== document.activeElement) byId("size").value = path.size ?? "";
+    for (const key of Object.keys(options)) {
+      const control = byId(key);
+      if (control !== document.activeElement) control.value = options[key] ?? "";
+    }
+    byId("undo").disabled = this.history.past.length === 0;
+    byId("redo").disabled = this.history.future.length === 0;
+    if (!more) this.writeAddress();
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.planNow(), PAUSE);
+    this.mark();
+    this.drawPath();
+  }
+
+  writeAddress() {
+    const address = `#${addressOf(this.state, this.initial)}`;
+    if (address !== (location.hash || "#")) history.replaceState(null, "", address);
+  }
+
+  /* The state as the planner takes it: SI units and options. */
+  wish() {
+    return wishOf(this.state, this.robots.get(this.state.robot.name)?.fields ?? {});
+  }
+
+  drawPath() {
+    return this.ask("path", this.wish(), (answer) => this.pathDrawn(answer));
+  }
+
+  pathDrawn(answer) {
+    say(byId("path-problem"), answer.refusal ?? this.notice, true);
+    if (answer.refusal) return;
+    this.drawn = answer.answer;
+    this.editor.path = answer.answer.corners;
+    byId("close").textContent = this.drawn.closed ? "Open path" : "Close path";
+    showCorners(byId("corner-table"), this.editor.path.points, (points) =>
+      this.setPoints(points, this.drawn.closed),
+    );
+    this.show();
+  }
+
+  /* Mark whether a plan or an answer is on its way, for screen readers and for programs that wait. */
+  mark() {
+    const busy =
+      this.questions > 0 || this.timer !== null || this.client.wish !== null || this.client.planning !== null;
+    document.body.dataset.busy = busy ? "1" : "0";
+    byId("view").setAttribute("aria-busy", String(busy));
+  }
+
+  /* Ask the planner, and count the question as long as `use` takes to use the answer. */
+  async ask(what, content, use) {
+    this.asked();
+    const answer = await this.client.ask(what, content);
+    try {
+      if (!answer.stopped) await use(answer);
+    } finally {
+      this.answered();
+    }
+  }
+
+  asked() {
+    this.questions += 1;
+    this.mark();
+  }
+
+  answered() {
+    this.questions -= 1;
+    this.mark();
+  }
+
+  async planNow() {
+    this.timer = null;
+    this.writeAddress();
+    const wish = this.wish();
+    this.client.ask("steady", wish).then((answer) => answer.stopped || showMotion(answer));
+    this.runs.compare(wish.robot);
+    this.client.plan(wish, {
+      began: () => this.began(),
+      progress: ({ stage, done }) => say(byId("progress"), `Planning: ${stage}, ${Math.round(100 * done)} %`),
+      done: (answer) => this.planned(answer),
+    });
+  }
+
+  began() {
+    this.old = true;
+    clearTimeout(this.slow);
+    this.slow = setTimeout(() => {
+      byId("stop").hidden = false;
+      say(byId("progress"), "Planning…");
+    }, 700);
+  }
+
+  /* No plan is being made any more. */
+  ended() {
+    clearTimeout(this.slow);
+    byId("stop").hidden = true;
+    say(byId("progress"), "");
+    this.mark();
+  }
+
+  planned(answer) {
+    this.ended();
+    if (!answer.broken) this.problem("");
+    say(byId("options-problem"), "", true);
+    if (answer.refusal) say(byId(`${answer.about ?? "path"}-problem`), answer.refusal, true);
+    byId("saves")
+      .querySelectorAll("button")
+      .forEach((button) => (button.disabled = Boolean(answer.refusal)));
+    if (answer.refusal) {
+      say(byId("message"), this.plan ? "Picture and numbers are those of the last plan that could be made." : "");
+      this.show();
+      return;
+    }
+    this.plan = answer.answer;
+    this.old = false;
+    say(byId("message"), summary(this.plan));
+    showResults(this.plan, byId("tails").checked);
+    this.scale = chart(byId("strip"), {
+      times: this.ends(),
+      values: [...this.plan.dwells],
+      words: "dwells over time",
+      unit: "s",
+      steps: true,
+    });
+    this.player.take(this.plan);
+    this.show();
+    if (this.track) this.compare();
+    if (byId("trade").open) this.tradeOff();
+  }
+
+  ends() {
+    let end = 0;
+    return [0, ...Array.from(this.plan.dwells, (dwell) => (end += dwell))];
+  }
+
+  problem(words) {
+    say(byId("problem"), words, true);
+  }
+
+  show() {
+    const tracks = this.track ? [{ points: this.track.points }] : [];
+    this.view.show({ drawn: this.drawn ?? null, plan: this.plan, tracks, old: this.old && this.plan !== null });
+  }
+
+  played(pose, time) {
+    this.view.playing = this.player.running;
+    this.view.showRobot(this.plan.body, pose);
+    if (this.scale) marker(byId("strip"), this.scale(time));
+  }
+
+  setRobot(values, key) {
+    const known = this.robots.get(this.state.robot.name);
+    const name = known ? `${this.state.robot.name}-changed` : this.state.robot.name;
+    this.change(
+      { robot: { name: this.state.robot.name.endsWith("-changed") ? this.state.robot.name : name, values } },
+      `robot ${key}`,
+    );
+  }
+
+  setPoints(points, closed, name = "my path") {
+    const grid = onGrid(points);
+    const refusal = pointsRefusal(grid);
+    if (refusal) {
+      say(byId("path-problem"), refusal, true);
+      return;
+    }
+    this.change({ path: { points: grid, closed, name } });
+  }
+
+  async stroke(points, closed) {
+    const over = this.state.options.smooth;
+    await this.ask("smooth", { points, closed, over }, ({ answer, refusal }) => {
+      say(byId("path-problem"), refusal ?? "", true);
+      if (refusal) return;
+      byId("smooth").placeholder = answer.over;
+      this.view.moved = true;
+      this.setPoints(answer.points, closed, "my stroke");
+    });
+  }
+
+  async tradeOff() {
+    byId("trade-off").replaceChildren(element("p", { class: "soft" }, "Planning with ten dwells…"));
+    const answer = await this.client.ask("tradeOff", this.wish());
+    if (answer.stopped) return;
+    if (answer.refusal) say(byId("trade-off").firstChild, answer.refusal, true);
+    else
+      byId("trade-off").replaceChildren(
+        tradeOff(answer.answer, this.state.options.minimumSeconds, (dwell) =>
+          this.setOption("minimumSeconds", dwell),
+        ),
+      );
+  }
+
+  setOption(key, value) {
+    this.change({ options: { ...this.state.options, [key]: value } });
+  }
+
+  async saveFile(name) {
+    if (name === "plan.svg") {
+      save(
+        name,
+        pictureText(byId("view"), document.title, document.querySelector("style").textContent),
+        "image/svg+xml",
+      );
+      return;
+    }
+    const answer = await this.client.ask("file", { name, wish: this.wish() });
+    say(byId("take-problem"), answer.refusal ?? "", true);
+    if (!answer.refusal) save(name, answer.answer);
+  }
+
+  /* Open the file that was dropped or chosen; it says by its content what it is. */
+  async openFiles(files) {
+    this.asked();
+    const file = await oneFile(files);
+    if (file?.refusal) this.fileProblem.tell("path", file.refusal);
+    else if (file) {
+      const part = /\.toml$/i.test(file.name) ? "robot" : "path";
+      await this.ask("open", file, async ({ answer, refusal }) => {
+        this.fileProblem.tell(part, refusal ?? "");
+        if (!refusal) await this.opened(file.name, answer);
+      });
+    }
+    this.answered();
+  }
+
+  async opened(name, content) {
+    if (content.kind === "robot") {
+      this.robots.set(content.fields.name, content);
+      this.change({ robot: { name: content.fields.name, values: labValues(content.fields) } });
+    } else if (content.kind === "path") {
+      const path = await askUnit(content, this.plan?.tailLength ?? 10);
+      if (path) {
+        this.view.moved = false;
+        this.setPoints(path.points, path.closed, path.name);
+      }
+    } else if (content.kind === "track") {
+      await this.compare("none", { name, ...content });
+    } else if (content.kind === "runs") {
+      await this.runs.open(name, content.table, this.wish().robot);
+    }
+  }
+
+  async compare(how = this.track.how, track = this.track) {
+    await this.ask("compare", { table: track.table, how }, ({ answer, refusal }) => {
+      this.fileProblem.tell("measured", refusal ? `${track.name}: ${refusal}` : "");
+      if (refusal) return;
+      this.track = { ...track, ...answer, how };
+      this.view.moved = false;
+      this.show();
+      this.showTrack();
+    });
+  }
+
+  showTrack() {
+    showTrack(this.track, this.plan, byId("tails").checked, {
+      fit: (wished) => this.compare(wished),
+      saveTrack: () => save("track.csv", this.track.csv, "text/csv"),
+      remove: () => {
+        this.track = null;
+        byId("measured").replaceChildren();
+        this.show();
+      },
+    });
+  }
+
+  newAddress() {
+    const { state, problem } = this.address();
+    this.change(state);
+    this.notice = problem;
+    say(byId("path-problem"), problem, true);
+  }
+
+  step(way) {
+    if (this.history[way]()) this.refresh();
+  }
+
+  mode(name) {
+    this.editor.mode = name;
+    byId("view").dataset.mode = name;
+    say(byId("mode-words"), WORDS[name]);
+    this.view.place();
+  }
+}
+
+inflated(byId("planner").textContent.trim())
+  .text()
+  .then((planner) => new Page(JSON.parse(byId("data").textContent), planner).start());

@@ -1,0 +1,261 @@
+/* What the user has chosen: robot, path and options; its form in the page's address; undo and redo.
+ *
+ * A state is a plain object and is never changed: each change makes a new one.
+ *   robot    {name, values}: the values of FIELDS in laboratory units
+ *   path     {shape, size}, with the size in cm; or {points, closed, name}, whole thousandths of a centimetre
+ *   options  those of OPTIONS
+ * The address holds, after #, a version and what differs from the page's own first state. */
+
+import { closeMatch } from "../close_match.js";
+
+const VERSION = 1;
+const THOUSANDTHS = 1000; // of a centimetre: the grid of points
+const MOST_STEPS = 500; // that can be undone
+const MOST_POINTS = 20_000; // of a path, which an address can hold
+
+/* Fields of the robot: key, words, unit, number of the unit in one SI unit, step of a key press, of all robots. */
+const FIELDS = [
+  { key: "tails", words: "Number of tails N", unit: "", perSi: 1, step: 1, first: true },
+  { key: "tailLength", words: "Tail length l", unit: "cm", perSi: 100, step: 0.1, first: true },
+  { key: "motorSpeed", words: "Motor speed", unit: "rpm", perSi: 30 / Math.PI, step: 1, first: true },
+  { key: "viscosity", words: "Viscosity", unit: "Pa s", perSi: 1, step: 0.01, first: true },
+  { key: "tailRadius", words: "Tail radius", unit: "mm", perSi: 1000, step: 0.05 },
+  { key: "youngsModulus", words: "Stiffness (Young's modulus)", unit: "MPa", perSi: 1e-6, step: 0.05 },
+  { key: "headRadius", words: "Head radius", unit: "mm", perSi: 1000, step: 0.5 },
+  { key: "headLength", words: "Head length", unit: "mm", perSi: 1000, step: 1 },
+  { key: "discOffset", words: "Disc offset", unit: "mm", perSi: 1000, step: 0.5, optional: true },
+  { key: "C_t", words: "Drag coefficient C_t", unit: "", perSi: 1, step: 0.05 },
+  { key: "C_r", words: "Spin drag coefficient C_r", unit: "", perSi: 1, step: 0.05 },
+  { key: "C_yr", words: "Side force coefficient C_yr", unit: "", perSi: 1, step: 0.05 },
+];
+
+const OPTIONS = {
+  objective: "error",
+  corner: "nearest",
+  point: "head_centre",
+  minimumSeconds: null, // shortest dwell that the motor allows [s]
+  tolerance: null, // largest stated error [cm]
+  timeWeight: 0,
+  smooth: null, // length over which a drawn stroke is smoothed [cm]; null: the page's own
+};
+
+/* Robot fields in laboratory units from those in SI units. A number that is a round one keeps its digits. */
+function labValues(robot) {
+  const pairs = FIELDS.map(({ key, perSi }) => {
+    const value = robot[key];
+    return [key, value === null || value === undefined ? null : tidied(value * perSi)];
+  });
+  return Object.fromEntries(pairs);
+}
+
+/* Remove the last bits that a change of units leaves: 3.2 instead of 3.2000000000000006. */
+function tidied(value) {
+  const short = Number(value.toPrecision(12));
+  return Math.abs(short - value) <= 4 * Number.EPSILON * Math.abs(value) ? short : value;
+}
+
+/* Robot fields in SI units from those in laboratory units; `given` has exact SI values of unchanged fields. */
+function siValues(values, given = {}) {
+  const known = labValues(given);
+  const pairs = FIELDS.map(({ key, perSi }) => {
+    if (values[key] === null) return [key, null];
+    return [key, values[key] === known[key] ? given[key] : values[key] / perSi];
+  });
+  return Object.fromEntries(pairs);
+}
+
+/* Put points [cm] on the grid of thousandths, as whole numbers, without repeating one. */
+function onGrid(points) {
+  const rows = points.map(([x, y]) => [Math.round(x * THOUSANDTHS), Math.round(y * THOUSANDTHS)]);
+  return rows.filter(([x, y], i) => i === 0 || x !== rows[i - 1][0] || y !== rows[i - 1][1]);
+}
+
+/* Say why points on the grid are no path of the page; empty: they are. */
+function pointsRefusal({ length }) {
+  if (length < 2) return "The path needs two or more corners that differ.";
+  if (length <= MOST_POINTS) return "";
+  return `The path has ${length} points, and the page takes up to ${MOST_POINTS}: give fewer, or plan it with softflagella plan.`;
+}
+
+/* A state as the planner takes it; `given` has exact SI values of fields of the robot. */
+function wishOf({ robot, path, options }, given) {
+  const { points, closed, name, shape, size } = path;
+  const drawing = points ? { points: inCentimetres(points), closed, name } : { words: `${shape}:${size}` };
+  return { robot: { ...given, name: robot.name, ...siValues(robot.values, given) }, path: drawing, options };
+}
+
+/* Points in cm from whole thousandths. */
+function inCentimetres(points) {
+  return points.map(([x, y]) => [x / THOUSANDTHS, y / THOUSANDTHS]);
+}
+
+/* Write a state as the part of an address behind #, without what is as in `initial`. */
+function addressOf(state, initial) {
+  const parts = [`v=${VERSION}`];
+  if (state.robot.name !== initial.robot.name) parts.push(`robot=${encodeURIComponent(state.robot.name)}`);
+  for (const { key } of FIELDS) {
+    const value = state.robot.values[key];
+    if (value !== initial.robot.values[key]) parts.push(`${key}=${value === null ? "none" : value}`);
+  }
+  const { shape, size, points, closed, name } = state.path;
+  if (points) {
+    parts.push(`points=${packed(points)}`);
+    if (closed) parts.push("closed=1");
+    if (name) parts.push(`name=${encodeURIComponent(name)}`);
+  } else if (shape !== initial.path.shape || size !== initial.path.size) {
+    parts.push(`path=${encodeURIComponent(`${shape}:${size}`)}`);
+  }
+  for (const key of Object.keys(OPTIONS)) {
+    if (state.options[key] !== initial.options[key]) parts.push(`${key}=${state.options[key] ?? "none"}`);
+  }
+  return parts.length === 1 ? "" : parts.join("&");
+}
+
+/* Read an address; return {state, problem}. A problem is a sentence, and the state is then `initial`. */
+function fromAddress(text, initial, shapes) {
+  if (text === "") return { state: initial, problem: "" };
+  try {
+    const parts = new Map(text.split("&").map((part) => splitPart(part)));
+    if (parts.get("v") !== String(VERSION)) throw new Error("it is of another version of this page");
+    parts.delete("v");
+    const robot = readRobot(parts, initial.robot);
+    const path = readPath(parts, initial.path, shapes);
+    const options = readOptions(parts, initial.options);
+    if (parts.size) throw new Error(`it has an unknown part, ${[...parts.keys()][0]}`);
+    return { state: { robot, path, options }, problem: "" };
+  } catch (broken) {
+    const problem = `The link cannot be read: ${broken.message}. The page shows its own first plan.`;
+    return { state: initial, problem };
+  }
+}
+
+function splitPart(part) {
+  const at = part.indexOf("=");
+  if (at < 1) throw new Error("it is cut off or damaged");
+  return [part.slice(0, at), part.slice(at + 1)];
+}
+
+function taken(parts, key) {
+  const value = parts.get(key);
+  parts.delete(key);
+  return value;
+}
+
+function readRobot(parts, robot) {
+  const name = taken(parts, "robot");
+  const values = { ...robot.values };
+  for (const { key, optional } of FIELDS) {
+    const text = taken(parts, key);
+    if (text !== undefined) values[key] = text === "none" && optional ? null : number(key, text);
+  }
+  return { name: name === undefined ? robot.name : decoded(name), values };
+}
+
+function readPath(parts, path, shapes) {
+  const points = taken(parts, "points");
+  const closed = taken(parts, "closed") === "1";
+  const name = decoded(taken(parts, "name") ?? "");
+  const words = taken(parts, "path");
+  if (points !== undefined) return { points: unpacked(points), closed, name };
+  if (words === undefined) return path;
+  const at = decoded(words).lastIndexOf(":");
+  const [shape, size] = [decoded(words).slice(0, at), number("path", decoded(words).slice(at + 1))];
+  if (!shapes.includes(shape)) {
+    const near = closeMatch(shape, shapes);
+    throw new Error(`it has an unknown shape, ${shape}${near === null ? "" : ` (is it ${near}?)`}`);
+  }
+  return { shape, size };
+}
+
+function readOptions(parts, options) {
+  const read = { ...options };
+  for (const [key, standard] of Object.entries(OPTIONS)) {
+    const text = taken(parts, key);
+    if (text === undefined) continue;
+    if (typeof standard === "string") read[key] = decoded(text);
+    else read[key] = text === "none" ? null : number(key, text);
+  }
+  return read;
+}
+
+function decoded(text) {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    throw new Error("it is cut off or damaged");
+  }
+}
+
+function number(key, text) {
+  const value = Number(text);
+  if (text.trim() === "" || !Number.isFinite(value)) throw new Error(`${key} is no number`);
+  return value;
+}
+
+/* Write whole numbers as differences in base 36: "a.-3~1.0" has the points (10, -3) and (11, -3). */
+function packed(points) {
+  let [x, y] = [0, 0];
+  return points
+    .map((point) => {
+      const step = [point[0] - x, point[1] - y];
+      [x, y] = point;
+      return step.map((value) => value.toString(36)).join(".");
+    })
+    .join("~");
+}
+
+function unpacked(text) {
+  let [x, y] = [0, 0];
+  const points = text.split("~").map((pair) => {
+    if (!/^-?[0-9a-z]+\.-?[0-9a-z]+$/.test(pair)) throw new Error("it is cut off or damaged");
+    const [right, up] = pair.split(".").map((digits) => parseInt(digits, 36));
+    x += right;
+    y += up;
+    return [x, y];
+  });
+  if (points.length < 2) throw new Error("its path has one point");
+  return points;
+}
+
+/* The states that can be undone and done again. */
+class History {
+  constructor(state) {
+    this.state = state;
+    this.past = [];
+    this.future = [];
+  }
+
+  /* Take a new state. Changes with the same `kind`, such as moves of one slider, are one step. */
+  change(state, kind = null) {
+    if (JSON.stringify(state) === JSON.stringify(this.state)) return false;
+    if (kind === null || kind !== this.kind) this.past.push(this.state);
+    if (this.past.length > MOST_STEPS) this.past.shift();
+    this.kind = kind;
+    this.future = [];
+    this.state = state;
+    return true;
+  }
+
+  /* End a change that goes on, so that the next one is a step of its own. */
+  settle() {
+    this.kind = null;
+  }
+
+  undo() {
+    return this.move(this.past, this.future);
+  }
+
+  redo() {
+    return this.move(this.future, this.past);
+  }
+
+  move(from, to) {
+    if (from.length === 0) return false;
+    to.push(this.state);
+    this.state = from.pop();
+    this.kind = null;
+    return true;
+  }
+}
+
+export { FIELDS, History, addressOf, fromAddress, inCentimetres, labValues, onGrid, pointsRefusal, siValues, wishOf };

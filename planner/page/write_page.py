@@ -1,0 +1,135 @@
+"""Write the page that plans, for a robot, with its look-up table."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from planner.files.tracker_header import DIRECTIONS, c_part, header_template
+from planner.page.first_state import NamedPath, first_options, robots_of, shapes_of, slider_ends
+from planner.page.page import page_text
+from planner.page.table_data import packed_bytes, packed_data, table_data
+from planner.planning.request import PlanRequest
+from planner.vehicle.calibration_table import CalibrationKnowledge
+from planner.vehicle.coefficient_modes import both_directions
+from planner.vehicle.tracked_point import TrackedVehicle, tracked_vehicle
+from sim.io.files import write_text
+from sim.io.provenance import __version__, code_version
+from sim.model.robot import Robot
+from surrogate.interface import LookupTable
+from surrogate.table.lookup import NeuralTable
+
+TITLE = "Plan a path for a soft robot"
+
+
+def write_page(
+    path: str | Path,
+    robot: Robot,
+    lookup: LookupTable,
+    request: PlanRequest,
+    *,
+    knowledge: CalibrationKnowledge | None = None,
+    paths: Sequence[NamedPath] = (),
+    smooth: float | None = None,
+    title: str = TITLE,
+) -> Path:
+    """Write one HTML file that plans without a server; the same input gives the same bytes.
+
+    Args:
+        path: the file.
+        robot: the robot that the page begins with.
+        lookup: the table that knows it. A trained table is written into the page, and the robot can be changed
+            there; of any other table, and of a robot that a calibration has changed, the vehicle is written, and
+            the robot's fields are locked.
+        request: the options of the first plan.
+        knowledge: what a calibration found besides the robot.
+        paths: they are offered besides the shapes, and the first one is planned.
+        smooth: length over which a drawn stroke is smoothed [l].
+        title: of the page.
+
+    Raises:
+        InputError: the table does not know the robot, or the file cannot be written.
+    """
+    tracked = tracked_vehicle(robot, lookup, request.point, knowledge)
+    known = knowledge or CalibrationKnowledge()
+    why = _locked(robot, lookup, known)
+    shapes = shapes_of(tracked.vehicle.turn_radius * robot.tail_length, paths)
+    data = {
+        "robots": robots_of(robot)[: 1 if why else None],
+        "limits": slider_ends(robot, lookup.domain),
+        "shapes": shapes,
+        "first": {
+            "robot": robot.name,
+            "shape": shapes[0]["name"],
+            "options": first_options(request, robot, smooth),
+        },
+        "locked": {"name": robot.name, "why": why} if why else None,
+        "planner": {
+            "table": _planner_data(lookup, robot, tracked, why),
+            "files": {
+                "codeVersion": code_version(),
+                "directions": DIRECTIONS,
+                "flash": c_part("schedule_flash.h"),
+                "schedule": c_part("schedule.h"),
+                "tracker": packed_bytes(header_template().encode()),
+            },
+        },
+    }
+    version = f"softflagella {__version__}"
+    footer = (
+        f"{version}, code {code_version()}. Robot {robot.name}. Look-up table {lookup.identity}. The page "
+        "computes in your browser and sends nothing."
+    )
+    write_text(path, page_text(title, footer, data, version))
+    return Path(path)
+
+
+def _locked(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowledge) -> str:
+    """Say why the page cannot compute another robot than this one; empty: it can."""
+    if robot.effects:
+        return f"This robot has effects ({', '.join(robot.effects)}), which the page does not compute anew."
+    if robot.correction is not None:
+        return "This robot has a calibration's correction, which the page does not compute anew."
+    if knowledge.names or any(knowledge.current):
+        return "A calibration has measured this robot; the page has its vehicle, and computes no other."
+    if not isinstance(lookup, NeuralTable):
+        return "The look-up table is of this robot alone, so the page computes no other."
+    if lookup.intervals is None or lookup.curve_errors is None:
+        return "The look-up table states one error for all robots, which the page does not compute anew."
+    return ""
+
+
+def _planner_data(lookup: LookupTable, robot: Robot, tracked: TrackedVehicle, why: str) -> Any:
+    """Return the look-up table's numbers, or those of the vehicle alone, for the planner in JavaScript."""
+    if not why and isinstance(lookup, NeuralTable):
+        return json.loads(table_data(lookup))
+    vehicle, columns = tracked.vehicle, both_directions(robot.group_values())
+    curves, errors = lookup.response(columns), lookup.error_modes(columns)
+    content = {
+        "identity": lookup.identity,
+        "name": robot.name,
+        "ownTable": tracked.own_table,
+        "groups": robot.group_values(),
+        "vehicle": {
+            "twist": vehicle.twist,
+            "curves": [
+                {name: getattr(curves, name)[i] for name in ("lag", "memory", "rest", "spread")} for i in (0, 1)
+            ],
+            "before": curves.before,
+            "errors": [
+                {"twist": twist, "lag": lag, "memory": memory} if lag.any() or memory.any() else {"twist": twist}
+                for twist, lag, memory in zip(errors.twist, errors.lag, errors.memory, strict=True)
+            ],
+            "modes": [
+                {"name": mode.name, "twist": mode.twist, "lag": mode.lag, "current": mode.current}
+                for mode in vehicle.modes
+                if not mode.name.startswith("table: ")
+            ],
+            "current": vehicle.current,
+            "tailGap": vehicle.tail_gap,
+            "leastGap": vehicle.least_gap,
+        },
+    }
+    return json.loads(packed_data(content))

@@ -1,0 +1,95 @@
+"""How the errors of a vehicle grow along a schedule: deviations from the predicted poses, to first order.
+
+A mode of the vehicle changes its twists, its lags or the current. In each dwell it changes the move and the turn;
+a turn tilts everything that comes later. The phase of the disc at each flip adds independent noise to the lag, of
+which the variances add up.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.vehicle.rollout import Rollout, Switches
+from planner.vehicle.vehicle import Vehicle, interpolated
+from sim.arrays import Floats, Integers
+from sim.mechanics import planar
+
+
+class ErrorGrowth(NamedTuple):
+    """Deviations of one standard deviation of each of P modes at E flips, the first and the last among them."""
+
+    flips: Integers  # (E,), their numbers; the last one is the end of the schedule
+    position: Floats  # (E, 2), as predicted
+    deviation: Floats  # (E, P, 2), from there
+    turned: Floats  # (E, P), of the heading
+    variance: Floats  # (E, 3), of the noise from the start to this flip: x and y of the body, heading
+
+    def at(self, flips: Integers) -> ErrorGrowth:
+        """Select some of the flips."""
+        rows = np.searchsorted(self.flips, flips)
+        return ErrorGrowth(
+            flips, self.position[rows], self.deviation[rows], self.turned[rows], self.variance[rows]
+        )
+
+    @property
+    def noise(self) -> Floats:
+        """Standard deviation (E − 1, 3) of what the noise adds between the flips: x and y in the lab, heading."""
+        added = np.diff(self.variance, axis=0)
+        across = added[:, :2].mean(1)  # x and y of the body are mixed in the lab
+        return np.sqrt(np.stack([across, across, added[:, 2]], 1))
+
+
+def error_growth(vehicle: Vehicle, switches: Switches, rollout: Rollout, flips: Integers) -> ErrorGrowth:
+    """Propagate the modes and the noise of a vehicle to some flips of a schedule.
+
+    Args:
+        vehicle: with its modes and its spread.
+        switches: the schedule.
+        rollout: what the vehicle does on it.
+        flips: their numbers (E,), increasing, from 0 to that of all dwells.
+    """
+    dwells, count = switches.dwells, len(switches.dwells)
+    side = (np.arange(count) + (switches.first_direction < 0)) % 2
+    moves_predicted, poses = rollout.changes, rollout.poses
+    circle = planar.arc(vehicle.twist[side], dwells)
+    lag = planar.compose(moves_predicted, planar.inverse(circle))
+    steps = np.diff(poses[:, :2], axis=0)
+    modes = vehicle.modes
+    deviation, turned = np.zeros((len(flips), len(modes), 2)), np.zeros((len(flips), len(modes)))
+    lags = _mode_lags(vehicle, side, dwells)
+    for p, mode in enumerate(modes):
+        arc = planar.arc((vehicle.twist + mode.twist)[side], dwells) if mode.twist.any() else circle
+        change = planar.compose(lag + lags[p], arc) - moves_predicted
+        heading = np.concatenate([[0.0], np.cumsum(change[:, 2])])
+        moves = planar.turn(change[:, :2], poses[:-1, 2]) + mode.current * dwells[:, None]
+        moves += heading[:-1, None] * left(steps)
+        position = np.concatenate([np.zeros((1, 2)), np.cumsum(moves, 0)])
+        deviation[:, p], turned[:, p] = position[flips], heading[flips]
+    spread = np.empty((count, 3))
+    for index in (0, 1):
+        spread[side == index] = vehicle.lag_noise(1 - 2 * index, dwells[side == index])
+    variance = np.concatenate([np.zeros((1, 3)), np.cumsum(spread**2, 0)])[flips]
+    return ErrorGrowth(flips, poses[flips, :2], deviation, turned, variance)
+
+
+def _mode_lags(vehicle: Vehicle, side: Integers, dwells: Floats) -> list[Floats | float]:
+    """Return what each mode adds to the lags (M, 3) of the dwells (M,) in directions `side` (M,)."""
+    before = np.concatenate([dwells[:1], dwells[:-1]])
+    with_lag = [p for p, mode in enumerate(vehicle.modes) if mode.lag is not None]
+    added: list[Floats | float] = [0.0] * len(vehicle.modes)
+    if not with_lag:
+        return added
+    lags = np.empty((len(dwells), len(with_lag), 3))
+    for index in (0, 1):
+        tables = np.stack([vehicle.modes[p].lag[index] for p in with_lag], 2)  # type: ignore[index]
+        lags[side == index] = interpolated(tables, before[side == index], dwells[side == index])
+    for place, p in enumerate(with_lag):
+        added[p] = lags[:, place]
+    return added
+
+
+def left(vector: Floats) -> Floats:
+    """Turn vectors (..., 2) by a right angle to the left."""
+    return np.stack([-vector[..., 1], vector[..., 0]], -1)

@@ -1,0 +1,91 @@
+"""A schedule that repeats: how well a lap closes, how far robots drift in a lap, and the reference of a tracker.
+
+A lap has an even number of dwells, so each begins in the same direction of the motor. Lengths in l, angles in rad.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planner.draws import normals
+from planner.paths.tractrix import Reference
+from planner.paths.units import in_lab
+from planner.planning.error_growth import error_growth
+from planner.planning.stated_error import LEVEL, flips_between
+from planner.vehicle.rollout import Switches, roll_out
+from planner.vehicle.tracked_point import TrackedVehicle
+from sim.model.robot import Robot
+
+_DRAWS = 1000
+_SHOWN = 1e-5  # l and rad; smaller differences are rounding
+_OVERLAP = 10.0  # radii of the pivot's circle, of the next lap that a tracker sees
+
+
+class Lap(NamedTuple):
+    """What a lap leaves behind: differences of the pose from that a lap before."""
+
+    closes: float  # distance, as predicted
+    closes_turn: float  # angle, as predicted
+    drift: float  # distance that 95 % of the robots keep to that the model's uncertainty allows, open loop
+    drift_turn: float  # angle of the same robots
+
+    def line(self, robot: Robot) -> str:
+        """Say in one sentence how well the laps repeat."""
+        closes, drift = in_lab(max(self.closes, _SHOWN), robot), in_lab(self.drift, robot)
+        turned, drift_turn = (math.degrees(angle) for angle in (max(self.closes_turn, _SHOWN), self.drift_turn))
+        return (
+            f"repeat it: a lap ends where it began, to within {closes} and {turned:.1g} degrees as predicted; "
+            f"95 % of robots drift by up to {drift} and {drift_turn:.2g} degrees a lap without feedback"
+        )
+
+    def to_dict(self) -> dict[str, float]:
+        """Return the content for plan.json."""
+        return {
+            "closes_over_l": self.closes,
+            "closes_rad": self.closes_turn,
+            "drift_over_l": self.drift,
+            "drift_rad": self.drift_turn,
+        }
+
+    @staticmethod
+    def from_dict(content: Mapping[str, Any]) -> Lap:
+        """Read the content of a plan.json."""
+        names = ("closes_over_l", "closes_rad", "drift_over_l", "drift_rad")
+        return Lap(*(float(content[name]) for name in names))
+
+
+def turning(reference: Reference) -> float:
+    """Return the turn of the heading in a lap, a multiple of 2π."""
+    return 2 * math.pi * round((reference.heading[-1] - reference.heading[0]) / (2 * math.pi))
+
+
+def overlapped(reference: Reference, pivot_radius: float) -> Reference:
+    """Continue a closed reference into the next lap, so that a tracker sees no end."""
+    arc = reference.arc
+    count = int(np.searchsorted(arc, min(_OVERLAP * pivot_radius, float(arc[-1])), side="right"))
+    rows = slice(1, max(count, 2))
+    return Reference(
+        np.concatenate([reference.p, reference.p[rows]]),
+        np.concatenate([reference.q, reference.q[rows]]),
+        np.concatenate([reference.heading, reference.heading[rows] + turning(reference)]),
+        np.concatenate([arc, arc[-1] + arc[rows]]),
+        False,
+    )
+
+
+def drift_of_a_lap(tracked: TrackedVehicle, switches: Switches, seed: int) -> tuple[float, float]:
+    """Compute the quantiles LEVEL of how far robots are from the vehicle after a lap, and of their turn."""
+    rollout = roll_out(tracked.vehicle, switches, tracked.offset)
+    growth = error_growth(tracked.vehicle, switches, rollout, flips_between(len(switches.dwells)))
+    modes = growth.deviation.shape[1]
+    drawn = normals(seed, 0, _DRAWS * (modes + 3)).reshape(_DRAWS, modes + 3)
+    middle = (growth.position[1:] + growth.position[:-1]) / 2
+    lever = ((growth.position[-1] - middle) ** 2).sum(1)
+    across = math.sqrt(float((growth.noise[:, 0] ** 2 + growth.noise[:, 2] ** 2 * lever / 2).sum()))
+    moved = drawn[:, :modes] @ growth.deviation[-1] + across * drawn[:, modes : modes + 2]
+    turned = drawn[:, :modes] @ growth.turned[-1] + math.sqrt(float(growth.variance[-1, 2])) * drawn[:, -1]
+    return float(np.quantile(np.hypot(*moved.T), LEVEL)), float(np.quantile(np.abs(turned), LEVEL))

@@ -1,0 +1,236 @@
+"""The rest of a plan from where a robot is: a way back to the path, and the path that is left.
+
+The place that the robot has reached follows from its track (`planner.tracking.reached`). Where the robot is near
+that place and turned along the path, the rest begins there. Elsewhere it gets the tracker's way back
+(`planner.tracking.way_back`), or with obstacles a way among them (`planner.goal.route`). Way and path together are
+the declared path of the new plan, so its errors are stated from where the robot is. It keeps dwell and guidance of
+the old plan. Lengths in l.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.goal.dubins import words
+from planner.goal.lattice import RouteLimits
+from planner.goal.route import Lattices, NoWayError, route
+from planner.jobs.pivot_track import pivot_reference
+from planner.paths.distance import two_sided
+from planner.paths.obstacles import Footprint
+from planner.paths.path import Path2D, arc_length, resample
+from planner.paths.tractrix import Drift, Reference, slips_at_heading
+from planner.paths.units import in_lab, place_in_lab
+from planner.planning.declared_path import Declared
+from planner.planning.errors import plan_errors
+from planner.planning.kept_clear import KeptClear
+from planner.planning.plan import zigzag_drift
+from planner.planning.planned import Plan
+from planner.planning.schedule import Start, follow
+from planner.tracking.guidance import TrackerGuidance, stride
+from planner.tracking.reached import reached
+from planner.tracking.way_back import ROOM, SEGMENTS, shortest_way
+from planner.vehicle.rollout import predicted_poses
+from sim.arrays import Floats
+from sim.io.errors import InputError
+
+POSE = tuple[float, float, float]
+_SPACING = 0.02  # of a way
+_WORTH = 1.0  # of a length of the path: what it costs to leave it out
+_NEAR = 0.02  # l, rad: what is near in any case
+_CANDIDATES = 12  # places of the path, a turn radius apart, to which a way among obstacles may lead
+_GUESS = 0.2  # what a length along the drawn path counts beside the distance from it
+
+
+class Rest(NamedTuple):
+    """The rest of a plan, and how it comes about."""
+
+    plan: Plan
+    followed: float  # length of the path up to the place that the robot has reached
+    way: float  # length of the way back; 0: none
+    left_out: float  # length of the path that the way leaves out
+    joins: tuple[float, float]  # x, y of the tracked point where the way ends
+
+    def lines(self) -> list[str]:
+        """Say it in one sentence."""
+        robot = self.plan.robot
+        done = f"the track has followed {in_lab(self.followed, robot)} of the path"
+        if self.way == 0:
+            return [f"{done}; the robot goes on from there"]
+        return [
+            f"{done}; a way of {in_lab(self.way, robot)} joins it at {place_in_lab(*self.joins, robot)}, "
+            f"{in_lab(self.left_out, robot)} of the path is left out"
+        ]
+
+
+def rest_of(plan: Plan, times: Floats, poses: Floats) -> Rest:
+    """Plan the rest of a plan from the last pose of a track, at rest there.
+
+    Args:
+        plan: the plan that the robot has followed so far.
+        times: (N,), not falling [μ0 l⁴/EI].
+        poses: (N, 3) of the head's centre at these times.
+
+    Raises:
+        InputError: the path has been followed to its end, or no way leads back to it.
+    """
+    reference = plan.declared.reference
+    place = place_reached(plan, times, poses)
+    if place > len(reference.q) - 2:
+        raise InputError("the track has followed the path to its end; there is nothing left to plan")
+    x, y, heading = poses[-1].tolist()
+    heading += 2 * math.pi * round((float(reference.heading[place]) - heading) / (2 * math.pi))
+    drift = zigzag_drift(plan.tracked, plan.straight, max(plan.straight.dwells))
+    way, join = _way(plan, (x, y, heading), place, drift)
+    path = _cut(reference, join)
+    if way is not None:
+        turns = 2 * math.pi * round((float(way.heading[-1]) - float(path.heading[0])) / (2 * math.pi))
+        parts = _cut_end(way), replace(path, heading=path.heading + turns)
+        p, q, headings = (
+            np.concatenate([getattr(part, name) for part in parts]) for name in ("p", "q", "heading")
+        )
+        path = Reference(p, q, headings, arc_length(q), False)
+    joins_x, joins_y = reference.p[join].tolist()
+    return Rest(
+        _planned(plan, path, (x, y, heading), 0 if way is None else len(way.q) - 1, join),
+        float(arc_length(reference.p)[place]),
+        0.0 if way is None else float(way.arc[-1]),
+        float(arc_length(reference.p[place : join + 1])[-1]),
+        (joins_x, joins_y),
+    )
+
+
+def place_reached(plan: Plan, times: Floats, poses: Floats) -> int:
+    """Return the point of the reference that a robot has reached; see `rest_of`."""
+    vehicle, heading = plan.tracked.vehicle, poses[:, 2]
+    q = poses[:, :2] - vehicle.pivot_distance * np.stack([np.cos(heading), np.sin(heading)], 1)
+    speed = vehicle.speed + float(np.hypot(*vehicle.current))
+    return reached(plan.declared.reference, times, np.column_stack([q, heading]), speed)
+
+
+def _way(plan: Plan, pose: POSE, place: int, drift: Drift) -> tuple[Reference | None, int]:
+    """Find the way from a pose to the path, and the point of the reference where it ends."""
+    law = TrackerGuidance(plan)
+    law.go_to((place, 0.0, SEGMENTS, 0.0))
+    distance = law.distance(pose)[0]
+    turned = pose[2] - float(plan.declared.reference.heading[law.place])
+    near = max(plan.predicted_max, plan.straight.largest, _NEAR)
+    if abs(distance) <= near and abs(turned) <= max(plan.straight.swing, _NEAR):
+        return None, law.place
+    a, (x, y, heading) = plan.tracked.vehicle.pivot_distance, pose
+    course = heading + float(slips_at_heading(np.array(heading), drift))
+    start = x - a * math.cos(heading), y - a * math.sin(heading), course
+    poses, join = _shortest(plan, start, place, drift)
+    if plan.kept_clear is not None:
+        limits, margin = _limits(plan, drift), plan.kept_clear.margin
+        if len(poses) and float(limits.clearance(poses).min()) < margin:
+            poses, join = _around(plan, start, place, limits, margin)
+    if len(poses) < 2:
+        return None, join
+    return pivot_reference(poses, plan.tracked.rod, drift, heading), join
+
+
+def _shortest(plan: Plan, start: POSE, place: int, drift: Drift) -> tuple[Floats, int]:
+    """Find the shortest way from a pose of the pivot; return its poses (m, 3), and the point where it ends."""
+    reference = plan.declared.reference
+    headings = reference.heading[place:-1]
+    targets = np.column_stack([reference.q[place:-1], headings + slips_at_heading(headings, drift)])
+    left_out = reference.arc[place:-1] - reference.arc[place]
+    way = shortest_way(start, targets, left_out, stride(plan), _radius(plan), _WORTH)
+    return way.poses(_SPACING), place + way.target
+
+
+def _radius(plan: Plan) -> float:
+    """Return the radius of arcs on the way."""
+    current = float(np.hypot(*plan.tracked.vehicle.current)) / plan.straight.speed
+    return plan.tracked.vehicle.pivot_radius * (1 + current) / ROOM
+
+
+def _limits(plan: Plan, drift: Drift) -> RouteLimits:
+    assert plan.kept_clear is not None
+    body = Footprint.of(plan.robot, -plan.tracked.vehicle.pivot_distance)
+    return RouteLimits(_radius(plan), body, plan.kept_clear.free_space, drift)
+
+
+def _around(plan: Plan, start: POSE, place: int, limits: RouteLimits, margin: float) -> tuple[Floats, int]:
+    """Find a way among obstacles to one of the next places of the path; see `_shortest`.
+
+    Raises:
+        NoWayError: there is none.
+    """
+    reference = plan.declared.reference
+    steps = reference.arc[place] + limits.radius * np.arange(_CANDIDATES)
+    rows = np.unique(np.clip(np.searchsorted(reference.arc, steps), place, len(reference.q) - 2))
+    headings = reference.heading[rows]
+    targets = np.column_stack([reference.q[rows], headings + slips_at_heading(headings, limits.drift)])
+    stop = np.array([start])
+    lattices: Lattices = {}
+    best = route([stop, targets], limits, margin, lattices, plan.robot)
+    end = best.poses(_SPACING)[-1]
+    join = int(rows[int(np.hypot(*(targets[:, :2] - end[:2]).T).argmin())])
+    cost = best.length + _WORTH * (reference.arc[join] - reference.arc[place])
+    left_out = _WORTH * (reference.arc[rows] - reference.arc[place])
+    bounds = words(stop, targets, limits.radius).sum(-1).min(-1) + left_out  # obstacles make ways longer
+    for k in np.argsort(bounds).tolist():
+        if bounds[k] >= cost:
+            break
+        try:
+            way = route([stop, targets[k : k + 1]], limits, margin, lattices, plan.robot)
+        except NoWayError:
+            continue
+        if way.length + left_out[k] < cost:
+            best, join, cost = way, int(rows[k]), way.length + left_out[k]
+    return best.poses(_SPACING), join
+
+
+def _planned(plan: Plan, path: Reference, pose: POSE, way: int, join: int) -> Plan:
+    """Plan for way and path; `way` points of them are the way."""
+    tracked, heading = plan.tracked, pose[2]
+    drawn = _drawn(plan, path.p[: way + 1], join)
+    off_drawn, missed = two_sided(path.p, drawn.polyline())
+    declared = Declared(path, plan.declared.curvature, off_drawn, missed, plan.declared.warnings)
+    turned = heading - float(path.heading[0])
+    if abs(turned) < 1e-6:
+        turns = path.heading - path.heading[0]
+        turning = np.flatnonzero(np.abs(turns) > 1e-6)
+        turned = -float(turns[turning[0]]) if len(turning) else -1.0
+    start = Start(pose, -1 if turned > 0 else 1)
+    switches = follow(path, tracked.vehicle, plan.guidance, tracked.offset, start=start)
+    errors = plan_errors(tracked, drawn, declared, switches, guaranteed=None, seed=0)
+    rest = Plan(tracked, plan.objective, drawn, declared, plan.straight, plan.guidance, switches, errors)
+    if plan.kept_clear is None:
+        return rest
+    body, kept = Footprint.of(tracked.robot, 0.0), plan.kept_clear
+    clearance = float(body.clearance(predicted_poses(tracked.vehicle, switches), kept.free_space).min())
+    if clearance <= 0:
+        raise InputError("on the way back the robot would touch what it must keep out of; move it, and plan again")
+    return replace(rest, kept_clear=KeptClear(kept.free_space, min(kept.margin, clearance), clearance, ()))
+
+
+def _drawn(plan: Plan, way: Floats, join: int) -> Path2D:
+    """Return the way, and after it the rest of the path as drawn."""
+    declared, path = plan.declared.reference.p, plan.drawn.polyline()
+    if plan.drawn.closed:  # it may be followed from another point of it
+        begin = int(np.hypot(*(path[:-1] - declared[0]).T).argmin())
+        path = np.concatenate([path[begin:-1], path[: begin + 1]])
+    path = resample(path, _SPACING)
+    arc, done = arc_length(path), arc_length(declared)
+    guess = arc[-1] * done[join] / done[-1]
+    apart = np.hypot(*(path - declared[join]).T) + _GUESS * np.abs(arc - guess)
+    rest = path[int(apart.argmin()) :]
+    return Path2D.of(np.concatenate([way[:-1], rest if len(rest) > 1 else path[-2:]]), closed=False)
+
+
+def _cut(reference: Reference, first: int) -> Reference:
+    """Return a reference from one of its points on."""
+    p, q, heading = reference.p[first:], reference.q[first:], reference.heading[first:]
+    return Reference(p, q, heading, arc_length(q), False)
+
+
+def _cut_end(reference: Reference) -> Reference:
+    """Return a reference without its last point."""
+    p, q, heading = reference.p[:-1], reference.q[:-1], reference.heading[:-1]
+    return Reference(p, q, heading, arc_length(q), False)

@@ -1,0 +1,97 @@
+"""The file of the page: the same each time, without connections; robots that it cannot change are locked."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import softflagella as sf
+from planner.vehicle.coefficient_modes import both_directions
+from sim.io.errors import run_command
+from softflagella.__main__ import main
+from tests.planner.page.robots import shipped
+
+
+def data_of(page: Path) -> dict:
+    """Read the data of a page."""
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page.read_text(), re.DOTALL)
+    assert found is not None
+    return dict(json.loads(found[1]))
+
+
+def test_the_same_input_gives_the_same_bytes_and_a_policy_without_connections(tmp_path: Path) -> None:
+    first, again = (sf.write_page(tmp_path / name).read_bytes() for name in ("a.html", "b.html"))
+    assert first == again
+    text = first.decode()
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)
+    assert policy is not None
+    assert policy[1].startswith("default-src 'none'; script-src 'sha256-")
+    assert "unsafe" not in policy[1]
+    assert not re.search(r"""(?:src|href)=["']?(?:https?:)?//""", text)
+
+
+def test_paths_and_options_are_what_the_page_begins_with(tmp_path: Path) -> None:
+    page = sf.write_page(
+        tmp_path / "page.html",
+        paths={"mine": sf.circle(2.0)},
+        objective="flips",
+        tolerance=0.5,
+        title="<Tank & 1>",
+    )
+    data = data_of(page)
+    assert data["first"] == {"robot": "paper-control", "shape": "mine", "options": {
+        "objective": "flips", "corner": "nearest", "point": "head_centre", "minimumSeconds": None,
+        "tolerance": pytest.approx(5.5), "timeWeight": 0.0, "smooth": None}}  # fmt: skip
+    shape = data["shapes"][0]
+    assert (shape["name"], shape["closed"]) == ("mine", True)
+    assert np.hypot(*np.array(shape["points"]).T) == pytest.approx(22.0)
+    assert "<title>&lt;Tank &amp; 1&gt;</title>" in page.read_text()
+
+
+def test_a_robot_with_an_effect_is_locked_and_small(tmp_path: Path) -> None:
+    robot = replace(sf.load_robot("paper-control"), effects={"left_right_bias": 0.1})
+    page = sf.write_page(tmp_path / "page.html", robot, lookup=sf.tabulate(robot))
+    data = data_of(page)
+    assert "left_right_bias" in data["locked"]["why"]
+    assert [entry["name"] for entry in data["robots"]] == ["paper-control"]
+    assert page.stat().st_size < 0.5e6
+
+
+def test_of_a_table_without_errors_of_the_response_the_vehicle_is_written(tmp_path: Path) -> None:
+    robot, lookup = sf.load_robot("paper-control"), replace(shipped(), curve_errors=None)
+    page = sf.write_page(tmp_path / "page.html", robot, lookup=lookup)
+    data = data_of(page)
+    assert "one error for all robots" in data["locked"]["why"]
+    assert len(data["planner"]["table"]["vehicle"]["errors"]) == len(
+        lookup.error_modes(both_directions(robot.group_values())).twist
+    )
+    assert page.stat().st_size < 0.5e6
+
+
+def test_bad_input_ends_in_one_line_and_leaves_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = str(tmp_path / "page.html")
+    for words in (["--robot", "nobody"], ["--path", "squre:3"], ["--tolerance", "-1"], ["--min-dwell-s", "nan"]):
+        assert run_command(main, ["page", *words, "--out", out]) == 2
+        assert len(capsys.readouterr().err.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_paths_have_the_names_of_their_shapes_and_files(tmp_path: Path) -> None:
+    (tmp_path / "my path.csv").write_text("x,y\n0,0\n3,0\n3,2\n")
+    words = [
+        "page",
+        "--path",
+        "circle:1.5",
+        "--path",
+        str(tmp_path / "my path.csv"),
+        "--out",
+        str(tmp_path / "p.html"),
+    ]
+    assert run_command(main, words) == 0
+    shapes = data_of(tmp_path / "p.html")["shapes"]
+    assert [shape["name"] for shape in shapes[:3]] == ["circle:1.5", "my path", "circle"]

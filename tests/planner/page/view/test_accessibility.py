@@ -1,0 +1,177 @@
+"""Everybody can use the page: names, keyboard, one word for a finished plan, contrast, sizes of text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from tests.planner.page.view.browser import opened_page, planned
+
+TEXT, LINES = 4.5, 3.0  # contrast at least
+TARGET = 44  # pixels
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+CONTROLS = "a[href], button, input:not([type=hidden]), select, summary, [tabindex='0']"
+RGB = """([name, part]) => {
+  const element = document.querySelector(part);
+  const words = getComputedStyle(element)[name];
+  return words.match(/[\\d.]+/g).map(Number);
+}"""
+
+
+@pytest.fixture(scope="module", params=["light", "dark"])
+def page(browser: Any, address: str, request: pytest.FixtureRequest) -> Iterator[Any]:
+    """Open the page, all its parts unfolded, with a plan."""
+    with opened_page(browser, address, color_scheme=request.param) as opened:
+        planned(opened)
+        opened.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+        opened.locator("#trade-off circle").first.wait_for()
+        planned(opened)
+        yield opened
+
+
+def luminance(colour: list[float]) -> float:
+    """Return the relative luminance of a colour of sRGB (WCAG 2.2)."""
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4
+              for part in (value / 255 for value in colour[:3])]  # fmt: skip
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(first: list[float], second: list[float]) -> float:
+    light, dark = sorted((luminance(first), luminance(second)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def test_each_control_has_a_name(page: Any) -> None:
+    session = page.context.new_cdp_session(page)
+    nodes = session.send("Accessibility.getFullAXTree")["nodes"]
+    roles = {
+        "button",
+        "link",
+        "textbox",
+        "spinbutton",
+        "slider",
+        "combobox",
+        "checkbox",
+        "radio",
+        "image",
+        "group",
+    }
+    controls = [node for node in nodes if not node["ignored"] and node["role"]["value"] in roles - {"group"}]
+    assert len(controls) > 60
+    assert [node for node in controls if not node.get("name", {}).get("value", "").strip()] == []
+
+
+def test_tab_reaches_each_control_in_the_order_of_the_page(page: Any) -> None:
+    """Of radio buttons that belong together, Tab reaches the one that is chosen."""
+    wanted = page.evaluate(
+        f"""() => [...document.querySelectorAll("{CONTROLS}")].filter((control) => !control.disabled
+             && control.tabIndex >= 0 && control.checkVisibility()
+             && !(control.type === "radio" && !control.checked)).map((control, i) => {{
+               control.dataset.order = i; return i; }})"""
+    )
+    page.evaluate("document.activeElement.blur(); window.scrollTo(0, 0)")
+    page.locator(".skip").focus()
+    reached = []
+    for _ in wanted:
+        reached.append(int(page.evaluate("document.activeElement.dataset.order ?? -1")))
+        page.keyboard.press("Tab")
+    assert reached == wanted
+
+
+def test_a_finished_plan_is_told_once(page: Any) -> None:
+    page.evaluate(
+        """() => {
+          window.told = [];
+          for (const region of document.querySelectorAll("[role=status], [aria-live=polite], output")) {
+            if (region.getAttribute("aria-live") === "off") continue;
+            new MutationObserver(() => window.told.push(region.textContent)).observe(
+              region, { childList: true, characterData: true, subtree: true });
+          }
+        }"""
+    )
+    page.fill("#size", "27.5")
+    words = planned(page)
+    page.click("#play")
+    page.wait_for_timeout(200)
+    page.click("#play")
+    assert page.evaluate("window.told") == [words]
+
+
+def test_text_and_lines_have_enough_contrast(page: Any) -> None:
+    texts = page.evaluate(
+        """() => {
+          const numbers = (words) => words.match(/[\\d.]+/g).map(Number);
+          const behind = (part) => {
+            for (; part; part = part.parentElement) {
+              const colour = numbers(getComputedStyle(part).backgroundColor);
+              if (colour.length < 4 || colour[3] > 0) return colour;
+            }
+          };
+          const own = (part) => [...part.childNodes].some((node) => node.nodeType === 3
+            && node.textContent.trim());
+          return [...document.body.querySelectorAll("*")].filter((part) => part.checkVisibility() && own(part)
+            && !part.closest("script, noscript")).map((part) => {
+              const style = getComputedStyle(part);
+              const colour = part.namespaceURI.endsWith("svg") ? style.fill : style.color;
+              return [part.outerHTML.slice(0, 80), numbers(colour), behind(part)];
+            });
+        }"""
+    )
+    assert len(texts) > 100
+    assert [(part, colour) for part, colour, behind in texts if contrast(colour, behind) < TEXT] == []
+    card = page.evaluate(RGB, ["backgroundColor", "#view"])
+    for kind in ("drawn", "declared", "forward", "backward", "start"):
+        line = page.evaluate(RGB, ["stroke", f"#scene path.{kind}"])
+        assert contrast(line, card) >= LINES, kind
+    for part in ("#size", "#shape", "#undo", "#play"):
+        edge = page.evaluate(RGB, ["borderTopColor", part])
+        assert contrast(edge, page.evaluate(RGB, ["backgroundColor", "section"])) >= LINES, part
+
+
+def test_lines_differ_by_more_than_colour(page: Any) -> None:
+    looks = page.evaluate(
+        """() => ["drawn", "declared", "forward", "backward"].map((kind) => {
+          const style = getComputedStyle(document.querySelector(`#scene path.${kind}`));
+          return `${style.strokeDasharray} ${style.strokeWidth}`;
+        })"""
+    )
+    assert len(set(looks)) == len(looks)
+    assert "motor +" in page.inner_text("#clock") or "motor −" in page.inner_text("#clock")
+
+
+def test_targets_on_a_phone_are_large_enough(browser: Any, address: str) -> None:
+    with opened_page(browser, address, **PHONE) as page:
+        planned(page)
+        page.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+        planned(page)
+        small = page.evaluate(
+            f"""() => [...document.querySelectorAll("{CONTROLS}")].filter((control) => control.checkVisibility()
+                 && !control.closest("svg") && control.id !== "pick" && !control.classList.contains("skip"))
+               .map((control) => [control.outerHTML.slice(0, 70),
+                 (control.closest("label.choice") ?? control).getBoundingClientRect()])
+               .filter(([, box]) => box.height < {TARGET} || box.width < {TARGET})
+               .map(([words, box]) => [words, box.width, box.height])"""
+        )
+        assert small == []
+
+
+@pytest.mark.parametrize(("width", "zoom"), [(320, 1), (640, 2)])
+def test_nothing_scrolls_sideways(browser: Any, address: str, width: int, zoom: int) -> None:
+    """Nothing does at 320 pixels, nor with text of 200 % on 640 pixels."""
+    with opened_page(browser, address, viewport={"width": width, "height": 700}) as page:
+        planned(page)
+        page.evaluate(f"document.documentElement.style.fontSize = '{100 * zoom}%'")
+        page.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+        planned(page)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        size = page.evaluate("parseFloat(getComputedStyle(document.body).fontSize)")
+        assert size == pytest.approx(16 * zoom)
+        cut = page.evaluate(
+            """() => [...document.querySelectorAll("button, label, p, dd, dt, h1, h2, summary")].filter((part) =>
+               part.checkVisibility() && !part.closest(".away, .wide, svg") && !part.classList.contains("away") &&
+               !part.classList.contains("skip") && part.scrollWidth > part.clientWidth + 1 &&
+               getComputedStyle(part).display !== "inline").map((part) => part.outerHTML.slice(0, 90))"""
+        )
+        assert cut == []
