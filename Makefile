@@ -25,8 +25,8 @@ OUT ?= reports/dataset.html
 export OMP_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 
-# Tests run in two processes, longest first; tests/conftest.py says what stays together. REST is what `make test` omits.
-TWO := -n 2 --dist loadgroup --no-loadscope-reorder
+# Tests run in a process for each core, longest first; tests/conftest.py says what stays together. REST is what `make test` omits.
+XDIST := -n auto --dist loadgroup --no-loadscope-reorder
 REST := long or rates or cluster
 
 .DEFAULT_GOAL := help
@@ -50,17 +50,17 @@ reports/demo.html: $(STAMP) $(SOURCES) $(wildcard $(foreach p,dataset surrogate 
 	$(RUN) -m softflagella demo --out $@
 
 test: $(VENV)/.extras ## run the tests of every feature
-	$(RUN) -m pytest $(TWO) -m "not ($(REST))"
+	$(RUN) -m pytest $(XDIST) -m "not ($(REST))"
 test-rest: $(VENV)/.extras ## run what `make test` leaves out: rates over many tables, clusters, the longest tests
-	$(RUN) -m pytest $(TWO) -m "$(REST)"
+	$(RUN) -m pytest $(XDIST) -m "$(REST)"
 test-all: $(VENV)/.extras ## run every test
-	$(RUN) -m pytest $(TWO)
+	$(RUN) -m pytest $(XDIST)
 $(VENV)/.extras: $(STAMP)
 	$(INSTALL) -e '.[clusters,page]'
 	touch $@
 
 quick: $(STAMP) ## run the quick tests, a minute and a half
-	$(RUN) -m pytest $(TWO) -m "not (slow or page or $(REST))"
+	$(RUN) -m pytest $(XDIST) -m "not (slow or page or $(REST))"
 
 constraints: $(STAMP) ## pin what pyproject.toml needs, with hashes (UPGRADE=1: the newest versions)
 	$(RUN) -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"])' \

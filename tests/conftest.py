@@ -1,7 +1,7 @@
 """Shared by all tests: one thread, the marks by duration, the order, and the processor time that each test takes.
 
 tests/durations.json has the processor seconds of the longer tests; `pytest --write-durations` brings it up to date
-for the tests that it runs. Tests over `SLOW` are marked. The longest run first, so that two processes
+for the tests that it runs. Tests over `SLOW` are marked. The longest run first, so that all processes
 end at about the same time. The quick tests of a file stay in one process, with those that share a fixture of the
 module. Another slow test goes to whichever process is free, unless an `xdist_group` says with which tests it runs.
 """
