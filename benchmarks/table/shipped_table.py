@@ -3,6 +3,10 @@
 Usage: softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
        python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
        python -m benchmarks shipped_table WORK --test MODEL   errors and coverage on the held-out robots
+       python -m benchmarks shipped_table WORK --spread-of MODEL --sweep TWO --out NEW
+
+The last one learns the spread over the disc's phase anew, from a sweep of robots with two tails. That of the
+shipped file is from domain.toml with 8192 rows, the seed 20261123, N = 2 and a history every 64 rows.
 
 The tails are learned from robots with heads far wider than those of the sweep, a single tail from robots of the
 sweep as well. The response to a flip is learned from the sweep, and from some of these wide robots. All robots are
@@ -16,6 +20,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +34,7 @@ from surrogate.networks.training_loop import Settings
 from surrogate.table.errors import coverage, curve_errors, error_table, relative_errors, summary
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
+from surrogate.table.response_table import ResponseTable
 from surrogate.training.simulated import (
     MOTION,
     SimulatedRobots,
@@ -37,10 +43,11 @@ from surrogate.training.simulated import (
     read_robots,
     simulate_robots,
 )
-from surrogate.training.train import learn, split, with_radius
+from surrogate.training.train import fit_spread, learn, split, with_radius
 
 TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=3000)
 CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)
+SPREAD = Settings(width=32, depth=2, members=1, epochs=60, iterations=600)
 ROWS = {"tails": (32768, 101), "widths": (4096, 202), "held_out": (4096, 402), "locked": (4096, 20261201)}
 FLIPS = {"flips": (1400, 301), "locked_flips": (400, 20261202)}
 _SWEPT = 16384  # rows of the sweep without history whose lags are learned
@@ -148,6 +155,23 @@ def draw(lookup: NeuralTable, rows: SimulatedRobots, path: str) -> None:
     figure.savefig(path, dpi=100)
 
 
+def relearned_spread(lookup: NeuralTable, folder: str) -> NeuralTable:
+    """Learn the spread of a table's lags anew, and print its error on held-out robots of the sweep."""
+    rows, numbers = read_robots(folder)
+    part = split(numbers)
+    network, bases = fit_spread(rows.at(part == 0), SPREAD)
+    curves = ResponseTable((*lookup.curves.networks[:2], network), {**lookup.curves.bases, **bases})
+    source = {"spread": {"rows": len(rows), "data_hash": read_manifest(folder)["config_hash"]}}
+    changed = replace(lookup, curves=curves, provenance={**lookup.provenance, **source})
+    held_out = rows.at(part == 2)
+    known = ~changed.query(held_out.robots, flag=True)["outside"]
+    found, wanted = changed.response(held_out.robots, flag=True).spread[known], held_out.curves["spread"][known]
+    factor = np.exp(np.abs(np.log(found[..., 2] / wanted[..., 2])))
+    middle, most = np.quantile(factor, [0.5, 0.95])
+    print(f"{known.sum()} held-out robots: within a factor of {middle:.2f}, 95 % within {most:.2f}")
+    return changed
+
+
 def as_reached(robots: Mapping[str, Floats], *, title: str = "") -> SimulatedRobots:
     """Simulate robots as a data set does: the motion that straight tails reach, if it is steady."""
     columns = steady_columns(robots, title=title)
@@ -161,11 +185,15 @@ def main(*words: str) -> None:
     parser.add_argument("--out")
     parser.add_argument("--sweep", help="data set built from surrogate/shipped/domain.toml")
     parser.add_argument("--test")
+    parser.add_argument("--spread-of", help="model whose spread is learned anew from --sweep")
     parser.add_argument("--picture", help="with --test: draw the errors of the held-out robots")
     arguments = parser.parse_args(words)
     if arguments.out:
         if not arguments.sweep:
             parser.error("--out needs --sweep")
+        if arguments.spread_of:
+            relearned_spread(load(arguments.spread_of), arguments.sweep).save(arguments.out)
+            return
         tails, widths, held_out, flips = (
             kept(arguments.work, n) for n in ("tails", "widths", "held_out", "flips")
         )

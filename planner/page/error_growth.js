@@ -4,38 +4,60 @@
 import { arc, compose, inversePose } from "./planar.js";
 import { lagAt, lagNoise, lagPlace } from "./vehicle.js";
 
-/* Propagate the modes and the noise of a vehicle to some flips of a schedule, given by rising numbers from 0 to
- * that of all dwells. error_growth
+const STILL = [0, 0, 0];
+const UNCHANGED = { twist: [STILL, STILL], current: [0, 0] };
+
+/* Propagate the modes of a vehicle, and those of its disc's phase, to some flips of a schedule, given by rising
+ * numbers from 0 to that of all dwells. error_growth
  *
- * Returns {flips, position, modes, variance}: predicted positions [x, y] at the flips; of each mode {x, y,
- * turned}, columns over the flips; variances of the noise from the start to each flip, [x and y of the body,
- * heading]. */
+ * Returns {flips, position, modes}: predicted positions [x, y] at the flips; of each mode {x, y, turned}, columns
+ * over the flips. */
 function errorGrowth(vehicle, switches, rollout, flips) {
   const { dwells, firstDirection } = switches, from = firstDirection < 0 ? 1 : 0;
   const sides = Array.from(dwells, (_, i) => (i + from) % 2);
   const circles = Array.from(dwells, (dwell, i) => arc(vehicle.twist[sides[i]], dwell));
   const places = Array.from(dwells, (dwell, i) => lagPlace(i ? dwells[i - 1] : dwell, dwell));
   const schedule = {
-    dwells, sides, circles, places, poses: rollout.poses, changes: rollout.changes,
+    dwells, sides, circles, poses: rollout.poses, changes: rollout.changes,
     lags: rollout.changes.map((change, i) => compose(change, inversePose(circles[i]))),
   };
   return {
     flips,
     position: flips.map((flip) => rollout.poses[flip].slice(0, 2)),
-    modes: vehicle.modes.map((mode) => modeGrowth(vehicle, mode, schedule, flips)),
-    variance: noiseVariance(vehicle, dwells, sides, flips),
+    modes: [
+      ...vehicle.modes.map((mode) => modeGrowth(vehicle, mode, schedule, flips, modeLags(mode, sides, places))),
+      ...phaseLags(vehicle, sides, dwells).map((added) => modeGrowth(vehicle, UNCHANGED, schedule, flips, added)),
+    ],
   };
 }
 
-function modeGrowth(vehicle, mode, schedule, flips) {
-  const { dwells, sides, circles, places, poses, changes, lags } = schedule;
+/* What the four modes of the disc's phase add to the lags of the dwells. _phase_lags */
+function phaseLags(vehicle, sides, dwells) {
+  const spread = [1, -1].map((sense) => lagNoise(vehicle, sense, dwells));
+  let turned = 0;
+  const phase = Array.from(dwells, (dwell, i) => {
+    const before = turned;
+    turned += vehicle.phaseRate[sides[i]] * dwell;
+    return before;
+  });
+  return [0, 1].flatMap((side) => [Math.cos, Math.sin].map((wave) => sides.map((of, i) => {
+    return of === side ? spread[side].map((values) => values[i] * wave(phase[i])) : STILL;
+  })));
+}
+
+function modeLags(mode, sides, places) {
+  return sides.map((side, i) => (mode.lag ? lagAt(mode.lag[side], places[i]) : STILL));
+}
+
+function modeGrowth(vehicle, mode, schedule, flips, addedLags) {
+  const { dwells, sides, circles, poses, changes, lags } = schedule;
   const twist = vehicle.twist.map((row, side) => row.map((value, k) => value + mode.twist[side][k]));
   const turns = mode.twist.flat().some((value) => value !== 0), [currentX, currentY] = mode.current;
   const growth = { x: [0], y: [0], turned: [0] };
   let x = 0, y = 0, turned = 0;
   for (let i = 0, next = 1; i < dwells.length; i++) {
     const side = sides[i], circle = turns ? arc(twist[side], dwells[i]) : circles[i];
-    const added = mode.lag ? lagAt(mode.lag[side], places[i]) : [0, 0, 0];
+    const added = addedLags[i];
     const moved = compose([lags[i][0] + added[0], lags[i][1] + added[1], lags[i][2] + added[2]], circle);
     const ahead = moved[0] - changes[i][0], left = moved[1] - changes[i][1];
     const c = Math.cos(poses[i][2]), s = Math.sin(poses[i][2]);
@@ -51,35 +73,14 @@ function modeGrowth(vehicle, mode, schedule, flips) {
   return growth;
 }
 
-function noiseVariance(vehicle, dwells, sides, flips) {
-  const noise = [1, -1].map((sense) => lagNoise(vehicle, sense, dwells));
-  const total = [0, 0, 0], variance = [[0, 0, 0]];
-  for (let i = 0, next = 1; i < dwells.length; i++) {
-    for (let axis = 0; axis < 3; axis++) total[axis] += noise[sides[i]][axis][i] ** 2;
-    if (flips[next] !== i + 1) continue;
-    variance.push([...total]);
-    next += 1;
-  }
-  return variance;
-}
-
 /* Select some of the flips. ErrorGrowth.at */
 function growthAt(growth, flips) {
   const rows = new Map(growth.flips.map((flip, row) => [flip, row]));
   const some = (values) => flips.map((flip) => values[rows.get(flip)]);
   return {
-    flips, position: some(growth.position), variance: some(growth.variance),
+    flips, position: some(growth.position),
     modes: growth.modes.map(({ x, y, turned }) => ({ x: some(x), y: some(y), turned: some(turned) })),
   };
 }
 
-/* Standard deviations of what the noise adds between the flips: [x, y in the lab, heading]. ErrorGrowth.noise */
-function noiseBetween({ variance }) {
-  return variance.slice(1).map((after, block) => {
-    const added = after.map((value, axis) => value - variance[block][axis]);
-    const across = Math.sqrt((added[0] + added[1]) / 2); // x and y of the body are mixed in the lab
-    return [across, across, Math.sqrt(added[2])];
-  });
-}
-
-export { errorGrowth, growthAt, noiseBetween };
+export { errorGrowth, growthAt };

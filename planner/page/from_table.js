@@ -23,6 +23,7 @@ function tableVehicle(robot, table) {
     twist: motions.map(({ v_z, v_x, omega_yr_bar }) => [v_z, v_x, omega_yr_bar]),
     curves: senses.map((values) => response(table, values)),
     before: BEFORE,
+    phaseRate: motions.map((motion) => groups.N * motion.omega_t_bar),
     errors: () => tableErrorModes(table, senses[0]),
     modes: [],
     current: [0, 0],
@@ -34,9 +35,9 @@ function tableVehicle(robot, table) {
 /* Make a vehicle of a table's answers in both directions.
  *
  * twist: [forward, left, yaw rate] of each direction. curves: flat lag, memory, rest and spread of each, as for a
- * positive motor. before: dwells of the memory. errors: gives the table's errors, see curve_errors.js. modes:
- * further ones. The rest is as in vehicle.js. */
-function vehicleOfParts({ twist, curves, before, errors, modes, current, tailGap, leastGap }, name) {
+ * positive motor. before: dwells of the memory. phaseRate: N times the disc's spin of each. errors: gives the
+ * table's errors, see curve_errors.js. modes: further ones. The rest is as in vehicle.js. */
+function vehicleOfParts({ twist, curves, before, phaseRate, errors, modes, current, tailGap, leastGap }, name) {
   const speed = (twist[0][0] + twist[1][0]) / 2, robot = `robot ${pythonText(name)}`;
   if (speed <= 0) {
     throw new InputError(`${robot} does not move forward (v_z = ${general(speed, 3)}); turn its motor slower`);
@@ -51,6 +52,7 @@ function vehicleOfParts({ twist, curves, before, errors, modes, current, tailGap
     lag: curves.map(({ lag, memory }, side) => mirrored(lagTable(lag, memory, before), SIDES[side])),
     rest: curves.map(({ rest }, side) => mirrored(resampled(rest), SIDES[side])),
     spread: curves.map(({ spread }) => resampled(spread)),
+    phaseRate,
     modes: [...tableModes(twist, errors()), ...modes],
     current, tailGap, leastGap,
   };

@@ -7,7 +7,7 @@ import { evaluate } from "./ensemble.js";
 import { DWELLS, atEqualDwells } from "./response.js";
 import { tailInputs } from "./tails.js";
 
-const PARTS = [["lag", "spread"], ["memory", "rest"]]; // what each network gives
+const PARTS = [["lag"], ["memory", "rest"], ["spread"]]; // what each network gives
 const SMALL_SURGE = 0.1; // of v_x
 const OF_HEAD = [0, 1, 2, 3, 5, 6]; // of the inputs of the head: all but the coupling of sway and turn
 
@@ -25,11 +25,17 @@ function responseCurves(table, head, tails, motion) {
         for (let at = 0; at < count; at++) curve[at] += size * vectors.values[c * count + at];
       }
       first += vectors.shape[0];
-      curves[name] = curve.map((value, at) => value * speeds[at % 3]);
+      const scaled = name === "spread" ? spreadOf(curve, tails.number) : curve;
+      curves[name] = scaled.map((value, at) => value * speeds[at % 3]);
     }
   });
-  curves.spread = curves.spread.map((value) => Math.max(value, 0));
+  curves.spread = curves.spread.map(Math.abs);
   return curves;
+}
+
+/* The spread of its logarithm, which was learned of robots with two tails. */
+function spreadOf(logarithm, number) {
+  return logarithm.map((value) => (number === 2 ? Math.exp(Math.min(value, 0)) : 0));
 }
 
 /* Lags with the memory of a dwell before of the same length. ResponseTable.lag_at_equal_dwells */

@@ -4,7 +4,7 @@
 import { largest, linspace, sum } from "./arrays.js";
 import { nearest } from "./distance.js";
 import { normals } from "./draws.js";
-import { growthAt, noiseBetween } from "./error_growth.js";
+import { growthAt } from "./error_growth.js";
 import { BEFORE_KNOTS, COUNT, SHORTEST, STEP, pivotRadius } from "./vehicle.js";
 import { zigzagSpeed } from "./zigzag.js";
 
@@ -73,59 +73,33 @@ function flipsBetween(count, every = 0) {
 function statedError(growth, predicted, every = 0, seed = 0) {
   const count = growth.flips[growth.flips.length - 1], some = growthAt(growth, flipsBetween(count, every));
   const blocks = extremes(predicted, some.flips, (predicted.distance.length - 1) / count);
-  const modes = some.modes.length, axes = every ? 2 : 3; // of the noise: x and y, or x, y and heading
-  const z = normals(seed, 0, DRAWS * modes), size = blocks.low.length * axes;
-  const drawn = normals(seed, DRAWS * modes, DRAWS * size), worst = new Float64Array(DRAWS);
-  const move = every ? movesFromMeasured(some, every) : movesFromStart(some);
+  const modes = some.modes.length, z = normals(seed, 0, DRAWS * modes), worst = new Float64Array(DRAWS);
+  const size = blocks.low.length, moved = new Float64Array(2 * size);
+  const [ofX, ofY] = columnsOfModes(every ? addedFromMeasured(some, every) : addedFromStart(some), size);
   for (let draw = 0; draw < DRAWS; draw++) {
     const ofModes = z.subarray(draw * modes, (draw + 1) * modes);
-    const moved = move(ofModes, drawn.subarray(draw * size, (draw + 1) * size));
+    for (let block = 0; block < size; block++) {
+      moved[2 * block] = product(ofModes, ofX, block);
+      moved[2 * block + 1] = product(ofModes, ofY, block);
+    }
     worst[draw] = farthest(moved, blocks, predicted.closed);
   }
   return quantile(worst.sort(), LEVEL);
 }
 
-/* How far vehicles are off at the ends of the blocks, if no pose is measured: a function of z of the modes and of
- * the numbers of the noise, which gives x and y of each block in turn. */
-function movesFromStart(growth) {
-  const noise = noiseBetween(growth), blocks = noise.length, sigma = Float64Array.from(noise.flat());
-  const position = Float64Array.from(growth.position.flat()), moved = new Float64Array(2 * blocks);
-  const [ofX, ofY] = columnsOfModes(growth.modes.map(({ x, y }) => [x.slice(1), y.slice(1)]), blocks);
-  return (z, drawn) => {
-    let swung = 0, x = 0, y = 0, leverX = 0, leverY = 0;
-    for (let block = 0; block < blocks; block++) {
-      const turn = drawn[3 * block + 2] * sigma[3 * block + 2], at = 2 * block;
-      swung += turn;
-      x += drawn[3 * block] * sigma[3 * block];
-      y += drawn[3 * block + 1] * sigma[3 * block + 1];
-      leverX += (turn * (position[at + 2] + position[at])) / 2;
-      leverY += (turn * (position[at + 3] + position[at + 1])) / 2;
-      moved[at] = product(z, ofX, block) + x - (swung * position[at + 3] - leverY);
-      moved[at + 1] = product(z, ofY, block) + y + (swung * position[at + 2] - leverX);
-    }
-    return moved;
-  };
+/* How far each mode leads to the end of each block, [x, y], if no pose is measured. */
+function addedFromStart({ modes }) {
+  return modes.map(({ x, y }) => [x.slice(1), y.slice(1)]);
 }
 
 /* The same, if each block starts from a known pose. */
-function movesFromMeasured(growth, every) {
-  const { flips, position } = growth, noise = noiseBetween(growth), blocks = noise.length;
-  const shares = noise.map((_, block) => Math.min(Math.max(every / (flips[block + 1] - flips[block]), 0), 1));
-  const steps = noise.map((_, i) => [position[i + 1][0] - position[i][0], position[i + 1][1] - position[i][1]]);
-  const relative = growth.modes.map(({ x, y, turned }) => [
-    steps.map(([, dy], i) => x[i + 1] - x[i] + turned[i] * dy),
-    steps.map(([dx], i) => y[i + 1] - y[i] - turned[i] * dx),
+function addedFromMeasured({ modes, flips, position }, every) {
+  const steps = position.slice(1).map(([x, y], i) => [x - position[i][0], y - position[i][1]]);
+  const shares = steps.map((_, i) => Math.min(Math.max(every / (flips[i + 1] - flips[i]), 0), 1));
+  return modes.map(({ x, y, turned }) => [
+    steps.map(([, dy], i) => (x[i + 1] - x[i] + turned[i] * dy) * shares[i]),
+    steps.map(([dx], i) => (y[i + 1] - y[i] - turned[i] * dx) * shares[i]),
   ]);
-  const [ofX, ofY] = columnsOfModes(relative, blocks), moved = new Float64Array(2 * blocks);
-  const sigma = Float64Array.from(noise, ([across], block) => across * Math.sqrt(shares[block]));
-  return (z, drawn) => {
-    for (let block = 0; block < blocks; block++) {
-      const at = 2 * block;
-      moved[at] = product(z, ofX, block) * shares[block] + drawn[at] * sigma[block];
-      moved[at + 1] = product(z, ofY, block) * shares[block] + drawn[at + 1] * sigma[block];
-    }
-    return moved;
-  };
 }
 
 /* What modes [x, y] add in each block, block by block in one column each. */

@@ -6,6 +6,7 @@
  *   lag      flat tables after dwells BEFORE_KNOTS, at TIMES: forward, left, heading
  *   rest     flat tables of a first dwell, at TIMES
  *   spread   flat tables, one sigma of the lag over the unknown phase of the disc at the flip, at TIMES
+ *   phaseRate   N times the disc's mean spin
  *
  * and modes [{name, twist, lag or null, current}], each one standard deviation; current [x, y] in the lab; tailGap
  * in diameters, and leastGap. Lengths in l, times in μ0 l⁴/EI, angles in rad. */

@@ -118,6 +118,7 @@ def _planner_data(lookup: LookupTable, robot: Robot, tracked: TrackedVehicle, wh
                 {name: getattr(curves, name)[i] for name in ("lag", "memory", "rest", "spread")} for i in (0, 1)
             ],
             "before": curves.before,
+            "phaseRate": vehicle.phase_rate,
             "errors": [
                 {"twist": twist, "lag": lag, "memory": memory} if lag.any() or memory.any() else {"twist": twist}
                 for twist, lag, memory in zip(errors.twist, errors.lag, errors.memory, strict=True)

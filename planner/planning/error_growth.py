@@ -1,8 +1,13 @@
 """How the errors of a vehicle grow along a schedule: deviations from the predicted poses, to first order.
 
 A mode of the vehicle changes its twists, its lags or the current. In each dwell it changes the move and the turn;
-a turn tilts everything that comes later. The phase of the disc at each flip adds independent noise to the lag, of
-which the variances add up.
+a turn tilts everything that comes later.
+
+The lag after a flip also varies with the phase φ of the disc at that flip: N waves in a turn, with the standard
+deviation `Vehicle.spread`. The motor's speed tells how far the disc turns from flip to flip, so only the first
+phase is unknown, and where in the wave it lies. The lags of each direction thus vary as A cos Nφ + B sin Nφ, with
+independent A and B of mean 0 and variance 1: two modes for each direction. Where φ comes back at every second
+flip, as with equal dwells, these errors add up; elsewhere they average out.
 """
 
 from __future__ import annotations
@@ -12,37 +17,30 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.vehicle.rollout import Rollout, Switches
-from planner.vehicle.vehicle import Vehicle, interpolated
+from planner.vehicle.vehicle import Mode, Vehicle, interpolated
 from sim.arrays import Floats, Integers
 from sim.mechanics import planar
 
 
 class ErrorGrowth(NamedTuple):
-    """Deviations of one standard deviation of each of P modes at E flips, the first and the last among them."""
+    """Deviations of one standard deviation of each of P modes at E flips, the first and the last among them.
+
+    The modes are those of the vehicle, and then four of the disc's phase.
+    """
 
     flips: Integers  # (E,), their numbers; the last one is the end of the schedule
     position: Floats  # (E, 2), as predicted
     deviation: Floats  # (E, P, 2), from there
     turned: Floats  # (E, P), of the heading
-    variance: Floats  # (E, 3), of the noise from the start to this flip: x and y of the body, heading
 
     def at(self, flips: Integers) -> ErrorGrowth:
         """Select some of the flips."""
         rows = np.searchsorted(self.flips, flips)
-        return ErrorGrowth(
-            flips, self.position[rows], self.deviation[rows], self.turned[rows], self.variance[rows]
-        )
-
-    @property
-    def noise(self) -> Floats:
-        """Standard deviation (E − 1, 3) of what the noise adds between the flips: x and y in the lab, heading."""
-        added = np.diff(self.variance, axis=0)
-        across = added[:, :2].mean(1)  # x and y of the body are mixed in the lab
-        return np.sqrt(np.stack([across, across, added[:, 2]], 1))
+        return ErrorGrowth(flips, self.position[rows], self.deviation[rows], self.turned[rows])
 
 
 def error_growth(vehicle: Vehicle, switches: Switches, rollout: Rollout, flips: Integers) -> ErrorGrowth:
-    """Propagate the modes and the noise of a vehicle to some flips of a schedule.
+    """Propagate the modes of a vehicle, and those of its disc's phase, to some flips of a schedule.
 
     Args:
         vehicle: with its modes and its spread.
@@ -56,9 +54,10 @@ def error_growth(vehicle: Vehicle, switches: Switches, rollout: Rollout, flips: 
     circle = planar.arc(vehicle.twist[side], dwells)
     lag = planar.compose(moves_predicted, planar.inverse(circle))
     steps = np.diff(poses[:, :2], axis=0)
-    modes = vehicle.modes
+    of_phase = _phase_lags(vehicle, side, dwells)
+    modes = [*vehicle.modes, *(Mode("phase of the disc", np.zeros((2, 3))) for _ in of_phase)]
+    lags = [*_mode_lags(vehicle, side, dwells), *of_phase]
     deviation, turned = np.zeros((len(flips), len(modes), 2)), np.zeros((len(flips), len(modes)))
-    lags = _mode_lags(vehicle, side, dwells)
     for p, mode in enumerate(modes):
         arc = planar.arc((vehicle.twist + mode.twist)[side], dwells) if mode.twist.any() else circle
         change = planar.compose(lag + lags[p], arc) - moves_predicted
@@ -67,11 +66,19 @@ def error_growth(vehicle: Vehicle, switches: Switches, rollout: Rollout, flips: 
         moves += heading[:-1, None] * left(steps)
         position = np.concatenate([np.zeros((1, 2)), np.cumsum(moves, 0)])
         deviation[:, p], turned[:, p] = position[flips], heading[flips]
-    spread = np.empty((count, 3))
+    return ErrorGrowth(flips, poses[flips, :2], deviation, turned)
+
+
+def _phase_lags(vehicle: Vehicle, side: Integers, dwells: Floats) -> list[Floats]:
+    """Return what the four modes of the disc's phase add to the lags (M, 3) of the dwells (M,)."""
+    turned = np.cumsum(vehicle.phase_rate[side] * dwells)
+    phase = np.concatenate([[0.0], turned[:-1]])  # N φ at the flip before each dwell, from that of the first one
+    added = []
     for index in (0, 1):
+        spread = np.zeros((len(dwells), 3))
         spread[side == index] = vehicle.lag_noise(1 - 2 * index, dwells[side == index])
-    variance = np.concatenate([np.zeros((1, 3)), np.cumsum(spread**2, 0)])[flips]
-    return ErrorGrowth(flips, poses[flips, :2], deviation, turned, variance)
+        added += [spread * np.cos(phase)[:, None], spread * np.sin(phase)[:, None]]
+    return added
 
 
 def _mode_lags(vehicle: Vehicle, side: Integers, dwells: Floats) -> list[Floats | float]:

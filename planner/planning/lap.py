@@ -82,10 +82,6 @@ def drift_of_a_lap(tracked: TrackedVehicle, switches: Switches, seed: int) -> tu
     rollout = roll_out(tracked.vehicle, switches, tracked.offset)
     growth = error_growth(tracked.vehicle, switches, rollout, flips_between(len(switches.dwells)))
     modes = growth.deviation.shape[1]
-    drawn = normals(seed, 0, _DRAWS * (modes + 3)).reshape(_DRAWS, modes + 3)
-    middle = (growth.position[1:] + growth.position[:-1]) / 2
-    lever = ((growth.position[-1] - middle) ** 2).sum(1)
-    across = math.sqrt(float((growth.noise[:, 0] ** 2 + growth.noise[:, 2] ** 2 * lever / 2).sum()))
-    moved = drawn[:, :modes] @ growth.deviation[-1] + across * drawn[:, modes : modes + 2]
-    turned = drawn[:, :modes] @ growth.turned[-1] + math.sqrt(float(growth.variance[-1, 2])) * drawn[:, -1]
+    drawn = normals(seed, 0, _DRAWS * modes).reshape(_DRAWS, modes)
+    moved, turned = drawn @ growth.deviation[-1], drawn @ growth.turned[-1]
     return float(np.quantile(np.hypot(*moved.T), LEVEL)), float(np.quantile(np.abs(turned), LEVEL))

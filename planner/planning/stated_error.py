@@ -2,8 +2,8 @@
 
 *Stated error*: 95 % of vehicles drawn at random within the uncertainty stay within this distance of the declared
 path when they carry out the schedule open-loop. Uncertain are the modes of the vehicle (held-out errors of the
-look-up table, covariance of a calibration, current) and the phase of the disc at each flip, which adds independent
-noise with every dwell. Deviations are of first order in all of them (`planner.planning.error_growth`).
+look-up table, covariance of a calibration, current) and the phase of the disc at the first flip. Deviations are of
+first order in all of them (`planner.planning.error_growth`).
 
 *With feedback*: the same, if every k flips the pose is measured and the remaining path is planned again.
 
@@ -107,11 +107,9 @@ def stated_error(growth: ErrorGrowth, predicted: Predicted, *, every: int = 0, s
     edges = growth.flips
     low, high, normal = _extremes(predicted, edges, (len(predicted.distance) - 1) // count)
     if every:  # each window starts from a known pose
-        z, drawn = _draws(growth, 2, seed)
         tilt = growth.turned[:-1, :, None] * left(np.diff(growth.position, axis=0))[:, None]
         share = np.maximum(every / np.diff(edges), 0.0).clip(max=1.0)
-        moved = _sums(z, np.diff(growth.deviation, axis=0) - tilt) * share[:, None]
-        moved += drawn * growth.noise[:, :2] * np.sqrt(share)[:, None]
+        moved = _sums(_draws(growth, seed), np.diff(growth.deviation, axis=0) - tilt) * share[:, None]
     else:
         moved, _ = deviations_open_loop(growth, seed)
     across = np.einsum("dki,ki->dk", moved, normal)
@@ -125,20 +123,14 @@ def stated_error(growth: ErrorGrowth, predicted: Predicted, *, every: int = 0, s
 
 def deviations_open_loop(growth: ErrorGrowth, seed: int = 0) -> tuple[Floats, Floats]:
     """Draw deviations at the ends of the blocks: of the place (D, E − 1, 2) and of the heading (D, E − 1)."""
-    z, drawn = _draws(growth, 3, seed)
-    moved, steps = _sums(z, growth.deviation[1:]), drawn * growth.noise
-    swung = np.cumsum(steps[..., 2], 1)
-    middle = (growth.position[1:] + growth.position[:-1]) / 2
-    lever = swung[..., None] * growth.position[1:] - np.cumsum(steps[..., 2:] * middle, 1)
-    moved += np.cumsum(steps[..., :2], 1) + left(lever)
-    return moved, z @ growth.turned[1:].T + swung
+    z = _draws(growth, seed)
+    return _sums(z, growth.deviation[1:]), z @ growth.turned[1:].T
 
 
-def _draws(growth: ErrorGrowth, axes: int, seed: int) -> tuple[Floats, Floats]:
-    """Draw modes (D, P) and noise (D, E − 1, axes): of x and y, or of x, y and heading."""
-    modes, blocks = growth.deviation.shape[1], len(growth.noise)
-    z = normals(seed, 0, _DRAWS * modes).reshape(_DRAWS, modes)
-    return z, normals(seed, _DRAWS * modes, _DRAWS * blocks * axes).reshape(_DRAWS, blocks, axes)
+def _draws(growth: ErrorGrowth, seed: int) -> Floats:
+    """Draw modes (D, P)."""
+    modes = growth.deviation.shape[1]
+    return normals(seed, 0, _DRAWS * modes).reshape(_DRAWS, modes)
 
 
 def _sums(z: Floats, deviation: Floats) -> Floats:

@@ -60,6 +60,7 @@ def table_vehicle(robot: Robot, lookup: LookupTable, knowledge: CalibrationKnowl
         lag=lag,
         rest=mirrored(resampled(curves.rest)),
         spread=resampled(curves.spread),
+        phase_rate=robot.tails * motion["omega_t_bar"],
         modes=(
             *_table_modes(twist, lookup.error_modes(columns)),
             *coefficient_modes(robot, lookup, Motion(twist, lag), knowledge),

@@ -40,6 +40,7 @@ class Vehicle:
     lag: Floats  # (2, K, T, 3) after dwells of BEFORE_KNOTS: forward, left, heading
     rest: Floats  # (2, T, 3), of a first dwell
     spread: Floats  # (2, T, 3), one-sigma of the lag, over the unknown phase of the disc at the flip
+    phase_rate: Floats = field(default_factory=lambda: np.zeros(2))  # (2,), N times the disc's mean spin
     modes: tuple[Mode, ...] = ()  # what is uncertain, each by one standard deviation
     current: Floats = field(default_factory=lambda: np.zeros(2))  # in the lab
     tail_gap: float = 10.0  # in diameters

@@ -191,7 +191,7 @@ def _curve_arrays(table: NeuralTable) -> Arrays:
     lag, memory = table.curves.bases["lag"], table.curves.bases["memory"]
     count = min(len(lag.vectors), len(memory.vectors), _MOST_COMPONENTS)
     arrays: Arrays = {}
-    for name, network in zip(NETWORKS[4:], table.curves.networks, strict=True):
+    for name, network in zip(NETWORKS[4:], table.curves.networks[:2], strict=True):
         arrays |= _arrays(name, network.member(0), half=True, outputs=count)
     vectors = np.concatenate([lag.vectors[:count], memory_at_equal_dwells(memory.vectors[:count])])
     mean = lag.mean + memory_at_equal_dwells(memory.mean[None])[0]

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-FORMAT = 5  # of model files
+FORMAT = 6  # of model files
 RESPONSE_OUTPUTS = ("net_speed_bar", *LAGS[::-1])
 OUTSIDE = "outside"  # flag of robots that the table does not know
 BRANCHES = 0.6  # |ω_yr/ω_t| from which a robot may have several motions

@@ -5,10 +5,11 @@ robot to robot:
 
     Δz/w, Δx/v_x, Δψ/ω_yr,   w² = v_z² + (v_x/10)²
 
-(w and not v_z, because v_z may vanish). Lag, memory, rest and spread are each written in the principal
-components of the rows that were learned. Two networks give the components: one for lag and spread, one for memory
-and rest, which data sets hold for a part of their robots. A robot's inputs are those of its tails in steady motion
-(`surrogate.wrench.tails`), how the drag of its head compares with that of its tails, and N.
+(w and not v_z, because v_z may vanish). Lag, memory, rest and the logarithm of the spread are each written in the
+principal components of the rows that were learned. Three networks give the components: one for the lag, one for
+memory and rest, which data sets hold for a part of their robots, and one for the spread. Robots with two tails
+have a spread; with more, the lag does not depend on the phase of the disc. A robot's inputs are those of its tails
+in steady motion (`surrogate.wrench.tails`), how the drag of its head compares with that of its tails, and N.
 
 The components are curves of the simulator. So the curves of the table are smooth, and constant for long dwells.
 Left out: robots with one tail, and robots whose left and right turns differ. Units: l, μ0 l⁴/EI.
@@ -36,7 +37,7 @@ SHAPES = {
     "rest": (len(DWELLS), 3),
     "spread": (len(DWELLS), 3),
 }
-PARTS = (("lag", "spread"), ("memory", "rest"))  # what each network gives
+PARTS = (("lag",), ("memory", "rest"), ("spread",))  # what each network gives
 _SMALL_SURGE = 0.1  # of v_x
 _OF_HEAD = [0, 1, 2, 3, 5, 6]  # of the inputs of the head: all but the coupling of sway and turn
 
@@ -60,8 +61,10 @@ class ResponseTable:
         speeds, curves = curve_speeds(heads, motion), {}
         for name, components in self._components(tails, motion).items():
             curve = self.bases[name].mean + components @ self.bases[name].vectors
+            if name == "spread":  # its logarithm was learned, of robots with two tails
+                curve = np.exp(np.where((tails.number == 2)[:, None], np.minimum(curve, 0.0), -np.inf))
             curves[name] = curve.reshape(-1, *SHAPES[name]) * along_axes(speeds, SHAPES[name])
-        curves["spread"] = np.maximum(curves["spread"], 0.0)
+        curves["spread"] = np.abs(curves["spread"])
         return curves
 
     def lag_at_equal_dwells(self, heads: Heads, tails: Tails, motion: Floats) -> Floats:

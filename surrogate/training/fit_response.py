@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
@@ -25,8 +25,9 @@ from surrogate.table.response_table import (
 from surrogate.wrench.heads import Heads
 from surrogate.wrench.tails import Tails
 
-COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 20}
+COMPONENTS = {"lag": 32, "memory": 32, "rest": 32, "spread": 8}
 SETTINGS = Settings(width=48, depth=2, members=2, epochs=200, iterations=150)
+_LEAST_SPREAD = 1e-6  # of the way in one unit of time
 _SMOOTH = 2.0  # standard deviations over which the components change
 
 
@@ -39,21 +40,37 @@ def fit_response(
     work: TrainingContext,
 ) -> ResponseTable:
     """Fit a table to curves of robots, by name as in SHAPES, each (M, …, 3); NaN where one was not simulated."""
+    parts = [fit_part(names, heads, tails, motion, curves, settings, work) for names in PARTS]
+    bases = {name: basis for _, of_part in parts for name, basis in of_part.items()}
+    return ResponseTable(tuple(network for network, _ in parts), bases)
+
+
+def fit_part(
+    names: Sequence[str],
+    heads: Heads,
+    tails: Tails,
+    motion: Floats,
+    curves: Mapping[str, Floats],
+    settings: Settings,
+    work: TrainingContext,
+) -> tuple[Ensemble, dict[str, Basis]]:
+    """Fit the network of some curves, one of PARTS, and their bases; see `fit_response`."""
     inputs, speeds = response_inputs(tails, motion), curve_speeds(heads, motion)
-    networks: list[Ensemble] = []
-    bases: dict[str, Basis] = {}
-    for names in PARTS:
-        known = np.all([np.isfinite(curves[n]).reshape(len(inputs), -1).all(1) for n in names], axis=0)
-        targets = []
-        for name in names:
-            scaled = curves[name][known] / along_axes(speeds[known], SHAPES[name])
-            bases[name] = _basis(scaled.reshape(len(scaled), -1), COMPONENTS[name])
-            targets.append((scaled.reshape(len(scaled), -1) - bases[name].mean) @ bases[name].vectors.T)
-        sizes = [(len(bases[name].vectors), (3 / np.prod(SHAPES[name])) ** 0.5) for name in names]
-        weights = np.concatenate([np.full(count, weight) for count, weight in sizes])
-        part = work.part(" and ".join(names))
-        networks.append(_learned(inputs[known], np.concatenate(targets, -1), weights, settings, part))
-    return ResponseTable(tuple(networks), bases)
+    known = np.all([np.isfinite(curves[n]).reshape(len(inputs), -1).all(1) for n in names], axis=0)
+    if "spread" in names and (known & (tails.number == 2)).any():
+        known &= tails.number == 2
+    bases, targets = {}, []
+    for name in names:
+        scaled = (curves[name][known] / along_axes(speeds[known], SHAPES[name])).reshape(known.sum(), -1)
+        if name == "spread":
+            scaled = np.log(np.maximum(np.abs(scaled), _LEAST_SPREAD))
+        bases[name] = _basis(scaled, COMPONENTS[name])
+        targets.append((scaled - bases[name].mean) @ bases[name].vectors.T)
+    sizes = [(len(bases[name].vectors), (3 / np.prod(SHAPES[name])) ** 0.5) for name in names]
+    weights = np.concatenate([np.full(count, weight) for count, weight in sizes])
+    unit = "of the logarithm" if "spread" in names else "% of the way in one unit of time"
+    part = work.part(" and ".join(names))
+    return _learned(inputs[known], np.concatenate(targets, -1), weights, settings, part, unit), bases
 
 
 def _basis(flat: Floats, count: int) -> Basis:
@@ -64,7 +81,7 @@ def _basis(flat: Floats, count: int) -> Basis:
 
 
 def _learned(
-    inputs: Floats, wanted: Floats, weights: Floats, settings: Settings, work: TrainingContext
+    inputs: Floats, wanted: Floats, weights: Floats, settings: Settings, work: TrainingContext, unit: str
 ) -> Ensemble:
     """Fit a network that gives components (M, C)."""
     network = TrainableEnsemble(
@@ -81,7 +98,7 @@ def _learned(
         return (y - wanted) * weights
 
     x = torch.from_numpy(inputs)
-    fit(network, x, data, residual, settings, work, unit="% of the way in one unit of time")
+    fit(network, x, data, residual, settings, work, unit=unit)
     return network.trained()
 
 

@@ -23,13 +23,15 @@ from sim.io.provenance import fingerprint, provenance
 from surrogate.input_ranges import ROBOT
 from surrogate.loops import compile_once
 from surrogate.networks.checkpoints import TrainingContext, device_named
+from surrogate.networks.ensemble import Ensemble
 from surrogate.networks.training_loop import Settings
 from surrogate.table.errors import curve_errors, relative_errors, summary
 from surrogate.table.intervals import Intervals
 from surrogate.table.lookup import BRANCHES, NeuralTable, steady_outputs
+from surrogate.table.response_table import Basis
 from surrogate.table.support import Support
 from surrogate.table.wrench_table import CLASSES, network_index
-from surrogate.training.fit_response import SETTINGS, fit_response
+from surrogate.training.fit_response import SETTINGS, fit_part, fit_response
 from surrogate.training.fit_wrench import WrenchSamples, fit_wrench, learnable, wrench_samples
 from surrogate.training.response_errors import held_out_curve_errors
 from surrogate.training.simulated import SimulatedRobots, join_robots, read_robots, simulate_robots
@@ -176,6 +178,17 @@ def learn(
         provenance={**created, **(source or {}), "rows": counts},
     )
     return _judged(lookup, width_rows, held_out, flips_held_out)
+
+
+def fit_spread(
+    flipped: SimulatedRobots, settings: Settings, work: TrainingContext = _QUIET
+) -> tuple[Ensemble, dict[str, Basis]]:
+    """Fit the spread of the lags over the disc's phase alone; `flipped` are robots with response curves."""
+    flipped = _several_tails(flipped)
+    samples = _learnable(flipped)
+    usable = np.flatnonzero(learnable(wrench_samples(flipped.robots, flipped.motion)))
+    curves = flipped.at(usable).curves
+    return fit_part(("spread",), samples.heads, samples.tails, samples.motion, curves, settings, work)
 
 
 def _judged(

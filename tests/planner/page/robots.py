@@ -86,6 +86,7 @@ def vehicle_to_page(vehicle: Vehicle) -> dict[str, Any]:
     return {
         "twist": vehicle.twist.tolist(),
         **{name: _sides(getattr(vehicle, name)) for name in ("lag", "rest", "spread")},
+        "phaseRate": vehicle.phase_rate.tolist(),
         "modes": [
             {
                 "name": mode.name,

@@ -1,4 +1,4 @@
-"""Deviations along a schedule are Python's, in a current and with modes of every kind."""
+"""Deviations along a schedule are Python's: in a current, with modes of every kind and those of the phase."""
 
 from __future__ import annotations
 
@@ -22,30 +22,28 @@ def test_growth(first: int) -> None:
     rng = np.random.default_rng(first + 1)
     modes = (Mode("current", np.zeros((2, 3)), current=np.array([1e-4, -2e-4])),)
     vehicle = vehicle_of(random_robots(1)[0])
-    vehicle = replace(vehicle, current=np.array([0.01, -0.02]), modes=(*vehicle.modes[:6], *modes))
+    spread = rng.uniform(0.0, 1e-3, vehicle.spread.shape)
+    vehicle = replace(vehicle, current=np.array([0.01, -0.02]), modes=(*vehicle.modes[:6], *modes), spread=spread)
     switches = Switches(first, rng.uniform(0.25, 3.0, 40), rng.normal(size=(41, 3)))
     page = {"firstDirection": first, "dwells": switches.dwells, "poses": switches.poses}
     car = vehicle_to_page(vehicle)
     growth = call(
         "error_growth.js", "errorGrowth", car, page, call("rollout.js", "rollOut", car, page, 0.1), FLIPS
     )
-    whole, some, noise = answers(
+    whole, some = answers(
         [
             ("error_growth.js", "growthAt", growth, FLIPS),
             ("error_growth.js", "growthAt", growth, SOME),
-            ("error_growth.js", "noiseBetween", growth),
         ]
     )
     wanted = error_growth(vehicle, switches, roll_out(vehicle, switches, 0.1), np.array(FLIPS))
     check_growth(whole, wanted)
     check_growth(some, wanted.at(np.array(SOME)))
-    check_alike(noise, wanted.noise)
 
 
 def check_growth(found: dict[str, list[dict[str, list[float]]]], wanted: ErrorGrowth) -> None:
     assert found["flips"] == wanted.flips.tolist()
     check_alike(found["position"], wanted.position)
-    check_alike(found["variance"], wanted.variance)
     deviation = np.stack([[mode["x"], mode["y"]] for mode in found["modes"]])
     check_alike(deviation.transpose(2, 1, 0), wanted.deviation.transpose(0, 2, 1), 1e-9)
     check_alike(np.array([mode["turned"] for mode in found["modes"]]).T, wanted.turned, 1e-9)

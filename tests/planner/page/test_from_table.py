@@ -29,6 +29,7 @@ def check_tables(found: dict[str, object], wanted: Vehicle) -> None:
     check_alike(np.array(found["twist"]).T, wanted.twist.T)
     for name in ("lag", "rest", "spread"):
         check_alike(np.reshape(found[name], (-1, 3)), getattr(wanted, name).reshape(-1, 3))
+    assert found["phaseRate"] == pytest.approx(wanted.phase_rate.tolist(), rel=EXACT)
     assert found["current"] == [0.0, 0.0]
     assert found["tailGap"] == pytest.approx(wanted.tail_gap, rel=EXACT)
     assert found["leastGap"] == wanted.least_gap

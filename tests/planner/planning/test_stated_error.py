@@ -13,6 +13,7 @@ from planner.paths.distance import distance_to
 from planner.paths.path import Path2D, circle
 from planner.paths.tractrix import Reference, reference
 from planner.planning.error_growth import error_growth
+from planner.planning.plan import plan
 from planner.planning.schedule import follow
 from planner.planning.stated_error import (
     Predicted,
@@ -25,6 +26,9 @@ from planner.planning.stated_error import (
 from planner.vehicle.rollout import Rollout, Switches, roll_out, trace
 from planner.vehicle.vehicle import BEFORE_KNOTS, TIMES, Mode, Vehicle
 from sim.io.errors import InputError
+from sim.mechanics import planar
+from sim.model.presets import PRESETS
+from sim.motion.replay import replay
 from surrogate.table.model_file import load
 from tests.oracles.unseen_robots import carried
 from tests.planner.vehicles import plain_guidance, vehicle
@@ -97,15 +101,56 @@ def test_without_uncertainty_it_is_the_predicted_error() -> None:
     assert stated_for(car, switches, rollout, error) == pytest.approx(error.largest)
 
 
-def test_random_phases_add_as_a_walk() -> None:
-    """On a line, a heading that jitters by s at each of M flips leads s √(M³/3) steps aside."""
-    car = replace(vehicle(errors=0.0), spread=np.tile([0.0, 0.0, 1e-3], (2, len(TIMES), 1)))
+JITTER = np.tile([0.0, 0.0, 1e-3], (2, len(TIMES), 1))  # of the lag, over the disc's phase
+
+
+def test_a_phase_that_returns_bends_a_line() -> None:
+    """If both directions always flip at one phase, each pair of dwells adds a turn of √2 s."""
+    car = replace(vehicle(errors=0.0), spread=JITTER)
     switches, ref, rollout = planned(car, Path2D.of([[0, 0], [30, 0]]))
     error = predicted_error(ref.p, rollout.track, closed=False)
     stated = stated_for(car, switches, rollout, error)
-    count = len(switches.dwells)
-    expected = 1.96 * 1e-3 * np.sqrt(count**3 / 3) * 30 / count
+    expected = 1.96 * math.sqrt(2) * 1e-3 * len(switches.dwells) / 2 * 30 / 2
     assert stated - error.largest == pytest.approx(expected, rel=0.2)
+
+
+def test_phases_that_differ_average_out() -> None:
+    """With unequal dwells, the disc flips at ever other phases."""
+    car = replace(vehicle(errors=0.0), spread=JITTER, phase_rate=np.array([40.0, -40.0]))
+    switches, ref, rollout = planned(car, circle(2.0))
+    error = predicted_error(ref.p, rollout.track, closed=True)
+    excess = stated_for(car, switches, rollout, error) - error.largest
+    returning = replace(car, phase_rate=np.zeros(2))
+    assert 0 < excess < 0.1 * (stated_for(returning, switches, rollout, error) - error.largest)
+
+
+def test_the_modes_of_the_phase_are_lags() -> None:
+    """A deviation is that of a vehicle with other lags at each flip."""
+    car = replace(vehicle(errors=0.0), spread=JITTER, phase_rate=np.array([3.0, -3.1]), modes=())
+    dwells = np.array([0.5, 0.7, 0.4, 0.9, 0.6])
+    switches = Switches(-1, dwells, np.zeros((6, 3)))
+    rollout = roll_out(car, switches, 0.0)
+    growth = error_growth(car, switches, rollout, np.arange(6))
+    phase = np.concatenate([[0.0], np.cumsum(dwells * [-3.1, 3.0, -3.1, 3.0, -3.1])[:-1]])
+    second = np.arange(5) % 2 == 0  # dwells of the second direction
+    waves = [~second * np.cos(phase), ~second * np.sin(phase), second * np.cos(phase), second * np.sin(phase)]
+    for mode, wave in enumerate(waves):
+        pose, heading = np.zeros(3), 0.0
+        for i in range(5):
+            arc = planar.arc(car.twist[int(second[i])], dwells[i])
+            lag = planar.compose(rollout.changes[i], planar.inverse(arc))
+            pose = planar.compose(pose, planar.compose(lag + np.array([0.0, 0.0, 1e-3 * wave[i]]), arc))
+            heading += 1e-3 * wave[i]
+        assert growth.turned[-1, mode] == pytest.approx(heading, rel=1e-9, abs=1e-15)
+        assert growth.deviation[-1, mode] == pytest.approx(pose[:2] - rollout.poses[-1, :2], abs=3e-7)
+
+
+def test_a_straight_line_of_two_tails_bends_as_stated() -> None:
+    """With equal dwells the disc's phase adds to the heading at each pair; without it, 0.042 l were stated."""
+    result = plan(Path2D.of([[0, 0], [12, 0]]), PRESETS["paper-control"], dwell=1.8)
+    track = replay([result.schedule()])[0]
+    aside = np.abs(track["y_over_l"]).max()
+    assert 1.5 * result.predicted_max < aside < result.stated_error
 
 
 def test_feedback_stops_the_growth() -> None:
