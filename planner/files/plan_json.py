@@ -13,6 +13,7 @@ from sim.model.plan_file import read_plan_file
 
 _NUMBERS = ("stated_error_over_l", "feedback_error_over_l", "predicted_rms_over_l", "predicted_max_over_l",
             "offset_over_l", "minimum_dwell_bar")  # fmt: skip
+LARGEST = 1e100  # of a number, so that sums and squares of them are finite
 _TABLES = {"reference": 2, "raw_path": 2, "predicted_poses": 3}
 
 
@@ -48,11 +49,13 @@ def check_numbers(content: dict[str, Any], name: str | Path) -> None:
     """
     try:
         for key in (*_NUMBERS, *([] if content[GUARANTEE] is None else [GUARANTEE])):
-            if not np.isfinite(float(content[key])):
-                raise InputError(f"{name}: {key} = {content[key]} is no finite number; plan again")
+            if not abs(float(content[key])) < LARGEST:
+                raise InputError(
+                    f"{name}: {key} = {content[key]} is no finite number below {LARGEST:g}; plan again"
+                )
         for key, width in _TABLES.items():
             table = np.array(content[key], dtype=float)
-            if table.ndim != 2 or table.shape[1] != width or len(table) < 2 or not np.isfinite(table).all():
+            if table.ndim != 2 or table.shape[1] != width or len(table) < 2 or not (np.abs(table) < LARGEST).all():
                 raise InputError(f"{name}: {key} must have two or more rows of {width} finite numbers; plan again")
         content["point"]
     except (KeyError, TypeError, ValueError, OverflowError) as broken:

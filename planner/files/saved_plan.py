@@ -91,7 +91,7 @@ def restore_plan(
         path = plan_json(source)
         name, kept, content = str(path), str(path), load_plan(path)
     try:
-        with naming(name):
+        with naming(name), np.errstate(over="raise", invalid="raise"):
             robot = _robot(content["robot"])
             knowledge = CalibrationKnowledge.from_dict(content.get("calibration", {}), name)
             own = own_table or bool(content.get("own_table", False))

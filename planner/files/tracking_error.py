@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from planner.files.plan_json import LARGEST
 from planner.paths.distance import distance_to, two_sided
 from planner.paths.units import length_in_lab
 from planner.planning.picture import REPLAYED, draw_tracks
@@ -23,7 +24,6 @@ from sim.io.quantities import convert_columns, numbers_of
 from sim.io.units import format_length
 from sim.mechanics import planar
 
-_LARGEST = 1e100  # of a number
 _COLUMNS = ("time_bar", "x_over_l", "y_over_l", "heading_rad")
 _LAB = ("time_s", "x_cm", "y_cm", "heading_deg")  # or in other units
 
@@ -77,7 +77,7 @@ def tracking_error(plan: dict[str, Any], track: pd.DataFrame) -> TrackingError:
     track = track_in_tails(track, plan["robot"])
     values = {name: numbers_of(track[name]).to_numpy() for name in _COLUMNS}
     pose = np.stack([values["x_over_l"], values["y_over_l"], values["heading_rad"]], 1)
-    if not (np.abs([*pose.T, values["time_bar"]]) < _LARGEST).all():
+    if not (np.abs([*pose.T, values["time_bar"]]) < LARGEST).all():
         raise InputError("the track has a value that is not a finite number; correct the file")
     if len(pose) < 2 or not np.ptp(values["time_bar"]) > 0:
         raise InputError("the track has no two times; give a row for each time, in order")

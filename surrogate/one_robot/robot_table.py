@@ -193,6 +193,9 @@ def _wrong(table: RobotTable) -> str:
     """Return what is wrong with the numbers of a table; empty if nothing is."""
     if not all(isinstance(part, dict) for part in (table.robot, table.steady, table.slopes, table.errors)):
         return "its robot, motion, slopes and errors are not named numbers"
+    numbers = [table.robot, table.steady, table.slopes, table.errors, table.before, table.error_curves]
+    if _has_words([*numbers, *(getattr(table, name) for name in _CURVES)]):
+        return "its numbers have no such form"
     before = np.array(table.before, dtype=float)
     if before.ndim != 1 or not _all_ordinary(before):
         return "its numbers have no such form"
@@ -224,6 +227,13 @@ def _wrong(table: RobotTable) -> str:
     if not all(math.isfinite(size) for error in table.errors.values() for size in error.values()):
         return "its errors are not finite numbers"
     return ""
+
+
+def _has_words(content: Any) -> bool:
+    """Whether lists and dictionaries have, at any depth, a word or a truth value; numpy takes "1" for a number."""
+    if isinstance(content, dict | list | tuple):
+        return any(map(_has_words, content.values() if isinstance(content, dict) else content))
+    return isinstance(content, str | bool)
 
 
 def _all_ordinary(values: Floats) -> bool:

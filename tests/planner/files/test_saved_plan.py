@@ -144,6 +144,9 @@ def test_paths_are_no_plans(tmp_path: Path) -> None:
         ({"calibration": {"names": ["C_t"]}}, "calibration"),
         ({"minimum_dwell_bar": 0.0}, "not above 0"),
         ({"format": 1}, "has format 1"),
+        ({"stated_error_over_l": 1e200}, "stated_error_over_l = 1e\\+200 is no finite number below 1e\\+100"),
+        ({"reference": [[0.0, 0.0], [1e200, 0.0]]}, "reference must have two or more rows"),
+        ({"off_drawn_over_l": 1.0, "guidance": {"heading_rad": [1e300, -1e300]}}, "lacks what is needed"),
         ({"robot": {"groups": {"omega_bar": 10.0}}}, "lacks what is needed"),
     ],
 )

@@ -69,6 +69,8 @@ def test_damaged_tables_of_one_robot_are_refused(single: RobotTable, tmp_path: P
         ("slopes", {"C_t": [1.0]}, "slopes are not finite numbers"),
         ("errors", {"v_x": {"rms": float("inf")}}, "errors are not finite"),
         ("before", 5, "its numbers have no such form"),
+        ("errors", {"v_x": {"rms": "0.1"}}, "its numbers have no such form"),
+        ("slopes", {"C_t": [["1", 2.0, 3.0], [1.0, 2.0, 3.0]]}, "its numbers have no such form"),
     ],
 )
 def test_wrong_numbers_of_one_robot_are_refused_though_the_hash_is_right(
