@@ -240,6 +240,7 @@ def _errors(
         feedback=float(content["feedback_error_over_l"]),
         guaranteed=None if guaranteed is None else float(guaranteed),
         closure=None if closure is None else float(closure),
+        table_share=float(content.get("table_share", 1.0)),
     )
 
 

@@ -1,7 +1,7 @@
 /* The errors of a plan: distances of the predicted track from declared and drawn path, and the stated error.
  *
  * Mirrors planner/planning/errors.py. Lengths in l. */
-import { largest } from "./arrays.js";
+import { largest, sum } from "./arrays.js";
 import { distanceTo } from "./distance.js";
 import { errorGrowth } from "./error_growth.js";
 import { polyline } from "./path.js";
@@ -11,7 +11,7 @@ import { flipsBetween, largestDistance, predictedError, rmsInTime, statedError }
 const FEEDBACK_EVERY = 20; // flips
 
 /* Compute the errors of a schedule: {track, stated, feedback, guaranteed, closure, predictedRms, predictedMax,
- * drawnRms, drawnMax}. plan_errors
+ * drawnRms, drawnMax, tableShare}. plan_errors
  *
  * tracked: see tracked_point.js. drawn: the path as drawn. declared: see declared_path.js. switches: the schedule.
  * guaranteed: bound on the error without uncertainty. seed: of the random robots. */
@@ -33,7 +33,15 @@ function planErrors(tracked, drawn, declared, switches, guaranteed, seed) {
     predictedMax: largestDistance(predicted),
     drawnRms: rmsInTime(fromDrawn, dwells),
     drawnMax: largest(fromDrawn),
+    tableShare: tableShare(vehicle, growth),
   };
+}
+
+/* The share of the look-up table's modes in the squared deviations along a schedule. _table_share */
+function tableShare(vehicle, growth) {
+  const squares = growth.modes.map(({ x, y }) => x.reduce((total, value, i) => total + value ** 2 + y[i] ** 2, 0));
+  const ofTable = squares.filter((_, p) => vehicle.modes[p]?.name.startsWith("table: "));
+  return sum(ofTable) / Math.max(sum(squares), 1e-300);
 }
 
 export { FEEDBACK_EVERY, planErrors };

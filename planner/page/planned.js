@@ -24,7 +24,8 @@ function planWarnings(plan) {
 
 /* Propose the robot's own table where the errors of the look-up table decide the stated error. */
 function tableWarnings({ tracked, errors, switches }) {
-  if (tracked.ownTable || errors.stated < OWN_TABLE_FROM * errors.predictedMax) return [];
+  const large = errors.stated >= OWN_TABLE_FROM * errors.predictedMax && errors.tableShare > 0.5;
+  if (tracked.ownTable || !large) return [];
   return [
     `the stated error is mostly that of the look-up table, over ${switches.dwells.length} flips: simulate this ` +
       "robot's own table (--own-table, own_table=True), or measure poses on the way",
@@ -109,6 +110,7 @@ function planContent(plan) {
     zigzag_rms_over_l: plan.straight.rms,
     guaranteed_error_over_l: errors.guaranteed,
     stated_error_over_l: errors.stated,
+    table_share: errors.tableShare,
     feedback_error_over_l: errors.feedback,
     feedback_every: new Whole(FEEDBACK_EVERY),
     predicted_rms_over_l: errors.predictedRms,

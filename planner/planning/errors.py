@@ -10,10 +10,11 @@ import numpy as np
 from planner.paths.distance import distance_to
 from planner.paths.path import Path2D
 from planner.planning.declared_path import Declared
-from planner.planning.error_growth import error_growth
+from planner.planning.error_growth import ErrorGrowth, error_growth
 from planner.planning.stated_error import flips_between, predicted_error, rms_in_time, stated_error
 from planner.vehicle.rollout import Switches, roll_out
 from planner.vehicle.tracked_point import TrackedVehicle
+from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
 
 FEEDBACK_EVERY = 20  # flips
@@ -32,6 +33,7 @@ class PlanErrors:
     feedback: float  # the same where the pose is measured, and the rest planned again, every 20 flips
     guaranteed: float | None  # bound for a robot without errors, however long the path; None: not known
     closure: float | None  # from the end of the track to the beginning of a closed path
+    table_share: float = 1.0  # of the look-up table in the variance of the deviations
 
     @property
     def predicted_rms(self) -> float:
@@ -96,4 +98,12 @@ def plan_errors(
         feedback=min(feedback, stated),  # a measured robot may keep to the schedule
         guaranteed=guaranteed,
         closure=float(np.linalg.norm(rollout.track[-1] - path[0])) if drawn.closed else None,
+        table_share=_table_share(tracked.vehicle, growth),
     )
+
+
+def _table_share(vehicle: Vehicle, growth: ErrorGrowth) -> float:
+    """Return the share of the look-up table's modes in the squared deviations along a schedule."""
+    squares = (growth.deviation**2).sum((0, 2))
+    of_table = sum(float(squares[p]) for p, mode in enumerate(vehicle.modes) if mode.name.startswith("table: "))
+    return of_table / max(float(squares.sum()), 1e-300)

@@ -164,7 +164,8 @@ class Plan:
 
     def _table_warnings(self) -> tuple[str, ...]:
         """Propose the robot's own table where the errors of the look-up table decide the stated error."""
-        if self.tracked.own_table or self.stated_error < _OWN_TABLE_FROM * self.predicted_max:
+        large = self.stated_error >= _OWN_TABLE_FROM * self.predicted_max and self.errors.table_share > 0.5
+        if self.tracked.own_table or not large:
             return ()
         return (
             f"the stated error is mostly that of the look-up table, over {len(self.dwells)} flips: simulate this "
@@ -325,6 +326,7 @@ class Plan:
             "zigzag_rms_over_l": self.straight.rms,
             GUARANTEE: self.errors.guaranteed,
             "stated_error_over_l": self.errors.stated,
+            "table_share": self.errors.table_share,
             "feedback_error_over_l": self.errors.feedback,
             "feedback_every": FEEDBACK_EVERY,
             "predicted_rms_over_l": self.errors.predicted_rms,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -22,6 +23,7 @@ from tests.processes import LIMIT
 
 RUN = ("sh", "python")
 LONG = {"tutorial/calibration.md", "tutorial/schedule.md", "howto/cluster.md", "howto/goal.md", "howto/jobs.md"}
+NAMED = re.compile(r"# (?P<name>[\w-]+\.toml)$", re.MULTILINE)
 SHOWN = {*RUN, "toml", "text", "c", "js"}
 
 
@@ -52,6 +54,8 @@ def test_the_blocks_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytes
     monkeypatch.chdir(work)
     shell, names = environment(commands), {"__name__": "__page__"}
     for block in blocks(page):
+        if named := NAMED.match(block.code):  # a file that the reader writes
+            (work / named["name"]).write_text(block.code)
         if block.reason or block.language not in RUN:
             continue
         if block.language == "python":

@@ -58,7 +58,7 @@ def plan_to_page(result: Plan) -> dict[str, Any]:
         "errors": {
             _camel(name): getattr(errors, name)
             for name in ("predicted_rms", "predicted_max", "drawn_rms", "drawn_max", "stated", "feedback",
-                         "guaranteed", "closure")
+                         "guaranteed", "closure", "table_share")
         },
     }  # fmt: skip
 
