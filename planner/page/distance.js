@@ -65,11 +65,11 @@ class Boxes {
     return least;
   }
 
-  /* The lowest number of a segment that is nearer to a point than `reach`. */
+  /* The lowest number of a segment that is not further from a point than `reach`. */
   firstWithin(point, reach) {
     let first = -1;
     this.visit(point, () => (first < 0 ? reach : -1), (segment) => {
-      if (first < 0 && closest(this.line, segment, point).gap < reach) first = segment;
+      if (first < 0 && closest(this.line, segment, point).gap <= reach) first = segment;
     });
     return first;
   }

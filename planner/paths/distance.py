@@ -114,7 +114,7 @@ def _closest(
     square = np.maximum((chosen**2).sum(-1), 1e-300)
     share = np.clip((away * chosen).sum(-1) / square, 0, 1)
     gap = np.hypot(*np.moveaxis(away - share[..., None] * chosen, -1, 0))
-    tied = gap < gap.min(1, keepdims=True) + TIE
+    tied = gap <= gap.min(1, keepdims=True) + TIE
     best = np.where(tied, candidates, len(start)).argmin(1)
     rows = np.arange(len(points))
     return gap[rows, best], candidates[rows, best], share[rows, best]

@@ -67,6 +67,9 @@ function connectPath(page) {
   byId("reverse").addEventListener("click", () =>
     page.setPoints([...page.editor.path.points].reverse(), page.drawn.closed),
   );
+  byId("smooth-path").addEventListener("click", () =>
+    page.smooth(page.editor.path.points, page.drawn.closed, page.state.path.name),
+  );
   byId("snap").addEventListener("change", (event) => (page.editor.snaps = event.target.checked));
   byId("view").addEventListener("dblclick", (event) => page.editor.remove(page.view.placeOf(event)));
   byId("rigid").addEventListener("submit", (event) => {

@@ -32,7 +32,7 @@ class Page {
     );
     this.view = new PlanView();
     this.editor = new PathEditor(
-      (points, closed) => this.stroke(points, closed),
+      (points, closed) => this.smooth(points, closed, "my stroke"),
       (points, closed) => this.setPoints(points, closed),
     );
     this.view.editor = this.editor;
@@ -278,14 +278,15 @@ class Page {
     this.change({ path: { points: grid, closed, name } });
   }
 
-  async stroke(points, closed) {
+  /* Smooth a stroke, or the path that is shown, and make it the path. */
+  async smooth(points, closed, name) {
     const over = this.state.options.smooth;
     await this.ask("smooth", { points, closed, over }, ({ answer, refusal }) => {
       say(byId("path-problem"), refusal ?? "", true);
       if (refusal) return;
       byId("smooth").placeholder = answer.over;
       this.view.moved = true;
-      this.setPoints(answer.points, closed, "my stroke");
+      this.setPoints(answer.points, closed, name);
     });
   }
 

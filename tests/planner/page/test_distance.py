@@ -46,6 +46,14 @@ def test_steps_of_no_length_and_a_single_segment() -> None:
         assert found["segment"] == segment.tolist()
 
 
+@pytest.mark.parametrize("away", [1e4, 1e5, 1e7])
+def test_points_far_away(away: float) -> None:
+    line = away * np.array([1.0, 0.7]) + np.cumsum(RNG.normal(size=(30, 2)), axis=0)
+    found = answer("distance.js", "nearest", line, away * RNG.normal(size=(40, 2)))
+    assert min(found["segment"]) >= 0
+    assert np.isfinite(found["distance"]).all()
+
+
 def test_two_sided_distances() -> None:
     pairs = [(random_stroke(k).polyline(), random_stroke(k + 1).polyline()) for k in range(6)]
     pairs.append((polygon(4, 3.0).polyline(), Path2D.of([[0, 0], [1, 0], [1, 1e-7]]).polyline()))

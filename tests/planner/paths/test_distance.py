@@ -79,3 +79,13 @@ def test_memory_does_not_grow_with_all_candidates() -> None:
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert most < 24 * len(points) + 40e6
+
+
+@pytest.mark.parametrize("away", [1e4, 1e5, 1e7])
+def test_points_far_away(away: float) -> None:
+    """Where distances are so large that TIE is less than their last bit."""
+    rng = np.random.default_rng(3)
+    line = away * np.array([1.0, 0.7]) + np.cumsum(rng.normal(size=(30, 2)), axis=0)
+    points = away * rng.normal(size=(40, 2))
+    distance, _, _ = nearest(line, points)
+    assert distance == pytest.approx(all_with_all(line, points), rel=1e-12)

@@ -68,6 +68,15 @@ def drop(page: Any, *files: Path | dict[str, Any]) -> None:
     page.locator("#pick").set_input_files([file if isinstance(file, dict) else str(file) for file in files])
 
 
+def drag(page: Any, *paths: Path) -> None:
+    """Drag files or folders onto the picture, and let them go there."""
+    session, box = page.context.new_cdp_session(page), page.locator("#view").bounding_box()
+    place = {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2}
+    data = {"items": [], "files": [str(path) for path in paths], "dragOperationsMask": 1}
+    for kind in ("dragEnter", "dragOver", "drop"):
+        session.send("Input.dispatchDragEvent", {"type": kind, **place, "data": data})
+
+
 def saved(page: Any, name: str, folder: Path) -> Path:
     """Save a file with its button."""
     with page.expect_download() as download:

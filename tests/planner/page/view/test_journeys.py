@@ -20,7 +20,7 @@ from sim.io.errors import run_command
 from sim.model.presets import PRESETS
 from softflagella.__main__ import main
 from surrogate.one_robot.tabulate import tabulate
-from tests.planner.page.view.browser import drop, opened_page, planned, saved, text_of
+from tests.planner.page.view.browser import drag, drop, opened_page, planned, saved, text_of
 
 ROBOT = PRESETS["paper-control"]
 
@@ -247,6 +247,46 @@ def test_a_replay_is_shown_over_its_plan_with_the_error_of_the_command(
     rms = float(re.search(r"tracking error ([\d.]+) (mm|cm)", capsys.readouterr().out).group(1))  # type: ignore[union-attr]
     ours = float(re.search(r"([\d.]+) cm rms", seen).group(1))  # type: ignore[union-attr]
     assert ours * 10 == pytest.approx(rms, rel=0.02)
+
+
+def test_files_and_folders_are_dragged_onto_the_picture(browser: Any, address: str, tmp_path: Path) -> None:
+    one, other = tmp_path / "one.csv", tmp_path / "other.csv"
+    one.write_text("x_cm,y_cm\n0,0\n40,0\n40,30\n")
+    other.write_text("x_cm,y_cm\n0,0\n50,0\n")
+    with opened_page(browser, address) as page:
+        planned(page)
+        before = address_of(page)
+        drag(page, one, other)
+        page.locator("#path-problem", has_text="Give one").wait_for()
+        assert text_of(page, "#path-problem") == "Give one file at a time."
+        drag(page, tmp_path)
+        page.locator("#path-problem", has_text="cannot be read; give a file").wait_for()
+        assert address_of(page) == before
+        drag(page, one)
+        page.locator("#path-problem").wait_for(state="hidden")
+        assert "dwells" in planned(page)
+        assert "points=" in address_of(page)
+
+
+def test_an_opened_path_is_smoothed(browser: Any, address: str, tmp_path: Path) -> None:
+    """What the refusal of a noisy path advises can be done in the page."""
+    x = np.linspace(0, 60, 240)
+    noise = 0.5 * np.random.default_rng(0).normal(size=(2, 240))
+    rows = "".join(f"{a:.3f},{b:.3f}\n" for a, b in np.stack([x, 8 * np.sin(x / 10)], 1) + noise.T)
+    (tmp_path / "camera.csv").write_text("x_cm,y_cm\n" + rows)
+    with opened_page(browser, address) as page:
+        planned(page)
+        drop(page, tmp_path / "camera.csv")
+        page.locator("#path-problem", has_text="it looks noisy").wait_for()
+        planned(page)
+        refusal = text_of(page, "#path-problem")
+        advised = re.search(r"smoothed over ([\d.]+) (mm|cm)", refusal)
+        assert advised, refusal
+        page.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+        page.fill("#smooth", f"{float(advised[1]) / (10 if advised[2] == 'mm' else 1):g}")
+        page.get_by_role("button", name="Smooth this path").click()
+        page.locator("#path-problem").wait_for(state="hidden")
+        assert "dwells. 95 of 100" in planned(page)
 
 
 def test_the_page_prints_on_paper(browser: Any, address: str, tmp_path: Path) -> None:
