@@ -111,6 +111,7 @@ function lockedVehicle({ vehicle, groups, ownTable }, name) {
     twist: rows(vehicle.twist),
     curves,
     before: flat(vehicle.before),
+    phaseRate: Array.from(flat(vehicle.phaseRate)),
     errors: () => errors,
     modes,
     current: Array.from(flat(vehicle.current)),

@@ -2,9 +2,10 @@
 
 import { byId, figure } from "./dom.js";
 import { axes, flips, planLayers, poseTransform, robotShape } from "./scene.js";
-import { fitted, panned, placeAt, transform, viewport, zoomed } from "./viewport.js";
+import { fitted, lensPlace, panned, placeAt, transform, viewport, zoomed } from "./viewport.js";
 
 const LENS = 10; // times larger than the picture
+const LENS_MARGIN = 10; // pixels from the edges, as in page.css
 const KEYS = { ArrowLeft: [60, 0], ArrowRight: [-60, 0], ArrowUp: [0, 60], ArrowDown: [0, -60] };
 
 class PlanView {
@@ -61,21 +62,27 @@ class PlanView {
     this.placeLens();
   }
 
-  fit() {
+  /* The points that are to be seen. */
+  shown() {
     const { drawn, plan, tracks } = this.content;
-    const points = [
+    return [
       ...(drawn?.points ?? []),
       ...(plan?.reference ?? []),
       ...tracks.flatMap((track) => track.points),
     ];
-    this.view = fitted(points, ...this.size);
+  }
+
+  fit() {
+    this.view = fitted(this.shown(), ...this.size);
     this.moved = false;
     this.place();
   }
 
-  /* Put all groups where the viewport has them. */
+  /* Put all groups where the viewport has them, and the lens where it hides least. */
   place() {
     const [width, height] = this.size;
+    const lens = (this.lens.clientWidth || 200) + 2 * LENS_MARGIN;
+    this.lensPlace = lensPlace(this.view, this.shown(), width, height, lens);
     this.scene.setAttribute("transform", transform(this.view));
     this.grid.replaceChildren(axes(this.view, width, height));
     const dots = this.content.plan ? flips(this.content.plan, this.view) : null;
@@ -88,6 +95,7 @@ class PlanView {
     const { plan } = this.content;
     this.lens.style.display = plan ? "" : "none";
     if (!plan) return;
+    this.lens.setAttribute("class", this.lensPlace);
     const [x, y] = this.follows ?? plan.start;
     const size = this.lens.clientWidth || 200;
     const scale = LENS * this.view.scale;

@@ -60,9 +60,14 @@ class RobotForm {
     this.values = values;
     for (const [key, inputs] of this.inputs) {
       for (const input of inputs)
-        if (input !== document.activeElement || input.type === "range") input.value = values[key] ?? "";
+        if (input !== document.activeElement || input.type === "range") input.value = sixDigits(values[key]);
     }
   }
+}
+
+/* What a field shows of a value; the plan has all its digits. */
+function sixDigits(value) {
+  return value === null || value === undefined ? "" : Number(value.toPrecision(6));
 }
 
 /* Show the motion of the robot [cm, s, rad], or why there is none. */

@@ -48,6 +48,28 @@ function pixelOf(view, [x, y]) {
   return [view.left + view.scale * x, view.top - view.scale * y];
 }
 
+const LENS_PLACES = {
+  "right top": [1, 0],
+  "left top": [0, 0],
+  "right bottom": [1, 1],
+  "left bottom": [0, 1],
+  middle: [0.5, 0.5],
+};
+
+/* The place in width × height pixels at which a round lens hides the fewest points [cm]: "right top", …. */
+function lensPlace(view, points, width, height, lens) {
+  const hidden = Object.entries(LENS_PLACES).map(([name, [right, down]]) => {
+    const x = lens / 2 + right * (width - lens);
+    const y = lens / 2 + down * (height - lens);
+    const inside = points.filter((point) => {
+      const [px, py] = pixelOf(view, point);
+      return Math.hypot(px - x, py - y) < lens / 2;
+    });
+    return { name, count: inside.length };
+  });
+  return hidden.reduce((best, place) => (place.count < best.count ? place : best)).name;
+}
+
 /* The transform of a group that is drawn in cm, y upwards. */
 function transform(view) {
   return `matrix(${view.scale} 0 0 ${-view.scale} ${view.left} ${view.top})`;
@@ -72,4 +94,4 @@ function tickWords(value, step) {
   return value.toFixed(Math.max(0, Math.min(6, -Math.floor(Math.log10(step) + 1e-9)))).replace("-", "−");
 }
 
-export { fitted, panned, pixelOf, placeAt, tickStep, tickWords, ticks, transform, viewport, zoomed };
+export { fitted, lensPlace, panned, pixelOf, placeAt, tickStep, tickWords, ticks, transform, viewport, zoomed };

@@ -30,6 +30,16 @@ def test_everything_fits() -> None:
     assert answer("view/viewport.js", "fitted", [], 600, 400)["scale"] > 0
 
 
+def test_the_lens_is_where_it_hides_least() -> None:
+    view = {"scale": 1.0, "left": 0.0, "top": 400.0}  # places are pixels, y upwards
+    corners = {"right top": [540, 330], "left top": [60, 330], "right bottom": [540, 70], "left bottom": [60, 70],
+               "middle": [300, 200]}  # fmt: skip
+    for free in corners:
+        points = [place for name, place in corners.items() if name != free]
+        assert answer("view/viewport.js", "lensPlace", view, points, 600, 400, 150) == free
+    assert answer("view/viewport.js", "lensPlace", view, [[300, 200]], 600, 400, 150) == "right top"
+
+
 def test_ticks_are_round_and_far_enough_apart() -> None:
     for scale in (0.0123, 0.7, 12.0, 333.0):
         step = answer("view/viewport.js", "tickStep", {**VIEW, "scale": scale})
