@@ -15,6 +15,7 @@ _PAGES = (  # of the documentation: name without suffix, title, what it is
     ("howto/tracker", "Keep a robot on its path with a camera", "a schedule with feedback"),
 )
 ROBOT_PAGE = "robot.html"  # the page that plans, beside the demo's page
+ROBOT_PICTURE = _DOCS / "page.png"  # of it; there is none without a checkout
 PLAN_FILES = {
     "schedule.h": "the schedule for a microcontroller, open loop",
     "tracker.h": "the same with feedback from a camera",

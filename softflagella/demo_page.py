@@ -41,7 +41,7 @@ from softflagella.demo_figures import (
     draw_sweep,
     in_lab_units,
 )
-from softflagella.demo_files import PLAN_FILES, ROBOT_PAGE, documentation, header_excerpt
+from softflagella.demo_files import PLAN_FILES, ROBOT_PAGE, ROBOT_PICTURE, documentation, header_excerpt
 from softflagella.replanning import Steered, gap_closed
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
@@ -236,6 +236,8 @@ def _add_schedule(page: Page, results: Results, folder: Path) -> None:
     page.commands(header_excerpt((folder / name / "schedule.h").read_text()))
     page.links([(ROBOT_PAGE, "Plan in your browser", "draw a path, see what the robot will do, save its schedule; "
                  "the three paths are there, and their `track.csv` can be dropped on them")])  # fmt: skip
+    if ROBOT_PICTURE.is_file():
+        page.picture(ROBOT_PICTURE.read_bytes(), "the page that plans: a square, its zigzag, the robot to scale")
 
 
 def _add_sweep(page: Page, results: Results) -> None:

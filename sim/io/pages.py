@@ -7,6 +7,7 @@ backticks are set as code.
 
 from __future__ import annotations
 
+import base64
 import html
 import re
 from collections.abc import Sequence
@@ -140,6 +141,11 @@ class Page:
                 f"<figure>{figure_markup(figure, description, number=self._figures)}{below}</figure>"
             )
         self._parts.append("</div>")
+
+    def picture(self, png: bytes, description: str) -> None:
+        """Add a picture, with a description for people who cannot see it."""
+        source = f"data:image/png;base64,{base64.b64encode(png).decode()}"
+        self._parts.append(f'<img src="{source}" alt="{html.escape(description)}">')
 
     def write(self, path: str | Path, footer: str) -> None:
         """Write the page completely or not at all."""
