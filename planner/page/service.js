@@ -32,8 +32,15 @@ async function service(data) {
     : { locked: null, table: await readTable(data.table) };
   const files = { ...data.files, tracker: await inflated(data.files.tracker).text() };
   let last = null; // {key, plan}: the plan that the page shows
+  let asked = null; // {key, swims}: the vehicle that was asked for last
 
   function tracked(fields, point) {
+    const key = JSON.stringify([fields, point]);
+    if (asked?.key !== key) asked = { key, swims: vehicleOf(fields, point) };
+    return asked.swims;
+  }
+
+  function vehicleOf(fields, point) {
     if (!locked) return trackedVehicle(makeRobot(fields), table, point);
     const robot = makeRobot({ ...fields, groups: locked.groups });
     return trackedPoint(robot, locked.vehicle, point, data.table.identity, locked.ownTable);

@@ -74,15 +74,14 @@ function statedError(growth, predicted, every = 0, seed = 0) {
   const count = growth.flips[growth.flips.length - 1], some = growthAt(growth, flipsBetween(count, every));
   const blocks = extremes(predicted, some.flips, (predicted.distance.length - 1) / count);
   const modes = some.modes.length, z = normals(seed, 0, DRAWS * modes), worst = new Float64Array(DRAWS);
-  const size = blocks.low.length, moved = new Float64Array(2 * size);
-  const [ofX, ofY] = columnsOfModes(every ? addedFromMeasured(some, every) : addedFromStart(some), size);
+  const added = every ? addedFromMeasured(some, every) : addedFromStart(some);
+  const { normal } = blocks, last = blocks.low.length - 1, forward = [normal[2 * last + 1], -normal[2 * last]];
+  const across = alongDirections(added, normal);
+  const onward = alongDirections(added.map(([x, y]) => [[x[last]], [y[last]]]), forward);
   for (let draw = 0; draw < DRAWS; draw++) {
     const ofModes = z.subarray(draw * modes, (draw + 1) * modes);
-    for (let block = 0; block < size; block++) {
-      moved[2 * block] = product(ofModes, ofX, block);
-      moved[2 * block + 1] = product(ofModes, ofY, block);
-    }
-    worst[draw] = farthest(moved, blocks, predicted.closed);
+    const beyond = predicted.closed ? 0 : Math.max(product(ofModes, onward, 0), 0); // past the end of an open path
+    worst[draw] = farthest(ofModes, across, blocks, beyond);
   }
   return quantile(worst.sort(), LEVEL);
 }
@@ -102,15 +101,15 @@ function addedFromMeasured({ modes, flips, position }, every) {
   ]);
 }
 
-/* What modes [x, y] add in each block, block by block in one column each. */
-function columnsOfModes(modes, blocks) {
-  return [0, 1].map((axis) => {
-    const values = new Float64Array(blocks * modes.length);
-    modes.forEach((mode, p) => {
-      for (let block = 0; block < blocks; block++) values[block * modes.length + p] = mode[axis][block];
-    });
-    return values;
+/* What modes [x, y] add in each block along a direction, x and y in turn; block by block in one column. */
+function alongDirections(modes, directions) {
+  const blocks = directions.length / 2, values = new Float64Array(blocks * modes.length);
+  modes.forEach(([x, y], p) => {
+    for (let block = 0; block < blocks; block++) {
+      values[block * modes.length + p] = x[block] * directions[2 * block] + y[block] * directions[2 * block + 1];
+    }
   });
+  return values;
 }
 
 /* The sum of the modes in a block, z standard deviations of each. */
@@ -120,19 +119,15 @@ function product(z, values, block) {
   return total;
 }
 
-/* The largest distance from the path of a vehicle that is so far off at the ends of the blocks. */
-function farthest(moved, { low, high, normal }, closed) {
-  let worst = 0;
+/* The largest distance from the path of a vehicle with z of the modes; beyond: how far it goes past the end. */
+function farthest(z, across, { low, high }, beyond) {
+  let worst = 0, off = 0;
   for (let block = 0; block < low.length; block++) {
-    const x = moved[2 * block], y = moved[2 * block + 1], nx = normal[2 * block], ny = normal[2 * block + 1];
-    const across = x * nx + y * ny;
-    let off = Math.max(Math.abs(high[block] + across), Math.abs(low[block] + across));
-    if (!closed && block === low.length - 1) { // past the end of an open path
-      off = Math.hypot(off, Math.max(x * ny - y * nx, 0));
-    }
+    const aside = product(z, across, block);
+    off = Math.max(Math.abs(high[block] + aside), Math.abs(low[block] + aside));
     worst = Math.max(worst, off);
   }
-  return worst;
+  return Math.max(worst, Math.hypot(off, beyond));
 }
 
 /* Lowest and highest signed distance in each block, and the normals at its end, x and y in turn. */
