@@ -41,6 +41,15 @@ def exists(test: str) -> bool:
     return path.exists() and f"def {name.partition('[')[0]}(" in path.read_text()
 
 
+def without_group(test: str) -> str:
+    """Return the identifier of a test without the group that pytest-xdist appends."""
+    name, brackets, group = test.partition("]@")
+    if group:
+        return name + brackets[0]
+    at, bracket = test.find("@"), test.find("[")
+    return test[:at] if at >= 0 and not 0 <= bracket < at else test
+
+
 def shares_fixture(item: pytest.Item) -> bool:
     """Whether a test uses a fixture that is made once for its module."""
     fixtures = getattr(item, "_fixtureinfo").name2fixturedefs.values()  # noqa: B009
@@ -91,7 +100,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     if hasattr(report, "processor_seconds"):
-        _measured[report.nodeid] += report.processor_seconds
+        _measured[without_group(report.nodeid)] += report.processor_seconds
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -6,6 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from tests.conftest import without_group
 from tests.processes import LIMIT
 
 FILE = """
@@ -29,3 +32,9 @@ def test_a_group_stays_in_one_process(tmp_path: Path) -> None:
     workers = (tmp_path / "workers.txt").read_text().split()
     assert len(workers) == 6
     assert len(set(workers)) == 1
+
+
+@pytest.mark.parametrize("test", ["tests/a.py::test_b", "tests/a.py::test_b[c@d]", "tests/a.py::test_b[x]"])
+@pytest.mark.parametrize("group", ["", "@tests/a.py", "@tests/a.py::test_b", "@one", "@tests/a.py::test_b[x]"])
+def test_durations_are_noted_without_the_group(test: str, group: str) -> None:
+    assert without_group(test + group) == test
