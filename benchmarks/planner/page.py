@@ -3,10 +3,11 @@
 Prints the size, the time of a query in node, the time from opening to the first plan, from lifting the pen to the
 plan of a drawn circle, and from a changed viscosity to the robot's motion. Medians over several openings. Writes
 pictures of the page on a laptop, on a telephone and in the dark into reports/; docs/page.png is that on a laptop.
+Where there is Firefox, its plans are compared with Python's, too.
 
 Usage: python -m benchmarks page [TIMES]     (default 5)
 
-Takes a minute. Needs node, chromium and playwright.
+Takes two minutes. Needs node, chromium and playwright.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import numpy as np
 
 import softflagella as sf
 from benchmarks.markdown import heading, row
+from benchmarks.planner.page_in_firefox import parity
 from planner.page.table_data import table_data
 from sim.model.presets import PRESETS
 from surrogate.table.model_file import load
@@ -57,6 +59,11 @@ def main(times: str = "5") -> None:
     )
     for name, values in zip(names, zip(*opened, strict=True), strict=True):
         print(row(name, f"{median(values):.2f} s"))
+    compared = parity()
+    if compared is None:
+        print(row("plans in Firefox, against Python's", "no firefox-esr here"))
+    else:
+        print(row(f"{compared[0]} plans in Firefox, against Python's: largest difference", f"{compared[1]:.1e}"))
 
 
 def _query(folder: Path) -> float:

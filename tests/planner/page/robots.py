@@ -53,7 +53,8 @@ def columns_of(rows: list[dict[str, float]]) -> dict[str, np.ndarray]:
 @cache
 def random_robots(count: int, seed: int = 0) -> list[Robot]:
     """Draw robots near the paper's that the table knows."""
-    rng, robots, base = np.random.default_rng(seed), [], PRESETS["paper-control"]
+    rng, base = np.random.default_rng(seed), PRESETS["paper-control"]
+    robots: list[Robot] = []
     while len(robots) < count:
         robot = replace(
             base,
