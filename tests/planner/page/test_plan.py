@@ -54,12 +54,13 @@ ERRORS = {"stated": "stated", "feedback": "feedback", "guaranteed": "guaranteed"
           "predictedMax": "predicted_max", "drawnRms": "drawn_rms", "drawnMax": "drawn_max"}  # fmt: skip
 
 
+def planning_call(case: tuple[Path2D, Robot, dict[str, Any]]) -> tuple[Any, ...]:
+    path, robot, options = case
+    return "plan.js", "planPath", path, robot_to_page(robot), TABLE, {page_name(n): v for n, v in options.items()}
+
+
 def planned(cases: list[tuple[Path2D, Robot, dict[str, Any]]]) -> list[Any]:
-    calls = [
-        ("plan.js", "planPath", path, robot_to_page(robot), TABLE, {page_name(n): v for n, v in options.items()})
-        for path, robot, options in cases
-    ]
-    return answers(calls, shipped_data(), left_out=["vehicle"])
+    return answers([planning_call(case) for case in cases], shipped_data(), left_out=["vehicle"])
 
 
 def check_plan(found: Any, wanted: Plan) -> None:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from planner.files.saved_plan import restore_plan
 from planner.paths.path import Path2D, polygon
 from planner.planning.plan import plan
 from planner.planning.planned import Plan
 from sim.io.errors import InputError
 from sim.model.robot import Robot
-from tests.planner.page.page_core import EXACT, without_digits
-from tests.planner.page.robots import random_robots, shipped
-from tests.planner.page.test_plan import ERRORS, planned
+from tests.planner.page.page_core import EXACT, answers, call, without_digits
+from tests.planner.page.robots import random_robots, shipped, shipped_data
+from tests.planner.page.test_plan import ERRORS, planned, planning_call
 
 COUNT = 200
 AT_ONCE = 10  # plans of one process
@@ -89,6 +92,28 @@ def compare(case: Case, found: Any) -> tuple[float, float]:
     return apart(numbers_of_page(found), numbers(wanted)), apart(numbers(moved), numbers(wanted))
 
 
+def check_reading(seeds: Sequence[int]) -> None:
+    """Assert that each program reads the plan.json of the other, and that Python predicts what the core states."""
+    cases = [random_case(seed) for seed in seeds]
+    calls = [("planned.js", "planRecord", call(*planning_call(case))) for case in cases]
+    for (path, robot, options), record in zip(cases, answers(calls, shipped_data()), strict=True):
+        theirs = json.loads(record["text"])
+        restored = restore_plan(theirs, lookup=shipped())
+        assert restored.predicted_max == pytest.approx(theirs["predicted_max_over_l"], abs=EXACT)
+        assert restored.predicted_rms == pytest.approx(theirs["predicted_rms_over_l"], abs=EXACT)
+        ours = plan(path, robot, lookup=shipped(), **options)
+        file = {"name": "plan.json", "bytes": list(json.dumps(ours.to_dict()).encode())}
+        (opened,) = answers([("open_file.js", "openFile", file)])
+        (drawn,) = opened["paths"]
+        assert opened["unit"] == pytest.approx(100 * robot.tail_length)
+        assert np.array(drawn["points"]) == pytest.approx(ours.drawn.points, abs=EXACT)
+        assert drawn["closed"] == ours.drawn.closed
+
+
+def test_each_program_reads_the_plans_of_the_other() -> None:
+    check_reading([1, 2])
+
+
 @pytest.mark.rates
 def test_random_plans() -> None:
     results = []
@@ -100,3 +125,4 @@ def test_random_plans() -> None:
     print(f"{loose.sum()} of {COUNT} turn on the last bit; there the programs differ by {differences[loose]}")
     assert (differences[moves < FIRM] <= EXACT).all(), np.flatnonzero((moves < FIRM) & (differences > EXACT))
     assert loose.mean() <= MOST_LOOSE
+    check_reading(np.flatnonzero(loose).tolist())
