@@ -33,13 +33,13 @@ def check_columns(columns: Mapping[str, Any]) -> dict[str, Floats]:
         InputError: a column is missing or unknown, or a number is not finite or out of its range.
     """
     known = {*GROUP_COLUMNS, *OPTIONAL_COLUMNS, *catalogue()}
-    unknown = sorted(set(columns) - known)
+    unknown = sorted(name for name in set(columns) - known if name not in catalogue())
     if unknown:
         raise InputError(
             f"unknown column {unknown[0]!r}; allowed are {', '.join(sorted(known))}: rename or drop it"
         )
     values = checked_values(columns)
-    for name in set(values) & set(catalogue()):
+    for name in [name for name in values if name in catalogue()]:
         for size in (values[name].min(), values[name].max()):
             check_size(name, float(size))
     return values
@@ -49,8 +49,8 @@ def group_columns(robots: Sequence[Robot]) -> dict[str, Floats]:
     """Return the dimensionless columns of robots, (M,) each; an effect that a robot lacks is null."""
     rows = [robot.group_values() for robot in robots]
     names = dict.fromkeys(name for row in rows for name in row)
-    nulls = {name: effect.null for name, effect in catalogue().items()}
-    return {name: np.array([row.get(name, nulls.get(name)) for row in rows]) for name in names}
+    nulls = {name: catalogue()[name].null if name in catalogue() else None for name in names}
+    return {name: np.array([row.get(name, nulls[name]) for row in rows]) for name in names}
 
 
 def names_robot(source: str | Path) -> bool:

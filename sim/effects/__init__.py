@@ -11,12 +11,30 @@ from functools import cache
 
 from sim.io.errors import InputError
 from sim.model.effect import Effect
+from sim.model.force_law import law_from_name
 
 __all__ = ["Effect", "catalogue", "check_effects", "check_size", "effect_named"]
 
 
+class Catalogue(dict[str, Effect]):
+    """Effects by name. It lists those of this folder, and knows beside them each law by its name.
+
+    A law (`sim.model.force_law`) states itself in its name. So it is found here in any process without being
+    registered, and it is never listed.
+    """
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(name) or (isinstance(name, str) and law_from_name(name) is not None)
+
+    def __missing__(self, name: str) -> Effect:
+        law = law_from_name(name)
+        if law is None:
+            raise KeyError(name)
+        return law
+
+
 @cache
-def catalogue() -> dict[str, Effect]:
+def catalogue() -> Catalogue:
     """Return every effect that the base model lacks, by name, in alphabetical order.
 
     Example:
@@ -30,7 +48,7 @@ def catalogue() -> dict[str, Effect]:
     for name, effect in found.items():
         if effect.name != name:
             raise TypeError(f"effect file {name}.py declares the name {effect.name!r}; make them equal")
-    return found
+    return Catalogue(found)
 
 
 def effect_named(name: str) -> Effect:

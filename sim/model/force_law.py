@@ -1,0 +1,204 @@
+"""Laws of force on head and disc that no effect of the catalogue states: a place, a driver and a power law.
+
+    force on the head or disc   F = ε μ0 R^d m v,     m = (ω/ω_c)^p (l/l_c)^q (N/N_c)^r
+    coefficient of the head     C × m^ε
+
+F is one of F_x, F_z, M_y, M_z about J, and v is one of v_x, v_z, ω_yr, ω_h, ω_t. d makes ε dimensionless. A term
+that would tell left from right is multiplied by the sign of the motor where it is `rectified`; mirror symmetry
+allows just one of the two. C is C_t, C_r or C_yr, with one pattern of exponents whose size is ε.
+
+ω_c, l_c and N_c belong to the paper's control example. ω/ω_c is ω̄ (l/r0)⁻⁴ over its value there and l/l_c is l/R
+over its value there, as for one material, fluid and head.
+
+A law's name states it in full: "law_Fx_wh_speed-93_length425_tails0" has the exponents −0.093, 0.425 and 0. So
+a file or a process that knows only the name has the law. Exponents are rounded to thousandths. They
+lie from −4 to 4.
+
+Left out: laws of the tails. A side force elsewhere on the axis is a force and a couple, two laws of one factor.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sim.arrays import Floats
+from sim.io.errors import InputError
+from sim.linear.complex_step import magnitude, sign
+from sim.model.effect import Effect
+from sim.model.presets import CONTROL
+
+if TYPE_CHECKING:
+    from sim.model.body import Body
+    from sim.model.groups import Groups
+
+WRENCHES = {"Fx": ("F_x", 1), "Fz": ("F_z", 1), "My": ("M_y", 2), "Mz": ("M_z", 2)}  # symbol, power of length
+MOTIONS = {"vx": ("v_x", 0), "vz": ("v_z", 0), "wyr": ("ω_yr", 1), "wh": ("ω_h", 1), "wt": ("ω_t", 1)}
+COEFFICIENTS = {"Ct": "C_t", "Cr": "C_r", "Cyr": "C_yr"}
+STEEPEST = 4.0
+_CONTROL_SPEED = CONTROL.omega_bar / CONTROL.l_over_r0**4
+_CONTROL_TAILS = 2
+_LAW = re.compile(
+    rf"law_({'|'.join([*WRENCHES, *COEFFICIENTS])})(?:_({'|'.join(MOTIONS)}))?(_rectified)?"
+    r"_speed(-?\d{1,4})_length(-?\d{1,4})_tails(-?\d{1,4})",
+    re.ASCII,
+)
+
+
+@dataclass(frozen=True)
+class Powers:
+    """Exponents of motor speed, tail length and number of tails, to a thousandth.
+
+    Example:
+        >>> Powers(speed=-0.093, length=0.425).name
+        'speed-93_length425_tails0'
+    """
+
+    speed: float = 0.0
+    length: float = 0.0
+    tails: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("speed", self.speed), ("length", self.length), ("tails", self.tails)):
+            if not abs(value) <= STEEPEST:
+                raise InputError(f"exponent of {name} = {value:g}; it must lie from {-STEEPEST:g} to {STEEPEST:g}")
+            object.__setattr__(self, name, round(value, 3) + 0.0)
+
+    @property
+    def name(self) -> str:
+        """The exponents as part of a law's name."""
+        pairs = (("speed", self.speed), ("length", self.length), ("tails", self.tails))
+        return "_".join(f"{name}{round(1000 * value)}" for name, value in pairs)
+
+    @property
+    def words(self) -> str:
+        """The factor as a formula, empty for a constant."""
+        pairs = (("ω/ω_c", self.speed), ("l/l_c", self.length), ("N/N_c", self.tails))
+        return "".join(f" ({symbol})^{value:g}" for symbol, value in pairs if value)
+
+    def logarithm(self, groups: Groups) -> Floats:
+        """Compute ln m of B robots, (B,)."""
+        speed = magnitude(groups.omega_bar) / groups.l_over_r0**4 / _CONTROL_SPEED
+        length = groups.l_over_R / CONTROL.l_over_R
+        tails = self.tails * math.log(groups.N / _CONTROL_TAILS)
+        return np.asarray(self.speed * np.log(speed) + self.length * np.log(length) + tails)
+
+
+@dataclass(frozen=True)
+class ForceLaw(Effect):
+    """ε μ0 R^d m times a velocity component, as a component of the wrench on head and disc about J."""
+
+    wrench: str = ""  # of WRENCHES
+    motion: str = ""  # of MOTIONS
+    rectified: bool = False
+    powers: Powers = Powers()
+
+    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
+        strength = size * np.exp(self.powers.logarithm(groups))
+        if self.rectified:
+            strength = strength * sign(groups.omega_bar)
+        d = WRENCHES[self.wrench][1] + MOTIONS[self.motion][1]
+        place = list(WRENCHES).index(self.wrench), list(MOTIONS).index(self.motion)
+        return body.with_resistance({place: -strength / groups.l_over_R**d})
+
+
+@dataclass(frozen=True)
+class CoefficientLaw(Effect):
+    """A coefficient of the head times m^ε."""
+
+    coefficient: str = ""  # of COEFFICIENTS
+    powers: Powers = Powers()
+
+    def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
+        more = np.exp(size * self.powers.logarithm(groups)) - 1
+        R, L = body.head_radius, body.head_length
+        lever = L / 2
+        if self.coefficient == "Cr":
+            return body.with_resistance({(3, 3): more * 8 * math.pi * groups.C_r * R**3})
+        if self.coefficient == "Cyr":
+            side = more * groups.C_yr * R * L
+            return body.with_resistance({(0, 3): side, (2, 3): side * lever})
+        drag = more * 6 * math.pi * groups.C_t * R
+        coupled = drag * lever
+        return body.with_resistance(
+            {(0, 0): drag, (1, 1): drag, (0, 2): coupled, (2, 0): coupled, (2, 2): coupled * lever}
+        )
+
+
+def force_law(wrench: str, motion: str, powers: Powers, *, rectified: bool | None = None) -> ForceLaw:
+    """Make the law of a force on head and disc.
+
+    Args:
+        wrench: component of the force, of WRENCHES.
+        motion: component of the velocity that drives it, of MOTIONS.
+        powers: exponents of its factor.
+        rectified: whether the sign of the motor multiplies it; None: as mirror symmetry wants it.
+    """
+    mirrored = (wrench == "Fz") == (motion == "vz")  # both change sign with the motor, or neither does
+    turned = not mirrored if rectified is None else rectified
+    symbol, d_force = WRENCHES[wrench]
+    driver, d_motion = MOTIONS[motion]
+    d = d_force + d_motion
+    unit = f"μ0 R^{d}" if d > 1 else "μ0 R"
+    return ForceLaw(
+        name=f"law_{wrench}_{motion}{'_rectified' if turned else ''}_{powers.name}",
+        title=f"{symbol} on the head from {driver}",
+        equation=f"{symbol} = ε {unit}{powers.words} {driver}{' sgn ω' if turned else ''}",
+        source="a power law, from measured runs",
+        unit=unit,
+        null=0.0,
+        bounds=(-500.0, 500.0),
+        typical=0.5,
+        symmetry="even" if turned != mirrored else "odd",
+        dissipative=False,
+        similar=not powers.speed,
+        wrench=wrench,
+        motion=motion,
+        rectified=turned,
+        powers=powers,
+    )
+
+
+def coefficient_law(coefficient: str, powers: Powers) -> CoefficientLaw:
+    """Make the law of a coefficient of the head, of COEFFICIENTS, as a power law."""
+    symbol = COEFFICIENTS[coefficient]
+    return CoefficientLaw(
+        name=f"law_{coefficient}_{powers.name}",
+        title=f"{symbol} as a power law",
+        equation=f"{symbol} × [{powers.words.strip()}]^ε",
+        source="a power law, from measured runs",
+        unit="1",
+        null=0.0,
+        bounds=(-4.0, 4.0),
+        typical=0.2,
+        symmetry="even",
+        dissipative=False,
+        similar=not powers.speed,
+        coefficient=coefficient,
+        powers=powers,
+    )
+
+
+def law_from_name(name: str) -> ForceLaw | CoefficientLaw | None:
+    """Return the law that a name states in full; None where it states none, or not as a law's own name does."""
+    match = _LAW.fullmatch(name)
+    if not match:
+        return None
+    place, motion, rectified, *digits = match.groups()
+    exponents = [int(text) / 1000 for text in digits]
+    if (
+        max(map(abs, exponents)) > STEEPEST
+        or (place in COEFFICIENTS) == bool(motion)
+        or (rectified and not motion)
+    ):
+        return None
+    powers = Powers(*exponents)
+    if place in COEFFICIENTS:
+        law: ForceLaw | CoefficientLaw = coefficient_law(place, powers)
+    else:
+        law = force_law(place, motion, powers, rectified=bool(rectified))
+    return law if law.name == name else None
