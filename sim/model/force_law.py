@@ -84,7 +84,7 @@ class Powers:
         """Compute ln m of B robots, (B,)."""
         speed = magnitude(groups.omega_bar) / groups.l_over_r0**4 / _CONTROL_SPEED
         length = groups.l_over_R / CONTROL.l_over_R
-        tails = self.tails * math.log(groups.N / _CONTROL_TAILS)
+        tails = self.tails * np.log(np.asarray(groups.N) / _CONTROL_TAILS)
         return np.asarray(self.speed * np.log(speed) + self.length * np.log(length) + tails)
 
 
