@@ -3,12 +3,14 @@
 The path that the robot can follow is declared first, as for every plan. Where obstacles block it, ways around
 replace it (`planner.jobs.detours`). The margin around the robot's body is at least the stated error of the plan,
 which is known only when the plan is made. So the path is planned again with a larger margin until the two agree.
-If that leads to no plan, shorter dwells are tried, which need less clearance. Lengths in l.
+If that leads to no plan, longer dwells are tried, whose flips add up to less, and shorter ones, which swing less.
+Lengths in l.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,13 +27,14 @@ from planner.planning.plan import Redirect, make_plan
 from planner.planning.planned import Plan
 from planner.planning.request import PlanRequest
 from planner.vehicle.coefficient_modes import OWN_TABLE
-from planner.vehicle.dwell_choice import dwells_for
+from planner.vehicle.dwell_choice import dwells_for, longer_dwells
 from planner.vehicle.rollout import predicted_poses
 from planner.vehicle.tracked_point import TrackedVehicle
+from sim.io.errors import InputError
 
 _MARGINS = 6  # tried for each dwell
 _MORE = 1.05  # times the stated error is the next margin
-_DWELLS = 4  # shortest dwells that are tried
+_DWELLS = 4  # longer and shorter dwells that are tried
 
 
 def plan_clear(
@@ -69,21 +72,30 @@ def plan_redirected(
     redirect: Redirect,
     progress: Callable[[float], object] | None = None,
 ) -> Plan:
-    """Plan with the dwell that the objective chooses; where the path is blocked, with shorter ones.
+    """Plan with the dwell that the objective chooses; where the path is blocked, with longer and shorter ones.
+
+    With the objective "error" the dwell is that of the path without obstacles. For the least stated error among
+    the ways around, a dwell would be best whose error is so large that its way leaves out most of the path.
 
     Raises:
         BlockedError: there is no way around what blocks the path.
     """
+    chosen = request
+    if request.dwell is None and request.tolerance is None and request.objective == "error":
+        with suppress(InputError):  # a path that cannot be followed itself may have a way around
+            chosen = replace(request, dwell=make_plan(drawn, tracked, request, progress).minimum_dwell)
     try:
-        return make_plan(drawn, tracked, request, progress, redirect)
+        return make_plan(drawn, tracked, chosen, progress, redirect)
     except BlockedError as blocked:
         if blocked.hopeless or request.dwell is not None:
             raise
         refusal = blocked
     dwells = dwells_for(tracked.vehicle, request.objective, request.least_dwell(tracked.robot))
-    for place in np.unique(np.linspace(0, len(dwells) - 1, _DWELLS).astype(int))[1:].tolist():
+    shorter = np.unique(np.linspace(0, len(dwells) - 1, _DWELLS).astype(int))[chosen is request :]
+    longer = longer_dwells(tracked.vehicle, dwells[0])[:_DWELLS]
+    for dwell in (*longer, *(dwells[place] for place in shorter.tolist())):
         try:
-            return make_plan(drawn, tracked, replace(request, dwell=dwells[place]), progress, redirect)
+            return make_plan(drawn, tracked, replace(request, dwell=dwell), progress, redirect)
         except BlockedError:
             continue
     raise refusal

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import textwrap
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
@@ -226,7 +227,8 @@ class Plan:
         ]
         lines += [f"  {line}" for line in self.job_lines()]
         if self.warnings:
-            lines.append(f"  {len(self.warnings)} warnings, the first: {self.warnings[0][:200]}")
+            count = "1 warning" if len(self.warnings) == 1 else f"{len(self.warnings)} warnings, the first"
+            lines.append(f"  {count}: {textwrap.shorten(self.warnings[0], 120, placeholder=' …')}")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
