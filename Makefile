@@ -36,13 +36,15 @@ help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
 
 setup: $(STAMP) ## make .venv, install everything, pinned, and compile all loops
-$(STAMP): pyproject.toml constraints.txt
-	$(PYTHON) -m venv $(VENV)
-	sed -n '/^uv==/,/[^\]$$/p' constraints.txt > $(VENV)/uv.txt
-	$(VENV)/bin/pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r $(VENV)/uv.txt
+$(STAMP): pyproject.toml constraints.txt | $(VENV)/bin/uv
 	$(INSTALL) -e '.[dev]'
 	$(RUN) -m sim compile
 	$(RUN) -m surrogate compile
+	touch $@
+$(VENV)/bin/uv: constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	sed -n '/^uv==/,/[^\]$$/p' constraints.txt > $(VENV)/uv.txt
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r $(VENV)/uv.txt
 	touch $@
 
 demo: reports/demo.html ## the whole pipeline on the paper's robot, ends with reports/demo.html
@@ -62,7 +64,7 @@ $(VENV)/.extras: $(STAMP)
 quick: $(STAMP) ## run the quick tests, a minute and a half
 	$(RUN) -m pytest $(XDIST) -m "not (slow or page or $(REST))"
 
-constraints: $(STAMP) ## pin what pyproject.toml needs, with hashes (UPGRADE=1: the newest versions)
+constraints: $(VENV)/bin/uv ## pin what pyproject.toml needs, with hashes (UPGRADE=1: the newest versions)
 	$(RUN) -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"])' \
 	| $(UV) pip compile --quiet pyproject.toml - --extra dev --extra clusters --extra docs --extra page --universal --generate-hashes \
 	--no-annotate --custom-compile-command 'make constraints' $(if $(UPGRADE),--upgrade) -o constraints.txt

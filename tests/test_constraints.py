@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -43,3 +45,13 @@ def test_the_build_backend_is_pinned(pins: dict[str, str]) -> None:
     (backend,) = PROJECT["build-system"]["requires"]
     name, _, version = backend.partition("==")
     assert pins[name].split()[0] == version
+
+
+def test_pins_are_renewed_before_anything_is_installed_by_them(tmp_path: Path) -> None:
+    """Pins that contradict pyproject.toml cannot be installed."""
+    for name in ("Makefile", "pyproject.toml", "constraints.txt"):
+        shutil.copy(ROOT / name, tmp_path)
+    make = ["make", "--dry-run", "constraints"]
+    steps = subprocess.run(make, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    assert "pip compile" in steps and "uv.txt" in steps
+    assert "uv pip install" not in steps
