@@ -74,7 +74,7 @@ class CoveragePlan:
 
         ax = given_axes(ax)
         length = self.plan.robot.tail_length
-        draw_swath(ax, self.plan.track, self.width, length)
+        draw_swath(ax, self.plan.smooth_track, self.width, length)
         ax = self.plan.plot(ax)
         draw_field(ax, self.field, length)
         return ax

@@ -6,6 +6,7 @@ import json
 import math
 import textwrap
 from dataclasses import dataclass
+from functools import cached_property
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ from planner.planning.kept_clear import KeptClear
 from planner.planning.lap import Lap
 from planner.planning.line_of_sight import Guidance
 from planner.vehicle.dwell_choice import Objective
-from planner.vehicle.rollout import Switches
+from planner.vehicle.rollout import Switches, trace_smoothly
 from planner.vehicle.tracked_point import TrackedVehicle
 from planner.vehicle.zigzag import Zigzag
 from sim.arrays import Floats
@@ -131,6 +132,11 @@ class Plan:
     def track(self) -> Floats:
         """Predicted track (S, 2) of the tracked point, several samples a dwell."""
         return self.errors.track
+
+    @cached_property
+    def smooth_track(self) -> Floats:
+        """Predicted track (S, 2) of the tracked point for pictures, with more samples where a dwell turns far."""
+        return trace_smoothly(self.tracked.vehicle, self.switches, self.tracked.offset)
 
     @property
     def reference(self) -> Floats:
@@ -245,7 +251,7 @@ class Plan:
         ax = given_axes(ax)
         length = self.robot.tail_length
         draw_tracks(ax, self.drawn.polyline(), self.reference, self.stated_error, length)
-        draw_prediction(ax, self.track, length)
+        draw_prediction(ax, self.smooth_track, length)
         if self.kept_clear is not None:
             draw_regions(ax, self.kept_clear.free_space, length)
         return ax

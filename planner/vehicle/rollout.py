@@ -15,6 +15,8 @@ from planner.vehicle.vehicle import Vehicle
 from sim.arrays import Floats
 from sim.mechanics import planar
 
+_SMOOTH = np.radians(5)  # turn between two samples of a track that looks smooth
+
 
 @dataclass(frozen=True)
 class Switches:
@@ -55,6 +57,15 @@ def roll_out(vehicle: Vehicle, switches: Switches, offset: float, *, samples: in
 def trace(vehicle: Vehicle, switches: Switches, offset: float, *, samples: int = 8) -> Floats:
     """Predict the track of the tracked point, (M samples + 1, 2), at equal times within each dwell."""
     return roll_out(vehicle, switches, offset, samples=samples).track
+
+
+def trace_smoothly(vehicle: Vehicle, switches: Switches, offset: float) -> Floats:
+    """Predict the track of the tracked point (S, 2) for pictures: a sample every 5°, at least 8 a dwell."""
+    times = np.maximum(np.ceil(np.abs(np.diff(switches.poses[:, 2])) / (8 * _SMOOTH)), 1).astype(int)
+    most = int(times.max())
+    fine = trace(vehicle, switches, offset, samples=8 * most)
+    wanted = np.arange(8 * most) % (most // times)[:, None] == 0  # of each dwell, without its end
+    return np.concatenate([fine[:-1][wanted.ravel()], fine[-1:]])
 
 
 def predicted_poses(vehicle: Vehicle, switches: Switches) -> Floats:

@@ -8,6 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 
+import softflagella as sf
 from planner.files.pictures import legend_below
 from planner.jobs.coverage_picture import draw_swath
 
@@ -38,3 +39,12 @@ def test_a_swath_is_smooth_where_a_track_has_few_samples() -> None:
     centres = np.array([path.vertices.mean(0) for path in swath.get_paths()])
     assert np.ptp(centres[:, 0]) == pytest.approx(33.0, rel=0.02)
     assert np.hypot(*np.diff(centres, axis=0).T).max() < 0.5 * 11 / 10
+
+
+def test_a_long_dwell_is_drawn_as_a_curve() -> None:
+    """With eight samples a dwell it used to have straight pieces."""
+    tour = sf.tour([(0, 0), (4, 0), (2, 1)], "paper-control", objective="time")
+    (line,) = [line for line in tour.plot(Figure().add_subplot()).lines if line.get_label() == "predicted"]
+    steps = np.diff(np.asarray(line.get_xydata()), axis=0)
+    turns = np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))
+    assert (np.abs(turns) > np.radians(8)).sum() < len(tour.plan.dwells)  # only at the flips

@@ -97,8 +97,17 @@ def test_the_command_says_that_tails_touch(capsys: pytest.CaptureFixture[str]) -
 
 @pytest.mark.parametrize(
     ("words", "refusal"),
-    [("points.csv", "name the file of their motion with --out"), ("paper", "no robot 'paper'")],
+    [
+        ("points.csv", "name the file of their motion with --out"),
+        ("paper", "no robot 'paper'"),
+        ("robot.tml", "robot.tml: no such file"),  # it used to be called a table of points
+        (".", ". is a folder"),
+    ],
 )
-def test_words_that_name_no_robot(words: str, refusal: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_words_that_name_no_robot(
+    words: str, refusal: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("points.csv").write_text("N\n2\n")
     assert run_command(main, ["steady", words]) == 2
     assert refusal in capsys.readouterr().err

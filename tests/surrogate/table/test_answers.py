@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,12 +39,18 @@ def test_a_table_of_one_robot_has_the_error_that_it_states() -> None:
     assert answer_with_error(table, COLUMNS)["error"].tolist() == [worst]
 
 
-def test_the_command_prints_the_answer_for_a_robot(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_the_answer_for_a_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
     assert run_command(main, ["query", "paper-control", "--certify"]) == 0
     said = capsys.readouterr().out
     answer = answer_with_error(load(), COLUMNS)
     assert said.startswith(describe_motion(ROBOT, answer, error="relative error of the look-up table (90 %)"))
     assert "certified relative error 0.0" in said
+    assert run_command(main, ["query", "points.csv"]) == 2
+    assert "points.csv: no such file" in capsys.readouterr().err
+    Path("points.csv").write_text("N\n2\n")
     assert run_command(main, ["query", "points.csv"]) == 2
     assert "name the file of the answers with --out" in capsys.readouterr().err
     assert run_command(sim, ["steady", "paper-control"]) == 0
