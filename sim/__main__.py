@@ -25,11 +25,12 @@ BAR_AFTER = 1.0  # s
 )  # fmt: skip
 def _steady(arguments: Namespace) -> None:
     from sim.inputs import names_robot
-    from sim.io.tables import read_table
 
     if names_robot(arguments.robot):
         _steady_robot(arguments)
     elif arguments.out is None:
+        from sim.io.tables import read_table
+
         read_table(arguments.robot)  # refuses what is no table
         raise InputError(f"{arguments.robot} is a table of points; name the file of their motion with --out")
     else:

@@ -71,11 +71,12 @@ def _train(arguments: Namespace) -> None:
 )  # fmt: skip
 def _query(arguments: Namespace) -> None:
     from sim.inputs import names_robot
-    from sim.io.tables import read_table
 
     if names_robot(arguments.robot):
         _query_robot(arguments)
     elif arguments.out is None:
+        from sim.io.tables import read_table
+
         read_table(arguments.robot)  # refuses what is no table
         raise InputError(f"{arguments.robot} is a table of points; name the file of the answers with --out")
     else:

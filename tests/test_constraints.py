@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from tests.processes import LIMIT
+
 ROOT = Path(__file__).parents[1]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())
 INSTALLED_EXTRAS = ("dev", "clusters", "docs", "dask", "ray", "s3")
@@ -52,7 +54,7 @@ def test_pins_are_renewed_before_anything_is_installed_by_them(tmp_path: Path) -
     for name in ("Makefile", "pyproject.toml", "constraints.txt"):
         shutil.copy(ROOT / name, tmp_path)
     make = ["make", "--dry-run", "constraints"]
-    steps = subprocess.run(make, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    steps = subprocess.run(make, cwd=tmp_path, capture_output=True, text=True, check=True, timeout=LIMIT).stdout
     assert "uv.txt" in steps
     assert "pip compile" in steps
     assert "uv pip install" not in steps

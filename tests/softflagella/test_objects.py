@@ -71,7 +71,7 @@ def test_pictures_are_in_centimetres() -> None:
     axes = plan.plot(Figure().add_subplot())
     assert axes.get_xlabel() == "x [cm]"
     predicted = next(line for line in axes.lines if line.get_label() == "predicted")
-    np.testing.assert_allclose(predicted.get_xydata(), CM * plan.track)
+    np.testing.assert_allclose(predicted.get_xydata(), CM * plan.smooth_track)
     axes = tracker.plot(Figure().add_subplot())
     estimated = next(line for line in axes.lines if line.get_label() == "estimated")
     np.testing.assert_allclose(estimated.get_xydata()[0], CM * np.array(tracker.pose[:2]))

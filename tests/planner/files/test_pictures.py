@@ -42,7 +42,7 @@ def test_a_swath_is_smooth_where_a_track_has_few_samples() -> None:
 
 
 def test_a_long_dwell_is_drawn_as_a_curve() -> None:
-    """With eight samples a dwell it used to have straight pieces."""
+    """Eight samples a dwell would be a polygon."""
     tour = sf.tour([(0, 0), (4, 0), (2, 1)], "paper-control", objective="time")
     (line,) = [line for line in tour.plot(Figure().add_subplot()).lines if line.get_label() == "predicted"]
     steps = np.diff(np.asarray(line.get_xydata()), axis=0)
