@@ -106,8 +106,8 @@ def export(folder: str | Path, *, table: LookupTable | str | Path | None = None)
         >>> import tempfile
         >>> import softflagella as sf
         >>> with tempfile.TemporaryDirectory() as folder:
-        ...     print(sf.export(folder)[:8])
-        148.9 kB
+        ...     print(sf.export(folder)[:3])
+        148
     """
     return save_small_copy(_trained(table), folder)
 
