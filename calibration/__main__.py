@@ -1,4 +1,4 @@
-"""Command line of the calibration: `calibrate`, `decide`, `simulate`, `tracks`."""
+"""Command line of the calibration: `calibrate`, `decide`, `laws`, `simulate`, `tracks`."""
 
 from __future__ import annotations
 
@@ -82,6 +82,38 @@ def _decide(arguments: Namespace) -> None:
     for explanation in decision.standings:
         print(f"  {explanation.title}: {f'behind by {explanation.behind:.1f}' if explanation.behind else 'best'}")
     print(decision.sentence)
+
+
+@program.command(
+    "laws",
+    "describe a residual that no effect explains: where a term acts, and on which inputs it depends",
+    argument("table", help="CSV or Parquet of measured runs"),
+    ROBOT,
+    out("folder"),
+    argument("--seed", type=int, default=0, help="of the bootstrap (default: 0)"),
+    JOBS,
+)
+def _laws(arguments: Namespace) -> None:
+    from calibration.report.robot_laws import find_robot_laws
+    from sim.inputs import load_robot
+
+    described = find_robot_laws(
+        arguments.table,
+        load_robot(arguments.robot),
+        seed=arguments.seed,
+        jobs=arguments.jobs,
+        tell=lambda line: print(line, file=sys.stderr),
+    )
+    paths = described.save(arguments.out)
+    print(described.sentence)
+    print(
+        f"error on the held-out runs ({described.study.split.names}): calibrated "
+        f"{100 * described.error_without:.2f} %, noise {100 * described.noise:.2f} %"
+    )
+    for law in described.laws.fitted if described.laws else ():
+        reason = law.reason or f"error {100 * law.error:.2f} %"
+        print(f"  {law.place.name}: {reason}; gain in BIC {law.gain:.0f}")
+    print(f"-> {', '.join(map(str, paths))}")
 
 
 @program.command(

@@ -24,7 +24,7 @@ ROOMS = {
                   "export", "compile_loops", "__main__"],
     "planner": ["draws", "paths", "vehicle", "planning", "goal", "jobs", "tracking", "files", "page",
                 "command_line", "fleet_command", "job_commands", "tracking_commands", "page_command", "__main__"],
-    "calibration": ["statistics", "attribution", "verdict", "swimmer", "report", "examples", "__main__"],
+    "calibration": ["statistics", "attribution", "verdict", "swimmer", "laws", "report", "examples", "__main__"],
     "softflagella": ["shadowing", "api", "replanning", "demo_figures", "demo_files", "demo_page", "demo",
                      "__init__", "__main__"],
 }  # fmt: skip

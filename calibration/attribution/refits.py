@@ -226,7 +226,7 @@ def judge(study: Study, candidate: Candidate, base: Fit, refit: Fit, others: Dir
     after = examine_residual(
         replace(study, seed=study.seed + 1), refit, others, draws=_DRAWS, decide=study.level / 2
     )
-    gain, error = _session_gain(study, base, refit)
+    gain, error = session_gain(study, base, refit)
     low, high = interval_at_second(refit, candidate.effect)
     verdict = "kept"
     if not refit.converged:
@@ -254,7 +254,7 @@ def interval_at_second(refit: Fit, effect: Parameter) -> tuple[float, float]:
     return refit.parameters[effect.name] - half, refit.parameters[effect.name] + half
 
 
-def _session_gain(study: Study, base: Fit, refit: Fit) -> tuple[float, float]:
+def session_gain(study: Study, base: Fit, refit: Fit) -> tuple[float, float]:
     """Sum the gain in log likelihood over left-out sessions, with its standard error (linearised refits).
 
     With whitened residuals r of the refit and r + d of the base, a session gains ½|d|² + d·r, |d| of it by noise.

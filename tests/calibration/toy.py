@@ -37,7 +37,7 @@ def slopes(columns: Mapping[str, Any], parameters: tuple[str, ...], **_: object)
     """Stand-in for `sim.motion.batches.sensitivity_columns`, by differences; all robots in one batch."""
     base = {name: np.asarray(value, float) for name, value in columns.items()}
     rows = len(base["N"])
-    for name in set(parameters) & set(catalogue()):
+    for name in (parameter for parameter in parameters if parameter in catalogue()):
         base.setdefault(name, np.full(rows, catalogue()[name].null))
     stacked = {name: np.tile(value, (1 + len(parameters), 1)) for name, value in base.items()}
     widths = []

@@ -1,0 +1,214 @@
+"""Laws that describe a residual: the best places, each fitted in the simulator, and those that are not told apart.
+
+The places that `calibration.laws.search` ranks first are fitted with all exponents, the coefficients and the
+nuisance parameters free. If the best of them leaves more than noise, all others follow. A law is kept if
+
+- the fit converged within the ranges of its numbers, and its BIC is smaller than that of the model without a law,
+- the interval of at least one of its numbers excludes the null, and
+- it predicts left-out sessions better, by more than the uncertainty of that gain.
+
+Kept laws cannot be told apart if their BIC differ by less than one parameter can gain by chance (6.63). The place
+that is true need not be among the places of the search: a law describes the runs, and is no claim about their
+cause. Intervals do not count the choice among the places.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from tqdm import tqdm
+
+from calibration.attribution.refits import INDISTINGUISHABLE, session_gain
+from calibration.laws.law_model import EXPONENTS, INPUTS, SIZE, LawModel
+from calibration.laws.places import Place, places
+from calibration.laws.search import Ranked, rank
+from calibration.statistics.fit import Fit, fit
+from calibration.statistics.held_out import error_interval, errors
+from calibration.statistics.residual_tests import Directions, examine_residual
+from calibration.statistics.study import LEVEL, Study
+from calibration.swimmer.swimmer import SwimmerModel
+from sim.io.errors import InputError
+from sim.model.force_law import Powers
+
+_FITTED = 6  # places that are fitted first
+_CURVED = 0.3  # share of the best gain below which a place is not among them
+_LARGEST_AT_START = 50.0  # size of a term
+_FAR = 6.0  # standard deviations of χ²
+_DRAWS = 400  # of the bootstrap, for the residual that a law leaves
+
+
+@dataclass(frozen=True)
+class Law:
+    """A place with its exponents, fitted to the runs."""
+
+    place: Place
+    ranked: Ranked  # the linear model of the place
+    model: LawModel
+    fit: Fit
+    gain: float  # BIC of the model without a law less that with it
+    session_gain: tuple[float, float]  # in log likelihood over left-out sessions, and its standard error
+    p_value: float  # of the residual that it leaves
+    error: float  # relative rms on the held-out runs
+    error_interval: tuple[float, float]  # 95 %
+    reason: str  # why it is not kept; empty if it is
+
+    @property
+    def powers(self) -> Powers:
+        """Its exponents."""
+        return Powers(*(self.fit.parameters.get(name, 0.0) for name in EXPONENTS))
+
+    @property
+    def words(self) -> str:
+        """The law in words, with 95 % intervals."""
+        factors, independent = [], []
+        for name, symbol in zip(EXPONENTS, INPUTS, strict=True):
+            if name not in self.fit.names:
+                continue
+            low, high = self.fit.interval(name)
+            if low <= 0.0 <= high:
+                independent.append(symbol)
+            else:
+                factors.append(f"{symbol}^{self.fit.parameters[name]:.2f} ({low:.2f} to {high:.2f})")
+        said = f"{self.place.words}, in proportion to {' '.join(factors)}" if factors else self.place.words
+        if independent:
+            said += f", independent of {' and '.join(independent)} within the intervals"
+        return said
+
+
+@dataclass(frozen=True)
+class Laws:
+    """What describes a residual."""
+
+    ranked: tuple[Ranked, ...]  # every place, the best first
+    fitted: tuple[Law, ...]  # those that were fitted, the largest gain first
+    level: float = LEVEL  # α of the residual that a law leaves, as for an effect: half of it decides
+
+    @property
+    def kept(self) -> tuple[Law, ...]:
+        """Laws that the runs cannot tell from the best one, best first."""
+        kept = _kept(self.fitted)
+        return tuple(law for law in kept if kept[0].gain - law.gain < INDISTINGUISHABLE)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the best law leaves no more than noise."""
+        return bool(self.kept) and self.kept[0].p_value >= self.level / 2
+
+    @property
+    def sentence(self) -> str:
+        """What the runs say, without a claim about the cause."""
+        if not self.kept:
+            return "No law of the places that were searched describes the residual."
+        best = self.kept[0]
+        if not self.complete:
+            return (
+                "No law of the places that were searched describes the whole residual. The nearest is "
+                f"{best.words}; it leaves more than noise (p = {best.p_value:.2g})."
+            )
+        if len(self.kept) == 1:
+            return f"The residual is described by {best.words}."
+        rivals = "; or ".join(law.words for law in self.kept)
+        return f"The residual is described by {rivals}: these runs cannot tell them apart."
+
+
+def find_laws(study: Study, base: Fit) -> Laws:
+    """Find laws that describe the residual of a fit without effects.
+
+    Args:
+        study: of a `SwimmerModel`.
+        base: its coefficients and nuisance parameters, fitted to the runs that the study uses.
+
+    Source: Schwarz (1978) for BIC; nested power laws as in dimensional analysis.
+    """
+    model = study.model
+    if not isinstance(model, SwimmerModel):
+        raise TypeError("laws are looked for in a SwimmerModel")
+    ranked = rank(model, base, study.split.fitted, places(), title="places" if study.progress else "")
+    least = max(_CURVED * ranked[0].gain, 0.0)
+    likely = [one for one in ranked[:_FITTED] if one.gain > least]
+    laws = _fit_all(study, model, base, likely)
+    kept = _kept(laws)
+    if not kept or kept[0].p_value < study.level / 2:
+        laws += _fit_all(study, model, base, [one for one in ranked if one.gain > 0 and one not in likely])
+    return Laws(tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), study.level)
+
+
+def _fit_all(study: Study, model: SwimmerModel, base: Fit, chosen: Sequence[Ranked]) -> list[Law]:
+    """Fit and judge places, without those where the motion cannot be simulated."""
+    bar = tqdm(chosen, desc="laws", unit="law", delay=1.0, disable=not study.progress)
+    return [law for one in bar if (law := _fitted(study, model, base, one))]
+
+
+def _fitted(study: Study, model: SwimmerModel, base: Fit, ranked: Ranked) -> Law | None:
+    """Fit a law from its linear model, and judge it; None where its motion cannot be simulated."""
+    used, data = study.split.fitted, model.runs
+    size = float(np.clip(ranked.size, -_LARGEST_AT_START, _LARGEST_AT_START))
+    with_law = LawModel.of(model, ranked.place, size)
+    names = tuple(p.name for p in with_law.effects)
+    refit = _best_fit(study, with_law, base, {**ranked.start, SIZE: size})
+    if refit is None:
+        return None
+    count = int(used.sum()) * refit.prediction.shape[1]
+    gain = base.deviance - refit.deviance - len(names) * math.log(count)
+    predictive = session_gain(study, base, refit)
+    reason = ""
+    if not refit.converged:
+        reason = "its fit did not converge"
+    elif any(refit.parameters[p.name] in p.bounds for p in with_law.effects):
+        reason = "a number is at the end of its range"
+    elif gain <= 0:
+        reason = "its BIC is not smaller than that without a law"
+    elif all(low <= 0.0 <= high for low, high in map(refit.interval, names)):
+        reason = "the intervals of all its numbers include the null"
+    elif predictive[0] <= predictive[1]:
+        reason = "does not predict left-out sessions better"
+    again = replace(study, model=with_law, seed=study.seed + 1)
+    none = Directions.plain(np.empty((*data.y.shape, 0)))
+    return Law(
+        place=ranked.place,
+        ranked=ranked,
+        model=with_law,
+        fit=refit,
+        gain=gain,
+        session_gain=predictive,
+        p_value=examine_residual(again, refit, none, draws=_DRAWS).general_p,
+        error=errors(data, refit.prediction, study.split.test)[0],
+        error_interval=error_interval(data, refit.prediction, study.split.test, study.seed),
+        reason=reason,
+    )
+
+
+def _kept(laws: Sequence[Law]) -> list[Law]:
+    """Return the laws that are kept, the largest gain first."""
+    return sorted((law for law in laws if not law.reason), key=lambda law: -law.gain)
+
+
+def _best_fit(study: Study, model: LawModel, base: Fit, linear: dict[str, float]) -> Fit | None:
+    """Fit a law from its linear model; if more than noise is left, from the model as given, too.
+
+    Args:
+        linear: size and exponents of the linear model.
+
+    Returns:
+        The better fit, or None where the motion cannot be simulated.
+    """
+    names = tuple(p.name for p in model.effects)
+    flat = {name: linear[SIZE] / 2 if name == SIZE else 0.0 for name in names}
+    freedom = int(study.split.fitted.sum()) * base.prediction.shape[1] - len(base.names) - len(names)
+    best: Fit | None = None
+    for start in (
+        {**base.parameters, **{name: linear[name] for name in names}},
+        {**base.parameters, **{p.name: p.start for p in model.coefficients}, **flat},
+    ):
+        try:
+            refit = fit(model, start, (*base.names, *names), study.split.fitted, title="")
+        except InputError:
+            continue
+        if best is None or refit.deviance < best.deviance:
+            best = refit
+        if best.converged and best.deviance < freedom + _FAR * math.sqrt(2 * freedom):
+            break
+    return best

@@ -1,0 +1,101 @@
+"""Laws that no effect of the catalogue states, in tables of the toy robot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calibration.laws.law_model import EXPONENTS, SIZE, LawModel
+from calibration.laws.places import Place, places
+from calibration.report.robot_laws import find_robot_laws, robot_with_law
+from calibration.statistics.statistical_model import by_differences, start_values
+from calibration.swimmer.synthetic_table import make_table
+from sim.effects import catalogue
+from sim.inputs import group_columns, load_robot
+from tests.calibration import toy
+from tests.calibration.toy_tables import START, TRUTH, toy_swimmer, toy_table
+
+LAWS = {
+    "Cyr": {"law_Cyr_speed500_length-500_tails0": 1.0},
+    "Mz_wh": {"law_Mz_wh_speed1000_length-1000_tails0": 5.0},
+}
+
+
+def place(name: str) -> Place:
+    return next(one for one in places() if one.name == name)
+
+
+@pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize("name", [one.name for one in places()])
+def test_derivatives_are_those_by_differences(name: str) -> None:
+    model = LawModel.of(toy_swimmer(toy_table(1)), place(name), 0.1)
+    law = {
+        p.name: value for p, value in zip(model.effects, (0.1, 0.3, -0.4, 0.2)[-len(model.effects) :], strict=True)
+    }
+    names = ["C_t", "C_yr", "youngs_modulus", *law]
+    parameters = {**start_values(model), **law}
+    seen, slopes = model.derivatives(parameters, names)
+    other_seen, other = by_differences(model, parameters, names)
+    np.testing.assert_allclose(seen, other_seen, atol=1e-9)
+    np.testing.assert_allclose(slopes, other, rtol=0.06, atol=2e-3 * np.abs(slopes).max())
+
+
+@pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize("name", LAWS)
+def test_a_law_is_found_at_its_place_with_its_exponents(name: str) -> None:
+    table = make_table(replace(TRUTH, effects=LAWS[name]), seed=4, title="")
+    described = find_robot_laws(table, START, progress=False)
+    assert described.laws is not None
+    kept = {law.place.name: law for law in described.laws.kept}
+    assert name in kept
+    law = kept[name]
+    (effect,) = LAWS[name]
+    for exponent, true in zip(EXPONENTS, catalogue()[effect].powers.__dict__.values(), strict=True):  # type: ignore[attr-defined]
+        low, high = law.fit.interval(exponent)
+        margin = high - low  # the interval is one of 95 %
+        assert low - margin / 2 < true < high + margin / 2
+    assert law.error < 0.7 * described.error_without
+    assert law.error < 1.2 * described.noise
+    assert "described by" in described.sentence
+
+
+@pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize("name", LAWS)
+def test_the_robot_with_a_law_moves_as_its_fit_says(name: str) -> None:
+    table = make_table(replace(TRUTH, effects=LAWS[name]), seed=4, title="")
+    described = find_robot_laws(table, START, progress=False)
+    assert described.laws is not None
+    law = next(one for one in described.laws.fitted if one.place.name == name)
+    robot = robot_with_law(START, law)
+    assert robot is not None
+    runs, place_of_run = law.model.robots(law.fit.parameters)
+    for row in (0, 17):
+        fitted = runs[place_of_run[row]]
+        same = replace(robot, tails=fitted.tails, tail_length=fitted.tail_length, motor_speed=fitted.motor_speed)
+        motions = (
+            toy.steady_columns({key: np.array([a[0]]) for key, a in group_columns([same]).items()}),
+            toy.steady_columns(group_columns([fitted])),
+        )
+        assert motions[0]["omega_yr_bar"][0] == pytest.approx(motions[1]["omega_yr_bar"][0], rel=2e-3)
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_nothing_is_described_where_nothing_is_missing(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    described = find_robot_laws(toy_table(3), START, progress=False)
+    assert described.laws is None
+    assert "within the noise" in described.sentence
+    assert described.to_frame().empty
+    assert [path.name for path in described.save(tmp_path)] == ["laws.json"]
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_files_of_a_law_are_read_back(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    table = make_table(replace(TRUTH, effects=LAWS["Cyr"]), seed=4, title="")
+    described = find_robot_laws(table, START, progress=False)
+    described.save(tmp_path)
+    assert described.laws is not None
+    robot = load_robot(tmp_path / "law.toml")
+    assert robot == robot_with_law(START, described.laws.kept[0])
+    assert SIZE.removeprefix("law_") in described.to_frame().columns
