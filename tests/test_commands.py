@@ -305,6 +305,17 @@ def decide(made: Path, out: Path) -> str:
     return "Decided: head's end-over-end drag."
 
 
+def laws(made: Path, out: Path) -> str:
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        table = toy_table(4, **{"law_Cyr_speed500_length-500_tails0": 1.0})
+        table.to_csv(out / "t.csv", index=False)
+        done("calibration", "laws", out / "t.csv", "--robot", "paper-measured", "--out", out / "laws")
+    assert json.loads((out / "laws" / "laws.json").read_text())["kept"][0] == "Cyr"
+    assert load_robot(out / "laws" / "law.toml").effects
+    return "The residual is described by the side-force coefficient C_yr"
+
+
 RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "steady"): steady, ("sim", "replay"): replay, ("sim", "robot"): robot, ("sim", "check"): check_paper,
     ("sim", "film"): film, ("planner", "page"): page,
@@ -319,7 +330,7 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("planner", "hold"): hold, ("planner", "replan"): replanned,
     ("planner", "fleet"): fleet,
     ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
-    ("calibration", "tracks"): tracks, ("calibration", "decide"): decide,
+    ("calibration", "tracks"): tracks, ("calibration", "decide"): decide, ("calibration", "laws"): laws,
 }  # fmt: skip
 
 
