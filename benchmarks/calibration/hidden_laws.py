@@ -67,8 +67,8 @@ def main(tables: str = "24", first_seed: str = "0") -> None:
         try:
             table = make_table(replace(ROBOT, effects=effects), seed=seed, title="")
             described = find_robot_laws(table, PRESETS["paper-measured"], seed=seed, progress=False)
-        except InputError as error:
-            print(f"{seed}: {effects}: not made: {error}")
+        except InputError as reason:
+            print(f"{seed}: {effects}: not made: {reason}")
             continue
         kept = described.laws.kept if described.laws and described.laws.complete else ()
         names_kept = [law.place.name for law in kept]
