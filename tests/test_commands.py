@@ -311,9 +311,9 @@ def laws(made: Path, out: Path) -> str:
         table = toy_table(4, **{"law_Cyr_speed500_length-500_tails0": 1.0})
         table.to_csv(out / "t.csv", index=False)
         done("calibration", "laws", out / "t.csv", "--robot", "paper-measured", "--out", out / "laws")
-    assert json.loads((out / "laws" / "laws.json").read_text())["kept"][0] == "Cyr"
+    assert "Cyr" in json.loads((out / "laws" / "laws.json").read_text())["kept"]  # runs cannot tell it from C_t
     assert load_robot(out / "laws" / "law.toml").effects
-    return "The residual is described by the side-force coefficient C_yr"
+    return "The residual is described by "
 
 
 RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
