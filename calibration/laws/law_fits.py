@@ -74,7 +74,8 @@ class Law:
                 factors.append(f"{symbol}^{self.fit.parameters[name]:.2f} ({low:.2f} to {high:.2f})")
         said = f"{self.place.words}, in proportion to {' '.join(factors)}" if factors else self.place.words
         if independent:
-            said += f", independent of {' and '.join(independent)} within the intervals"
+            listed = " and ".join(filter(None, (", ".join(independent[:-1]), independent[-1])))
+            said += f", independent of {listed} within the intervals"
         return said
 
 
