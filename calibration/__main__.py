@@ -1,4 +1,4 @@
-"""Command line of the calibration: `calibrate`, `decide`, `laws`, `simulate`, `tracks`."""
+"""Command line of the calibration: `calibrate`, `decide`, `laws`, `adopt`, `simulate`, `tracks`."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ main = program.main
         metavar="COLUMN=VALUES",
         help="what the lab can set in its next runs, such as l_cm=5,7,9; for N, l_cm and omega_rpm",
     ),
+    argument("--no-laws", action="store_true", help="do not look for laws where no effect explains the runs"),
     JOBS,
     aliases=("close",),
 )
@@ -41,6 +42,7 @@ def _calibrate(arguments: Namespace) -> None:
         load_robot(arguments.robot),
         protocol=arguments.protocol,
         own=own,
+        laws=not arguments.no_laws,
         seed=arguments.seed,
         jobs=arguments.jobs,
         tell=lambda line: print(line, file=sys.stderr),
@@ -69,6 +71,7 @@ def _calibrate(arguments: Namespace) -> None:
     JOBS,
 )
 def _decide(arguments: Namespace) -> None:
+    from calibration.laws.law_model import with_law
     from calibration.swimmer.measured_table import read_measurements
     from calibration.swimmer.swimmer import SwimmerModel
     from calibration.verdict.next_runs import GIVEN_UP
@@ -77,7 +80,7 @@ def _decide(arguments: Namespace) -> None:
 
     explanations, before = read_explanations(arguments.verdict)
     model = SwimmerModel(load_robot(arguments.robot), read_measurements(arguments.table), arguments.jobs)
-    decision = decide(model, explanations, before)
+    decision = decide(model, explanations, before, with_law)
     print(f"{decision.new_runs} new runs. An explanation that is behind by more than {GIVEN_UP:.1f} is given up.")
     for explanation in decision.standings:
         print(f"  {explanation.title}: {f'behind by {explanation.behind:.1f}' if explanation.behind else 'best'}")
@@ -114,6 +117,23 @@ def _laws(arguments: Namespace) -> None:
         reason = law.reason or f"error {100 * law.error:.2f} %"
         print(f"  {law.place.name}: {reason}; gain in BIC {law.gain:.0f}")
     print(f"-> {', '.join(map(str, paths))}")
+
+
+@program.command(
+    "adopt",
+    "write a law that describes a table as an effect for the catalogue, with its test",
+    argument("verdict", help="verdict.json or laws.json"),
+    argument("--name", required=True, help="of the effect, such as speed_dependent_side_force"),
+    argument("--law", default="", metavar="PLACE", help="which of the laws that were kept (default: the best)"),
+    out("folder"),
+)
+def _adopt(arguments: Namespace) -> None:
+    import sim.effects
+    from calibration.report.adoption import adopt_law
+
+    paths = adopt_law(arguments.verdict, arguments.name, arguments.out, place=arguments.law)
+    print(f"-> {', '.join(map(str, paths))}")
+    print(f"{paths[0].name} belongs in {sim.effects.__path__[0]}; {paths[1].name} tests it there")
 
 
 @program.command(

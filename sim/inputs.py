@@ -18,6 +18,7 @@ from sim.io.files import write_text
 from sim.io.reading import read_toml
 from sim.model.correction import read_correction
 from sim.model.groups import GROUP_COLUMNS, OPTIONAL_COLUMNS, checked_values
+from sim.model.learnt_range import read_learnt_range
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.model.robot_toml import read_robot, robot_toml
@@ -87,12 +88,13 @@ def _read_robot(path: Path) -> Robot:
     name = tables.pop("name", path.stem)
     tables.pop("calibration", None)  # read by planner.vehicle.calibration_table
     correction = read_correction(tables.pop("correction"), str(path)) if "correction" in tables else None
+    learnt_from = read_learnt_range(tables.pop("learnt_from"), str(path)) if "learnt_from" in tables else None
     effects = tables.pop("effects", {})
     if not isinstance(effects, dict):
         raise InputError(f"{path}: effects = {effects!r}; write a table [effects] with lines name = size")
     values = read_robot(tables, str(path))
     check_effects(effects)
-    return Robot(name=str(name), effects=dict(effects), correction=correction, **values)
+    return Robot(name=str(name), effects=dict(effects), correction=correction, learnt_from=learnt_from, **values)
 
 
 def save_robot(robot: Robot, path: str | Path) -> None:

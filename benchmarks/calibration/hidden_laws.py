@@ -32,8 +32,8 @@ from calibration.swimmer.swimmer import SwimmerModel
 from calibration.swimmer.synthetic_table import make_table
 from sim.inputs import group_columns
 from sim.io.errors import InputError
-from sim.model.force_law import COEFFICIENTS, Powers
 from sim.model.groups import Groups
+from sim.model.power_law import COEFFICIENTS, Powers
 from sim.model.presets import PRESETS
 
 _SCORES = (8.0, 16.0, 32.0)
@@ -60,10 +60,10 @@ def main(tables: str = "24", first_seed: str = "0") -> None:
         if seed % 4:
             size = score / _signal(study, base, model, place, powers)
             if place.is_term:
-                effects = {place.effect_name(powers) or "": size}
+                effects = {place.effect(powers).name: size}
             else:
                 powers = Powers(*(np.clip(size * p, -4, 4) for p in (powers.speed, powers.length, powers.tails)))
-                effects = {place.effect_name(powers) or "": 1.0}
+                effects = {place.effect(powers).name: 1.0}
         try:
             table = make_table(replace(ROBOT, effects=effects), seed=seed, title="")
             described = find_robot_laws(table, PRESETS["paper-measured"], seed=seed, progress=False)

@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from tqdm import tqdm
 
-from calibration.statistics.fit import Fit, fit
+from calibration.statistics.fit import Fit, fit, noise_at_most
 from calibration.statistics.residual_tests import TESTABLE, Directions, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import ForwardModel, Parameter, Parameters, prior_rows, start_values
 from calibration.statistics.study import Study, groups, leave_one_group_out
@@ -38,7 +38,6 @@ INDISTINGUISHABLE = 6.63  # χ² with one degree of freedom, 99 %
 UNSEEN = 1e9  # smallest detectable size of an effect that changes nothing
 FIRST = 3  # number of single effects to which a second one is added
 _CURVED = 0.3  # share of the best score's z² below which an effect is not refitted if it leaves too much
-_FAR = 6.0  # standard deviations of χ²
 _DRAWS = 400  # of the bootstrap, for the residual that an effect leaves
 
 
@@ -139,6 +138,7 @@ def examine(
     scored = unexamined(misfit, effects, needed, beside)
     examined = []
     title = " ".join(("effects", *(f"beside {e.title}" for e in beside)))
+    values = int(study.split.fitted.sum()) * base.prediction.shape[1]
     order = np.argsort(-np.abs(misfit.scores.z)).tolist()
     for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not study.progress):
         effect, candidate = effects[j], scored[j]
@@ -153,7 +153,9 @@ def examine(
         if effect.second is not None:
             size[effect.second.name] = float(misfit.second[j]) if local else effect.second.start
         start = {**(base.parameters if local else start_values(study.model)), **size}
-        refit = fit(study.model, start, (*base.names, *size), study.split.fitted, title="")
+        names = (*base.names, *size)
+        target = noise_at_most(values, len(names))
+        refit = fit(study.model, start, names, study.split.fitted, target=target, title="")
         examined.append(judge(study, candidate, base, refit, directions.without(j)))
     return examined
 
@@ -173,10 +175,10 @@ def _reason_not_to_refit(
     if not low <= guess <= high and (guess < low) == (effect.start == low):
         return "its score has a sign that the effect cannot have"
     # A refit takes z² from the deviance if the model is linear. `_CURVED` allows for its curvature.
-    freedom = int(study.split.fitted.sum()) * base.prediction.shape[1] - len(base.names)
-    remainder = base.deviance - z**2 / _CURVED - freedom
+    values = int(study.split.fitted.sum()) * base.prediction.shape[1]
+    remainder = base.deviance - z**2 / _CURVED
     best = float(np.max(np.where(misfit.scores.survived >= TESTABLE, misfit.scores.z**2, 0.0)))
-    if z**2 < _CURVED * best and remainder > _FAR * math.sqrt(2 * freedom):
+    if z**2 < _CURVED * best and remainder > noise_at_most(values, len(base.names)):
         return "leaves far more than noise, by its score"
     return ""
 

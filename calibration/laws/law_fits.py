@@ -17,26 +17,29 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
 from calibration.attribution.refits import INDISTINGUISHABLE, session_gain
-from calibration.laws.law_model import EXPONENTS, INPUTS, SIZE, LawModel
-from calibration.laws.places import Place, places
+from calibration.laws.law_model import EXPONENTS, SIZE, LawModel
+from calibration.laws.places import Place, in_common, places
+from calibration.laws.readings import INPUTS, in_words
 from calibration.laws.search import Ranked, rank
-from calibration.statistics.fit import Fit, fit
+from calibration.statistics.fit import Fit, fit, noise_at_most
 from calibration.statistics.held_out import error_interval, errors
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.study import LEVEL, Study
 from calibration.swimmer.swimmer import SwimmerModel
+from calibration.verdict.experiment import Rival
+from sim.arrays import Floats
 from sim.io.errors import InputError
-from sim.model.force_law import Powers
 
 _FITTED = 6  # places that are fitted first
 _CURVED = 0.3  # share of the best gain below which a place is not among them
 _LARGEST_AT_START = 50.0  # size of a term
-_FAR = 6.0  # standard deviations of χ²
+_RPM = 30 / math.pi
 _DRAWS = 400  # of the bootstrap, for the residual that a law leaves
 
 
@@ -56,33 +59,53 @@ class Law:
     reason: str  # why it is not kept; empty if it is
 
     @property
-    def powers(self) -> Powers:
-        """Its exponents."""
-        return Powers(*(self.fit.parameters.get(name, 0.0) for name in EXPONENTS))
-
-    @property
     def words(self) -> str:
         """The law in words, with 95 % intervals."""
-        factors, independent = [], []
-        for name, symbol in zip(EXPONENTS, INPUTS, strict=True):
-            if name not in self.fit.names:
-                continue
-            low, high = self.fit.interval(name)
-            if low <= 0.0 <= high:
-                independent.append(symbol)
-            else:
-                factors.append(f"{symbol}^{self.fit.parameters[name]:.2f} ({low:.2f} to {high:.2f})")
-        said = f"{self.place.words}, in proportion to {' '.join(factors)}" if factors else self.place.words
-        if independent:
-            listed = " and ".join(filter(None, (", ".join(independent[:-1]), independent[-1])))
-            said += f", independent of {listed} within the intervals"
-        return said
+        chosen = [i for i, name in enumerate(EXPONENTS) if name in self.fit.names]
+        at = [self.fit.names.index(EXPONENTS[i]) for i in chosen]
+        said = in_words(
+            [INPUTS[i] for i in chosen],
+            np.array([self.fit.parameters[EXPONENTS[i]] for i in chosen]),
+            self.fit.covariance[np.ix_(at, at)],
+            [self.fit.interval(EXPONENTS[i]) for i in chosen],
+        )
+        return ", ".join(filter(None, (self.place.words, said)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the law as laws.json has it; `size` is at the geometric mean of the runs."""
+        effect, size, _ = self.model.effect(self.fit.parameters)
+        runs = self.model.runs
+        numbers = {
+            p.name.removeprefix("law_"): {
+                "value": self.fit.parameters[p.name],
+                "interval": list(self.fit.interval(p.name)),
+            }
+            for p in self.model.effects
+        }
+        return {
+            "place": self.place.name,
+            "words": self.words,
+            "effect": {"name": effect.name, "size": size},
+            **numbers,
+            "runs": {
+                "N": [float(runs.tails.min()), float(runs.tails.max())],
+                "l_cm": [100 * float(runs.length.min()), 100 * float(runs.length.max())],
+                "omega_rpm": [_RPM * float(np.abs(runs.omega).min()), _RPM * float(np.abs(runs.omega).max())],
+            },
+            "gain": self.gain,
+            "session_gain": list(self.session_gain),
+            "p_value": self.p_value,
+            "error": self.error,
+            "error_interval": list(self.error_interval),
+            "reason": self.reason,
+        }
 
 
 @dataclass(frozen=True)
 class Laws:
     """What describes a residual."""
 
+    base: Fit  # coefficients and nuisance parameters, without a law
     ranked: tuple[Ranked, ...]  # every place, the best first
     fitted: tuple[Law, ...]  # those that were fitted, the largest gain first
     level: float = LEVEL  # α of the residual that a law leaves, as for an effect: half of it decides
@@ -112,11 +135,35 @@ class Laws:
         if len(self.kept) == 1:
             return f"The residual is described by {best.words}."
         rivals = "; or ".join(law.words for law in self.kept)
-        return f"The residual is described by {rivals}: these runs cannot tell them apart."
+        shared = in_common([law.place for law in self.kept])
+        agree = f" All of them are {shared}." if shared else ""
+        return f"The residual is described by {rivals}: these runs cannot tell them apart.{agree}"
+
+    @property
+    def prediction(self) -> Floats:
+        """(n, k) of the best law, fitted without the held-out runs; without a law, of the calibrated model."""
+        return self.kept[0].fit.prediction if self.kept else self.base.prediction
+
+    @property
+    def rivals(self) -> tuple[Rival, ...]:
+        """Laws that the runs cannot tell apart, best first; none if there are not two."""
+        if not self.complete or len(self.kept) < 2:
+            return ()
+        return tuple(Rival(law.words, law.fit, law.model, law.model.record) for law in self.kept)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the record for laws.json and verdict.json."""
+        return {
+            "sentence": self.sentence,
+            "complete": self.complete,
+            "places": [{"place": one.place.name, "gain": one.gain} for one in self.ranked],
+            "laws": [law.to_dict() for law in self.fitted],
+            "kept": [law.place.name for law in self.kept],
+        }
 
 
 def find_laws(study: Study, base: Fit) -> Laws:
-    """Find laws that describe the residual of a fit without effects.
+    """Find laws that describe the residual of a fit without effects; for `calibration.verdict.calibrate`, too.
 
     Args:
         study: of a `SwimmerModel`.
@@ -134,7 +181,7 @@ def find_laws(study: Study, base: Fit) -> Laws:
     kept = _kept(laws)
     if not kept or kept[0].p_value < study.level / 2:
         laws += _fit_all(study, model, base, [one for one in ranked if one.gain > 0 and one not in likely])
-    return Laws(tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), study.level)
+    return Laws(base, tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), study.level)
 
 
 def _fit_all(study: Study, model: SwimmerModel, base: Fit, chosen: Sequence[Ranked]) -> list[Law]:
@@ -198,18 +245,19 @@ def _best_fit(study: Study, model: LawModel, base: Fit, linear: dict[str, float]
     """
     names = tuple(p.name for p in model.effects)
     flat = {name: linear[SIZE] / 2 if name == SIZE else 0.0 for name in names}
-    freedom = int(study.split.fitted.sum()) * base.prediction.shape[1] - len(base.names) - len(names)
+    values = int(study.split.fitted.sum()) * base.prediction.shape[1]
+    target = noise_at_most(values, len(base.names) + len(names))
     best: Fit | None = None
     for start in (
         {**base.parameters, **{name: linear[name] for name in names}},
         {**base.parameters, **{p.name: p.start for p in model.coefficients}, **flat},
     ):
         try:
-            refit = fit(model, start, (*base.names, *names), study.split.fitted, title="")
+            refit = fit(model, start, (*base.names, *names), study.split.fitted, target=target, title="")
         except InputError:
             continue
         if best is None or refit.deviance < best.deviance:
             best = refit
-        if best.converged and best.deviance < freedom + _FAR * math.sqrt(2 * freedom):
+        if best.converged and best.deviance < target:
             break
     return best

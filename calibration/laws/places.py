@@ -2,7 +2,7 @@
 
 A `Place` is one of
 
-- a component of the wrench on head and disc, driven by a component of the velocity (`sim.model.force_law`), of
+- a component of the wrench on head and disc, driven by a component of the velocity (`sim.model.power_law`), of
   which the even ones in the direction of the motor are listed. Its size is ε;
 - a coefficient of the head, the drag of the tails, or their stiffness: a factor, which is 1 without a law.
 
@@ -17,9 +17,11 @@ direction of the motor.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sim.model.force_law import COEFFICIENTS, MOTIONS, WRENCHES, Powers, coefficient_law, force_law
+from sim.model.effect import Effect
+from sim.model.power_law import COEFFICIENTS, MOTIONS, TAILS, WRENCHES, Powers, factor_law, force_law
 
 _WRENCH_WORDS = {
     "Fx": "a side force on the head",
@@ -57,15 +59,40 @@ class Place:
     motion: str = ""  # of MOTIONS, of a term
 
     @property
+    def part(self) -> str:
+        """The part of the robot on which it acts: "head" or "tails"."""
+        return "tails" if self.name in TAILS else "head"
+
+    @property
     def is_term(self) -> bool:
         """Whether it is a term of a size of its own, and not a factor."""
         return bool(self.wrench)
 
-    def effect_name(self, powers: Powers) -> str | None:
-        """Name the effect of `sim.model.force_law` that has this place; None for the tails."""
-        if self.is_term:
-            return force_law(self.wrench, self.motion, powers).name
-        return coefficient_law(self.name, powers).name if self.name in COEFFICIENTS else None
+    def effect(self, powers: Powers) -> Effect:
+        """Return the effect of `sim.model.power_law` at this place."""
+        return force_law(self.wrench, self.motion, powers) if self.is_term else factor_law(self.name, powers)
+
+
+def place_named(name: str) -> Place:
+    """Return the place of that name.
+
+    Raises:
+        KeyError: there is none.
+    """
+    return {place.name: place for place in places()}[name]
+
+
+def in_common(chosen: Sequence[Place]) -> str:
+    """Say what places have in common; empty if that is nothing."""
+    if len({place.part for place in chosen}) > 1:
+        return ""
+    wrenches, motions = {place.wrench for place in chosen}, {place.motion for place in chosen}
+    if len(wrenches) == 1 and chosen[0].wrench:
+        return _WRENCH_WORDS[chosen[0].wrench]
+    part = chosen[0].part
+    if len(motions) == 1 and chosen[0].motion:
+        return f"a load on the {part} that is driven by {_MOTION_WORDS[chosen[0].motion]}"
+    return f"a load on the {part}" if part == "head" else "the tails"
 
 
 def places() -> tuple[Place, ...]:

@@ -58,7 +58,8 @@ def rank(
         title: of the progress bar for the derivatives; empty for none.
     """
     directions = _directions(model, base, candidates, title)  # (n, k, places)
-    x = np.column_stack([np.ones(len(model.runs)), logarithms(model.runs)])
+    inputs_of_runs = logarithms(model.runs)
+    x = np.column_stack([np.ones(len(model.runs)), inputs_of_runs - inputs_of_runs.mean(0)])
     varied = [0, *(i for i in range(1, x.shape[1]) if np.ptp(x[used, i]) > 0)]
     by_place = directions[..., None] * x[:, None, None, varied]  # (n, k, places, columns)
     columns = by_place.reshape(*directions.shape[:2], -1)

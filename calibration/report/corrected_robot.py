@@ -12,6 +12,7 @@ uncertainty is that of its weights and of what it leaves beyond noise, at the ro
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +25,7 @@ from calibration.swimmer.nuisance_numbers import LENGTH
 from calibration.swimmer.swimmer import robot_numbers
 from calibration.verdict.experiment import LearntCorrection
 from planner.vehicle.calibration_table import NUMBERS, CalibrationKnowledge, knowledge_toml
+from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.model.robot import Robot
@@ -32,12 +34,13 @@ from surrogate.input_ranges import COEFFICIENTS
 
 
 def check_given(robot: Robot) -> None:
-    """Refuse a robot that already has a correction: its table of runs belongs to the robot as given."""
-    if robot.correction is not None:
-        raise InputError(
-            f"robot {robot.name!r} has a table [correction] from an earlier calibration: calibrate the robot "
-            "as it was given, with the runs of both"
-        )
+    """Refuse a robot that already has a correction or a law: its table of runs belongs to the robot as given."""
+    for table, held in (("correction", robot.correction), ("learnt_from", robot.learnt_from)):
+        if held is not None:
+            raise InputError(
+                f"robot {robot.name!r} has a table [{table}] from an earlier calibration: calibrate the robot as "
+                "it was given, with the runs of both"
+            )
 
 
 def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
@@ -52,25 +55,33 @@ def corrected_robot(robot: Robot, parameters: Parameters) -> Robot:
     return replace(robot, **numbers, effects={**robot.effects, **sizes})
 
 
-def calibration_knowledge(robot: Robot, final: FinalRefit) -> CalibrationKnowledge:
+def calibration_knowledge(
+    robot: Robot, final: FinalRefit, further: Mapping[str, Floats] | None = None
+) -> CalibrationKnowledge:
     """Collect the covariance of the corrected robot's parameters and effects, and the current in the tank.
 
     Args:
         robot: as it was given; the error of the tail length is one of ln l of this robot.
+        further: how effects, and parameters beyond their own derivative, depend on what was fitted: name -> (p,).
     """
     length = robot.tail_length + final.parameters.get(LENGTH, 0.0)
-    kept, names, scales = [], [], []
+    slopes: dict[str, Floats] = {}  # name -> (p,)
     for place, parameter in enumerate(final.fitted):
         if parameter.name in (*COEFFICIENTS, *NUMBERS, *catalogue(), LENGTH):
-            kept.append(place)
-            names.append("tail_length" if parameter.name == LENGTH else parameter.name)
-            scales.append(1 / length if parameter.name == LENGTH else 1.0)
-    covariance = final.covariance[np.ix_(kept, kept)] * np.outer(scales, scales)
+            of_length = parameter.name == LENGTH
+            row = np.zeros(len(final.fitted))
+            row[place] = 1 / length if of_length else 1.0
+            slopes["tail_length" if of_length else parameter.name] = row
+    for name, row in (further or {}).items():
+        slopes[name] = slopes.get(name, np.zeros(len(final.fitted))) + row
+    names = tuple(slopes)
+    table = np.array([slopes[name] for name in names]).reshape(len(names), len(final.fitted))
+    covariance = table @ final.covariance @ table.T
     places = {parameter.name: i for i, parameter in enumerate(final.fitted)}
     current = [(final.parameters[n], places[n]) if n in places else (0.0, None) for n in CURRENT]
     errors = [0.0 if at is None else math.sqrt(final.covariance[at, at]) for _, at in current]
     return CalibrationKnowledge(
-        names=tuple(names),
+        names=names,
         covariance=(covariance + covariance.T) / 2,  # rounding
         current=(current[0][0], current[1][0]),
         current_error=(errors[0], errors[1]),
@@ -79,8 +90,12 @@ def calibration_knowledge(robot: Robot, final: FinalRefit) -> CalibrationKnowled
 
 def corrected_toml(robot: Robot, final: FinalRefit, learnt: LearntCorrection | None = None) -> str:
     """Write corrected.toml, with the correction that was `learnt` where nothing explains the runs."""
-    corrected, known = handed_on(robot, final, learnt)
-    return robot_toml(corrected) + "\n" + knowledge_toml(known)
+    return as_toml(*handed_on(robot, final, learnt))
+
+
+def as_toml(robot: Robot, known: CalibrationKnowledge) -> str:
+    """Write a robot and what a calibration knows about it."""
+    return robot_toml(robot) + "\n" + knowledge_toml(known)
 
 
 def handed_on(

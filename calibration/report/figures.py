@@ -35,6 +35,8 @@ def compared(result: Verdict) -> list[tuple[str, Floats]]:
     models = [("calibrated", result.base.prediction)]
     if final_model(result):
         models.append((final_model(result), result.final.prediction))
+    elif result.described and result.corrections.law is not None:
+        models.append(("with the law in corrected.toml", result.corrections.law.prediction))
     elif result.corrections.learnt is not None:
         models.append(("with the correction in corrected.toml", result.corrections.learnt.prediction))
     return models

@@ -9,6 +9,7 @@ import numpy as np
 
 from calibration.attribution.refits import IMITABLE, SURE, UNSEEN, Candidate
 from calibration.report.figures import draw_evidence, draw_maps, draw_residuals, draw_summary, final_model
+from calibration.report.law_card import add_laws
 from calibration.report.quantities import (
     LABELS,
     detectable,
@@ -46,6 +47,7 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
     """Add the sections of the report."""
     _add_next_steps(page, result)
     _add_errors(page, result, data)
+    add_laws(page, result)
     _add_numbers(page, result)
     _add_fit(page, result)
     _add_residuals(page, result, data)
@@ -104,6 +106,8 @@ def _add_errors(page: Page, result: Verdict, data: Measurements) -> None:
         models["after"] = f"calibrated, {final_model(result)}"
     if "predictive" in errors.rms:
         models["predictive"] = "calibrated, with the correction in corrected.toml"
+    if "law" in errors.rms:
+        models["law"] = "calibrated, with the best law"
     models["generic"] = "calibrated, with a regression of the residual"
     rows = [
         (

@@ -1,8 +1,7 @@
-"""Laws that describe what a measured table has beyond the model, and the robot that has the best of them.
+"""Laws that describe what a measured table has beyond the model, whether an effect explains it or not.
 
 laws.json has every place that was ranked and every law that was fitted. law.toml is the corrected robot with the
-best law as an effect (`sim.model.force_law`), for the look-up table, the planner and the simulator. It is written
-if this law leaves no more than noise. A law of the tails is no effect, so there is no law.toml for it.
+best law (`calibration.report.law_robot`). It is written if this law leaves no more than noise.
 """
 
 from __future__ import annotations
@@ -10,16 +9,17 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from calibration.laws.law_fits import Law, Laws, find_laws
+from calibration.laws.law_fits import Laws, find_laws
 from calibration.laws.law_model import EXPONENTS, SIZE
-from calibration.report.corrected_robot import check_given, corrected_robot
+from calibration.report.corrected_robot import as_toml, check_given
+from calibration.report.law_robot import law_handed_on
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.held_out import errors
 from calibration.statistics.residual_tests import Directions, examine_residual
@@ -28,13 +28,9 @@ from calibration.statistics.study import Study, find_outliers, split_runs
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.protocols import PROTOCOLS
 from calibration.swimmer.swimmer import SwimmerModel
-from sim.inputs import group_columns
 from sim.io.files import files_together, write_text
 from sim.io.provenance import provenance
-from sim.model.force_law import COEFFICIENTS
-from sim.model.groups import Groups
 from sim.model.robot import Robot
-from sim.model.robot_toml import robot_toml
 
 
 @dataclass(frozen=True, repr=False)
@@ -72,10 +68,11 @@ class RobotLaws:
 
     def to_frame(self) -> pd.DataFrame:
         """Tabulate the laws that were fitted, the largest gain first."""
+        numbers = [name.removeprefix("law_") for name in (SIZE, *EXPONENTS)]
         rows = [
             {
                 "place": law.place.name,
-                **{_short(name): law.fit.parameters.get(name, math.nan) for name in (SIZE, *EXPONENTS)},
+                **{column: law.fit.parameters.get(f"law_{column}", math.nan) for column in numbers},
                 "gain": law.gain,
                 "error": law.error,
                 "p_value": law.p_value,
@@ -83,21 +80,18 @@ class RobotLaws:
             }
             for law in (self.laws.fitted if self.laws else ())
         ]
-        columns = ["place", "size", "speed", "length", "tails", "gain", "error", "p_value", "kept"]
-        return pd.DataFrame(rows, columns=columns)
+        return pd.DataFrame(rows, columns=["place", *numbers, "gain", "error", "p_value", "kept"])
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of laws.json."""
-        laws = self.laws or Laws((), ())
+        laws = self.laws or Laws(self.base, (), ())
         return {
+            **laws.to_dict(),
             "sentence": self.sentence,
             "p_value": self.p_value,
             "error_without": self.error_without,
             "noise": self.noise,
             "held_out": self.study.split.names,
-            "places": [{"place": one.place.name, "gain": one.gain} for one in laws.ranked],
-            "laws": [_record(law) for law in laws.fitted],
-            "kept": [law.place.name for law in laws.kept],
             "table": self.table,
             "provenance": provenance({"table": self.table}),
         }
@@ -111,13 +105,13 @@ class RobotLaws:
         Raises:
             InputError: the files cannot be written.
         """
-        best = self.laws.kept[0] if self.laws and self.laws.complete else None
-        robot = None if best is None else robot_with_law(self.robot, best)
-        names = ("laws.json",) if robot is None else ("laws.json", "law.toml")
+        described = self.laws is not None and self.laws.complete
+        names = ("laws.json", "law.toml") if described else ("laws.json",)
         with files_together(folder, names) as temporary:
             write_text(temporary / "laws.json", json.dumps(self.to_dict(), indent=1) + "\n")
-            if robot is not None:
-                write_text(temporary / "law.toml", robot_toml(robot))
+            if self.laws is not None and described:
+                with_law = law_handed_on(self.robot, self.laws.kept[0], self.study.split.kept)
+                write_text(temporary / "law.toml", as_toml(*with_law))
         return [Path(folder, name) for name in names]
 
 
@@ -163,47 +157,3 @@ def find_robot_laws(
     laws = find_laws(study, base) if p_value < study.level else None
     name = "table" if isinstance(table, pd.DataFrame) else Path(table).name
     return RobotLaws(robot, data, study, base, p_value, laws, name)
-
-
-def robot_with_law(given: Robot, law: Law) -> Robot | None:
-    """Return the corrected robot with a law as an effect; None where there is no such effect (tails)."""
-    powers, parameters = law.powers, dict(law.fit.parameters)
-    name = law.place.effect_name(powers)
-    if name is None:
-        return None
-    robots, place = law.model.robots({**parameters, **dict.fromkeys(EXPONENTS, 0.0)})
-    logarithms = [float(powers.logarithm(Groups.from_columns(group_columns([robot])))[0]) for robot in robots]
-    to_control = math.exp(-float(np.array(logarithms)[place].mean()))  # the law has m = 1 at the control example
-    size = 1.0
-    if law.place.is_term:
-        size = parameters[SIZE] * to_control
-    else:
-        parameters[COEFFICIENTS[law.place.name]] *= to_control
-    corrected = corrected_robot(given, parameters)
-    return replace(corrected, effects={**corrected.effects, name: size})
-
-
-def _record(law: Law) -> dict[str, Any]:
-    """Write a law as laws.json has it; the size is at the geometric mean of the runs."""
-    numbers = {
-        _short(p.name): {
-            "value": law.fit.parameters[p.name],
-            "interval": list(law.fit.interval(p.name)),
-        }
-        for p in law.model.effects
-    }
-    return {
-        "place": law.place.name,
-        "words": law.words,
-        **numbers,
-        "gain": law.gain,
-        "session_gain": list(law.session_gain),
-        "p_value": law.p_value,
-        "error": law.error,
-        "error_interval": list(law.error_interval),
-        "reason": law.reason,
-    }
-
-
-def _short(name: str) -> str:
-    return name.removeprefix("law_")

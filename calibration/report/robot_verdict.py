@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import pandas as pd
 
-from calibration.report.corrected_robot import check_given, corrected_toml, handed_on
+from calibration.laws.law_fits import Laws, find_laws
+from calibration.report.corrected_robot import as_toml, check_given, handed_on
+from calibration.report.law_robot import law_handed_on
 from calibration.report.report import write_report
 from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.measured_table import Measurements, read_measurements
@@ -48,13 +51,20 @@ class RobotVerdict(Verdict):
 
     @property
     def corrected(self) -> Robot:
-        """The robot with fitted coefficients, nuisance parameters and effects."""
-        return handed_on(self.robot, self.fits.final_refit, self.corrections.learnt)[0]
+        """The robot with fitted coefficients, nuisance parameters and effects, or with the law that describes."""
+        return self._handed_on[0]
 
     @property
     def knowledge(self) -> CalibrationKnowledge:
         """Covariance of what was fitted, and the current in the tank; for `softflagella.plan`."""
-        return handed_on(self.robot, self.fits.final_refit, self.corrections.learnt)[1]
+        return self._handed_on[1]
+
+    @cached_property
+    def _handed_on(self) -> tuple[Robot, CalibrationKnowledge]:
+        laws = self.corrections.law
+        if isinstance(laws, Laws) and laws.complete:
+            return law_handed_on(self.robot, laws.kept[0], self.conditions.split.kept)
+        return handed_on(self.robot, self.fits.final_refit, self.corrections.learnt)
 
     def _repr_html_(self) -> str:
         return as_html(repr(self), self.plot)
@@ -87,7 +97,7 @@ class RobotVerdict(Verdict):
         Raises:
             InputError: the files cannot be written.
         """
-        corrected = corrected_toml(self.robot, self.fits.final_refit, self.corrections.learnt)
+        corrected = as_toml(*self._handed_on)
         with files_together(folder, FILES) as temporary:
             write_report(self, self.runs, temporary / "report.html", title=self.table)
             write_text(temporary / "corrected.toml", corrected)
@@ -101,6 +111,7 @@ def calibrate_robot(
     *,
     protocol: Literal["session", "paper"] = "session",
     own: Owned | None = None,
+    laws: bool = True,
     seed: int = 0,
     jobs: int | None = None,
     progress: bool = True,
@@ -113,6 +124,7 @@ def calibrate_robot(
         robot: as given.
         protocol: what is fitted and tested.
         own: what the lab can set in its next runs.
+        laws: whether laws are looked for where no effect explains the runs.
         seed: of the bootstrap.
         jobs: threads; default all processors.
         progress: show progress bars.
@@ -129,6 +141,13 @@ def calibrate_robot(
         tell(f"excluded: {line}")
     data, held_out = PROTOCOLS[protocol](data)
     model = SwimmerModel(robot, data, jobs, own=own or {})
-    verdict = calibrate(model, held_out=held_out, correction=learn_head_correction, seed=seed, progress=progress)
+    verdict = calibrate(
+        model,
+        held_out=held_out,
+        describe=find_laws if laws else None,
+        correction=learn_head_correction,
+        seed=seed,
+        progress=progress,
+    )
     name = "table" if isinstance(table, pd.DataFrame) else Path(table).name
     return RobotVerdict(**vars(verdict), robot=robot, runs=data, table=name)

@@ -48,6 +48,7 @@ WRONG = 3.0  # pull beyond which a nuisance parameter is taken to be wrong
 _LEARNT = 0.02  # share of the prior's variance that the runs must remove before a pull means anything
 _NOTHING = 0.01  # change in per cent, or in the unit in which it is shown, that is not stated
 _MOST_STEPS = 25
+_TRIED = 4  # steps before a search is given up
 _SHORT = 0.1  # after a shorter step, in ln C or ε, the Jacobian is used once more
 _SMALL = 0.01  # the iteration ends at a step that is expected to reduce rᵀ Σ⁻¹ r by less
 _LARGEST = 0.7  # change of ln C in one step
@@ -55,6 +56,7 @@ _PASSES = 3  # iterations for the scatter of the sessions
 _DAMPING = (0.0, *(10.0**e for e in range(-3, 9)))  # λ
 _NEARER = 5  # starts that are tried
 _UNSETTLED = 1.0  # a fit has not converged if one more step is expected to reduce rᵀ Σ⁻¹ r by more
+_FAR = 6.0  # standard deviations of χ²
 _FLAT = 0.05  # share of the expected rise; if the rise is smaller, the deviance is flat and the end stays
 _STEEP = 5.0  # if it is larger, the others were not refitted along a bent valley, and the end stays
 
@@ -131,11 +133,13 @@ def fit(
     used: Flags,
     *,
     wrong_numbers: tuple[tuple[Pull, ...], ...] = (),
+    target: float = math.inf,
     title: str = "fit",
 ) -> Fit:
     """Fit `names` to the runs in `used` (n,), starting at `start`; other parameters stay.
 
     Args:
+        target: of rᵀ Σ⁻¹ r. Where the steps that are left cannot reach it, the search ends before it converges.
         wrong_numbers: nuisance parameters that are wrong, each followed by those that may be wrong in its place;
             the first of each is fitted without its prior.
     """
@@ -145,7 +149,7 @@ def fit(
     fitted = tuple(replace(p, sigma=None) if p.name in freed else p for p in fitted)
     run = repeat_covariance(data.y[used], data.condition[used])
     problem = _Problem(model, fitted, used, inverse_root(run), title)
-    point = _descend(problem, problem.first(dict(start)))
+    point = _descend(problem, problem.first(dict(start)), target)
     linear = least_squares(point.products, passes=_PASSES)
     share = float(linear.share)
     normal = point.products.at(linear.share)
@@ -225,8 +229,12 @@ class _Step(NamedTuple):
     damping: int  # place of its λ in _DAMPING
 
 
-def _descend(problem: _Problem, point: _Point) -> _Point:
-    """Find the least rᵀ Σ⁻¹ r from `point`; steps to where the model cannot be solved quickly are too long."""
+def _descend(problem: _Problem, point: _Point, target: float) -> _Point:
+    """Find the least rᵀ Σ⁻¹ r from `point`; steps to where the model cannot be solved quickly are too long.
+
+    A wrong model crawls along a bent valley far above the noise. The search ends there as soon as all steps that
+    are left, with what the present one promises, would not come down to `target`.
+    """
     fitted = problem.fitted
     least, kept = 0, False  # place of the least damping allowed; whether the derivatives are of another point
     for count in range(1, _MOST_STEPS + 1):
@@ -235,6 +243,9 @@ def _descend(problem: _Problem, point: _Point) -> _Point:
         share = least_squares(point.products, passes=0 if count == 1 else _PASSES).share
         step = _step(fitted, point.parameters, point.products.at(share), least)
         if step.promise < _SMALL and count > 1:
+            break
+        above = float(point.products.at(share)[-1, -1]) - target
+        if count > _TRIED and (_MOST_STEPS - count) * step.promise < above:
             break
         tried = problem.at(step.parameters, None if step.size > _SHORT else point.derivative, count + 1)
         if tried.solved and tried.products.at(share)[-1, -1] < point.products.at(share)[-1, -1] + _SMALL:
@@ -246,6 +257,17 @@ def _descend(problem: _Problem, point: _Point) -> _Point:
             if least >= len(_DAMPING):
                 break
     return point
+
+
+def noise_at_most(values: int, parameters: int) -> float:
+    """Compute a deviance that noise alone hardly exceeds: `_FAR` standard deviations of χ² beyond its mean.
+
+    Args:
+        values: that are fitted.
+        parameters: fitted to them.
+    """
+    freedom = values - parameters
+    return freedom + _FAR * math.sqrt(2 * freedom)
 
 
 def _step(fitted: tuple[Parameter, ...], parameters: dict[str, float], normal: Floats, least: int) -> _Step:

@@ -25,7 +25,8 @@ from calibration.statistics.study import Split, groups, leave_one_group_out
 from calibration.swimmer.swimmer import SwimmerModel
 from sim.arrays import Flags, Floats, Integers
 from sim.io.errors import InputError
-from sim.model.correction import Correction, inputs_of, monomials
+from sim.model.correction import Correction, monomials
+from sim.model.learnt_range import inputs_of
 
 Powers = tuple[tuple[int, ...], ...]
 

@@ -8,7 +8,8 @@
    effects beside a wrong number, and pairs follow, each only if nothing before explains the residual.
 4. The verdict (`calibration.verdict.verdict.reach_verdict`).
 5. If several explanations are left, next runs that would tell them apart (`calibration.verdict.next_runs`).
-   If nothing explains the residual, a correction that is handed on for steering, where there is one.
+   If nothing explains the residual, laws that describe it (`describe`), and where none does, a correction that
+   is handed on for steering.
 6. Errors on the held-out runs: as given, calibrated, with the effect, with a regression of the residual
    (`calibration.statistics.residual_regression`), and from noise alone. Whether the held-out runs agree with the
    final model (`calibration.statistics.held_out`).
@@ -50,7 +51,7 @@ from calibration.statistics.residual_regression import regress_residual
 from calibration.statistics.residual_tests import TESTABLE, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import ForwardModel, start_values
 from calibration.statistics.study import DRAWS, LEVEL, Split, Study, find_outliers, split_runs
-from calibration.verdict.experiment import Experiment, LearntCorrection
+from calibration.verdict.experiment import Description, Experiment, LearntCorrection, Rival
 from calibration.verdict.next_runs import next_runs
 from calibration.verdict.sequential_test import Explanation
 from calibration.verdict.verdict import (
@@ -73,6 +74,7 @@ def calibrate(
     model: Subject,
     *,
     held_out: Flags | None = None,
+    describe: Callable[[Study, Fit], Description | None] | None = None,
     correction: Callable[[Subject, Fit, Split], LearntCorrection | None] | None = None,
     level: float = LEVEL,
     seed: int = 0,
@@ -84,8 +86,10 @@ def calibrate(
     Args:
         model: its parameters' starts are the model "as given" (uncalibrated).
         held_out: (n,) runs kept for the test, whole sessions; default `study.middle_session`.
-        correction: learns a correction of the calibrated model where nothing explains the residual, such as
-            `calibration.swimmer.head_correction.learn_head_correction`.
+        describe: looks for laws where nothing explains the residual, such as
+            `calibration.laws.law_fits.find_laws`.
+        correction: learns a correction of the calibrated model where nothing explains the residual and no law
+            describes it, such as `calibration.swimmer.head_correction.learn_head_correction`.
         level: α of every claim.
         seed: of the bootstrap; the same seed gives the same result.
         draws: of the bootstrap. It resolves no smaller p-value than 2/(draws + 1).
@@ -106,9 +110,14 @@ def calibrate(
         untestable=dict(model.untestable),
     )
     verdict = reach_verdict(evidence, level, number_explains=explained.number is not None)
-    learnt = correction(model, explained.base, split) if correction and verdict == "unexplained" else None
+    description = describe(study, explained.base) if describe and verdict == "unexplained" else None
+    described = description is not None and description.complete
+    steered = verdict == "unexplained" and not described
+    learnt = correction(model, explained.base, split) if correction and steered else None
     fixed = {"level": level, "seed": seed, "catalogue": [e.name for e in model.effects], "locked": split.names}
-    corrections = Corrections(regress_residual(model.runs, explained.base.prediction, split.fitted), learnt)
+    regression = regress_residual(model.runs, explained.base.prediction, split.fitted)
+    corrections = Corrections(regression, learnt, description)
+    rivals = description.rivals if description is not None and described else explained.rivals(model)
     return Verdict(
         verdict=verdict,
         evidence=evidence,
@@ -122,7 +131,7 @@ def calibrate(
             excluded=(*model.runs.excluded, *split.reasons),
             caveats=(*model.runs.caveats, *split.caveats, *_caveats(model, explained)),
         ),
-        next=_next_runs(model, explained.rivals, seed),
+        next=_next_runs(rivals, seed),
     )
 
 
@@ -144,14 +153,13 @@ class Explained:
             return self.best[0].refit
         return self.number or self.base
 
-    @property
-    def rivals(self) -> tuple[tuple[str, Fit], ...]:
-        """Explanations that the runs cannot tell apart, in words, best first; none if there are not two."""
+    def rivals(self, model: Experiment) -> tuple[Rival, ...]:
+        """List explanations that the runs cannot tell apart, best first; none if there are not two."""
         known = [(c.title, c.refit) for c in (*self.best, *self.rival_effects) if c.refit]
         if self.number and self.rival_effects:
             wrong = ", ".join(alike[0].parameter.title for alike in self.number.wrong_numbers)
             known = [(f"the stated value of {wrong} is wrong", self.number), *known]
-        return tuple(known) if len(known) > 1 else ()
+        return tuple(Rival(title, refit, model) for title, refit in known) if len(known) > 1 else ()
 
 
 def explain(study: Study, guess: Mapping[str, float]) -> Explained:
@@ -230,13 +238,12 @@ def _fits(study: Study, explained: Explained, uncalibrated: Floats, *, moved: bo
     )
 
 
-def _next_runs(model: Experiment, rivals: tuple[tuple[str, Fit], ...], seed: int) -> Next:
-    """Plan the runs that would tell rival explanations apart; none if there are no rivals."""
+def _next_runs(rivals: tuple[Rival, ...], seed: int) -> Next:
+    """Plan the runs that would tell rivals apart; none if there are no rivals."""
     if not rivals:
         return Next()
-    runs, batch = next_runs(model, [fitted for _, fitted in rivals], seed=seed)
-    outputs = model.runs.outputs
-    return Next(tuple(Explanation.from_fit(title, fitted, outputs) for title, fitted in rivals), runs, batch)
+    runs, batch = next_runs(rivals, seed=seed)
+    return Next(tuple(map(Explanation.from_rival, rivals)), runs, batch)
 
 
 def _errors(study: Study, explained: Explained, uncalibrated: Floats, corrections: Corrections) -> HeldOutErrors:
@@ -251,6 +258,8 @@ def _errors(study: Study, explained: Explained, uncalibrated: Floats, correction
     }
     if corrections.learnt is not None:
         predictions["predictive"] = corrections.learnt.prediction
+    if corrections.law is not None:
+        predictions["law"] = corrections.law.prediction
     stated = {name: errors(runs, prediction, test) for name, prediction in predictions.items()}
     noise = base.noise.run
     return HeldOutErrors(

@@ -1,10 +1,15 @@
-"""What `calibrate` needs of its subject beside the forward model: units, a start, runs that can be made next."""
+"""What `calibrate` needs of its subject beside the forward model: units, a start, runs that can be made next.
+
+Beside the catalogue a subject may have two ways to describe what no effect explains: a law, and a correction.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from calibration.statistics.fit import Fit
 from calibration.statistics.statistical_model import ForwardModel
 from sim.arrays import Flags, Floats
 
@@ -48,4 +53,42 @@ class LearntCorrection(Protocol):
     @property
     def terms(self) -> tuple[str, ...]:
         """What it depends on, in words."""
+        ...
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A fitted model that explains or describes the runs as well as others do."""
+
+    title: str  # in words
+    fit: Fit
+    model: Experiment  # that was fitted
+    law: Mapping[str, Any] = field(default_factory=dict)  # what makes this model of one without the law
+
+
+class Description(Protocol):
+    """Laws that describe runs which no effect explains."""
+
+    @property
+    def sentence(self) -> str:
+        """What the laws say, without a claim about the cause."""
+        ...
+
+    @property
+    def complete(self) -> bool:
+        """Whether the best law leaves no more than noise."""
+        ...
+
+    @property
+    def prediction(self) -> Floats:
+        """(n, k) of the best law, fitted without the held-out runs; without a law, of the calibrated model."""
+        ...
+
+    @property
+    def rivals(self) -> tuple[Rival, ...]:
+        """Laws that the runs cannot tell apart, best first; none if there are not two."""
+        ...
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the record for verdict.json."""
         ...

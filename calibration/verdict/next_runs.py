@@ -27,9 +27,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
-from calibration.statistics.fit import Fit
 from calibration.statistics.statistical_model import Noise
-from calibration.verdict.experiment import Experiment
+from calibration.verdict.experiment import Rival
 from sim.arrays import Floats
 
 STOP = 25.0  # ratio of likelihoods at which an explanation is given up, 1/α of the sequence of batches
@@ -86,17 +85,18 @@ class Pair(NamedTuple):
     covariance: Floats  # (p, p) of its fit
 
 
-def next_runs(
-    model: Experiment, rivals: Sequence[Fit], *, count: int = 3, seed: int = 0
-) -> tuple[tuple[NextRun, ...], Batch]:
-    """Find the best experiments to tell fits apart, best first, and the best batch of `BATCH` runs.
+def next_runs(rivals: Sequence[Rival], *, count: int = 3, seed: int = 0) -> tuple[tuple[NextRun, ...], Batch]:
+    """Find the best experiments to tell rivals apart, best first, and the best batch of `BATCH` runs.
 
     Args:
-        rivals: two fits or more, the best first; of many, the first four are told apart.
+        rivals: two fitted models or more, the best first; of many, the first four are told apart.
     """
-    possible, settings = model.possible()
-    fits = rivals[:_MOST_RIVALS]
-    sides = [possible.derivatives(fitted.parameters, fitted.names) for fitted in fits]
+    settings = rivals[0].model.possible()[1]
+    fits = [rival.fit for rival in rivals[:_MOST_RIVALS]]
+    sides = [
+        rival.model.possible()[0].derivatives(rival.fit.parameters, rival.fit.names)
+        for rival in rivals[:_MOST_RIVALS]
+    ]
     pairs = [
         Pair(true[0] - wrong[0], wrong[1], again.covariance)
         for (_, true), (again, wrong) in itertools.permutations(zip(fits, sides, strict=True), 2)

@@ -94,16 +94,28 @@ def _after_ambiguous(result: Verdict) -> list[str]:
 
 
 def _after_unexplained(result: Verdict) -> list[str]:
-    steps = [
-        "Look where the residual is large (below): a dependence on one input points to the part of the set-up to "
-        "check."
-    ]
+    if result.described:
+        first = "Look for a cause where the law acts (below), and which depends on the same inputs."
+    else:
+        first = (
+            "Look where the residual is large (below): a dependence on one input points to the part of the set-up "
+            "to check."
+        )
+    steps = [first]
     if result.evidence.untestable:
         missing = sorted(result.evidence.untestable)
         steps.append(
             f"Note more in the table, so that these effects can be tested: {', '.join(missing)}. The section on "
             "the evidence says which columns they need."
         )
+    if result.described:
+        return [
+            *steps,
+            *_telling_apart(result),
+            f"{_PLAN} It has the law, which holds between these runs only.",
+            "When the cause is known, make the law an effect of the catalogue: `softflagella calibration adopt "
+            "verdict.json --name NAME --out .`.",
+        ]
     if result.error_predictive is None:
         return [
             *steps,

@@ -9,15 +9,15 @@ is given up if it is behind the best one by more than 2 ln STOP. Source: Grünwa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from calibration.statistics.fit import Fit
 from calibration.statistics.statistical_model import ForwardModel, Noise, Runs, start_values
+from calibration.verdict.experiment import Rival
 from calibration.verdict.next_runs import GIVEN_UP
 from sim.arrays import Flags, Floats
 from sim.io.errors import InputError
@@ -33,12 +33,15 @@ class Explanation:
     covariance: Floats  # (p, p) of them
     noise: Noise  # of runs and sessions
     outputs: tuple[str, ...]  # (k,) that were fitted
+    law: Mapping[str, Any] = field(default_factory=dict)  # of a rival that is a law, see `with_law` of `standings`
 
     @staticmethod
-    def from_fit(title: str, fitted: Fit, outputs: tuple[str, ...]) -> Explanation:
-        """Keep of a fit what a decision needs."""
+    def from_rival(rival: Rival) -> Explanation:
+        """Keep of a rival what a decision needs."""
+        fitted = rival.fit
         parameters = {name: fitted.parameters[name] for name in fitted.names}
-        return Explanation(title, parameters, fitted.covariance, fitted.noise, outputs)
+        outputs = tuple(rival.model.runs.outputs)
+        return Explanation(rival.title, parameters, fitted.covariance, fitted.noise, outputs, rival.law)
 
     def record(self) -> dict[str, Any]:
         """Write it for verdict.json."""
@@ -49,6 +52,7 @@ class Explanation:
             "noise_of_a_run": self.noise.run.tolist(),
             "share_of_sessions": self.noise.share,
             "outputs": list(self.outputs),
+            **({"law": dict(self.law)} if self.law else {}),
         }
 
     @staticmethod
@@ -66,7 +70,8 @@ class Explanation:
             raise ValueError
         if not np.isfinite(numbers).all():
             raise ValueError
-        return Explanation(str(record["title"]), parameters, covariance, Noise(run, share), outputs)
+        law = dict(record.get("law", {}))
+        return Explanation(str(record["title"]), parameters, covariance, Noise(run, share), outputs, law)
 
 
 @dataclass(frozen=True)
@@ -115,17 +120,32 @@ def new_runs(runs: Runs, before: set[str]) -> Flags:
     return new
 
 
-def standings(model: ForwardModel, explanations: Sequence[Explanation], new: Flags) -> list[Standing]:
+Model = TypeVar("Model", bound=ForwardModel)
+
+
+def standings(
+    model: Model,
+    explanations: Sequence[Explanation],
+    new: Flags,
+    with_law: Callable[[Model, Mapping[str, Any]], ForwardModel] | None = None,
+) -> list[Standing]:
     """Judge explanations by the new runs in `new` (n,), best first.
 
-    It takes up where `calibration.verdict.verdict.reach_verdict` says "ambiguous".
+    It takes up where `calibration.verdict.verdict.reach_verdict` says "ambiguous", and where several laws describe
+    what nothing explains.
+
+    Args:
+        with_law: makes the model of a law from the model without it and the law's record.
 
     Raises:
         InputError: the table has other outputs than were fitted, or lacks what an effect needs.
     """
-    data, known = model.runs, start_values(model)
-    scores = []
+    data, scores = model.runs, []
     for explanation in explanations:
+        subject: ForwardModel = model
+        if explanation.law and with_law:
+            subject = with_law(model, explanation.law)
+        known = start_values(subject)
         if explanation.outputs != data.outputs:
             raise InputError(
                 f"this table has the outputs {', '.join(data.outputs)}; the verdict was made from "
@@ -138,7 +158,7 @@ def standings(model: ForwardModel, explanations: Sequence[Explanation], new: Fla
                 "table before"
             )
         parameters = {**known, **explanation.parameters}
-        prediction, J = model.derivatives(parameters, list(explanation.parameters))
+        prediction, J = subject.derivatives(parameters, list(explanation.parameters))
         slopes = J[new].reshape(-1, J.shape[-1])
         spread = explanation.noise.covariance(data.session[new]) + slopes @ explanation.covariance @ slopes.T
         residual = (data.y - prediction)[new].ravel()
@@ -176,11 +196,16 @@ class Decision:
         return f"Not decided between {' and '.join(titles)}: make more runs."
 
 
-def decide(model: ForwardModel, explanations: Sequence[Explanation], before: set[str]) -> Decision:
-    """Judge explanations by the runs of sessions that were not among those `before`.
+def decide(
+    model: Model,
+    explanations: Sequence[Explanation],
+    before: set[str],
+    with_law: Callable[[Model, Mapping[str, Any]], ForwardModel] | None = None,
+) -> Decision:
+    """Judge explanations by the runs of sessions that were not among those `before`, see `standings`.
 
     Raises:
         InputError: there are no new runs, or they cannot be compared with what was fitted.
     """
     new = new_runs(model.runs, before)
-    return Decision(tuple(standings(model, explanations, new)), int(new.sum()))
+    return Decision(tuple(standings(model, explanations, new, with_law)), int(new.sum()))

@@ -2,7 +2,7 @@
 
 "none": no departure beyond noise. "number": a nuisance parameter is wrong, and explains it. "effect": one effect,
 or one pair, explains it. "ambiguous": several do, and the runs cannot tell them apart. "unexplained": there is a
-departure, and nothing in the catalogue explains it.
+departure, and nothing in the catalogue explains it. A law may describe it; a law is no claim about the cause.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from calibration.statistics.held_out import FinalRefit
 from calibration.statistics.residual_regression import Regression
 from calibration.statistics.residual_tests import Misfit
 from calibration.statistics.study import Split
-from calibration.verdict.experiment import LearntCorrection
+from calibration.verdict.experiment import Description, LearntCorrection
 from calibration.verdict.next_runs import Batch, NextRun
 from calibration.verdict.sequential_test import Explanation
 from sim.arrays import Floats
 from sim.io.deprecated import old_attributes
 
-MODELS = ("uncalibrated", "before", "after", "generic", "predictive")  # whose errors are stated
+MODELS = ("uncalibrated", "before", "after", "generic", "predictive", "law")  # whose errors are stated
 _NOTABLE = 2.0  # pull of a nuisance parameter beyond which the sentence says so
 _NEAR = 0.5  # if no effect explains the residual, the best one is named if it removes at least this share
 
@@ -86,7 +86,8 @@ class HeldOutErrors:
     """How far each model is from the held-out runs, relative rms, and how far noise alone would be.
 
     The models are "uncalibrated", "before" (calibrated), "after" (with the effects of the verdict), "generic"
-    (with a regression of the residual) and "predictive" (with a learnt correction, if there is one).
+    (with a regression of the residual), and, if there are such, "law" (with the best law) and "predictive" (with a
+    learnt correction).
     """
 
     rms: dict[str, float]  # of each model, over all outputs
@@ -101,7 +102,8 @@ class Corrections:
     """Descriptions of the residual that do not explain it."""
 
     regression: Regression  # of the calibrated model's outputs
-    learnt: LearntCorrection | None  # what is handed on where nothing explains the residual
+    learnt: LearntCorrection | None  # what is handed on where nothing explains or describes the residual
+    law: Description | None = None  # laws, where they were looked for
 
 
 @dataclass(frozen=True)
@@ -312,7 +314,24 @@ class Verdict:
             names += self._outside
             return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart."
         none = "no effect and no pair of effects of the catalogue explains"
-        return f"There is a residual ({p}) that {none}{self._nearest}.{self._steered}"
+        return f"There is a residual ({p}) that {none}{self._nearest}.{self._described}{self._steered}"
+
+    @property
+    def described(self) -> bool:
+        """Whether a law describes a residual that nothing explains, and leaves no more than noise."""
+        return self.corrections.law is not None and self.corrections.law.complete
+
+    @property
+    def _described(self) -> str:
+        """What laws say about the residual, with the error of the best one."""
+        law = self.corrections.law
+        if law is None:
+            return ""
+        if not law.complete:
+            return f" {law.sentence}"
+        with_law, without = 100 * self.errors.rms["law"], 100 * self.error_before
+        errors = f"{with_law:.2f} % with it, {without:.2f} % without it"
+        return f" {law.sentence} The error on the held-out runs is {errors}."
 
     @property
     def _steered(self) -> str:

@@ -60,6 +60,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "untestable": result.evidence.untestable,
         "generic_features": list(result.corrections.regression.features),
         "correction_terms": list(learnt.terms) if learnt else [],
+        "laws": result.corrections.law.to_dict() if result.corrections.law else None,
         "explanations": [e.record() for e in result.next.explanations],
         "sessions": list(result.conditions.sessions),
         "next_runs": [run.record() for run in result.next.runs],

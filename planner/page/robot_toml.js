@@ -29,7 +29,7 @@ const MEASURED = new Set([
 const LARGEST_SIGMA = 0.5; // share of the number itself
 const LARGEST = 1e100; // of a number, whatever its unit
 const SIGMA = "_sigma";
-const LOCKED = ["effects", "correction", "calibration"];
+const LOCKED = ["effects", "correction", "learnt_from", "calibration"];
 const HEADER = `\
 # Units are suffixes: length_cm, length_mm, speed_rpm, speed_rad_s, ... KEY_sigma states one standard deviation of
 # a number, in its unit or as "5 %"; only a calibration uses it.

@@ -11,7 +11,7 @@ from functools import cache
 
 from sim.io.errors import InputError
 from sim.model.effect import Effect
-from sim.model.force_law import law_from_name
+from sim.model.power_law import law_from_name
 
 __all__ = ["Effect", "catalogue", "check_effects", "check_size", "effect_named"]
 
@@ -19,7 +19,7 @@ __all__ = ["Effect", "catalogue", "check_effects", "check_size", "effect_named"]
 class Catalogue(dict[str, Effect]):
     """Effects by name. It lists those of this folder, and knows beside them each law by its name.
 
-    A law (`sim.model.force_law`) states itself in its name. So it is found here in any process without being
+    A law (`sim.model.power_law`) states itself in its name. So it is found here in any process without being
     registered, and it is never listed.
     """
 

@@ -12,8 +12,7 @@ where b is the largest size that is allowed. So it changes drag, and the simulat
 motion, and the response to a flip, which was not measured, with the same drag. Left and right turns stay mirror
 images.
 
-A correction holds between the runs that it was learnt from, and a little beyond (`_MARGIN`). A robot outside is
-refused.
+A correction holds between the runs that it was learnt from (`sim.model.learnt_range`). A robot outside is refused.
 """
 
 from __future__ import annotations
@@ -27,9 +26,8 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.io.errors import InputError
+from sim.model.learnt_range import INPUTS, LearntRange, inputs_of
 
-INPUTS = ("N", "ln l/R", "ln ω̄ (R/l)⁴")
-_MARGIN = (0.5, 0.1, 0.1)  # of the inputs, beyond the runs
 MOST = {"C_t": 1.5, "C_r": 1.5, "C_yr": 1.5, "surface_couple": 2.0, "anisotropic_head_drag": 0.6}  # b
 _LARGEST = 1e9  # of any number: powers of larger ones overflow
 KNOBS = tuple(MOST)  # what a correction may change
@@ -71,14 +69,8 @@ class Correction:
         Raises:
             InputError: the robot is outside the runs that the correction was learnt from.
         """
-        x = inputs_of(values)
-        for name, value, low, high, margin in zip(INPUTS, x, self.low, self.high, _MARGIN, strict=True):
-            if not low - margin <= value <= high + margin:
-                raise InputError(
-                    f"{name} = {value:.3g} is outside the runs that the robot's correction was learnt from "
-                    f"({low:.3g} to {high:.3g}): make runs there, or leave out the table [correction]"
-                )
-        terms = self.terms(np.array([x]))[0]
+        LearntRange(self.low, self.high).check(values, "correction")
+        terms = self.terms(np.array([inputs_of(values)]))[0]
         corrected = dict(values)
         for name, weights in self.weights.items():
             g = MOST[name] * math.tanh(float(terms @ np.array(weights)) / MOST[name])
@@ -93,12 +85,6 @@ class Correction:
 def monomials(x: Floats, powers: tuple[tuple[int, ...], ...]) -> Floats:
     """Compute products of powers of the columns of x (m, 3), (m, t)."""
     return np.stack([(x ** np.array(term)).prod(1) for term in powers], 1)
-
-
-def inputs_of(values: Mapping[str, float]) -> tuple[float, float, float]:
-    """Compute INPUTS of a robot."""
-    slender = math.log(values["l_over_R"])
-    return float(values["N"]), slender, math.log(abs(values["omega_bar"])) - 4 * slender
 
 
 def correction_tables(correction: Correction) -> dict[str, Any]:

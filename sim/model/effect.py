@@ -36,6 +36,7 @@ class Factors(NamedTuple):
 
     viscosity: Floats | float = 1.0  # everything that drags, and the flow that a force makes
     drag: Floats | float = 1.0  # drag of head, disc and tails
+    tail_drag: Floats | float = 1.0  # drag of the tails alone
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from sim.io.notebook import as_html
 from sim.io.units import format_length, from_si
 from sim.model.correction import Correction
 from sim.model.groups import Groups, check_finite, check_positive, check_slenderness, check_tails
+from sim.model.learnt_range import LearntRange
 from sim.model.uncertainty import DEFAULTS, Sigma
 
 
@@ -53,6 +54,7 @@ class Robot:
     effects: Mapping[str, float] = field(default_factory=dict)  # name -> size
     sigmas: Mapping[str, Sigma] = field(default_factory=dict)  # of the fields that state one, see `sigma`
     correction: Correction | None = None  # what a calibration learnt that no effect explains
+    learnt_from: LearntRange | None = None  # the runs that its law was learnt from
 
     def __post_init__(self) -> None:
         check_tails(self.tails)
@@ -114,9 +116,11 @@ class Robot:
         """Compute the dimensionless groups of this robot by column name, for the positive direction of the motor.
 
         Raises:
-            InputError: the robot has a correction, and is outside its range.
+            InputError: the robot has a correction or a law, and is outside the runs that it was learnt from.
         """
         values = self._given_groups()
+        if self.learnt_from is not None:
+            self.learnt_from.check(values, "law")
         return values if self.correction is None else self.correction.applied(values)
 
     def _given_groups(self) -> dict[str, float]:

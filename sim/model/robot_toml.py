@@ -1,8 +1,8 @@
 """robot.toml: a robot in the units of a laboratory, with comments.
 
-The file has the tables [tails], [head], [fluid], [motor], [drag] and, if there are any, [effects] and
-[correction]. A key is a quantity with its unit as suffix: length_cm, speed_rpm, viscosity_Pa_s. Every usual unit
-is read (`sim.io.units`), one is written. KEY_sigma states one standard deviation of a number that was measured: a
+The file has the tables [tails], [head], [fluid], [motor], [drag] and, if there are any, [effects], [correction]
+and [learnt_from]. A key is a quantity with its unit as suffix: length_cm, speed_rpm, viscosity_Pa_s. Every usual
+unit is read (`sim.io.units`), one is written. KEY_sigma states one standard deviation of a measured number: a
 number in the unit of its key, or a text like "10 %".
 """
 
@@ -82,7 +82,7 @@ def read_robot(tables: Mapping[str, Any], where: str) -> dict[str, Any]:
     """Read the fields of `Robot` in SI units, and `sigmas`, from the tables of a robot.toml.
 
     Args:
-        tables: as parsed, without name, effects, correction and calibration.
+        tables: as parsed, without name, effects, correction, learnt_from and calibration.
         where: the file's name, for messages.
 
     Raises:
@@ -131,7 +131,11 @@ def robot_toml(robot: Robot) -> str:
         tables["effects"] = [f"{name} = {float(size)!r}" for name, size in robot.effects.items()]
     if robot.correction:
         tables["correction"] = [f"{k} = {json.dumps(v)}" for k, v in correction_tables(robot.correction).items()]
-    order = sorted(tables, key=[*dict.fromkeys(entry.table for entry in ENTRIES), "effects", "correction"].index)
+    if robot.learnt_from:
+        learnt = robot.learnt_from
+        tables["learnt_from"] = [f"low = {list(learnt.low)}", f"high = {list(learnt.high)}"]
+    known = [*dict.fromkeys(entry.table for entry in ENTRIES), "effects", "correction", "learnt_from"]
+    order = sorted(tables, key=known.index)
     blocks = ["\n".join([f"[{table}]", *tables[table]]) for table in order]
     name = json.dumps(robot.name, ensure_ascii=False).replace("\x7f", "\\u007f")  # escapes as TOML does
     return "\n\n".join([f"{_HEADER}name = {name}", *blocks, *([] if robot.effects else [_NO_EFFECTS])]) + "\n"

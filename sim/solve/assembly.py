@@ -60,7 +60,7 @@ def with_effects(body: Body, groups: Groups) -> Body:
     """
     terms = body.nonlocal_terms._asdict()
     viscosity: Any = np.ones(len(groups))
-    drag = np.ones(len(groups))
+    drag, tail_drag = np.ones(len(groups)), np.ones(len(groups))
     for name, size in groups.effects.items():
         effect = effect_named(name)
         if effect.reach == "nonlocal":
@@ -68,12 +68,13 @@ def with_effects(body: Body, groups: Groups) -> Body:
         body = effect.adds(size, groups, body)
         factors = effect.scales(size, groups)
         viscosity, drag = viscosity * factors.viscosity, drag * factors.drag
+        tail_drag = tail_drag * factors.tail_drag
     all_drag = viscosity * drag
     terms = {name: value * all_drag if catalogue()[name].is_drag else value for name, value in terms.items()}
     return body._replace(
         viscosity=viscosity,
-        zeta_parallel=body.zeta_parallel * all_drag,
-        zeta_perp=body.zeta_perp * all_drag,
+        zeta_parallel=body.zeta_parallel * (all_drag * tail_drag),
+        zeta_perp=body.zeta_perp * (all_drag * tail_drag),
         resistance=body.resistance * all_drag,
         nonlocal_terms=Nonlocal(**terms),
     )

@@ -8,6 +8,7 @@ from typing import Literal
 
 import pandas as pd
 
+from calibration.laws.law_model import with_law
 from calibration.report.robot_verdict import RobotVerdict, calibrate_robot
 from calibration.swimmer.camera_tracks import measure_tracks
 from calibration.swimmer.measured_table import read_measurements
@@ -26,6 +27,7 @@ def calibrate(
     protocol: Literal["session", "paper"] = "session",
     seed: int = 0,
     own: Owned | None = None,
+    laws: bool = True,
     jobs: int | None = None,
     progress: bool = True,
 ) -> RobotVerdict:
@@ -39,6 +41,7 @@ def calibrate(
         seed: of the bootstrap; the same seed gives the same result.
         own: what the lab can set in its next runs, such as `{"l_cm": (5, 7, 9)}`; for `N`, `l_cm` and `omega_rpm`
             (both directions). Default: the table's range.
+        laws: whether laws are looked for where no effect explains the runs; it takes up to two minutes.
         jobs: threads; default all processors.
         progress: show progress bars.
 
@@ -56,7 +59,7 @@ def calibrate(
         >>> result = sf.plan(sf.circle(2.0), verdict.corrected, knowledge=verdict.knowledge)  # doctest: +SKIP
     """
     return calibrate_robot(
-        table, one_robot(robot), protocol=protocol, own=own, seed=seed, jobs=jobs, progress=progress
+        table, one_robot(robot), protocol=protocol, own=own, laws=laws, seed=seed, jobs=jobs, progress=progress
     )
 
 
@@ -86,7 +89,8 @@ def decide(
         explanations, before = list(verdict.next.explanations), set(verdict.conditions.sessions)
     else:
         explanations, before = read_explanations(verdict)
-    return decide_between(SwimmerModel(one_robot(robot), read_measurements(table), jobs), explanations, before)
+    model = SwimmerModel(one_robot(robot), read_measurements(table), jobs)
+    return decide_between(model, explanations, before, with_law)
 
 
 def tracks(

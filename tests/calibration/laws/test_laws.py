@@ -9,7 +9,8 @@ import pytest
 
 from calibration.laws.law_model import EXPONENTS, SIZE, LawModel
 from calibration.laws.places import Place, places
-from calibration.report.robot_laws import find_robot_laws, robot_with_law
+from calibration.report.law_robot import law_handed_on, robot_with_law
+from calibration.report.robot_laws import find_robot_laws
 from calibration.statistics.statistical_model import by_differences, start_values
 from calibration.swimmer.synthetic_table import make_table
 from sim.effects import catalogue
@@ -68,8 +69,7 @@ def test_the_robot_with_a_law_moves_as_its_fit_says(name: str) -> None:
     described = find_robot_laws(table, START, progress=False)
     assert described.laws is not None
     law = next(one for one in described.laws.fitted if one.place.name == name)
-    robot = robot_with_law(START, law)
-    assert robot is not None
+    robot = robot_with_law(START, law, law.fit.parameters)
     runs, place_of_run = law.model.robots(law.fit.parameters)
     for row in (0, 17):
         fitted = runs[place_of_run[row]]
@@ -97,5 +97,5 @@ def test_files_of_a_law_are_read_back(tmp_path) -> None:  # type: ignore[no-unty
     described.save(tmp_path)
     assert described.laws is not None
     robot = load_robot(tmp_path / "law.toml")
-    assert robot == robot_with_law(START, described.laws.kept[0])
+    assert robot == law_handed_on(START, described.laws.kept[0], described.study.split.kept)[0]
     assert SIZE.removeprefix("law_") in described.to_frame().columns

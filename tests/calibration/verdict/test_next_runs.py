@@ -9,6 +9,7 @@ import pytest
 
 from calibration.statistics.fit import fit
 from calibration.statistics.statistical_model import Noise, start_values
+from calibration.verdict.experiment import Rival
 from calibration.verdict.next_runs import BATCH, STOP, Pair, _greedy, _together, next_runs
 from tests.calibration.toy_tables import TRUTH, toy_swimmer, toy_table
 
@@ -59,7 +60,7 @@ def test_a_batch_is_stated_with_its_settings_and_where_to_stop() -> None:
         fit(model, start_values(model), (*common, name), used, title="")
         for name in ("end_over_end_drag", "disc_drag")
     ]
-    batch = next_runs(model, fits)[1]
+    batch = next_runs([Rival("", fitted, model) for fitted in fits])[1]
     assert len(batch.settings) == BATCH
     assert batch.stop == pytest.approx(2 * math.log(STOP))
     assert 0 <= batch.decides <= 1

@@ -77,7 +77,7 @@ def test_texts_are_read_or_refused_in_the_same_words(old: str, new: str, tmp_pat
         check_robot({**found, "name": Path(found["name"]).name}, wanted)
 
 
-@pytest.mark.parametrize("table", ["effects", "correction", "calibration"])
+@pytest.mark.parametrize("table", ["effects", "correction", "learnt_from", "calibration"])
 def test_a_robot_that_python_must_make_is_refused(table: str) -> None:
     found = answer("robot_toml.js", "readRobot", f"{TEXT}\n[{table}]\nx = 1\n", "robot.toml")
     assert isinstance(found, InputError)

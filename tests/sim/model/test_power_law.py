@@ -1,4 +1,4 @@
-"""Laws of force on head and disc: the catalogue's own formulas, derivatives, symmetry, names."""
+"""Laws that state themselves by name: the catalogue's own formulas, derivatives, symmetry, names."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ import pytest
 from sim.effects import catalogue, check_size
 from sim.inputs import check_columns
 from sim.io.errors import InputError
-from sim.model.force_law import (
+from sim.model.groups import Groups
+from sim.model.power_law import (
     COEFFICIENTS,
     MOTIONS,
+    TAILS,
     WRENCHES,
     Powers,
-    coefficient_law,
+    factor_law,
     force_law,
     law_from_name,
 )
-from sim.model.groups import Groups
 from sim.motion.sensitivity import sensitivities
 from sim.motion.steady import steady
 from sim.solve.assembly import assemble, numbers
@@ -63,13 +64,33 @@ def test_a_couple_linear_in_length_and_number_is_that_of_tails_under_the_surface
 
 @pytest.mark.parametrize("coefficient", COEFFICIENTS)
 def test_a_coefficient_as_a_power_law_is_that_coefficient(coefficient: str) -> None:
-    law = coefficient_law(coefficient, STEEP)
+    law = factor_law(coefficient, STEEP)
     groups = with_law(law.name, 0.7, N=3, l_over_R=4.0, omega_bar=20.0)
     factor = float(np.exp(0.7 * STEEP.logarithm(groups)[0]))
     assert abs(factor - 1) > 0.05
     symbol = COEFFICIENTS[coefficient]
     same = control(N=3, l_over_R=4.0, omega_bar=20.0, **{symbol: CONTROL_VALUES[symbol] * factor})
     assert np.allclose(assemble(groups).resistance, assemble(same).resistance, rtol=1e-13, atol=1e-16)
+
+
+def test_drag_of_the_tails_is_that_of_a_viscous_fluid_around_the_tails_alone() -> None:
+    """In units of that fluid, the head has less drag and the motor turns faster."""
+    law = factor_law("tail_drag", STEEP)
+    groups = with_law(law.name, 0.7, N=3, l_over_R=4.0, omega_bar=20.0)
+    factor = float(np.exp(0.7 * STEEP.logarithm(groups)[0]))
+    head = {symbol: CONTROL_VALUES[symbol] / factor for symbol in COEFFICIENTS.values()}
+    one, other = steady(groups), steady(control(N=3, l_over_R=4.0, omega_bar=20.0 * factor, **head))
+    for output in OUTPUTS:
+        assert float(getattr(other, output)[0]) == pytest.approx(factor * float(getattr(one, output)[0]), rel=1e-9)
+
+
+def test_stiffness_of_the_tails_is_a_slower_motor_in_its_unit_of_time() -> None:
+    law = factor_law("tail_stiffness", STEEP)
+    groups = with_law(law.name, 0.7, N=3, l_over_R=4.0, omega_bar=20.0)
+    factor = float(np.exp(0.7 * STEEP.logarithm(groups)[0]))
+    one, other = steady(groups), steady(control(N=3, l_over_R=4.0, omega_bar=20.0 / factor))
+    for output in OUTPUTS:
+        assert factor * float(getattr(other, output)[0]) == pytest.approx(float(getattr(one, output)[0]), rel=1e-9)
 
 
 def test_the_power_law_is_in_motor_speed_and_not_in_its_group() -> None:
@@ -85,7 +106,7 @@ def test_the_power_law_is_in_motor_speed_and_not_in_its_group() -> None:
 
 LAWS = [
     *(force_law(w, m, STEEP).name for w, m in product(WRENCHES, MOTIONS)),
-    *(coefficient_law(c, STEEP).name for c in COEFFICIENTS),
+    *(factor_law(c, STEEP).name for c in (*COEFFICIENTS, *TAILS)),
 ]
 
 
@@ -128,6 +149,7 @@ def test_a_law_is_known_by_its_name_and_not_listed() -> None:
         "law_Fy_wh_speed0_length0_tails0",
         "law_Fx_speed0_length0_tails0",
         "law_Ct_wh_speed0_length0_tails0",
+        "law_tail_drag_wh_speed0_length0_tails0",
         "law_Ct_rectified_speed100_length0_tails0",
     ],
 )

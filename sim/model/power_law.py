@@ -1,11 +1,13 @@
-"""Laws of force on head and disc that no effect of the catalogue states: a place, a driver and a power law.
+"""Laws that no effect of the catalogue states: a place, a driver and a power law.
 
     force on the head or disc   F = ε μ0 R^d m v,     m = (ω/ω_c)^p (l/l_c)^q (N/N_c)^r
     coefficient of the head     C × m^ε
+    drag of the tails           ζ∥, ζ⊥ × m^ε
+    stiffness of the tails      EI × m^ε
 
 F is one of F_x, F_z, M_y, M_z about J, and v is one of v_x, v_z, ω_yr, ω_h, ω_t. d makes ε dimensionless. A term
 that would tell left from right is multiplied by the sign of the motor where it is `rectified`; mirror symmetry
-allows just one of the two. C is C_t, C_r or C_yr, with one pattern of exponents whose size is ε.
+allows just one of the two. C is C_t, C_r or C_yr. A factor has one pattern of exponents, whose size is ε.
 
 ω_c, l_c and N_c belong to the paper's control example. ω/ω_c is ω̄ (l/r0)⁻⁴ over its value there and l/l_c is l/R
 over its value there, as for one material, fluid and head.
@@ -14,7 +16,8 @@ A law's name states it in full: "law_Fx_wh_speed-93_length425_tails0" has the ex
 a file or a process that knows only the name has the law. Exponents are rounded to thousandths. They
 lie from −4 to 4.
 
-Left out: laws of the tails. A side force elsewhere on the axis is a force and a couple, two laws of one factor.
+Left out: loads of a part of the tails. A side force elsewhere on the axis is a force and a couple, two laws of one
+factor.
 """
 
 from __future__ import annotations
@@ -29,7 +32,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.io.errors import InputError
 from sim.linear.complex_step import magnitude, sign
-from sim.model.effect import Effect
+from sim.model.effect import Effect, Factors
 from sim.model.presets import CONTROL
 
 if TYPE_CHECKING:
@@ -39,11 +42,13 @@ if TYPE_CHECKING:
 WRENCHES = {"Fx": ("F_x", 1), "Fz": ("F_z", 1), "My": ("M_y", 2), "Mz": ("M_z", 2)}  # symbol, power of length
 MOTIONS = {"vx": ("v_x", 0), "vz": ("v_z", 0), "wyr": ("ω_yr", 1), "wh": ("ω_h", 1), "wt": ("ω_t", 1)}
 COEFFICIENTS = {"Ct": "C_t", "Cr": "C_r", "Cyr": "C_yr"}
+TAILS = {"tail_drag": "drag of the tails", "tail_stiffness": "stiffness of the tails"}
+_TAIL_SYMBOLS = {"tail_drag": "ζ∥, ζ⊥", "tail_stiffness": "EI"}
 STEEPEST = 4.0
 _CONTROL_SPEED = CONTROL.omega_bar / CONTROL.l_over_r0**4
 _CONTROL_TAILS = 2
 _LAW = re.compile(
-    rf"law_({'|'.join([*WRENCHES, *COEFFICIENTS])})(?:_({'|'.join(MOTIONS)}))?(_rectified)?"
+    rf"law_({'|'.join([*WRENCHES, *COEFFICIENTS, *TAILS])})(?:_({'|'.join(MOTIONS)}))?(_rectified)?"
     r"_speed(-?\d{1,4})_length(-?\d{1,4})_tails(-?\d{1,4})",
     re.ASCII,
 )
@@ -107,26 +112,35 @@ class ForceLaw(Effect):
 
 
 @dataclass(frozen=True)
-class CoefficientLaw(Effect):
-    """A coefficient of the head times m^ε."""
+class FactorLaw(Effect):
+    """A coefficient of the head, or the drag or the stiffness of the tails, times m^ε."""
 
-    coefficient: str = ""  # of COEFFICIENTS
+    place: str = ""  # of COEFFICIENTS or TAILS
     powers: Powers = Powers()
 
     def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
         more = np.exp(size * self.powers.logarithm(groups)) - 1
         R, L = body.head_radius, body.head_length
         lever = L / 2
-        if self.coefficient == "Cr":
+        if self.place == "Cr":
             return body.with_resistance({(3, 3): more * 8 * math.pi * groups.C_r * R**3})
-        if self.coefficient == "Cyr":
+        if self.place == "Cyr":
             side = more * groups.C_yr * R * L
             return body.with_resistance({(0, 3): side, (2, 3): side * lever})
-        drag = more * 6 * math.pi * groups.C_t * R
-        coupled = drag * lever
-        return body.with_resistance(
-            {(0, 0): drag, (1, 1): drag, (0, 2): coupled, (2, 0): coupled, (2, 2): coupled * lever}
-        )
+        if self.place == "Ct":
+            drag = more * 6 * math.pi * groups.C_t * R
+            coupled = drag * lever
+            return body.with_resistance(
+                {(0, 0): drag, (1, 1): drag, (0, 2): coupled, (2, 0): coupled, (2, 2): coupled * lever}
+            )
+        return body
+
+    def scales(self, size: Floats, groups: Groups) -> Factors:
+        """Return what a law of the tails multiplies; stiffer tails move as in a fluid of viscosity μ0 m^(−ε)."""
+        if self.place in COEFFICIENTS:
+            return Factors()
+        factor = np.exp(size * self.powers.logarithm(groups))
+        return Factors(tail_drag=factor) if self.place == "tail_drag" else Factors(viscosity=1 / factor)
 
 
 def force_law(wrench: str, motion: str, powers: Powers, *, rectified: bool | None = None) -> ForceLaw:
@@ -163,12 +177,17 @@ def force_law(wrench: str, motion: str, powers: Powers, *, rectified: bool | Non
     )
 
 
-def coefficient_law(coefficient: str, powers: Powers) -> CoefficientLaw:
-    """Make the law of a coefficient of the head, of COEFFICIENTS, as a power law."""
-    symbol = COEFFICIENTS[coefficient]
-    return CoefficientLaw(
-        name=f"law_{coefficient}_{powers.name}",
-        title=f"{symbol} as a power law",
+def factor_law(place: str, powers: Powers) -> Effect:
+    """Make the law of a coefficient of the head, of COEFFICIENTS, or of the drag or stiffness of the tails.
+
+    Args:
+        place: of COEFFICIENTS or TAILS.
+        powers: exponents of its factor.
+    """
+    symbol = COEFFICIENTS.get(place) or _TAIL_SYMBOLS[place]
+    return FactorLaw(
+        name=f"law_{place}_{powers.name}",
+        title=f"{COEFFICIENTS.get(place) or TAILS[place]} as a power law",
         equation=f"{symbol} × [{powers.words.strip()}]^ε",
         source="a power law, from measured runs",
         unit="1",
@@ -178,12 +197,12 @@ def coefficient_law(coefficient: str, powers: Powers) -> CoefficientLaw:
         symmetry="even",
         dissipative=False,
         similar=not powers.speed,
-        coefficient=coefficient,
+        place=place,
         powers=powers,
     )
 
 
-def law_from_name(name: str) -> ForceLaw | CoefficientLaw | None:
+def law_from_name(name: str) -> Effect | None:
     """Return the law that a name states in full; None where it states none, or not as a law's own name does."""
     match = _LAW.fullmatch(name)
     if not match:
@@ -192,13 +211,13 @@ def law_from_name(name: str) -> ForceLaw | CoefficientLaw | None:
     exponents = [int(text) / 1000 for text in digits]
     if (
         max(map(abs, exponents)) > STEEPEST
-        or (place in COEFFICIENTS) == bool(motion)
+        or (place not in WRENCHES) == bool(motion)
         or (rectified and not motion)
     ):
         return None
     powers = Powers(*exponents)
-    if place in COEFFICIENTS:
-        law: ForceLaw | CoefficientLaw = coefficient_law(place, powers)
+    if motion:
+        law: Effect = force_law(place, motion, powers, rectified=bool(rectified))
     else:
-        law = force_law(place, motion, powers, rectified=bool(rectified))
+        law = factor_law(place, powers)
     return law if law.name == name else None

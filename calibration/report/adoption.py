@@ -1,0 +1,195 @@
+"""Adopt a law as an effect of the catalogue: its file for `sim/effects`, and the test of that file.
+
+The effect has the law's formula under a name of its own. Its null is no law, its bounds are ten times its size to
+each side. In `sim/effects` it is found like every other effect: by calibrations, sweeps and the simulator.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim.effects import catalogue
+from sim.io.errors import InputError
+from sim.io.files import files_together, write_text
+from sim.io.reading import ContentError, read_json
+from sim.model.effect import Effect
+from sim.model.groups import Groups
+from sim.model.power_law import FactorLaw, ForceLaw, law_from_name
+from sim.model.presets import PRESETS
+from sim.motion.steady import steady
+
+_NAME = re.compile(r"[a-z][a-z0-9_]{2,40}", re.ASCII)
+_WIDER = 10.0  # bounds over the size
+_TAILS = (2, 3)  # of the robots of the test
+
+_EFFECT = '''"""{title}.
+
+    {equation}
+
+{words}. The factor is 1 at the paper's control example. The law was learnt from runs with {runs}.
+The error on held-out runs is {error:.2f} % with it, {without:.2f} % without it. It describes these runs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from sim.model.power_law import Powers, {maker}
+
+EFFECT = replace(
+    {maker}({place}, Powers({powers})),
+    name="{name}",
+    title={title!r},
+    source={source!r},
+    bounds=({low!r}, {high!r}),
+    typical={size!r},
+)
+'''
+
+_TEST = '''"""The effect {name}: the law that it was adopted from, and the motion of the control robot with it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.effects import effect_named
+from sim.model.groups import Groups
+from sim.model.presets import PRESETS
+from sim.motion.steady import steady
+
+SIZE = {size!r}
+
+
+def motion(tails: int, effects: dict[str, float]) -> list[float]:
+    values = {{**PRESETS["paper-control"].group_values(), "N": float(tails), **effects}}
+    solved = steady(Groups.from_columns({{key: np.array([value]) for key, value in values.items()}}))
+    return [float(getattr(solved, output)[0]) for output in ("omega_yr", "v_x", "v_z")]
+
+
+@pytest.mark.parametrize(("tails", "expected"), {expected})
+def test_the_motion_is_that_of_the_law(tails: int, expected: list[float]) -> None:
+    assert effect_named("{name}").typical == SIZE
+    assert motion(tails, {{"{name}": SIZE}}) == pytest.approx(expected, rel=1e-4, abs=1e-9)
+    assert motion(tails, {{"{name}": SIZE}}) == pytest.approx(motion(tails, {{"{law}": SIZE}}), rel=1e-9)
+'''
+
+
+def adopt_law(source: str | Path, name: str, folder: str | Path, *, place: str = "") -> list[Path]:
+    """Write NAME.py and test_NAME.py of a law, both or none.
+
+    Args:
+        source: verdict.json or laws.json with laws that were kept.
+        name: of the new effect, in lower case.
+        folder: for the files.
+        place: of the law; default: the best one.
+
+    Returns:
+        The paths of the files.
+
+    Raises:
+        InputError: there is no such law, the name cannot be used, or the files cannot be written.
+    """
+    if not _NAME.fullmatch(name):
+        raise InputError(
+            f"name {name!r}: write lower-case letters, digits and _, such as speed_dependent_side_force"
+        )
+    if name in catalogue():
+        raise InputError(f"there is an effect {name} already; give another name")
+    record, without = _law_of(source, place)
+    try:
+        effect = law_from_name(str(record["effect"]["name"]))
+        size, error = float(record["effect"]["size"]), float(record["error"])
+        words, runs = str(record["words"]), _runs_in_words(record["runs"])
+        if effect is None or not math.isfinite(size + error) or not size:
+            raise ValueError
+    except (KeyError, TypeError, ValueError, OverflowError):
+        raise InputError(f"{source}: the law cannot be read; calibrate the table again") from None
+    text = _effect_file(effect, name, size, words, runs, error, without, Path(source).name)
+    file, test = f"{name}.py", f"test_{name}.py"
+    with files_together(folder, (file, test)) as temporary:
+        write_text(temporary / file, text)
+        write_text(temporary / test, _test_file(effect, name, size))
+    return [Path(folder, file), Path(folder, test)]
+
+
+def _law_of(source: str | Path, place: str) -> tuple[dict[str, Any], float]:
+    """Return the record of a law, and the held-out error without it.
+
+    Raises:
+        InputError: the file has none.
+    """
+    try:
+        record = read_json(source)
+    except ContentError as unreadable:
+        raise InputError(f"{source} is no verdict.json ({str(unreadable).removeprefix(f'{source} ')})") from None
+    content = record if isinstance(record, dict) else {}
+    of_verdict = isinstance(content.get("laws"), dict)
+    laws = content["laws"] if of_verdict else content
+    try:
+        without = float(content["error_before" if of_verdict else "error_without"])
+        kept = [law for law in laws.get("laws") or [] if law["place"] in laws["kept"]]
+        names = [str(law["place"]) for law in kept]
+    except (KeyError, TypeError, ValueError, AttributeError):
+        raise InputError(f"{source} has no laws: give the verdict.json or laws.json of a table") from None
+    if not kept:
+        raise InputError(f"{source}: no law describes the runs of this table")
+    if place and place not in names:
+        raise InputError(f"{source}: no law {place!r} was kept; kept are {', '.join(names)}")
+    return kept[names.index(place) if place else 0], without
+
+
+def _runs_in_words(runs: dict[str, Any]) -> str:
+    parts = []
+    for key, symbol, unit in (("N", "N", ""), ("l_cm", "l", " cm"), ("omega_rpm", "ω", " rpm")):
+        low, high = (float(value) for value in runs[key])
+        parts.append(
+            f"{symbol} from {low:.4g} to {high:.4g}{unit}" if low < high else f"{symbol} = {low:.4g}{unit}"
+        )
+    return ", ".join(parts)
+
+
+def _effect_file(
+    effect: Effect, name: str, size: float, words: str, runs: str, error: float, without: float, source: str
+) -> str:
+    assert isinstance(effect, ForceLaw | FactorLaw)
+    pairs = zip(("speed", "length", "tails"), vars(effect.powers).values(), strict=True)
+    if isinstance(effect, ForceLaw):
+        maker, place = "force_law", f'"{effect.wrench}", "{effect.motion}"'
+        bounds = (-_WIDER * abs(size), _WIDER * abs(size))
+    else:
+        maker, place, bounds = "factor_law", f'"{effect.place}"', effect.bounds
+    title = name.replace("_", " ")
+    return _EFFECT.format(
+        title=title[0].upper() + title[1:],
+        equation=effect.equation,
+        words=words[0].upper() + words[1:],
+        runs=runs,
+        error=100 * error,
+        without=100 * without,
+        maker=maker,
+        place=place,
+        powers=", ".join(f"{key}={value!r}" for key, value in pairs if value),
+        name=name,
+        source=f"a law of measured runs, {source}",
+        low=bounds[0],
+        high=bounds[1],
+        size=size,
+    )
+
+
+def _test_file(effect: Effect, name: str, size: float) -> str:
+    expected = []
+    for tails in _TAILS:
+        values = {**PRESETS["paper-control"].group_values(), "N": float(tails), effect.name: size}
+        solved = steady(Groups.from_columns({key: np.array([value]) for key, value in values.items()}))
+        outputs = [float(f"{float(getattr(solved, key)[0]):.10g}") for key in ("omega_yr", "v_x", "v_z")]
+        if not np.isfinite(outputs).all():
+            raise InputError(f"{effect.name} = {size:g}: the control robot cannot be simulated with this law")
+        expected.append((tails, outputs))
+    return _TEST.format(name=name, law=effect.name, size=size, expected=expected)

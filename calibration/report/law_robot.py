@@ -1,0 +1,71 @@
+"""The corrected robot with a law, and how sure it is: what a calibration hands on where a law describes the runs.
+
+The law is an effect by its name (`sim.model.power_law`), whose factor is 1 at the paper's control example; that of
+the fit is 1 at the geometric mean of the runs. So the size of a term, or the coefficient that a factor multiplies,
+is written for the control example. Exponents are rounded to thousandths.
+
+The uncertainty of the exponents is handed on as that of the load at this robot: with x the logarithm of its inputs
+over those of the mean,
+
+    term:    δε/ε = δε_m/ε_m + Σ x_i δp_i,
+    factor:  δ ln C = δ ln C_m + Σ x_i δp_i.
+
+The range of the runs goes into the table [learnt_from] (`sim.model.learnt_range`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from calibration.laws.law_fits import Law
+from calibration.laws.law_model import EXPONENTS, SIZE
+from calibration.report.corrected_robot import calibration_knowledge, corrected_robot
+from calibration.statistics.held_out import FinalRefit, refit_to_all
+from calibration.statistics.statistical_model import Parameters
+from planner.vehicle.calibration_table import CalibrationKnowledge
+from sim.arrays import Flags, Floats
+from sim.model.learnt_range import learnt_range
+from sim.model.robot import Robot
+
+
+def law_handed_on(given: Robot, law: Law, rows: Flags) -> tuple[Robot, CalibrationKnowledge]:
+    """Return the corrected robot with a law, fitted once more to the runs in `rows` (n,), and its covariance."""
+    final = refit_to_all(law.model, law.fit, rows)
+    robot = robot_with_law(given, law, final.parameters)
+    return robot, calibration_knowledge(given, final, _slopes(robot, law, final))
+
+
+def robot_with_law(given: Robot, law: Law, parameters: Parameters) -> Robot:
+    """Return the corrected robot with a law as an effect.
+
+    Args:
+        parameters: of the law's model.
+    """
+    effect, size, factor = law.model.effect(parameters)
+    written = dict(parameters)
+    for name, power in law.place.moves:
+        if not law.place.is_term:
+            written[name] *= factor**power
+    corrected = corrected_robot(given, written)
+    runs = law.model.robots({**written, **dict.fromkeys(EXPONENTS, 0.0)})[0]
+    return replace(
+        corrected,
+        effects={**corrected.effects, effect.name: size},
+        learnt_from=learnt_range(run.group_values() for run in runs),
+    )
+
+
+def _slopes(robot: Robot, law: Law, final: FinalRefit) -> dict[str, Floats]:
+    """Compute how the load at this robot depends on the numbers of its law, (p,) each."""
+    inputs = np.log([robot.motor_speed, robot.tail_length, robot.tails]) - np.array(law.model.centre)
+    exponents = np.zeros(len(final.fitted))
+    for place, parameter in enumerate(final.fitted):
+        if parameter.name in EXPONENTS:
+            exponents[place] = inputs[EXPONENTS.index(parameter.name)]
+    if not law.place.is_term:
+        return {name: power * exponents for name, power in law.place.moves}
+    (name,) = [name for name in robot.effects if name.startswith(f"law_{law.place.name}_")]
+    size = np.array([parameter.name == SIZE for parameter in final.fitted]) / final.parameters[SIZE]
+    return {name: robot.effects[name] * (exponents + size)}

@@ -1,0 +1,114 @@
+"""A law becomes a member of the catalogue: a file with its formula, and a test that holds it."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibration.report.adoption import adopt_law
+from sim.effects import catalogue
+from sim.io.errors import InputError
+from sim.solve.assembly import numbers
+from tests.sim.model.test_power_law import with_law
+
+LAWS = {
+    "Fx_wh": ("law_Fx_wh_speed-93_length425_tails0", 0.4),
+    "Cyr": ("law_Cyr_speed100_length400_tails0", 1.0),
+    "tail_drag": ("law_tail_drag_speed-150_length-500_tails100", 1.0),
+}
+
+
+def record(place: str) -> dict[str, Any]:
+    name, size = LAWS[place]
+    runs = {"N": [2, 5], "l_cm": [5.0, 15.0], "omega_rpm": [143.0, 143.0]}
+    return {
+        "place": place,
+        "words": f"words of {place}",
+        "effect": {"name": name, "size": size},
+        "error": 0.026,
+        "runs": runs,
+    }
+
+
+def verdict(folder: Path) -> Path:
+    laws = {"kept": list(LAWS), "laws": [record(place) for place in LAWS]}
+    path = folder / "verdict.json"
+    path.write_text(json.dumps({"error_before": 0.05, "laws": laws}))
+    return path
+
+
+def module(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    loaded = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(loaded)
+    return loaded
+
+
+@pytest.mark.parametrize("place", LAWS)
+def test_the_file_is_an_effect_with_the_law_s_formula(
+    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    effect_file, test_file = adopt_law(verdict(tmp_path), "new_effect", tmp_path / "out", place=place)
+    effect = module(effect_file).EFFECT
+    name, size = LAWS[place]
+    assert (effect.name, effect.typical, effect.null) == ("new_effect", size, 0.0)
+    text = effect_file.read_text()
+    assert "N from 2 to 5, l from 5 to 15 cm, ω = 143 rpm" in text
+    assert "2.60 % with it, 5.00 % without it" in text
+    monkeypatch.setitem(catalogue(), "new_effect", effect)
+    for changes in ({}, {"N": 4, "l_over_R": 4.0, "omega_bar": -20.0}):
+        one, other = (numbers(with_law(each, 0.7 * size, **changes)) for each in ("new_effect", name))
+        np.testing.assert_array_equal(one, other)
+    own_test = module(test_file)
+    for case in own_test.test_the_motion_is_that_of_the_law.pytestmark[0].args[1]:
+        own_test.test_the_motion_is_that_of_the_law(*case)
+    monkeypatch.setattr(own_test, "SIZE", 0.8 * size)
+    with pytest.raises(AssertionError):
+        own_test.test_the_motion_is_that_of_the_law(*case)
+
+
+def test_the_best_law_is_adopted_by_default(tmp_path: Path) -> None:
+    effect_file, _ = adopt_law(verdict(tmp_path), "new_effect", tmp_path)
+    assert "Words of Fx_wh" in effect_file.read_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "message"),
+    [
+        ("New Effect", "", "write lower-case letters"),
+        ("disc_drag", "", "there is an effect disc_drag already"),
+        ("new_effect", "Mz_wh", "no law 'Mz_wh' was kept; kept are Fx_wh, Cyr, tail_drag"),
+    ],
+)
+def test_what_cannot_be_adopted_is_refused_and_nothing_is_written(
+    name: str, place: str, message: str, tmp_path: Path
+) -> None:
+    source = verdict(tmp_path)
+    with pytest.raises(InputError, match=message):
+        adopt_law(source, name, tmp_path / "out", place=place)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("{}", "has no laws"),
+        ("[1]", "has no laws"),
+        ("no", "is no verdict.json"),
+        ('{"error_before": 0.1, "laws": {"kept": [], "laws": []}}', "no law describes the runs"),
+        ('{"error_before": 0.1, "laws": {"kept": ["Ct"], "laws": [{"place": "Ct"}]}}', "cannot be read"),
+    ],
+)
+def test_a_file_without_laws_is_refused(content: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "verdict.json"
+    path.write_text(content)
+    with pytest.raises(InputError, match=message):
+        adopt_law(path, "new_effect", tmp_path / "out")
