@@ -21,6 +21,7 @@ from calibration.report.quantities import (
     size,
     tolerance,
 )
+from calibration.statistics.exclusions import count_of_rows
 from calibration.statistics.fit import WRONG, Fit, least_determined
 from calibration.statistics.statistical_model import Parameter
 from calibration.swimmer.measured_table import Measurements
@@ -202,9 +203,14 @@ def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
     page.text(
         f"{len(data)} usable runs in {sessions} session{'s' if sessions > 1 else ''}: "
         f"{_range('N', data.tails, '')}, {_range('tail length', 100 * data.length, ' cm')}, "
-        f"{_range('motor speed', speed, ' rpm')}. Held out for the test: {conditions.split.names}. Excluded: "
-        f"{'; '.join(conditions.excluded) or 'nothing'}."
+        f"{_range('motor speed', speed, ' rpm')}. Held out for the test: {conditions.split.names}."
     )
+    excluded = conditions.summary_of_excluded
+    page.text(
+        f"Excluded: {count_of_rows(conditions.excluded)} of {conditions.rows} rows{':' if excluded else '.'}"
+    )
+    if excluded:
+        page.steps(excluded)
     scatter = np.sqrt(np.diag(result.base.noise.run)).tolist()
     noise = ", ".join(f"{LABELS[o]} {output_error(o, s)}" for o, s in zip(data.outputs, scatter, strict=True))
     share = math.sqrt(result.final.noise.share)

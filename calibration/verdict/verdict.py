@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from calibration.attribution.refits import Candidate
 from calibration.attribution.wrong_numbers import wrong_number
+from calibration.statistics.exclusions import summary_of_excluded
 from calibration.statistics.fit import Fit, Pull
 from calibration.statistics.held_out import FinalRefit
 from calibration.statistics.residual_regression import Regression
@@ -120,8 +121,14 @@ class Conditions:
     split: Split  # fitted and held-out runs
     sessions: tuple[str, ...]  # names of all sessions
     hash: str  # of everything that was fixed
-    excluded: tuple[str, ...]  # rows that were not used, and why
+    excluded: tuple[str, ...]  # rows and columns that were not used, and why
+    rows: int  # of the table, used or not
     caveats: tuple[str, ...]  # what weakens the conclusion, in words
+
+    @property
+    def summary_of_excluded(self) -> list[str]:
+        """What was excluded, by reason, with the number of rows."""
+        return summary_of_excluded(self.excluded, self.rows)
 
 
 def reach_verdict(evidence: Evidence, level: float, *, number_explains: bool) -> str:
