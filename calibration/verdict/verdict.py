@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from calibration.attribution.refits import Candidate
-from calibration.attribution.wrong_numbers import wrong_number
+from calibration.attribution.wrong_numbers import notable_pull, wrong_number
 from calibration.statistics.exclusions import summary_of_excluded
 from calibration.statistics.fit import Fit, Pull
 from calibration.statistics.held_out import FinalRefit
@@ -25,7 +25,6 @@ from sim.arrays import Floats
 from sim.io.deprecated import old_attributes
 
 MODELS = ("uncalibrated", "before", "after", "generic", "predictive")  # whose errors are stated
-_NOTABLE = 2.0  # pull of a nuisance parameter beyond which the sentence says so
 _NEAR = 0.5  # if no effect explains the residual, the best one is named if it removes at least this share
 
 _LONGEST = 500  # letters of a sentence in a repr
@@ -289,10 +288,10 @@ class Verdict:
         if self.wrong_numbers:
             said = "; and ".join(", or ".join(p.words for p in alike) for alike in self.wrong_numbers)
             return f"A nuisance parameter is wrong: {said}."
-        farthest = self.fits.pulls[0] if self.fits.pulls and self.verdict != "unexplained" else None
-        if farthest is not None and farthest.learnt and abs(farthest.z) > _NOTABLE:
-            return f"{farthest.words}."
-        return ""
+        learnt = [p for p in self.fits.pulls if p.learnt]
+        if not learnt or self.verdict == "unexplained" or abs(learnt[0].z) <= notable_pull(len(learnt)):
+            return ""
+        return f"{learnt[0].words}."
 
     @property
     def _effect_words(self) -> str:
