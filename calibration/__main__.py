@@ -57,8 +57,8 @@ def _calibrate(arguments: Namespace) -> None:
     )
     for limit in result.conditions.caveats:
         print(f"the conclusion is weaker: {limit}")
-    if result.conditions.excluded:
-        print(f"excluded: {len(result.conditions.excluded)}, first {result.conditions.excluded[0]}")
+    for line in result.conditions.summary_of_excluded:
+        print(f"excluded: {line}")
     print(f"-> {', '.join(map(str, paths))}")
 
 

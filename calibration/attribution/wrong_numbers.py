@@ -12,7 +12,8 @@ Demortier and Lyons (2002).
 If the runs pull a nuisance parameter beyond `fit.WRONG`, the fit is made again without its prior. Of several
 that the runs cannot tell apart, the one is freed that is off by the fewest of its own standard deviations. If the
 fit then leaves no more than noise, the wrong number explains the residual, and no effect is claimed for it. An
-effect is claimed only if it fits better than the freed number by more than one parameter can gain by chance.
+effect is claimed only if it fits better than the freed number by more than one parameter can gain by chance. A
+smaller pull is mentioned only if it is notable among so many (`notable_pull`).
 """
 
 from __future__ import annotations
@@ -20,12 +21,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from scipy.stats import norm as normal
+
 from calibration.attribution.refits import INDISTINGUISHABLE, Candidate, judge
 from calibration.statistics.fit import Fit, Pull, fit
 from calibration.statistics.residual_tests import Directions
 from calibration.statistics.statistical_model import Parameter, change
 from calibration.statistics.study import Study
 
+_NOTABLE = 0.05  # share of tables with nothing wrong whose verdict names a nuisance parameter, at most
 _MOST = 2  # numbers that may be wrong together
 _TRIED = 3  # effects that are fitted once more beside wrong numbers
 
@@ -69,6 +73,14 @@ def wrong_number(candidates: Sequence[Pull]) -> tuple[Pull, ...]:
     likeliest = min((p for p in wrong if farthest.z**2 - p.z**2 < INDISTINGUISHABLE), key=_standardised_change)
     alike = [p for p in wrong if p is not likeliest and likeliest.z**2 - p.z**2 < INDISTINGUISHABLE]
     return (likeliest, *sorted(alike, key=_standardised_change))
+
+
+def notable_pull(count: int) -> float:
+    """Compute the pull that the farthest of `count` nuisance parameters exceeds by chance in one table in twenty.
+
+    Šidák (1967): the probability is at most that of independent pulls, also where pulls are correlated.
+    """
+    return float(normal.isf((1 - (1 - _NOTABLE) ** (1 / count)) / 2))
 
 
 def _standardised_change(pull: Pull) -> float:

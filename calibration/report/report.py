@@ -22,7 +22,8 @@ from calibration.report.quantities import (
     size,
     tolerance,
 )
-from calibration.statistics.fit import WRONG, Fit, least_determined
+from calibration.statistics.exclusions import count_of_rows
+from calibration.statistics.fit import WRONG, Fit, Pull, least_determined
 from calibration.statistics.statistical_model import Parameter
 from calibration.swimmer.measured_table import Measurements
 from calibration.verdict.next_runs import STOP, Batch
@@ -60,19 +61,20 @@ def _add_next_steps(page: Page, result: Verdict) -> None:
     page.steps(next_steps(result), numbered=True)
     for caveat in result.conditions.caveats:
         page.text(f"The conclusion is weaker: {caveat}.", tone="bad")
-    if result.next.batch is not None:
+    if result.next.batch is not None and result.next.batch.worth_making:
         _add_batch(page, result.next.batch)
-    if result.next_runs:
+    runs = [run for run in result.next_runs if run.worth_making]
+    if runs:
         page.text(
-            "Or repeat a single setting. Separation is for the two explanations "
+            "Single settings that decide when they are repeated. Separation is for the two explanations "
             "that it tells apart least, in units of χ². Settings are those that `--own` named, or the table's."
         )
-        settings = list(result.next_runs[0].settings)
+        settings = list(runs[0].settings)
         page.table(
             (*(_SETTINGS.get(s, s) for s in settings), "repeats", "separation", "decides"),
             [
                 (*map(str, r.settings.values()), str(r.repeats), f"{r.separation:.1f}", f"{100 * r.decides:.0f} %")
-                for r in result.next_runs
+                for r in runs
             ],
         )
 
@@ -173,13 +175,17 @@ def _add_numbers(page: Page, result: Verdict) -> None:
     page.text(
         "What was given is known to a tolerance only. So these parameters are fitted, too, each with the "
         "tolerance that was stated for it. The pull is how far the runs move a parameter, in standard deviations "
-        f"of what chance would do; beyond {WRONG:g} the stated value is taken to be wrong."
+        f"of what chance would do; beyond {WRONG:g} the stated value is taken to be wrong, unless nothing "
+        "explains the residual."
     )
+    beyond = [p.parameter.title for p in result.fits.pulls if p.wrong]
     if wrong:
         page.text(f"Taken to be wrong: {'; and '.join(wrong)}.", tone="bad")
-    elif result.verdict == "unexplained":
+    elif beyond:
         page.text(
-            "Nothing explains the residual, so none is taken to be wrong: what is missing pulls at them, too."
+            f"The runs pull beyond {WRONG:g}: {', '.join(beyond)}. Nothing explains the residual, so none of them "
+            "is taken to be wrong: what is missing in the model pulls at them, too.",
+            tone="bad",
         )
     else:
         page.text("None is taken to be wrong.", tone="good")
@@ -192,11 +198,17 @@ def _add_numbers(page: Page, result: Verdict) -> None:
                 tolerance(p.parameter),
                 fitted_value(p),
                 fitted_value(p, alone=True) if p.learnt else "nothing",
-                f"{p.z:+.1f}" if p.learnt else "",
+                _pull(p),
             )
             for p in result.fits.pulls
         ],
     )
+
+
+def _pull(pull: Pull) -> str:
+    if not pull.learnt:
+        return ""
+    return f"{pull.z:+.1f}{f' (beyond {WRONG:g})' if pull.wrong else ''}"
 
 
 def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
@@ -206,9 +218,14 @@ def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
     page.text(
         f"{len(data)} usable runs in {sessions} session{'s' if sessions > 1 else ''}: "
         f"{_range('N', data.tails, '')}, {_range('tail length', 100 * data.length, ' cm')}, "
-        f"{_range('motor speed', speed, ' rpm')}. Held out for the test: {conditions.split.names}. Excluded: "
-        f"{'; '.join(conditions.excluded) or 'nothing'}."
+        f"{_range('motor speed', speed, ' rpm')}. Held out for the test: {conditions.split.names}."
     )
+    excluded = conditions.summary_of_excluded
+    page.text(
+        f"Excluded: {count_of_rows(conditions.excluded)} of {conditions.rows} rows{':' if excluded else '.'}"
+    )
+    if excluded:
+        page.steps(excluded)
     scatter = np.sqrt(np.diag(result.base.noise.run)).tolist()
     noise = ", ".join(f"{LABELS[o]} {output_error(o, s)}" for o, s in zip(data.outputs, scatter, strict=True))
     share = math.sqrt(result.final.noise.share)

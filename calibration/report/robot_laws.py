@@ -20,6 +20,7 @@ from calibration.laws.law_fits import Laws, find_laws
 from calibration.laws.law_model import EXPONENTS, SIZE
 from calibration.report.corrected_robot import as_toml, check_given
 from calibration.report.law_robot import law_handed_on
+from calibration.statistics.exclusions import count_of_rows, summary_of_excluded
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.held_out import errors
 from calibration.statistics.residual_tests import Directions, examine_residual
@@ -141,7 +142,8 @@ def find_robot_laws(
     """
     check_given(robot)
     data = read_measurements(table)
-    for line in (*data.converted, *(f"excluded: {line}" for line in data.excluded)):
+    excluded = summary_of_excluded(data.excluded, len(data) + count_of_rows(data.excluded))
+    for line in (*data.converted, *(f"excluded: {line}" for line in excluded)):
         tell(line)
     data, held_out = PROTOCOLS["session"](data)
     model = SwimmerModel(robot, data, jobs)

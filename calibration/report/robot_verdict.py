@@ -15,6 +15,7 @@ from calibration.laws.law_fits import Laws, find_laws
 from calibration.report.corrected_robot import as_toml, check_given, handed_on
 from calibration.report.law_robot import law_handed_on
 from calibration.report.report import write_report
+from calibration.statistics.exclusions import count_of_rows, summary_of_excluded
 from calibration.swimmer.head_correction import learn_head_correction
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.possible_runs import Owned
@@ -137,7 +138,7 @@ def calibrate_robot(
     data = read_measurements(table)
     for line in data.converted:
         tell(line)
-    for line in data.excluded:
+    for line in summary_of_excluded(data.excluded, len(data) + count_of_rows(data.excluded)):
         tell(f"excluded: {line}")
     data, held_out = PROTOCOLS[protocol](data)
     model = SwimmerModel(robot, data, jobs, own=own or {})

@@ -9,7 +9,8 @@ Columns in other units (R_yr_mm, "theta [rad]") are converted, and `Measurements
 Some conditions must be repeated, because the noise is estimated from repeats. `session` names the group of runs
 that were made together. Without it, all runs of one N are one session. Some effects need elapsed_min,
 temperature_C, tank_diameter_cm or course_deg (direction of the path in the lab, where a run is a part of a
-circle). Rows that cannot be used are excluded with number and reason. So are columns of other names, unless the
+circle). Rows that cannot be used are excluded with number and reason, and so are copies of rows
+(`calibration.swimmer.copied_rows`). Columns without any value are left out, and columns of other names, unless the
 name looks like a misspelt one.
 
 Observations are compared on a relative scale: y = ln |output| for spins, yaw rate and radius, and θ in radians. A
@@ -29,6 +30,7 @@ import numpy as np
 import pandas as pd
 
 from calibration.statistics.statistical_model import Runs, repeat_covariance
+from calibration.swimmer.copied_rows import find_copies
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, TACHOMETER
 from sim.arrays import Floats, Integers
 from sim.io.errors import InputError, naming
@@ -79,6 +81,7 @@ KNOWN_COLUMNS = {
 }
 _LARGEST = 1e9  # of a value
 _FEWEST_RUNS, _FEWEST_REPEATS = 24, 8
+_COPY = "a copy of an earlier row, equal in all inputs and outputs"
 _OWN = 1e-3  # share of an output's scatter that must be independent of the other outputs
 
 
@@ -119,14 +122,18 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         near = difflib.get_close_matches(name, KNOWN_COLUMNS, n=1)
         if near:
             raise InputError(f"unknown column {name!r}: is it {near[0]!r}? rename or drop it")
+    empty = [str(c) for c in table if c not in (*INPUTS, *unknown) and _is_empty(table[c])]
+    table = table.drop(columns=empty)
     outputs = tuple(name for name, (column, _, _) in OUTPUTS.items() if column in table)
     if len(outputs) < 2 or not {"omega_yr", "R_yr", "theta", "v"} & set(outputs):
         raise InputError(
             "the table needs at least two outputs, one of them omega_yr_rad_s, R_yr_cm, theta_deg or v_cm_s: "
             "the spins alone do not tell the coefficients apart"
+            + (f" (without any value: {', '.join(empty)})" if empty else "")
         )
     numbers = table.drop(columns="session", errors="ignore").apply(numbers_of)
     reasons = _reasons(table, numbers, outputs)
+    _mark_copies(reasons, numbers, outputs)
     keep = np.array([not r for r in reasons])
     aside = tuple(f"row {i + 1}: {r}" for i, r in enumerate(reasons) if r)
     good = numbers[keep]
@@ -142,7 +149,11 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
     session_names, session = np.unique(names.to_numpy(dtype=str), return_inverse=True)
     repeats = len(good) - len(np.unique(condition))
     if repeats < _FEWEST_REPEATS:
-        raise InputError(f"{repeats} repeated runs; to estimate the noise, give at least {_FEWEST_REPEATS}")
+        copied = sum(_COPY in reason for reason in reasons)
+        without = f", without {copied} copies of rows" if copied else ""
+        raise InputError(
+            f"{repeats} repeated runs{without}; to estimate the noise, give at least {_FEWEST_REPEATS}"
+        )
     columns = []
     for name in outputs:
         column, factor, _ = OUTPUTS[name]
@@ -162,7 +173,12 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         inputs=np.stack(inputs, 1),
         input_names=("N", "ln l", "ln |omega|", "direction", *noted),
         rows=np.flatnonzero(keep) + 1,
-        excluded=(*aside, *follows, *(f"column {name}: not known, left out" for name in unknown)),
+        excluded=(
+            *aside,
+            *follows,
+            *(f"column {name}: without any value, left out" for name in empty),
+            *(f"column {name}: not known, left out" for name in unknown),
+        ),
         caveats=_caveats(tails, length, omega),
         tails=tails,
         length=length,
@@ -172,6 +188,20 @@ def _read(source: str | Path | pd.DataFrame) -> Measurements:
         noted_names=tuple(noted),
         converted=converted,
     )
+
+
+def _is_empty(column: pd.Series) -> bool:
+    """Tell whether a column has nothing but missing values and blanks."""
+    return bool((column.isna() | (column.astype(str).str.strip() == "")).all())
+
+
+def _mark_copies(reasons: list[str], numbers: pd.DataFrame, outputs: tuple[str, ...]) -> None:
+    """Give a reason to every usable row that is a copy of an earlier one."""
+    usable = [i for i, reason in enumerate(reasons) if not reason]
+    used = numbers.iloc[usable]
+    columns = [OUTPUTS[name][0] for name in outputs]
+    for place, earlier in find_copies(used[list(INPUTS)].to_numpy(), used[columns].to_numpy()).items():
+        reasons[usable[place]] = f"{_COPY} (row {usable[earlier] + 1})"
 
 
 def _independent(

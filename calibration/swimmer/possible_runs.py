@@ -3,8 +3,9 @@
 Columns that are wrong by a factor that is not possible are refused. Inputs are checked before anything is
 simulated. Outputs are compared with the model as given.
 
-Without a word from the lab, the next runs have the table's range of lengths, its numbers of tails and one more,
-and its fastest speed and slower ones. A lab says what it has as "N=2,3,4", "l_cm=5,7,9" and "omega_rpm=60,120".
+Without a word from the lab, the next runs have the table's numbers of tails and lengths, because others may have
+to be built, and its fastest speed and slower ones. A lab says what it has as "N=2,3,4", "l_cm=5,7,9" and
+"omega_rpm=60,120".
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ def _other_units(column: str) -> dict[str, float]:
 
 UNITS = {output: _other_units(column) for output, (column, _, _) in OUTPUTS.items()}
 SETTINGS = ("N", "l_cm", "omega_rpm")
-_LENGTHS = 6
+_LENGTHS = 6  # of many, spread evenly
 _SPEEDS = (0.4, 0.7, 1.0)  # of the fastest
 
 Owned = Mapping[str, tuple[float, ...]]
@@ -149,9 +150,15 @@ def possible_settings(runs: Measurements, own: Owned) -> Floats:
     """List N, l_cm and omega_rpm of every run that can be made next, (m, 3); both directions."""
     cm, rpm = 100 * runs.length, np.abs(runs.omega).max() * 30 / math.pi
     default = {
-        "N": np.arange(runs.tails.min(), runs.tails.max() + 2),
-        "l_cm": np.unique(np.linspace(cm.min(), cm.max(), _LENGTHS).round(1)),
+        "N": runs.tails,
+        "l_cm": _some(np.unique(cm.round(3))),
         "omega_rpm": (rpm * np.array(_SPEEDS)).round(1),
     }
     tails, lengths, speeds = (np.unique(own.get(name, default[name])).astype(float) for name in SETTINGS)
     return np.array([(n, a, w) for n in tails for a in lengths for w in (*speeds, *-speeds)])
+
+
+def _some(lengths: Floats) -> Floats:
+    """Choose at most `_LENGTHS` of sorted lengths, the shortest and the longest among them."""
+    places = np.linspace(0, len(lengths) - 1, min(len(lengths), _LENGTHS)).round().astype(int)
+    return np.asarray(lengths[places])

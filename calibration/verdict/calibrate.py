@@ -45,6 +45,7 @@ from calibration.attribution.wrong_numbers import (
     pulls,
     without_wrong_priors,
 )
+from calibration.statistics.exclusions import caveat_of_excluded, count_of_rows
 from calibration.statistics.fit import Fit, fit, profile_intervals
 from calibration.statistics.held_out import error_interval, errors, held_out_p_value, refit_to_all
 from calibration.statistics.residual_regression import regress_residual
@@ -118,6 +119,8 @@ def calibrate(
     regression = regress_residual(model.runs, explained.base.prediction, split.fitted)
     corrections = Corrections(regression, learnt, description)
     rivals = description.rivals if description is not None and described else explained.rivals(model)
+    excluded = (*model.runs.excluded, *split.reasons)
+    rows = len(model.runs) + count_of_rows(model.runs.excluded)
     return Verdict(
         verdict=verdict,
         evidence=evidence,
@@ -128,8 +131,14 @@ def calibrate(
             split=split,
             sessions=model.runs.session_names,
             hash=fingerprint(fixed),
-            excluded=(*model.runs.excluded, *split.reasons),
-            caveats=(*model.runs.caveats, *split.caveats, *_caveats(model, explained)),
+            excluded=excluded,
+            rows=rows,
+            caveats=(
+                *model.runs.caveats,
+                *caveat_of_excluded(excluded, rows),
+                *split.caveats,
+                *_caveats(model, explained),
+            ),
         ),
         next=_next_runs(rivals, seed),
     )

@@ -34,6 +34,7 @@ from sim.arrays import Floats
 STOP = 25.0  # ratio of likelihoods at which an explanation is given up, 1/α of the sequence of batches
 GIVEN_UP = 2 * math.log(STOP)  # the same as a difference of deviances
 BATCH = 8  # runs
+SELDOM = 0.5  # share of cases in which runs must decide to be worth making
 _DRAWS = 4000
 _DECIDES = 3.84  # difference of χ² at which one of the two is chosen
 _WANTED = 0.9  # share of draws that should decide
@@ -50,12 +51,17 @@ class NextRun:
     separation: float  # λ of all repeats
     decides: float  # share of draws in which the true one is chosen
 
+    @property
+    def worth_making(self) -> bool:
+        return self.decides >= SELDOM
+
     def record(self) -> dict[str, Any]:
         return {
             **self.settings,
             "repeats": self.repeats,
             "separation": round(self.separation, 2),
             "decides": round(self.decides, 3),
+            "worth_making": self.worth_making,
         }
 
 
@@ -68,11 +74,16 @@ class Batch:
     decides: float  # share of draws in which the true one of these two is chosen
     stop: float  # difference of deviances on the new runs at which to stop
 
+    @property
+    def worth_making(self) -> bool:
+        return self.decides >= SELDOM
+
     def record(self) -> dict[str, Any]:
         return {
             "runs": list(self.settings),
             "separation": round(self.separation, 2),
             "decides": round(self.decides, 3),
+            "worth_making": self.worth_making,
             "stop_at_deviance": round(self.stop, 2),
         }
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from calibration.verdict.verdict import Verdict
 
 DISAGREES = 0.01  # p of the held-out runs below which they do not agree with the final model
-_SELDOM = 0.5  # share of cases in which runs must decide to be worth making
 _PLAN = "Plan with the corrected robot: `softflagella plan square:3 --robot corrected.toml --out plan`."
 _NEW_SESSION = "add the new runs to the table with a session of their own (column `session`)"
 
@@ -130,11 +129,11 @@ def _telling_apart(result: Verdict) -> list[str]:
     if result.next.batch is None:
         return []
     count, decides = len(result.next.batch.settings), result.next.batch.decides
-    if decides < _SELDOM:
+    if not result.next.batch.worth_making:
         return [
-            "No runs with the settings of this table tell the explanations apart well: the best "
-            f"{count} decide in {100 * decides:.0f} % of cases (table below). Say what else the lab can set, and "
-            "calibrate again, for example with `--own l_cm=5,7,9`."
+            "Do not make runs with these settings to tell the explanations apart: the best "
+            f"{count} decide in {100 * decides:.0f} % of cases only. Say what else the lab can set or build, and "
+            "calibrate again, for example with `--own N=2,4,6 --own l_cm=5,7,9`."
         ]
     return [
         f"Make the {count} runs of the table below, which tell the explanations apart in "

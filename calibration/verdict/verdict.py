@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from calibration.attribution.refits import Candidate
-from calibration.attribution.wrong_numbers import wrong_number
+from calibration.attribution.wrong_numbers import notable_pull, wrong_number
+from calibration.statistics.exclusions import summary_of_excluded
 from calibration.statistics.fit import Fit, Pull
 from calibration.statistics.held_out import FinalRefit
 from calibration.statistics.residual_regression import Regression
@@ -24,7 +25,6 @@ from sim.arrays import Floats
 from sim.io.deprecated import old_attributes
 
 MODELS = ("uncalibrated", "before", "after", "generic", "predictive", "law")  # whose errors are stated
-_NOTABLE = 2.0  # pull of a nuisance parameter beyond which the sentence says so
 _NEAR = 0.5  # if no effect explains the residual, the best one is named if it removes at least this share
 
 _LONGEST = 500  # letters of a sentence in a repr
@@ -122,8 +122,14 @@ class Conditions:
     split: Split  # fitted and held-out runs
     sessions: tuple[str, ...]  # names of all sessions
     hash: str  # of everything that was fixed
-    excluded: tuple[str, ...]  # rows that were not used, and why
+    excluded: tuple[str, ...]  # rows and columns that were not used, and why
+    rows: int  # of the table, used or not
     caveats: tuple[str, ...]  # what weakens the conclusion, in words
+
+    @property
+    def summary_of_excluded(self) -> list[str]:
+        """What was excluded, by reason, with the number of rows."""
+        return summary_of_excluded(self.excluded, self.rows)
 
 
 def reach_verdict(evidence: Evidence, level: float, *, number_explains: bool) -> str:
@@ -284,10 +290,10 @@ class Verdict:
         if self.wrong_numbers:
             said = "; and ".join(", or ".join(p.words for p in alike) for alike in self.wrong_numbers)
             return f"A nuisance parameter is wrong: {said}."
-        farthest = self.fits.pulls[0] if self.fits.pulls and self.verdict != "unexplained" else None
-        if farthest is not None and farthest.learnt and abs(farthest.z) > _NOTABLE:
-            return f"{farthest.words}."
-        return ""
+        learnt = [p for p in self.fits.pulls if p.learnt]
+        if not learnt or self.verdict == "unexplained" or abs(learnt[0].z) <= notable_pull(len(learnt)):
+            return ""
+        return f"{learnt[0].words}."
 
     @property
     def _effect_words(self) -> str:

@@ -3,6 +3,7 @@
  * Mirrors calibration/swimmer/measured_table.py, which explains the columns. Where Python refuses a table for the
  * number of its runs, this reader goes on, since it tells what is still needed. */
 import { closeMatch } from "./close_match.js";
+import { findCopies } from "./copied_rows.js";
 import { solveDense } from "./dense.js";
 import { general, pythonText } from "./format.js";
 import { InputError } from "./input_error.js";
@@ -65,23 +66,27 @@ function measurementsOf(given, where) {
   const lacking = INPUTS.find((name) => !first.table.names.includes(name));
   if (lacking) throw new InputError(`the table has no column '${lacking}'; it needs ${INPUTS.join(", ")}`);
   const others = [...outputColumns.map(({ column }) => column), ...NOTED, ...Object.keys(SIGMAS)];
-  const { table, notes } = convertColumns(first.table, others, where, SYNONYMS);
-  const unknown = table.names.filter((name) => !KNOWN.includes(name));
+  const { table: whole, notes } = convertColumns(first.table, others, where, SYNONYMS);
+  const unknown = whole.names.filter((name) => !KNOWN.includes(name));
   for (const name of unknown) {
     const near = closeMatch(name, KNOWN);
     if (near) throw new InputError(`unknown column ${pythonText(name)}: is it '${near}'? rename or drop it`);
   }
+  const empty = emptyColumns(whole).filter((name) => ![...INPUTS, ...unknown].includes(name));
+  const table = without(whole, empty);
   const outputs = Object.keys(OUTPUTS).filter((name) => table.names.includes(OUTPUTS[name].column));
   if (outputs.length < 2 || !outputs.some((name) => PLANAR.includes(name))) {
     throw new InputError(
       "the table needs at least two outputs, one of them omega_yr_rad_s, R_yr_cm, theta_deg or v_cm_s: " +
-        "the spins alone do not tell the coefficients apart",
+        "the spins alone do not tell the coefficients apart" +
+        (empty.length ? ` (without any value: ${empty.join(", ")})` : ""),
     );
   }
   const column = (name) => table.columns[table.names.indexOf(name)];
   const used = [...INPUTS, ...outputs.map((name) => OUTPUTS[name].column)];
   const columns = Object.fromEntries(used.map((name) => [name, column(name)]));
   const reasons = reasonsOf(table, columns, outputs);
+  markCopies(reasons, columns);
   const usable = reasons.flatMap((reason, row) => (reason ? [] : [row]));
   if (!usable.length) {
     throw new InputError(`0 usable runs (row 1: ${reasons[0]}); a calibration needs at least ${FEWEST_RUNS}`);
@@ -104,8 +109,33 @@ function measurementsOf(given, where) {
     runs.excluded.push(...follows);
     runs.refusal = refusal ?? sigmaRefusal(table, usable);
   }
+  runs.excluded.push(...empty.map((name) => `column ${name}: without any value, left out`));
   runs.excluded.push(...unknown.map((name) => `column ${name}: not known, left out`));
   return runs;
+}
+
+/* Names of columns that have nothing but missing values and blanks. _is_empty */
+function emptyColumns({ names, texts }) {
+  return names.filter((_, i) => texts[i].every((text) => text.trim() === "" || text === "nan"));
+}
+
+function without({ names, columns, texts }, left) {
+  const kept = names.flatMap((name, i) => (left.includes(name) ? [] : [i]));
+  return {
+    names: kept.map((i) => names[i]), columns: kept.map((i) => columns[i]), texts: kept.map((i) => texts[i]),
+  };
+}
+
+/* Give a reason to every usable row that is a copy of an earlier one. _mark_copies */
+function markCopies(reasons, columns) {
+  const usable = reasons.flatMap((reason, row) => (reason ? [] : [row]));
+  const used = (names) => names.map((name) => usable.map((row) => columns[name][row]));
+  const outputs = Object.keys(columns).filter((name) => !INPUTS.includes(name));
+  if (!usable.length) return;
+  for (const [place, earlier] of findCopies(used(INPUTS), used(outputs))) {
+    reasons[usable[place]] =
+      `a copy of an earlier row, equal in all inputs and outputs (row ${usable[earlier] + 1})`;
+  }
 }
 
 /* Say why each row cannot be used; empty where it can. _reasons */

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
-from calibration.attribution.wrong_numbers import pulls
+from calibration.attribution.wrong_numbers import notable_pull, pulls
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import fit
 from calibration.statistics.statistical_model import by_differences, start_values
@@ -70,6 +70,31 @@ def test_numbers_drawn_from_their_priors_are_no_effects() -> None:
     most = binom.isf(0.01, count, 0.05)
     assert claimed <= most
     assert count - covered <= most
+
+
+@pytest.mark.parametrize(("count", "correlation"), [(1, 0.0), (4, 0.0), (10, 0.0), (10, 0.3), (10, 0.9)])
+def test_one_table_in_twenty_has_a_notable_pull_by_chance(count: int, correlation: float) -> None:
+    """Beyond 2 σ it was one in three: ten pulls have ten chances. Correlated pulls have fewer."""
+    tables = 20000
+    rng = np.random.default_rng(count)
+    common, own = rng.normal(size=(tables, 1)), rng.normal(size=(tables, count))
+    farthest = np.abs(math.sqrt(correlation) * common + math.sqrt(1 - correlation) * own).max(1)
+    share = float((farthest > notable_pull(count)).mean())
+    assert share < 0.05 + 3 * math.sqrt(0.05 * 0.95 / tables)
+    assert correlation or share == pytest.approx(0.05, abs=3 * math.sqrt(0.05 * 0.95 / tables))
+
+
+@pytest.mark.usefixtures("toy_model", "few_candidates")
+def test_a_pull_of_two_and_a_half_among_ten_is_not_mentioned() -> None:
+    result = calibrated(toy_table(3))
+    assert result.verdict == "none"
+    learnt = sum(p.learnt for p in result.fits.pulls)
+    for z, named in ((0.99 * notable_pull(learnt), False), (1.01 * notable_pull(learnt), True)):
+        pulled = (replace(result.fits.pulls[0], z=z), *result.fits.pulls[1:])
+        sentence = replace(result, fits=replace(result.fits, pulls=pulled)).sentence
+        assert sentence.startswith(f"{pulled[0].words}.") is named
+    assert learnt > 3
+    assert 2.2 < notable_pull(learnt) < 3
 
 
 @pytest.mark.usefixtures("toy_model")

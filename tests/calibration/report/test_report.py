@@ -16,7 +16,7 @@ from calibration.statistics.statistical_model import Parameter
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.nuisance_numbers import nuisance_parameters
 from calibration.verdict.next_steps import next_steps
-from calibration.verdict.verdict import Verdict
+from calibration.verdict.verdict import Next, Verdict
 from calibration.verdict.verdict_json import verdict_record
 from tests.calibration.toy_tables import (
     START,
@@ -150,10 +150,53 @@ def test_rivals_are_told_apart_by_runs_and_a_command(tmp_path: Path) -> None:
     )
     assert next_steps(often)[0].startswith("Make the 8 runs of the table below")
     assert "`softflagella calibration decide " in next_steps(often)[1]
+    assert next_steps(seldom)[0].startswith("Do not make runs with these settings")
     assert "--own" in next_steps(seldom)[0]
-    seen = page(result, runs, tmp_path)
+    seen = page(often, runs, tmp_path)
     assert "Runs to make next" in seen.text
     assert "`" not in seen.text
+
+
+@shares_verdicts
+def test_runs_that_seldom_decide_are_not_offered(tmp_path: Path) -> None:
+    """Batches that decide in 14 % of cases stood in the report like good ones."""
+    result, runs = ambiguous()
+    batch, run = result.next.batch, result.next.runs[0]
+    assert batch is not None
+    poor = Next(result.next.explanations, (replace(run, decides=0.14),), replace(batch, decides=0.14))
+    seen = page(replace(result, next=poor), runs, tmp_path)
+    assert "decide in 14 % of cases only" in seen.text
+    assert "Runs to make next" not in seen.text
+    assert "Single settings" not in seen.text
+    record = verdict_record(replace(result, next=poor), table="t")
+    assert record["next_batch"]["worth_making"] is False
+    assert [entry["worth_making"] for entry in record["next_runs"]] == [False]
+    mixed = Next(poor.explanations, (replace(run, decides=0.93), *poor.runs), replace(batch, decides=0.95))
+    seen = page(replace(result, next=mixed), runs, tmp_path)
+    assert "Runs to make next" in seen.text
+    assert "93 %" in seen.text
+    assert "14 %" not in seen.text
+
+
+@shares_verdicts
+def test_a_pull_that_is_not_taken_to_be_wrong_has_its_reason(tmp_path: Path) -> None:
+    """Pulls of +19 stood beside a text that did not name them."""
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        runs = toy_swimmer(toy_table(3)).runs
+    plain = calibrated_toy(3)
+    first, second, *others = plain.fits.pulls
+    pulled = (replace(first, z=19.0), second, *others)
+    for verdict, words in (
+        ("unexplained", f"pull beyond 3: {first.parameter.title}. Nothing explains the residual, so none of them"),
+        ("none", f"Taken to be wrong: {first.parameter.title}."),
+    ):
+        seen = page(replace(plain, verdict=verdict, fits=replace(plain.fits, pulls=pulled)), runs, tmp_path)
+        assert "+19.0 (beyond 3)" in seen.text
+        assert words in seen.text
+        assert "None is taken to be wrong" not in seen.text
+        assert seen.text.count("(beyond 3)") == 1
+    assert "None is taken to be wrong" in page(plain, runs, tmp_path).text
 
 
 @shares_verdicts

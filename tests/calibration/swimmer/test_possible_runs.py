@@ -14,16 +14,24 @@ from sim.io.errors import InputError
 from tests.calibration.toy_tables import START, calibrated, toy_swimmer, toy_table
 
 
-def test_without_a_word_it_is_the_range_of_the_table() -> None:
+def test_without_a_word_it_is_what_the_table_has() -> None:
+    """N = 6 used to be proposed where the table has 2 to 5, and lengths between those of the table."""
     runs = toy_swimmer(toy_table(3)).runs
     grid = possible_settings(runs, {})
-    assert set(grid[:, 0]) == {2, 3, 4, 5, 6}
-    assert grid[:, 1].min() == pytest.approx(5)
-    assert grid[:, 1].max() == pytest.approx(11)
+    assert set(grid[:, 0]) == {2, 3, 4, 5}
+    assert set(grid[:, 1]) == {5, 8, 11}
     assert np.abs(grid[:, 2]).max() == pytest.approx(np.abs(runs.omega).max() * 30 / math.pi)
-    assert len(np.unique(grid, axis=0)) == len(grid) == 5 * 6 * 6
+    assert len(np.unique(grid, axis=0)) == len(grid) == 4 * 3 * 6
     one_length = toy_swimmer(toy_table(3, lengths_cm=(8.0,))).runs
-    assert len(possible_settings(one_length, {})) == 5 * 6
+    assert len(possible_settings(one_length, {})) == 4 * 6
+
+
+def test_of_many_lengths_six_are_proposed() -> None:
+    lengths = tuple(np.linspace(5.0, 13.0, 17))
+    grid = possible_settings(toy_swimmer(toy_table(3, lengths_cm=lengths)).runs, {})
+    assert set(grid[:, 1]) <= set(lengths)
+    assert len(np.unique(grid[:, 1])) == 6
+    assert (grid[:, 1].min(), grid[:, 1].max()) == (5.0, 13.0)
 
 
 def test_a_lab_gets_only_what_it_has() -> None:

@@ -18,6 +18,7 @@ from calibration.verdict.verdict_json import verdict_record
 from sim.io.errors import InputError, run_command
 from tests.calibration import toy
 from tests.calibration.toy_tables import FEW_DRAWS, START, calibrated, calibrated_toy, shares_verdicts, toy_table
+from tests.page_text import PageText
 
 
 @pytest.mark.usefixtures("toy_model")
@@ -163,6 +164,30 @@ def test_the_verdict_is_that_of_the_table_without_the_slipped_decimal_point() ->
 @shares_verdicts
 def test_noise_and_missing_effects_are_no_gross_errors() -> None:
     assert calibrated_toy(5, end_over_end_drag=5.0).conditions.excluded == ()
+
+
+@pytest.mark.usefixtures("toy_model", "few_candidates")
+def test_half_of_a_table_does_not_go_missing_without_a_word(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The spins of the camera without their sign: one line named row 1."""
+    from calibration.__main__ import main
+
+    table = toy_table(3)
+    table["omega_h_rpm"] = table["omega_h_rpm"].abs()
+    count, wrong = len(table), int((table["omega_rpm"] > 0).sum())
+    table.to_csv(tmp_path / "t.csv", index=False)
+    words = ["calibrate", str(tmp_path / "t.csv"), "--robot", "paper-measured", "--out", str(tmp_path / "out")]
+    assert run_command(main, words) == 0
+    printed = capsys.readouterr()
+    reason = "omega_h_rpm has the wrong sign for its omega_rpm: the head turns against the motor"
+    for text in (printed.out, printed.err):
+        assert f"excluded: {wrong} of {count} rows (rows " in text
+        assert reason in text
+    assert f"the conclusion is weaker: {wrong} of {count} rows (50 %) were excluded" in printed.out
+    seen = PageText(tmp_path / "out" / "report.html").text
+    assert f"Excluded: {wrong} of {count} rows:" in seen
+    assert reason in seen
 
 
 @pytest.mark.usefixtures("toy_model")

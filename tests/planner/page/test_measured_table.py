@@ -71,6 +71,16 @@ TABLES: dict[str, tuple[Change, dict[str, Any]]] = {
         lambda table: table.assign(v_cm_s=table["omega_yr_rad_s"].abs() * table["R_yr_cm"]),
         {},
     ),
+    "copied rows": (lambda table: pd.concat([table, table[3:30], table.assign(session="again")[:7]]), {}),
+    "coarse numbers that agree by chance": (
+        lambda table: table.round({"R_yr_cm": 0, "theta_deg": -1, "omega_yr_rad_s": 1, "omega_h_rpm": -1})
+        .drop(columns="omega_t_rpm"),
+        {},
+    ),
+    "columns without a value": (
+        lambda table: table.assign(v_cm_s=np.nan, session=" ", elapsed_min="", tachometer_sigma_percent=np.nan),
+        {},
+    ),
     "stated uncertainty": (lambda table: table.assign(camera_scale_sigma_percent=2.0), {}),
 }  # fmt: skip
 
