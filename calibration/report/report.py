@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from calibration.attribution.halved_tolerances import notable_gains
 from calibration.attribution.refits import IMITABLE, SURE, UNSEEN, Candidate
 from calibration.report.figures import draw_evidence, draw_maps, draw_residuals, draw_summary, final_model
 from calibration.report.law_card import add_laws
@@ -34,6 +35,7 @@ from sim.io.pages import Page
 from sim.io.provenance import code_version
 
 _SETTINGS = {"l_cm": "l [cm]", "omega_rpm": "ω [rpm]"}
+_SMALLEST_GAIN = 0.005  # by which half of a tolerance must lower the detectable sizes to be ranked
 _TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes", "score": "effects"}
 
 
@@ -50,6 +52,7 @@ def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
     _add_errors(page, result, data)
     add_laws(page, result)
     _add_numbers(page, result)
+    _add_halved_tolerances(page, result)
     _add_fit(page, result)
     _add_residuals(page, result, data)
     _add_evidence(page, result)
@@ -209,6 +212,44 @@ def _pull(pull: Pull) -> str:
     if not pull.learnt:
         return ""
     return f"{pull.z:+.1f}{f' (beyond {WRONG:g})' if pull.wrong else ''}"
+
+
+def _add_halved_tolerances(page: Page, result: Verdict) -> None:
+    candidates = result.evidence.candidates
+    gains, notable = result.halved_tolerances, notable_gains(candidates)
+    nuisances = {p.name: p for p in result.base.fitted}
+    ranked = [
+        f"{nuisances[name].title} ({100 * gain:.1f} %)" for name, gain in gains.items() if gain >= _SMALLEST_GAIN
+    ]
+    if not ranked:
+        return
+    page.section("Which number, measured better, would show what")
+    page.text(
+        "Half of one tolerance lowers the smallest detectable sizes, on average over the effects that these runs "
+        f"can show, by: {', '.join(ranked)}. The first is worth measuring better first. All other tolerances stay."
+    )
+    if not notable:
+        page.text("No tolerance lowers the size of a single effect notably.")
+        return
+    page.table(
+        (
+            "effect",
+            "smallest detectable size",
+            "number to measure better",
+            "tolerance (σ), today",
+            "size with half",
+        ),
+        [
+            (
+                halved.effect.effect.title,
+                detectable(halved.effect.effect, halved.today),
+                nuisances[halved.nuisance].title,
+                tolerance(nuisances[halved.nuisance]),
+                detectable(halved.effect.effect, halved.halved),
+            )
+            for halved in notable
+        ],
+    )
 
 
 def _add_data(page: Page, result: Verdict, data: Measurements) -> None:

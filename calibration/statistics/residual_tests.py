@@ -133,6 +133,7 @@ class Misfit:
     critical_z: float  # quantile of max |z_j| at the level
     features: tuple[str, ...]  # names of the features of the inputs
     exact_length: Floats  # (e,) `Scores.length` if the nuisance parameters were exact
+    halved_length: dict[str, Floats]  # (e,) the same if the σ of one nuisance parameter were halved, by its name
     second: Floats  # (e,) value of each effect's second number at its largest score; NaN where there is none
 
 
@@ -219,6 +220,28 @@ class _Tester:
         largest = np.abs(shapes).max((-1, -2)) if shapes.size else np.zeros(len(share))
         return Scores(np.stack([lack, kernel, largest], -1), *projected, shapes, share)
 
+    def lengths_if_halved(self, residual: Floats) -> Floats:
+        """Compute the length of every projected direction if one prior had half of its σ, (e, p).
+
+        Half of σ adds c = 3/σ² to the place i of A, the products of the first p columns. With b, their products
+        with a direction d, the length grows by |d′|² = |d|² + c w_i²/(1 + c V_ii), V = A⁻¹ and w = V b (Sherman
+        and Morrison 1950). The noise is what it is today.
+
+        Args:
+            residual: (n, k), as `scores` takes it.
+        """
+        p, e = self.J.shape[-1], self.D.shape[-1]
+        root = inverse_root(repeat_covariance(residual, self.condition))
+        products = self.design.sums((root.T @ root)[None], residual[None])
+        products.within[..., range(p), range(p)] += self.precision
+        normal = _score_equations(products, p)[0]  # (e, p + 2, p + 2)
+        weights, covariance = solved(normal[:, : p + 1, : p + 1])
+        square = normal[:, p, p] - (weights * normal[:, :p, p]).sum(-1)
+        further = 3 * self.precision
+        variance = np.diagonal(covariance, axis1=-2, axis2=-1)
+        grown = square[:, None] + further * weights**2 / (1 + further * variance)
+        return np.sqrt(np.maximum(grown, 1e-300)).reshape(e, p)
+
     def _shapes(self, covariance: Floats, white: Floats, root: Floats, share: Floats) -> Floats:
         """Compute z of every output along every feature, (B, k, f).
 
@@ -251,16 +274,21 @@ def projected_scores(products: Sums, p: int) -> tuple[Floats, Floats, Floats]:
     Returns:
         z of the last column along it, the share of it that survives the projection, and the length of the rest.
     """
-    e = products.within.shape[-1] - p - 1
-    columns = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
-    part = products.take(columns)
-    normal = part.at(session_share(part, passes=_PASSES_OF_A_SCORE))  # (B, e, p + 2, p + 2)
+    normal = _score_equations(products, p)
     weights = solved(normal[..., : p + 1, : p + 1])[0]  # of the first p columns in the one that is scored
     score = normal[..., p, p + 1] - (weights * normal[..., :p, p + 1]).sum(-1)
     square = normal[..., p, p] - (weights * normal[..., :p, p]).sum(-1)
     length = np.sqrt(np.maximum(square, 1e-300))
     survived = length / np.sqrt(np.maximum(normal[..., p, p], 1e-300))
     return np.where(survived > 1e-6, score / length, 0.0), survived, length
+
+
+def _score_equations(products: Sums, p: int) -> Floats:
+    """Multiply the first `p` columns, one more and the last with each other, (B, e, p + 2, p + 2)."""
+    e = products.within.shape[-1] - p - 1
+    columns = np.array([[*range(p), p + j, p + e] for j in range(e)], dtype=np.int64).reshape(e, p + 2)
+    part = products.take(columns)
+    return part.at(session_share(part, passes=_PASSES_OF_A_SCORE))
 
 
 def examine_residual(
@@ -304,6 +332,7 @@ def examine_residual(
     null_table = np.concatenate(batches)
     scores = Scores(*(getattr(observed, name)[0] for name in Scores.__dataclass_fields__))
     best = _best(scores.z, testable, directions)
+    halved = tester.lengths_if_halved(residual_as_given)[best]
     return Misfit(
         scores=replace(scores, z=scores.z[best], survived=scores.survived[best], length=scores.length[best]),
         p={name: _p_value(null_table[:, [i]], statistics[[i]]) for i, name in enumerate((*GENERAL, "score"))},
@@ -314,6 +343,7 @@ def examine_residual(
         critical_z=float(np.quantile(null_table[:, -1], 1 - study.level)),
         features=tester.names,
         exact_length=exact.length[0][best],
+        halved_length={fitted.names[i]: halved[:, i] for i in np.flatnonzero(precision).tolist()},
         second=directions.second[best],
     )
 

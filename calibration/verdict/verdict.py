@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from calibration.attribution.halved_tolerances import overall_gains
 from calibration.attribution.refits import Candidate
 from calibration.attribution.wrong_numbers import notable_pull, wrong_number
 from calibration.statistics.exclusions import summary_of_excluded
@@ -251,6 +252,14 @@ class Verdict:
         known = tuple((freed[alike[0].parameter.name], *alike[1:]) for alike in self.fits.final.wrong_numbers)
         further = wrong_number([p for p in self.fits.pulls if not p.freed])
         return (*known, further) if further else known
+
+    @property
+    def halved_tolerances(self) -> dict[str, float]:
+        """Share by which half of its tolerance lowers the smallest detectable sizes, by nuisance parameter.
+
+        The largest comes first. `evidence.candidates` have the sizes of every effect in `detectable_halved`.
+        """
+        return overall_gains(self.evidence.candidates)
 
     @property
     def held_out_error_falls(self) -> bool | None:

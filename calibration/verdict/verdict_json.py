@@ -13,6 +13,7 @@ from sim.io.provenance import provenance
 def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
     """Write a verdict as verdict.json has it; its keys are a format, and older than the names here."""
     final, misfit, learnt, errors = result.final, result.evidence.misfit, result.corrections.learnt, result.errors
+    parameter_titles = {p.name: p.title for p in result.base.fitted}
     parameters = {
         name: {
             "value": final.parameters[name],
@@ -34,6 +35,10 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "effects_instead": [[e.name for e in c.claimed] for c in result.evidence.rival_effects],
         "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
         "numbers_as_given": [_number_record(p) for p in result.fits.pulls],
+        "halved_tolerances": [
+            {"name": name, "title": parameter_titles[name], "smallest_detectable_sizes_fall_by": gain}
+            for name, gain in result.halved_tolerances.items()
+        ],
         **{f"error_{name}": errors.rms.get(name) for name in MODELS},
         "held_out_error_falls": result.held_out_error_falls,
         "error_after_interval": list(errors.after_interval),
@@ -50,6 +55,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
                 "survived_share": c.survived,
                 "smallest_detectable": c.detectable,
                 "smallest_detectable_if_numbers_were_exact": c.detectable_exact,
+                "smallest_detectable_with_half_of_a_tolerance": dict(c.detectable_halved),
                 "size": c.refit.parameters[c.effect.name] if c.refit else None,
                 "deviance": c.refit.deviance if c.refit else None,
                 "session_gain": [c.gain, c.gain_error],

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from calibration.attribution.halved_tolerances import notable_gains
 from calibration.report.quantities import detectable, direction_in_words, plain, size, with_error
 from calibration.report.report import write_report
 from calibration.statistics.fit import Pull
@@ -208,6 +209,20 @@ def test_a_report_without_a_claim_compares_no_model_with_itself(tmp_path: Path) 
     seen = page(calibrated_toy(3), runs, tmp_path)
     assert "with the verdict's effects" not in seen.text
     assert seen.text.count("tail length [cm]") == 1
+
+
+@shares_verdicts
+def test_the_number_to_measure_better_is_listed_with_what_it_would_show(tmp_path: Path) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        runs = toy_swimmer(toy_table(2)).runs
+    result = calibrated_toy(2)
+    seen = page(result, runs, tmp_path).text
+    title, entry = "Which number, measured better, would show what", result.halved_tolerances
+    best = next(p.title for p in result.base.fitted if p.name == next(iter(entry)))
+    assert f"by: {best} (" in seen[seen.index(title) :]
+    halved = notable_gains(result.evidence.candidates)[0]
+    assert detectable(halved.effect.effect, halved.halved) in seen[seen.index(title) :]
 
 
 def test_a_change_of_nothing_is_said_in_words() -> None:
