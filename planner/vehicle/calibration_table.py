@@ -50,9 +50,10 @@ class CalibrationKnowledge:
     current_error: tuple[float, float] = (0.0, 0.0)  # [m/s]
 
     def __post_init__(self) -> None:
-        unknown = [name for name in self.names if name not in {*COEFFICIENTS, *NUMBERS, *catalogue()}]
+        numbers, effects = (*COEFFICIENTS, *NUMBERS), catalogue()
+        unknown = [name for name in self.names if name not in numbers and name not in effects]
         if unknown:
-            allowed = ", ".join((*COEFFICIENTS, *NUMBERS))
+            allowed = ", ".join(numbers)
             raise InputError(f"calibration: unknown name {unknown[0]!r}; give {allowed} or an effect")
         V = self.covariance
         if V.shape != (len(self.names),) * 2 or not (np.abs(V) < _LARGEST).all() or not np.allclose(V, V.T):

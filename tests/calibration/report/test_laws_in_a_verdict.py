@@ -1,0 +1,201 @@
+"""A verdict with a law: what it says, the robot that it hands on, and who refuses this robot."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibration.laws.law_fits import Laws, find_laws
+from calibration.laws.law_model import EXPONENTS, SIZE, LawModel, with_law
+from calibration.laws.partial_residuals import dependences
+from calibration.laws.places import place_named
+from calibration.report.corrected_robot import check_given
+from calibration.report.law_card import draw_dependences, draw_place
+from calibration.report.law_robot import _slopes, robot_with_law
+from calibration.report.robot_verdict import RobotVerdict
+from calibration.statistics.held_out import refit_to_all
+from calibration.swimmer.head_correction import learn_head_correction
+from calibration.swimmer.synthetic_table import make_table
+from calibration.verdict.calibrate import calibrate
+from calibration.verdict.experiment import Rival
+from calibration.verdict.next_runs import BATCH, next_runs
+from calibration.verdict.sequential_test import Explanation, standings
+from dataset.rows.robot_inputs import robot_fields
+from planner.vehicle.calibration_table import read_knowledge
+from sim.effects import effect_named
+from sim.inputs import group_columns, load_robot, save_robot
+from sim.io.errors import InputError
+from sim.model.groups import Groups
+from sim.model.robot import Robot
+from tests.calibration.toy_tables import (
+    FEW_DRAWS,
+    START,
+    TRUTH,
+    install_few_candidates,
+    install_toy,
+    shares_verdicts,
+    toy_swimmer,
+    toy_table,
+)
+
+HIDDEN = {
+    "Cyr": {"law_Cyr_speed500_length-500_tails0": 1.0},
+    "Mz_wh": {"law_Mz_wh_speed1000_length-1000_tails0": 5.0},
+}
+
+
+@cache
+def described(place: str) -> RobotVerdict:
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        install_few_candidates(patch)
+        model = toy_swimmer(make_table(replace(TRUTH, effects=HIDDEN[place]), seed=4, title=""))
+        verdict = calibrate(
+            model, describe=find_laws, correction=learn_head_correction, draws=FEW_DRAWS, progress=False
+        )
+    return RobotVerdict(**vars(verdict), robot=START, runs=model.runs, table="runs.csv")
+
+
+def laws_of(verdict: RobotVerdict) -> Laws:
+    laws = verdict.corrections.law
+    assert isinstance(laws, Laws)
+    return laws
+
+
+def load_at(robot: Robot, name: str) -> float:
+    """Compute ln |ε m| of a term at a robot, or ln C m of the coefficient."""
+    law = effect_named(name)
+    m = float(law.powers.logarithm(Groups.from_columns(group_columns([robot])))[0])  # type: ignore[attr-defined]
+    return m + math.log(abs(robot.effects[name]) if "_w" in name else robot.C_yr)
+
+
+@shares_verdicts
+@pytest.mark.parametrize("place", HIDDEN)
+def test_a_law_stands_beside_the_verdict_and_takes_the_place_of_the_correction(place: str) -> None:
+    verdict = described(place)
+    assert verdict.verdict == "unexplained"
+    assert verdict.described
+    assert verdict.effects == ()
+    assert "no effect and no pair of effects of the catalogue explains" in verdict.sentence
+    assert "The residual is described by" in verdict.sentence
+    assert verdict.corrections.learnt is None
+    assert verdict.errors.rms["law"] < 0.7 * verdict.error_before
+    assert place in [law.place.name for law in laws_of(verdict).kept]
+
+
+@shares_verdicts
+@pytest.mark.parametrize("place", HIDDEN)
+def test_its_files_have_the_law_its_range_and_its_covariance(place: str, tmp_path: Path) -> None:
+    verdict = described(place)
+    record, report, corrected = verdict.save(tmp_path)
+    kept = json.loads(record.read_text())["laws"]["kept"]
+    assert place in kept
+    text = report.read_text()
+    assert "Laws that describe the residual" in text
+    assert "Where it acts" in text
+    robot = load_robot(corrected)
+    assert robot == verdict.corrected
+    (name,) = robot.effects
+    assert name.startswith(f"law_{kept[0]}")
+    assert robot.learnt_from is not None
+    known = read_knowledge(corrected)
+    assert {"C_t", "C_r", "C_yr"} <= set(known.names)
+    assert (name in known.names) == effect_named(name).name.startswith(("law_F", "law_M"))
+    assert np.linalg.eigvalsh(known.covariance).min() > -1e-9 * known.covariance.max()
+
+
+@shares_verdicts
+def test_a_robot_outside_the_runs_is_refused_by_everything(tmp_path: Path) -> None:
+    robot = described("Cyr").corrected
+    robot.group_values()
+    for outside in (replace(robot, tails=9), replace(robot, tail_length=3 * robot.tail_length)):
+        with pytest.raises(InputError, match="outside the runs that the robot's law was learnt from"):
+            outside.group_values()
+    with pytest.raises(InputError, match=r"has a table \[learnt_from\] from an earlier calibration"):
+        check_given(robot)
+    with pytest.raises(InputError, match=r"has a table \[learnt_from\], which no sweep covers"):
+        robot_fields(robot)
+    save_robot(robot, tmp_path / "robot.toml")
+    lines = (tmp_path / "robot.toml").read_text().splitlines()
+    damages = {"low = [1.0]": "three numbers", "low = 3": "cannot be read", "": "needs the lines low and high"}
+    for damage, message in damages.items():
+        damaged = [damage if line.startswith("low =") else line for line in lines]
+        (tmp_path / "damaged.toml").write_text("\n".join(damaged))
+        with pytest.raises(InputError, match=message):
+            load_robot(tmp_path / "damaged.toml")
+
+
+@shares_verdicts
+@pytest.mark.parametrize("place", HIDDEN)
+def test_the_uncertainty_of_the_exponents_is_that_of_the_load_at_the_robot(place: str) -> None:
+    verdict = described(place)
+    law = next(one for one in laws_of(verdict).kept if one.place.name == place)
+    final = refit_to_all(law.model, law.fit, verdict.conditions.split.kept)
+    robot = robot_with_law(START, law, final.parameters)
+    slopes = next(iter(_slopes(robot, law, final).values()))
+    scale = next(iter(robot.effects.values())) if law.place.is_term else 1.0
+    for name in EXPONENTS:
+        loads = []
+        for change in (0.1, -0.1):
+            moved = robot_with_law(START, law, {**final.parameters, name: final.parameters[name] + change})
+            (effect,) = moved.effects
+            loads.append(load_at(replace(robot, effects=moved.effects, C_yr=moved.C_yr), effect))
+        at = [p.name for p in final.fitted].index(name)
+        assert (loads[0] - loads[1]) / 0.2 == pytest.approx(slopes[at] / scale, abs=0.01)
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_a_law_is_the_same_in_a_table_of_other_runs() -> None:
+    """Its factor is 1 at the mean of the runs that it was fitted to, not at that of new ones."""
+    table = toy_table(4)
+    law = LawModel.of(toy_swimmer(table), place_named("Mz_wh"), 1.0)
+    parameters = {p.name: p.start for p in law.coefficients} | {SIZE: 3.0, "law_speed": 0.5, "law_length": -1.0}
+    parameters |= {p.name: p.start for p in law.nuisances}
+    some = (table["l_cm"] > 6).to_numpy()
+    fewer = with_law(toy_swimmer(table[some]), law.record)
+    np.testing.assert_allclose(fewer.predict([parameters])[0], law.predict([parameters])[0][some], rtol=1e-12)
+    for damage in ({"centre": [0.0]}, {"place": "no such place"}, {"typical": math.nan}):
+        with pytest.raises(InputError, match="the record of a law cannot be read"):
+            with_law(toy_swimmer(table), {**law.record, **damage})
+
+
+@shares_verdicts
+@pytest.mark.usefixtures("toy_model")
+def test_new_runs_decide_between_two_laws() -> None:
+    verdict = described("Mz_wh")
+    fitted = {law.place.name: law for law in laws_of(verdict).fitted}
+    pair = [fitted["Mz_wh"], next(law for name, law in fitted.items() if name != "Mz_wh")]
+    rivals = [Rival(law.place.name, law.fit, law.model, law.model.record) for law in pair]
+    batch = next_runs(rivals)[1]
+    assert len(batch.settings) == BATCH
+    new = toy_swimmer(make_table(replace(TRUTH, effects=HIDDEN["Mz_wh"]), seed=9, title=""))
+    records = [json.loads(json.dumps(Explanation.from_rival(rival).record())) for rival in rivals]
+    explanations = [Explanation.read(record) for record in records]
+    standing = standings(new, explanations, np.ones(len(new.runs), dtype=bool), with_law)
+    assert standing[0].title == "Mz_wh"
+    assert standing[1].behind > 0
+
+
+@shares_verdicts
+def test_the_runs_at_each_input_lie_on_the_law() -> None:
+    verdict = described("Cyr")
+    law = next(one for one in laws_of(verdict).kept if one.place.name == "Cyr")
+    curves = dependences(law, verdict.conditions.split.fitted)
+    assert [curve.symbol for curve in curves] == ["ω", "l", "N"]
+    pulls = []
+    for curve in curves:
+        assert (curve.low <= curve.factor).all()
+        assert (curve.factor <= curve.high).all()
+        on_curve = np.interp(curve.groups, curve.inputs, curve.factor)
+        pulls += list(np.log(curve.by_runs / on_curve) / curve.errors)
+    assert np.abs(pulls).max() < 4
+    assert np.abs(pulls).max() > 0
+    assert draw_dependences(curves).axes
+    for place in ("Fx_wh", "Fz_vz", "My_wt", "Mz_wh", "Ct", "Cr", "tail_drag"):
+        assert draw_place(START, place_named(place)).axes[0].has_data()
