@@ -28,8 +28,8 @@ from calibration.statistics.fit import WRONG, Fit, Pull, least_determined
 from calibration.statistics.statistical_model import Parameter
 from calibration.swimmer.measured_table import Measurements
 from calibration.verdict.next_runs import STOP, Batch
-from calibration.verdict.next_steps import DISAGREES, next_steps
-from calibration.verdict.verdict import Verdict
+from calibration.verdict.next_steps import next_steps
+from calibration.verdict.verdict import DISAGREES, Verdict
 from sim.arrays import Floats
 from sim.io.pages import Page
 from sim.io.provenance import code_version

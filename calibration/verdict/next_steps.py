@@ -5,9 +5,8 @@ A verdict that the held-out runs contradict comes before all others: more runs, 
 
 from __future__ import annotations
 
-from calibration.verdict.verdict import Verdict
+from calibration.verdict.verdict import DISAGREES, Verdict
 
-DISAGREES = 0.01  # p of the held-out runs below which they do not agree with the final model
 _PLAN = "Plan with the corrected robot: `softflagella plan square:3 --robot corrected.toml --out plan`."
 _NEW_SESSION = "add the new runs to the table with a session of their own (column `session`)"
 
@@ -93,6 +92,13 @@ def _after_ambiguous(result: Verdict) -> list[str]:
 
 
 def _after_unexplained(result: Verdict) -> list[str]:
+    if result.harmless:
+        return [
+            f"{_PLAN} The residual is smaller than the noise of a run, and harmless for prediction between these "
+            "runs.",
+            "Look for its cause only if you want to name it. These runs show it because they are many: repeat the "
+            f"conditions where it is largest (below), {_NEW_SESSION}, and calibrate again.",
+        ]
     if result.described:
         first = "Look for a cause where the law acts (below), and which depends on the same inputs."
     else:
@@ -113,7 +119,7 @@ def _after_unexplained(result: Verdict) -> list[str]:
             *_telling_apart(result),
             f"{_PLAN} It has the law, which holds between these runs only.",
             "When the cause is known, make the law an effect of the catalogue: `softflagella calibration adopt "
-            "verdict.json --name NAME --out .`.",
+            "verdict.json --name NAME --out effects`.",
         ]
     if result.error_predictive is None:
         return [

@@ -7,6 +7,7 @@ departure, and nothing in the catalogue explains it. A law may describe it; a la
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,40 +22,16 @@ from calibration.statistics.residual_tests import Misfit
 from calibration.statistics.study import Split
 from calibration.verdict.experiment import Description, LearntCorrection
 from calibration.verdict.next_runs import Batch, NextRun
+from calibration.verdict.old_names import OLD_NAMES
 from calibration.verdict.sequential_test import Explanation
 from sim.arrays import Floats
 from sim.io.deprecated import old_attributes
 
 MODELS = ("uncalibrated", "before", "after", "generic", "predictive", "law")  # whose errors are stated
+DISAGREES = 0.01  # p of the held-out runs below which they do not agree with the final model
 _NEAR = 0.5  # if no effect explains the residual, the best one is named if it removes at least this share
 
 _LONGEST = 500  # letters of a sentence in a repr
-
-_OLD_NAMES = {  # of attributes -> where they are now
-    "base_intervals": "fits.base_intervals",
-    "final_intervals": "fits.final_intervals",
-    "misfit": "evidence.misfit",
-    "draws": "evidence.draws",
-    "candidates": "evidence.candidates",
-    "numbers": "fits.pulls",
-    "instead": "evidence.rival_effects",
-    "generic": "corrections.regression",
-    "predictive": "corrections.learnt",
-    "explanations": "next.explanations",
-    "next_batch": "next.batch",
-    "error_after_interval": "errors.after_interval",
-    "locked_p": "errors.p_value",
-    "delivered": "fits.final_refit",
-    "errors_by_output": "errors.by_output",
-    "locked": "conditions.split.names",
-    "sessions": "conditions.sessions",
-    "used": "conditions.split.fitted",
-    "uncalibrated": "fits.uncalibrated",
-    "untestable": "evidence.untestable",
-    "plan_hash": "conditions.hash",
-    "set_aside": "conditions.excluded",
-    "limits": "conditions.caveats",
-}
 
 
 @dataclass(frozen=True)
@@ -238,7 +215,7 @@ class Verdict:
         return self.next.runs
 
     if not TYPE_CHECKING:
-        __getattr__ = old_attributes(_OLD_NAMES)
+        __getattr__ = old_attributes(OLD_NAMES)
 
     @property
     def wrong_numbers(self) -> tuple[tuple[Pull, ...], ...]:
@@ -329,7 +306,32 @@ class Verdict:
             names += self._outside
             return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart."
         none = "no effect and no pair of effects of the catalogue explains"
-        return f"There is a residual ({p}) that {none}{self._nearest}.{self._described}{self._steered}"
+        return (
+            f"There is a residual ({p}) that {none}{self._nearest}.{self._small}{self._described}{self._steered}"
+        )
+
+    @property
+    def harmless(self) -> bool:
+        """Whether an unexplained residual is so small that predictions do not suffer from it.
+
+        If noise and departure add in squares, the departure is smaller than the noise of a run where the error on
+        the held-out runs is below √2 times that noise. The whole 95 % interval of the error must be below it, the
+        interval must reach down to the noise, and the held-out runs must agree with the calibrated model.
+        """
+        low, high = self.errors.after_interval
+        small = low <= self.noise_ceiling and high < math.sqrt(2) * self.noise_ceiling
+        return self.verdict == "unexplained" and small and self.errors.p_value >= DISAGREES
+
+    @property
+    def _small(self) -> str:
+        """The words for a residual that does not matter for prediction."""
+        if not self.harmless:
+            return ""
+        error, noise = _percent(self.error_before), _percent(self.noise_ceiling)
+        return (
+            " It is smaller than the noise of a run, and harmless for prediction between these runs: on the "
+            f"held-out runs the calibrated model is off by {error}, and noise alone makes {noise}."
+        )
 
     @property
     def described(self) -> bool:

@@ -40,6 +40,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
             for name, gain in result.halved_tolerances.items()
         ],
         **{f"error_{name}": errors.rms.get(name) for name in MODELS},
+        "harmless": result.harmless,
         "held_out_error_falls": result.held_out_error_falls,
         "error_after_interval": list(errors.after_interval),
         "noise_ceiling": errors.noise,

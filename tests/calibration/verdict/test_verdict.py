@@ -8,7 +8,9 @@ from typing import Any
 
 import pytest
 
-from calibration.verdict.verdict import _OLD_NAMES, Verdict, reach_verdict
+from calibration.verdict.next_steps import next_steps
+from calibration.verdict.old_names import OLD_NAMES
+from calibration.verdict.verdict import Corrections, Evidence, HeldOutErrors, Verdict, reach_verdict
 
 
 def evidence(p_value: float, explanations: int) -> Any:
@@ -32,9 +34,49 @@ def test_the_rule(p_value: float, explanations: int, number_explains: bool, verd
     assert reach_verdict(evidence(p_value, explanations), 0.04, number_explains=number_explains) == verdict
 
 
+def unexplained(
+    *, error: float, interval: tuple[float, float], p_value: float = 0.4, verdict: str = "unexplained"
+) -> Verdict:
+    """A verdict with nothing but its errors; noise 2.36 %."""
+    rms = {"before": error, "after": error}
+    found = Evidence(SimpleNamespace(p_value=0.004), 1000, (), (), (), {})  # type: ignore[arg-type]
+    fits: Any = SimpleNamespace(pulls=(), base=None, final=None)
+    conditions: Any = SimpleNamespace(split=SimpleNamespace(names="N=4"))
+    parts: Any = {"fits": fits, "corrections": Corrections(None, None), "next": None, "conditions": conditions}  # type: ignore[arg-type]
+    return Verdict(verdict, found, errors=HeldOutErrors(rms, {}, interval, 0.0236, p_value), **parts)
+
+
+def test_a_residual_that_the_held_out_runs_do_not_show_is_harmless() -> None:
+    small = unexplained(error=0.0237, interval=(0.0219, 0.0256))
+    assert small.harmless
+    assert "harmless for prediction" in small.sentence
+    assert "off by 2.37 %, and noise alone makes 2.36 %" in small.sentence
+    assert next_steps(small)[0].startswith("Plan with the corrected robot")
+    assert "harmless" in next_steps(small)[0]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        unexplained(error=0.0265, interval=(0.0245, 0.0290)),  # the held-out runs show it
+        unexplained(error=0.0280, interval=(0.0200, 0.0350)),  # too few of them to say
+        unexplained(error=0.0237, interval=(0.0219, 0.0256), p_value=0.001),  # in one output, say
+    ],
+    ids=["shown", "too few", "disagreement"],
+)
+def test_any_other_residual_is_not(other: Verdict) -> None:
+    assert not other.harmless
+    assert "harmless" not in other.sentence
+    assert "Look where the residual is large" in next_steps(other)[0]
+
+
+def test_what_is_explained_is_not_called_harmless() -> None:
+    assert not unexplained(error=0.0237, interval=(0.0219, 0.0256), verdict="effect").harmless
+
+
 def test_old_names_warn_and_find_their_part() -> None:
     parts: dict[str, Any] = {}
-    for path in _OLD_NAMES.values():
+    for path in OLD_NAMES.values():
         part, *steps = path.split(".")
         holder = parts.setdefault(part, SimpleNamespace())
         for step in steps[:-1]:
@@ -43,7 +85,7 @@ def test_old_names_warn_and_find_their_part() -> None:
         setattr(holder, steps[-1], path)
     assert set(parts) <= {field.name for field in fields(Verdict)}
     verdict = Verdict(**{"verdict": "none", "errors": None, **parts})
-    for old, new in _OLD_NAMES.items():
+    for old, new in OLD_NAMES.items():
         with pytest.warns(DeprecationWarning, match=f"Verdict.{old} is deprecated; use Verdict.{new}"):
             assert getattr(verdict, old) == new
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
