@@ -133,7 +133,9 @@ class Laws:
                 f"{best.words}; it leaves more than noise (p = {best.p_value:.2g})."
             )
         if len(self.kept) == 1:
-            return f"The residual is described by {best.words}."
+            return (
+                f"The residual is described by {best.words}, and less well by all other places that were searched."
+            )
         rivals = "; or ".join(law.words for law in self.kept)
         shared = in_common([law.place for law in self.kept])
         agree = f" All of them are {shared}." if shared else ""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from calibration.laws.law_fits import Law, Laws
 from calibration.laws.law_model import EXPONENTS
@@ -133,5 +134,7 @@ def draw_dependences(curves: list[Dependence]) -> Figure:
         axes.set_xlabel(label, fontsize=9)
         axes.set_ylabel("factor", fontsize=9)
         axes.tick_params(labelsize=8)
+        if curve.symbol == "N":
+            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.tight_layout(h_pad=0.5)
     return figure

@@ -348,7 +348,7 @@ class Verdict:
             return f" {law.sentence}"
         with_law, without = 100 * self.errors.rms["law"], 100 * self.error_before
         errors = f"{with_law:.2f} % with it, {without:.2f} % without it"
-        return f" {law.sentence} The error on the held-out runs is {errors}."
+        return f" {law.sentence} This is no claim about the cause. The error on the held-out runs is {errors}."
 
     @property
     def _steered(self) -> str:

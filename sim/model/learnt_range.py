@@ -28,8 +28,8 @@ _LARGEST = 1e9  # of a bound
 class LearntRange:
     """Smallest and largest inputs of the runs, in the order of INPUTS."""
 
-    low: tuple[float, ...]
-    high: tuple[float, ...]
+    low: tuple[float, ...]  # three numbers
+    high: tuple[float, ...]  # three numbers
 
     def __post_init__(self) -> None:
         """Refuse numbers that are no range."""
