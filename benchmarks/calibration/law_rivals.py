@@ -7,7 +7,8 @@ and nuisance parameters are fitted to some runs, and so is a correction of what 
                         threshold and ridge with the smallest BIC (Brunton, Proctor and Kutz 2016)
     Gaussian process    of ln ω, ln l and ln N, squared exponential with a length scale for each, by marginal
                         likelihood (Rasmussen and Williams 2006, chapter 5)
-    law                 `calibration.laws.law_fits.find_laws`; without a law that leaves only noise, nothing is corrected
+    law                 `calibration.laws.law_fits.find_laws`; without a law that leaves only noise, nothing
+                        is corrected
 
 Errors over the noise of a run are stated on the middle session (N = 4) and on N = 5, each left out of everything.
 A place is stated by the law alone. FILE keeps the records, and those that it has are not made again.
