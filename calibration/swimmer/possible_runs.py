@@ -26,6 +26,7 @@ from sim.model.robot import Robot
 
 SHORTEST, LONGEST, FASTEST = 0.5, 50, 1000  # tails in head radii, ω̄
 OFF, SLIPS = 20.0, 3.0  # factors: of an output, of the spins' sum
+_SPINS = 4.0  # factor of the yaw rate beyond which all other spins may be in another unit
 _NEAR = 1.6  # factor between an output in another unit and what the robot does
 _USUAL = ("rpm", "rad_s", "deg_s", "rps", "mm", "cm", "m", "deg", "rad", "mm_s", "cm_s", "m_s", "cm_min")
 
@@ -84,7 +85,19 @@ def check_outputs(runs: Measurements, prediction: Floats) -> None:
             )
     for i, name in enumerate(runs.outputs):
         theirs, ours = np.median(runs.y[:, i]), np.median(prediction[:, i])
-        check_factor(name, float(theirs / ours if name == "theta" else math.exp(theirs - ours)))
+        factor = float(theirs / ours if name == "theta" else math.exp(theirs - ours))
+        try:
+            check_factor(name, factor)
+        except InputError as refusal:
+            raise InputError(f"{refusal}{_all_spins(factor) if name == 'omega_yr' else ''}") from None
+
+
+def _all_spins(factor: float) -> str:
+    """Say that the yaw rate may be right and all other spins be in another unit, which agrees with their sum."""
+    if 1 / _SPINS < factor < _SPINS:
+        return ""
+    meant, stated = ("rad/s", "rpm") if factor > 1 else ("rpm", "rad/s")
+    return f"; or the spins of motor, head and tails are all in {meant} where {stated} is stated"
 
 
 def check_factor(output: str, factor: float) -> None:

@@ -87,6 +87,20 @@ def test_an_output_in_another_unit_is_refused_with_that_unit(name: str, unit: st
         calibrated(table)
 
 
+@pytest.mark.usefixtures("toy_model")
+@pytest.mark.parametrize(
+    ("factor", "meant", "stated"), [(math.pi / 30, "rad/s", "rpm"), (30 / math.pi, "rpm", "rad/s")]
+)
+def test_all_spins_in_another_unit_are_said(factor: float, meant: str, stated: str) -> None:
+    """Their sum is right, so only the yaw rate was blamed."""
+    table = toy_table(4, lengths_cm=(5.0, 5.5, 6.0))
+    for column in ("omega_rpm", "omega_h_rpm", "omega_t_rpm"):
+        table[column] *= factor
+    words = f"the spins of motor, head and tails are all in {meant} where {stated} is stated"
+    with pytest.raises(InputError, match=words):
+        calibrated(table)
+
+
 @pytest.mark.parametrize(
     ("given", "meant", "factor"),
     [
