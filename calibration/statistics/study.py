@@ -26,6 +26,7 @@ FAR = 12.0  # robust standard deviations between repeats
 _MAD = 1.4826  # median absolute deviation to standard deviation
 _FEWEST = 3  # sessions that are held out as a whole
 _BLOCKS = 4  # in all
+_HELD_OUT = 1 / 12  # least share of the runs that are held out
 
 
 @dataclass(frozen=True)
@@ -74,9 +75,15 @@ def groups(data: Runs) -> tuple[Integers, tuple[str, ...]]:
 
 
 def middle_session(data: Runs) -> Flags:
-    """Choose the middle session by name, which needs no extrapolation, or a block if sessions are few; (n,)."""
+    """Choose the middle session by name, which needs no extrapolation, or a block if sessions are few; (n,).
+
+    Its neighbours join it until `_HELD_OUT` of the runs are held out, where sessions are short.
+    """
     group, names = groups(data)
-    return np.asarray(group == len(names) // 2)
+    by_distance = sorted(range(len(names)), key=lambda place: abs(place - len(names) // 2))
+    sizes = np.bincount(group, minlength=len(names))[by_distance]
+    count = int(np.searchsorted(np.cumsum(sizes), _HELD_OUT * len(group) - 0.5)) + 1
+    return np.isin(group, by_distance[:count])
 
 
 def split_runs(data: Runs, held_out: Flags | None, outliers: tuple[Flags, tuple[str, ...]]) -> Split:
