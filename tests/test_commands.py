@@ -316,6 +316,14 @@ def laws(made: Path, out: Path) -> str:
     return "The residual is described by "
 
 
+def adopt(made: Path, out: Path) -> str:
+    laws(made, out)
+    done("calibration", "adopt", out / "laws" / "laws.json", "--name", "new_effect", "--law", "Cyr", "--out", out)
+    assert "factor_law" in (out / "new_effect.py").read_text()
+    assert (out / "test_new_effect.py").exists()
+    return "new_effect.py belongs in "
+
+
 RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "steady"): steady, ("sim", "replay"): replay, ("sim", "robot"): robot, ("sim", "check"): check_paper,
     ("sim", "film"): film, ("planner", "page"): page,
@@ -331,6 +339,7 @@ RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("planner", "fleet"): fleet,
     ("planner", "check"): check, ("calibration", "calibrate"): calibrate, ("calibration", "simulate"): simulate,
     ("calibration", "tracks"): tracks, ("calibration", "decide"): decide, ("calibration", "laws"): laws,
+    ("calibration", "adopt"): adopt,
 }  # fmt: skip
 
 

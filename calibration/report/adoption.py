@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -24,15 +25,15 @@ from sim.model.presets import PRESETS
 from sim.motion.steady import steady
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{2,40}", re.ASCII)
+_WIDTH = 110  # of lines
 _WIDER = 10.0  # bounds over the size
 _TAILS = (2, 3)  # of the robots of the test
 
-_EFFECT = '''"""{title}.
+_EFFECT = '''"""The effect "{title}", a law of measured runs.
 
     {equation}
 
-{words}. The factor is 1 at the paper's control example. The law was learnt from runs with {runs}.
-The error on held-out runs is {error:.2f} % with it, {without:.2f} % without it. It describes these runs.
+{words}
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ from sim.model.power_law import Powers, {maker}
 EFFECT = replace(
     {maker}({place}, Powers({powers})),
     name="{name}",
-    title={title!r},
-    source={source!r},
+    title="{title}",
+    source="{source}",
     bounds=({low!r}, {high!r}),
     typical={size!r},
 )
@@ -72,11 +73,18 @@ def motion(tails: int, effects: dict[str, float]) -> list[float]:
     return [float(getattr(solved, output)[0]) for output in ("omega_yr", "v_x", "v_z")]
 
 
-@pytest.mark.parametrize(("tails", "expected"), {expected})
+@pytest.mark.parametrize(
+    ("tails", "expected"),
+    [
+        {expected},
+    ],
+)
 def test_the_motion_is_that_of_the_law(tails: int, expected: list[float]) -> None:
     assert effect_named("{name}").typical == SIZE
-    assert motion(tails, {{"{name}": SIZE}}) == pytest.approx(expected, rel=1e-4, abs=1e-9)
-    assert motion(tails, {{"{name}": SIZE}}) == pytest.approx(motion(tails, {{"{law}": SIZE}}), rel=1e-9)
+    moved = motion(tails, {{"{name}": SIZE}})
+    assert moved == pytest.approx(expected, rel=1e-4, abs=1e-9)
+    law = "{law}"
+    assert moved == pytest.approx(motion(tails, {{law: SIZE}}), rel=1e-9)
 '''
 
 
@@ -101,7 +109,7 @@ def adopt_law(source: str | Path, name: str, folder: str | Path, *, place: str =
         )
     if name in catalogue():
         raise InputError(f"there is an effect {name} already; give another name")
-    record, without = _law_of(source, place)
+    record, without, table = _law_of(source, place)
     try:
         effect = law_from_name(str(record["effect"]["name"]))
         size, error = float(record["effect"]["size"]), float(record["error"])
@@ -110,7 +118,12 @@ def adopt_law(source: str | Path, name: str, folder: str | Path, *, place: str =
             raise ValueError
     except (KeyError, TypeError, ValueError, OverflowError):
         raise InputError(f"{source}: the law cannot be read; calibrate the table again") from None
-    text = _effect_file(effect, name, size, words, runs, error, without, Path(source).name)
+    described = (
+        f"{words[0].upper()}{words[1:]}. The factor is 1 at the paper's control example. The law was learnt from "
+        f"runs with {runs}. The error on held-out runs is {100 * error:.2f} % with it, {100 * without:.2f} % "
+        "without it. It describes these runs."
+    )
+    text = _effect_file(effect, name, size, textwrap.fill(described, _WIDTH), table)
     file, test = f"{name}.py", f"test_{name}.py"
     with files_together(folder, (file, test)) as temporary:
         write_text(temporary / file, text)
@@ -118,8 +131,8 @@ def adopt_law(source: str | Path, name: str, folder: str | Path, *, place: str =
     return [Path(folder, file), Path(folder, test)]
 
 
-def _law_of(source: str | Path, place: str) -> tuple[dict[str, Any], float]:
-    """Return the record of a law, and the held-out error without it.
+def _law_of(source: str | Path, place: str) -> tuple[dict[str, Any], float, str]:
+    """Return the record of a law, the held-out error without it, and the name of the table.
 
     Raises:
         InputError: the file has none.
@@ -141,7 +154,8 @@ def _law_of(source: str | Path, place: str) -> tuple[dict[str, Any], float]:
         raise InputError(f"{source}: no law describes the runs of this table")
     if place and place not in names:
         raise InputError(f"{source}: no law {place!r} was kept; kept are {', '.join(names)}")
-    return kept[names.index(place) if place else 0], without
+    table = re.sub(r'["\\\n]', "", str(content.get("table", "")))
+    return kept[names.index(place) if place else 0], without, table
 
 
 def _runs_in_words(runs: dict[str, Any]) -> str:
@@ -154,9 +168,7 @@ def _runs_in_words(runs: dict[str, Any]) -> str:
     return ", ".join(parts)
 
 
-def _effect_file(
-    effect: Effect, name: str, size: float, words: str, runs: str, error: float, without: float, source: str
-) -> str:
+def _effect_file(effect: Effect, name: str, size: float, words: str, table: str) -> str:
     assert isinstance(effect, ForceLaw | FactorLaw)
     pairs = zip(("speed", "length", "tails"), vars(effect.powers).values(), strict=True)
     if isinstance(effect, ForceLaw):
@@ -164,19 +176,15 @@ def _effect_file(
         bounds = (-_WIDER * abs(size), _WIDER * abs(size))
     else:
         maker, place, bounds = "factor_law", f'"{effect.place}"', effect.bounds
-    title = name.replace("_", " ")
     return _EFFECT.format(
-        title=title[0].upper() + title[1:],
+        title=name.replace("_", " "),
         equation=effect.equation,
-        words=words[0].upper() + words[1:],
-        runs=runs,
-        error=100 * error,
-        without=100 * without,
+        words=words,
         maker=maker,
         place=place,
         powers=", ".join(f"{key}={value!r}" for key, value in pairs if value),
         name=name,
-        source=f"a law of measured runs, {source}",
+        source=f"a law of measured runs, {table}",
         low=bounds[0],
         high=bounds[1],
         size=size,
@@ -191,5 +199,5 @@ def _test_file(effect: Effect, name: str, size: float) -> str:
         outputs = [float(f"{float(getattr(solved, key)[0]):.10g}") for key in ("omega_yr", "v_x", "v_z")]
         if not np.isfinite(outputs).all():
             raise InputError(f"{effect.name} = {size:g}: the control robot cannot be simulated with this law")
-        expected.append((tails, outputs))
-    return _TEST.format(name=name, law=effect.name, size=size, expected=expected)
+        expected.append(f"({tails}, {outputs})")
+    return _TEST.format(name=name, law=effect.name, size=size, expected=",\n        ".join(expected))

@@ -39,7 +39,7 @@ def record(place: str) -> dict[str, Any]:
 def verdict(folder: Path) -> Path:
     laws = {"kept": list(LAWS), "laws": [record(place) for place in LAWS]}
     path = folder / "verdict.json"
-    path.write_text(json.dumps({"error_before": 0.05, "laws": laws}))
+    path.write_text(json.dumps({"error_before": 0.05, "laws": laws, "table": "runs.csv"}))
     return path
 
 
@@ -60,7 +60,9 @@ def test_the_file_is_an_effect_with_the_law_s_formula(
     effect = module(effect_file).EFFECT
     name, size = LAWS[place]
     assert (effect.name, effect.typical, effect.null) == ("new_effect", size, 0.0)
-    text = effect_file.read_text()
+    text = " ".join(effect_file.read_text().split())
+    assert all(len(line) <= 115 for file in (effect_file, test_file) for line in file.read_text().splitlines())
+    assert effect.source == "a law of measured runs, runs.csv"
     assert "N from 2 to 5, l from 5 to 15 cm, ω = 143 rpm" in text
     assert "2.60 % with it, 5.00 % without it" in text
     monkeypatch.setitem(catalogue(), "new_effect", effect)
