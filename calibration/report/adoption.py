@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.effects import catalogue
+from sim.effects import catalogue, check_size
 from sim.io.errors import InputError
 from sim.io.files import files_together, write_text
 from sim.io.reading import ContentError, read_json
@@ -113,9 +113,10 @@ def adopt_law(source: str | Path, name: str, folder: str | Path, *, place: str =
     try:
         effect = law_from_name(str(record["effect"]["name"]))
         size, error = float(record["effect"]["size"]), float(record["error"])
-        words, runs = str(record["words"]), _runs_in_words(record["runs"])
-        if effect is None or not math.isfinite(size + error) or not size:
+        words, runs = _plain(record["words"]), _runs_in_words(record["runs"])
+        if effect is None or not math.isfinite(size + error) or not size or not words:
             raise ValueError
+        check_size(effect.name, size)
     except (KeyError, TypeError, ValueError, OverflowError):
         raise InputError(f"{source}: the law cannot be read; calibrate the table again") from None
     described = (
@@ -154,8 +155,12 @@ def _law_of(source: str | Path, place: str) -> tuple[dict[str, Any], float, str]
         raise InputError(f"{source}: no law describes the runs of this table")
     if place and place not in names:
         raise InputError(f"{source}: no law {place!r} was kept; kept are {', '.join(names)}")
-    table = re.sub(r'["\\\n]', "", str(content.get("table", "")))
-    return kept[names.index(place) if place else 0], without, table
+    return kept[names.index(place) if place else 0], without, _plain(content.get("table", ""))
+
+
+def _plain(text: object) -> str:
+    """Remove from a text of a file what would end a string of Python."""
+    return re.sub(r"[\"\\\x00-\x1f]", "", str(text))
 
 
 def _runs_in_words(runs: dict[str, Any]) -> str:

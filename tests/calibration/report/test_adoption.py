@@ -82,6 +82,15 @@ def test_the_best_law_is_adopted_by_default(tmp_path: Path) -> None:
     assert "Words of Fx_wh" in effect_file.read_text()
 
 
+def test_words_and_names_cannot_end_a_string(tmp_path: Path) -> None:
+    content = json.loads(verdict(tmp_path).read_text())
+    content["table"] = 'a".csv\\'
+    content["laws"]["laws"][0]["words"] = 'words """ raise SystemExit'
+    (tmp_path / "verdict.json").write_text(json.dumps(content))
+    effect = module(adopt_law(tmp_path / "verdict.json", "new_effect", tmp_path)[0]).EFFECT
+    assert effect.source == "a law of measured runs, a.csv"
+
+
 @pytest.mark.parametrize(
     ("name", "place", "message"),
     [
