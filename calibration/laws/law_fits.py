@@ -138,7 +138,7 @@ class Laws:
             )
         rivals = "; or ".join(law.words for law in self.kept)
         shared = in_common([law.place for law in self.kept])
-        agree = f" All of them are {shared}." if shared else ""
+        agree = f" All of them {shared}." if shared else ""
         return f"The residual is described by {rivals}: these runs cannot tell them apart.{agree}"
 
     @property

@@ -83,16 +83,16 @@ def place_named(name: str) -> Place:
 
 
 def in_common(chosen: Sequence[Place]) -> str:
-    """Say what places have in common; empty if that is nothing."""
+    """Say what places have in common, as a predicate; empty if that is nothing."""
     if len({place.part for place in chosen}) > 1:
         return ""
     wrenches, motions = {place.wrench for place in chosen}, {place.motion for place in chosen}
     if len(wrenches) == 1 and chosen[0].wrench:
-        return _WRENCH_WORDS[chosen[0].wrench]
-    part = chosen[0].part
-    if len(motions) == 1 and chosen[0].motion:
-        return f"a load on the {part} that is driven by {_MOTION_WORDS[chosen[0].motion]}"
-    return f"a load on the {part}" if part == "head" else "the tails"
+        return f"are {_WRENCH_WORDS[chosen[0].wrench]}"
+    acts = f"act on the {chosen[0].part}"
+    return (
+        f"{acts}, driven by {_MOTION_WORDS[chosen[0].motion]}" if len(motions) == 1 and chosen[0].motion else acts
+    )
 
 
 def places() -> tuple[Place, ...]:

@@ -1,0 +1,29 @@
+"""What places of laws have in common."""
+
+from __future__ import annotations
+
+import pytest
+
+from calibration.laws.places import in_common, place_named, places
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("Fz_wt", "Fz_vx"), "are a force along the axis on the head"),
+        (("My_wt", "Fx_wt"), "act on the head, driven by the spin of the tails ω_t"),
+        (("Ct", "Fx_wt"), "act on the head"),
+        (("Ct", "Cyr"), "act on the head"),
+        (("tail_drag", "tail_stiffness"), "act on the tails"),
+        (("tail_drag", "Cr"), ""),
+    ],
+)
+def test_what_they_have_in_common_is_said(names: tuple[str, ...], said: str) -> None:
+    assert in_common([place_named(name) for name in names]) == said
+
+
+def test_places_have_names_of_their_own() -> None:
+    names = [place.name for place in places()]
+    assert len(set(names)) == len(names) == 25
+    with pytest.raises(KeyError):
+        place_named("no such place")
