@@ -63,6 +63,7 @@ GENERAL = ("lack", "kernel", "shape")
 _PASSES = 3  # iterations for the scatter of the sessions
 _PASSES_OF_A_SCORE = 2
 _AT_ONCE = 50  # draws
+_VALUES = 2_000_000  # of the draws that are made at once
 
 
 @dataclass(frozen=True)
@@ -189,8 +190,7 @@ class _Tester:
         inputs = data.inputs[used]
         spread = inputs.std(0)
         inputs = (inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
-        distance = ((inputs[:, None] - inputs[None]) ** 2).sum(-1)
-        self.K = np.exp(-distance / 2)
+        self.places, self.K = _kernel(inputs)
         self.names, self.F = features(data, used)
         self.F = self.F[used]
         kinds, place = np.unique(self.condition, return_inverse=True)
@@ -215,7 +215,8 @@ class _Tester:
         white = residual - np.einsum("nkp,bp->bnk", self.J, step, optimize=True)
         white = self._shrunk(white @ np.swapaxes(root, -1, -2), share)
         lack = ((self.means @ white) ** 2).sum((-1, -2))
-        kernel = np.einsum("bnk,nm,bmk->b", white, self.K, white, optimize=True)
+        at_places = self.places @ white
+        kernel = np.einsum("bik,ij,bjk->b", at_places, self.K, at_places, optimize=True)
         shapes = self._shapes(base.covariance[:, 0], white, root, share)
         largest = np.abs(shapes).max((-1, -2)) if shapes.size else np.zeros(len(share))
         return Scores(np.stack([lack, kernel, largest], -1), *projected, shapes, share)
@@ -264,6 +265,18 @@ class _Tester:
         less = 1 / np.sqrt(1 + share[:, None] * self.design.sizes) - 1  # (B, s)
         picks = self.design.picks
         return np.asarray(table + picks.T @ (less[..., None] * (picks @ table)))
+
+
+def _kernel(inputs: Floats) -> tuple[Floats, Floats]:
+    """Compute the kernel between the u different rows of inputs (n, q).
+
+    Returns:
+        (u, n) rows that add up the runs with equal inputs, and (u, u) the kernel.
+    """
+    kinds, place = np.unique(inputs, axis=0, return_inverse=True)
+    square = (kinds**2).sum(1)
+    distance = np.maximum(square[:, None] + square - 2 * kinds @ kinds.T, 0.0)
+    return (np.arange(len(kinds))[:, None] == place.reshape(-1)).astype(float), np.exp(-distance / 2)
 
 
 def projected_scores(products: Sums, p: int) -> tuple[Floats, Floats, Floats]:
@@ -321,7 +334,7 @@ def examine_residual(
     statistics = np.append(observed.general[0], _largest(observed.z, testable))
     batches: list[Floats] = []
     while (drawn := sum(map(len, batches))) < (draws or study.draws):
-        count = min(_AT_ONCE, (draws or study.draws) - drawn)
+        count = min(_AT_ONCE, max(1, _VALUES // residual.size), (draws or study.draws) - drawn)
         noise = rng.normal(size=(count, *residual.shape))
         noise += scatter * rng.normal(size=(count, session.max() + 1, residual.shape[-1]))[:, session]
         nuisances = rng.normal(size=(count, len(sigma))) * sigma
