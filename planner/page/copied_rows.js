@@ -5,7 +5,7 @@ const CHANCE = 0.01; // equal pairs that are expected by chance
 const ROUNDING = 1e-9; // relative difference below which two numbers are one
 const TYPICAL = 0.01; // relative standard deviation where no repeats but copies are left
 
-/* Find copied rows: a Map from a place to the place of the row that it repeats.
+/* Find copied rows: pairs of a place and the place of the row that it repeats.
  *
  * inputs, outputs: lists of columns. */
 function findCopies(inputs, outputs) {
@@ -16,14 +16,14 @@ function findCopies(inputs, outputs) {
     if (first.has(row)) copies.set(place, first.get(row));
     else first.set(row, place);
   }
-  if (!copies.size) return copies;
+  if (!copies.size) return [];
   const condition = Array.from({ length: count }, (_, place) => words(inputs, place)), sizes = new Map();
   for (const name of condition) sizes.set(name, (sizes.get(name) ?? 0) + 1);
   const pairs = [...sizes.values()].reduce((total, size) => total + (size * (size - 1)) / 2, 0);
   const kept = condition.map((_, place) => place).filter((place) => !copies.has(place));
   const places = kept.map((place) => condition[place]);
   const chances = outputs.map((column) => equal(kept.map((place) => column[place]), places));
-  return pairs * chances.reduce((product, chance) => product * chance, 1) < CHANCE ? copies : new Map();
+  return pairs * chances.reduce((product, chance) => product * chance, 1) < CHANCE ? [...copies] : [];
 }
 
 /* Estimate the probability that two repeats of an output are equal. _equal */
