@@ -21,6 +21,7 @@ from calibration.laws.readings import INPUTS
 from calibration.statistics.statistical_model import inverse_root
 from sim.arrays import Flags, Floats
 
+_LARGEST = 20.0  # logarithm of a factor
 _MOST_VALUES = 12  # of an input; with more, neighbouring runs are put together
 
 
@@ -54,22 +55,27 @@ def dependences(law: Law, used: Flags) -> list[Dependence]:
         curve = np.linspace(x[used, place].min(), x[used, place].max(), 60)
         half = fitted.half_width(at) * np.abs(curve)
         members = _grouped(x[used, place])
-        weights = np.array([(columns[rows] ** 2).sum() for rows in members])
+        weights = np.maximum([(columns[rows] ** 2).sum() for rows in members], np.finfo(float).tiny)
         shifts = np.array([(columns[rows] * residual[rows]).sum() for rows in members]) / weights
         middle = np.array([x[used, place][rows].mean() for rows in members])
         results.append(
             Dependence(
                 symbol,
                 np.exp(curve + model.centre[place]),
-                np.exp(power * curve),
-                np.exp(power * curve - half),
-                np.exp(power * curve + half),
+                _factor(power * curve),
+                _factor(power * curve - half),
+                _factor(power * curve + half),
                 np.exp(middle + model.centre[place]),
-                np.exp(power * middle + shifts),
-                weights**-0.5,
+                _factor(power * middle + shifts),
+                np.minimum(weights**-0.5, _LARGEST),
             )
         )
     return results
+
+
+def _factor(logarithm: Floats) -> Floats:
+    """Compute e to a power that is limited: what the runs do not determine may be of any size."""
+    return np.asarray(np.exp(np.clip(logarithm, -_LARGEST, _LARGEST)))
 
 
 def _along_load(law: Law) -> Floats:

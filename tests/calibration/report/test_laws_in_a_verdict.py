@@ -197,5 +197,14 @@ def test_the_runs_at_each_input_lie_on_the_law() -> None:
     assert np.abs(pulls).max() < 4
     assert np.abs(pulls).max() > 0
     assert draw_dependences(curves).axes
+    far = replace(law.fit, covariance=1e12 * law.fit.covariance, jacobian=1e-9 * law.fit.jacobian)
+    undetermined = dependences(replace(law, fit=far), verdict.conditions.split.fitted)
+    assert all(
+        np.isfinite(part).all()
+        for curve in undetermined
+        for part in vars(curve).values()
+        if part is not curve.symbol
+    )
+    draw_dependences(undetermined).canvas.draw()  # it used to overflow
     for place in ("Fx_wh", "Fz_vz", "My_wt", "Mz_wh", "Ct", "Cr", "tail_drag"):
         assert draw_place(START, place_named(place)).axes[0].has_data()
