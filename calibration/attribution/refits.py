@@ -143,7 +143,6 @@ def examine(
     scored = unexamined(misfit, effects, needed, beside)
     examined = []
     title = " ".join(("effects", *(f"beside {e.title}" for e in beside)))
-    values = int(study.split.fitted.sum()) * base.prediction.shape[1]
     order = np.argsort(-np.abs(misfit.scores.z)).tolist()
     for j in tqdm(order, desc=title, unit="effect", delay=1.0, disable=not study.progress):
         effect, candidate = effects[j], scored[j]
@@ -159,7 +158,7 @@ def examine(
             size[effect.second.name] = float(misfit.second[j]) if local else effect.second.start
         start = {**(base.parameters if local else start_values(study.model)), **size}
         names = (*base.names, *size)
-        target = noise_at_most(values, len(names))
+        target = noise_at_most(study.values, len(names))
         refit = fit(study.model, start, names, study.split.fitted, target=target, title="")
         examined.append(judge(study, candidate, base, refit, directions.without(j)))
     return examined
@@ -180,10 +179,9 @@ def _reason_not_to_refit(
     if not low <= guess <= high and (guess < low) == (effect.start == low):
         return "its score has a sign that the effect cannot have"
     # A refit takes z² from the deviance if the model is linear. `_CURVED` allows for its curvature.
-    values = int(study.split.fitted.sum()) * base.prediction.shape[1]
     remainder = base.deviance - z**2 / _CURVED
     best = float(np.max(np.where(misfit.scores.survived >= TESTABLE, misfit.scores.z**2, 0.0)))
-    if z**2 < _CURVED * best and remainder > noise_at_most(values, len(base.names)):
+    if z**2 < _CURVED * best and remainder > noise_at_most(study.values, len(base.names)):
         return "leaves far more than noise, by its score"
     return ""
 
@@ -218,9 +216,8 @@ def ebic(study: Study, refit: Fit, count: int) -> float:
 
     Source: Chen and Chen (2008), γ = 1.
     """
-    values = int(study.split.fitted.sum()) * refit.prediction.shape[1]
     sets = math.comb(len(study.model.effects), count)
-    return refit.deviance + len(refit.names) * math.log(values) + 2 * math.log(sets)
+    return refit.deviance + len(refit.names) * math.log(study.values) + 2 * math.log(sets)
 
 
 def judge(study: Study, candidate: Candidate, base: Fit, refit: Fit, others: Directions) -> Candidate:

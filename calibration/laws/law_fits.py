@@ -194,15 +194,14 @@ def _fit_all(study: Study, model: SwimmerModel, base: Fit, chosen: Sequence[Rank
 
 def _fitted(study: Study, model: SwimmerModel, base: Fit, ranked: Ranked) -> Law | None:
     """Fit a law from its linear model, and judge it; None where its motion cannot be simulated."""
-    used, data = study.split.fitted, model.runs
+    data = model.runs
     size = float(np.clip(ranked.size, -_LARGEST_AT_START, _LARGEST_AT_START))
     with_law = LawModel.of(model, ranked.place, size)
     names = tuple(p.name for p in with_law.effects)
     refit = _best_fit(study, with_law, base, {**ranked.start, SIZE: size})
     if refit is None:
         return None
-    count = int(used.sum()) * refit.prediction.shape[1]
-    gain = base.deviance - refit.deviance - len(names) * math.log(count)
+    gain = base.deviance - refit.deviance - len(names) * math.log(study.values)
     predictive = session_gain(study, base, refit)
     reason = ""
     if not refit.converged:
@@ -247,8 +246,7 @@ def _best_fit(study: Study, model: LawModel, base: Fit, linear: dict[str, float]
     """
     names = tuple(p.name for p in model.effects)
     flat = {name: linear[SIZE] / 2 if name == SIZE else 0.0 for name in names}
-    values = int(study.split.fitted.sum()) * base.prediction.shape[1]
-    target = noise_at_most(values, len(base.names) + len(names))
+    target = noise_at_most(study.values, len(base.names) + len(names))
     best: Fit | None = None
     for start in (
         {**base.parameters, **{name: linear[name] for name in names}},

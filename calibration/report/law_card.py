@@ -105,8 +105,7 @@ def draw_place(robot: Robot, place: Place) -> Figure:
 
 def _draw_load(axes: Any, place: Place, disc: Floats, head_length: float) -> None:
     """Draw a load of the head at the disc, which is at its rear; e_z is to the right, e_x up."""
-    centre = disc + np.array([head_length / 2, 0.0])
-    at = {"Ct": centre, "Cr": centre, "Cyr": centre}.get(place.name, disc)
+    at = disc if place.is_term else disc + np.array([head_length / 2, 0.0])  # coefficients act at the centre
     kind = place.wrench or {"Ct": "Fz", "Cr": "Mz", "Cyr": "Fx"}[place.name]
     angles = np.linspace(-0.4 * math.pi, 1.1 * math.pi, 40)
     if kind == "Fx":

@@ -52,6 +52,11 @@ class Study:
     draws: int = DRAWS  # of the bootstrap
     progress: bool = False  # show progress bars
 
+    @property
+    def values(self) -> int:
+        """Number of values that are fitted, over runs and outputs."""
+        return int(self.split.fitted.sum()) * self.model.runs.y.shape[1]
+
     @classmethod
     def fitted_to(cls, model: ForwardModel, used: Flags, **settings: Any) -> Study:
         """Study a model on the runs in `used` (n,); all others are held out."""

@@ -86,10 +86,7 @@ def check_outputs(runs: Measurements, prediction: Floats) -> None:
     for i, name in enumerate(runs.outputs):
         theirs, ours = np.median(runs.y[:, i]), np.median(prediction[:, i])
         factor = float(theirs / ours if name == "theta" else math.exp(theirs - ours))
-        try:
-            check_factor(name, factor)
-        except InputError as refusal:
-            raise InputError(f"{refusal}{_all_spins(factor) if name == 'omega_yr' else ''}") from None
+        check_factor(name, factor, _all_spins(factor) if name == "omega_yr" else "")
 
 
 def _all_spins(factor: float) -> str:
@@ -100,8 +97,11 @@ def _all_spins(factor: float) -> str:
     return f"; or the spins of motor, head and tails are all in {meant} where {stated} is stated"
 
 
-def check_factor(output: str, factor: float) -> None:
+def check_factor(output: str, factor: float, otherwise: str = "") -> None:
     """Check the ratio of an output, a name of OUTPUTS, to the prediction of the model as given.
+
+    Args:
+        otherwise: what else may be wrong, for the end of the message.
 
     Raises:
         InputError: the output seems to be in another unit.
@@ -111,12 +111,12 @@ def check_factor(output: str, factor: float) -> None:
         if 1 / _NEAR < factor / wrong < _NEAR:
             raise InputError(
                 f"{column} is {factor:.3g} times what the robot as given does: it seems to be in {unit}; "
-                "convert it, or correct the coefficients in robot.toml if its unit is right"
+                f"convert it, or correct the coefficients in robot.toml if its unit is right{otherwise}"
             )
     if not 1 / OFF < factor < OFF:
         raise InputError(
             f"{column} is {factor:.3g} times what the robot as given does; "
-            "check its unit, those of l_cm and omega_rpm, and robot.toml"
+            f"check its unit, those of l_cm and omega_rpm, and robot.toml{otherwise}"
         )
 
 

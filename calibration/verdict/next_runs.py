@@ -102,12 +102,11 @@ def next_runs(rivals: Sequence[Rival], *, count: int = 3, seed: int = 0) -> tupl
     Args:
         rivals: two fitted models or more, the best first; of many, the first four are told apart.
     """
-    settings = rivals[0].model.possible()[1]
-    fits = [rival.fit for rival in rivals[:_MOST_RIVALS]]
-    sides = [
-        rival.model.possible()[0].derivatives(rival.fit.parameters, rival.fit.names)
-        for rival in rivals[:_MOST_RIVALS]
-    ]
+    told_apart = rivals[:_MOST_RIVALS]
+    fits = [rival.fit for rival in told_apart]
+    possible = [rival.model.possible() for rival in told_apart]
+    settings = possible[0][1]  # those of all of them
+    sides = [model.derivatives(fit.parameters, fit.names) for (model, _), fit in zip(possible, fits, strict=True)]
     pairs = [
         Pair(true[0] - wrong[0], wrong[1], again.covariance)
         for (_, true), (again, wrong) in itertools.permutations(zip(fits, sides, strict=True), 2)

@@ -100,13 +100,12 @@ def _after_unexplained(result: Verdict) -> list[str]:
             f"conditions where it is largest (below), {_NEW_SESSION}, and calibrate again.",
         ]
     if result.described:
-        first = "Look for a cause where the law acts (below), and which depends on the same inputs."
+        steps = ["Look for a cause where the law acts (below), and which depends on the same inputs."]
     else:
-        first = (
+        steps = [
             "Look where the residual is large (below): a dependence on one input points to the part of the set-up "
             "to check."
-        )
-    steps = [first]
+        ]
     if result.evidence.untestable:
         missing = sorted(result.evidence.untestable)
         steps.append(

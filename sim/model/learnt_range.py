@@ -11,7 +11,7 @@ So a robot outside the runs, by more than a small margin, is refused. In a robot
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,7 +65,7 @@ def inputs_of(values: Mapping[str, float]) -> tuple[float, float, float]:
     return float(values["N"]), slender, math.log(abs(values["omega_bar"])) - 4 * slender
 
 
-def learnt_range(robots: Any) -> LearntRange:
+def learnt_range(robots: Iterable[Mapping[str, float]]) -> LearntRange:
     """Compute the range of robots from their groups, each by column name."""
     inputs = np.array([inputs_of(values) for values in robots])
     return LearntRange(tuple(inputs.min(0).round(6).tolist()), tuple(inputs.max(0).round(6).tolist()))

@@ -52,6 +52,12 @@ def ambiguous() -> tuple[Verdict, Measurements]:
     return calibrated_toy(1, **ONE_LENGTH), runs  # type: ignore[arg-type]
 
 
+def runs_of_toy(seed: int) -> Measurements:
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        return toy_swimmer(toy_table(seed)).runs
+
+
 def page(result: Verdict, runs: Measurements, folder: Path) -> PageText:
     write_report(result, runs, folder / "report.html", title="t.csv")
     return PageText(folder / "report.html")
@@ -182,9 +188,7 @@ def test_runs_that_seldom_decide_are_not_offered(tmp_path: Path) -> None:
 @shares_verdicts
 def test_a_pull_that_is_not_taken_to_be_wrong_has_its_reason(tmp_path: Path) -> None:
     """Pulls of +19 stood beside a text that did not name them."""
-    with pytest.MonkeyPatch.context() as patch:
-        install_toy(patch)
-        runs = toy_swimmer(toy_table(3)).runs
+    runs = runs_of_toy(3)
     plain = calibrated_toy(3)
     first, second, *others = plain.fits.pulls
     pulled = (replace(first, z=19.0), second, *others)
@@ -203,9 +207,7 @@ def test_a_pull_that_is_not_taken_to_be_wrong_has_its_reason(tmp_path: Path) -> 
 @shares_verdicts
 def test_a_report_without_a_claim_compares_no_model_with_itself(tmp_path: Path) -> None:
     """Residuals before and after were the same picture twice."""
-    with pytest.MonkeyPatch.context() as patch:
-        install_toy(patch)
-        runs = toy_swimmer(toy_table(3)).runs
+    runs = runs_of_toy(3)
     seen = page(calibrated_toy(3), runs, tmp_path)
     assert "with the verdict's effects" not in seen.text
     assert seen.text.count("tail length [cm]") == 1
@@ -213,9 +215,7 @@ def test_a_report_without_a_claim_compares_no_model_with_itself(tmp_path: Path) 
 
 @shares_verdicts
 def test_the_number_to_measure_better_is_listed_with_what_it_would_show(tmp_path: Path) -> None:
-    with pytest.MonkeyPatch.context() as patch:
-        install_toy(patch)
-        runs = toy_swimmer(toy_table(2)).runs
+    runs = runs_of_toy(2)
     result = calibrated_toy(2)
     seen = page(result, runs, tmp_path).text
     title, entry = "Which number, measured better, would show what", result.halved_tolerances
