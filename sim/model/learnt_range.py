@@ -55,7 +55,7 @@ class LearntRange:
             if not low - margin <= value <= high + margin:
                 raise InputError(
                     f"{name} = {value:.3g} is outside the runs that the robot's {what} was learnt from "
-                    f"({low:.3g} to {high:.3g}): make runs there, or leave it out"
+                    f"({low:.3g} to {high:.3g}): make runs there, or leave the {what} out of its file"
                 )
 
 
