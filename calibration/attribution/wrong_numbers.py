@@ -14,6 +14,9 @@ that the runs cannot tell apart, the one is freed that is off by the fewest of i
 fit then leaves no more than noise, the wrong number explains the residual, and no effect is claimed for it. An
 effect is claimed only if it fits better than the freed number by more than one parameter can gain by chance. A
 smaller pull is mentioned only if it is notable among so many (`notable_pull`).
+
+A number that would have to be off by more than `IMPLAUSIBLE` of its standard deviations does not come ahead of
+effects that explain as much (`implausible`). They come first, and the number is named after them.
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ from calibration.statistics.residual_tests import Directions
 from calibration.statistics.statistical_model import Parameter, change
 from calibration.statistics.study import Study
 
+IMPLAUSIBLE = 5.0  # standard deviations of its prior: a ruler is seldom wrong by so many
 _NOTABLE = 0.05  # share of tables with nothing wrong whose verdict names a nuisance parameter, at most
 _MOST = 2  # numbers that may be wrong together
 _TRIED = 3  # effects that are fitted once more beside wrong numbers
@@ -70,9 +74,9 @@ def wrong_number(candidates: Sequence[Pull]) -> tuple[Pull, ...]:
     if not wrong:
         return ()
     farthest = wrong[0]
-    likeliest = min((p for p in wrong if farthest.z**2 - p.z**2 < INDISTINGUISHABLE), key=_standardised_change)
+    likeliest = min((p for p in wrong if farthest.z**2 - p.z**2 < INDISTINGUISHABLE), key=lambda p: p.tolerances)
     alike = [p for p in wrong if p is not likeliest and likeliest.z**2 - p.z**2 < INDISTINGUISHABLE]
-    return (likeliest, *sorted(alike, key=_standardised_change))
+    return (likeliest, *sorted(alike, key=lambda p: p.tolerances))
 
 
 def notable_pull(count: int) -> float:
@@ -83,9 +87,9 @@ def notable_pull(count: int) -> float:
     return float(normal.isf((1 - (1 - _NOTABLE) ** (1 / count)) / 2))
 
 
-def _standardised_change(pull: Pull) -> float:
-    assert pull.parameter.sigma is not None
-    return abs(pull.alone) / pull.parameter.sigma
+def implausible(freed: Sequence[Pull]) -> bool:
+    """Tell whether one of the freed parameters is further off than its stated tolerance makes credible."""
+    return any(pull.tolerances > IMPLAUSIBLE for pull in freed)
 
 
 def without_wrong_priors(study: Study, fitted: Fit) -> Fit:

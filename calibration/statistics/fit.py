@@ -84,15 +84,26 @@ class Pull:
         return self.learnt and abs(self.z) > WRONG
 
     @property
+    def tolerances(self) -> float:
+        """How many of its stated standard deviations it is off, by the runs alone."""
+        assert self.parameter.sigma is not None
+        return abs(self.alone) / self.parameter.sigma
+
+    @property
     def words(self) -> str:
         """What the runs alone say, as in "E is 40 % below what was given (3.7 σ)"."""
+        return f"{self.parameter.title} is {self.departure} ({abs(self.z):.1f} σ)"
+
+    @property
+    def departure(self) -> str:
+        """How far it is from its value, by the runs alone, as in "40 % below what was given"."""
         given, change = self.parameter, self.alone
         size = abs(math.expm1(change)) * 100 if given.logarithmic else abs(change) * given.shown
         if size < _NOTHING:
-            return f"{given.title} is what was given ({abs(self.z):.1f} σ)"
+            return "what was given"
         unit, side = "%" if given.logarithmic else given.unit, "below" if change < 0 else "above"
         digits = f"{size:.2g}" if size < 99.5 else f"{size:.0f}"
-        return f"{given.title} is {digits} {unit} {side} what was given ({abs(self.z):.1f} σ)"
+        return f"{digits} {unit} {side} what was given"
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@
    Outliers are excluded (`calibration.statistics.study`).
 2. The coefficients and the nuisance parameters are fitted to the other sessions, and the residual is tested.
 3. What explains it is looked for (`explain`). A nuisance parameter that leaves its prior is freed, and comes ahead
-   of every effect (`calibration.attribution.wrong_numbers`). Single effects (`calibration.attribution.refits`),
+   of every effect unless it would be far outside its prior (`calibration.attribution.wrong_numbers`). Single effects (`calibration.attribution.refits`),
    effects beside a wrong number, and pairs follow, each only if nothing before explains the residual.
 4. The verdict (`calibration.verdict.verdict.reach_verdict`).
 5. If several explanations are left, next runs that would tell them apart (`calibration.verdict.next_runs`).
@@ -42,11 +42,12 @@ from calibration.attribution.wrong_numbers import (
     as_good_as_number,
     beats_number,
     beside_wrong_numbers,
+    implausible,
     pulls,
     without_wrong_priors,
 )
 from calibration.statistics.exclusions import caveat_of_excluded, count_of_rows
-from calibration.statistics.fit import Fit, fit, profile_intervals
+from calibration.statistics.fit import Fit, Pull, fit, profile_intervals
 from calibration.statistics.held_out import error_interval, errors, held_out_p_value, refit_to_all
 from calibration.statistics.residual_regression import regress_residual
 from calibration.statistics.residual_tests import TESTABLE, Misfit, directions, examine_residual
@@ -108,6 +109,7 @@ def calibrate(
         candidates=explained.candidates,
         explaining=explained.best,
         rival_effects=explained.rival_effects,
+        rival_number=explained.rival_number,
         untestable=dict(model.untestable),
     )
     verdict = reach_verdict(evidence, level, number_explains=explained.number is not None)
@@ -154,6 +156,7 @@ class Explained:
     best: tuple[Candidate, ...] = ()  # what explains the residual, best first; more than one: not told apart
     number: Fit | None = None  # the fit with a wrong nuisance parameter freed, if that explains the residual
     rival_effects: tuple[Candidate, ...] = ()  # effects that explain as much as the wrong number does
+    rival_number: tuple[Pull, ...] = ()  # the wrong number, where effects come ahead of it
 
     @property
     def final(self) -> Fit:
@@ -165,9 +168,10 @@ class Explained:
     def rivals(self, model: Experiment) -> tuple[Rival, ...]:
         """List explanations that the runs cannot tell apart, best first; none if there are not two."""
         known = [(c.title, c.refit) for c in (*self.best, *self.rival_effects) if c.refit]
-        if self.number and self.rival_effects:
+        if self.number and known:
             wrong = ", ".join(alike[0].parameter.title for alike in self.number.wrong_numbers)
-            known = [(f"the stated value of {wrong} is wrong", self.number), *known]
+            number = f"the stated value of {wrong} is wrong", self.number
+            known = [*known, number] if self.best else [number, *known]
         return tuple(Rival(title, refit, model) for title, refit in known) if len(known) > 1 else ()
 
 
@@ -203,6 +207,11 @@ def explain(study: Study, guess: Mapping[str, float]) -> Explained:
     best = explaining(candidates)
     if number_explains and not beats_number(best, freed):
         rival_effects = tuple(as_good_as_number(candidates, freed, level))
+        claims = [c for c in rival_effects if c.kept]
+        off = tuple(p for p in pulls(freed, model.nuisances) if p.freed)
+        if claims and misfit.p_value < level and implausible(off):
+            checked = tuple(with_checks(study, claims, base))
+            return Explained(base, misfit, tuple(candidates), checked, freed, rival_number=off)
         return Explained(base, misfit, tuple(candidates), (), freed, rival_effects)
     best = (
         best

@@ -84,7 +84,10 @@ def _after_effect(result: Verdict) -> list[str]:
 
 def _after_ambiguous(result: Verdict) -> list[str]:
     first = result.explaining[0].title
+    numbers = " and ".join(p.parameter.title for p in result.evidence.rival_number)
+    again = f"Measure {numbers} again, to rule out that the stated value is wrong, and calibrate again."
     return [
+        *([again] if numbers else []),
         *_telling_apart(result),
         f"Until then, corrected.toml has {first}. It predicts runs like those of this table; elsewhere the "
         "explanations differ.",

@@ -44,6 +44,7 @@ class Evidence:
     explaining: tuple[Candidate, ...]  # what explains the residual, best first; more than one: not told apart
     rival_effects: tuple[Candidate, ...]  # effects that explain as much as the number that is wrong
     untestable: dict[str, str]  # effects that these runs cannot test: what is missing
+    rival_number: tuple[Pull, ...] = ()  # numbers that explain as much, but would be too far off to come first
 
 
 @dataclass(frozen=True)
@@ -113,8 +114,8 @@ class Conditions:
 def reach_verdict(evidence: Evidence, level: float, *, number_explains: bool) -> str:
     """Decide the verdict; this is the rule of the whole calibration.
 
-    A wrong nuisance parameter comes ahead of every effect that is not better. Without one, a residual within the
-    noise is "none". Beyond it, the number of explanations that the runs cannot tell apart decides. What new runs
+    A wrong nuisance parameter comes ahead of every effect that is not better, or it is one of several explanations
+    (`Evidence.rival_number`). Without one, a residual within the noise is "none". Beyond it, the number of explanations that the runs cannot tell apart decides. What new runs
     say about an "ambiguous" verdict is decided by `calibration.verdict.sequential_test.standings`.
 
     Args:
@@ -125,7 +126,8 @@ def reach_verdict(evidence: Evidence, level: float, *, number_explains: bool) ->
         return "number"
     if evidence.misfit.p_value >= level:
         return "none"
-    return ("unexplained", "effect", "ambiguous")[min(len(evidence.explaining), 2)]
+    explanations = len(evidence.explaining) + bool(evidence.rival_number)
+    return ("unexplained", "effect", "ambiguous")[min(explanations, 2)]
 
 
 @dataclass(frozen=True, repr=False)
@@ -303,7 +305,7 @@ class Verdict:
             return f"The residual ({p}) is consistent with {said}, and with no {rivals} of the catalogue."
         if self.verdict == "ambiguous":
             names = " or ".join(c.title for c in self.explaining)
-            names += self._outside
+            names += self._outside + self._or_number
             return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart."
         none = "no effect and no pair of effects of the catalogue explains"
         return (
@@ -377,6 +379,16 @@ class Verdict:
             return ""
         many = len(self.explaining) > 1 or len(self.explaining[0].claimed) > 1
         return f", or something outside the catalogue that looks like {'them' if many else 'it'}"
+
+    @property
+    def _or_number(self) -> str:
+        """The words for numbers that explain as much, but would be off by too many of their tolerances."""
+        numbers = (
+            f"{p.parameter.title} that is {p.departure} ({p.tolerances:.0f} of its tolerances)"
+            for p in self.evidence.rival_number
+        )
+        said = " and ".join(numbers)
+        return f", or by {said}" if said else ""
 
     @property
     def _nearest(self) -> str:

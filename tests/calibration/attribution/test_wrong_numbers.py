@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
+from calibration.attribution import wrong_numbers
 from calibration.attribution.wrong_numbers import notable_pull, pulls
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import fit
@@ -111,6 +112,30 @@ def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
     record = verdict_record(result, table="t")
     assert record["wrong_numbers"][0] == [p.parameter.name for p in result.wrong_numbers[0]]
     assert result.error_after < 1.25 * result.noise_ceiling
+
+
+@pytest.mark.usefixtures("toy_model", "few_candidates")
+def test_a_number_far_beyond_its_tolerance_does_not_come_ahead_of_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A head's length nine of its tolerances off explains as much as the effect that was there."""
+    table = toy_table(2, end_over_end_drag=0.6)
+    result = calibrated(table)
+    assert result.verdict == "ambiguous"
+    assert result.effects == ("end_over_end_drag",)
+    (number,) = result.evidence.rival_number
+    assert number.parameter.name == "head_length"
+    assert number.tolerances > wrong_numbers.IMPLAUSIBLE
+    assert f"L (head length) that is {number.departure} (9 of its tolerances)" in result.sentence
+    assert result.sentence.index("end-over-end drag") < result.sentence.index("head length")
+    titles = [e.title for e in result.next.explanations]
+    assert titles == ["head's end-over-end drag", "the stated value of L (head length) is wrong"]
+    record = verdict_record(result, table="t")
+    assert record["numbers_instead"] == ["head_length"]
+    assert record["wrong_numbers"] == []
+    assert record["next_steps"][1].startswith("Measure L (head length) again")
+    monkeypatch.setattr(wrong_numbers, "IMPLAUSIBLE", 2 * number.tolerances)
+    ahead = calibrated(table)
+    assert ahead.verdict == "number"
+    assert [c.effect.name for c in ahead.evidence.rival_effects] == ["end_over_end_drag"]
 
 
 @pytest.mark.long

@@ -13,25 +13,30 @@ from calibration.verdict.old_names import OLD_NAMES
 from calibration.verdict.verdict import Corrections, Evidence, HeldOutErrors, Verdict, reach_verdict
 
 
-def evidence(p_value: float, explanations: int) -> Any:
-    return SimpleNamespace(misfit=SimpleNamespace(p_value=p_value), explaining=(None,) * explanations)
+def evidence(p_value: float, effects: int, numbers: int) -> Any:
+    misfit = SimpleNamespace(p_value=p_value)
+    return SimpleNamespace(misfit=misfit, explaining=(None,) * effects, rival_number=(None,) * numbers)
 
 
 @pytest.mark.parametrize(
-    ("p_value", "explanations", "number_explains", "verdict"),
+    ("p_value", "effects", "rival_numbers", "number_explains", "verdict"),
     [
-        (0.5, 0, False, "none"),
-        (0.5, 0, True, "number"),
-        (0.01, 0, True, "number"),
-        (0.01, 1, True, "effect"),
-        (0.01, 0, False, "unexplained"),
-        (0.01, 1, False, "effect"),
-        (0.01, 2, False, "ambiguous"),
-        (0.01, 5, False, "ambiguous"),
+        (0.5, 0, 0, False, "none"),
+        (0.5, 0, 0, True, "number"),
+        (0.01, 0, 0, True, "number"),
+        (0.01, 1, 0, True, "effect"),
+        (0.01, 1, 1, True, "ambiguous"),
+        (0.01, 0, 0, False, "unexplained"),
+        (0.01, 1, 0, False, "effect"),
+        (0.01, 2, 0, False, "ambiguous"),
+        (0.01, 5, 0, False, "ambiguous"),
     ],
 )
-def test_the_rule(p_value: float, explanations: int, number_explains: bool, verdict: str) -> None:
-    assert reach_verdict(evidence(p_value, explanations), 0.04, number_explains=number_explains) == verdict
+def test_the_rule(
+    p_value: float, effects: int, rival_numbers: int, number_explains: bool, verdict: str
+) -> None:
+    given = evidence(p_value, effects, rival_numbers)
+    assert reach_verdict(given, 0.04, number_explains=number_explains) == verdict
 
 
 def unexplained(
