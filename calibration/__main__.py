@@ -27,7 +27,7 @@ main = program.main
         metavar="COLUMN=VALUES",
         help="what the lab can set in its next runs, such as l_cm=5,7,9; for N, l_cm and omega_rpm",
     ),
-    argument("--no-laws", action="store_true", help="do not look for laws where no effect explains the runs"),
+    argument("--no-laws", action="store_true", help="do not look for laws that describe the runs"),
     JOBS,
     aliases=("close",),
 )

@@ -203,7 +203,7 @@ def pairs(study: Study, candidates: Sequence[Candidate]) -> list[Candidate]:
         tangents = directions(study.model, first.refit.parameters, others, title=title)
         misfit = examine_residual(again, first.refit, tangents)
         second += examine(again, first.refit, misfit, tangents, beside=(first.effect,))
-    single = min((ebic(study, c.refit, 1) for c in refitted if c.refit), default=math.inf)
+    single = lowest_ebic(study, candidates)
     kept: dict[frozenset[str], Candidate] = {}
     for pair in second:
         if pair.kept and pair.refit is not None and ebic(study, pair.refit, 2) < single:
@@ -211,13 +211,19 @@ def pairs(study: Study, candidates: Sequence[Candidate]) -> list[Candidate]:
     return list(kept.values())
 
 
+def lowest_ebic(study: Study, candidates: Sequence[Candidate]) -> float:
+    """Return the lowest EBIC of a single effect that was refitted; infinity if none was."""
+    return min((ebic(study, c.refit, 1) for c in candidates if c.refit), default=math.inf)
+
+
 def ebic(study: Study, refit: Fit, count: int) -> float:
     """Add to the deviance of a fit with `count` effects what they cost: k ln n + 2 ln (number of such sets).
 
-    Source: Chen and Chen (2008), γ = 1.
+    A nuisance parameter that lost its prior counts once more among the k numbers. Source: Chen and Chen (2008), γ = 1.
     """
     sets = math.comb(len(study.model.effects), count)
-    return refit.deviance + len(refit.names) * math.log(study.values) + 2 * math.log(sets)
+    numbers = len(refit.names) + len(refit.wrong_numbers)
+    return refit.deviance + numbers * math.log(study.values) + 2 * math.log(sets)
 
 
 def judge(study: Study, candidate: Candidate, base: Fit, refit: Fit, others: Directions) -> Candidate:

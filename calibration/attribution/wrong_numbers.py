@@ -26,7 +26,7 @@ from collections.abc import Sequence
 
 from scipy.stats import norm as normal
 
-from calibration.attribution.refits import INDISTINGUISHABLE, Candidate, judge
+from calibration.attribution.refits import INDISTINGUISHABLE, Candidate, ebic, judge, lowest_ebic
 from calibration.statistics.fit import Fit, Pull, fit
 from calibration.statistics.residual_tests import Directions
 from calibration.statistics.statistical_model import Parameter, change
@@ -108,6 +108,9 @@ def beside_wrong_numbers(
 ) -> list[Candidate]:
     """Refit the most promising effects once more, without the priors of nuisance parameters that they contradict.
 
+    An effect beside a wrong number is a pair. It is returned only if its EBIC is lower than that of every single
+    effect with all priors.
+
     Args:
         directions: of the effects.
     """
@@ -123,7 +126,8 @@ def beside_wrong_numbers(
         assert candidate.refit is not None
         refit = without_wrong_priors(study, candidate.refit)
         judged.append(judge(study, candidate, base, refit, directions.without(names.index(name))))
-    return judged
+    single = lowest_ebic(study, candidates)
+    return [c for c in judged if c.refit and ebic(study, c.refit, len(c.refit.wrong_numbers) + 1) < single]
 
 
 def beats_number(best: Sequence[Candidate], number: Fit) -> bool:

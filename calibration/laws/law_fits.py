@@ -7,6 +7,10 @@ nuisance parameters free. If the best of them leaves more than noise, all others
 - the interval of at least one of its numbers excludes the null, and
 - it predicts left-out sessions better, by more than the uncertainty of that gain.
 
+Beside a claim that something outside the catalogue could imitate, only the places that rank first are fitted, each
+with the exponents of its linear model alone: a claim has one number, or two. A law fits as well as the claim if it
+leaves no more than noise and its deviance is not larger by what one parameter can gain by chance.
+
 Kept laws cannot be told apart if their BIC differ by less than one parameter can gain by chance (6.63). The place
 that is true need not be among the places of the search: a law describes the runs, and is no claim about their
 cause. Intervals do not count the choice among the places.
@@ -39,6 +43,8 @@ from sim.io.errors import InputError
 _FITTED = 6  # places that are fitted first
 _CURVED = 0.3  # share of the best gain below which a place is not among them
 _LARGEST_AT_START = 50.0  # size of a term
+_NAMED = 2  # laws beside a claim that are named
+_SAME = 0.1  # of the noise of a run
 _RPM = 30 / math.pi
 _DRAWS = 400  # of the bootstrap, for the residual that a law leaves
 
@@ -81,6 +87,7 @@ class Law:
                 "interval": list(self.fit.interval(p.name)),
             }
             for p in self.model.effects
+            if p.name in self.fit.names
         }
         return {
             "place": self.place.name,
@@ -151,7 +158,30 @@ class Laws:
         """Laws that the runs cannot tell apart, best first; none if there are not two."""
         if not self.complete or len(self.kept) < 2:
             return ()
-        return tuple(Rival(law.words, law.fit, law.model, law.model.record) for law in self.kept)
+        return tuple(map(_rival, self.kept))
+
+    def as_good_as(self, claim: Fit) -> tuple[Rival, ...]:
+        """List the kept laws that leave no more than noise and fit as well as a claimed effect, best first."""
+        return tuple(map(_rival, self._as_good_as(claim)))
+
+    def _as_good_as(self, claim: Fit) -> list[Law]:
+        """List them without those that predict what the claim does: they are the claim in other words."""
+        limit = claim.deviance + INDISTINGUISHABLE
+        good = [law for law in self.kept if law.p_value >= self.level / 2 and law.fit.deviance < limit]
+        scatter = np.sqrt(np.diag(claim.noise.run))
+        return [law for law in good if np.abs((law.fit.prediction - claim.prediction) / scatter).max() > _SAME]
+
+    def beside(self, claim: Fit) -> str:
+        """Say which laws fit as well as a claimed effect, and what they have in common."""
+        laws = self._as_good_as(claim)
+        if not laws:
+            return "No law of the places that were searched describes it as well."
+        shared = in_common([law.place for law in laws]) if len(laws) > 1 else ""
+        agree = f" All of them {shared}." if shared else ""
+        named = "; or by ".join(law.words for law in laws[:_NAMED])
+        others = len(laws) - _NAMED
+        more = f"; or by laws at {others} other place{'s' if others > 1 else ''}" if others > 0 else ""
+        return f"It is described as well by {named}{more}.{agree}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the record for laws.json and verdict.json."""
@@ -164,12 +194,13 @@ class Laws:
         }
 
 
-def find_laws(study: Study, base: Fit) -> Laws:
+def find_laws(study: Study, base: Fit, claim: Fit | None = None) -> Laws:
     """Find laws that describe the residual of a fit without effects; for `calibration.verdict.calibrate`, too.
 
     Args:
         study: of a `SwimmerModel`.
         base: its coefficients and nuisance parameters, fitted to the runs that the study uses.
+        claim: the fit of a claimed effect, beside which laws are looked for; None where no effect is claimed.
 
     Source: Schwarz (1978) for BIC; nested power laws as in dimensional analysis.
     """
@@ -179,6 +210,9 @@ def find_laws(study: Study, base: Fit) -> Laws:
     ranked = rank(model, base, study.split.fitted, places(), title="places" if study.progress else "")
     least = max(_CURVED * ranked[0].gain, 0.0)
     likely = [one for one in ranked[:_FITTED] if one.gain > least]
+    if claim is not None:
+        laws = _fit_all(study, model, base, likely, chosen_alone=True)
+        return Laws(base, tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), study.level)
     laws = _fit_all(study, model, base, likely)
     kept = _kept(laws)
     if not kept or kept[0].p_value < study.level / 2:
@@ -186,19 +220,25 @@ def find_laws(study: Study, base: Fit) -> Laws:
     return Laws(base, tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), study.level)
 
 
-def _fit_all(study: Study, model: SwimmerModel, base: Fit, chosen: Sequence[Ranked]) -> list[Law]:
-    """Fit and judge places, without those where the motion cannot be simulated."""
-    bar = tqdm(chosen, desc="laws", unit="law", delay=1.0, disable=not study.progress)
-    return [law for one in bar if (law := _fitted(study, model, base, one))]
+def _fit_all(
+    study: Study, model: SwimmerModel, base: Fit, likely: Sequence[Ranked], *, chosen_alone: bool = False
+) -> list[Law]:
+    """Fit and judge places, without those where the motion cannot be simulated.
+
+    Args:
+        chosen_alone: whether only the exponents of the linear model are fitted.
+    """
+    bar = tqdm(likely, desc="laws", unit="law", delay=1.0, disable=not study.progress)
+    return [law for one in bar if (law := _fitted(study, model, base, one, chosen_alone))]
 
 
-def _fitted(study: Study, model: SwimmerModel, base: Fit, ranked: Ranked) -> Law | None:
+def _fitted(study: Study, model: SwimmerModel, base: Fit, ranked: Ranked, chosen_alone: bool) -> Law | None:
     """Fit a law from its linear model, and judge it; None where its motion cannot be simulated."""
     data = model.runs
     size = float(np.clip(ranked.size, -_LARGEST_AT_START, _LARGEST_AT_START))
     with_law = LawModel.of(model, ranked.place, size)
-    names = tuple(p.name for p in with_law.effects)
-    refit = _best_fit(study, with_law, base, {**ranked.start, SIZE: size})
+    names = tuple(p.name for p in with_law.effects if not chosen_alone or p.name in (SIZE, *ranked.chosen))
+    refit = _best_fit(study, with_law, base, names, {**ranked.start, SIZE: size})
     if refit is None:
         return None
     gain = base.deviance - refit.deviance - len(names) * math.log(study.values)
@@ -206,7 +246,7 @@ def _fitted(study: Study, model: SwimmerModel, base: Fit, ranked: Ranked) -> Law
     reason = ""
     if not refit.converged:
         reason = "its fit did not converge"
-    elif any(refit.parameters[p.name] in p.bounds for p in with_law.effects):
+    elif any(refit.parameters[p.name] in p.bounds for p in with_law.effects if p.name in names):
         reason = "a number is at the end of its range"
     elif gain <= 0:
         reason = "its BIC is not smaller than that without a law"
@@ -230,21 +270,27 @@ def _fitted(study: Study, model: SwimmerModel, base: Fit, ranked: Ranked) -> Law
     )
 
 
+def _rival(law: Law) -> Rival:
+    return Rival(law.words, law.fit, law.model, law.model.record)
+
+
 def _kept(laws: Sequence[Law]) -> list[Law]:
     """Return the laws that are kept, the largest gain first."""
     return sorted((law for law in laws if not law.reason), key=lambda law: -law.gain)
 
 
-def _best_fit(study: Study, model: LawModel, base: Fit, linear: dict[str, float]) -> Fit | None:
+def _best_fit(
+    study: Study, model: LawModel, base: Fit, names: tuple[str, ...], linear: dict[str, float]
+) -> Fit | None:
     """Fit a law from its linear model; if more than noise is left, from the model as given, too.
 
     Args:
+        names: its numbers that are fitted.
         linear: size and exponents of the linear model.
 
     Returns:
         The better fit, or None where the motion cannot be simulated.
     """
-    names = tuple(p.name for p in model.effects)
     flat = {name: linear[SIZE] / 2 if name == SIZE else 0.0 for name in names}
     target = noise_at_most(study.values, len(base.names) + len(names))
     best: Fit | None = None

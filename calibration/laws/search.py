@@ -41,6 +41,11 @@ class Ranked:
     exponents: tuple[float, ...]  # of EXPONENTS; 0 where the input is not in the model
 
     @property
+    def chosen(self) -> tuple[str, ...]:
+        """Names of the exponents in the model."""
+        return tuple(name for name, value in zip(EXPONENTS, self.exponents, strict=True) if value)
+
+    @property
     def start(self) -> dict[str, float]:
         """Exponents with which a fit starts."""
         limited = np.clip(self.exponents, -_POWERS_AT_START, _POWERS_AT_START)

@@ -33,6 +33,11 @@ def add_laws(page: Page, result: Verdict) -> None:
     if not isinstance(laws, Laws):
         return
     page.section("Laws that describe the residual")
+    if result.explaining:
+        page.text(
+            "Something outside the catalogue could imitate what is claimed, so laws were fitted to the calibrated "
+            "model without it."
+        )
     page.text(laws.sentence, tone="good" if laws.complete else "bad")
     page.text(
         "A law is a place where a term acts, times a power law in the motor speed ω, the tail length l and the "

@@ -63,7 +63,7 @@ class RobotVerdict(Verdict):
     @cached_property
     def _handed_on(self) -> tuple[Robot, CalibrationKnowledge]:
         laws = self.corrections.law
-        if isinstance(laws, Laws) and laws.complete:
+        if isinstance(laws, Laws) and self.described:
             return law_handed_on(self.robot, laws.kept[0], self.conditions.split.kept)
         return handed_on(self.robot, self.fits.final_refit, self.corrections.learnt)
 
@@ -125,7 +125,7 @@ def calibrate_robot(
         robot: as given.
         protocol: what is fitted and tested.
         own: what the lab can set in its next runs.
-        laws: whether laws are looked for where no effect explains the runs.
+        laws: whether laws are looked for where no effect explains the runs, or something else could imitate it.
         seed: of the bootstrap.
         jobs: threads; default all processors.
         progress: show progress bars.

@@ -9,7 +9,8 @@
 4. The verdict (`calibration.verdict.verdict.reach_verdict`).
 5. If several explanations are left, next runs that would tell them apart (`calibration.verdict.next_runs`).
    If nothing explains the residual, laws that describe it (`describe`), and where none does, a correction that
-   is handed on for steering.
+   is handed on for steering. If something outside the catalogue could imitate what is claimed, laws that fit as
+   well.
 6. Errors on the held-out runs: as given, calibrated, with the effect, with a regression of the residual
    (`calibration.statistics.residual_regression`), and from noise alone. Whether the held-out runs agree with the
    final model (`calibration.statistics.held_out`).
@@ -69,6 +70,8 @@ from calibration.verdict.verdict import (
 from sim.arrays import Flags, Floats
 from sim.io.provenance import fingerprint
 
+_LAWS_TOLD_APART = 3  # beside a claim; the more there are, the fewer runs tell all of them apart
+
 Subject = TypeVar("Subject", bound=Experiment)
 
 
@@ -76,7 +79,7 @@ def calibrate(
     model: Subject,
     *,
     held_out: Flags | None = None,
-    describe: Callable[[Study, Fit], Description | None] | None = None,
+    describe: Callable[[Study, Fit, Fit | None], Description | None] | None = None,
     correction: Callable[[Subject, Fit, Split], LearntCorrection | None] | None = None,
     level: float = LEVEL,
     seed: int = 0,
@@ -88,7 +91,7 @@ def calibrate(
     Args:
         model: its parameters' starts are the model "as given" (uncalibrated).
         held_out: (n,) runs kept for the test, whole sessions; default `study.middle_session`.
-        describe: looks for laws where nothing explains the residual, such as
+        describe: looks for laws where nothing explains the residual, and beside an uncertain claim, such as
             `calibration.laws.law_fits.find_laws`.
         correction: learns a correction of the calibrated model where nothing explains the residual and no law
             describes it, such as `calibration.swimmer.head_correction.learn_head_correction`.
@@ -113,14 +116,17 @@ def calibrate(
         untestable=dict(model.untestable),
     )
     verdict = reach_verdict(evidence, level, number_explains=explained.number is not None)
-    description = describe(study, explained.base) if describe and verdict == "unexplained" else None
-    described = description is not None and description.complete
+    claim = explained.final if any(c.uncertain for c in explained.best) else None
+    sought = describe is not None and (verdict == "unexplained" or claim is not None)
+    description = describe(study, explained.base, claim) if describe and sought else None
+    described = verdict == "unexplained" and description is not None and description.complete
     steered = verdict == "unexplained" and not described
     learnt = correction(model, explained.base, split) if correction and steered else None
     fixed = {"level": level, "seed": seed, "catalogue": [e.name for e in model.effects], "locked": split.names}
     regression = regress_residual(model.runs, explained.base.prediction, split.fitted)
     corrections = Corrections(regression, learnt, description)
-    rivals = description.rivals if description is not None and described else explained.rivals(model)
+    laws = description.as_good_as(claim) if description and claim else ()
+    rivals = description.rivals if description and described else explained.rivals(model, laws)
     excluded = (*model.runs.excluded, *split.reasons)
     rows = len(model.runs) + count_of_rows(model.runs.excluded)
     return Verdict(
@@ -165,14 +171,19 @@ class Explained:
             return self.best[0].refit
         return self.number or self.base
 
-    def rivals(self, model: Experiment) -> tuple[Rival, ...]:
-        """List explanations that the runs cannot tell apart, best first; none if there are not two."""
+    def rivals(self, model: Experiment, laws: tuple[Rival, ...]) -> tuple[Rival, ...]:
+        """List explanations that the runs cannot tell apart, best first; none if there are not two.
+
+        Args:
+            laws: that fit as well as the best effect; the first of them come last.
+        """
         known = [(c.title, c.refit) for c in (*self.best, *self.rival_effects) if c.refit]
         if self.number and known:
             wrong = ", ".join(alike[0].parameter.title for alike in self.number.wrong_numbers)
             number = f"the stated value of {wrong} is wrong", self.number
             known = [*known, number] if self.best else [number, *known]
-        return tuple(Rival(title, refit, model) for title, refit in known) if len(known) > 1 else ()
+        rivals = (*(Rival(title, refit, model) for title, refit in known), *laws[:_LAWS_TOLD_APART])
+        return rivals if len(rivals) > 1 else ()
 
 
 def explain(study: Study, guess: Mapping[str, float]) -> Explained:

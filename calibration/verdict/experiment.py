@@ -67,7 +67,7 @@ class Rival:
 
 
 class Description(Protocol):
-    """Laws that describe runs which no effect explains."""
+    """Laws that describe runs which no effect explains, or only one that something else could imitate."""
 
     @property
     def sentence(self) -> str:
@@ -87,6 +87,14 @@ class Description(Protocol):
     @property
     def rivals(self) -> tuple[Rival, ...]:
         """Laws that the runs cannot tell apart, best first; none if there are not two."""
+        ...
+
+    def as_good_as(self, claim: Fit) -> tuple[Rival, ...]:
+        """Laws that leave no more than noise and fit as well as a claimed effect, best first."""
+        ...
+
+    def beside(self, claim: Fit) -> str:
+        """What the laws say about a claimed effect."""
         ...
 
     def to_dict(self) -> dict[str, Any]:

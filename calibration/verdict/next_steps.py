@@ -77,6 +77,7 @@ def _after_effect(result: Verdict) -> list[str]:
         )
     return [
         *steps,
+        *_telling_apart(result),
         f"{_PLAN} It has the effect.",
         "Film the robot on its way, and compare: `softflagella planner check plan/plan.json track.csv`.",
     ]

@@ -302,11 +302,16 @@ class Verdict:
                 sizes.append(f"{like}{effect.title}, size {size:.3g} ({low:.3g} to {high:.3g})")
             rivals = "other effect" if len(sizes) == 1 else "single effect or other pair"
             said = " and ".join(sizes) + self._outside
-            return f"The residual ({p}) is consistent with {said}, and with no {rivals} of the catalogue."
+            return (
+                f"The residual ({p}) is consistent with {said}, and with no {rivals} of the catalogue."
+                f"{self._beside}"
+            )
         if self.verdict == "ambiguous":
             names = " or ".join(c.title for c in self.explaining)
             names += self._outside + self._or_number
-            return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart."
+            return (
+                f"The residual ({p}) is explained by {names}: these runs cannot tell them apart.{self._beside}"
+            )
         none = "no effect and no pair of effects of the catalogue explains"
         return (
             f"There is a residual ({p}) that {none}{self._nearest}.{self._small}{self._described}{self._steered}"
@@ -338,7 +343,8 @@ class Verdict:
     @property
     def described(self) -> bool:
         """Whether a law describes a residual that nothing explains, and leaves no more than noise."""
-        return self.corrections.law is not None and self.corrections.law.complete
+        law = self.corrections.law
+        return self.verdict == "unexplained" and law is not None and law.complete
 
     @property
     def _described(self) -> str:
@@ -389,6 +395,11 @@ class Verdict:
         )
         said = " and ".join(numbers)
         return f", or by {said}" if said else ""
+
+    @property
+    def _beside(self) -> str:
+        """What the search for laws says about an uncertain claim."""
+        return f" {self.corrections.law.beside(self.final)}" if self.corrections.law else ""
 
     @property
     def _nearest(self) -> str:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from calibration.attribution.refits import ebic
+from calibration.attribution.wrong_numbers import pulls
 from calibration.statistics.fit import fit
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import Study
+from calibration.swimmer.nuisance_numbers import CAMERA
 from tests.calibration.toy_tables import toy_swimmer, toy_table
 
 
@@ -24,3 +27,6 @@ def test_pairs_pay_for_their_number() -> None:
     study = Study.fitted_to(model, used)
     cost = ebic(study, fitted, 2) - ebic(study, fitted, 1)
     assert cost == pytest.approx(2 * math.log((count - 1) / 2))
+    pull = pulls(fit(model, start_values(model), (*names, CAMERA), used, title=""), model.nuisances)[0]
+    freed = replace(fitted, wrong_numbers=((pull,),))
+    assert ebic(study, freed, 2) - ebic(study, fitted, 2) == pytest.approx(math.log(study.values))

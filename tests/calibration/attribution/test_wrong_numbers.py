@@ -11,10 +11,13 @@ import pytest
 from scipy.stats import binom
 
 from calibration.attribution import wrong_numbers
-from calibration.attribution.wrong_numbers import notable_pull, pulls
+from calibration.attribution.refits import examine
+from calibration.attribution.wrong_numbers import beside_wrong_numbers, notable_pull, pulls
 from calibration.report.corrected_robot import corrected_robot
 from calibration.statistics.fit import fit
+from calibration.statistics.residual_tests import directions, examine_residual
 from calibration.statistics.statistical_model import by_differences, start_values
+from calibration.statistics.study import Study, find_outliers, split_runs
 from calibration.swimmer.measured_table import read_measurements
 from calibration.swimmer.nuisance_numbers import CAMERA, HEADING, LENGTH, TACHOMETER
 from calibration.swimmer.swimmer import SwimmerModel
@@ -25,7 +28,7 @@ from sim.io.errors import InputError
 from sim.model.robot import Robot
 from sim.model.uncertainty import Sigma
 from tests.calibration import toy
-from tests.calibration.toy_tables import START, TRUTH, calibrated, toy_table
+from tests.calibration.toy_tables import FEW_DRAWS, START, TRUTH, calibrated, toy_swimmer, toy_table
 
 EXACT = {
     name: Sigma(0.0, False)
@@ -136,6 +139,29 @@ def test_a_number_far_beyond_its_tolerance_does_not_come_ahead_of_an_effect(monk
     ahead = calibrated(table)
     assert ahead.verdict == "number"
     assert [c.effect.name for c in ahead.evidence.rival_effects] == ["end_over_end_drag"]
+
+
+@pytest.mark.usefixtures("toy_model", "few_candidates")
+def test_an_effect_beside_a_wrong_number_comes_behind_a_single_effect_that_fits_as_well() -> None:
+    """Both are off: the pair is found. Were there a single effect that fits as well, it would not be."""
+    table = toy_table(1, end_over_end_drag=1.5)
+    table["R_yr_cm"] *= 1.08
+    model = toy_swimmer(table)
+    start = start_values(model)
+    split = split_runs(model.runs, None, find_outliers(model.runs, model.predict([start])[0]))
+    study = Study(model, split, draws=FEW_DRAWS, progress=False)
+    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
+    base = fit(model, start, names, split.fitted, title="")
+    tangents = directions(model, base.parameters, model.effects)
+    candidates = examine(study, base, examine_residual(study, base, tangents), tangents)
+    (pair,) = beside_wrong_numbers(study, base, candidates, tangents)
+    assert pair.effect.name == "end_over_end_drag"
+    assert pair.kept
+    assert pair.refit is not None
+    single = next(c for c in candidates if c.refit)
+    assert single.refit is not None
+    as_good = replace(single, refit=replace(single.refit, deviance=pair.refit.deviance))
+    assert beside_wrong_numbers(study, base, [*candidates, as_good], tangents) == []
 
 
 @pytest.mark.long

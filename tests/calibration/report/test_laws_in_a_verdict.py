@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calibration.attribution.refits import INDISTINGUISHABLE
 from calibration.laws.law_fits import Laws, find_laws
 from calibration.laws.law_model import EXPONENTS, SIZE, LawModel, with_law
 from calibration.laws.partial_residuals import dependences
@@ -56,6 +57,19 @@ def described(place: str) -> RobotVerdict:
         install_toy(patch)
         install_few_candidates(patch)
         model = toy_swimmer(make_table(replace(TRUTH, effects=HIDDEN[place]), seed=4, title=""))
+        verdict = calibrate(
+            model, describe=find_laws, correction=learn_head_correction, draws=FEW_DRAWS, progress=False
+        )
+    return RobotVerdict(**vars(verdict), robot=START, runs=model.runs, table="runs.csv")
+
+
+@cache
+def claimed_beside_laws() -> RobotVerdict:
+    """A weak effect, which something outside the catalogue could imitate."""
+    with pytest.MonkeyPatch.context() as patch:
+        install_toy(patch)
+        install_few_candidates(patch)
+        model = toy_swimmer(toy_table(3, end_over_end_drag=0.6))
         verdict = calibrate(
             model, describe=find_laws, correction=learn_head_correction, draws=FEW_DRAWS, progress=False
         )
@@ -108,6 +122,53 @@ def test_its_files_have_the_law_its_range_and_its_covariance(place: str, tmp_pat
     assert {"C_t", "C_r", "C_yr"} <= set(known.names)
     assert (name in known.names) == effect_named(name).name.startswith(("law_F", "law_M"))
     assert np.linalg.eigvalsh(known.covariance).min() > -1e-9 * known.covariance.max()
+
+
+@shares_verdicts
+def test_an_uncertain_claim_is_set_beside_the_laws_that_fit_as_well(tmp_path: Path) -> None:
+    verdict = claimed_beside_laws()
+    laws, claim = laws_of(verdict), verdict.final
+    assert verdict.verdict == "effect"
+    assert verdict.explaining[0].uncertain
+    assert not verdict.described
+    as_good = laws.as_good_as(claim)
+    assert len(as_good) > 2
+    assert all(rival.fit.deviance < claim.deviance + INDISTINGUISHABLE for rival in as_good)
+    assert f"It is described as well by {as_good[0].title}; or by {as_good[1].title}" in verdict.sentence
+    assert verdict.sentence.endswith("All of them act on the head.")
+    titles = [e.title for e in verdict.next.explanations]
+    assert titles == ["head's end-over-end drag", *(rival.title for rival in as_good[:3])]
+    record, report, corrected = verdict.save(tmp_path)
+    assert json.loads(record.read_text())["laws"]["kept"]
+    assert "so laws were fitted to the calibrated model without it" in report.read_text()
+    assert list(load_robot(corrected).effects) == ["end_over_end_drag"]
+    assert load_robot(corrected).learnt_from is None
+
+
+@shares_verdicts
+def test_the_claim_in_other_words_is_no_rival_of_it() -> None:
+    """End-over-end drag is a couple from the yaw rate."""
+    verdict = claimed_beside_laws()
+    laws = laws_of(verdict)
+    same = next(law for law in laws.kept if law.place.name == "My_wyr")
+    assert same.fit.deviance == pytest.approx(verdict.final.deviance, abs=0.05)
+    assert same.words not in [rival.title for rival in laws.as_good_as(verdict.final)]
+
+
+@shares_verdicts
+def test_beside_a_claim_a_law_has_the_numbers_of_its_linear_model() -> None:
+    for law in laws_of(claimed_beside_laws()).fitted:
+        assert set(law.fit.names) & set(EXPONENTS) == set(law.ranked.chosen)
+    law = laws_of(described("Mz_wh")).kept[0]
+    assert set(EXPONENTS) - set(law.fit.names) <= {EXPONENTS[2]}
+
+
+@shares_verdicts
+def test_laws_that_fit_less_well_do_not_weaken_a_claim() -> None:
+    verdict = claimed_beside_laws()
+    better = replace(verdict.final, deviance=verdict.final.deviance - 100)
+    assert laws_of(verdict).as_good_as(better) == ()
+    assert laws_of(verdict).beside(better) == "No law of the places that were searched describes it as well."
 
 
 @shares_verdicts
