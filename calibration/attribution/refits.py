@@ -219,7 +219,9 @@ def lowest_ebic(study: Study, candidates: Sequence[Candidate]) -> float:
 def ebic(study: Study, refit: Fit, count: int) -> float:
     """Add to the deviance of a fit with `count` effects what they cost: k ln n + 2 ln (number of such sets).
 
-    A nuisance parameter that lost its prior counts once more among the k numbers. Source: Chen and Chen (2008), γ = 1.
+    A nuisance parameter that lost its prior counts once more among the k numbers.
+
+    Source: Chen and Chen (2008), γ = 1.
     """
     sets = math.comb(len(study.model.effects), count)
     numbers = len(refit.names) + len(refit.wrong_numbers)

@@ -4,8 +4,9 @@
    Outliers are excluded (`calibration.statistics.study`).
 2. The coefficients and the nuisance parameters are fitted to the other sessions, and the residual is tested.
 3. What explains it is looked for (`explain`). A nuisance parameter that leaves its prior is freed, and comes ahead
-   of every effect unless it would be far outside its prior (`calibration.attribution.wrong_numbers`). Single effects (`calibration.attribution.refits`),
-   effects beside a wrong number, and pairs follow, each only if nothing before explains the residual.
+   of every effect unless it would be far outside its prior (`calibration.attribution.wrong_numbers`). Single
+   effects (`calibration.attribution.refits`), effects beside a wrong number, and pairs follow, each only if
+   nothing before explains the residual.
 4. The verdict (`calibration.verdict.verdict.reach_verdict`).
 5. If several explanations are left, next runs that would tell them apart (`calibration.verdict.next_runs`).
    If nothing explains the residual, laws that describe it (`describe`), and where none does, a correction that

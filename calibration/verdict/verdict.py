@@ -115,8 +115,9 @@ def reach_verdict(evidence: Evidence, level: float, *, number_explains: bool) ->
     """Decide the verdict; this is the rule of the whole calibration.
 
     A wrong nuisance parameter comes ahead of every effect that is not better, or it is one of several explanations
-    (`Evidence.rival_number`). Without one, a residual within the noise is "none". Beyond it, the number of explanations that the runs cannot tell apart decides. What new runs
-    say about an "ambiguous" verdict is decided by `calibration.verdict.sequential_test.standings`.
+    (`Evidence.rival_number`). Without one, a residual within the noise is "none". Beyond it, the number of
+    explanations that the runs cannot tell apart decides. What new runs say about an "ambiguous" verdict is decided
+    by `calibration.verdict.sequential_test.standings`.
 
     Args:
         level: α of the residual's p-value.
@@ -309,9 +310,7 @@ class Verdict:
         if self.verdict == "ambiguous":
             names = " or ".join(c.title for c in self.explaining)
             names += self._outside + self._or_number
-            return (
-                f"The residual ({p}) is explained by {names}: these runs cannot tell them apart.{self._beside}"
-            )
+            return f"The residual ({p}) is explained by {names}: these runs cannot tell them apart.{self._beside}"
         none = "no effect and no pair of effects of the catalogue explains"
         return (
             f"There is a residual ({p}) that {none}{self._nearest}.{self._small}{self._described}{self._steered}"

@@ -118,7 +118,9 @@ def test_a_number_beyond_its_tolerance_is_a_finding_of_its_own() -> None:
 
 
 @pytest.mark.usefixtures("toy_model", "few_candidates")
-def test_a_number_far_beyond_its_tolerance_does_not_come_ahead_of_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_number_far_beyond_its_tolerance_does_not_come_ahead_of_an_effect(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """A head's length nine of its tolerances off explains as much as the effect that was there."""
     table = toy_table(2, end_over_end_drag=0.6)
     result = calibrated(table)

@@ -32,9 +32,7 @@ def evidence(p_value: float, effects: int, numbers: int) -> Any:
         (0.01, 5, 0, False, "ambiguous"),
     ],
 )
-def test_the_rule(
-    p_value: float, effects: int, rival_numbers: int, number_explains: bool, verdict: str
-) -> None:
+def test_the_rule(p_value: float, effects: int, rival_numbers: int, number_explains: bool, verdict: str) -> None:
     given = evidence(p_value, effects, rival_numbers)
     assert reach_verdict(given, 0.04, number_explains=number_explains) == verdict
 
