@@ -1,4 +1,4 @@
-"""Which sessions are held out."""
+"""Which sessions are held out, and which runs are outliers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibration.statistics.study import middle_session
+from calibration.statistics.study import find_outliers, middle_session
 
 
 def runs_of(sizes: list[int]) -> Any:
@@ -32,3 +32,30 @@ def test_neighbours_join_short_sessions(sizes: list[int], held_out: list[int]) -
     held = middle_session(runs)
     assert sorted(set(runs.session[held].tolist())) == held_out
     assert not set(runs.session[held]) & set(runs.session[~held])
+
+
+def pairs(count: int, seed: int) -> Any:
+    """Conditions of two runs, with two outputs of unit noise."""
+    y = np.random.default_rng(seed).normal(size=(2 * count, 2))
+    condition, rows = np.repeat(np.arange(count), 2), np.arange(2 * count)
+    return SimpleNamespace(y=y, condition=condition, rows=rows, outputs=("R_yr", "theta"))
+
+
+def test_runs_that_were_mistracked_are_excluded_and_clean_ones_are_not() -> None:
+    """A departure of nine standard deviations used to be kept, and raised the noise."""
+    runs = pairs(200, seed=0)
+    mistracked = np.arange(0, 400, 40)
+    assert not find_outliers(runs, np.zeros_like(runs.y))[0].any()
+    runs.y[mistracked, 1] += 9.0
+    bad, reasons = find_outliers(runs, np.zeros_like(runs.y))
+    assert set(np.flatnonzero(bad)) <= set(mistracked)
+    assert bad.sum() >= 8
+    assert all("theta is" in reason for reason in reasons)
+    kept = runs.y[~bad]
+    assert kept.std(0) == pytest.approx([1, 1], abs=0.12)
+
+
+def test_an_effect_that_changes_all_repeats_excludes_none() -> None:
+    runs = pairs(200, seed=1)
+    runs.y[:200] += 15.0
+    assert not find_outliers(runs, np.zeros_like(runs.y))[0].any()
