@@ -145,7 +145,8 @@ def _on_mesh(
             return None
         reverse_twist = before_flip[2]
         start, first = before_flip[0], before_flip[1] * REVERSED
-    main = transient(body, start.copy(), first.copy(), twist, SETTLED, before, tolerance)
+    marks = before if history else np.empty(0)
+    main = transient(body, start.copy(), first.copy(), twist, SETTLED, marks, tolerance)
     if not main.solved:
         return None
     dwells = np.minimum(DWELLS, SETTLED)

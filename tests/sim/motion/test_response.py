@@ -3,6 +3,8 @@ tend to."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -18,6 +20,7 @@ from sim.motion.steady import steady
 from sim.motion.stepped_response import stepped_response
 from sim.motion.switching import switch_response
 from sim.solve.assembly import reversed_bodies
+from sim.solve.transient import Transient, transient
 from tests.sim.robots import CONTROL_VALUES, control, first_body
 
 FINE = Resolution(24, 72)
@@ -140,3 +143,19 @@ def test_a_replay_turns_at_the_rate_of_each_direction() -> None:
         late = track[(track["dwell"] == dwell) & (track["time_bar"] > 8.0 * dwell + 4.0)]
         turned = np.diff(late["heading_rad"].to_numpy()[[0, -1]]) / np.diff(late["time_bar"].to_numpy()[[0, -1]])
         assert turned[0] == pytest.approx(rate, rel=0.01)
+
+
+@pytest.mark.parametrize(("history", "marks"), [(False, {0}), (True, {0, len(BEFORE)})])
+def test_steps_end_at_the_dwells_before_only_where_they_are_wanted(
+    history: bool, marks: set[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without them a response took a sixth more steps."""
+    counts = set()
+
+    def counting(*arguments: Any) -> Transient:
+        counts.add(len(arguments[5]))
+        return transient(*arguments)
+
+    monkeypatch.setattr(response, "transient", counting)
+    responses(control(), history=history)
+    assert counts == marks
