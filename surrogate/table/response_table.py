@@ -26,7 +26,6 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.model.response import BEFORE, DWELLS, at_equal_dwells
-from surrogate.networks.compiled import evaluate_rows
 from surrogate.networks.ensemble import Ensemble
 from surrogate.wrench.heads import Heads
 from surrogate.wrench.tails import Tails, tail_inputs
@@ -85,7 +84,7 @@ class ResponseTable:
         """Return the components of each kind of curve, (M, C)."""
         inputs, components = response_inputs(tails, motion), {}
         for names, network in zip(PARTS, self.networks, strict=True):
-            answer, first = evaluate_rows(network.packed, inputs), 0
+            answer, first = network.packed.evaluate(inputs), 0
             for name in names:
                 end = first + len(self.bases[name].vectors)
                 components[name], first = answer[:, first:end], end

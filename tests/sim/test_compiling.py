@@ -13,7 +13,8 @@ import pytest
 
 import sim
 from sim import compiling
-from sim.compiling import CACHE, Locator, code_digest, folder_for_code, folder_of_package, prune
+from sim.compiling import CACHE, code_digest, folder_for_code, folder_of_package, prune
+from sim.machine_code import Locator
 from tests.processes import LIMIT
 
 SIM = Path(sim.__file__).parent

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from sim import compiling
+from sim import compiling, machine_code
 from sim.motion import warm
 
 
@@ -17,8 +17,8 @@ def test_compiling_a_loop_is_announced(
 ) -> None:
     """The bar appears at once here; its text names the number of loops. The loop is never in the cache."""
     monkeypatch.setattr(compiling, "CACHE", tmp_path)
-    shown = compiling.tqdm
-    monkeypatch.setattr(compiling, "tqdm", lambda **options: shown(**{**options, "delay": 0, "mininterval": 0}))
+    shown = machine_code.tqdm
+    monkeypatch.setattr(machine_code, "tqdm", lambda **options: shown(**{**options, "delay": 0, "mininterval": 0}))
 
     def formula(x: float) -> float:
         return 2 * x
