@@ -87,9 +87,7 @@ def _teach_array_at() -> None:
     from numba import carray
     from numba.extending import overload
 
-    @overload(array_at)
-    def _implementation(address: Any, shape: Any) -> Any:
-        return lambda address, shape: carray(address, shape)
+    overload(array_at)(lambda address, shape: lambda address, shape: carray(address, shape))
 
 
 def object_code(function: Kept) -> bytes:

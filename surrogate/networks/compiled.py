@@ -46,9 +46,9 @@ def evaluate_rows(
     """Write the mean of the members at inputs x (M, F) to y (M, O)."""
     shape = array_at(sizes, 6)
     inputs, outputs = array_at(x, (count, shape[1])), array_at(y, (count, shape[2]))
-    numbers_of, room_of = array_at(numbers, many), array_at(room, space)
+    network, work = array_at(numbers, many), array_at(room, space)
     for row in range(count):
-        evaluate(numbers_of, shape, inputs[row], outputs[row], room_of)
+        evaluate(network, shape, inputs[row], outputs[row], work)
 
 
 @compiled

@@ -70,11 +70,11 @@ class ResponseTable:
         """Return lags with the memory of a dwell before of the same length, (M, D, 3), in l, l, rad."""
         components = self._components(tails, motion)
         both = np.concatenate([components["lag"], components["memory"]], 1)
-        curve = (self._equal.mean + both @ self._equal.vectors).reshape(-1, *SHAPES["lag"])
+        curve = (self.equal_dwells.mean + both @ self.equal_dwells.vectors).reshape(-1, *SHAPES["lag"])
         return np.asarray(curve * curve_speeds(heads, motion)[:, None])
 
     @cached_property
-    def _equal(self) -> Basis:
+    def equal_dwells(self) -> Basis:
         """The basis of `lag_at_equal_dwells`: the components of the lag, and then those of the memory."""
         lag, memory = self.bases["lag"], self.bases["memory"]
         mean = lag.mean + memory_at_equal_dwells(memory.mean[None])[0]

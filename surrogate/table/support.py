@@ -101,7 +101,7 @@ def novelty_rows(
 ) -> None:
     """Write q over its limit of inputs (M, F) to novelty (M,)."""
     support, work = array_at(numbers, 2 * size + 1 + terms * terms), array_at(room, size + 2 * terms)
-    x, q, pairs = array_at(inputs, (count, size)), array_at(novelty, count), array_at(products, (2, terms))
+    x, q, pairs = array_at(inputs, (count, size)), array_at(novelty, count), array_at(products, 2 * terms)
     for row in range(count):
         q[row] = novelty_at(support, pairs, x[row], work)
 
@@ -112,16 +112,16 @@ def novelty_at(support: Floats, products: Integers, inputs: Floats, room: Floats
 
     Args:
         support: `Support.numbers`.
-        products: see `products_of`.
+        products: see `products_of`, one after the other, (2 P,).
         room: to work in, see `support_room`.
     """
-    size, count = len(inputs), products.shape[1]
+    size, count = len(inputs), len(products) // 2
     x, features, solved = room[:size], room[size : size + count], room[size + count : size + 2 * count]
     for i in range(size):
         x[i] = (inputs[i] - support[i]) / support[size + i]
     features[0] = 1.0
     for p in range(1, count):
-        features[p] = features[products[0, p]] * x[products[1, p]]
+        features[p] = features[products[p]] * x[products[count + p]]
     novelty = 0.0
     for i in range(count):
         factor = support[2 * size + 1 + i * count : 2 * size + 2 + i * count + i]

@@ -89,9 +89,9 @@ def head_inputs(resistance: Floats, length: Floats, across: Floats) -> Floats:
         length: L, (M,).
         across: N ζ⊥, (M,).
     """
-    diagonal = (resistance[:, i, i] for i in range(4))
-    others = resistance[:, 0, 2], resistance[:, 0, 3], resistance[:, 3, 4]
-    return np.stack(inputs_of_head(*diagonal, *others, length, across), -1)
+    sway, surge, turn, spin = (resistance[:, i, i] for i in range(4))
+    coupling, side, disc = resistance[:, 0, 2], resistance[:, 0, 3], resistance[:, 3, 4]
+    return np.stack(inputs_of_head(sway, surge, turn, spin, coupling, side, disc, length, across), -1)
 
 
 @formula
