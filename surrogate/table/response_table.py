@@ -66,16 +66,9 @@ class ResponseTable:
         curves["spread"] = np.abs(curves["spread"])
         return curves
 
-    def lag_at_equal_dwells(self, heads: Heads, tails: Tails, motion: Floats) -> Floats:
-        """Return lags with the memory of a dwell before of the same length, (M, D, 3), in l, l, rad."""
-        components = self._components(tails, motion)
-        both = np.concatenate([components["lag"], components["memory"]], 1)
-        curve = (self.equal_dwells.mean + both @ self.equal_dwells.vectors).reshape(-1, *SHAPES["lag"])
-        return np.asarray(curve * curve_speeds(heads, motion)[:, None])
-
     @cached_property
     def equal_dwells(self) -> Basis:
-        """The basis of `lag_at_equal_dwells`: the components of the lag, and then those of the memory."""
+        """Lag and memory where the dwell before is as long: components of the lag, then of the memory."""
         lag, memory = self.bases["lag"], self.bases["memory"]
         mean = lag.mean + memory_at_equal_dwells(memory.mean[None])[0]
         return Basis(mean, np.concatenate([lag.vectors, memory_at_equal_dwells(memory.vectors)]))
