@@ -162,11 +162,13 @@ def _read(path: Path) -> bytes | None:
 
 def _write(path: Path, code: bytes) -> None:
     """Write machine code to a file, completely or not at all. Without a place to write, each process compiles."""
-    part = path.with_suffix(f".{os.getpid()}")
+    part = path.with_suffix(f".part-{os.getpid()}")
     with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
         part.write_bytes(sha256(code).digest() + code)
         part.replace(path)
+    with suppress(OSError):
+        part.unlink(missing_ok=True)
 
 
 def _loaded(code: bytes, name: str) -> int:

@@ -36,7 +36,7 @@ from surrogate.table.flat_table import (
     WIDTHS,
     WRENCH,
 )
-from surrogate.table.support import monomial_count, novelty_at
+from surrogate.table.support import monomial_count, novelty_at, support_room
 from surrogate.wrench.balance import MATRICES, inputs_at, solve
 from surrogate.wrench.heads import HEAD_LENGTH, HEAD_NUMBERS, RESISTANCE, ROBOT_NUMBERS, SENSE
 from surrogate.wrench.tails import INPUTS, inputs_of_head
@@ -55,7 +55,7 @@ _SMALL_SURGE = 0.1  # of v_x
 _WIDTH_FEATURES = 11
 _TERMS = monomial_count(len(INPUTS))
 _SUPPORT_NUMBERS = 2 * len(INPUTS) + 1 + _TERMS * _TERMS
-_SUPPORT_ROOM = len(INPUTS) + 2 * _TERMS
+_SUPPORT_ROOM = support_room(len(INPUTS))
 _MOST = 1.7976931348623157e308
 
 

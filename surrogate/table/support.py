@@ -57,8 +57,8 @@ class Support:
 
     @property
     def numbers(self) -> Floats:
-        """Shift, scale, limit and factor in one array, for the compiled loops."""
-        return np.concatenate([self.shift, self.scale, [self.limit], self.factor.ravel()])
+        """Shift, scale, limit and the factor column by column in one array, for the compiled loops."""
+        return np.concatenate([self.shift, self.scale, [self.limit], self.factor.T.ravel()])
 
 
 def monomial_count(inputs: int) -> int:
@@ -68,7 +68,7 @@ def monomial_count(inputs: int) -> int:
 
 def support_room(inputs: int) -> int:
     """Return how many numbers `novelty_at` works in."""
-    return inputs + 2 * monomial_count(inputs)
+    return inputs + monomial_count(inputs)
 
 
 @cache
@@ -100,7 +100,7 @@ def novelty_rows(
     count: int, size: int, terms: int, products: Any, numbers: Any, inputs: Any, novelty: Any, room: Any
 ) -> None:
     """Write q over its limit of inputs (M, F) to novelty (M,)."""
-    support, work = array_at(numbers, 2 * size + 1 + terms * terms), array_at(room, size + 2 * terms)
+    support, work = array_at(numbers, 2 * size + 1 + terms * terms), array_at(room, size + terms)
     x, q, pairs = array_at(inputs, (count, size)), array_at(novelty, count), array_at(products, 2 * terms)
     for row in range(count):
         q[row] = novelty_at(support, pairs, x[row], work)
@@ -116,18 +116,17 @@ def novelty_at(support: Floats, products: Integers, inputs: Floats, room: Floats
         room: to work in, see `support_room`.
     """
     size, count = len(inputs), len(products) // 2
-    x, features, solved = room[:size], room[size : size + count], room[size + count : size + 2 * count]
+    x, features = room[:size], room[size : size + count]
     for i in range(size):
         x[i] = (inputs[i] - support[i]) / support[size + i]
     features[0] = 1.0
     for p in range(1, count):
         features[p] = features[products[p]] * x[products[count + p]]
     novelty = 0.0
-    for i in range(count):
-        factor = support[2 * size + 1 + i * count : 2 * size + 2 + i * count + i]
-        remainder = features[i]
-        for j in range(i):
-            remainder -= factor[j] * solved[j]
-        solved[i] = remainder / factor[i]
-        novelty += solved[i] ** 2
+    for j in range(count):
+        column = support[2 * size + 1 + j * count : 2 * size + 1 + (j + 1) * count]
+        solved = features[j] / column[j]
+        for i in range(j + 1, count):
+            features[i] -= column[i] * solved
+        novelty += solved**2
     return novelty / count / support[2 * size]
