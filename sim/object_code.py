@@ -84,8 +84,8 @@ def array_at(address: Any, shape: Any) -> Any:
 
 @cache
 def _teach_array_at() -> None:
-    from numba import carray
     from numba.extending import overload
+    from numba.np.numpy_support import carray
 
     overload(array_at)(lambda address, shape: lambda address, shape: carray(address, shape))
 

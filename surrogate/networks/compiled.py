@@ -40,9 +40,7 @@ def room_of(sizes: Integers) -> int:
 
 
 @kept(FLOATS, INTEGERS, COUNT, COUNT, FLOATS, FLOATS, FLOATS, COUNT)
-def evaluate_rows(
-    numbers: Any, sizes: Any, many: int, count: int, x: Any, y: Any, room: Any, space: int
-) -> None:
+def evaluate_rows(numbers: Any, sizes: Any, many: int, count: int, x: Any, y: Any, room: Any, space: int) -> None:
     """Write the mean of the members at inputs x (M, F) to y (M, O)."""
     shape = array_at(sizes, 6)
     inputs, outputs = array_at(x, (count, shape[1])), array_at(y, (count, shape[2]))

@@ -190,9 +190,7 @@ def _steady(table: Floats, places: Integers, robot: Floats, answer: Floats, room
 
 
 @compiled
-def _response(
-    table: Floats, places: Integers, robot: Floats, dwell: float, answer: Floats, room: Floats
-) -> None:
+def _response(table: Floats, places: Integers, robot: Floats, dwell: float, answer: Floats, room: Floats) -> None:
     """Write net speed and lag at equal dwells, in the order of RESPONSE_OUTPUTS."""
     number, tail = robot[HEAD_NUMBERS + 4], robot[HEAD_NUMBERS:]
     components, shifts = places[LAG + 2], places[MEMORY + 2]

@@ -64,9 +64,7 @@ def solve_rows(
 
 
 @compiled
-def solve(
-    numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room: Floats, matrices: Floats
-) -> bool:
+def solve(numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room: Floats, matrices: Floats) -> bool:
     """Write the motion (5,) of one robot (37,); return whether the solution converged.
 
     Args:

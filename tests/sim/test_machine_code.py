@@ -38,7 +38,7 @@ def test_a_compiled_function_keeps_its_name_and_can_be_sent_to_processes() -> No
     assert loop.__name__ == "solve_dense"
     assert loop.__doc__ is not None
     assert loop.__doc__.startswith("Solve b")
-    assert pickle.loads(pickle.dumps(invert)) is invert  # noqa: S301
+    assert pickle.loads(pickle.dumps(invert)) is invert
 
 
 def test_a_formula_is_plain_python() -> None:

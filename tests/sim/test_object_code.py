@@ -14,7 +14,7 @@ from sim.object_code import COUNT, FLOATS, INTEGERS, Kept, array_at, kept
 from surrogate.table.support import novelty_rows
 from tests.processes import LIMIT
 
-PACKAGE = '''
+PACKAGE = """
 import math
 import numpy as np
 from sim.compiling import compiled
@@ -29,7 +29,7 @@ def bend(x, count, y):
     found, wanted = array_at(x, count), array_at(y, count)
     for i in range(count):
         wanted[i] = bent(found[i])
-'''
+"""
 USE = """
 import sys
 sys.path[:0] = sys.argv[1:3]
