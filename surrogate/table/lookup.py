@@ -59,6 +59,7 @@ _REASONS = (  # why a robot is outside
     "its tails or its motor were not learned, or no motion was found",
     "its tails move as none of the learned ones do",
     "it yaws nearly as fast as its tails turn, and may have several motions",
+    "no robot has such numbers",
 )
 _MOTION, _INPUTS = slice(MOTION, MOTION + 5), slice(INPUT, INPUT + 7)  # rows of the compiled loop's answer
 _NOT_OF_HEAD = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")

@@ -56,11 +56,15 @@ class QuickQuery:
 
     def __init__(self, table: FlatTable, widths: Sequence[str]):
         compile_once()
+        self._made_of = table, tuple(widths)
         self._table, self._widths = table, [(i, name) for i, name in enumerate(_OUTPUTS) if name in widths]
         self._addresses = table.numbers.ctypes.data, table.places.ctypes.data
         self._sizes = len(table.numbers), len(table.places)
         self._matrices = _ROOM + table.room
         self._space = self._matrices + MATRICES * 16
+
+    def __reduce__(self) -> tuple[type[QuickQuery], tuple[FlatTable, tuple[str, ...]]]:
+        return QuickQuery, self._made_of  # addresses belong to one process, and to one copy
 
     def rows(
         self, values: Mapping[str, Floats], robots: Floats | None, dwells: Floats | None, *, widths: bool = False

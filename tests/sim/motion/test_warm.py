@@ -71,6 +71,6 @@ def test_what_another_process_compiled_is_only_read_here(tmp_path: Path, monkeyp
     assert compiling.compile_apart("someones_loops")
     loops = importlib.import_module("someones_loops")
     assert loops.whole(2.0) == 5.0
-    assert sum(loops.whole.stats.cache_hits.values()) == 1
-    assert not loops.whole.stats.cache_misses
+    assert sum(loops.whole.dispatcher.stats.cache_hits.values()) == 1
+    assert not loops.whole.dispatcher.stats.cache_misses
     assert not compiling.compile_apart("nobodys_loops")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -77,6 +79,17 @@ def test_answers_do_not_change_with_the_next_query() -> None:
     kept = {name: values.copy() for name, values in first.items()}
     load().query(one(omega_bar=20.0))
     assert first == kept
+
+
+def test_a_copy_of_a_table_has_numbers_of_its_own() -> None:
+    """Compiled loops get addresses, which belong to one table in one process."""
+    lookup = load()
+    wanted = lookup.query(one())
+    copies = [copy.deepcopy(lookup), pickle.loads(pickle.dumps(lookup))]
+    lookup._quick._table.numbers[:] = np.nan
+    del lookup
+    for copied in copies:
+        assert copied.query(one()) == wanted
 
 
 @pytest.mark.parametrize(
