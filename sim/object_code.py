@@ -7,7 +7,8 @@ missing, is damaged, or belongs to another kind of processor, the function is co
 
 Such a function must not allocate and must not raise: the only symbols that it may need from outside are those of
 the C library's mathematics (ALLOWED). Others are refused when it is compiled. So its callers bring the memory that
-it works in.
+it works in. Its own sums, and those of the formulas that it calls, are not reordered; those of the compiled
+functions that it calls are.
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ def object_code(function: Kept) -> bytes:
     import llvmlite.binding as llvm
     from numba import cfunc, types
 
-    from sim.machine_code import MATHEMATICS, compiler_settings
+    from sim.machine_code import compiler_settings
 
     _teach_array_at()
     pointer: Any = types.CPointer
@@ -107,8 +108,7 @@ def object_code(function: Kept) -> bytes:
     signature = types.void(*[kinds[kind] for kind in function.kinds])
     with compiler_settings():
         compiler: Any = cfunc
-        options = {"nopython": True, "error_model": "numpy", "fastmath": MATHEMATICS}
-        called = compiler(signature, **options)(function.py_func)
+        called = compiler(signature, nopython=True, error_model="numpy")(function.py_func)
     module = called._library._final_module.clone()
     for part in [*module.functions, *module.global_variables]:
         if part.name == called._wrapper_name:

@@ -15,6 +15,7 @@ import numpy as np
 
 from sim.arrays import Floats, Integers
 from sim.compiling import compiled
+from sim.linear.vectors import formula
 from sim.mechanics.drag import head_resistance, tail_coefficients
 from sim.model.groups import LEAST_SLENDERNESS, MOST_TAILS
 from sim.model.response import DWELLS
@@ -102,9 +103,12 @@ def _possible(group: Floats) -> bool:
     return positive and slender and tails and group[_SPEED] != 0
 
 
-@compiled
+@formula
 def _assemble(group: Floats, robot: Floats) -> None:
-    """Write head and tails of a robot without effects, as `surrogate.wrench.heads.pack_robots` packs them."""
+    """Write head and tails of a robot without effects, as `surrogate.wrench.heads.pack_robots` packs them.
+
+    A formula, so that its products are not reordered: the rows of a head with much drag nearly cancel.
+    """
     radius = 1 / group[_LENGTH]
     length, offset, count = group[_HEAD] * radius, group[_OFFSET] * radius, group[_NUMBER]
     parallel, perp = tail_coefficients(group[_SLENDERNESS])
