@@ -13,7 +13,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from numba.core.dispatcher import Dispatcher
 from tqdm import tqdm
 
 from sim import compiling
@@ -58,7 +57,7 @@ def count_loops(package: str) -> int:
     """Count the compiled functions of a package that are loaded."""
     modules = [module for name, module in sys.modules.copy().items() if name.partition(".")[0] == package]
     return sum(
-        isinstance(value, Dispatcher) and value.py_func.__module__ == module.__name__
+        isinstance(value, compiling.Loop) and value.py_func.__module__ == module.__name__
         for module in modules
         for value in vars(module).values()
     )
@@ -122,9 +121,11 @@ class _Count:
 @contextmanager
 def _shown(count: Callable[[], _Count]) -> Iterator[None]:
     """Show compiled loops in the bar of this count, or not at all, rather than in one of their own."""
-    own = vars(compiling)["tqdm"]
-    vars(compiling)["tqdm"] = lambda **_: count()
+    from sim import machine_code  # here, for it imports numba
+
+    own = vars(machine_code)["tqdm"]
+    vars(machine_code)["tqdm"] = lambda **_: count()
     try:
         yield
     finally:
-        vars(compiling)["tqdm"] = own
+        vars(machine_code)["tqdm"] = own

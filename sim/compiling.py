@@ -1,5 +1,7 @@
 """Compiled loops: machine code by numba, kept on disk between runs.
 
+numba takes a second to import. So a loop imports it, with `sim.machine_code`, on its first call.
+
 numba's own cache depends on the time stamp of the loop's file. If a formula in another file changes, it would use
 old machine code; if a comment changes, it would compile again. So the cache is a folder whose name has a digest of
 the code of all files that compiled loops are made of, without comments and docstrings. The folders of the last few
@@ -24,27 +26,24 @@ import ast
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
-from functools import cache
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from functools import cache, cached_property, update_wrapper
 from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
 from shutil import rmtree
 from types import CodeType
-from typing import Any, Self, TypeVar, cast
-
-from llvmlite.binding import get_host_cpu_name
-from numba import config, njit
-from numba.core import event
-from numba.core.caching import _CacheLocator
-from tqdm import tqdm
+from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _HERE = Path(__file__).parent
-_SOURCES = ("arrays.py", "compiling.py", "linear/*.py", "mechanics/*.py", "model/body.py", "solve/*.py")
+_SOURCES = (
+    "arrays.py", "compiling.py", "machine_code.py", "linear/*.py", "mechanics/*.py", "model/body.py", "solve/*.py",
+)  # fmt: skip
 _KEPT = 3  # folders of other versions
-_LEVEL = 1  # of optimisation: loops run as fast as at level 3 and compile in less than half the time
+_NUMBA = "sim.machine_code"  # by name: this module imports us, and numba
 
 
 def code_digest(root: Path, patterns: Iterable[str] = _SOURCES) -> str:
@@ -112,21 +111,32 @@ def _cache_folder() -> Path:
 
 
 CACHE = _cache_folder()
-_ALL = f"all-for-{get_host_cpu_name()}"  # machine code belongs to one kind of processor
 _APART = "SOFTFLAGELLA_COMPILES"  # environment of a process that compiles for others
 if not CACHE.exists():
     prune(CACHE.parent, _KEPT)
 
 
+@cache
+def processor() -> str:
+    """Return the name of this kind of processor, to which machine code belongs."""
+    from llvmlite.binding import get_host_cpu_name
+
+    return str(get_host_cpu_name())
+
+
+def _all_compiled_mark() -> str:
+    return f"all-for-{processor()}"
+
+
 def all_compiled(folder: Path = CACHE) -> bool:
     """Whether every loop of a folder has been compiled for this processor; true where they are being compiled."""
-    return (folder / _ALL).exists() or _APART in os.environ
+    return _APART in os.environ or (folder / _all_compiled_mark()).exists()
 
 
 def mark_all_compiled(folder: Path = CACHE) -> None:
     """Remember that every loop of a folder has been compiled for this processor."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / _ALL).touch()
+    (folder / _all_compiled_mark()).touch()
 
 
 def compile_apart(module: str) -> bool:
@@ -139,16 +149,13 @@ def compile_apart(module: str) -> bool:
         process.kill()
 
 
-_modules: set[str] = set()  # with compiled loops
-
-
 @cache
 def folder_of_package(root: Path) -> Path:
     """Return where the loops of another package are kept: all its files, in all its folders, name the folder."""
     return folder_for_code(CACHE, root.name, root, ("**/*.py",))
 
 
-def _package_root(file: Path) -> Path:
+def package_root(file: Path) -> Path:
     """Return the outermost folder with an __init__.py around a file, or the file's own folder."""
     root = file.parent
     while (root.parent / "__init__.py").exists():
@@ -156,90 +163,43 @@ def _package_root(file: Path) -> Path:
     return root
 
 
-class Locator(_CacheLocator):
-    """Tells numba in which of our folders a loop is kept. The folder's name says which code it belongs to."""
+class Loop:
+    """A compiled function. numba is imported, and the function compiled or read from disk, on the first call."""
 
-    def __init__(self, module: str, file: Path):
-        self._module = module
-        self._folder = CACHE if file.is_relative_to(_HERE) else folder_of_package(_package_root(file))
+    __name__: str
 
-    @classmethod
-    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Self:
-        """Return the locator of a function."""
-        return cls(py_func.__module__, Path(py_file))
+    def __init__(self, function: Callable[..., Any]):
+        update_wrapper(self, function)
+        self.py_func = function
 
-    def get_cache_path(self) -> str:
-        """Return the folder."""
-        return str(self._folder)
+    @cached_property
+    def dispatcher(self) -> Any:
+        """What numba calls, and calls from other compiled functions."""
+        return import_module(_NUMBA).dispatcher(self.py_func)
 
-    def get_source_stamp(self) -> str:
-        """Return the same stamp always: other code has another folder."""
-        return ""
+    def __call__(self, *arguments: Any) -> Any:
+        return self.dispatcher(*arguments)
 
-    def get_disambiguator(self) -> str:
-        """Return the module's name, since two modules may have functions of one name."""
-        return self._module
-
-
-class _Progress(event.Listener):
-    """A line on stderr while numba compiles loops of this package; it appears after a second."""
-
-    def __init__(self) -> None:
-        self._depth = 0
-        self._bar: tqdm[Any] | None = None
-
-    def on_start(self, event: Any) -> None:
-        """A loop, or one that it calls, begins to compile."""
-        if _is_ours(event):
-            self._depth += 1
-            if self._bar is None:
-                self._bar = tqdm(
-                    desc="compiling loops for first use",
-                    bar_format="{desc}: {n_fmt} done in {elapsed} min",
-                    delay=1.0,
-                    leave=False,
-                )
-
-    def on_end(self, event: Any) -> None:
-        """A loop has been compiled."""
-        if _is_ours(event) and self._bar is not None:
-            self._depth -= 1
-            self._bar.update()
-            if self._depth == 0:
-                self._bar.close()
-                self._bar = None
-
-
-def _is_ours(event: Any) -> bool:
-    return event.data["dispatcher"].py_func.__module__ in _modules
-
-
-event.register("numba:compile", _Progress())  # type: ignore[no-untyped-call]
+    def __reduce__(self) -> str:
+        return self.__name__
 
 
 def compiled(function: F) -> F:
     """Compile a function of numbers and arrays on its first call, without holding the interpreter's lock."""
-    _modules.add(function.__module__)
-    with _setting("CACHE_LOCATOR_CLASSES", f"{__name__}.{Locator.__name__}"):
-        loop: Any = njit(
-            cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz", "arcp"}
-        )(function)
-    compile_loop, level = loop.compile, type(config.OPT)(_LEVEL)  # type: ignore[attr-defined]
-
-    def compile_quickly(signature: Any) -> Any:
-        with _setting("OPT", level):
-            return compile_loop(signature)
-
-    loop.compile = compile_quickly
-    return cast(F, loop)
+    return cast(F, Loop(function))
 
 
-@contextmanager
-def _setting(name: str, value: object) -> Iterator[None]:
-    """A setting of numba for as long as the block lasts."""
-    before = getattr(config, name)
-    setattr(config, name, value)
-    try:
-        yield
-    finally:
-        setattr(config, name, before)
+_formulas: list[Callable[..., Any]] = []  # that numba has not been told of
+
+
+def inlined(function: F) -> F:
+    """Mark a function that compiled functions may call, and that stays plain Python when called from Python."""
+    _formulas.append(function)
+    return function
+
+
+def take_formulas() -> list[Callable[..., Any]]:
+    """Return the functions marked since the last call."""
+    taken = _formulas.copy()
+    _formulas.clear()
+    return taken

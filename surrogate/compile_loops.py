@@ -5,17 +5,27 @@ from __future__ import annotations
 from sim.compile_stages import run_stages
 from sim.compiling import mark_all_compiled
 from surrogate.loops import FOLDER
-from surrogate.table.model_file import load
-from surrogate.training.simulated import draw_robots
+from surrogate.networks.compiled import evaluate_rows
+from surrogate.table.compiled_query import query_rows
+from surrogate.table.support import novelty_rows
+from surrogate.wrench.balance import inverse_rows, solve_rows
+
+_KEPT = {
+    "networks": evaluate_rows,
+    "domain": novelty_rows,
+    "inverses": inverse_rows,
+    "motions": solve_rows,
+    "queries": query_rows,
+}
 
 
 def compile_all() -> float:
-    """Call every loop once. Loops that are compiled already are only loaded.
+    """Load every loop; compile those that have not been compiled.
 
     Returns:
         The time that it took, in seconds.
     """
-    stages = (("look-up table", lambda: load().query(draw_robots(16, 0, wide=False), intervals=True, flag=True)),)
+    stages = tuple((name, lambda function=function: function.call) for name, function in _KEPT.items())
     seconds = run_stages("surrogate", stages, FOLDER)
     mark_all_compiled(FOLDER)
     return seconds

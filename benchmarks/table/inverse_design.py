@@ -19,8 +19,9 @@ from benchmarks.table.shipped_table import as_reached
 from sim.motion.batches import steady_columns
 from surrogate.input_ranges import BOUNDS, COEFFICIENTS, ROBOT
 from surrogate.table.inverse import inverse
-from surrogate.table.lookup import OUTSIDE, NeuralTable
+from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
+from surrogate.table.quick_query import OUTSIDE
 from surrogate.training.simulated import SimulatedRobots, draw_robots
 from surrogate.training.train import with_radius
 

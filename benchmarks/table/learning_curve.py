@@ -23,8 +23,8 @@ import torch
 from dataset.report.figures import plain_logarithms
 from surrogate.networks.checkpoints import TrainingContext
 from surrogate.networks.training_loop import Settings
+from surrogate.table.compiled_query import BRANCHES
 from surrogate.table.errors import relative_errors
-from surrogate.table.lookup import BRANCHES
 from surrogate.table.wrench_table import WrenchTable
 from surrogate.training.fit_wrench import WrenchSamples, fit_wrench, learnable, wrench_samples
 from surrogate.training.simulated import SimulatedRobots, read_robots

@@ -38,7 +38,7 @@ function spreadOf(logarithm, number) {
   return logarithm.map((value) => (number === 2 ? Math.exp(Math.min(value, 0)) : 0));
 }
 
-/* Lags with the memory of a dwell before of the same length. ResponseTable.lag_at_equal_dwells */
+/* Lags with the memory of a dwell before of the same length. ResponseTable.equal_dwells */
 function lagAtEqualDwells({ lag, memory }) {
   const added = atEqualDwells(memory);
   return lag.map((value, at) => value + added[at]);

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from numba.extending import register_jitable
+from sim.compiling import inlined
 
 Vector = tuple[Any, Any, Any]
 Matrix = tuple[Vector, Vector, Vector]
@@ -26,8 +26,7 @@ E_Z: Vector = (0.0, 0.0, 1.0)
 
 def formula(function: F) -> F:
     """Decorate a formula: the same source for numbers in compiled loops and for tensors."""
-    marked: F = register_jitable(function)
-    return marked
+    return inlined(function)
 
 
 @formula

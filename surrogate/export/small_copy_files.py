@@ -30,7 +30,8 @@ from surrogate.export.small_copy import (
     network_depth,
 )
 from surrogate.input_ranges import ROBOT
-from surrogate.table.lookup import RESPONSE_OUTPUTS, NeuralTable
+from surrogate.table.lookup import NeuralTable
+from surrogate.table.quick_query import RESPONSE_OUTPUTS
 
 READERS = Path(__file__).parents[1] / "readers"
 FORMAT = 1

@@ -6,12 +6,13 @@ about a microsecond, however short the array is. These loops take about two micr
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Floats
+from sim.arrays import Floats, Integers
 from sim.compiling import compiled
+from sim.object_code import COUNT, FLOATS, INTEGERS, array_at, kept
 
 _MAGIC = 6755399441055744.0  # 1.5 · 2^52: a small integer added to it stands in its lowest bits
 _LOG2_E = 1.4426950408889634
@@ -22,54 +23,75 @@ _LARGEST = 20.0  # |x| from which tanh is 1 in double precision
 class Packed(NamedTuple):
     """An ensemble for the loops."""
 
-    shift: Floats  # (F,)
-    scale: Floats  # (F,)
-    mean: Floats  # (O,)
-    spread: Floats  # (O,)
-    numbers: Floats  # of each member: weights and biases layer by layer, then the linear map
-    width: int
-    depth: int
-    members: int
+    numbers: Floats  # shift (F,), scale (F,), mean (O,), spread (O,); for each member weights, biases, linear map
+    sizes: Integers  # (6,): where the numbers begin, F, O, width, depth, members
+
+    def evaluate(self, x: Floats) -> Floats:
+        """Return the mean of the members, (M, O), at inputs x (M, F)."""
+        x = np.ascontiguousarray(x, dtype=float)
+        y, room = np.empty((len(x), self.sizes[2])), np.empty(room_of(self.sizes))
+        evaluate_rows(self.numbers, self.sizes, len(self.numbers), len(x), x, y, room, len(room))
+        return y
+
+
+def room_of(sizes: Integers) -> int:
+    """Return how many numbers `evaluate` works in."""
+    return int(sizes[1] + sizes[2] + 3 * sizes[3])
+
+
+@kept(FLOATS, INTEGERS, COUNT, COUNT, FLOATS, FLOATS, FLOATS, COUNT)
+def evaluate_rows(numbers: Any, sizes: Any, many: int, count: int, x: Any, y: Any, room: Any, space: int) -> None:
+    """Write the mean of the members at inputs x (M, F) to y (M, O)."""
+    shape = array_at(sizes, 6)
+    inputs, outputs = array_at(x, (count, shape[1])), array_at(y, (count, shape[2]))
+    network, work = array_at(numbers, many), array_at(room, space)
+    for row in range(count):
+        evaluate(network, shape, inputs[row], outputs[row], work)
 
 
 @compiled
-def evaluate_rows(network: Packed, x: Floats) -> Floats:
-    """Return the mean of the members, (M, O), at inputs x (M, F)."""
-    y = np.empty((len(x), len(network.mean)))
-    for row in range(len(x)):
-        evaluate(network, x[row], y[row])
-    return y
+def evaluate(numbers: Floats, sizes: Integers, x: Floats, y: Floats, room: Floats) -> None:
+    """Write the mean of the members at inputs x (F,) to y (O,).
 
-
-@compiled
-def evaluate(network: Packed, x: Floats, y: Floats) -> None:
-    """Write the mean of the members at inputs x (F,) to y (O,)."""
-    inputs, outputs, width = len(x), len(y), network.width
-    first, total = (x - network.shift) / network.scale, np.zeros(outputs)
-    hidden, next_hidden = np.empty(width), np.empty(width)
-    at = 0
-    for _ in range(network.members):
-        at = _layer(network.numbers, at, first, hidden)
-        _tanh(hidden)
-        for _ in range(network.depth - 1):
-            at = _layer(network.numbers, at, hidden, next_hidden)
-            _tanh(next_hidden)
+    Args:
+        numbers, sizes: see `Packed`.
+        room: to work in, see `room_of`.
+    """
+    at, inputs, outputs, width = sizes[0], sizes[1], sizes[2], sizes[3]
+    first, total = room[:inputs], room[inputs : inputs + outputs]
+    hidden = room[inputs + outputs : inputs + outputs + width]
+    next_hidden = room[inputs + outputs + width : inputs + outputs + 2 * width]
+    power = room[inputs + outputs + 2 * width : inputs + outputs + 3 * width]
+    for i in range(inputs):
+        first[i] = (x[i] - numbers[at + i]) / numbers[at + inputs + i]
+    mean = at + 2 * inputs
+    at = mean + 2 * outputs
+    for j in range(outputs):
+        total[j] = 0.0
+    for _ in range(sizes[5]):
+        at = _layer(numbers, at, first, hidden)
+        _tanh(hidden, power)
+        for _ in range(sizes[4] - 1):
+            at = _layer(numbers, at, hidden, next_hidden)
+            _tanh(next_hidden, power)
             hidden, next_hidden = next_hidden, hidden
-        at = _layer(network.numbers, at, hidden, y)
+        at = _layer(numbers, at, hidden, y)
         for i in range(inputs):
             for j in range(outputs):
-                y[j] += first[i] * network.numbers[at + i * outputs + j]
+                y[j] += first[i] * numbers[at + i * outputs + j]
         at += inputs * outputs
-        total += y
+        for j in range(outputs):
+            total[j] += y[j]
     for j in range(outputs):
-        y[j] = total[j] / network.members * network.spread[j] + network.mean[j]
+        y[j] = total[j] / sizes[5] * numbers[mean + outputs + j] + numbers[mean + j]
 
 
 @compiled
 def _layer(numbers: Floats, at: int, x: Floats, y: Floats) -> int:
     """Write y = Wᵀ x + b with the numbers from place `at` on; return the place behind them."""
     n, m = len(x), len(y)
-    y[:] = numbers[at + n * m : at + n * m + m]
+    for j in range(m):
+        y[j] = numbers[at + n * m + j]
     whole = n - n % 4
     for i in range(0, whole, 4):
         a, b = numbers[at + i * m : at + (i + 1) * m], numbers[at + (i + 1) * m : at + (i + 2) * m]
@@ -84,10 +106,12 @@ def _layer(numbers: Floats, at: int, x: Floats, y: Floats) -> int:
 
 
 @compiled
-def _tanh(x: Floats) -> None:
-    """Take tanh in place, exact to rounding: 1 − 2/(e^2x + 1), with e^r as its Taylor series for |r| < ln(2)/2."""
+def _tanh(x: Floats, power: Floats) -> None:
+    """Take tanh in place, exact to rounding: 1 − 2/(e^2x + 1), with e^r as its Taylor series for |r| < ln(2)/2.
+
+    `power` is room of the same size.
+    """
     n = len(x)
-    power = np.empty(n)
     shifted = power.view(np.int64)
     for j in range(n):
         x[j] = 2 * min(max(x[j], -_LARGEST), _LARGEST)

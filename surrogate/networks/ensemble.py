@@ -93,15 +93,14 @@ class Ensemble:
     @cached_property
     def packed(self) -> Packed:
         """The same numbers for the compiled loops."""
-        shape, parts = self.shape, []
+        shape = self.shape
+        parts = [self.shift, self.scale, self.mean, self.spread]
         for k in range(shape["members"]):
             for weight, bias in zip(self.weights, self.biases, strict=True):
                 parts += [weight[k].ravel(), bias[k].ravel()]
             parts.append(self.bypass[k].ravel())
-        return Packed(
-            *(self.shift, self.scale, self.mean, self.spread, np.concatenate(parts)),
-            *(shape["width"], shape["depth"], shape["members"]),
-        )
+        sizes = (0, *(shape[name] for name in ("inputs", "outputs", "width", "depth", "members")))
+        return Packed(np.concatenate(parts), np.array(sizes))
 
 
 def state_shapes(*, inputs: int, outputs: int, width: int, depth: int, members: int) -> dict[str, tuple[int, ...]]:

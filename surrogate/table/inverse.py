@@ -20,7 +20,8 @@ from sim.io.errors import InputError
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.input_ranges import BOUNDS
 from surrogate.table.errors import error_scale
-from surrogate.table.lookup import OUTSIDE, NeuralTable
+from surrogate.table.lookup import NeuralTable
+from surrogate.table.quick_query import OUTSIDE
 
 Bounds = Mapping[str, tuple[float, float]]
 

@@ -15,7 +15,7 @@ from sim.linear.complex_step import change, moved
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.networks.ensemble import Ensemble
 from surrogate.table.wrench_table import WrenchTable, network_index
-from surrogate.wrench.balance import inverse_rows
+from surrogate.wrench.balance import inverses_of
 from surrogate.wrench.heads import full_motion, heads_and_tails, slope_at, unbalanced
 
 
@@ -47,7 +47,7 @@ def _changes(
 ) -> dict[str, tuple[Floats, ...]]:
     """Return derivatives of STEADY_OUTPUTS by parameter, of robots with one network and the solution u (M, 4)."""
     heads, tails = heads_and_tails(columns, keep=parameters)
-    inverse = inverse_rows(slope_at(lambda v: unbalanced(heads, tails, v, network), u))
+    inverse = inverses_of(slope_at(lambda v: unbalanced(heads, tails, v, network), u))
 
     def outputs(robots: dict[str, Floats]) -> tuple[Floats, ...]:
         heads, tails = heads_and_tails(robots, keep=parameters)

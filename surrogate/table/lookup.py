@@ -14,44 +14,44 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from sim.arrays import Flags, Floats, Integers
+from sim.arrays import Floats
 from sim.effects import catalogue
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.io.notebook import as_html, given_axes
-from sim.mechanics import planar
 from sim.model.groups import DWELL
-from sim.model.response import DWELLS, LAGS, Responses
+from sim.model.response import Responses
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.error_modes import STEADY, error_modes, joined
+from surrogate.input_ranges import ROBOT
 from surrogate.interface import ErrorModes, OutsideError
 from surrogate.networks.ensemble import Ensemble
+from surrogate.table.compiled_query import INPUT, MOTION, REASON
 from surrogate.table.curve_errors import CURVE_ERRORS, NORMAL_90, CurveErrors
 from surrogate.table.errors import RELATIVE, error_scale
+from surrogate.table.flat_table import flat_table
 from surrogate.table.intervals import Intervals
 from surrogate.table.jacobian import slopes
-from surrogate.table.response_table import ResponseTable, between_dwells, curve_speeds
+from surrogate.table.quick_query import OUTSIDE, RESPONSE_OUTPUTS, SHORTEST, QuickQuery, outside
+from surrogate.table.response_table import ResponseTable, curve_speeds
 from surrogate.table.support import Support
 from surrogate.table.tensor_file import digest, write
 from surrogate.table.wrench_table import WrenchTable, motion_sensitivity, network_index, rows_by_network
-from surrogate.wrench.balance import inputs_rows
-from surrogate.wrench.heads import Heads, heads_and_tails, needs_no_learning
-from surrogate.wrench.tails import Tails, pack_tails, wrench_slopes
+from surrogate.wrench.heads import Heads, heads_and_tails, needs_no_learning, pack_robots
+from surrogate.wrench.tails import Tails, wrench_slopes
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
 FORMAT = 6  # of model files
-RESPONSE_OUTPUTS = ("net_speed_bar", *LAGS[::-1])
-OUTSIDE = "outside"  # flag of robots that the table does not know
-BRANCHES = 0.6  # |ω_yr/ω_t| from which a robot may have several motions
 CERTIFIED = "certified_error"
 _REASONS = (  # why a robot is outside
     "",
@@ -59,7 +59,9 @@ _REASONS = (  # why a robot is outside
     "its tails or its motor were not learned, or no motion was found",
     "its tails move as none of the learned ones do",
     "it yaws nearly as fast as its tails turn, and may have several motions",
+    "no robot has such numbers",
 )
+_MOTION, _INPUTS = slice(MOTION, MOTION + 5), slice(INPUT, INPUT + 7)  # rows of the compiled loop's answer
 _NOT_OF_HEAD = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 
 
@@ -115,19 +117,23 @@ class NeuralTable:
         Raises:
             InputError: a robot that cannot be, or one outside the domain.
         """
+        if not certify and (intervals is False or self._quick_widths):
+            answer = self._quick.one(columns, intervals=intervals, flag=flag)
+            if answer is not None:
+                return answer
         values = check_columns({name: array for name, array in columns.items() if name != DWELL})
         if DWELL in columns:
             _check_flips(values)
-        motions = self.motions(values, flag=flag)
-        result: dict[str, Any] = steady_outputs(motions, self.tails)
-        if DWELL in columns:
-            dwells = _checked_dwells(columns[DWELL])
-            lags = self.curves.lag_at_equal_dwells(motions.heads, motions.tails, motions.motion)
-            result |= _at_dwells(lags, result, dwells, motions.heads.sense)
-        if intervals:
-            result |= self._intervals(motions, result)
+        robots = None if _without_effects(values) else pack_robots(*heads_and_tails(values))
+        dwells = self._dwells(columns, values, flag=flag)
+        widths = intervals and self._quick_widths
+        answers = self._quick.rows(values, robots, dwells, widths=widths)
+        self._check_known(values, answers, flag=flag)
+        result = self._quick.named(answers, with_dwell=dwells is not None, widths=widths)
+        if intervals and not widths:
+            result |= self._intervals(self.motions(values, flag=flag), result)
         if flag:
-            result[OUTSIDE] = np.array([bool(reason) for reason in motions.reason])
+            result[OUTSIDE] = outside(answers)
         if certify:
             from surrogate.table.certify import certified_error
 
@@ -221,14 +227,40 @@ class NeuralTable:
     def motions(self, values: Mapping[str, Floats], *, flag: bool = False) -> Motions:
         """Return the motion of checked robots (`sim.inputs.check_columns`); see `query` for `flag`."""
         heads, tails = heads_and_tails(values)
-        motion, converged = self.tails.solve(heads, tails)
-        inputs = inputs_rows(pack_tails(tails), motion)
-        known = converged & self._within_ranges(values)
-        reasons = self._reasons(network_index(tails.number), motion, inputs, known)
-        if any(reasons) and not flag:
-            row, reason = next((row, reason) for row, reason in enumerate(reasons) if reason)
-            raise self._refusal(values, row, reason)
-        return Motions(heads, tails, motion, inputs, reasons)
+        answers = self._quick.rows(values, pack_robots(heads, tails), None)
+        self._check_known(values, answers, flag=flag)
+        motion, inputs = (np.ascontiguousarray(answers[place].T) for place in (_MOTION, _INPUTS))
+        return Motions(heads, tails, motion, inputs, [_REASONS[int(number)] for number in answers[REASON]])
+
+    @cached_property
+    def _quick(self) -> QuickQuery:
+        ranges = [self.ranges[name] for name in _NOT_OF_HEAD]
+        widths = self.intervals if self._quick_widths else None
+        names = (*STEADY_OUTPUTS, *RESPONSE_OUTPUTS)
+        flat = flat_table(self.tails, self.curves, self.support, ranges, widths, names)
+        return QuickQuery(flat, () if widths is None else list(widths.factor))
+
+    @cached_property
+    def _quick_widths(self) -> bool:
+        """Whether the compiled loop knows the intervals: networks of several members have a spread as well."""
+        members = [network.shape["members"] for network in self.tails.wrench if network is not None]
+        return self.intervals is not None and set(members) == {1}
+
+    def _dwells(self, columns: Mapping[str, Floats], values: Mapping[str, Floats], *, flag: bool) -> Floats | None:
+        """Return the checked dwells of a query, (M,); a robot outside is refused before a dwell is."""
+        if DWELL not in columns:
+            return None
+        try:
+            return np.broadcast_to(_checked_dwells(columns[DWELL]), values["N"].shape)
+        except InputError:
+            self.motions(values, flag=flag)
+            raise
+
+    def _check_known(self, values: Mapping[str, Floats], answers: Floats, *, flag: bool) -> None:
+        """Refuse the first robot that is outside, unless such robots are flagged."""
+        if not flag:
+            for row in np.flatnonzero(outside(answers))[:1]:
+                raise self._refusal(values, int(row), _REASONS[int(answers[REASON, row])])
 
     def width_features(self, motions: Motions) -> Floats:
         """Return what the width of an interval may depend on, (M, 11)."""
@@ -262,23 +294,6 @@ class NeuralTable:
             added[f"{name}_low"], added[f"{name}_high"] = result[name] - half, result[name] + half
         return added
 
-    def _within_ranges(self, values: Mapping[str, Floats]) -> Flags:
-        """Return whether tails and motor speed are within the learned ranges; heads may be any."""
-        low, high = np.array([self.ranges[name] for name in _NOT_OF_HEAD]).T
-        sizes = np.abs(np.stack([values[name] for name in _NOT_OF_HEAD], -1))
-        return np.asarray(((low * (1 - 1e-9) <= sizes) & (sizes <= high * (1 + 1e-9))).all(1))
-
-    def _reasons(self, kind: Integers, motion: Floats, inputs: Floats, known: Flags) -> list[str]:
-        which = np.ones(len(motion), dtype=np.int64)
-        quick = np.abs(motion[:, 2]) > BRANCHES * np.abs(motion[:, 4])
-        for k, rows in rows_by_network(kind):
-            support = self.support[k]
-            if support is not None:
-                outside = np.where(support.novelty(inputs[rows]) <= 1, 0, 3)
-                outside[(outside == 0) & quick[rows]] = 4
-                which[rows] = np.where(known[rows], outside, 2)
-        return [_REASONS[number] for number in which.tolist()]
-
     def _refusal(self, values: Mapping[str, Floats], row: int, reason: str) -> OutsideError:
         words = ""
         for name in dict.fromkeys((*_NOT_OF_HEAD, *self.ranges)):
@@ -310,6 +325,11 @@ def _medians(errors: Mapping[str, Mapping[str, float]]) -> str:
     )
 
 
+def _without_effects(values: Mapping[str, Floats]) -> bool:
+    """Return whether no robot has an effect."""
+    return not any(size.any() for name, size in values.items() if name not in ROBOT)
+
+
 def _check_flips(values: Mapping[str, Floats]) -> None:
     """Refuse robots whose response to a flip was not learned."""
     for name, size in values.items():
@@ -336,17 +356,9 @@ def _checked_dwells(dwells: Floats) -> Floats:
         dwells = np.asarray(dwells, dtype=float)
     except (TypeError, ValueError):
         raise InputError(f"{DWELL} has a value that is no number; give numbers") from None
-    for value in dwells[~(np.isfinite(dwells) & (dwells >= DWELLS[0] * (1 - 1e-9)))][:1]:
-        raise InputError(f"{DWELL} = {value:g}; give a dwell from {DWELLS[0]:g} on")
+    for value in dwells[~(np.isfinite(dwells) & (dwells >= SHORTEST))][:1]:
+        raise InputError(f"{DWELL} = {value:g}; give a dwell from {SHORTEST:g} on")
     return dwells
-
-
-def _at_dwells(lags: Floats, steady: Mapping[str, Floats], dwells: Floats, sense: Floats) -> dict[str, Floats]:
-    """Return RESPONSE_OUTPUTS at one dwell for each robot, when all dwells are equal."""
-    lag = between_dwells(lags, dwells)
-    twist = twists(steady["v_z"], steady["v_x"], steady["omega_yr_bar"], sense)
-    speed = planar.net_speed(twist, lag, dwells)
-    return dict(zip(RESPONSE_OUTPUTS, (speed, *lag.T[::-1]), strict=True))
 
 
 def table_content(lookup: NeuralTable) -> dict[str, Any]:

@@ -26,7 +26,6 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.model.response import BEFORE, DWELLS, at_equal_dwells
-from surrogate.networks.compiled import evaluate_rows
 from surrogate.networks.ensemble import Ensemble
 from surrogate.wrench.heads import Heads
 from surrogate.wrench.tails import Tails, tail_inputs
@@ -67,16 +66,9 @@ class ResponseTable:
         curves["spread"] = np.abs(curves["spread"])
         return curves
 
-    def lag_at_equal_dwells(self, heads: Heads, tails: Tails, motion: Floats) -> Floats:
-        """Return lags with the memory of a dwell before of the same length, (M, D, 3), in l, l, rad."""
-        components = self._components(tails, motion)
-        both = np.concatenate([components["lag"], components["memory"]], 1)
-        curve = (self._equal.mean + both @ self._equal.vectors).reshape(-1, *SHAPES["lag"])
-        return np.asarray(curve * curve_speeds(heads, motion)[:, None])
-
     @cached_property
-    def _equal(self) -> Basis:
-        """The basis of `lag_at_equal_dwells`: the components of the lag, and then those of the memory."""
+    def equal_dwells(self) -> Basis:
+        """Lag and memory where the dwell before is as long: components of the lag, then of the memory."""
         lag, memory = self.bases["lag"], self.bases["memory"]
         mean = lag.mean + memory_at_equal_dwells(memory.mean[None])[0]
         return Basis(mean, np.concatenate([lag.vectors, memory_at_equal_dwells(memory.vectors)]))
@@ -85,7 +77,7 @@ class ResponseTable:
         """Return the components of each kind of curve, (M, C)."""
         inputs, components = response_inputs(tails, motion), {}
         for names, network in zip(PARTS, self.networks, strict=True):
-            answer, first = evaluate_rows(network.packed, inputs), 0
+            answer, first = network.packed.evaluate(inputs), 0
             for name in names:
                 end = first + len(self.bases[name].vectors)
                 components[name], first = answer[:, first:end], end

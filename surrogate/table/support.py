@@ -12,11 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations_with_replacement
+from typing import Any
 
 import numpy as np
 
 from sim.arrays import Floats, Integers
 from sim.compiling import compiled
+from sim.object_code import COUNT, FLOATS, INTEGERS, array_at, kept
 
 DEGREE = 3
 _KEPT = 0.998  # share of the rows that are inside
@@ -47,18 +49,31 @@ class Support:
 
     def novelty(self, inputs: Floats) -> Floats:
         """Return q over its limit, (M,), at inputs (M, F): at most 1 inside."""
-        parents, last = _products(len(self.shift))
-        return _novelty_rows(self.shift, self.scale, self.factor, parents, last, inputs) / self.limit
+        inputs = np.ascontiguousarray(inputs, dtype=float)
+        products, numbers, novelty = products_of(len(self.shift)), self.numbers, np.empty(len(inputs))
+        room = np.empty(support_room(len(self.shift)))
+        novelty_rows(len(inputs), len(self.shift), products.shape[1], products, numbers, inputs, novelty, room)
+        return novelty
+
+    @property
+    def numbers(self) -> Floats:
+        """Shift, scale, limit and the factor column by column in one array, for the compiled loops."""
+        return np.concatenate([self.shift, self.scale, [self.limit], self.factor.T.ravel()])
 
 
 def monomial_count(inputs: int) -> int:
     """Return the number of monomials up to DEGREE of some inputs, P."""
-    return len(_products(inputs)[0])
+    return products_of(inputs).shape[1]
+
+
+def support_room(inputs: int) -> int:
+    """Return how many numbers `novelty_at` works in."""
+    return inputs + monomial_count(inputs)
 
 
 @cache
-def _products(inputs: int) -> tuple[Integers, Integers]:
-    """List the monomials up to DEGREE of some inputs, the constant first: `parents` and `last`, both (P,).
+def products_of(inputs: int) -> Integers:
+    """List the monomials up to DEGREE of some inputs, the constant first: parents and last inputs, (2, P).
 
     Monomial p is monomial parents[p] times the input last[p].
     """
@@ -69,33 +84,49 @@ def _products(inputs: int) -> tuple[Integers, Integers]:
             index[names] = len(parents)
             parents.append(index[names[:-1]])
             last.append(names[-1])
-    return np.array(parents), np.array(last)
+    return np.array([parents, last])
 
 
 def _monomials(x: Floats) -> Floats:
     """Return all monomials up to DEGREE of x (M, F), (M, P)."""
     columns = [np.ones(len(x))]
-    for parent, factor in list(zip(*_products(x.shape[1]), strict=True))[1:]:
+    for parent, factor in products_of(x.shape[1]).T[1:].tolist():
         columns.append(columns[parent] * x[:, factor])
     return np.column_stack(columns)
 
 
+@kept(COUNT, COUNT, COUNT, INTEGERS, FLOATS, FLOATS, FLOATS, FLOATS)
+def novelty_rows(
+    count: int, size: int, terms: int, products: Any, numbers: Any, inputs: Any, novelty: Any, room: Any
+) -> None:
+    """Write q over its limit of inputs (M, F) to novelty (M,)."""
+    support, work = array_at(numbers, 2 * size + 1 + terms * terms), array_at(room, size + terms)
+    x, q, pairs = array_at(inputs, (count, size)), array_at(novelty, count), array_at(products, 2 * terms)
+    for row in range(count):
+        q[row] = novelty_at(support, pairs, x[row], work)
+
+
 @compiled
-def _novelty_rows(
-    shift: Floats, scale: Floats, factor: Floats, parents: Integers, last: Integers, inputs: Floats
-) -> Floats:
-    """Return q of the module's head, (M,), at inputs (M, F)."""
-    novelty, count = np.zeros(len(inputs)), len(parents)
-    features, solved = np.ones(count), np.empty(count)
-    for row in range(len(inputs)):
-        x = (inputs[row] - shift) / scale
-        for p in range(1, count):
-            features[p] = features[parents[p]] * x[last[p]]
-        for i in range(count):
-            remainder = features[i]
-            for j in range(i):
-                remainder -= factor[i, j] * solved[j]
-            solved[i] = remainder / factor[i, i]
-            novelty[row] += solved[i] ** 2
-        novelty[row] /= count
-    return novelty
+def novelty_at(support: Floats, products: Integers, inputs: Floats, room: Floats) -> float:
+    """Return q over its limit at inputs (F,).
+
+    Args:
+        support: `Support.numbers`.
+        products: see `products_of`, one after the other, (2 P,).
+        room: to work in, see `support_room`.
+    """
+    size, count = len(inputs), len(products) // 2
+    x, features = room[:size], room[size : size + count]
+    for i in range(size):
+        x[i] = (inputs[i] - support[i]) / support[size + i]
+    features[0] = 1.0
+    for p in range(1, count):
+        features[p] = features[products[p]] * x[products[count + p]]
+    novelty = 0.0
+    for j in range(count):
+        column = support[2 * size + 1 + j * count : 2 * size + 1 + (j + 1) * count]
+        solved = features[j] / column[j]
+        for i in range(j + 1, count):
+            features[i] -= column[i] * solved
+        novelty += solved**2
+    return novelty / count / support[2 * size]

@@ -13,11 +13,10 @@ import numpy as np
 from sim.arrays import Flags, Floats, Integers
 from sim.linear.complex_step import angle, length, magnitude
 from surrogate.loops import compile_once
-from surrogate.networks.compiled import evaluate_rows
 from surrogate.networks.ensemble import Ensemble
-from surrogate.wrench.balance import inverse_rows, solve_rows
-from surrogate.wrench.heads import Heads, straight_resistance
-from surrogate.wrench.tails import Tails, linear_torque, pack_tails, tail_inputs
+from surrogate.wrench.balance import inverses_of, solve_robots
+from surrogate.wrench.heads import Heads, pack_robots, straight_resistance
+from surrogate.wrench.tails import Tails, linear_torque, tail_inputs
 
 CLASSES = (1, 2, 3)  # networks for N = 1, N = 2, and three or more tails
 _LEAST_SURGE = 0.05  # of the speed: errors of v_z are relative to this at least
@@ -47,13 +46,11 @@ class WrenchTable:
         compile_once()
         motion = np.full((len(tails.number), 5), np.nan)
         converged = np.zeros(len(motion), dtype=bool)
-        speeds, drags = np.column_stack([heads.speed, heads.gain]), pack_tails(tails)
+        robots = pack_robots(heads, tails)
         for k, rows in rows_by_network(network_index(tails.number)):
             network = self.wrench[k]
             if network is not None:
-                motion[rows], converged[rows] = solve_rows(
-                    network.packed, speeds[rows], heads.resistance[rows], drags[rows]
-                )
+                motion[rows], converged[rows] = solve_robots(network.packed, robots[rows])
         return motion, converged
 
     def outputs(self, heads: Heads, motion: Floats, gap: Floats) -> tuple[Floats, ...]:
@@ -68,7 +65,7 @@ class WrenchTable:
     def quick_gap(self, tails: Tails, inputs: Floats) -> Floats:
         """Return `tail_gap` with known inputs (M, 7) of the networks; without derivatives."""
         inputs = np.column_stack([inputs, np.log(tails.number)])
-        return _gap(tails, evaluate_rows(self.gap.packed, inputs)[:, 0])
+        return _gap(tails, self.gap.packed.evaluate(inputs)[:, 0])
 
     def tail_gap(self, tails: Tails, motion: Floats) -> Floats:
         """Return the smallest distance between tails over 2 r0, (M,); infinite for one tail."""
@@ -99,7 +96,7 @@ def motion_sensitivity(heads: Heads, tails: Tails, motion: Floats) -> Floats:
         ],
         -1,
     )
-    return inverse_rows(matrix) / size[:, :, None]
+    return inverses_of(matrix) / size[:, :, None]
 
 
 def clamp_distance(tails: Tails) -> Floats:

@@ -25,9 +25,10 @@ from surrogate.loops import compile_once
 from surrogate.networks.checkpoints import TrainingContext, device_named
 from surrogate.networks.ensemble import Ensemble
 from surrogate.networks.training_loop import Settings
+from surrogate.table.compiled_query import BRANCHES
 from surrogate.table.errors import curve_errors, relative_errors, summary
 from surrogate.table.intervals import Intervals
-from surrogate.table.lookup import BRANCHES, NeuralTable, steady_outputs
+from surrogate.table.lookup import NeuralTable, steady_outputs
 from surrogate.table.response_table import Basis
 from surrogate.table.support import Support
 from surrogate.table.wrench_table import CLASSES, network_index

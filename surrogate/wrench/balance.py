@@ -9,78 +9,120 @@ is nearer to the first guess (linear theory). Units: l, μ0 l⁴/EI, EI/l².
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from sim.arrays import Flags, Floats
+from sim.arrays import Flags, Floats, Integers
 from sim.compiling import compiled
 from sim.linear.dense import solve_dense
-from surrogate.networks.compiled import Packed, evaluate
+from sim.object_code import COUNT, FLOATS, INTEGERS, array_at, kept
+from surrogate.networks.compiled import Packed, evaluate, room_of
+from surrogate.wrench.heads import HEAD_NUMBERS, RESISTANCE, ROBOT_NUMBERS
 from surrogate.wrench.tails import inputs_of_tail, linear_thrust, linear_torque, wrench_terms
 
 STEPS, CORRECTION = 60, 1e-9  # of Broyden's method; the correction is relative
 _DIFFERENCE, _LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
 _FIRST_SPIN = 0.6  # ω_t/ω in the first guess
 _LONGEST = 0.5  # largest relative change of ω_t in one step
+_VECTORS = 64  # numbers for the vectors of one robot, before the room of the network
+MATRICES = 4  # 4×4 matrices that a solution works in
 
 
-@compiled
-def solve_rows(network: Packed, heads: Floats, resistances: Floats, tails: Floats) -> tuple[Floats, Flags]:
+def solution_room(sizes: Integers) -> int:
+    """Return how many numbers `solve` works in with a network."""
+    return _VECTORS + room_of(sizes)
+
+
+def solve_robots(network: Packed, robots: Floats) -> tuple[Floats, Flags]:
     """Solve for (v_x, v_z, ω_yr, ω_h, ω_t), (M, 5), of a positive motor; tell which robots converged, (M,).
 
     Args:
         network: of the tails.
-        heads: |ω| and gain, (M, 2).
-        resistances: of the heads, (M, 4, 5).
-        tails: columns of `surrogate.wrench.tails.pack_tails`, (M, 13).
+        robots: (M, 37), see `surrogate.wrench.heads.pack_robots`.
     """
-    motions, converged = np.empty((len(heads), 5)), np.empty(len(heads), dtype=np.bool_)
-    y, guess, second = np.empty(len(network.mean)), np.empty(5), np.empty(5)
-    for row in range(len(heads)):
-        head, resistance, tail = heads[row], resistances[row], tails[row]
-        _first_guess(head, resistance, tail, guess)
-        motions[row] = guess
-        converged[row] = _solve(network, head, resistance, tail, y, motions[row], False)
-        if tail[4] == 1:
-            second[:] = guess
-            second_found = _solve(network, head, resistance, tail, y, second, True)
-            nearer = abs(second[1] - guess[1]) < abs(motions[row, 1] - guess[1])
-            if second_found and (nearer or not converged[row]):
-                motions[row] = second
-                converged[row] = True
-    return motions, converged
+    motions, converged = np.empty((len(robots), 5)), np.empty(len(robots), dtype=np.int64)
+    room, matrices = np.empty(solution_room(network.sizes)), np.empty((MATRICES, 4, 4))
+    solve_rows(
+        network.numbers, network.sizes, len(network.numbers), len(robots), robots, motions, converged, room,
+        len(room), matrices,
+    )  # fmt: skip
+    return motions, converged == 1
+
+
+@kept(FLOATS, INTEGERS, COUNT, COUNT, FLOATS, FLOATS, INTEGERS, FLOATS, COUNT, FLOATS)
+def solve_rows(
+    numbers: Any, sizes: Any, many: int, count: int, robots: Any, motions: Any, converged: Any, room: Any,
+    space: int, matrices: Any,
+) -> None:  # fmt: skip
+    """Write the motions (M, 5) of robots (M, 37), and 1 for those that converged, (M,)."""
+    network, shape = array_at(numbers, many), array_at(sizes, 6)
+    robot, motion = array_at(robots, (count, ROBOT_NUMBERS)), array_at(motions, (count, 5))
+    flags, vectors, work = array_at(converged, count), array_at(room, space), array_at(matrices, (MATRICES, 4, 4))
+    for row in range(count):
+        flags[row] = 1 if solve(network, shape, robot[row], motion[row], vectors, work) else 0
 
 
 @compiled
-def inverse_rows(matrices: Floats) -> Floats:
+def solve(numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room: Floats, matrices: Floats) -> bool:
+    """Write the motion (5,) of one robot (37,); return whether the solution converged.
+
+    Args:
+        numbers, sizes: network of the tails, see `surrogate.networks.compiled.Packed`.
+        room: to work in, see `solution_room`.
+        matrices: to work in, (MATRICES, 4, 4).
+    """
+    guess, second = room[:5], room[5:10]
+    _first_guess(robot, guess, matrices)
+    for i in range(5):
+        motion[i] = guess[i]
+    found = _solve(numbers, sizes, robot, motion, room, matrices, False)
+    if robot[HEAD_NUMBERS + 4] == 1:
+        for i in range(5):
+            second[i] = guess[i]
+        second_found = _solve(numbers, sizes, robot, second, room, matrices, True)
+        nearer = abs(second[1] - guess[1]) < abs(motion[1] - guess[1])
+        if second_found and (nearer or not found):
+            for i in range(5):
+                motion[i] = second[i]
+            found = True
+    return found
+
+
+def inverses_of(matrices: Floats) -> Floats:
     """Invert matrices (M, n, n); numbers that are not finite where there is no inverse."""
-    inverses = np.empty_like(matrices)
-    for row in range(len(matrices)):
-        inverses[row] = np.eye(matrices.shape[1])
-        solve_dense(matrices[row].copy(), inverses[row])
+    size = matrices.shape[1]
+    inverses = np.empty_like(matrices, order="C")
+    inverse_rows(len(matrices), size, np.array(matrices, order="C"), inverses)
     return inverses
 
 
-@compiled
-def inputs_rows(tails: Floats, motions: Floats) -> Floats:
-    """Return `surrogate.wrench.tails.tail_inputs`, (M, 7), of tails (M, 13) that move so (M, 5)."""
-    x = np.empty((len(tails), 7))
-    for row in range(len(tails)):
-        inputs_at(tails[row], motions[row], x[row])
-    return x
+@kept(COUNT, COUNT, FLOATS, FLOATS)
+def inverse_rows(count: int, size: int, matrices: Any, inverses: Any) -> None:
+    """Write the inverses of matrices (M, n, n), which are overwritten."""
+    matrix, inverse = array_at(matrices, (count, size, size)), array_at(inverses, (count, size, size))
+    for row in range(count):
+        for i in range(size):
+            for j in range(size):
+                inverse[row, i, j] = 1.0 if i == j else 0.0
+        solve_dense(matrix[row], inverse[row])
 
 
 @compiled
 def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
     """Write `surrogate.wrench.tails.INPUTS` of one robot to x (7,), or HEAD_INPUTS after them to x (14,)."""
     beta = np.arctan2(motion[0], motion[2])
-    x[:7] = inputs_of_tail(tail[0], tail[2], tail[3], tail[4], tail[5], motion, beta)
+    x[0], x[1], x[2], x[3], x[4], x[5], x[6] = inputs_of_tail(
+        tail[0], tail[2], tail[3], tail[4], tail[5], motion, beta
+    )
     for i in range(7, len(x)):
         x[i] = tail[i - 1]
 
 
 @compiled
-def _unbalanced(resistance: Floats, tail: Floats, motion: Floats, y: Floats, residual: Floats) -> None:
+def _unbalanced(robot: Floats, motion: Floats, y: Floats, residual: Floats) -> None:
     """Write `surrogate.wrench.heads.unbalanced` for numbers y of the tails to residual (4,)."""
+    tail = robot[HEAD_NUMBERS:]
     side, along, turn, force, thrust, torque, squared = wrench_terms(tail[0], tail[1], tail[2], tail[4], motion)
     residual[0] = side + force * y[0]
     residual[1] = along + thrust * (y[1] + squared * y[4])
@@ -88,64 +130,70 @@ def _unbalanced(resistance: Floats, tail: Floats, motion: Floats, y: Floats, res
     residual[3] = torque * (y[3] + squared * y[5])
     for i in range(4):
         for j in range(5):
-            residual[i] -= resistance[i, j] * motion[j]
+            residual[i] -= robot[RESISTANCE + 5 * i + j] * motion[j]
 
 
 @compiled
-def _first_guess(head: Floats, resistance: Floats, tail: Floats, motion: Floats) -> None:
+def _first_guess(robot: Floats, motion: Floats, matrices: Floats) -> None:
     """Write the motion with the torque and thrust of linear theory and the side forces of straight tails."""
-    speed, gain = head[0], head[1]
+    speed, gain, tail = robot[0], robot[1], robot[HEAD_NUMBERS:]
+    resistance = robot[RESISTANCE : RESISTANCE + 20]  # four rows of five
     perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
     spin = _FIRST_SPIN * speed
     for _ in range(3):
         torque = number * perp * a**2 * linear_torque(perp * spin)
-        spin = speed * resistance[3, 3] / (resistance[3, 3] + gain * (torque + resistance[3, 4]))
+        spin = speed * resistance[18] / (resistance[18] + gain * (torque + resistance[19]))
     head_spin = (spin - speed) / gain
-    matrix, push = resistance[:3, :3].copy(), np.empty((3, 1))
+    matrix, push = matrices[0, :3, :3], matrices[1, :3, :1]
+    for i in range(3):
+        for j in range(3):
+            matrix[i, j] = resistance[5 * i + j]
+        push[i, 0] = -resistance[5 * i + 3] * head_spin - resistance[5 * i + 4] * spin
     matrix[0, 0] += number * perp
     matrix[1, 1] += number * parallel
     matrix[2, 2] += number * perp / 3
     matrix[0, 2] -= number * perp / 2
     matrix[2, 0] -= number * perp / 2
-    for i in range(3):
-        push[i, 0] = -resistance[i, 3] * head_spin - resistance[i, 4] * spin
     push[1, 0] += number * (perp - parallel) * spin * a**2 * linear_thrust(perp * spin)
     solve_dense(matrix, push)
-    motion[:3] = push[:, 0]
+    for i in range(3):
+        motion[i] = push[i, 0]
     motion[3], motion[4] = head_spin, spin
 
 
 @compiled
 def _solve(
-    network: Packed, head: Floats, resistance: Floats, tail: Floats, y: Floats, motion: Floats, exact: bool
+    numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room: Floats, matrices: Floats, exact: bool
 ) -> bool:
     """Solve by Broyden's method for one robot, from the motion given; return whether it converged.
 
     Args:
-        y: room for the network's numbers, (6,).
         motion: first guess, replaced by the result, (5,).
         exact: the first derivative is that of the network, too.
     """
-    x, residual, before = np.empty(len(network.shift)), np.empty(4), np.empty(4)
-    step, change, moved = np.empty(4), np.empty(4), np.empty(5)
-    slope, inverse = np.empty((4, 4)), np.eye(4)
+    speed, gain, tail = robot[0], robot[1], robot[HEAD_NUMBERS:]
+    x, y, residual, before = room[10 : 10 + sizes[1]], room[24:30], room[30:34], room[34:38]
+    step, change, moved, work = room[38:42], room[42:46], room[46:51], room[_VECTORS:]
+    slope, inverse = matrices[2], matrices[3]
     inputs_at(tail, motion, x)
-    evaluate(network, x, y)
-    _unbalanced(resistance, tail, motion, y, residual)
+    evaluate(numbers, sizes, x, y, work)
+    _unbalanced(robot, motion, y, residual)
     largest = 0.0
     for j in range(4):
         largest = max(largest, abs(motion[j]))
     for j in range(4):
         width = _DIFFERENCE * (abs(motion[j]) + _LEAST_SHARE * largest)
-        moved[:] = motion
+        for i in range(5):
+            moved[i] = motion[i]
         moved[j] += width
-        moved[4] = head[0] + head[1] * moved[3]
+        moved[4] = speed + gain * moved[3]
         if exact:
             inputs_at(tail, moved, x)
-            evaluate(network, x, y)
-        _unbalanced(resistance, tail, moved, y, before)
+            evaluate(numbers, sizes, x, y, work)
+        _unbalanced(robot, moved, y, before)
         for i in range(4):
             slope[i, j] = (before[i] - residual[i]) / width
+            inverse[i, j] = 1.0 if i == j else 0.0
     solve_dense(slope, inverse)
     for _ in range(STEPS):
         share = 1.0
@@ -153,14 +201,14 @@ def _solve(
             step[i] = 0.0
             for j in range(4):
                 step[i] -= inverse[i, j] * residual[j]
-        turned = abs(head[1] * step[3]) / motion[4]
+        turned = abs(gain * step[3]) / motion[4]
         if turned > _LONGEST:
             share = _LONGEST / turned
         for i in range(4):
             step[i] *= share
             motion[i] += step[i]
             before[i] = residual[i]
-        motion[4] = head[0] + head[1] * motion[3]
+        motion[4] = speed + gain * motion[3]
         if not motion[4] > 0:
             return False
         size = max(abs(step[0]), abs(step[1])) / (np.hypot(motion[0], motion[1]) + abs(motion[2]))
@@ -170,18 +218,20 @@ def _solve(
         if not np.isfinite(size):
             return False
         inputs_at(tail, motion, x)
-        evaluate(network, x, y)
-        _unbalanced(resistance, tail, motion, y, residual)
+        evaluate(numbers, sizes, x, y, work)
+        _unbalanced(robot, motion, y, residual)
         for i in range(4):
             change[i] = residual[i] - before[i]
-        _update(inverse, step, change)
+        _update(inverse, step, change, room[51:59])
     return False
 
 
 @compiled
-def _update(inverse: Floats, step: Floats, change: Floats) -> None:
+def _update(inverse: Floats, step: Floats, change: Floats, room: Floats) -> None:
     """Update the inverse of the derivative after a step that changed the balance so (Broyden's good update)."""
-    predicted, along = np.zeros(4), np.zeros(4)
+    predicted, along = room[:4], room[4:8]
+    for i in range(4):
+        predicted[i] = along[i] = 0.0
     for i in range(4):
         for j in range(4):
             predicted[i] += inverse[i, j] * change[j]

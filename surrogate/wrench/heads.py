@@ -25,11 +25,15 @@ from sim.io.errors import InputError
 from sim.linear.complex_step import derivative, magnitude, sign
 from sim.model.groups import Groups
 from sim.solve.assembly import assemble
-from surrogate.wrench.tails import Tails, head_inputs, inputs_with_head, total_wrench
+from surrogate.wrench.tails import TAIL_NUMBERS, Tails, head_inputs, inputs_with_head, pack_tails, total_wrench
 
 Numbers = Callable[
     [Floats], Floats
 ]  # inputs with those of the head (M, 14) -> y (M, 6) of `surrogate.wrench.tails`
+
+# A robot for the compiled loops: |ω|, gain, resistance (20), L and sense of the head; then the tails, as packed.
+RESISTANCE, HEAD_LENGTH, SENSE, HEAD_NUMBERS = 2, 22, 23, 24
+ROBOT_NUMBERS = HEAD_NUMBERS + TAIL_NUMBERS
 
 _ON_TAILS = ("tail_sag",)  # local, but on the tails
 _SENSES = np.array([-1.0, 1.0, -1.0, -1.0, -1.0])  # mirror image of (v_x, v_z, ω_yr, ω_h, ω_t)
@@ -47,6 +51,16 @@ class Heads(NamedTuple):
     def at(self, rows: Integers | Flags) -> Heads:
         """Return the heads of the robots at indices or flags (M',)."""
         return Heads(*[part[rows] for part in self])
+
+
+def pack_robots(heads: Heads, tails: Tails) -> Floats:
+    """Return heads and tails for the compiled loops, (M, ROBOT_NUMBERS)."""
+    robots = np.empty((len(heads.speed), ROBOT_NUMBERS))
+    robots[:, 0], robots[:, 1] = heads.speed, heads.gain
+    robots[:, RESISTANCE:HEAD_LENGTH] = heads.resistance.reshape(len(robots), 20)
+    robots[:, HEAD_LENGTH], robots[:, SENSE] = heads.length, heads.sense
+    robots[:, HEAD_NUMBERS:] = pack_tails(tails)
+    return robots
 
 
 def heads_and_tails(columns: Mapping[str, Floats], keep: Collection[str] = ()) -> tuple[Heads, Tails]:

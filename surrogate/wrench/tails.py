@@ -68,9 +68,12 @@ class Tails(NamedTuple):
         return Tails(*[part[rows] for part in self])
 
 
+TAIL_NUMBERS = len(Tails._fields) - 1 + len(HEAD_INPUTS)  # of a robot
+
+
 def pack_tails(tails: Tails) -> Floats:
     """Return the fields as columns, (M, 13)."""
-    packed = np.empty((len(tails.number), len(Tails._fields) - 1 + len(HEAD_INPUTS)))
+    packed = np.empty((len(tails.number), TAIL_NUMBERS))
     for i, part in enumerate(tails[:-1]):
         packed[:, i] = part
     packed[:, -len(HEAD_INPUTS) :] = tails.head
@@ -87,17 +90,29 @@ def head_inputs(resistance: Floats, length: Floats, across: Floats) -> Floats:
         across: N ζ⊥, (M,).
     """
     sway, surge, turn, spin = (resistance[:, i, i] for i in range(4))
-    return np.stack(
-        [
-            np.log(sway / across),
-            np.log(surge / across),
-            np.log(turn / across),
-            np.log(length),
-            resistance[:, 0, 2] / np.sqrt(sway * turn),
-            np.log(resistance[:, 0, 3] / across),
-            resistance[:, 3, 4] / spin,
-        ],
-        -1,
+    coupling, side, disc = resistance[:, 0, 2], resistance[:, 0, 3], resistance[:, 3, 4]
+    return np.stack(inputs_of_head(sway, surge, turn, spin, coupling, side, disc, length, across), -1)
+
+
+@formula
+def inputs_of_head(
+    sway: Any, surge: Any, turn: Any, spin: Any, coupling: Any, side: Any, disc: Any, length: Any, across: Any
+) -> tuple[Any, ...]:
+    """Return HEAD_INPUTS.
+
+    Args:
+        sway, surge, turn, spin: the diagonal of the resistance of head and disc.
+        coupling, side, disc: its entries for sway and turn, for sway and ω_h, for spin and ω_t.
+        length, across: L and N ζ⊥.
+    """
+    return (
+        np.log(sway / across),
+        np.log(surge / across),
+        np.log(turn / across),
+        np.log(length),
+        coupling / np.sqrt(sway * turn),
+        np.log(side / across),
+        disc / spin,
     )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Flags, Floats
-from surrogate.wrench.balance import inverse_rows
+from surrogate.wrench.balance import inverses_of
 from surrogate.wrench.heads import Heads, Numbers, full_motion, straight_resistance, unbalanced
 from surrogate.wrench.tails import Tails, linear_thrust, linear_torque
 
@@ -62,7 +62,7 @@ def _residual_and_inverse(heads: Heads, tails: Tails, u: Floats, numbers: Number
     tails = Tails(*[np.concatenate([part] * 5) for part in tails])
     residual = unbalanced(heads, tails, moved, numbers).reshape(5, -1, 4)
     slope = ((residual[1:] - residual[0]) / width.T[:, :, None]).transpose(1, 2, 0)
-    return residual[0], inverse_rows(np.ascontiguousarray(slope))
+    return residual[0], inverses_of(np.ascontiguousarray(slope))
 
 
 def _updated(inverse: Floats, step: Floats, change: Floats) -> Floats:

@@ -13,7 +13,8 @@ import pytest
 
 import sim
 from sim import compiling
-from sim.compiling import CACHE, Locator, code_digest, folder_for_code, folder_of_package, prune
+from sim.compiling import CACHE, code_digest, folder_for_code, folder_of_package, prune
+from sim.machine_code import Locator
 from tests.processes import LIMIT
 
 SIM = Path(sim.__file__).parent
@@ -164,7 +165,7 @@ def test_machine_code_is_read_where_the_sources_have_moved(tmp_path: Path) -> No
     """Two checkouts of the same code, or a touched file, share what was compiled."""
     code = (
         "import sys; sys.path[:0] = sys.argv[1:]; from loops.one import twice; "
-        "print(twice(3.0), sum(twice.stats.cache_hits.values()))"
+        "print(twice(3.0), sum(twice.dispatcher.stats.cache_hits.values()))"
     )
     for place in ("here", "there"):
         (tmp_path / place / "loops").mkdir(parents=True)

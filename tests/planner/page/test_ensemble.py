@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from surrogate.networks.compiled import evaluate_rows
 from surrogate.networks.ensemble import Ensemble, state_shapes
 from tests.planner.page.page_core import answers, call, check_near, typed
 
@@ -23,4 +22,4 @@ def test_members_and_their_mean() -> None:
         prepared = call("ensemble.js", "networkOf", {"shape": shape, "state": state})
         members, mean = answers([("ensemble.js", name, prepared, x[0]) for name in ("membersAt", "evaluate")])
         check_near(members, network.members_at(x)[:, 0], 1e-13)
-        check_near(mean, evaluate_rows(network.packed, x[:, : shape["inputs"]])[0], 1e-13)
+        check_near(mean, network.packed.evaluate(x[:, : shape["inputs"]])[0], 1e-13)

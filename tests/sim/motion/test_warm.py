@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from sim import compiling
+from sim import compiling, machine_code
 from sim.motion import warm
 
 
@@ -17,8 +17,8 @@ def test_compiling_a_loop_is_announced(
 ) -> None:
     """The bar appears at once here; its text names the number of loops. The loop is never in the cache."""
     monkeypatch.setattr(compiling, "CACHE", tmp_path)
-    shown = compiling.tqdm
-    monkeypatch.setattr(compiling, "tqdm", lambda **options: shown(**{**options, "delay": 0, "mininterval": 0}))
+    shown = machine_code.tqdm
+    monkeypatch.setattr(machine_code, "tqdm", lambda **options: shown(**{**options, "delay": 0, "mininterval": 0}))
 
     def formula(x: float) -> float:
         return 2 * x
@@ -71,6 +71,6 @@ def test_what_another_process_compiled_is_only_read_here(tmp_path: Path, monkeyp
     assert compiling.compile_apart("someones_loops")
     loops = importlib.import_module("someones_loops")
     assert loops.whole(2.0) == 5.0
-    assert sum(loops.whole.stats.cache_hits.values()) == 1
-    assert not loops.whole.stats.cache_misses
+    assert sum(loops.whole.dispatcher.stats.cache_hits.values()) == 1
+    assert not loops.whole.dispatcher.stats.cache_misses
     assert not compiling.compile_apart("nobodys_loops")

@@ -13,9 +13,8 @@ from surrogate.table.model_file import load
 from surrogate.table.wrench_table import network_index
 from surrogate.training.fit_wrench import wrench_samples
 from surrogate.training.simulated import draw_robots
-from surrogate.wrench.balance import inputs_rows, solve_rows
+from surrogate.wrench.balance import inverses_of, solve_rows
 from surrogate.wrench.heads import heads_and_tails, unbalanced
-from surrogate.wrench.tails import pack_tails, tail_inputs
 from tests.oracles.balance import linear_guess, solve
 from tests.surrogate.small import rows, table
 
@@ -23,7 +22,7 @@ from tests.surrogate.small import rows, table
 def test_loops_are_kept_by_all_files_of_the_package() -> None:
     """Loops of one folder are made of formulas in another one."""
     folder = folder_of_package(Path(surrogate.__file__).parent)
-    assert Path(solve_rows.stats.cache_path).is_relative_to(folder)
+    assert solve_rows.path.parent == folder
 
 
 def test_motions_are_those_of_another_method() -> None:
@@ -40,9 +39,17 @@ def test_motions_are_those_of_another_method() -> None:
         wanted, known = solve(heads.at(rows), tails.at(rows), network)
         both = known & converged[rows]
         assert motion[rows][both] == pytest.approx(wanted[both], rel=1e-6)
-    inputs = inputs_rows(pack_tails(tails), motion)[converged]
-    with_arrays = tail_inputs(tails, motion)[converged]
-    assert inputs == pytest.approx(with_arrays, rel=1e-10, abs=1e-12)
+
+
+def test_inverses() -> None:
+    """Of matrices of any size; one without an inverse gives numbers that are not finite."""
+    matrices = np.random.default_rng(2).standard_normal((5, 3, 3))
+    matrices[4] = 0.0
+    before = matrices.copy()
+    inverses = inverses_of(matrices)
+    assert (matrices == before).all()
+    assert inverses[:4] @ matrices[:4] == pytest.approx(np.broadcast_to(np.eye(3), (4, 3, 3)), abs=1e-12)
+    assert not np.isfinite(inverses[4]).any()
 
 
 def test_forces_are_in_balance() -> None:

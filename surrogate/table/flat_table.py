@@ -1,0 +1,103 @@
+"""A look-up table as one array of numbers and one of places in it, for the compiled loops of a query.
+
+`places` says where the numbers of each part begin, or −1 for a part that the table lacks:
+
+    WRENCH    three networks of the tails' wrench, each as in `surrogate.networks.compiled.Packed`
+    GAP       the network of the gap
+    LAG, MEMORY   the networks of the response; that of the memory without its other outputs
+    SUPPORT   three supports, see `surrogate.table.support.Support.numbers`
+    RANGES    least and greatest of ω̄, l/R, l/r0 and a/R
+    CURVES    logarithms of DWELLS; mean and components of the lag at equal dwells
+    FEATURES  shift, scale and halves of the features of the intervals
+    WIDTHS    for each of the outputs the weights, the bounds and the factors of its interval
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats, Integers
+from sim.model.response import DWELLS
+from surrogate.networks.ensemble import SHARED, Ensemble
+from surrogate.table.intervals import Intervals
+from surrogate.table.response_table import ResponseTable
+from surrogate.table.support import Support, products_of, support_room
+from surrogate.table.wrench_table import WrenchTable
+from surrogate.wrench.balance import solution_room
+from surrogate.wrench.tails import INPUTS
+
+NETWORK = 6  # places of a network
+WRENCH, GAP, LAG, MEMORY, SUPPORT, RANGES, CURVES, FEATURES, WIDTHS = 0, 18, 24, 30, 36, 39, 40, 41, 42
+OUTPUTS = 12  # that have an interval
+PRODUCTS = WIDTHS + OUTPUTS  # where the monomials of the supports begin among the places
+DESIGN = 78  # numbers that the logarithm of a width is linear in
+
+
+class FlatTable(NamedTuple):
+    """A table for the compiled loops."""
+
+    numbers: Floats
+    places: Integers
+    room: int  # numbers that a query of one robot works in
+
+
+def flat_table(
+    tails: WrenchTable,
+    curves: ResponseTable,
+    supports: Sequence[Support | None],
+    ranges: Sequence[tuple[float, float]],
+    intervals: Intervals | None,
+    outputs: Sequence[str],
+) -> FlatTable:
+    """Return the parts of a table in one array.
+
+    Args:
+        tails, curves: the networks.
+        supports: of the classes of tails.
+        ranges: of ω̄, l/R, l/r0 and a/R.
+        intervals: of the outputs; left out if None.
+        outputs: names of the OUTPUTS outputs.
+    """
+    parts: list[Floats] = []
+    places = np.full(PRODUCTS, -1)
+
+    def put(place: int, *arrays: Floats) -> None:
+        places[place] = sum(len(part) for part in parts)
+        parts.extend(np.asarray(array, dtype=float).ravel() for array in arrays)
+
+    of_memory = first_outputs(curves.networks[1], len(curves.bases["memory"].vectors))
+    networks = (*tails.wrench, tails.gap, curves.networks[0], of_memory)
+    for i, network in enumerate(networks):
+        if network is not None:
+            put(NETWORK * i, network.packed.numbers)
+            places[NETWORK * i + 1 : NETWORK * (i + 1)] = network.packed.sizes[1:]
+    for k, support in enumerate(supports):
+        if support is not None:
+            put(SUPPORT + k, support.numbers)
+    put(RANGES, np.array(ranges).ravel())
+    put(CURVES, np.log(DWELLS), curves.equal_dwells.mean, curves.equal_dwells.vectors)
+    if intervals is not None:
+        put(FEATURES, intervals.shift, intervals.scale, intervals.middle)
+        for i, name in enumerate(outputs):
+            if name in intervals.factor:
+                bounds = np.array(intervals.bounds[name])
+                put(WIDTHS + i, intervals.weights[name], bounds, intervals.factor[name])
+    known = [network.packed.sizes for network in networks if network is not None]
+    components = int(places[LAG + 2] + places[MEMORY + 2])
+    room = support_room(len(INPUTS)) + max(solution_room(sizes) for sizes in known) + components + DESIGN
+    return FlatTable(np.concatenate(parts), np.concatenate([places, products_of(len(INPUTS)).ravel()]), room)
+
+
+def first_outputs(network: Ensemble, count: int) -> Ensemble:
+    """Return a network without its outputs after the first `count`."""
+
+    def cut(name: str, part: Floats) -> Floats:
+        whole = name in SHARED[:2] or (name.partition(".")[0] in ("weights", "biases") and name not in last)
+        return part if whole else np.ascontiguousarray(part[..., :count])
+
+    state: Mapping[str, Floats] = network.state
+    last = {f"{kind}.{len(network.weights) - 1}" for kind in ("weights", "biases")}
+    return Ensemble.from_state({name: cut(name, part) for name, part in state.items()})
