@@ -22,7 +22,8 @@ STEADY_OUTPUTS = (
     "omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "tail_gap",
 )  # fmt: skip
 STEADY_COLUMNS = (*STEADY_OUTPUTS[:-1], "converged", STEADY_OUTPUTS[-1])
-QUALITY_COLUMNS = ("stable", "growth", "error", "method", "note")  # how good a row is, beside its numbers
+STABILITY_COLUMNS = ("stable", "growth")
+QUALITY_COLUMNS = (*STABILITY_COLUMNS, "error", "method", "note")  # how good a row is, beside its numbers
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Steady:
     failed: Flags  # no numbers
     method: Words  # DIRECT or STEPPING
     growth: Floats  # logarithm of the growth of small perturbations in a motor revolution; NaN: unknown
-    note: Words  # why a row is not converged, or not solved directly; else empty
+    note: Words  # why a row is not converged, not stable, or not solved directly; else empty
 
     def __len__(self) -> int:
         return len(self.omega_t)
