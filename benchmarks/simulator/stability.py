@@ -1,0 +1,118 @@
+"""Growth of small perturbations of steady motions: agreement with time steps, and its price.
+
+Perturbed robots are stepped in time beside unperturbed ones on the same mesh (`sim.reference.stepped_growth`): robots
+of the sweep, robots of the wide domain of `robustness` that yaw fast, robots with effects on their tails, and robots
+whose tails push against each other. The price is the time of rows with the growth over that of rows without.
+
+Usage: python -m benchmarks stability [ROBOTS]
+
+Takes 2 minutes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+
+from benchmarks.simulator.robustness import robots
+from benchmarks.simulator.speed import sweep
+from sim.inputs import check_columns
+from sim.model.groups import Groups
+from sim.model.presets import PRESETS
+from sim.motion.batches import one_thread
+from sim.motion.orbits import Perturbed, solve_orbits
+from sim.motion.stability import growth, growth_of_orbit
+from sim.reference.stepped_growth import stepped_growth
+from sim.solve.assembly import bodies, numbers
+from sim.solve.refinement import FEW, SOLVED, refined_orbit
+
+_FOLLOWED = 7.0  # natural logarithm of the change that is followed in time
+_MOST_REVOLUTIONS = 60
+_QUICK = 0.5  # |ω_yr/ω_t| of robots that yaw fast
+_EFFECTS = {
+    "natural_curvature": (0.5, 1.5),
+    "natural_twist": (1.0, 3.0),
+    "tail_interaction": (0.5, 1.0),
+    "shear_thinning": (0.3,),
+    "rate_dependent_modulus": (0.1,),
+}
+
+
+def with_effects(base: Groups, name: str, size: float) -> Groups:
+    """Return the robots of `base` with one effect."""
+    return Groups(**{**vars(base), "effects": {name: np.full(len(base), size)}})
+
+
+def groups_of(columns: dict[str, np.ndarray], row: int) -> Groups:
+    """Return one robot of a table."""
+    return Groups.from_columns(check_columns({name: values[row : row + 1] for name, values in columns.items()}))
+
+
+def kinds(count: int) -> Iterator[tuple[str, list[Groups]]]:
+    """Yield what the robots are, and the robots."""
+    inside, wide = sweep(count), robots(4096)
+    inside.pop("T_bar", None)
+    yield "sweep", [groups_of(inside, i) for i in range(count)]
+    quick = []
+    for i in np.flatnonzero(wide["N"] > 1):
+        if len(quick) < count:
+            groups = groups_of(wide, i)
+            means = solve_orbits(numbers(groups), groups.N).means[0]
+            if abs(means[2]) > _QUICK * abs(means[0]):
+                quick.append(groups)
+    yield f"|ω_yr/ω_t| > {_QUICK}", quick
+    control = PRESETS["paper-control"].groups()
+    yield "effects on the tails", [
+        with_effects(control, name, size) for name, sizes in _EFFECTS.items() for size in sizes
+    ]
+    measured = PRESETS["paper-measured"].groups()
+    yield "tails in contact", [with_effects(measured, "tail_contact", 1.0)]
+
+
+def agreement(title: str, selected: list[Groups]) -> None:
+    """Print how far the growths are from those of time steps, on the same mesh."""
+    away, seen = [], []
+    for groups in selected:
+        body = bodies(groups)[0]
+        orbit = refined_orbit(body, groups.N, FEW)
+        if orbit.ended != SOLVED:
+            continue
+        final = growth_of_orbit(body, groups.N, orbit)
+        on_mesh = growth(body, groups.N, orbit.x[1], orbit.u[1])
+        on_mesh = on_mesh if np.sign(on_mesh) == np.sign(final) else final  # computed again on more phases
+        measured = stepped_growth(body, groups.N, min(_FOLLOWED / abs(on_mesh), _MOST_REVOLUTIONS))
+        away.append(abs(on_mesh - measured) / max(abs(measured), 0.1))
+        seen.append(final)
+    share = 100 * np.array(away)
+    print(
+        f"  {title:22} {len(seen):3} robots, growth {min(seen):.3g} to {max(seen):.3g}, {sum(g > 0 for g in seen)} "
+        f"unstable; off by {np.median(share):.1f} % at the median, {np.max(share):.1f} % at most"
+    )
+
+
+def price(title: str, selected: list[Groups]) -> None:
+    """Print the time of rows with and without the growth."""
+    spent = []
+    for perturbed in (Perturbed.NONE, Perturbed.ALL):
+        least = np.inf
+        for _ in range(3):
+            began = time.thread_time()
+            for groups in selected:
+                solve_orbits(numbers(groups), groups.N, phases=FEW, perturbed=perturbed)
+            least = min(least, time.thread_time() - began)
+        spent.append(least)
+    each = 1e3 * spent[0] / len(selected)
+    print(f"  {title:22} {each:8.2f} ms a row without, {100 * (spent[1] / spent[0] - 1):.0f} % more with growth")
+
+
+def main(count: str = "24") -> None:
+    selected = dict(kinds(int(count)))
+    with one_thread(), np.errstate(all="ignore"):
+        print("\ngrowth of small perturbations in a motor revolution, against time steps on the same mesh")
+        for title, some in selected.items():
+            agreement(title, some)
+        print("\nprice")
+        for title, some in selected.items():
+            price(title, some)
