@@ -2,11 +2,12 @@
 
 Perturbed robots are stepped in time beside unperturbed ones on the same mesh (`sim.reference.stepped_growth`): robots
 of the sweep, robots of the wide domain of `robustness` that yaw fast, robots with effects on their tails, and robots
-whose tails push against each other. The price is the time of rows with the growth over that of rows without.
+whose tails push against each other. A table counts the robots of `robustness` with N ≥ 2 whose orbit is unstable. The
+price is the time of rows with the growth over that of rows without.
 
 Usage: python -m benchmarks stability [ROBOTS]
 
-Takes 2 minutes.
+Takes 4 minutes.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from sim.solve.refinement import FEW, SOLVED, refined_orbit
 
 _FOLLOWED = 7.0  # natural logarithm of the change that is followed in time
 _MOST_REVOLUTIONS = 60
+_YAWS = (0.0, 0.25, 0.4, 0.5, 0.6, 0.8, np.inf)  # limits of |ω_yr/ω_t| in the table
 _QUICK = 0.5  # |ω_yr/ω_t| of robots that yaw fast
 _EFFECTS = {
     "natural_curvature": (0.5, 1.5),
@@ -107,12 +109,32 @@ def price(title: str, selected: list[Groups]) -> None:
     print(f"  {title:22} {each:8.2f} ms a row without, {100 * (spent[1] / spent[0] - 1):.0f} % more with growth")
 
 
+def domain() -> None:
+    """Print how many orbits of the wide domain are unstable, by how fast the robot yaws."""
+    wide, rows = robots(4096), []
+    for tails in np.unique(wide["N"][wide["N"] > 1]):
+        groups = Groups.from_columns({name: values[wide["N"] == tails] for name, values in wide.items()})
+        orbits = solve_orbits(numbers(groups), groups.N, phases=FEW, perturbed=Perturbed.ALL)
+        solved = orbits.ended == SOLVED
+        yaws = np.abs(orbits.means[:, 2] / orbits.means[:, 0])
+        rows.append(np.column_stack([yaws, orbits.growth])[solved])
+    yaws, grows = np.concatenate(rows).T
+    for low, high in zip(_YAWS[:-1], _YAWS[1:], strict=True):
+        inside = (low <= yaws) & (yaws < high)
+        print(
+            f"  |ω_yr/ω_t| from {low} to {high}: {inside.sum()} robots, {(grows[inside] > 0).sum()} unstable, "
+            f"{np.isnan(grows[inside]).sum()} unknown, largest growth {np.nanmax(grows[inside]):.3f}"
+        )
+
+
 def main(count: str = "24") -> None:
     selected = dict(kinds(int(count)))
     with one_thread(), np.errstate(all="ignore"):
         print("\ngrowth of small perturbations in a motor revolution, against time steps on the same mesh")
         for title, some in selected.items():
             agreement(title, some)
+        print("\norbits of the wide domain, N ≥ 2")
+        domain()
         print("\nprice")
         for title, some in selected.items():
             price(title, some)

@@ -45,21 +45,25 @@ def growth(body: Body, tails: int, x: Floats, u: Floats, *, vectors: int = _VECT
     """Compute the growth on an orbit x (n, M, 3), u (P, 4) of N tails.
 
     Args:
-        vectors: of Arnoldi's method, beside two for each tail.
+        vectors: of Arnoldi's method, beside two for each tail. If they are more than by default, only eigenvalues
+            that have converged count.
 
     Returns:
-        The growth in one motor revolution; NaN if no eigenvalue has converged.
+        The growth in one motor revolution; NaN if it cannot be computed.
     """
     omega_t, omega_h = mean_motion(body, u)[:2]
     count = min(2 * tails + vectors, x.size - 1)
     shift = abs(omega_t)
     projected = arnoldi(body, x, u, shift, _first_vector(tails, *x.shape[:2]), count)
-    if not np.isfinite(projected).all():
+    if not np.isfinite(projected[-1, -1]):
         return np.nan
-    values, vectors_of = np.linalg.eig(projected[:count])
-    converged = projected[count, count - 1] * np.abs(vectors_of[-1]) < _CONVERGED * np.abs(values)
-    rates = shift + (1 / values[converged]).real
-    return float(2 * np.pi * rates.max(initial=-np.inf) / abs(omega_t - omega_h)) if len(rates) else np.nan
+    if vectors == _VECTORS:
+        values = np.linalg.eigvals(projected[:count])
+    else:
+        values, ritz = np.linalg.eig(projected[:count])
+        values = values[projected[count, count - 1] * np.abs(ritz[-1]) < _CONVERGED * np.abs(values)]
+    largest = shift + (1 / values).real.max(initial=-np.inf)
+    return float(2 * np.pi * largest / abs(omega_t - omega_h))
 
 
 @cache

@@ -34,7 +34,8 @@ from sim.solve.orbit import FIRST_PHASE
 from sim.solve.rates import Rates
 from sim.solve.residual import fill_residual, is_local
 
-_TOLERANCE = 1e-4  # of GMRES
+_TOLERANCE = 1e-3  # of GMRES
+_CANCELS = 0.1  # smaller parts of a vector are made orthogonal again
 _STEP = 1e-6  # finite-difference step of the largest entry, in l
 
 
@@ -72,11 +73,12 @@ def arnoldi(body: Body, x: Floats, u: Floats, shift: float, first: Floats, count
         if not is_local(body):
             solve_nonlocal(body, rates, x, u, work, _TOLERANCE, dx, du)
         image = dx.reshape(x.size)
-        for _ in range(2):  # Gram-Schmidt, twice for orthogonality to rounding
+        before, size = np.inf, np.sqrt(np.dot(image, image))
+        while size < _CANCELS * before:  # Gram-Schmidt, again where digits cancelled
             parts = np.dot(basis[: i + 1], image)
             projected[: i + 1, i] += parts
             image -= np.dot(parts, basis[: i + 1])
-        size = np.sqrt(np.dot(image, image))
+            before, size = size, np.sqrt(np.dot(image, image))
         projected[i + 1, i] = size
         basis[i + 1] = image / size
     return projected
