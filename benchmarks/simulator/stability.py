@@ -1,9 +1,9 @@
 """Growth of small perturbations of steady motions: agreement with time steps, and its price.
 
-Perturbed robots are stepped in time beside unperturbed ones on the same mesh (`sim.reference.stepped_growth`): robots
-of the sweep, robots of the wide domain of `robustness` that yaw fast, robots with effects on their tails, and robots
-whose tails push against each other. A table counts the robots of `robustness` with N ≥ 2 whose orbit is unstable. The
-price is the time of rows with the growth over that of rows without.
+Perturbed robots are stepped in time beside unperturbed ones on the same mesh (`sim.reference.stepped_growth`):
+robots of the sweep, robots of the wide domain of `robustness` that yaw fast, robots with effects on their tails,
+and robots whose tails push against each other. A table counts the robots of `robustness` with N ≥ 2 whose orbit
+is unstable. The price is the time of rows with the growth over that of rows without.
 
 Usage: python -m benchmarks stability [ROBOTS]
 
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -66,9 +67,10 @@ def kinds(count: int) -> Iterator[tuple[str, list[Groups]]]:
                 quick.append(groups)
     yield f"|ω_yr/ω_t| > {_QUICK}", quick
     control = PRESETS["paper-control"].groups()
-    yield "effects on the tails", [
-        with_effects(control, name, size) for name, sizes in _EFFECTS.items() for size in sizes
-    ]
+    yield (
+        "effects on the tails",
+        [with_effects(control, name, size) for name, sizes in _EFFECTS.items() for size in sizes],
+    )
     measured = PRESETS["paper-measured"].groups()
     yield "tails in contact", [with_effects(measured, "tail_contact", 1.0)]
 
@@ -89,8 +91,8 @@ def agreement(title: str, selected: list[Groups]) -> None:
         seen.append(final)
     share = 100 * np.array(away)
     print(
-        f"  {title:22} {len(seen):3} robots, growth {min(seen):.3g} to {max(seen):.3g}, {sum(g > 0 for g in seen)} "
-        f"unstable; off by {np.median(share):.1f} % at the median, {np.max(share):.1f} % at most"
+        f"  {title:22} {len(seen):3} robots, growth {min(seen):.3g} to {max(seen):.3g}, "
+        f"{sum(g > 0 for g in seen)} unstable; off by {np.median(share):.1f} % at the median, {np.max(share):.1f} % at most"
     )
 
 
@@ -119,7 +121,7 @@ def domain() -> None:
         yaws = np.abs(orbits.means[:, 2] / orbits.means[:, 0])
         rows.append(np.column_stack([yaws, orbits.growth])[solved])
     yaws, grows = np.concatenate(rows).T
-    for low, high in zip(_YAWS[:-1], _YAWS[1:], strict=True):
+    for low, high in pairwise(_YAWS):
         inside = (low <= yaws) & (yaws < high)
         print(
             f"  |ω_yr/ω_t| from {low} to {high}: {inside.sum()} robots, {(grows[inside] > 0).sum()} unstable, "

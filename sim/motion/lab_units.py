@@ -92,8 +92,10 @@ def describe_motion(robot: Robot, motion: Mapping[str, Any], *, error: str = "es
         )
     if "growth" in motion and np.isfinite(motion["growth"][0]):
         factor = math.exp(float(motion["growth"][0]))
-        lines.append(f"  {'stable' if motion['stable'][0] else 'unstable'}: in a motor revolution small "
-                     f"perturbations change by a factor of {factor:.2g}")
+        lines.append(
+            f"  {'stable' if motion['stable'][0] else 'unstable'}: in a motor revolution small "
+            f"perturbations change by a factor of {factor:.2g}"
+        )
     if "error" in motion:
         lines.append(f"  {error} {100 * float(motion['error'][0]):.2g} %")
     return "\n".join(lines)

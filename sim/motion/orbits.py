@@ -42,7 +42,12 @@ class Orbits(NamedTuple):
 
 
 def solve_orbits(
-    rows: Floats, tails: int, directions: Floats | None = None, *, phases: int = FEW, perturbed: Perturbed = Perturbed.NONE
+    rows: Floats,
+    tails: int,
+    directions: Floats | None = None,
+    *,
+    phases: int = FEW,
+    perturbed: Perturbed = Perturbed.NONE,
 ) -> Orbits:
     """Solve for the orbits of robots with N tails.
 

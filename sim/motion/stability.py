@@ -5,10 +5,10 @@
 is the logarithm of the factor by which the perturbation that decays least changes in one revolution of the motor.
 The perturbation of each tail is a different one (`sim.solve.floquet`). Below 0 all of them decay.
 
-The growth is computed on the mesh of 8 edges, where decay is up to 3 % slower than in the limit of fine meshes, and
-on as many phases as the orbit has. Products of harmonics that these phases do not resolve can be mistaken for a slow
-perturbation. So a growth above DOUBTFUL is computed again, on 12 edges and on more phases, an odd number in an N-th of
-a turn. Robots with contact are left out of that; it would take ten seconds. Units: l, μ0 l⁴/EI.
+The growth is computed on the mesh of 8 edges, where decay is up to 3 % slower than in the limit of fine meshes,
+and on as many phases as the orbit has. Products of harmonics that these phases do not resolve can be mistaken for
+a slow perturbation. So a growth above DOUBTFUL is computed again, on 12 edges and on more phases, an odd number
+in an N-th of a turn. Robots with contact are left out of that; it would take ten seconds. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
 The direct solution (`sim.motion.orbits`) is the relative periodic orbit in which all tails move alike. It takes
 about a millisecond a robot, states the error of its means, and how fast small perturbations grow
-(`sim.motion.stability`). Straight tails at rest reach this orbit if the robot yaws slowly compared with the spin of
-its disc (docs/branches.md). If it yaws faster (|ω_yr| > QUICK |ω_t|), or if perturbations may grow, the robot is
-stepped in time from rest as well. If stepping reaches another motion, that one is the answer. If Newton's
+(`sim.motion.stability`). Straight tails at rest reach this orbit if the robot yaws slowly compared with the spin
+of its disc (docs/branches.md). If it yaws faster (|ω_yr| > QUICK |ω_t|), or if perturbations may grow, the robot
+is stepped in time from rest as well. If stepping reaches another motion, that one is the answer. If Newton's
 method does not converge, stepping gives the answer, too. Such rows say so. Their error is estimated from two
 meshes and steps. Units: l, μ0 l⁴/EI.
 """
@@ -37,8 +37,8 @@ def steady(groups: Groups, *, stability: bool = True) -> Steady:
 
     Args:
         groups: B robots; ω̄ may have either sign.
-        stability: whether to compute the growth of small perturbations of every robot, a sixth of the time. If not,
-            only robots whose tails push against each other get one.
+        stability: whether to compute the growth of small perturbations of every robot, which takes a third as long
+            again. If not, only robots whose tails push against each other get one.
 
     Returns:
         Their mean motion, dimensionless (lengths in l, times in μ0 l⁴/EI), and how good it is.

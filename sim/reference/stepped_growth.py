@@ -1,7 +1,7 @@
 """The growth of small perturbations, measured in time steps: the reference for `sim.motion.stability`.
 
-Two robots start on the orbit, one with its tails bent a little, each tail in another way. Their difference at equal
-phases of the disc,
+Two robots start on the orbit, one with its tails bent a little, each tail in another way. Their difference at
+equal phases of the disc,
 
     d = x₂ − x₁ − ẋ₁ (φ₂ − φ₁)/ω_t,
 

@@ -1,21 +1,21 @@
 """Small perturbations of an orbit, in which every tail may move differently.
 
 With the disc's phase φ as a label, tail j of a perturbed robot is δx_j = e^{σt} q(φ + 2πj/N), and its velocities
-change by e^{σt} p(φ); q has the period 2π, p the period 2π/N. Every perturbation is a sum of these: the shift by one
-tail and an N-th of a turn has no other eigenvectors, since σ is defined up to whole multiples of i N ω_t. So q is
-collocated at the phases of the orbit, and ẋ in Newton's equations changes by ω_t ∂q/∂φ + σ q:
+change by e^{σt} p(φ); q has the period 2π, p the period 2π/N. Every perturbation is a sum of these: the shift by
+one tail and an N-th of a turn has no other eigenvectors, since σ is defined up to whole multiples of i N ω_t. So
+q is collocated at the phases of the orbit, and ẋ in Newton's equations changes by ω_t ∂q/∂φ + σ q:
 
     J q + σ B q = 0,   J = ∂(r, t)/∂(x, u),   B = ∂(r, t)/∂ẋ
 
 The phase of the disc is a label, not an unknown, and the pose does not occur. So there is no neutral direction.
-With a shift s, Arnoldi's method is applied to −(J + s B)⁻¹ B, whose eigenvalues are 1/(σ − s). J + s B is the matrix
-of `sim.solve.newton` for ẋ = ω_t ∂x/∂φ + s (x − x*), factorised once; each vector costs one solution.
+With a shift s, Arnoldi's method is applied to −(J + s B)⁻¹ B, whose eigenvalues are 1/(σ − s). J + s B is the
+matrix of `sim.solve.newton` for ẋ = ω_t ∂x/∂φ + s (x − x*), factorised once; each vector costs one solution.
 
-If M is even, the trigonometric interpolant has a component (−1)^m without a derivative. A perturbation of this form
-would neither turn nor decay with its neighbours, and has led to false instabilities. Here it decays at the rate
-ω_t M/2. Units: l, μ0 l⁴/EI, EI/l².
-Source: Saad, *Numerical Methods for Large Eigenvalue Problems* (2011), 4.3 and 8.1; Golubitsky, Stewart, Schaeffer,
-*Singularities and Groups in Bifurcation Theory II* (1988), XVI.8, for the shift.
+If M is even, the trigonometric interpolant has a component (−1)^m without a derivative. A perturbation of this
+form would neither turn nor decay with its neighbours, and has led to false instabilities. Here it decays at the
+rate ω_t M/2. Units: l, μ0 l⁴/EI, EI/l².
+
+Source: Saad, *Numerical Methods for Large Eigenvalue Problems* (2011), ch. 6 for Arnoldi's method.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def arnoldi(body: Body, x: Floats, u: Floats, shift: float, first: Floats, count
     Returns:
         The Hessenberg matrix with the part of its last vector outside the space, (K + 1, K).
     """
-    n, columns, _ = x.shape
+    columns = x.shape[1]
     x, matrix = _without_highest(x), differentiation(columns)
     if columns % 2 == 0:
         for i in range(columns):

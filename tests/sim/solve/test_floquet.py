@@ -47,7 +47,7 @@ def evolution(body: Body, phase: float, x: np.ndarray, slope: np.ndarray, u: np.
 
 
 def monodromy_growth(body: Body, tails: int, x: np.ndarray, u: np.ndarray, steps: int) -> float:
-    """Integrate perturbations of all tails over an N-th of a turn, shift by one tail, and take the largest factor."""
+    """Integrate perturbations over an N-th of a turn, shift them by one tail, and take the largest factor."""
     columns, sense = x.shape[1], int(np.sign(body.omega))
     turn = sense * 2 * np.pi / tails / steps
     matrix = np.eye(3 * len(x) * tails)
