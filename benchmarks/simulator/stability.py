@@ -1,6 +1,6 @@
 """Growth of small perturbations of steady motions: agreement with time steps, and its price.
 
-Perturbed robots are stepped in time beside unperturbed ones on the same mesh (`sim.reference.stepped_growth`):
+Perturbed robots are stepped in time beside unperturbed ones on the same mesh (`tests.oracles.stepped_growth`):
 robots of the sweep, robots of the wide domain of `robustness` that yaw fast, robots with effects on their tails,
 and robots whose tails push against each other. A table counts the robots of `robustness` with N ≥ 2 whose orbit
 is unstable. The price is the time of rows with the growth over that of rows without.
@@ -26,9 +26,9 @@ from sim.model.presets import PRESETS
 from sim.motion.batches import one_thread
 from sim.motion.orbits import Perturbed, solve_orbits
 from sim.motion.stability import growth, growth_of_orbit
-from sim.reference.stepped_growth import stepped_growth
 from sim.solve.assembly import bodies, numbers
 from sim.solve.refinement import FEW, SOLVED, refined_orbit
+from tests.oracles.stepped_growth import stepped_growth
 
 _FOLLOWED = 7.0  # natural logarithm of the change that is followed in time
 _MOST_REVOLUTIONS = 60
@@ -58,8 +58,8 @@ def kinds(count: int) -> Iterator[tuple[str, list[Groups]]]:
     inside, wide = sweep(count), robots(4096)
     inside.pop("T_bar", None)
     yield "sweep", [groups_of(inside, i) for i in range(count)]
-    quick = []
-    for i in np.flatnonzero(wide["N"] > 1):
+    quick: list[Groups] = []
+    for i in np.flatnonzero(wide["N"] > 1).tolist():
         if len(quick) < count:
             groups = groups_of(wide, i)
             means = solve_orbits(numbers(groups), groups.N).means[0]
@@ -92,7 +92,8 @@ def agreement(title: str, selected: list[Groups]) -> None:
     share = 100 * np.array(away)
     print(
         f"  {title:22} {len(seen):3} robots, growth {min(seen):.3g} to {max(seen):.3g}, "
-        f"{sum(g > 0 for g in seen)} unstable; off by {np.median(share):.1f} % at the median, {np.max(share):.1f} % at most"
+        f"{sum(g > 0 for g in seen)} unstable; off by {np.median(share):.1f} % at the median, "
+        f"{np.max(share):.1f} % at most"
     )
 
 

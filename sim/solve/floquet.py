@@ -12,7 +12,7 @@ With a shift s, Arnoldi's method is applied to −(J + s B)⁻¹ B, whose eigenv
 matrix of `sim.solve.newton` for ẋ = ω_t ∂x/∂φ + s (x − x*), factorised once; each vector costs one solution.
 
 If M is even, the trigonometric interpolant has a component (−1)^m without a derivative. A perturbation of this
-form would neither turn nor decay with its neighbours, and has led to false instabilities. Here it decays at the
+form would neither turn nor decay with its neighbours, and could look unstable. Here it decays at the
 rate ω_t M/2. Units: l, μ0 l⁴/EI, EI/l².
 
 Source: Saad, *Numerical Methods for Large Eigenvalue Problems* (2011), ch. 6 for Arnoldi's method.

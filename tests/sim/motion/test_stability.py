@@ -10,8 +10,8 @@ from sim.motion.batches import steady_columns
 from sim.motion.stability import DOUBTFUL, growth, growth_of_orbit
 from sim.motion.steady import orbits, steady
 from sim.motion.steady_motion import DIRECT, STABILITY_COLUMNS, STEPPING
-from sim.reference.stepped_growth import stepped_growth
 from sim.solve.refinement import FEW, SOLVED, Orbit, refined_orbit
+from tests.oracles.stepped_growth import stepped_growth
 from tests.sim.robots import control, first_body
 
 TOP = {"C_t": 0.55, "C_r": 0.54, "C_yr": 4.1, "l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2}
