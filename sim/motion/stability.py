@@ -7,8 +7,11 @@ The perturbation of each tail is a different one (`sim.solve.floquet`). Below 0 
 
 The growth is computed on the mesh of 8 edges, where decay is up to 3 % slower than in the limit of fine meshes,
 and on as many phases as the orbit has. Products of harmonics that these phases do not resolve can be mistaken for
-a slow perturbation. So a growth above DOUBTFUL is computed again, on 12 edges and on more phases, an odd number
-in an N-th of a turn. Robots with contact are left out of that; it would take ten seconds. Units: l, μ0 l⁴/EI.
+a slow perturbation, and change the growth by up to a fifth if the robot yaws fast. So a growth above DOUBTFUL, and
+that of a robot with |ω_yr| > QUICK |ω_t|, is computed again on 12 edges and more than twice as many phases, an odd
+number in an N-th of a turn. Robots with contact are left out of that; it would take ten seconds.
+
+Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from sim.solve.floquet import arnoldi
 from sim.solve.orbit import mean_motion, solve_orbit
 from sim.solve.refinement import ROUGH, Orbit
 
+QUICK = 0.4  # |ω_yr/ω_t| from which a robot yaws fast
 DOUBTFUL = -0.05  # growth from which it is computed again
 _VECTORS, _MORE_VECTORS = 10, 30  # of Arnoldi's method beside two for each tail: first, and again
 _CONVERGED = 0.1  # relative residual of an eigenvalue up to which it counts
@@ -33,9 +37,10 @@ _CONVERGED = 0.1  # relative residual of an eigenvalue up to which it counts
 def growth_of_orbit(body: Body, tails: int, orbit: Orbit) -> float:
     """Compute the growth on an orbit of a robot with N tails; NaN if it cannot be computed."""
     value = growth(body, tails, orbit.x[1], orbit.u[1])
-    if value <= DOUBTFUL or has_contact(body):
+    yaws_fast = abs(orbit.means[2]) > QUICK * abs(orbit.means[0])
+    if (value <= DOUBTFUL and not yaws_fast) or has_contact(body):
         return value
-    instants = len(orbit.u[2]) + 1 + len(orbit.u[2]) % 2
+    instants = 2 * len(orbit.u[2]) + 1
     x, u = with_phases(orbit.x[2], tails * instants), with_phases(orbit.u[2][None], instants)[0].copy()
     _, size = solve_orbit(body, x, u, ROUGH)
     return growth(body, tails, x, u, vectors=_MORE_VECTORS) if size < ROUGH else np.nan

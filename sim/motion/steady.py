@@ -20,11 +20,11 @@ from sim.model.groups import Groups
 from sim.motion.orbits import Perturbed, solve_orbits
 from sim.motion.resolution import Resolution
 from sim.motion.settling import settle
+from sim.motion.stability import QUICK
 from sim.motion.steady_motion import DIRECT, Steady
 from sim.solve.assembly import numbers
 from sim.solve.refinement import FEW, REASONS, SOLVED
 
-QUICK = 0.4  # ω_yr/ω_t from which straight tails may reach another motion
 GROWS = -0.02  # growth in a motor revolution from which small perturbations may take the tails to another motion
 GROWS_IN_CONTACT = -0.12  # the same where tails touch: the mesh's error is larger
 SAME = 0.02  # relative difference up to which a stepped motion counts as the direct one

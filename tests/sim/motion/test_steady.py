@@ -13,7 +13,8 @@ from sim.model.presets import PRESETS
 from sim.motion.batches import steady_columns, stepped_columns
 from sim.motion.orbits import Orbits, Perturbed
 from sim.motion.settling import settle
-from sim.motion.steady import QUICK, orbits, steady
+from sim.motion.stability import QUICK
+from sim.motion.steady import orbits, steady
 from sim.motion.steady_motion import DIRECT, STEPPING
 from sim.reference.control_example import INDEPENDENT
 from sim.solve.refinement import LOST, REASONS
