@@ -74,7 +74,7 @@ def monodromy_growth(body: Body, tails: int, x: np.ndarray, u: np.ndarray, steps
         ({"N": 2, "omega_bar": 20.0, "rate_dependent_modulus": 0.1}, 24),
         ({"N": 3, "tail_interaction": 1.0}, 4),
         ({"N": 3, "shear_thinning": 0.3}, 4),
-        ({"N": 5, "omega_bar": 25.0, "tail_contact": 1.0}, 4),
+        ({"N": 5, "omega_bar": 25.0, "tail_contact": 1.0}, 12),
     ],
 )
 def test_growth_is_that_of_the_monodromy(robot: dict[str, float], steps: int) -> None:
