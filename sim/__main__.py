@@ -21,6 +21,8 @@ BAR_AFTER = 1.0  # s
     argument("robot", metavar="ROBOT", help="robot.toml, the name of a preset, or a table of points: CSV with "
              "C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…"),
     out("CSV with the same rows and their motion; needed for a table of points", default=None),
+    argument("--no-stability", action="store_true",
+             help="do not compute whether small perturbations decay, which takes about a third as long again"),
     JOBS,
 )  # fmt: skip
 def _steady(arguments: Namespace) -> None:
@@ -46,7 +48,8 @@ def _steady_robot(arguments: Namespace) -> None:
 
     robot = load_robot(arguments.robot)
     columns = group_columns([robot])
-    motion = steady_columns(columns, jobs=arguments.jobs, title="")
+    stability = not arguments.no_stability
+    motion = steady_columns(columns, stability=stability, jobs=arguments.jobs, title="")
     print(describe_motion(robot, motion))
     if motion["note"][0]:
         print(f"note: {motion['note'][0]}", file=sys.stderr)
@@ -78,7 +81,8 @@ def _steady_points(arguments: Namespace) -> None:
         )
         points = points.drop(columns=replaced)
     with naming(arguments.robot):
-        result = steady_columns({str(c): points[c].to_numpy() for c in points}, jobs=arguments.jobs)
+        columns = {str(c): points[c].to_numpy() for c in points}
+        result = steady_columns(columns, stability=not arguments.no_stability, jobs=arguments.jobs)
     table = pd.concat([points, pd.DataFrame(result)], axis=1)
     write_csv(table, arguments.out)
     ended = table["converged"].to_numpy()

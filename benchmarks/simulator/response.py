@@ -45,7 +45,7 @@ def costs(parts: list[Groups], robots: int) -> None:
     rng = np.random.default_rng(0)
     dwells = [np.exp(rng.uniform(np.log(0.3), np.log(4.0), len(bodies(part)))) for part in parts]
     ways: dict[str, Callable[[], object]] = {
-        "steady motion": lambda: [steady(part) for part in parts],
+        "steady motion": lambda: [steady(part, stability=False) for part in parts],
         "… and the whole curve, 25 dwells": lambda: [responses(part, history=False) for part in parts],
         "… and memory of the dwell before, and rest": lambda: [responses(part) for part in parts],
         "one dwell by time steps": lambda: [switch_response(p, T) for p, T in zip(parts, dwells, strict=True)],

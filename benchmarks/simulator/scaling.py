@@ -83,13 +83,13 @@ def table(title: str, sizes: tuple[int, ...], times: list[float], unit: float, n
 
 def main() -> None:
     points = sweep(BATCHES[-1])
-    steady_columns({k: v[:8] for k, v in points.items()}, title="")  # compile
+    steady_columns({k: v[:8] for k, v in points.items()}, stability=False, title="")  # compile
     step_time(2, 6)
     with threadpool_limits(1):
         spent = []
         for count in BATCHES:
             part = {k: v[:count] for k, v in points.items()}
-            spent.append(timed(lambda part=part: steady_columns(part, jobs=1, title=""))[0])  # type: ignore[misc]
+            spent.append(timed(lambda part=part: steady_columns(part, jobs=1, stability=False, title=""))[0])  # type: ignore[misc]
         table("Steady operating points, robots in a batch", BATCHES, spent, 1e-3, "ms")
         each = [t / n for t, n in zip(spent, BATCHES, strict=True)]
         print("  " + "".join(f"{1e6 * t:10.0f}" for t in each) + "  µs a robot")
@@ -103,8 +103,8 @@ def main() -> None:
         table(f"A Newton correction of the orbit, tails (phases {phases})", TAILS, orbits, 1e-6, "µs")
     rows = BATCHES[-2]
     part = {k: v[:rows] for k, v in points.items()}
-    alone = timed(lambda: steady_columns(part, jobs=1, title=""))[0]
-    many = timed(lambda: steady_columns(part, title=""))[0]
+    alone = timed(lambda: steady_columns(part, jobs=1, stability=False, title=""))[0]
+    many = timed(lambda: steady_columns(part, stability=False, title=""))[0]
     print(f"\nThreads: {available_jobs()} solve {rows} robots {alone / many:.2f} times as fast as one")
     print("Memory in work for one robot, whatever the size of the batch:")
     print(

@@ -46,7 +46,7 @@ def robots() -> None:
     ratios = []
     for i in range(ROBOTS):
         groups = Groups.from_columns({name: values[i : i + 1] for name, values in points.items()})
-        quick, motion = timed(lambda groups=groups: steady(groups), repeats=5)  # type: ignore[misc]
+        quick, motion = timed(lambda groups=groups: steady(groups, stability=False), repeats=5)  # type: ignore[misc]
         slow, reference = timed(lambda groups=groups: settle_plainly(groups))  # type: ignore[misc]
         apart = abs(reference[1] / motion.omega_yr[0] - 1)
         ratios.append(slow / quick)
@@ -97,7 +97,7 @@ def throughput() -> None:
     points = sweep(POINTS)
     print(f"\n{POINTS} steady operating points over the sweep's domain")
     for jobs in sorted({1, available_jobs()}):
-        spent, columns = timed(lambda jobs=jobs: steady_columns(points, jobs=jobs, title=""))  # type: ignore[misc]
+        spent, columns = timed(lambda jobs=jobs: steady_columns(points, jobs=jobs, stability=False, title=""))  # type: ignore[misc]
         direct_rows = int((columns["method"] == "direct").sum())
         print(f"  {jobs} threads: {POINTS / spent:6.0f} a second ({direct_rows} solved directly)")
     error = 100 * columns["error"]
@@ -105,7 +105,7 @@ def throughput() -> None:
 
 
 def main() -> None:
-    steady_columns(sweep(8), title="")  # compile
+    steady_columns(sweep(8), stability=False, title="")  # compile
     with threadpool_limits(1):
         robots()
         filament()

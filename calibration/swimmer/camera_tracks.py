@@ -203,7 +203,7 @@ def _check_motion(robot: Robot, runs: pd.DataFrame, measured: pd.DataFrame) -> N
     ]
     if not swimmers:
         return
-    simulated = lab_motion(swimmers, steady_columns(group_columns(swimmers)))
+    simulated = lab_motion(swimmers, steady_columns(group_columns(swimmers), stability=False))
     for output in ("omega_yr", "R_yr", "theta", "v"):
         column = OUTPUTS[output][0]
         factors = np.abs(measured[column][usable].to_numpy(dtype=float) / simulated[column])

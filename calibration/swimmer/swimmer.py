@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -79,7 +79,7 @@ class Solver(NamedTuple):
     slopes: Callable[..., Sensitivities]
 
 
-DIRECT = Solver(steady_columns, sensitivity_columns)
+DIRECT = Solver(partial(steady_columns, stability=False), sensitivity_columns)
 
 
 @dataclass(frozen=True)

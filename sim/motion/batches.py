@@ -25,6 +25,7 @@ from sim.motion.resolution import Resolution
 from sim.motion.sensitivity import Sensitivities, sensitivities
 from sim.motion.settling import settle
 from sim.motion.steady import steady
+from sim.motion.steady_motion import STABILITY_COLUMNS
 from sim.motion.warm import compile_once
 from sim.solve.refinement import MANY
 
@@ -103,20 +104,23 @@ def _single_threaded(work: Callable[[Job], Result], job: Job) -> Result:
 
 
 def steady_columns(
-    columns: Mapping[str, Floats], *, jobs: int | None = None, title: str = "steady"
+    columns: Mapping[str, Floats], *, stability: bool = True, jobs: int | None = None, title: str = "steady"
 ) -> dict[str, Any]:
     """Simulate the steady motion of any robots, in parallel (`sim.motion.steady`).
 
     Args:
         columns: robots by column name, see `sim.inputs.check_columns`, each (M,).
+        stability: whether to compute the growth of small perturbations, see `sim.motion.steady`.
         jobs: threads; default all processors.
         title: of the progress bar; empty for none.
 
     Returns:
-        The columns of `Steady.columns`, each (M,), in the order of the rows.
+        The columns of `Steady.columns`, each (M,), in the order of the rows; without STABILITY_COLUMNS if these
+        are not computed.
     """
     values = check_columns(columns)
-    return _in_batches(_steady_batch, values, split(values["N"], _DIRECT_ROWS), jobs=jobs, title=title)
+    work = partial(_steady_batch, stability=stability)
+    return _in_batches(work, values, split(values["N"], _DIRECT_ROWS), jobs=jobs, title=title)
 
 
 def sensitivity_columns(
@@ -186,8 +190,9 @@ def _in_batches(
     return {name: np.concatenate([d[name] for d in done])[order] for name in done[0]}
 
 
-def _steady_batch(columns: dict[str, Floats]) -> dict[str, Any]:
-    return steady(Groups.from_columns(columns)).columns()
+def _steady_batch(columns: dict[str, Floats], *, stability: bool) -> dict[str, Any]:
+    motion = steady(Groups.from_columns(columns), stability=stability).columns()
+    return {name: column for name, column in motion.items() if stability or name not in STABILITY_COLUMNS}
 
 
 def _settle_batch(columns: dict[str, Floats], *, chosen: Resolution | None, finer: int) -> dict[str, Any]:

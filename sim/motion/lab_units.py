@@ -67,7 +67,7 @@ def describe_motion(robot: Robot, motion: Mapping[str, Any], *, error: str = "es
 
     Args:
         robot: the robot.
-        motion: columns of its steady motion, each (1,).
+        motion: columns of its steady motion, each (1,); its stability is described if it is known.
         error: what the column `error` is.
     """
     lab = {name: float(values[0]) for name, values in lab_motion([robot], motion).items()}
@@ -89,6 +89,12 @@ def describe_motion(robot: Robot, motion: Mapping[str, Any], *, error: str = "es
     if motion["tail_gap"][0] < least_gap(robot.effects.get(CONTACT.name, 0.0)):
         lines.append(
             f"  the tails touch, and nothing keeps them apart in the model: add the effect {CONTACT.name}"
+        )
+    if "growth" in motion and np.isfinite(motion["growth"][0]):
+        factor = math.exp(float(motion["growth"][0]))
+        lines.append(
+            f"  {'stable' if motion['stable'][0] else 'unstable'}: in a motor revolution small "
+            f"perturbations change by a factor of {factor:.2g}"
         )
     if "error" in motion:
         lines.append(f"  {error} {100 * float(motion['error'][0]):.2g} %")

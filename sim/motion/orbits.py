@@ -5,13 +5,14 @@ The loops over robots are plain Python. What a single robot needs is compiled.
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats, Integers
 from sim.model.body import Body
-from sim.motion.alike import growth
+from sim.motion.stability import growth_of_orbit
 from sim.solve.assembly import unpacked
 from sim.solve.derivative import orbit_slopes
 from sim.solve.orbit import mean_motion, residual_on_orbit, smallest_gap
@@ -19,6 +20,14 @@ from sim.solve.refinement import FEW, SOLVED, Orbit, extrapolate, refined_orbit
 
 _NEAR = 1.1  # gap from which tails cannot touch, given the error of the gap
 WIDTH = 1e-5  # finite-difference step in a robot's numbers; the balance depends almost linearly on them
+
+
+class Perturbed(Enum):
+    """Which robots get the growth of small perturbations."""
+
+    NONE = "none"
+    TOUCHING = "those with contact whose tails touch"
+    ALL = "all"
 
 
 class Orbits(NamedTuple):
@@ -29,11 +38,16 @@ class Orbits(NamedTuple):
     error: Floats  # (B,) estimated relative error
     ended: Integers  # (B,) SOLVED or why not, see `sim.solve.refinement`
     gap: Floats  # (B,) smallest distance between tails over 2 r0
-    growth: Floats  # (B,) see `sim.motion.alike`; NaN where tails do not push against each other
+    growth: Floats  # (B,) of small perturbations in a motor revolution, see `sim.motion.stability`; NaN: unknown
 
 
 def solve_orbits(
-    rows: Floats, tails: int, directions: Floats | None = None, *, phases: int = FEW, stability: bool = False
+    rows: Floats,
+    tails: int,
+    directions: Floats | None = None,
+    *,
+    phases: int = FEW,
+    perturbed: Perturbed = Perturbed.NONE,
 ) -> Orbits:
     """Solve for the orbits of robots with N tails.
 
@@ -42,7 +56,7 @@ def solve_orbits(
         tails: N.
         directions: (B, K, K'), directions of the derivatives (none by default).
         phases: number of phases to begin with.
-        stability: whether to find out if tails that touch keep moving alike.
+        perturbed: robots that get a growth.
     """
     count = 0 if directions is None else directions.shape[1]
     slopes = np.full((len(rows), count, 5), np.nan)
@@ -53,8 +67,9 @@ def solve_orbits(
         orbits.append(orbit)
         if orbit.ended == SOLVED:
             gap[i] = smallest_gap(body, orbit.x[2], tails)
-            if stability and body.nonlocal_terms.tail_contact != 0 and gap[i] < _NEAR:
-                grows[i] = growth(body, tails, orbit.x[0], orbit.u[0])
+            touching = body.nonlocal_terms.tail_contact != 0 and gap[i] < _NEAR
+            if perturbed is Perturbed.ALL or (perturbed is Perturbed.TOUCHING and touching):
+                grows[i] = growth_of_orbit(body, tails, orbit)
             if directions is not None and count:
                 slopes[i] = _slopes(body, rows[i], directions[i], orbit)
     return Orbits(

@@ -69,7 +69,7 @@ def responses(
         extrapolated_memory: extrapolate the memory, too; it takes half as long again.
     """
     check_groups(groups)
-    motion = steady(groups) if motion is None else motion
+    motion = steady(groups, stability=False) if motion is None else motion
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
     robots = bodies(groups)
     by_robot, stepped = [], np.zeros(len(robots), dtype=bool)

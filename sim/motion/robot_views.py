@@ -48,7 +48,7 @@ class Scene(NamedTuple):
 
 def scene(robot: Robot) -> Scene:
     """Simulate the robot with its motor at +1."""
-    motion = steady(robot.groups())
+    motion = steady(robot.groups(), stability=False)
     _, tails = tails_over_a_revolution(robot, 8)
     return Scene(
         robot.head_radius / robot.tail_length,

@@ -81,6 +81,7 @@ def settle(
         converged=np.array([e.converged for e in ended]),
         failed=np.array([bool(e.failed) for e in ended]),
         method=np.full(len(robots), STEPPING),
+        growth=np.full(len(robots), np.nan),
         note=np.array([e.failed or _drift_note(e) for e in ended]),
     )
 

@@ -1,10 +1,10 @@
 """Steady motion at constant motor speed: solved for directly where that works, else by time stepping.
 
 The direct solution (`sim.motion.orbits`) is the relative periodic orbit in which all tails move alike. It takes
-less than a millisecond a robot and states the error of its means. Straight tails at rest reach this orbit if
-the robot yaws slowly compared with the spin of its disc (docs/branches.md). If it yaws faster (|ω_yr| > QUICK
-|ω_t|), or if its tails push against each other and may leave this motion (`sim.motion.alike`), the robot is
-stepped in time from rest as well. If stepping reaches another motion, that one is the answer. If Newton's
+about a millisecond a robot, states the error of its means, and how fast small perturbations grow
+(`sim.motion.stability`). Straight tails at rest reach this orbit if the robot yaws slowly compared with the spin
+of its disc (docs/branches.md). If it yaws faster (|ω_yr| > QUICK |ω_t|), or if perturbations may grow, the robot
+is stepped in time from rest as well. If stepping reaches another motion, that one is the answer. If Newton's
 method does not converge, stepping gives the answer, too. Such rows say so. Their error is estimated from two
 meshes and steps. Units: l, μ0 l⁴/EI.
 """
@@ -15,26 +15,30 @@ import numpy as np
 
 from sim.arrays import Floats, Integers, Words
 from sim.effects import check_size
+from sim.effects.tail_contact import EFFECT as CONTACT
 from sim.model.groups import Groups
-from sim.motion.orbits import solve_orbits
+from sim.motion.orbits import Perturbed, solve_orbits
 from sim.motion.resolution import Resolution
 from sim.motion.settling import settle
+from sim.motion.stability import QUICK
 from sim.motion.steady_motion import DIRECT, Steady
 from sim.solve.assembly import numbers
 from sim.solve.refinement import FEW, REASONS, SOLVED
 
-QUICK = 0.4  # ω_yr/ω_t from which straight tails may reach another motion
-GROWS = -0.02  # growth from which tails in contact may leave the motion in which they move alike
+GROWS = -0.02  # growth in a motor revolution from which small perturbations may take the tails to another motion
+GROWS_IN_CONTACT = -0.12  # the same where tails touch: the mesh's error is larger
 SAME = 0.02  # relative difference up to which a stepped motion counts as the direct one
 _OTHER_MOTION = "straight tails reach another motion than the one in which they move alike"
 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
-def steady(groups: Groups) -> Steady:
+def steady(groups: Groups, *, stability: bool = True) -> Steady:
     """Simulate the steady motion of robots of one N, as reached from rest.
 
     Args:
         groups: B robots; ω̄ may have either sign.
+        stability: whether to compute the growth of small perturbations of every robot, which takes a third as long
+            again. If not, only robots whose tails push against each other get one.
 
     Returns:
         Their mean motion, dimensionless (lengths in l, times in μ0 l⁴/EI), and how good it is.
@@ -49,9 +53,11 @@ def steady(groups: Groups) -> Steady:
         (0.049, True)
     """
     check_groups(groups)
-    motion, growth = _orbits(groups, FEW, stability=True)
+    motion = _orbits(groups, FEW, Perturbed.ALL if stability else Perturbed.TOUCHING)
     quick = np.abs(motion.omega_yr) > QUICK * np.abs(motion.omega_t)
-    doubtful = np.flatnonzero(~motion.failed & (quick | (growth > GROWS)))
+    contact = groups.effects.get(CONTACT.name, np.zeros(len(groups))) != 0
+    grows = motion.growth > np.where(contact, GROWS_IN_CONTACT, GROWS)
+    doubtful = np.flatnonzero(~motion.failed & (quick | grows))
     if len(doubtful):
         reached = settle(_rows(groups, doubtful), resolution=Resolution.for_settling)
         changed = doubtful[_difference(motion.at(doubtful), reached) > SAME]
@@ -80,15 +86,15 @@ def _rows(groups: Groups, rows: Integers) -> Groups:
 
 def orbits(groups: Groups, *, phases: int = FEW) -> Steady:
     """Solve directly, with `phases` phases to begin with; `failed` where there is no orbit."""
-    return _orbits(groups, phases, stability=False)[0]
+    return _orbits(groups, phases, Perturbed.NONE)
 
 
-def _orbits(groups: Groups, phases: int, *, stability: bool) -> tuple[Steady, Floats]:
-    """Solve directly, and compute how fast tails in contact leave the solution, (B,)."""
-    solution = solve_orbits(numbers(groups), groups.N, phases=phases, stability=stability)
+def _orbits(groups: Groups, phases: int, perturbed: Perturbed) -> Steady:
+    """Solve directly, and compute how fast perturbations grow."""
+    solution = solve_orbits(numbers(groups), groups.N, phases=phases, perturbed=perturbed)
     means = solution.means.T
     solved = solution.ended == SOLVED
-    motion = Steady(
+    return Steady(
         omega_t=means[0],
         omega_h=means[1],
         omega_yr=means[2],
@@ -99,9 +105,18 @@ def _orbits(groups: Groups, phases: int, *, stability: bool) -> tuple[Steady, Fl
         converged=solved,
         failed=~solved,
         method=np.full(len(groups), DIRECT),
-        note=np.array([REASONS[k] for k in solution.ended.tolist()]),
+        growth=solution.growth,
+        note=np.array(
+            [REASONS[k] or _growth_note(g) for k, g in zip(solution.ended.tolist(), solution.growth, strict=True)]
+        ),
     )
-    return motion, solution.growth
+
+
+def _growth_note(growth: float) -> str:
+    """Say that perturbations grow, if they do."""
+    if not growth > 0:
+        return ""
+    return f"unstable: small perturbations grow by {100 * np.expm1(growth):.2g} % in a motor revolution"
 
 
 def stepped(groups: Groups, notes: list[str]) -> Steady:

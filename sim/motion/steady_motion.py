@@ -22,7 +22,8 @@ STEADY_OUTPUTS = (
     "omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "R_yr_over_l", "theta_deg", "tail_gap",
 )  # fmt: skip
 STEADY_COLUMNS = (*STEADY_OUTPUTS[:-1], "converged", STEADY_OUTPUTS[-1])
-QUALITY_COLUMNS = ("error", "method", "note")  # how good a row is, beside its numbers
+STABILITY_COLUMNS = ("stable", "growth")
+QUALITY_COLUMNS = (*STABILITY_COLUMNS, "error", "method", "note")  # how good a row is, beside its numbers
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,8 @@ class Steady:
     converged: Flags  # the motion is steady and solved to tolerance
     failed: Flags  # no numbers
     method: Words  # DIRECT or STEPPING
-    note: Words  # why a row is not converged, or not solved directly; else empty
+    growth: Floats  # logarithm of the growth of small perturbations in a motor revolution; NaN: unknown
+    note: Words  # why a row is not converged, not stable, or not solved directly; else empty
 
     def __len__(self) -> int:
         return len(self.omega_t)
@@ -54,13 +56,18 @@ class Steady:
         """θ [rad], between the axis and the tangent of the path."""
         return np.asarray(np.arctan2(np.abs(self.v_x), self.v_z))
 
+    @property
+    def stable(self) -> Flags:
+        """Whether small perturbations decay; time steps settle on a motion only if they do."""
+        return np.where(self.method == STEPPING, self.converged, self.converged & (self.growth < 0))
+
     @np.errstate(all="ignore")  # robots that do not turn have no radius
     def columns(self) -> dict[str, Any]:
         """Return the columns of the command `softflagella sim steady`."""
         values = (
             self.omega_t, self.omega_h, self.omega_yr, self.v_x, self.v_z,
             self.turn_radius, np.degrees(self.slip_angle), self.converged, self.tail_gap,
-            self.error, self.method, self.note,
+            self.stable, self.growth, self.error, self.method, self.note,
         )  # fmt: skip
         return dict(zip((*STEADY_COLUMNS, *QUALITY_COLUMNS), values, strict=True))
 

@@ -80,7 +80,7 @@ def switch_response(
     dwell = np.asarray(dwell, dtype=float)
     for row in np.flatnonzero(~(np.isfinite(dwell) & (dwell > 0)))[:1]:
         raise InputError(f"{DWELL} = {dwell[row]} in row {row + 1}; it must be a finite number above 0")
-    motion = steady(groups) if motion is None else motion
+    motion = steady(groups, stability=False) if motion is None else motion
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
     robots = bodies(groups)
     pairs = zip(robots, reversed_bodies(groups), dwell, strict=True)

@@ -7,8 +7,8 @@
    of the whole change by extrapolation. Over the sweep it is larger than the true error in more than 95 % of the
    rows.
 
-Every result says whether the robot was solved, and if not, why. Left out: whether the orbit is stable;
-docs/branches.md says where it is not. Units: l, μ0 l⁴/EI.
+Every result says whether the robot was solved, and if not, why. Left out: whether the orbit is stable
+(`sim.motion.stability`). Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations

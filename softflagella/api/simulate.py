@@ -26,12 +26,14 @@ from sim.motion.switching import switch_response as respond
 from softflagella.api.robots import NAME, OneRobot, RobotRows, Robots, one_robot, robot_rows, with_units
 
 
-def steady(robots: Robots, *, jobs: int | None = None) -> pd.DataFrame:
+def steady(robots: Robots, *, stability: bool = True, jobs: int | None = None) -> pd.DataFrame:
     """Simulate the mean motion at constant motor speed, as reached from rest.
 
     Args:
         robots: a `Robot`, the path of a robot.toml, the name of a preset, or a list of these; or dimensionless
             robots, a table with M rows (single values stand for all rows).
+        stability: whether to compute `stable` and `growth`, which takes a third as long again, and up to three
+            times as long more for robots with non-local effects (flow, contact, natural shape, thinning).
         jobs: threads; default all processors.
 
     Returns:
@@ -39,8 +41,10 @@ def steady(robots: Robots, *, jobs: int | None = None) -> pd.DataFrame:
         `omega_t_rpm`, `omega_yr_rad_s`, `R_yr_cm`, `theta_deg`, `v_cm_s` and `circle_s`, the time of a circle.
         The dimensionless columns are `omega_t_bar`, `omega_h_bar`, `omega_yr_bar` (spins of tails and head and
         yaw rate [EI/(μ0 l⁴)]), `v_x`, `v_z` (sway and surge of the head's centre [EI/(μ0 l³)]), `R_yr_over_l`,
-        `theta_deg`, `converged`, `tail_gap` ([2 r0], below 1 if tails touch), `error` (the estimated relative
-        error), `method` ("direct" or "stepping") and `note` (why a row is not converged or not solved directly).
+        `theta_deg`, `converged`, `tail_gap` ([2 r0], below 1 if tails touch), `stable` (whether small
+        perturbations decay), `growth` (the logarithm of the factor by which they grow in a motor revolution; NaN
+        if time stepping found the motion), `error` (the estimated relative error), `method` ("direct" or
+        "stepping") and `note` (why a row is not converged, not stable, or not solved directly).
         `attrs["units"]` has the units.
 
     Raises:
@@ -60,7 +64,7 @@ def steady(robots: Robots, *, jobs: int | None = None) -> pd.DataFrame:
         [0.05, 0.08, 0.16]
     """
     rows = robot_rows(robots)
-    motion = steady_columns(rows.columns, jobs=jobs, title="")
+    motion = steady_columns(rows.columns, stability=stability, jobs=jobs, title="")
     return rows.frame(lab_motion(rows.robots, motion) if rows.robots else {}, motion)
 
 

@@ -62,7 +62,7 @@ def tabulate(robot: Robot) -> RobotTable:
     directions = {name: np.array([value, value]) for name, value in values.items()}
     directions["omega_bar"] = directions["omega_bar"] * [1.0, -1.0]
     groups = Groups.from_columns(directions)
-    motion = steady(groups)
+    motion = steady(groups, stability=False)
     if not motion.converged.all():
         raise InputError(f"{robot.name} has no steady motion to tabulate: {motion.note[0]}")
     response = responses(groups, motion, tolerance=TOLERANCE, extrapolated_memory=True)
@@ -148,7 +148,7 @@ def _slopes(values: dict[str, float]) -> dict[str, Any]:
         rows += [{**values, name: value} for value, _ in ends for _ in (0, 1)]
     columns = {name: np.array([row[name] for row in rows]) for name in values}
     columns["omega_bar"] = columns["omega_bar"] * np.tile([1.0, -1.0], 2 * len(names))
-    motion = steady(Groups.from_columns(columns))
+    motion = steady(Groups.from_columns(columns), stability=False)
     twist = np.stack([motion.v_z, motion.v_x, motion.omega_yr], -1).reshape(len(names), 2, 2, 3)
     slopes = (twist[:, 0] - twist[:, 1]) / np.array(widths)[:, None, None]
     by_name = dict(zip(names, slopes, strict=True))

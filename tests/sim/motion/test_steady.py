@@ -11,9 +11,10 @@ import pytest
 import sim.motion.steady
 from sim.model.presets import PRESETS
 from sim.motion.batches import steady_columns, stepped_columns
-from sim.motion.orbits import Orbits
+from sim.motion.orbits import Orbits, Perturbed
 from sim.motion.settling import settle
-from sim.motion.steady import QUICK, orbits, steady
+from sim.motion.stability import QUICK
+from sim.motion.steady import orbits, steady
 from sim.motion.steady_motion import DIRECT, STEPPING
 from sim.reference.control_example import INDEPENDENT
 from sim.solve.refinement import LOST, REASONS
@@ -107,8 +108,8 @@ def test_a_row_without_an_orbit_is_stepped_and_says_so(monkeypatch: pytest.Monke
     groups = control(2, omega_bar=[10.0, 14.0])
     plain = steady(groups)
 
-    def lose_the_first(rows: np.ndarray, tails: int, *, phases: int, stability: bool) -> Orbits:
-        solution = solve_orbits(rows, tails, phases=phases, stability=stability)
+    def lose_the_first(rows: np.ndarray, tails: int, *, phases: int, perturbed: Perturbed) -> Orbits:
+        solution = solve_orbits(rows, tails, phases=phases, perturbed=perturbed)
         solution.ended[0] = LOST
         solution.means[0] = np.nan
         return solution
@@ -145,7 +146,7 @@ def test_tails_in_contact_that_leave_the_orbit_are_stepped_and_say_so(monkeypatc
     groups = control(1, N=4, omega_bar=30.0, tail_contact=1.0)
     plain = steady(groups)
     assert plain.method.tolist() == [DIRECT]
-    monkeypatch.setattr(sim.motion.orbits, "growth", lambda *_: 0.1)
+    monkeypatch.setattr(sim.motion.orbits, "growth_of_orbit", lambda *_: 0.1)
     assert steady(groups).method.tolist() == [DIRECT]  # stepping reaches the same motion
     monkeypatch.setattr(sim.motion.steady, "SAME", 0.0)
     other = steady(groups)

@@ -11,11 +11,11 @@ from scipy.interpolate import CubicSpline
 from sim.linear.spectral import with_phases
 from sim.model.groups import Groups
 from sim.model.presets import PRESETS
-from sim.motion.alike import growth
 from sim.motion.resolution import Resolution
 from sim.motion.sensitivity import sensitivities
 from sim.motion.settling import settle
-from sim.motion.steady import GROWS, orbits
+from sim.motion.stability import growth
+from sim.motion.steady import orbits
 from sim.solve.orbit import mean_motion
 from sim.solve.refinement import FEW, MANY, SOLVED, difference, orbit_on_mesh, refined_orbit
 from tests.sim.robots import control, first_body
@@ -136,11 +136,11 @@ def test_tails_that_push_a_little_keep_moving_alike(tails: int) -> None:
     for groups in (control(N=tails, omega_bar=25.0), with_contact(control(N=tails, omega_bar=25.0))):
         body = first_body(groups)
         found = refined_orbit(body, tails, FEW)
-        assert growth(body, tails, found.x[0], found.u[0]) < -0.1
+        assert growth(body, tails, found.x[0], found.u[0]) < -0.5
 
 
 def test_a_ring_of_five_stout_tails_buckles() -> None:
     """Its tails leave the motion in which they move alike, which a little noise in their shape shows."""
     body = first_body(with_contact(control(N=5, omega_bar=58.8, l_over_r0=19.0)))
     found = refined_orbit(body, 5, FEW)
-    assert growth(body, 5, found.x[0], found.u[0]) > GROWS
+    assert growth(body, 5, found.x[0], found.u[0]) > 0.5

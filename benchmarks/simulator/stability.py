@@ -1,0 +1,145 @@
+"""Growth of small perturbations of steady motions: agreement with time steps, and its price.
+
+Perturbed robots are stepped in time beside unperturbed ones on the same mesh (`tests.oracles.stepped_growth`):
+robots of the sweep, robots of the wide domain of `robustness` that yaw fast, and robots with effects on their
+tails. A table counts the robots of `robustness` with N ≥ 2 whose orbit is unstable. The price is the time of rows
+with the growth over that of rows without, also for a robot whose tails push against each other.
+
+Usage: python -m benchmarks stability [ROBOTS]
+
+Takes 2 minutes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from benchmarks.simulator.robustness import robots
+from benchmarks.simulator.speed import sweep
+from sim.inputs import check_columns
+from sim.model.groups import Groups
+from sim.model.presets import PRESETS
+from sim.motion.batches import one_thread
+from sim.motion.orbits import Perturbed, solve_orbits
+from sim.motion.stability import growth, growth_of_orbit
+from sim.solve.assembly import bodies, numbers
+from sim.solve.refinement import FEW, MESHES, SOLVED, refined_orbit
+from tests.oracles.stepped_growth import stepped_growth
+
+_FOLLOWED = 7.0  # natural logarithm of the change that is followed in time
+_MOST_REVOLUTIONS = 60
+_YAWS = (0.0, 0.25, 0.4, 0.5, 0.6, 0.8, np.inf)  # limits of |ω_yr/ω_t| in the table
+_QUICK = 0.5  # |ω_yr/ω_t| of robots that yaw fast
+IN_CONTACT = "tails in contact"
+_EFFECTS = {
+    "natural_curvature": (0.5, 1.5),
+    "natural_twist": (1.0, 3.0),
+    "tail_interaction": (0.5, 1.0),
+    "shear_thinning": (0.3,),
+    "rate_dependent_modulus": (0.1,),
+}
+
+
+def with_effects(base: Groups, name: str, size: float) -> Groups:
+    """Return the robots of `base` with one effect."""
+    return Groups(**{**vars(base), "effects": {name: np.full(len(base), size)}})
+
+
+def groups_of(columns: dict[str, np.ndarray], row: int) -> Groups:
+    """Return one robot of a table."""
+    return Groups.from_columns(check_columns({name: values[row : row + 1] for name, values in columns.items()}))
+
+
+def kinds(count: int) -> Iterator[tuple[str, list[Groups]]]:
+    """Yield what the robots are, and the robots."""
+    inside, wide = sweep(count), robots(4096)
+    inside.pop("T_bar", None)
+    yield "sweep", [groups_of(inside, i) for i in range(count)]
+    quick: list[Groups] = []
+    for i in np.flatnonzero(wide["N"] > 1).tolist():
+        if len(quick) < count:
+            groups = groups_of(wide, i)
+            means = solve_orbits(numbers(groups), groups.N).means[0]
+            if abs(means[2]) > _QUICK * abs(means[0]):
+                quick.append(groups)
+    yield f"|ω_yr/ω_t| > {_QUICK}", quick
+    control = PRESETS["paper-control"].groups()
+    yield (
+        "effects on the tails",
+        [with_effects(control, name, size) for name, sizes in _EFFECTS.items() for size in sizes],
+    )
+    measured = PRESETS["paper-measured"].groups()
+    yield IN_CONTACT, [with_effects(measured, "tail_contact", 1.0)]
+
+
+def agreement(title: str, selected: list[Groups]) -> None:
+    """Print how far the growths are from those of time steps, on the same mesh."""
+    away, seen = [], []
+    for groups in selected:
+        body = bodies(groups)[0]
+        orbit = refined_orbit(body, groups.N, FEW)
+        if orbit.ended != SOLVED:
+            continue
+        final = growth_of_orbit(body, groups.N, orbit)
+        edges = MESHES[1] if final == growth(body, groups.N, orbit.x[1], orbit.u[1]) else MESHES[2]
+        revolutions = min(_FOLLOWED / abs(final), _MOST_REVOLUTIONS)
+        measured = stepped_growth(body, groups.N, revolutions, edges=edges)
+        away.append(abs(final - measured) / max(abs(measured), 0.1))
+        seen.append(final)
+    share = 100 * np.array(away)
+    print(
+        f"  {title:22} {len(seen):3} robots, growth {min(seen):.3g} to {max(seen):.3g}, "
+        f"{sum(g > 0 for g in seen)} unstable; off by {np.median(share):.1f} % at the median, "
+        f"{np.max(share):.1f} % at most"
+    )
+
+
+def price(title: str, selected: list[Groups]) -> None:
+    """Print the time of rows with and without the growth."""
+    spent = []
+    for perturbed in (Perturbed.NONE, Perturbed.ALL):
+        least = np.inf
+        for _ in range(3):
+            began = time.thread_time()
+            for groups in selected:
+                solve_orbits(numbers(groups), groups.N, phases=FEW, perturbed=perturbed)
+            least = min(least, time.thread_time() - began)
+        spent.append(least)
+    each = 1e3 * spent[0] / len(selected)
+    print(f"  {title:22} {each:8.2f} ms a row without, {100 * (spent[1] / spent[0] - 1):.0f} % more with growth")
+
+
+def domain() -> None:
+    """Print how many orbits of the wide domain are unstable, by how fast the robot yaws."""
+    wide, rows = robots(4096), []
+    for tails in np.unique(wide["N"][wide["N"] > 1]):
+        groups = Groups.from_columns({name: values[wide["N"] == tails] for name, values in wide.items()})
+        orbits = solve_orbits(numbers(groups), groups.N, phases=FEW, perturbed=Perturbed.ALL)
+        solved = orbits.ended == SOLVED
+        yaws = np.abs(orbits.means[:, 2] / orbits.means[:, 0])
+        rows.append(np.column_stack([yaws, orbits.growth])[solved])
+    yaws, grows = np.concatenate(rows).T
+    for low, high in pairwise(_YAWS):
+        inside = (low <= yaws) & (yaws < high)
+        print(
+            f"  |ω_yr/ω_t| from {low} to {high}: {inside.sum()} robots, {(grows[inside] > 0).sum()} unstable, "
+            f"{np.isnan(grows[inside]).sum()} unknown, largest growth {np.nanmax(grows[inside]):.3f}"
+        )
+
+
+def main(count: str = "24") -> None:
+    selected = dict(kinds(int(count)))
+    with one_thread(), np.errstate(all="ignore"):
+        print("\ngrowth of small perturbations in a motor revolution, against time steps on the same mesh")
+        for title, some in selected.items():
+            if title != IN_CONTACT:  # steps of tails in contact are not exact enough
+                agreement(title, some)
+        print("\norbits of the wide domain, N ≥ 2")
+        domain()
+        print("\nprice")
+        for title, some in selected.items():
+            price(title, some)

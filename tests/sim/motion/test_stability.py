@@ -1,0 +1,112 @@
+"""Stable motions are those that perturbed robots return to, in time steps too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.motion import steady as steady_module
+from sim.motion.batches import steady_columns
+from sim.motion.stability import DOUBTFUL, growth, growth_of_orbit
+from sim.motion.steady import orbits, steady
+from sim.motion.steady_motion import DIRECT, STABILITY_COLUMNS, STEPPING
+from sim.solve.refinement import FEW, SOLVED, Orbit, refined_orbit
+from tests.oracles.stepped_growth import stepped_growth
+from tests.sim.robots import control, first_body
+
+TOP = {"C_t": 0.55, "C_r": 0.54, "C_yr": 4.1, "l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2}
+UNSTABLE = {**TOP, "N": 6, "omega_bar": 117.0}  # yaws nearly as fast as its tails spin
+UNRESOLVED = {
+    "C_t": 0.8386, "C_r": 0.6482, "C_yr": 4.3827, "l_over_R": 7.888, "L_over_R": 5.2725, "l_over_r0": 16.1815,
+    "omega_bar": 160.783, "N": 5,
+}  # fmt: skip
+
+
+def orbit_of(robot: dict[str, float]) -> Orbit:
+    orbit = refined_orbit(first_body(control(**robot)), int(robot["N"]), FEW)
+    assert orbit.ended == SOLVED
+    return orbit
+
+
+@pytest.mark.parametrize(
+    ("robot", "revolutions"),
+    [
+        ({"N": 2, "omega_bar": 10.0}, 2.5),
+        ({"N": 3, "omega_bar": 100.0, "C_yr": 6.0}, 25.0),
+        ({"N": 5, "omega_bar": 40.0}, 12.0),
+        ({"N": 3, "omega_bar": 30.0, "natural_curvature": 1.5}, 10.0),
+        ({"N": 2, "omega_bar": 30.0, "natural_twist": 3.0}, 10.0),
+    ],
+)
+def test_stable_motions_are_returned_to_at_the_stated_rate(robot: dict[str, float], revolutions: float) -> None:
+    tails, body, orbit = int(robot["N"]), first_body(control(**robot)), orbit_of(robot)
+    found = growth(body, tails, orbit.x[1], orbit.u[1])
+    assert found < DOUBTFUL
+    assert growth_of_orbit(body, tails, orbit) == found
+    assert found == pytest.approx(stepped_growth(body, tails, revolutions), rel=0.05)
+
+
+def test_an_unstable_motion_is_left_at_the_stated_rate() -> None:
+    body, orbit = first_body(control(**UNSTABLE)), orbit_of(UNSTABLE)
+    found = growth(body, 6, orbit.x[1], orbit.u[1])
+    assert found > 0.3
+    assert growth_of_orbit(body, 6, orbit) > 0.3
+    assert found == pytest.approx(stepped_growth(body, 6, 8.0), rel=0.1)  # several perturbations grow
+
+
+def test_phases_that_do_not_resolve_a_perturbation_do_not_make_a_motion_unstable() -> None:
+    body, orbit = first_body(control(**UNRESOLVED)), orbit_of(UNRESOLVED)
+    assert growth(body, 5, orbit.x[1], orbit.u[1]) > 0.1
+    found = growth_of_orbit(body, 5, orbit)
+    assert found == pytest.approx(stepped_growth(body, 5, 40.0, edges=12), abs=0.01)
+    assert found < DOUBTFUL
+
+
+def test_an_unstable_row_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time steps from straight tails reach another motion; without them the row keeps the unstable one."""
+    groups = control(1, **UNSTABLE)
+    monkeypatch.setattr(steady_module, "SAME", np.inf)
+    motion = steady(groups)
+    assert motion.method.tolist() == [DIRECT]
+    assert motion.converged.all()
+    assert not motion.stable.any()
+    assert motion.note[0].startswith("unstable: small perturbations grow by ")
+
+
+def test_time_steps_that_settle_are_stable() -> None:
+    motion = steady(control(2, N=1.0, omega_bar=[10.0, 12.0]))
+    stepped = steady_module.stepped(control(1), ["a reason"])
+    assert motion.stable.all()
+    assert stepped.method.tolist() == [STEPPING]
+    assert stepped.stable.all()
+    assert np.isnan(stepped.growth).all()
+
+
+def test_a_reversed_motor_has_the_same_growth() -> None:
+    for robot in ({"N": 3, "omega_bar": 60.0}, {"N": 2, "omega_bar": 20.0, "C_yr": 5.0}):
+        back = {**robot, "omega_bar": -robot["omega_bar"]}
+        forward, backward = (steady(control(1, **r)).growth[0] for r in (robot, back))
+        assert backward == pytest.approx(forward, rel=1e-3)
+
+
+def test_a_row_does_not_depend_on_its_batch() -> None:
+    speeds = [10.0, 40.0, 90.0]
+    together = steady(control(3, N=4, omega_bar=speeds)).growth
+    alone = [steady(control(1, N=4, omega_bar=speed)).growth[0] for speed in speeds]
+    assert together.tolist() == pytest.approx(alone, rel=1e-9)
+
+
+def test_the_growth_can_be_left_out() -> None:
+    columns = {"omega_bar": np.array([10.0, 20.0])}
+    points = {**{name: np.full(2, value) for name, value in control_values().items()}, **columns}
+    with_growth, without = steady_columns(points, title=""), steady_columns(points, stability=False, title="")
+    assert set(with_growth) - set(without) == set(STABILITY_COLUMNS)
+    assert without["omega_yr_bar"].tolist() == with_growth["omega_yr_bar"].tolist()
+    assert with_growth["stable"].all()
+    assert np.isnan(orbits(control()).growth).all()
+
+
+def control_values() -> dict[str, float]:
+    groups = control()
+    names = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar")
+    return {**{name: float(getattr(groups, name)[0]) for name in names}, "N": float(groups.N)}
