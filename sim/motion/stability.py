@@ -67,7 +67,9 @@ def growth(body: Body, tails: int, x: Floats, u: Floats, *, vectors: int = _VECT
     else:
         values, ritz = np.linalg.eig(projected[:count])
         values = values[projected[count, count - 1] * np.abs(ritz[-1]) < _CONVERGED * np.abs(values)]
-    largest = shift + (1 / values).real.max(initial=-np.inf)
+    if not len(values):
+        return np.nan
+    largest = shift + (1 / values).real.max()
     return float(2 * np.pi * largest / abs(omega_t - omega_h))
 
 

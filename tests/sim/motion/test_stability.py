@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sim.motion import stability
 from sim.motion import steady as steady_module
 from sim.motion.batches import steady_columns
 from sim.motion.stability import DOUBTFUL, growth, growth_of_orbit
@@ -110,3 +111,11 @@ def control_values() -> dict[str, float]:
     groups = control()
     names = ("C_t", "C_r", "C_yr", "l_over_R", "L_over_R", "l_over_r0", "omega_bar")
     return {**{name: float(getattr(groups, name)[0]) for name in names}, "N": float(groups.N)}
+
+
+def test_a_growth_without_a_converged_exponent_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    orbit = orbit_of({"N": 2, "omega_bar": 10.0})
+    body = first_body(control(N=2, omega_bar=10.0))
+    assert growth(body, 2, orbit.x[1], orbit.u[1], vectors=30) < 0
+    monkeypatch.setattr(stability, "_CONVERGED", 0.0)
+    assert np.isnan(growth(body, 2, orbit.x[1], orbit.u[1], vectors=30))
