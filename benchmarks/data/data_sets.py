@@ -3,7 +3,8 @@
 1. Rows a second of one core, and the engine's processor time over that of the bare simulation.
 2. Bytes a row by encoding: Parquet as it comes, without dictionaries, numbers split into streams of bytes.
 3. A million synthetic rows: stored, joined, opened, scanned, read.
-4. What 10⁶ and 10⁸ rows take on n cores, by the measured cost.
+4. What long sweeps take on n cores, by what was measured: start-up, rounds of chunks to the end of the last one,
+   and joining. Compiling, once a machine, is not in it.
 
 Usage: python -m benchmarks data_sets [--rows N]
 
@@ -26,7 +27,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from benchmarks.timing import processor_time
-from dataset.build.build import build
+from dataset.build.build import build, chunks
 from dataset.rows.design import load_design
 from dataset.storage import shards
 from dataset.storage.data_set import batches, read, read_manifest
@@ -92,8 +93,8 @@ os.register_at_fork(after_in_child=_start)
 """
 
 
-def overhead(rows: int) -> float:
-    """Print the engine's overhead; return seconds a row.
+def overhead(rows: int) -> tuple[float, float]:
+    """Print the engine's overhead; return seconds a row, and the seconds of one worker beside its rows.
 
     The time of a row changes by ten per cent with what else the machine does. So both are compared in what they
     take beside the rows.
@@ -102,6 +103,7 @@ def overhead(rows: int) -> float:
     rows_alone = float(printed)
     print(f"{rows} rows of sweep.toml, processor seconds: all, the rows themselves, all the rest")
     print(f"  bare simulation in one process {bare:8.1f} {rows_alone:8.1f} {bare - rows_alone:8.1f}")
+    start_up = 0.0
     for jobs in (1, 2):
         with TemporaryDirectory() as folder:
             engine, _ = processor_seconds(_ENGINE, str(rows), f"{folder}/out", str(jobs))
@@ -109,7 +111,9 @@ def overhead(rows: int) -> float:
         more = (engine - cost) - (bare - rows_alone)
         print(f"  engine, workers: {jobs}             {engine:8.1f} {cost:8.1f} {engine - cost:8.1f}   "
               f"{100 * more / cost:+.1f} % of the rows")  # fmt: skip
-    return cost / rows
+        if jobs == 1:
+            start_up = engine - cost
+    return cost / rows, start_up
 
 
 def encodings() -> None:
@@ -137,8 +141,8 @@ def encodings() -> None:
         print(f"  {name:24} {pages / len(rows):6.1f}")
 
 
-def reading(rows: int) -> None:
-    """Print the times of storing and reading many synthetic rows."""
+def reading(rows: int) -> float:
+    """Print the times of storing and reading many synthetic rows; return the seconds of joining them, a row."""
     with TemporaryDirectory() as folder:
         out = f"{folder}/out"
         spent, _ = processor_seconds(_SYNTHETIC, str(rows), out)
@@ -149,13 +153,15 @@ def reading(rows: int) -> None:
         print(f"\n{rows} synthetic rows with all curves: {len(files)} files, {size / rows:.0f} bytes a row; "
               "processor seconds")  # fmt: skip
         print(f"  made, stored and joined                  {spent:6.1f}")
-        print(f"  of that, joined                          {processor_time(lambda: _joined(out, form)):6.1f}")
+        joining = processor_time(lambda: _joined(out, form))
+        print(f"  of that, joined                          {joining:6.1f}")
         print(f"  manifest opened and checked              {processor_time(lambda: read_manifest(out)):6.2f}")
         two = ["omega_bar", "omega_yr_bar"]
         print(f"  two columns scanned, all checked         {processor_time(lambda: _scanned(out, two)):6.2f}")
         print(f"  all columns scanned in batches           {processor_time(lambda: _scanned(out, None)):6.2f}")
         print(f"  all columns but curves read into pandas  {processor_time(lambda: read(out, plain)):6.2f}")
         print(f"  unchanged build                          {processor_time(lambda: _again(rows, out)):6.2f}")
+    return joining / rows
 
 
 def _again(rows: int, out: str) -> None:
@@ -175,19 +181,39 @@ def _joined(out: str, form: pa.Schema) -> None:
     shards.join(storage, parts, name, form.remove_metadata(), key)
 
 
-def projection(cost: float) -> None:
-    """Print what long sweeps take."""
-    print(f"\nProjected from {1e3 * cost:.1f} ms a row")
-    for rows in (10**6, 10**8):
-        hours = [f"{cost * rows / cores / 3600:.3g} h on {cores}" for cores in (2, 64, 1024)]
-        print(f"  {rows:.0e} rows: {-(-rows // SEGMENT)} files; {', '.join(hours)} cores")
+def projected(rows: int, cores: int, cost: float, start_up: float) -> float:
+    """Compute the seconds of a sweep until its last chunk ends; every core has a worker.
+
+    Args:
+        cost: seconds a row.
+        start_up: seconds of a worker beside its rows.
+    """
+    sizes = [stop - start for start, stop in chunks([(0, rows)], cores, cost)]
+    return start_up + -(-len(sizes) // cores) * max(sizes) * cost
+
+
+def projection(cost: float, start_up: float, joining: float) -> None:
+    """Print what long sweeps take.
+
+    Args:
+        cost: seconds a row.
+        start_up: seconds of a worker beside its rows.
+        joining: seconds a row, of one core for each segment.
+    """
+    print(f"\nProjected from {1e3 * cost:.1f} ms a row; minutes until the last chunk ends, and of joining")
+    for rows in (10**5, 10**6, 10**8):
+        files = -(-rows // SEGMENT)
+        for cores in (2, 64, 1024):
+            ends = projected(rows, cores, cost, start_up)
+            joined = -(-files // cores) * min(rows, SEGMENT) * joining
+            print(f"  {rows:.0e} rows, {cores:4d} cores, {files:2d} files {ends / 60:9.2f} {joined / 60:6.2f}")
 
 
 def main(*words: str) -> None:
     parser = argparse.ArgumentParser(description="Benchmarks of data sets.")
     parser.add_argument("--rows", type=int, default=ROWS, help=f"rows that are simulated (default: {ROWS})")
     rows = parser.parse_args(words).rows
-    cost = overhead(rows)
+    cost, start_up = overhead(rows)
     encodings()
-    reading(SEGMENT)
-    projection(cost)
+    joining = reading(SEGMENT)
+    projection(cost, start_up, joining)
