@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 FOLDER = Path(__file__).parent
 ROOMS = ("simulator", "data", "table", "planner", "calibration")
-CLAIMED = ("accuracy", "speed", "scaling", "robustness", "lookup", "tracking", "device", "physics")
+CLAIMED = ("accuracy", "speed", "scaling", "robustness", "lookup", "tracking", "tensors", "physics")
 _DURATION = re.compile(r"^Takes (.+)\.$", re.MULTILINE)
 
 

@@ -87,11 +87,11 @@ class TensorRobots:
         return TensorRobots(self.n, self.root[..., robots], self.root_tangent[..., robots], body)
 
 
-def tensor_robots(groups: Groups, *, edges: int, device: str = "cpu") -> TensorRobots:
-    """Describe the robots of `groups` (B of one N) with `edges` edges a tail, on a device of torch."""
+def tensor_robots(groups: Groups, *, edges: int) -> TensorRobots:
+    """Describe the robots of `groups` (B of one N) with `edges` edges a tail."""
     body = assemble(groups)
-    terms = body.nonlocal_terms._make(torch.as_tensor(value, device=device) for value in body.nonlocal_terms)
-    parts = {name: torch.as_tensor(getattr(body, name), device=device) for name in Body._fields[:-1]}
+    terms = body.nonlocal_terms._make(torch.as_tensor(value) for value in body.nonlocal_terms)
+    parts = {name: torch.as_tensor(getattr(body, name)) for name in Body._fields[:-1]}
     body = Body(**parts, nonlocal_terms=terms)
     like = body.offset
     angle = 2 * math.pi * torch.arange(groups.N, dtype=like.dtype, device=like.device) / groups.N

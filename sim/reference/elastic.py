@@ -1,4 +1,4 @@
-"""Elastic response of many tails at once, as tensors on any device: the formulas of `sim.mechanics.rod`.
+"""Elastic response of many tails at once, as tensors: the formulas of `sim.mechanics.rod`.
 
 Arrays are (n, 3, N, B): node or edge, component, tail, robot, with the batch last so that every operation runs
 over contiguous memory. Units: EI = 1, l = 1, so EA = 4 (l/r0)².

@@ -1,4 +1,4 @@
-"""Implicit time steps of many robots at once in the disc frame, with tensors on any device.
+"""Implicit time steps of many robots at once in the disc frame, with tensors.
 
 The reference for `sim.solve.march`, which takes the same steps of one robot in compiled loops.
 
