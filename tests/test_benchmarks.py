@@ -8,10 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
-from benchmarks.data.data_sets import projected
-
 ROOT = Path(__file__).parents[1]
 
 
@@ -54,12 +50,3 @@ def test_an_unknown_name_is_refused() -> None:
     done = benchmarks("accurracy")
     assert done.returncode == 2
     assert done.stderr == "error: no benchmark 'accurracy'; `python -m benchmarks` lists all\n"
-
-
-def test_a_projected_sweep_ends_with_its_last_chunk() -> None:
-    """9,000 rows are nine chunks for two cores, which take five rounds of them; more cores get smaller chunks."""
-    second = 0.02
-    assert projected(1024, 1, second, 3.0) == pytest.approx(3.0 + 1024 * second)
-    assert projected(9000, 2, second, 0.0) == pytest.approx(5 * 1024 * second)
-    assert projected(9000, 64, second, 1.5) < projected(9000, 8, second, 1.5) < projected(9000, 2, second, 1.5)
-    assert projected(10**6, 64, second, 1.5) > 10**6 * second / 64

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from calibration.attribution.refits import UNSEEN
-from calibration.statistics.fit import Pull
+from calibration.statistics.pull import Pull
 from calibration.statistics.statistical_model import Parameter
 
 LABELS = {

@@ -24,7 +24,8 @@ from calibration.report.quantities import (
     tolerance,
 )
 from calibration.statistics.exclusions import count_of_rows
-from calibration.statistics.fit import WRONG, Fit, Pull, least_determined
+from calibration.statistics.fit import Fit, least_determined
+from calibration.statistics.pull import WRONG, Pull
 from calibration.statistics.statistical_model import Parameter
 from calibration.swimmer.measured_table import Measurements
 from calibration.verdict.next_runs import STOP, Batch

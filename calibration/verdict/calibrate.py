@@ -49,25 +49,18 @@ from calibration.attribution.wrong_numbers import (
     without_wrong_priors,
 )
 from calibration.statistics.exclusions import caveat_of_excluded, count_of_rows
-from calibration.statistics.fit import Fit, Pull, fit, profile_intervals
+from calibration.statistics.fit import Fit, fit, profile_intervals
 from calibration.statistics.held_out import error_interval, errors, held_out_p_value, refit_to_all
+from calibration.statistics.pull import Pull
 from calibration.statistics.residual_regression import regress_residual
 from calibration.statistics.residual_tests import TESTABLE, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import ForwardModel, start_values
 from calibration.statistics.study import DRAWS, LEVEL, Split, Study, find_outliers, split_runs
+from calibration.verdict.contents import Conditions, Corrections, Evidence, Fits, HeldOutErrors, Next
 from calibration.verdict.experiment import Description, Experiment, LearntCorrection, Rival
 from calibration.verdict.next_runs import next_runs
 from calibration.verdict.sequential_test import Explanation
-from calibration.verdict.verdict import (
-    Conditions,
-    Corrections,
-    Evidence,
-    Fits,
-    HeldOutErrors,
-    Next,
-    Verdict,
-    reach_verdict,
-)
+from calibration.verdict.verdict import Verdict, reach_verdict
 from sim.arrays import Flags, Floats
 from sim.io.provenance import fingerprint
 

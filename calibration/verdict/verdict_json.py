@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from calibration.statistics.fit import Pull
+from calibration.statistics.pull import Pull
+from calibration.verdict.contents import MODELS
 from calibration.verdict.next_steps import next_steps
-from calibration.verdict.verdict import MODELS, Verdict
+from calibration.verdict.verdict import Verdict
 from sim.io.provenance import provenance
 
 

@@ -12,12 +12,13 @@ import pytest
 from calibration.attribution.halved_tolerances import notable_gains
 from calibration.report.quantities import detectable, direction_in_words, plain, size, with_error
 from calibration.report.report import write_report
-from calibration.statistics.fit import Pull
+from calibration.statistics.pull import Pull
 from calibration.statistics.statistical_model import Parameter
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.nuisance_numbers import nuisance_parameters
+from calibration.verdict.contents import Next
 from calibration.verdict.next_steps import next_steps
-from calibration.verdict.verdict import Next, Verdict
+from calibration.verdict.verdict import Verdict
 from calibration.verdict.verdict_json import verdict_record
 from tests.calibration.toy_tables import (
     START,

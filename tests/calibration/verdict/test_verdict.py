@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
+from calibration.verdict.contents import Corrections, Evidence, HeldOutErrors
 from calibration.verdict.next_steps import next_steps
 from calibration.verdict.old_names import OLD_NAMES
-from calibration.verdict.verdict import Corrections, Evidence, HeldOutErrors, Verdict, reach_verdict
+from calibration.verdict.verdict import Verdict, reach_verdict
 
 
 def evidence(p_value: float, effects: int, numbers: int) -> Any:
