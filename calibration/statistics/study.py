@@ -22,7 +22,7 @@ from sim.arrays import Flags, Floats, Integers
 
 LEVEL = 0.04  # α of every claim; below 0.05, because the noise is estimated and false claims must stay below 5 %
 DRAWS = 1000  # of the bootstrap
-FAR = 7.0  # robust standard deviations between repeats; clean pairs differ so far once in a million
+FAR = 12.0  # robust standard deviations between repeats
 _MAD = 1.4826  # median absolute deviation to standard deviation
 _FEWEST = 3  # sessions that are held out as a whole
 _BLOCKS = 4  # in all

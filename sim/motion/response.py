@@ -145,8 +145,8 @@ def _on_mesh(
             return None
         reverse_twist = before_flip[2]
         start, first = before_flip[0], before_flip[1] * REVERSED
-    marks = before if history else np.empty(0)
-    main = transient(body, start.copy(), first.copy(), twist, SETTLED, marks, tolerance)
+    none = np.empty(0)
+    main = transient(body, start.copy(), first.copy(), twist, SETTLED, none, tolerance)
     if not main.solved:
         return None
     dwells = np.minimum(DWELLS, SETTLED)
@@ -155,19 +155,18 @@ def _on_mesh(
     memory, rest = np.zeros((len(before), *lag.shape)), np.zeros_like(lag)
     if not history:
         return Curves(lag, memory, rest, spread)
-    shapes = main.shapes
     if even:
-        shapes = np.array([_mirrored(shape) for shape in shapes])
+        back = transient(body, start, first.copy(), twist, float(before[-1]), before, tolerance)
     else:
         back = transient(reverse, x.copy(), u * REVERSED, reverse_twist, float(before[-1]), before, tolerance)
-        if not back.solved:
-            return None
-        shapes = back.shapes
+    if not back.solved:
+        return None
+    shapes = np.array([_mirrored(shape) for shape in back.shapes]) if even else back.shapes
     starts = [*shapes, straight(edges, x.shape[1], body.offset)]
     curves = np.empty((len(starts), *lag.shape))
     for i, shape in enumerate(starts):
         until = _SAME if i < len(shapes) else SETTLED
-        flip = transient(body, shape, first.copy(), twist, until, np.empty(0), tolerance)
+        flip = transient(body, shape, first.copy(), twist, until, none, tolerance)
         if not flip.solved:
             return None
         curves[i] = lag_at(flip, np.minimum(DWELLS, until)).mean(1)
