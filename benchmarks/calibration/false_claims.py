@@ -64,7 +64,7 @@ def claims(verdict: Verdict, case: Case) -> dict[str, bool]:
     answers = {
         "an effect is claimed": bool(sets),
         "claimed without the words": bool(sets) and not uncertain,
-        "a number is wrong": verdict.verdict == "number" or bool(verdict.evidence.rival_number),
+        "a number is wrong": verdict.verdict == "number" or bool(verdict.evidence.rival_numbers),
         _NAMED: {case.truth} in (*sets, *beside),
         _OTHER: bool(sets) and {case.truth} not in sets,
         _NUMBER: verdict.verdict == "number" and {case.truth} not in beside,

@@ -194,13 +194,13 @@ class Laws:
         }
 
 
-def find_laws(study: Study, base: Fit, claim: Fit | None = None) -> Laws:
+def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
     """Find laws that describe the residual of a fit without effects; for `calibration.verdict.calibrate`, too.
 
     Args:
         study: of a `SwimmerModel`.
         base: its coefficients and nuisance parameters, fitted to the runs that the study uses.
-        claim: the fit of a claimed effect, beside which laws are looked for; None where no effect is claimed.
+        beside_claim: whether an effect is claimed for the residual, with which laws are compared.
 
     Source: Schwarz (1978) for BIC; nested power laws as in dimensional analysis.
     """
@@ -210,12 +210,9 @@ def find_laws(study: Study, base: Fit, claim: Fit | None = None) -> Laws:
     ranked = rank(model, base, study.split.fitted, places(), title="places" if study.progress else "")
     least = max(_CURVED * ranked[0].gain, 0.0)
     likely = [one for one in ranked[:_FITTED] if one.gain > least]
-    if claim is not None:
-        laws = _fit_all(study, model, base, likely, chosen_alone=True)
-        return Laws(base, tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), study.level)
-    laws = _fit_all(study, model, base, likely)
+    laws = _fit_all(study, model, base, likely, chosen_alone=beside_claim)
     kept = _kept(laws)
-    if not kept or kept[0].p_value < study.level / 2:
+    if not beside_claim and (not kept or kept[0].p_value < study.level / 2):
         laws += _fit_all(study, model, base, [one for one in ranked if one.gain > 0 and one not in likely])
     return Laws(base, tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), study.level)
 

@@ -57,7 +57,7 @@ from calibration.statistics.residual_tests import TESTABLE, Misfit, directions, 
 from calibration.statistics.statistical_model import ForwardModel, start_values
 from calibration.statistics.study import DRAWS, LEVEL, Split, Study, find_outliers, split_runs
 from calibration.verdict.contents import Conditions, Corrections, Evidence, Fits, HeldOutErrors, Next
-from calibration.verdict.experiment import Description, Experiment, LearntCorrection, Rival
+from calibration.verdict.experiment import Describe, Experiment, LearntCorrection, Rival
 from calibration.verdict.next_runs import next_runs
 from calibration.verdict.sequential_test import Explanation
 from calibration.verdict.verdict import Verdict, reach_verdict
@@ -73,7 +73,7 @@ def calibrate(
     model: Subject,
     *,
     held_out: Flags | None = None,
-    describe: Callable[[Study, Fit, Fit | None], Description | None] | None = None,
+    describe: Describe | None = None,
     correction: Callable[[Subject, Fit, Split], LearntCorrection | None] | None = None,
     level: float = LEVEL,
     seed: int = 0,
@@ -106,20 +106,21 @@ def calibrate(
         candidates=explained.candidates,
         explaining=explained.best,
         rival_effects=explained.rival_effects,
-        rival_number=explained.rival_number,
+        rival_numbers=explained.rival_numbers,
         untestable=dict(model.untestable),
     )
     verdict = reach_verdict(evidence, level, number_explains=explained.number is not None)
-    claim = explained.final if any(c.uncertain for c in explained.best) else None
-    sought = describe is not None and (verdict == "unexplained" or claim is not None)
-    description = describe(study, explained.base, claim) if describe and sought else None
-    described = verdict == "unexplained" and description is not None and description.complete
-    steered = verdict == "unexplained" and not described
+    unexplained, uncertain = verdict == "unexplained", any(c.uncertain for c in explained.best)
+    description = None
+    if describe and (unexplained or uncertain):
+        description = describe(study, explained.base, beside_claim=uncertain)
+    described = unexplained and description is not None and description.complete
+    steered = unexplained and not described
     learnt = correction(model, explained.base, split) if correction and steered else None
     fixed = {"level": level, "seed": seed, "catalogue": [e.name for e in model.effects], "locked": split.names}
     regression = regress_residual(model.runs, explained.base.prediction, split.fitted)
     corrections = Corrections(regression, learnt, description)
-    laws = description.as_good_as(claim) if description and claim else ()
+    laws = description.as_good_as(explained.final) if description and uncertain else ()
     rivals = description.rivals if description and described else explained.rivals(model, laws)
     excluded = (*model.runs.excluded, *split.reasons)
     rows = len(model.runs) + count_of_rows(model.runs.excluded)
@@ -156,7 +157,7 @@ class Explained:
     best: tuple[Candidate, ...] = ()  # what explains the residual, best first; more than one: not told apart
     number: Fit | None = None  # the fit with a wrong nuisance parameter freed, if that explains the residual
     rival_effects: tuple[Candidate, ...] = ()  # effects that explain as much as the wrong number does
-    rival_number: tuple[Pull, ...] = ()  # the wrong number, where effects come ahead of it
+    rival_numbers: tuple[Pull, ...] = ()  # the wrong numbers, where effects come ahead of them
 
     @property
     def final(self) -> Fit:
@@ -216,7 +217,7 @@ def explain(study: Study, guess: Mapping[str, float]) -> Explained:
         off = tuple(p for p in pulls(freed, model.nuisances) if p.freed)
         if claims and misfit.p_value < level and implausible(off):
             checked = tuple(with_checks(study, claims, base))
-            return Explained(base, misfit, tuple(candidates), checked, freed, rival_number=off)
+            return Explained(base, misfit, tuple(candidates), checked, freed, rival_numbers=off)
         return Explained(base, misfit, tuple(candidates), (), freed, rival_effects)
     best = (
         best

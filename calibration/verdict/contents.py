@@ -30,7 +30,7 @@ class Evidence:
     explaining: tuple[Candidate, ...]  # what explains the residual, best first; more than one: not told apart
     rival_effects: tuple[Candidate, ...]  # effects that explain as much as the number that is wrong
     untestable: dict[str, str]  # effects that these runs cannot test: what is missing
-    rival_number: tuple[Pull, ...] = ()  # numbers that explain as much, but would be too far off to come first
+    rival_numbers: tuple[Pull, ...] = ()  # numbers that explain as much, but would be too far off to come first
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from calibration.statistics.fit import Fit
 from calibration.statistics.statistical_model import ForwardModel
+from calibration.statistics.study import Study
 from sim.arrays import Flags, Floats
 
 
@@ -64,6 +65,14 @@ class Rival:
     fit: Fit
     model: Experiment  # that was fitted
     law: Mapping[str, Any] = field(default_factory=dict)  # what makes this model of one without the law
+
+
+class Describe(Protocol):
+    """Looks for laws that describe a residual."""
+
+    def __call__(self, study: Study, base: Fit, *, beside_claim: bool) -> Description | None:
+        """Describe what a fit without effects leaves; `beside_claim`: an effect is claimed for it."""
+        ...
 
 
 class Description(Protocol):

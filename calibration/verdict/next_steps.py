@@ -85,7 +85,7 @@ def _after_effect(result: Verdict) -> list[str]:
 
 def _after_ambiguous(result: Verdict) -> list[str]:
     first = result.explaining[0].title
-    numbers = " and ".join(p.parameter.title for p in result.evidence.rival_number)
+    numbers = " and ".join(p.parameter.title for p in result.evidence.rival_numbers)
     again = f"Measure {numbers} again, to rule out that the stated value is wrong, and calibrate again."
     return [
         *([again] if numbers else []),

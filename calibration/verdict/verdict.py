@@ -31,7 +31,7 @@ def reach_verdict(evidence: Evidence, level: float, *, number_explains: bool) ->
     """Decide the verdict; this is the rule of the whole calibration.
 
     A wrong nuisance parameter comes ahead of every effect that is not better, or it is one of several explanations
-    (`Evidence.rival_number`). Without one, a residual within the noise is "none". Beyond it, the number of
+    (`Evidence.rival_numbers`). Without one, a residual within the noise is "none". Beyond it, the number of
     explanations that the runs cannot tell apart decides. What new runs say about an "ambiguous" verdict is decided
     by `calibration.verdict.sequential_test.standings`.
 
@@ -43,7 +43,7 @@ def reach_verdict(evidence: Evidence, level: float, *, number_explains: bool) ->
         return "number"
     if evidence.misfit.p_value >= level:
         return "none"
-    explanations = len(evidence.explaining) + bool(evidence.rival_number)
+    explanations = len(evidence.explaining) + bool(evidence.rival_numbers)
     return ("unexplained", "effect", "ambiguous")[min(explanations, 2)]
 
 
@@ -306,7 +306,7 @@ class Verdict:
         """The words for numbers that explain as much, but would be off by too many of their tolerances."""
         numbers = (
             f"{p.parameter.title} that is {p.departure} ({p.tolerances:.0f} of its tolerances)"
-            for p in self.evidence.rival_number
+            for p in self.evidence.rival_numbers
         )
         said = " and ".join(numbers)
         return f", or by {said}" if said else ""

@@ -34,7 +34,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "transfer_p": [c.transfer for c in result.explaining],
         "imitable": any(c.uncertain for c in result.explaining),
         "effects_instead": [[e.name for e in c.claimed] for c in result.evidence.rival_effects],
-        "numbers_instead": [p.parameter.name for p in result.evidence.rival_number],
+        "numbers_instead": [p.parameter.name for p in result.evidence.rival_numbers],
         "wrong_numbers": [[p.parameter.name for p in alike] for alike in result.wrong_numbers],
         "numbers_as_given": [_number_record(p) for p in result.fits.pulls],
         "halved_tolerances": [

@@ -126,7 +126,7 @@ def test_a_number_far_beyond_its_tolerance_does_not_come_ahead_of_an_effect(
     result = calibrated(table)
     assert result.verdict == "ambiguous"
     assert result.effects == ("end_over_end_drag",)
-    (number,) = result.evidence.rival_number
+    (number,) = result.evidence.rival_numbers
     assert number.parameter.name == "head_length"
     assert number.tolerances > wrong_numbers.IMPLAUSIBLE
     assert f"L (head length) that is {number.departure} (9 of its tolerances)" in result.sentence

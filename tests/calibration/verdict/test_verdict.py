@@ -16,7 +16,7 @@ from calibration.verdict.verdict import Verdict, reach_verdict
 
 def evidence(p_value: float, effects: int, numbers: int) -> Any:
     misfit = SimpleNamespace(p_value=p_value)
-    return SimpleNamespace(misfit=misfit, explaining=(None,) * effects, rival_number=(None,) * numbers)
+    return SimpleNamespace(misfit=misfit, explaining=(None,) * effects, rival_numbers=(None,) * numbers)
 
 
 @pytest.mark.parametrize(
