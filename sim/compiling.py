@@ -40,7 +40,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _HERE = Path(__file__).parent
 _SOURCES = (
-    "arrays.py", "compiling.py", "machine_code.py", "linear/*.py", "mechanics/*.py", "model/body.py", "solve/*.py",
+    "arrays.py", "compiling.py", "machine_code.py", "object_code.py", "model/body.py",
+    "linear/*.py", "mechanics/*.py", "solve/*.py",
 )  # fmt: skip
 _KEPT = 3  # folders of other versions
 _NUMBA = "sim.machine_code"  # by name: this module imports us, and numba
@@ -192,8 +193,8 @@ def compiled(function: F) -> F:
 _formulas: list[Callable[..., Any]] = []  # that numba has not been told of
 
 
-def inlined(function: F) -> F:
-    """Mark a function that compiled functions may call, and that stays plain Python when called from Python."""
+def formula(function: F) -> F:
+    """Mark a formula: inlined in compiled functions, elsewhere plain Python, for numbers and tensors."""
     _formulas.append(function)
     return function
 

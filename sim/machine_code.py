@@ -1,7 +1,7 @@
 """What `sim.compiling` needs numba for: the cache of a compiled function, its progress bar, and its options.
 
 This module is imported on the first call of a compiled function. A compiled function that calls another one sees
-the other's dispatcher. The functions that are inlined (`sim.compiling.inlined`) are made known to numba before
+the other's dispatcher. The functions that are inlined (`sim.compiling.formula`) are made known to numba before
 a function is compiled.
 """
 

@@ -133,12 +133,11 @@ def object_code(function: Kept) -> bytes:
 
 @cache
 def _machine() -> str:
-    """Return twelve characters for the kind of processor, the version of LLVM and this file."""
+    """Return twelve characters for the kind of processor and the version of LLVM."""
     import llvmlite
     import llvmlite.binding as llvm
 
-    words = (llvmlite.__version__, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(),
-             Path(__file__).read_bytes())  # fmt: skip
+    words = llvmlite.__version__, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
     return sha256(repr(words).encode()).hexdigest()[:12]
 
 

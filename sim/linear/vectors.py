@@ -4,29 +4,21 @@ A vector is (a_x, a_y, a_z); a matrix is a tuple of three such rows. A component
 multiplied: a number in a compiled loop, or a tensor with an entry for each node and robot. So a formula of
 `sim.mechanics` is written once and used by both.
 
-`formula` marks such a function: plain Python when called from Python, inlined machine code when called from
-a compiled loop (`sim.compiling`).
+`sim.compiling.formula` marks such a function.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
-from sim.compiling import inlined
+from sim.compiling import formula
 
 Vector = tuple[Any, Any, Any]
 Matrix = tuple[Vector, Vector, Vector]
-F = TypeVar("F", bound=Callable[..., Any])
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 ZERO_MATRIX: Matrix = (ZERO, ZERO, ZERO)
 E_Z: Vector = (0.0, 0.0, 1.0)
-
-
-def formula(function: F) -> F:
-    """Decorate a formula: the same source for numbers in compiled loops and for tensors."""
-    return inlined(function)
 
 
 @formula

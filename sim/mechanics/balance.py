@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled, formula
 from sim.linear.blocks import vector
 from sim.linear.vectors import (
     E_Z,
@@ -34,7 +34,6 @@ from sim.linear.vectors import (
     cross,
     crossed,
     dot,
-    formula,
     minus,
     plus,
     projected,

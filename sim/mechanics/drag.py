@@ -24,7 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from sim.linear.vectors import Matrix, Vector, dot, formula, minus, outer, plus, plus_identity, times
+from sim.compiling import formula
+from sim.linear.vectors import Matrix, Vector, dot, minus, outer, plus, plus_identity, times
 
 
 @formula

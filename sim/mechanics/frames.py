@@ -25,9 +25,9 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled, formula
 from sim.linear.blocks import add, add_at, put, vector
-from sim.linear.vectors import ZERO, Vector, cross, dot, formula, minus, plus, times
+from sim.linear.vectors import ZERO, Vector, cross, dot, minus, plus, times
 from sim.mechanics.balance import Motion
 from sim.mechanics.geometry import ROOT_TANGENT, Geometry, inverse_voronoi
 from sim.model.body import Body

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from sim.compiling import formula
 from sim.linear.vectors import (
     Matrix,
     Vector,
@@ -33,7 +34,6 @@ from sim.linear.vectors import (
     cross,
     crossed,
     dot,
-    formula,
     minus,
     outer,
     plus,

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.linear.vectors import Vector, cross, dot, formula, minus, plus, times
+from sim.compiling import formula
+from sim.linear.vectors import Vector, cross, dot, minus, plus, times
 
 
 @formula

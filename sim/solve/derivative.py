@@ -13,10 +13,9 @@ from sim.arrays import Floats
 from sim.compiling import compiled
 from sim.model.body import Body
 from sim.solve.linearise import linearise
-from sim.solve.newton import factor_and_solve, new_workspace, solve_local, solve_nonlocal
+from sim.solve.newton import new_workspace, solve_linear
 from sim.solve.orbit import FIRST_PHASE
 from sim.solve.rates import on_orbit
-from sim.solve.residual import is_local
 
 _TOLERANCE = 1e-6  # of GMRES
 
@@ -35,11 +34,6 @@ def orbit_slopes(body: Body, r: Floats, t: Floats, x: Floats, u: Floats) -> Floa
     slopes = np.empty((count, u.shape[0], 4))
     for i in range(count):
         dx, du = -r[i], -t[i]
-        if i == 0:
-            factor_and_solve(body, rates, u, work, dx, du)
-        else:
-            solve_local(rates, work, dx, du)
-        if not is_local(body):
-            solve_nonlocal(body, rates, x, u, work, _TOLERANCE, dx, du)
+        solve_linear(body, rates, x, u, work, i == 0, _TOLERANCE, dx, du)
         slopes[i] = du
     return slopes

@@ -29,7 +29,7 @@ from sim.linear.spectral import differentiation
 from sim.linear.vectors import applied
 from sim.model.body import Body
 from sim.solve.linearise import linearise
-from sim.solve.newton import Workspace, factor_and_solve, new_workspace, solve_local, solve_nonlocal
+from sim.solve.newton import Workspace, new_workspace, solve_linear
 from sim.solve.orbit import FIRST_PHASE
 from sim.solve.rates import Rates
 from sim.solve.residual import fill_residual, is_local
@@ -66,12 +66,7 @@ def arnoldi(body: Body, x: Floats, u: Floats, shift: float, first: Floats, count
     dx, du = np.empty_like(x), np.empty_like(u)
     for i in range(count):
         _by_rate(body, rates, x, u, work, basis[i].reshape(x.shape), dx, du)
-        if i == 0:
-            factor_and_solve(body, rates, u, work, dx, du)
-        else:
-            solve_local(rates, work, dx, du)
-        if not is_local(body):
-            solve_nonlocal(body, rates, x, u, work, _TOLERANCE, dx, du)
+        solve_linear(body, rates, x, u, work, i == 0, _TOLERANCE, dx, du)
         image = dx.reshape(x.size)
         before, size = np.inf, np.sqrt(np.dot(image, image))
         while size < _CANCELS * before:  # Gram-Schmidt, again where digits cancelled

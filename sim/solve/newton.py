@@ -84,12 +84,7 @@ def correct(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, ane
     if not (anew and local):
         fill_residual(body, rates, x, u, work.room, work.equations.r, work.equations.t)
     _negate(work.equations, dx, du)
-    if anew:
-        factor_and_solve(body, rates, u, work, dx, du)
-    else:
-        solve_local(rates, work, dx, du)
-    if not local:
-        solve_nonlocal(body, rates, x, u, work, RELATIVE_TOLERANCE, dx, du)
+    solve_linear(body, rates, x, u, work, anew, RELATIVE_TOLERANCE, dx, du)
     return dx, du
 
 
@@ -122,6 +117,33 @@ def _negate(equations: Equations, dx: Floats, du: Floats) -> None:
 
 
 @compiled
+def solve_linear(
+    body: Body,
+    rates: Rates,
+    x: Floats,
+    u: Floats,
+    work: Workspace,
+    anew: bool,
+    tolerance: float,
+    dx: Floats,
+    du: Floats,
+) -> None:
+    """Solve with the derivative of the residual at x, u, which `linearise` left in `work`.
+
+    Args:
+        anew: factorise it; otherwise the stored factors are used.
+        tolerance: of GMRES for non-local effects, a share of the preconditioned right-hand side.
+        dx, du: come in as right-hand sides, (n, M, 3) and (P, 4); solved in place.
+    """
+    if anew:
+        factor_and_solve(body, rates, u, work, dx, du)
+    else:
+        _solve_local(rates, work, dx, du)
+    if not is_local(body):
+        _solve_nonlocal(body, rates, x, u, work, tolerance, dx, du)
+
+
+@compiled
 def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: Floats, du: Floats) -> None:
     """Factorise Newton's matrix without non-local effects, which `linearise` left in `work`, and solve with it.
 
@@ -141,7 +163,7 @@ def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: F
 
 
 @compiled
-def solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
+def _solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
     """Solve with the factors, in place: dx (n, M, 3) and du (P, 4) come in as right-hand sides."""
     if not is_joined(rates):
         separate.solve(work.equations.chains, dx, du[0])
@@ -151,14 +173,14 @@ def solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
 
 
 @compiled
-def solve_nonlocal(
+def _solve_nonlocal(
     body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float, dx: Floats, du: Floats
 ) -> None:
     """Solve with the matrix of everything that acts, by GMRES with the factors as preconditioner.
 
     Args:
         tolerance: share of the preconditioned right-hand side that may be left.
-        dx, du: come in as the right-hand side after `solve_local`, (n, M, 3) and (P, 4).
+        dx, du: come in as the right-hand side after `_solve_local`, (n, M, 3) and (P, 4).
     """
     nodes, size = dx.size, dx.size + du.size
     scale = 1 + abs(body.omega)
@@ -179,7 +201,7 @@ def solve_nonlocal(
                     side[:nodes].reshape(x.shape), side[nodes:].reshape(u.shape),
                 )  # fmt: skip
             image = (above - below) / (2 * step)
-            solve_local(rates, work, image[:nodes].reshape(x.shape), image[nodes:].reshape(u.shape))
+            _solve_local(rates, work, image[:nodes].reshape(x.shape), image[nodes:].reshape(u.shape))
             image[nodes:] /= scale
             count = i + 1
             if extend(krylov, i, image) < tolerance:

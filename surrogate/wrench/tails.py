@@ -36,8 +36,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.arrays import Flags, Floats, Integers
+from sim.compiling import formula
 from sim.linear.complex_step import angle
-from sim.linear.vectors import formula
 
 INPUTS = ("ln S", "ln a", "ln 1/r0", "asinh δ", "β", "asinh v_z", "ln spin drag of head over tails")
 HEAD_INPUTS = (
