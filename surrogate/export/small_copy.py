@@ -24,9 +24,8 @@ from sim.model.response import DWELLS
 from sim.motion.net_speed import twists
 from surrogate.input_ranges import ROBOT
 from surrogate.networks.ensemble import Ensemble
-from surrogate.table.errors import COMPARED, error_scale, relative_errors
+from surrogate.table.errors import COMPARED, RESPONSE_OUTPUTS, error_scale, relative_errors
 from surrogate.table.lookup import NeuralTable, steady_outputs
-from surrogate.table.quick_query import RESPONSE_OUTPUTS
 from surrogate.table.response_table import (
     between_dwells,
     curve_speeds,

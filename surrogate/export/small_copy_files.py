@@ -30,8 +30,8 @@ from surrogate.export.small_copy import (
     network_depth,
 )
 from surrogate.input_ranges import ROBOT
+from surrogate.table.errors import RESPONSE_OUTPUTS
 from surrogate.table.lookup import NeuralTable
-from surrogate.table.quick_query import RESPONSE_OUTPUTS
 
 READERS = Path(__file__).parents[1] / "readers"
 FORMAT = 1

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 
 from sim.arrays import Floats, Integers
-from sim.compiling import compiled
-from sim.linear.vectors import formula
+from sim.compiling import compiled, formula
 from sim.mechanics.drag import head_resistance, tail_coefficients
 from sim.model.groups import LEAST_SLENDERNESS, MOST_TAILS
 from sim.model.response import DWELLS
 from sim.object_code import COUNT, FLOATS, INTEGERS, array_at, kept
 from surrogate.input_ranges import ROBOT
 from surrogate.networks.compiled import evaluate
+from surrogate.table.errors import ITSELF, ONE, OUTPUTS, SCALES, SPEED, SURGE
 from surrogate.table.flat_table import (
     CURVES,
     DESIGN,
@@ -30,7 +30,6 @@ from surrogate.table.flat_table import (
     LAG,
     MEMORY,
     NETWORK,
-    OUTPUTS,
     PRODUCTS,
     RANGES,
     SUPPORT,
@@ -44,7 +43,7 @@ from surrogate.wrench.tails import INPUTS, inputs_of_head
 
 GROUPS = len(ROBOT)  # in the order of ROBOT
 MOTION, INPUT, NOVELTY, REASON, STEADY, RESPONSE, HALF = 0, 5, 12, 13, 14, 22, 26  # rows of the answer
-ANSWERS = HALF + OUTPUTS
+ANSWERS = HALF + len(OUTPUTS)
 WITH_DWELL, WITH_WIDTHS, ASSEMBLED = 1, 2, 4  # what is wanted; whether the robots are given as heads and tails
 INSIDE, NOT_LEARNED, NO_MOTION, STRANGE, QUICK, IMPOSSIBLE = range(6)  # reasons
 BRANCHES = 0.6  # |ω_yr/ω_t| from which a robot may have several motions
@@ -58,6 +57,7 @@ _TERMS = monomial_count(len(INPUTS))
 _SUPPORT_NUMBERS = 2 * len(INPUTS) + 1 + _TERMS * _TERMS
 _SUPPORT_ROOM = support_room(len(INPUTS))
 _MOST = 1.7976931348623157e308
+_SCALES = np.array([SCALES[name] for name in OUTPUTS])
 
 
 @kept(FLOATS, INTEGERS, COUNT, COUNT, COUNT, FLOATS, FLOATS, FLOATS, COUNT, FLOATS, FLOATS, COUNT, FLOATS)
@@ -279,16 +279,16 @@ def _half_widths(table: Floats, places: Integers, robot: Floats, answer: Floats,
     part = 8
     if number != 1:
         part = int(features[0] > middle[0]) + 2 * int(features[3] > middle[1]) + 4 * int(features[5] > middle[2])
-    design[0], place = 1.0, 1
+    design[0], place = 1.0, 1 + _WIDTH_FEATURES
     for i in range(_WIDTH_FEATURES):
         scaled = (features[i] - table[at + i]) / table[at + _WIDTH_FEATURES + i]
         design[1 + i] = min(max(scaled, -5.0), 5.0)
     for i in range(_WIDTH_FEATURES):
         for j in range(i, _WIDTH_FEATURES):
-            design[1 + _WIDTH_FEATURES + place - 1] = design[1 + i] * design[1 + j]
+            design[place] = design[1 + i] * design[1 + j]
             place += 1
     speed = np.hypot(answer[STEADY + 3], answer[STEADY + 4])
-    for k in range(OUTPUTS):
+    for k in range(len(_SCALES)):
         begin = places[WIDTHS + k]
         answer[HALF + k] = np.nan
         if begin >= 0:
@@ -309,12 +309,11 @@ def _finite(x: float) -> float:
 @compiled
 def _scale(output: int, answer: Floats, speed: float) -> float:
     """Return what the error of an output is relative to, see `surrogate.table.errors.error_scale`."""
-    if output == 6:  # the slip angle
+    kind = _SCALES[output]
+    if kind == ITSELF:
+        return abs(answer[STEADY + output])
+    if kind == ONE:
         return 1.0
-    if output in (4, 10, 11):  # surge, lags
+    if kind == SPEED:
         return speed
-    if output == 8:  # net speed
-        return abs(answer[STEADY + 4])
-    if output == 9:  # lag of the heading
-        return abs(answer[STEADY + 2])
-    return abs(answer[STEADY + output])
+    return abs(answer[STEADY + (4 if kind == SURGE else 2)])

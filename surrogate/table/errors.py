@@ -17,12 +17,20 @@ import numpy as np
 
 from sim.arrays import Flags, Floats
 from sim.model.response import LAGS
+from sim.motion.steady_motion import STEADY_OUTPUTS
 
 Columns = Mapping[str, Any]
 Errors = Mapping[str, Mapping[str, float]]  # output -> figures of `summary`
 
 RELATIVE = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "R_yr_over_l", "tail_gap")
 COMPARED = (*RELATIVE, "v_z", "theta_deg")
+RESPONSE_OUTPUTS = ("net_speed_bar", *LAGS[::-1])
+OUTPUTS = (*STEADY_OUTPUTS, *RESPONSE_OUTPUTS)  # that have an interval
+ITSELF, ONE, SPEED, SURGE, YAW_RATE = range(5)  # what an error is relative to
+SCALES = {
+    **dict.fromkeys(RELATIVE, ITSELF), **dict.fromkeys(("v_z", "lag_x", "lag_z"), SPEED),
+    "theta_deg": ONE, "net_speed_bar": SURGE, "lag_psi_rad": YAW_RATE,
+}  # fmt: skip
 _POOR = 0.05  # a 95th percentile from which on `shortcomings` speaks
 _UNITS = {"theta_deg": "deg", "lag_psi_rad": "of turn/unit", "v_z": "of speed", "lag_x": "of speed",
           "lag_z": "of speed", "net_speed_bar": "of v_z"}  # fmt: skip
@@ -30,15 +38,14 @@ _UNITS = {"theta_deg": "deg", "lag_psi_rad": "of turn/unit", "v_z": "of speed", 
 
 def error_scale(name: str, truth: Columns) -> Floats | float:
     """Return the number by which the error of an output is divided."""
-    if name in RELATIVE:
+    kind = SCALES[name]
+    if kind == ITSELF:
         return np.abs(truth[name])
-    if name == "theta_deg":
+    if kind == ONE:
         return 1.0
-    if name == "lag_psi_rad":
-        return np.abs(truth["omega_yr_bar"])
-    if name == "net_speed_bar":
-        return np.abs(truth["v_z"])
-    return np.hypot(truth["v_x"], truth["v_z"])  # v_z, lag_x, lag_z
+    if kind == SPEED:
+        return np.hypot(truth["v_x"], truth["v_z"])
+    return np.abs(truth["v_z" if kind == SURGE else "omega_yr_bar"])
 
 
 def relative_errors(answer: Columns, truth: Columns) -> dict[str, Floats]:

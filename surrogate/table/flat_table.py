@@ -22,6 +22,7 @@ import numpy as np
 from sim.arrays import Floats, Integers
 from sim.model.response import DWELLS
 from surrogate.networks.ensemble import SHARED, Ensemble
+from surrogate.table.errors import OUTPUTS
 from surrogate.table.intervals import Intervals
 from surrogate.table.response_table import ResponseTable
 from surrogate.table.support import Support, products_of, support_room
@@ -31,8 +32,7 @@ from surrogate.wrench.tails import INPUTS
 
 NETWORK = 6  # places of a network
 WRENCH, GAP, LAG, MEMORY, SUPPORT, RANGES, CURVES, FEATURES, WIDTHS = 0, 18, 24, 30, 36, 39, 40, 41, 42
-OUTPUTS = 12  # that have an interval
-PRODUCTS = WIDTHS + OUTPUTS  # where the monomials of the supports begin among the places
+PRODUCTS = WIDTHS + len(OUTPUTS)  # where the monomials of the supports begin among the places
 DESIGN = 78  # numbers that the logarithm of a width is linear in
 
 
@@ -50,7 +50,6 @@ def flat_table(
     supports: Sequence[Support | None],
     ranges: Sequence[tuple[float, float]],
     intervals: Intervals | None,
-    outputs: Sequence[str],
 ) -> FlatTable:
     """Return the parts of a table in one array.
 
@@ -58,8 +57,7 @@ def flat_table(
         tails, curves: the networks.
         supports: of the classes of tails.
         ranges: of ω̄, l/R, l/r0 and a/R.
-        intervals: of the outputs; left out if None.
-        outputs: names of the OUTPUTS outputs.
+        intervals: of OUTPUTS; left out if None.
     """
     parts: list[Floats] = []
     places = np.full(PRODUCTS, -1)
@@ -81,7 +79,7 @@ def flat_table(
     put(CURVES, np.log(DWELLS), curves.equal_dwells.mean, curves.equal_dwells.vectors)
     if intervals is not None:
         put(FEATURES, intervals.shift, intervals.scale, intervals.middle)
-        for i, name in enumerate(outputs):
+        for i, name in enumerate(OUTPUTS):
             if name in intervals.factor:
                 bounds = np.array(intervals.bounds[name])
                 put(WIDTHS + i, intervals.weights[name], bounds, intervals.factor[name])

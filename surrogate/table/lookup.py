@@ -39,7 +39,7 @@ from surrogate.table.errors import RELATIVE, error_scale
 from surrogate.table.flat_table import flat_table
 from surrogate.table.intervals import Intervals
 from surrogate.table.jacobian import slopes
-from surrogate.table.quick_query import OUTSIDE, RESPONSE_OUTPUTS, SHORTEST, QuickQuery, outside
+from surrogate.table.quick_query import OUTSIDE, SHORTEST, QuickQuery, outside
 from surrogate.table.response_table import ResponseTable, curve_speeds
 from surrogate.table.support import Support
 from surrogate.table.tensor_file import digest, write
@@ -236,8 +236,7 @@ class NeuralTable:
     def _quick(self) -> QuickQuery:
         ranges = [self.ranges[name] for name in _NOT_OF_HEAD]
         widths = self.intervals if self._quick_widths else None
-        names = (*STEADY_OUTPUTS, *RESPONSE_OUTPUTS)
-        flat = flat_table(self.tails, self.curves, self.support, ranges, widths, names)
+        flat = flat_table(self.tails, self.curves, self.support, ranges, widths)
         return QuickQuery(flat, () if widths is None else list(widths.factor))
 
     @cached_property

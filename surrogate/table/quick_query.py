@@ -14,7 +14,7 @@ import numpy as np
 
 from sim.arrays import Flags, Floats
 from sim.model.groups import DWELL, GROUP_COLUMNS, OPTIONAL_COLUMNS
-from sim.model.response import DWELLS, LAGS
+from sim.model.response import DWELLS
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.input_ranges import ROBOT
 from surrogate.loops import compile_once
@@ -31,14 +31,13 @@ from surrogate.table.compiled_query import (
     WITH_WIDTHS,
     query_rows,
 )
+from surrogate.table.errors import OUTPUTS
 from surrogate.table.flat_table import FlatTable
 from surrogate.wrench.balance import MATRICES
 from surrogate.wrench.heads import ROBOT_NUMBERS
 
-RESPONSE_OUTPUTS = ("net_speed_bar", *LAGS[::-1])
 OUTSIDE = "outside"  # flag of robots that the table does not know
 SHORTEST = DWELLS[0] * (1 - 1e-9)  # dwell
-_OUTPUTS = (*STEADY_OUTPUTS, *RESPONSE_OUTPUTS)
 _NUMBER = GROUP_COLUMNS.index("N")
 _ROBOT = GROUPS + 1  # where the parts of one array of numbers begin: groups, dwell, robot, answer, room
 _ANSWER = _ROBOT + ROBOT_NUMBERS
@@ -57,7 +56,7 @@ class QuickQuery:
     def __init__(self, table: FlatTable, widths: Sequence[str]):
         compile_once()
         self._made_of = table, tuple(widths)
-        self._table, self._widths = table, [(i, name) for i, name in enumerate(_OUTPUTS) if name in widths]
+        self._table, self._widths = table, [(i, name) for i, name in enumerate(OUTPUTS) if name in widths]
         self._addresses = table.numbers.ctypes.data, table.places.ctypes.data
         self._sizes = len(table.numbers), len(table.places)
         self._matrices = _ROOM + table.room
@@ -124,7 +123,7 @@ class QuickQuery:
 
     def named(self, answers: Floats, *, with_dwell: bool, widths: bool) -> dict[str, Any]:
         """Return outputs and the ends of their intervals by name, from answers (ANSWERS, M)."""
-        names = _OUTPUTS if with_dwell else STEADY_OUTPUTS
+        names = OUTPUTS if with_dwell else STEADY_OUTPUTS
         result: dict[str, Any] = {name: answers[STEADY + i] for i, name in enumerate(names)}
         if widths:
             for i, name in self._widths:

@@ -13,9 +13,8 @@ from sim.model.groups import DWELL
 from sim.motion.net_speed import twists
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.table.compiled_query import BRANCHES
-from surrogate.table.errors import error_scale
+from surrogate.table.errors import RESPONSE_OUTPUTS, error_scale
 from surrogate.table.lookup import Motions, NeuralTable
-from surrogate.table.quick_query import RESPONSE_OUTPUTS
 from surrogate.table.response_table import SHAPES, between_dwells, curve_speeds
 from surrogate.table.wrench_table import network_index, rows_by_network
 from surrogate.wrench.heads import heads_and_tails

@@ -10,7 +10,7 @@ import pytest
 from sim.io.errors import InputError
 from sim.model.groups import DWELL
 from sim.motion.steady_motion import STEADY_OUTPUTS
-from surrogate.table.quick_query import RESPONSE_OUTPUTS
+from surrogate.table.errors import RESPONSE_OUTPUTS
 from tests.planner.page.page_core import TABLE, answers, refusal_of, without_digits
 from tests.planner.page.robots import (
     EXACT,

@@ -19,9 +19,8 @@ from surrogate.__main__ import main
 from surrogate.export.small_copy import MOST_BYTES, SmallCopy, make_small_copy, measure_losses
 from surrogate.export.small_copy_files import save_small_copy
 from surrogate.input_ranges import ROBOT
-from surrogate.table.errors import error_scale
+from surrogate.table.errors import RESPONSE_OUTPUTS, error_scale
 from surrogate.table.model_file import load
-from surrogate.table.quick_query import RESPONSE_OUTPUTS
 from surrogate.training.simulated import draw_robots
 from tests.planner.compiled import compile_c
 from tests.processes import LIMIT
