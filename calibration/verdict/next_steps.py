@@ -75,9 +75,10 @@ def _after_effect(result: Verdict) -> list[str]:
         steps.append(
             "Take the effect as a description of the runs: its size is outside the range that its source allows."
         )
+    worth_making = result.next.batch is not None and result.next.batch.worth_making
     return [
         *steps,
-        *_telling_apart(result),
+        *(_telling_apart(result) if worth_making else []),  # else runs with other settings, as above
         f"{_PLAN} It has the effect.",
         "Film the robot on its way, and compare: `softflagella planner check plan/plan.json track.csv`.",
     ]

@@ -140,6 +140,11 @@ def test_an_uncertain_claim_is_set_beside_the_laws_that_fit_as_well(tmp_path: Pa
     assert titles == ["head's end-over-end drag", *(rival.title for rival in as_good[:3])]
     record, report, corrected = verdict.save(tmp_path)
     assert json.loads(record.read_text())["laws"]["kept"]
+    assert verdict.next.batch is not None
+    assert not verdict.next.batch.worth_making
+    first, second, *_ = json.loads(record.read_text())["next_steps"]
+    assert first.startswith("Test the claim where it matters most: make runs with other")
+    assert second.startswith("Plan with the corrected robot")
     assert "so laws were fitted to the calibrated model without it" in report.read_text()
     assert list(load_robot(corrected).effects) == ["end_over_end_drag"]
     assert load_robot(corrected).learnt_from is None
