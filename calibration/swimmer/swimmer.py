@@ -173,8 +173,9 @@ class SwimmerModel:
             columns.setdefault(second.name, np.full(len(runs), float(parameters.get(second.name, second.start))))
         moves = {name: _moves(name, influence) for name, influence in influences.items()}
         wanted = tuple(dict.fromkeys(move for group in moves.values() for move in group))
-        # Effects at their null may need more phases than the motion; effects that are present have them already.
-        phases = FEW if any(i.effect for i in self._at_work(parameters)) else MANY
+        # Non-local effects at their null may need more phases than the motion; with effects at work it has them.
+        at_null = any(catalogue()[name].reach == "nonlocal" for name in wanted if name in catalogue())
+        phases = MANY if at_null and not any(i.effect for i in self._at_work(parameters)) else FEW
         sensitivities = self.solver.slopes(columns, wanted, phases=phases, jobs=self.jobs, title=title)
         view = self._observation(runs, np.array(parameters.get(CAMERA, 1.0)))
         J = np.empty((*self.runs.y.shape, len(names)))
