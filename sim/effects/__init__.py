@@ -12,6 +12,7 @@ from functools import cache
 from sim.io.errors import InputError
 from sim.model.effect import Effect
 from sim.model.power_law import law_from_name
+from sim.model.scaled_effect import scaled_from_name
 
 __all__ = ["Effect", "catalogue", "check_effects", "check_size", "effect_named"]
 
@@ -19,18 +20,21 @@ __all__ = ["Effect", "catalogue", "check_effects", "check_size", "effect_named"]
 class Catalogue(dict[str, Effect]):
     """Effects by name. It lists those of this folder, and knows beside them each law by its name.
 
-    A law (`sim.model.power_law`) states itself in its name. So it is found here in any process without being
-    registered, and it is never listed.
+    A law (`sim.model.power_law`, `sim.model.scaled_effect`) states itself in its name. So it is found here in any
+    process without being registered, and it is never listed.
     """
 
     def __contains__(self, name: object) -> bool:
-        return super().__contains__(name) or (isinstance(name, str) and law_from_name(name) is not None)
+        return super().__contains__(name) or (isinstance(name, str) and self._law(name) is not None)
 
     def __missing__(self, name: str) -> Effect:
-        law = law_from_name(name)
+        law = self._law(name)
         if law is None:
             raise KeyError(name)
         return law
+
+    def _law(self, name: str) -> Effect | None:
+        return law_from_name(name) or scaled_from_name(name, self)
 
 
 @cache

@@ -80,6 +80,11 @@ class Effect:
     beside: str = ""  # the effect without which this one shows nothing
     grid: tuple[float, ...] = ()  # sizes at which a calibration looks for `beside`, whose second number this is
 
+    @property
+    def term(self) -> str:
+        """Name of its number in `Body.nonlocal_terms`, of a non-local effect."""
+        return self.name
+
     def adds(self, size: Floats, groups: Groups, body: Body) -> Body:
         """Add this effect's terms to the body."""
         return body

@@ -18,9 +18,11 @@ from sim.effects import catalogue, effect_named
 from sim.mechanics.drag import head_resistance, tail_coefficients
 from sim.model.body import Body
 from sim.model.groups import Groups
+from sim.model.scaled_effect import LOCAL_DRAG
 
 # Numbers of the non-local effects, by their names; plain numbers in compiled loops.
-Nonlocal = namedtuple("Nonlocal", [e.name for e in catalogue().values() if e.reach == "nonlocal"])  # type: ignore[misc]
+_NONLOCAL = {e.name: e for e in (*catalogue().values(), *LOCAL_DRAG.values()) if e.reach == "nonlocal"}
+Nonlocal = namedtuple("Nonlocal", list(_NONLOCAL))  # type: ignore[misc]
 _SHAPES = {"resistance": (4, 5), "tail_load": (3,)}  # of the entries that are not single numbers
 
 
@@ -64,13 +66,13 @@ def with_effects(body: Body, groups: Groups) -> Body:
     for name, size in groups.effects.items():
         effect = effect_named(name)
         if effect.reach == "nonlocal":
-            terms[name] = effect.number(size, groups)
+            terms[effect.term] = terms[effect.term] + effect.number(size, groups)
         body = effect.adds(size, groups, body)
         factors = effect.scales(size, groups)
         viscosity, drag = viscosity * factors.viscosity, drag * factors.drag
         tail_drag = tail_drag * factors.tail_drag
     all_drag = viscosity * drag
-    terms = {name: value * all_drag if catalogue()[name].is_drag else value for name, value in terms.items()}
+    terms = {name: value * all_drag if _NONLOCAL[name].is_drag else value for name, value in terms.items()}
     return body._replace(
         viscosity=viscosity,
         zeta_parallel=body.zeta_parallel * (all_drag * tail_drag),

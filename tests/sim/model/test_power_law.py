@@ -107,6 +107,8 @@ def test_the_power_law_is_in_motor_speed_and_not_in_its_group() -> None:
 LAWS = [
     *(force_law(w, m, STEEP).name for w, m in product(WRENCHES, MOTIONS)),
     *(factor_law(c, STEEP).name for c in (*COEFFICIENTS, *TAILS)),
+    force_law("Fx", "wt", STEEP, lever=-0.5, lever_unit="l").name,
+    force_law("Fx", "wyr", STEEP, lever=0.75, lever_unit="L").name,
 ]
 
 
@@ -151,6 +153,10 @@ def test_a_law_is_known_by_its_name_and_not_listed() -> None:
         "law_Ct_wh_speed0_length0_tails0",
         "law_tail_drag_wh_speed0_length0_tails0",
         "law_Ct_rectified_speed100_length0_tails0",
+        "law_Fz_wt_l-500_speed0_length0_tails0",
+        "law_Fx_wt_l-5000_speed0_length0_tails0",
+        "law_Fx_wt_l-0_speed0_length0_tails0",
+        "law_Ct_l-500_speed100_length0_tails0",
     ],
 )
 def test_what_is_no_name_of_a_law_is_refused(name: str) -> None:
@@ -159,6 +165,26 @@ def test_what_is_no_name_of_a_law_is_refused(name: str) -> None:
         check_size(name, 0.1)
     with pytest.raises(InputError, match="unknown column"):
         with_law(name, 0.1)
+
+
+@pytest.mark.parametrize(("unit", "ahead"), [("l", 1.0), ("L", CONTROL_VALUES["L_over_R"] / 4.0)])
+def test_a_side_force_with_a_lever_is_a_force_and_a_couple(unit: str, ahead: float) -> None:
+    """F_x at z ahead of J has M_y = z F_x about J."""
+    changes = {"N": 3, "l_over_R": 4.0, "omega_bar": 20.0}
+    law = force_law("Fx", "wt", STEEP, lever=-0.4, lever_unit=unit)
+    one = numbers(with_law(law.name, 0.3, **changes))
+    force = numbers(with_law(force_law("Fx", "wt", STEEP).name, 0.3, **changes))
+    couple = numbers(with_law(force_law("My", "wt", STEEP).name, -0.3 * 0.4 * ahead * 4.0, **changes))
+    assert np.allclose(one, force + couple - numbers(control(**changes)), rtol=1e-13, atol=1e-16)
+
+
+@pytest.mark.parametrize(
+    ("wrench", "lever", "unit", "message"),
+    [("Fz", -0.5, "l", "only Fx has one"), ("Fx", 1.0, "R", "only Fx has one"), ("Fx", 5.0, "l", "from -4 to 4")],
+)
+def test_a_lever_that_cannot_be_is_refused(wrench: str, lever: float, unit: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        force_law(wrench, "wt", Powers(), lever=lever, lever_unit=unit)
 
 
 def test_an_exponent_out_of_its_bounds_is_refused() -> None:
