@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.calibration.law_truths import Setting, hidden_law
 from benchmarks.calibration.planted import ROBOT
 from benchmarks.proportions import per_cent
-from calibration.laws.law_model import EXPONENTS
+from calibration.laws.inputs import EXPONENTS
 from calibration.report.robot_laws import RobotLaws, find_robot_laws
 from calibration.swimmer.synthetic_table import make_table
 from sim.io.errors import InputError

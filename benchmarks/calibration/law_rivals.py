@@ -34,8 +34,8 @@ from benchmarks.calibration.planted import ROBOT
 from benchmarks.markdown import heading, row
 from benchmarks.proportions import per_cent
 from benchmarks.records import Records
+from calibration.laws.inputs import logarithms
 from calibration.laws.law_fits import find_laws
-from calibration.laws.law_model import logarithms
 from calibration.statistics.fit import fit
 from calibration.statistics.held_out import errors
 from calibration.statistics.residual_tests import Directions, examine_residual

@@ -27,7 +27,8 @@ import numpy as np
 from tqdm import tqdm
 
 from calibration.attribution.refits import INDISTINGUISHABLE, session_gain
-from calibration.laws.law_model import EXPONENTS, SIZE, LawModel
+from calibration.laws.inputs import EXPONENTS, noted_in_words, parameter_of
+from calibration.laws.law_model import LEVER, SIZE, LawModel
 from calibration.laws.places import Place, in_common, places
 from calibration.laws.readings import INPUTS, in_words
 from calibration.laws.search import Ranked, rank
@@ -75,7 +76,20 @@ class Law:
             self.fit.covariance[np.ix_(at, at)],
             [self.fit.interval(EXPONENTS[i]) for i in chosen],
         )
-        return ", ".join(filter(None, (self.place.words, said)))
+        noted = [name for name in self.model.noted if parameter_of(name) in self.fit.names]
+        values = [self.fit.parameters[parameter_of(name)] for name in noted]
+        also = noted_in_words(noted, values, [self.fit.interval(parameter_of(name)) for name in noted])
+        return ", ".join(filter(None, (self.place.words, self._where, said, also)))
+
+    @property
+    def _where(self) -> str:
+        """Where on the axis a side force with a lever acts, in words; empty if it has none."""
+        if LEVER not in self.fit.names:
+            return ""
+        ends = sorted(map(abs, self.fit.interval(LEVER)))
+        lever, unit = self.fit.parameters[LEVER], self.place.lever_unit
+        side = "behind" if lever < 0 else "ahead of"
+        return f"{abs(lever):.2f} {unit} ({ends[0]:.2f} to {ends[1]:.2f}) {side} the disc"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the law as laws.json has it; `size` is at the geometric mean of the runs."""
@@ -207,7 +221,9 @@ def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
     model = study.model
     if not isinstance(model, SwimmerModel):
         raise TypeError("laws are looked for in a SwimmerModel")
-    ranked = rank(model, base, study.split.fitted, places(), title="places" if study.progress else "")
+    both = len(np.unique(np.sign(model.runs.omega[study.split.fitted]))) == 2
+    candidates = places(both_directions=both)
+    ranked = rank(model, base, study.split.fitted, candidates, title="places" if study.progress else "")
     least = max(_CURVED * ranked[0].gain, 0.0)
     likely = [one for one in ranked[:_FITTED] if one.gain > least]
     laws = _fit_all(study, model, base, likely, chosen_alone=beside_claim)
@@ -233,8 +249,8 @@ def _fitted(study: Study, model: SwimmerModel, base: Fit, ranked: Ranked, chosen
     """Fit a law from its linear model, and judge it; None where its motion cannot be simulated."""
     data = model.runs
     size = float(np.clip(ranked.size, -_LARGEST_AT_START, _LARGEST_AT_START))
-    with_law = LawModel.of(model, ranked.place, size)
-    names = tuple(p.name for p in with_law.effects if not chosen_alone or p.name in (SIZE, *ranked.chosen))
+    with_law = LawModel.of(model, ranked.place, size, noted=ranked.noted)
+    names = tuple(p.name for p in with_law.effects if not chosen_alone or p.name in (SIZE, LEVER, *ranked.chosen))
     refit = _best_fit(study, with_law, base, names, {**ranked.start, SIZE: size})
     if refit is None:
         return None
@@ -247,8 +263,10 @@ def _fitted(study: Study, model: SwimmerModel, base: Fit, ranked: Ranked, chosen
         reason = "a number is at the end of its range"
     elif gain <= 0:
         reason = "its BIC is not smaller than that without a law"
-    elif all(low <= 0.0 <= high for low, high in map(refit.interval, names)):
+    elif all(_includes(refit.interval(name), 0.0) for name in names if name != LEVER):
         reason = "the intervals of all its numbers include the null"
+    elif LEVER in names and _includes(refit.interval(LEVER), 0.0):
+        reason = "its lever is not told from none: a side force at the disc"
     elif predictive[0] <= predictive[1]:
         reason = "does not predict left-out sessions better"
     again = replace(study, model=with_law, seed=study.seed + 1)
@@ -265,6 +283,10 @@ def _fitted(study: Study, model: SwimmerModel, base: Fit, ranked: Ranked, chosen
         error_interval=error_interval(data, refit.prediction, study.split.test, study.seed),
         reason=reason,
     )
+
+
+def _includes(interval: tuple[float, float], value: float) -> bool:
+    return interval[0] <= value <= interval[1]
 
 
 def _rival(law: Law) -> Rival:
@@ -288,7 +310,8 @@ def _best_fit(
     Returns:
         The better fit, or None where the motion cannot be simulated.
     """
-    flat = {name: linear[SIZE] / 2 if name == SIZE else 0.0 for name in names}
+    kept = {SIZE: linear[SIZE] / 2, LEVER: linear[LEVER]}
+    flat = {name: kept.get(name, 0.0) for name in names}
     target = noise_at_most(study.values, len(base.names) + len(names))
     best: Fit | None = None
     for start in (

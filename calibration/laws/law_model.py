@@ -1,12 +1,14 @@
-"""The swimming robot with a law at one place: its exponents and size are fitted like effects.
+"""The swimming robot with a law at one place: its exponents, size and lever are fitted like effects.
 
-The factor m of a run depends on its inputs alone. So the derivatives along the size and the exponents follow from
-the one along the term, or along the logarithm of the coefficient:
+The factor m of a run depends on its inputs alone. So the derivatives along the size, the exponents and the lever
+follow from those along the term, or along the logarithm of the coefficient:
 
     term F = ε m v:    ∂f/∂ε = m ∂f/∂F,   ∂f/∂p_i = ε m x_i ∂f/∂F,
     factor C m:        ∂f/∂p_i = x_i ∂f/∂ln C,
+    side force with M_y = λ z F_x, z = l or L:   ∂f/∂F = ∂f/∂F_x + λ z ∂f/∂M_y,   ∂f/∂λ = ε m z ∂f/∂M_y,
 
-with x = (ln ω/ω_m, ln l/l_m, ln N/N_m).
+with x = (ln ω/ω_m, ln l/l_m, ln N/N_m) and the noted inputs of the law less their means
+(`calibration.laws.inputs`). The disc is at J.
 """
 
 from __future__ import annotations
@@ -19,97 +21,144 @@ from typing import Any
 
 import numpy as np
 
+from calibration.laws.inputs import (
+    EXPONENTS,
+    NOTED,
+    logarithms,
+    noted_values,
+    parameter_of,
+)
 from calibration.laws.places import Place, place_named
 from calibration.laws.readings import INPUTS
 from calibration.statistics.statistical_model import Parameter, Parameters, by_differences
 from calibration.swimmer.measured_table import Measurements
 from calibration.swimmer.swimmer import SwimmerModel, _Run
-from sim.arrays import Floats
+from sim.arrays import Floats, Integers
 from sim.effects import effect_named
 from sim.inputs import group_columns
 from sim.io.errors import InputError
 from sim.model.effect import Effect
 from sim.model.groups import Groups
 from sim.model.power_law import STEEPEST, Powers
+from sim.model.robot import Robot
 
-SIZE = "law_size"
-EXPONENTS = ("law_speed", "law_length", "law_tails")
+SIZE, LEVER = "law_size", "law_lever"
 _LARGEST = 200.0  # size of a term
 
 
-def logarithms(runs: Measurements) -> Floats:
-    """Compute ln ω, ln l, ln N of every run, (n, 3), in rad/s and m."""
-    return np.asarray(np.log(np.stack([np.abs(runs.omega), runs.length, runs.tails], 1)))
+def lever_arm(robot: Robot, unit: str) -> float:
+    """Compute how far ahead of the disc a lever of 1 is, in R: l/R or L/R."""
+    return (robot.tail_length if unit == "l" else robot.head_length) / robot.head_radius
+
+
+def lever_arms(robot: Robot, runs: Measurements, unit: str) -> Floats:
+    """Compute it for every run, (n,)."""
+    return np.array([lever_arm(replace(robot, tail_length=float(length)), unit) for length in runs.length])
 
 
 @dataclass(frozen=True)
 class LawModel(SwimmerModel):
-    """`SwimmerModel` with a law; the exponents of inputs that differ between the runs are its effects."""
+    """`SwimmerModel` with a law; what differs between the runs has an exponent, which is one of its effects."""
 
     place: Place = field(kw_only=True)
     typical: float = field(default=1.0, kw_only=True)  # a size of its term
-    centre: tuple[float, ...] = field(kw_only=True)  # ln ω_m, ln l_m, ln N_m
+    centre: tuple[float, ...] = field(kw_only=True)  # ln ω_m, ln l_m, ln N_m, and the means of `noted`
+    noted: tuple[str, ...] = field(default=(), kw_only=True)  # inputs of NOTED on which the factor depends, too
 
     @classmethod
     def of(
-        cls, model: SwimmerModel, place: Place, typical: float, centre: Sequence[float] | None = None
+        cls,
+        model: SwimmerModel,
+        place: Place,
+        typical: float,
+        centre: Sequence[float] | None = None,
+        noted: Sequence[str] = (),
     ) -> LawModel:
         """Add a law to a model.
 
         Args:
             typical: a size of its term.
-            centre: ln ω_m, ln l_m, ln N_m; default: the means of the model's runs.
+            centre: ln ω_m, ln l_m, ln N_m, and the means of `noted`; default: the means of the model's runs.
+            noted: inputs of NOTED on which the factor depends, too.
         """
-        middle = logarithms(model.runs).mean(0).tolist() if centre is None else centre
+        if centre is None:
+            centre = [*logarithms(model.runs).mean(0), *noted_values(model.runs, noted).mean(0)]
         plain = (model.robot, model.runs, model.jobs, model.solver, model.own)
-        return cls(*plain, place=place, typical=abs(typical) or 1.0, centre=tuple(middle))
+        middle = tuple(float(value) for value in centre)
+        return cls(*plain, place=place, typical=abs(typical) or 1.0, centre=middle, noted=tuple(noted))
 
     @property
     def record(self) -> dict[str, Any]:
         """What makes this model of one without the law, see `with_law`."""
-        return {"place": self.place.name, "typical": self.typical, "centre": list(self.centre)}
+        noted = {"noted": list(self.noted)} if self.noted else {}
+        return {"place": self.place.name, "typical": self.typical, "centre": list(self.centre), **noted}
+
+    @property
+    def exponents(self) -> tuple[str, ...]:
+        """Names of the exponents, and of the coefficients of noted inputs."""
+        return (*EXPONENTS, *map(parameter_of, self.noted))
 
     @cached_property
     def effects(self) -> tuple[Parameter, ...]:
         size = Parameter(SIZE, "size of the law", 0.0, (-_LARGEST, _LARGEST), self.typical)
+        titles = (*(f"exponent of {symbol}" for symbol in INPUTS), *(NOTED[name].words for name in self.noted))
+        # With a lever in tail lengths the couple has one power of l more than the force.
+        steepest = {"law_length": STEEPEST - 1} if self.place.lever_unit == "l" else {}
         exponents = (
-            Parameter(name, f"exponent of {symbol}", 0.0, (-STEEPEST, STEEPEST), 1.0)
-            for name, symbol in zip(EXPONENTS, INPUTS, strict=True)
+            Parameter(name, title, 0.0, (-STEEPEST, steepest.get(name, STEEPEST)), 1.0)
+            for name, title in zip(self.exponents, titles, strict=True)
         )
-        varied = np.ptp(self._logarithms, axis=0) > 0
-        chosen = tuple(p for p, differs in zip(exponents, varied, strict=True) if differs)
-        return (size, *chosen) if self.place.is_term else chosen
+        varied = np.ptp(self._inputs, axis=0) > 0
+        chosen = [p for p, differs in zip(exponents, varied, strict=True) if differs]
+        if self.place.lever_unit:
+            middle = self.place.levers[len(self.place.levers) // 2]
+            chosen.insert(0, Parameter(LEVER, "lever of the law", middle, self.place.lever_bounds, 0.5))
+        return (size, *chosen) if self.place.is_term else tuple(chosen)
 
     @cached_property
-    def _logarithms(self) -> Floats:
-        return logarithms(self.runs) - np.array(self.centre)
+    def _inputs(self) -> Floats:
+        """Inputs (n, q) less their means; 0 for what these runs do not note."""
+        values = np.concatenate([logarithms(self.runs), noted_values(self.runs, self.noted)], 1)
+        return np.nan_to_num(values - np.array(self.centre), nan=0.0)
+
+    @cached_property
+    def _arms(self) -> Floats:
+        return lever_arms(self.robot, self.runs, self.place.lever_unit)
 
     def factor(self, parameters: Parameters) -> Floats:
         """Compute m of every run, (n,)."""
-        return np.exp(self._logarithms @ [parameters.get(name, 0.0) for name in EXPONENTS])
+        return np.exp(self._inputs @ [parameters.get(name, 0.0) for name in self.exponents])
 
     def effect(self, parameters: Parameters) -> tuple[Effect, float, float]:
-        """Return the law as an effect.
+        """Return the law as an effect, at the means of noted inputs.
 
         Args:
-            parameters: a size and exponents, which are rounded to thousandths.
+            parameters: a size, exponents and a lever; the last two are rounded to thousandths.
 
         Returns:
             The effect; its size; and the factor, at the control example over that at the mean of the runs, of the
             parameters that a law multiplies. The factor is 1 for a term: its size contains it.
         """
-        powers = Powers(*(parameters.get(name, 0.0) for name in EXPONENTS))
-        robots, place = self.robots({**parameters, **dict.fromkeys(EXPONENTS, 0.0)})
-        logarithms = np.array([powers.logarithm(Groups.from_columns(group_columns([run])))[0] for run in robots])
-        to_control = math.exp(-float(logarithms[place].mean()))
-        effect = self.place.effect(powers)
+        powers = self.powers(parameters)
+        effect = self.place.effect(powers, parameters.get(LEVER, 0.0))
+        to_control = self.to_control(powers, parameters)
         return (effect, parameters[SIZE] * to_control, 1.0) if self.place.is_term else (effect, 1.0, to_control)
+
+    def powers(self, parameters: Parameters) -> Powers:
+        """Collect the exponents of ω, l and N."""
+        return Powers(*(parameters.get(name, 0.0) for name in EXPONENTS))
+
+    def to_control(self, powers: Powers, parameters: Parameters) -> float:
+        """Compute the factor m, at the control example over that at the mean of the runs."""
+        robots, place = self.robots({**parameters, **dict.fromkeys(self.exponents, 0.0)})
+        logs = np.array([powers.logarithm(Groups.from_columns(group_columns([run])))[0] for run in robots])
+        return math.exp(-float(logs[place].mean()))
 
     def derivatives(
         self, parameters: Parameters, names: Sequence[str], *, title: str = "", quick: bool = False
     ) -> tuple[Floats, Floats]:
         """Compute the prediction (n, k) and derivatives (n, k, p), see `SwimmerModel.derivatives`."""
-        of_law = {SIZE, *EXPONENTS}
+        of_law = {SIZE, LEVER, *self.exponents}
         others = [name for name in names if name not in of_law]
         moved = [name for name, _ in self.place.moves]
         known = {name: 1.0 for name in moved if self.place.is_term} | dict(parameters)
@@ -119,28 +168,49 @@ class LawModel(SwimmerModel):
             return by_differences(self, parameters, names, title=title)
         m = self.factor(parameters)
         slopes = {name: table[..., j] for j, name in enumerate(wanted)}
-        along = np.zeros(seen.shape)
         for name, power in self.place.moves:
             # The derivative along the logarithm of a coefficient is scaled by its value without m.
             if name in {p.name for p in self.coefficients}:
                 slopes[name] = slopes[name] * (m**power)[:, None]
-            along += power * slopes[name]
+        along = self._along([slopes[name] for name in moved], parameters.get(LEVER, 0.0))
         if self.place.is_term:
             slopes[SIZE] = along * m[:, None]
             along = slopes[SIZE] * parameters[SIZE]
-        for i, name in enumerate(EXPONENTS):
-            slopes[name] = along * self._logarithms[:, [i]]
+        if self.place.lever_unit:
+            slopes[LEVER] = parameters[SIZE] * (m * self._arms)[:, None] * slopes[moved[1]]
+        for i, name in enumerate(self.exponents):
+            slopes[name] = along * self._inputs[:, [i]]
         return seen, np.stack([slopes[name] for name in names], -1)
+
+    def _along(self, slopes: Sequence[Floats], lever: float) -> Floats:
+        """Combine the derivatives along what the place moves, (n, k) each."""
+        if self.place.lever_unit:
+            force, couple = slopes
+            return np.asarray(force + lever * self._arms[:, None] * couple)
+        return np.asarray(sum(power * slope for (_, power), slope in zip(self.place.moves, slopes, strict=True)))
+
+    def _conditions(self, parameters: Parameters, *, signed: bool = False) -> tuple[list[_Run], Integers]:
+        return super()._conditions(parameters, signed=signed or self.place.odd)
+
+    def _noted_at_work(self, parameters: Parameters) -> list[Floats]:
+        return [*super()._noted_at_work(parameters), *self._inputs[:, len(EXPONENTS) :].T]
+
+    def _is_at_null(self, parameters: Parameters) -> bool:
+        return super()._is_at_null(parameters) and not (self.place.is_term and parameters.get(SIZE, 0.0))
 
     def _run(self, parameters: Parameters, row: int, omega: float) -> _Run:
         run = super()._run(parameters, row, omega)
-        m = math.exp(float(self._logarithms[row] @ [parameters.get(name, 0.0) for name in EXPONENTS]))
+        m = math.exp(float(self._inputs[row] @ [parameters.get(name, 0.0) for name in self.exponents]))
         robot = run.robot
-        for name, power in self.place.moves:
+        size = parameters.get(SIZE, 0.0) * m
+        ahead = [1.0]
+        if unit := self.place.lever_unit:
+            ahead.append(parameters.get(LEVER, 0.0) * lever_arm(robot, unit))
+        for i, (name, power) in enumerate(self.place.moves):
             if self.place.is_term:
                 low, high = effect_named(name).bounds
-                size = min(max(parameters.get(SIZE, 0.0) * m, low), high)
-                robot = replace(robot, effects={**robot.effects, name: size})
+                load = min(max(size * ahead[i], low), high)
+                robot = replace(robot, effects={**robot.effects, name: load})
             else:
                 robot = replace(robot, **{name: getattr(robot, name) * m**power})
         return run._replace(robot=robot)
@@ -155,8 +225,13 @@ def with_law(model: SwimmerModel, record: Mapping[str, Any]) -> LawModel:
     try:
         place, typical = place_named(str(record["place"])), float(record["typical"])
         centre = [float(value) for value in record["centre"]]
-        if len(centre) != len(INPUTS) or not np.isfinite([typical, *centre]).all():
+        noted = [str(name) for name in record.get("noted", ())]
+        if (
+            len(centre) != len(INPUTS) + len(noted)
+            or not set(noted) <= set(NOTED)
+            or not np.isfinite([typical, *centre]).all()
+        ):
             raise ValueError
     except (KeyError, TypeError, ValueError, OverflowError):
         raise InputError("the record of a law cannot be read: calibrate the table again") from None
-    return LawModel.of(model, place, typical, centre)
+    return LawModel.of(model, place, typical, centre, noted)

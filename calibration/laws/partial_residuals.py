@@ -15,8 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.laws.inputs import EXPONENTS, logarithms
 from calibration.laws.law_fits import Law
-from calibration.laws.law_model import EXPONENTS, SIZE, logarithms
+from calibration.laws.law_model import SIZE
 from calibration.laws.readings import INPUTS
 from calibration.statistics.statistical_model import inverse_root
 from sim.arrays import Flags, Floats

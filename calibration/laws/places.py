@@ -2,17 +2,20 @@
 
 A `Place` is one of
 
-- a component of the wrench on head and disc, driven by a component of the velocity (`sim.model.power_law`), of
-  which the even ones in the direction of the motor are listed. Its size is ε;
+- a component of the wrench on head and disc, driven by a component of the velocity (`sim.model.power_law`). Terms
+  that are odd in the direction of the motor are among them if the runs have both directions;
+- a side force at one place on the axis, along the tails or along the head. How far ahead of the disc it acts, its
+  lever λ, is fitted, too;
+- an effect on the tails: spin drag, splay, sag, and drag that depends on the local speed or on the place along the
+  tail (`sim.model.scaled_effect`);
 - a coefficient of the head, the drag of the tails, or their stiffness: a factor, which is 1 without a law.
 
-Each is multiplied by m = (ω/ω_m)^p (l/l_m)^q (N/N_m)^r. ω_m, l_m and N_m are geometric means of the runs.
+The first three are terms of a size ε. Each is multiplied by m = (ω/ω_m)^p (l/l_m)^q (N/N_m)^r, with ω_m, l_m and
+N_m the geometric means of the runs, and by factors of noted inputs (`calibration.laws.inputs`).
 
 The drag of the tails is that of a more viscous fluid around the tails alone: the viscosity times m, and the
-coefficients of the head divided by m.
-
-Left out: terms at a free place on the axis, terms of one part of the tails, and terms that are odd in the
-direction of the motor.
+coefficients of the head divided by m. A side force F_x with a lever is F_x at the disc and the couple
+M_y = λ l F_x or λ L F_x.
 """
 
 from __future__ import annotations
@@ -20,8 +23,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from sim.effects import catalogue
 from sim.model.effect import Effect
-from sim.model.power_law import COEFFICIENTS, MOTIONS, TAILS, WRENCHES, Powers, factor_law, force_law
+from sim.model.power_law import (
+    COEFFICIENTS,
+    LEVERS,
+    MOTIONS,
+    TAILS,
+    WRENCHES,
+    Powers,
+    factor_law,
+    force_law,
+    is_mirrored,
+)
+from sim.model.scaled_effect import LOCAL_DRAG, SCALED, scaled_effect
 
 _WRENCH_WORDS = {
     "Fx": "a side force on the head",
@@ -41,6 +56,18 @@ _COEFFICIENT_WORDS = {
     "Cr": "the spin-drag coefficient C_r of the head",
     "Cyr": "the side-force coefficient C_yr of the head",
 }
+_LEVER_WORDS = {"l": "a side force behind the disc", "L": "a side force ahead of the disc"}
+_TAIL_EFFECTS = {
+    "tail_spin_drag": "drag on the tails' own spin",
+    "natural_splay": "a natural curvature of the tails away from the axis",
+    "tail_sag": "a steady load on the tails across the axis",
+    "tail_drag_by_speed": "drag of the tails by a power of their local speed",
+    "tail_drag_along": "drag that grows along the tails",
+}
+_ODD = "_odd"
+# Levers with which a side force is ranked, and between which it is fitted.
+_RANKED_LEVERS = {"l": (-0.25, -0.5, -0.75), "L": (0.5, 1.0)}
+_LEVER_BOUNDS = {"l": (-1.2, 0.3), "L": (-0.3, 1.3)}
 
 
 @dataclass(frozen=True)
@@ -54,23 +81,35 @@ class Place:
 
     name: str  # in files
     words: str
-    moves: tuple[tuple[str, int], ...]  # parameters of the model that it multiplies by m to a power
-    wrench: str = ""  # of WRENCHES, of a term
-    motion: str = ""  # of MOTIONS, of a term
+    moves: tuple[tuple[str, int], ...]  # parameters of the model that it multiplies by m to a power, and terms
+    part: str = "head"  # of the robot on which it acts: "head" or "tails"
+    is_term: bool = True  # of a size of its own, and not a factor
+    wrench: str = ""  # of WRENCHES, of a load at one place
+    motion: str = ""  # of MOTIONS, of a load at one place
+    odd: bool = False  # in the direction of the motor
+    lever_unit: str = ""  # of LEVERS, of a side force elsewhere than at the disc
 
     @property
-    def part(self) -> str:
-        """The part of the robot on which it acts: "head" or "tails"."""
-        return "tails" if self.name in TAILS else "head"
+    def levers(self) -> tuple[float, ...]:
+        """Levers λ with which the place is ranked; one that means nothing if it has none."""
+        return _RANKED_LEVERS.get(self.lever_unit, (0.0,))
 
     @property
-    def is_term(self) -> bool:
-        """Whether it is a term of a size of its own, and not a factor."""
-        return bool(self.wrench)
+    def lever_bounds(self) -> tuple[float, float]:
+        """Least and largest λ of a place that has one."""
+        return _LEVER_BOUNDS[self.lever_unit]
 
-    def effect(self, powers: Powers) -> Effect:
-        """Return the effect of `sim.model.power_law` at this place."""
-        return force_law(self.wrench, self.motion, powers) if self.is_term else factor_law(self.name, powers)
+    def effect(self, powers: Powers, lever: float = 0.0) -> Effect:
+        """Return the effect at this place (`sim.model.power_law`, `sim.model.scaled_effect`)."""
+        if self.wrench:
+            rectified = is_mirrored(self.wrench, self.motion) if self.odd else None
+            ahead = lever if self.lever_unit else 0.0
+            return force_law(
+                self.wrench, self.motion, powers, rectified=rectified, lever=ahead, lever_unit=self.lever_unit
+            )
+        if self.is_term:
+            return scaled_effect(LOCAL_DRAG.get(self.name) or catalogue()[self.name], powers)
+        return factor_law(self.name, powers)
 
 
 def place_named(name: str) -> Place:
@@ -87,7 +126,8 @@ def in_common(chosen: Sequence[Place]) -> str:
     if len({place.part for place in chosen}) > 1:
         return ""
     wrenches, motions = {place.wrench for place in chosen}, {place.motion for place in chosen}
-    if len(wrenches) == 1 and chosen[0].wrench:
+    at_disc = not any(place.lever_unit for place in chosen)
+    if len(wrenches) == 1 and chosen[0].wrench and at_disc:
         return f"are {_WRENCH_WORDS[chosen[0].wrench]}"
     acts = f"act on the {chosen[0].part}"
     return (
@@ -95,24 +135,53 @@ def in_common(chosen: Sequence[Place]) -> str:
     )
 
 
-def places() -> tuple[Place, ...]:
-    """List every place."""
-    terms = [
-        Place(
-            f"{wrench}_{motion}",
-            f"{_WRENCH_WORDS[wrench]} that is driven by {_MOTION_WORDS[motion]}",
-            ((force_law(wrench, motion, Powers()).name, 1),),
-            wrench,
-            motion,
-        )
-        for wrench in WRENCHES
-        for motion in MOTIONS
+def places(*, both_directions: bool = True) -> tuple[Place, ...]:
+    """List every place.
+
+    Args:
+        both_directions: whether the runs have both directions of the motor, without which nothing is odd.
+    """
+    loads = [_load(wrench, motion, odd=False) for wrench in WRENCHES for motion in MOTIONS]
+    elsewhere = [_load("Fx", motion, odd=False, lever_unit=unit) for unit in LEVERS for motion in MOTIONS]
+    odd = [_load(wrench, motion, odd=True) for wrench in WRENCHES for motion in MOTIONS] if both_directions else []
+    coefficients = [
+        Place(name, _COEFFICIENT_WORDS[name], ((field, 1),), is_term=False) for name, field in COEFFICIENTS.items()
     ]
-    coefficients = [Place(name, _COEFFICIENT_WORDS[name], ((field, 1),)) for name, field in COEFFICIENTS.items()]
     drag = (("viscosity", 1), *((field, -1) for field in COEFFICIENTS.values()))
+    drag_of_tails, stiffness = TAILS
     return (
-        *terms,
+        *loads,
         *coefficients,
-        Place("tail_drag", "the drag of the tails", drag),
-        Place("tail_stiffness", "the stiffness of the tails", (("youngs_modulus", 1),)),
+        Place(drag_of_tails, "the drag of the tails", drag, "tails", is_term=False),
+        Place(stiffness, "the stiffness of the tails", (("youngs_modulus", 1),), "tails", is_term=False),
+        *map(_tail_effect, (*SCALED, *LOCAL_DRAG)),
+        *elsewhere,
+        *odd,
     )
+
+
+def _load(wrench: str, motion: str, *, odd: bool, lever_unit: str = "") -> Place:
+    """Make the place of a load at one place on the axis."""
+    rectified = is_mirrored(wrench, motion) if odd else None
+    moves = [(force_law(wrench, motion, Powers(), rectified=rectified).name, 1)]
+    words = _WRENCH_WORDS[wrench]
+    if lever_unit:
+        moves.append((force_law("My", motion, Powers()).name, 1))
+        words = _LEVER_WORDS[lever_unit]
+    sides = ", and that differs between left and right turns" if odd else ""
+    return Place(
+        f"{wrench}_{motion}{_ODD if odd else ''}{f'_at_{lever_unit}' if lever_unit else ''}",
+        f"{words} that is driven by {_MOTION_WORDS[motion]}{sides}",
+        tuple(moves),
+        part="tails" if lever_unit == "l" else "head",
+        wrench=wrench,
+        motion=motion,
+        odd=odd,
+        lever_unit=lever_unit,
+    )
+
+
+def _tail_effect(name: str) -> Place:
+    """Make the place of an effect on the tails."""
+    effect = scaled_effect(LOCAL_DRAG.get(name) or catalogue()[name], Powers())
+    return Place(name, _TAIL_EFFECTS[name], ((effect.name, 1),), "tails")

@@ -20,13 +20,15 @@ from sim.io.files import files_together, write_text
 from sim.io.reading import ContentError, read_json
 from sim.model.effect import Effect
 from sim.model.groups import Groups
-from sim.model.power_law import FactorLaw, ForceLaw, law_from_name
+from sim.model.power_law import FactorLaw, ForceLaw
 from sim.model.presets import PRESETS
+from sim.model.scaled_effect import LOCAL_DRAG, ScaledEffect
 from sim.motion.steady import steady
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{2,40}", re.ASCII)
 _WIDTH = 110  # of lines
 _WIDER = 10.0  # bounds over the size
+_LAWS = (ForceLaw, FactorLaw, ScaledEffect)
 _TAILS = (2, 3)  # of the robots of the test
 
 _EFFECT = '''"""The effect "{title}", a law of measured runs.
@@ -40,10 +42,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sim.model.power_law import Powers, {maker}
+{imports}
 
 EFFECT = replace(
-    {maker}({place}, Powers({powers})),
+    {law},
     name="{name}",
     title="{title}",
     source="{source}",
@@ -111,10 +113,10 @@ def adopt_law(source: str | Path, name: str, folder: str | Path, *, place: str =
         raise InputError(f"there is an effect {name} already; give another name")
     record, without, table = _law_of(source, place)
     try:
-        effect = law_from_name(str(record["effect"]["name"]))
+        effect = catalogue()[str(record["effect"]["name"])]
         size, error = float(record["effect"]["size"]), float(record["error"])
         words, runs = _plain(record["words"]), _runs_in_words(record["runs"])
-        if effect is None or not math.isfinite(size + error) or not size or not words:
+        if not isinstance(effect, _LAWS) or not math.isfinite(size + error) or not size or not words:
             raise ValueError
         check_size(effect.name, size)
     except (KeyError, TypeError, ValueError, OverflowError):
@@ -174,25 +176,43 @@ def _runs_in_words(runs: dict[str, Any]) -> str:
 
 
 def _effect_file(effect: Effect, name: str, size: float, words: str, table: str) -> str:
-    assert isinstance(effect, ForceLaw | FactorLaw)
-    pairs = zip(("speed", "length", "tails"), vars(effect.powers).values(), strict=True)
-    if isinstance(effect, ForceLaw):
-        maker, place = "force_law", f'"{effect.wrench}", "{effect.motion}"'
-        bounds = (-_WIDER * abs(size), _WIDER * abs(size))
-    else:
-        maker, place, bounds = "factor_law", f'"{effect.place}"', effect.bounds
+    imports, law = _source_of(effect)
+    low, high = effect.bounds if isinstance(effect, FactorLaw) else (-_WIDER * abs(size), _WIDER * abs(size))
     return _EFFECT.format(
         title=name.replace("_", " "),
         equation=effect.equation,
         words=words,
-        maker=maker,
-        place=place,
-        powers=", ".join(f"{key}={value!r}" for key, value in pairs if value),
+        imports="\n".join(imports),
+        law=law,
         name=name,
         source=f"a law of measured runs, {table}",
-        low=bounds[0],
-        high=bounds[1],
+        low=low,
+        high=high,
         size=size,
+    )
+
+
+def _source_of(effect: Effect) -> tuple[list[str], str]:
+    """Write the lines that import a law's maker, and its call."""
+    assert isinstance(effect, _LAWS)
+    pairs = zip(("speed", "length", "tails"), vars(effect.powers).values(), strict=True)
+    powers = f"Powers({', '.join(f'{key}={value!r}' for key, value in pairs if value)})"
+    if isinstance(effect, FactorLaw):
+        return ["from sim.model.power_law import Powers, factor_law"], f'factor_law("{effect.place}", {powers})'
+    if isinstance(effect, ForceLaw):
+        further = f", rectified={effect.rectified}" if effect.symmetry == "odd" else ""
+        if effect.lever_unit:
+            further += f', lever={effect.lever!r}, lever_unit="{effect.lever_unit}"'
+        call = f'force_law("{effect.wrench}", "{effect.motion}", {powers}{further})'
+        return ["from sim.model.power_law import Powers, force_law"], call
+    scaled = effect.effect.name
+    imports = ["from sim.model.power_law import Powers"]
+    if scaled in LOCAL_DRAG:
+        imports.append("from sim.model.scaled_effect import LOCAL_DRAG, scaled_effect")
+        return imports, f'scaled_effect(LOCAL_DRAG["{scaled}"], {powers})'
+    imports.append("from sim.model.scaled_effect import scaled_effect")
+    return [f"from sim.effects.{scaled} import EFFECT as {scaled.upper()}", *imports], (
+        f"scaled_effect({scaled.upper()}, {powers})"
     )
 
 

@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law_fits import Law, Laws
-from calibration.laws.law_model import EXPONENTS
+from calibration.laws.law_model import LEVER
 from calibration.laws.partial_residuals import Dependence, dependences
 from calibration.laws.places import Place
 from calibration.laws.readings import INPUTS
@@ -46,7 +47,7 @@ def add_laws(page: Page, result: Verdict) -> None:
     )
     if laws.kept:
         best = laws.kept[0]
-        shown = draw_place(best.model.robot, best.place)
+        shown = draw_place(best.model.robot, best.place, best.fit.parameters.get(LEVER, 0.0))
         figures = [(shown, f"where it acts: {best.place.words}", "Where it acts (red).")]
         curves = dependences(best, result.conditions.split.fitted)
         if curves:
@@ -87,19 +88,24 @@ def _exponent(law: Law, name: str) -> str:
     return f"{plain(law.fit.parameters[name], 2)} ({plain(low, 2)} to {plain(high, 2)})"
 
 
-def draw_place(robot: Robot, place: Place) -> Figure:
-    """Draw the robot from above with the load of a place: a force or a couple at the disc, or the tails."""
+def draw_place(robot: Robot, place: Place, lever: float = 0.0) -> Figure:
+    """Draw the robot from above with the load of a place: a force or a couple on the axis, or the tails.
+
+    Args:
+        lever: of a side force that has one.
+    """
     shown = scene(robot)
     figure = Figure(figsize=(_WIDTH, 2.2))
     axes = figure.add_subplot()
     pose = np.zeros(3)
     draw_robot(axes, shown, pose, 1.0)
     disc = shown.seen_from_above(pose, np.zeros(3))
-    if place.part == "tails":
+    if place.part == "tails" and not place.lever_unit:
         for tail in shown.tails:
             axes.plot(*shown.seen_from_above(pose, tail).T, color=RED, lw=4, alpha=0.8, zorder=4)
     else:
-        _draw_load(axes, place, disc, shown.length)
+        ahead = lever * (shown.length if place.lever_unit == "L" else 1.0)
+        _draw_load(axes, place, disc + np.array([ahead, 0.0]), shown.length)
         axes.plot(*disc, "o", color=INK, ms=4, zorder=6)
     axes.set_aspect("equal")
     axes.axis("off")

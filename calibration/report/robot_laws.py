@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law_fits import Laws, find_laws
-from calibration.laws.law_model import EXPONENTS, SIZE
+from calibration.laws.law_model import SIZE
 from calibration.report.corrected_robot import as_toml, check_given
 from calibration.report.law_robot import law_handed_on
 from calibration.statistics.exclusions import count_of_rows, summary_of_excluded

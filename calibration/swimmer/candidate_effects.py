@@ -77,6 +77,17 @@ def _parameter(effect: Effect) -> Parameter:
     )  # fmt: skip
 
 
+def is_odd(name: str, influence: Influence | None) -> bool:
+    """Tell whether left and right turns differ with a parameter of a model.
+
+    Args:
+        influence: of that name; None if it has none.
+    """
+    if influence is not None:
+        return influence.odd
+    return name in catalogue() and catalogue()[name].symmetry == "odd"
+
+
 def reason_untestable(
     influence: Influence, columns: Mapping[str, object], both_directions: bool, outputs: Sequence[str]
 ) -> str:

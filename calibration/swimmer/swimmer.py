@@ -28,6 +28,7 @@ from calibration.swimmer.candidate_effects import (
     TRACKED_POINT,
     Influence,
     influences,
+    is_odd,
     reason_untestable,
 )
 from calibration.swimmer.measured_table import Measurements
@@ -166,7 +167,7 @@ class SwimmerModel:
         If a run has no direct solution: by differences of motions that are stepped in time, or NaN if `quick`.
         """
         influences = {name: self._influences.get(name) or self._seconds.get(name) for name in names}
-        odd = any(i is not None and i.odd for i in influences.values())
+        odd = any(is_odd(name, influence) for name, influence in influences.items())
         runs, place = self._conditions(parameters, signed=odd)
         columns = self._columns(runs, [parameters])
         for second in (i.parameter.second for i in influences.values() if i and i.parameter.second):
@@ -175,7 +176,7 @@ class SwimmerModel:
         wanted = tuple(dict.fromkeys(move for group in moves.values() for move in group))
         # Non-local effects at their null may need more phases than the motion; with effects at work it has them.
         at_null = any(catalogue()[name].reach == "nonlocal" for name in wanted if name in catalogue())
-        phases = MANY if at_null and not any(i.effect for i in self._at_work(parameters)) else FEW
+        phases = MANY if at_null and self._is_at_null(parameters) else FEW
         sensitivities = self.solver.slopes(columns, wanted, phases=phases, jobs=self.jobs, title=title)
         view = self._observation(runs, np.array(parameters.get(CAMERA, 1.0)))
         J = np.empty((*self.runs.y.shape, len(names)))
@@ -320,10 +321,18 @@ class SwimmerModel:
         runs, work = self.runs, self._at_work(parameters)
         signed |= any(i.odd for i in work) or any(catalogue()[e].symmetry == "odd" for e in self.robot.effects)
         omega = runs.omega if signed else np.abs(runs.omega)
-        drivers = [self._drivers[need] for need in dict.fromkeys(i.needs for i in work if i.needs)]
-        table = np.column_stack([runs.tails, runs.length, omega, *drivers]).round(9)
+        table = np.column_stack([runs.tails, runs.length, omega, *self._noted_at_work(parameters)]).round(9)
         _, first, place = np.unique(table, axis=0, return_index=True, return_inverse=True)
         return [self._run(parameters, int(row), float(omega[row])) for row in first], place.reshape(-1)
+
+    def _noted_at_work(self, parameters: Parameters) -> list[Floats]:
+        """List what was noted of every run (n,) and matters at `parameters`."""
+        needs = (influence.needs for influence in self._at_work(parameters))
+        return [self._drivers[need] for need in dict.fromkeys(needs) if need]
+
+    def _is_at_null(self, parameters: Parameters) -> bool:
+        """Tell whether no effect is at work."""
+        return not any(influence.effect for influence in self._at_work(parameters))
 
     def _run(self, parameters: Parameters, row: int, omega: float) -> _Run:
         effects, current = dict(self.robot.effects), 0.0

@@ -161,6 +161,11 @@ class FactorLaw(Effect):
         return Factors(tail_drag=factor) if self.place == "tail_drag" else Factors(viscosity=1 / factor)
 
 
+def is_mirrored(wrench: str, motion: str) -> bool:
+    """Tell whether both or neither of a force and its driver change sign with the motor's direction."""
+    return (wrench == "Fz") == (motion == "vz")
+
+
 def force_law(
     wrench: str,
     motion: str,
@@ -188,7 +193,7 @@ def force_law(
     if not abs(lever) <= STEEPEST:
         raise InputError(f"lever = {lever:g}; it must lie from {-STEEPEST:g} to {STEEPEST:g}")
     lever = round(lever, 3) + 0.0
-    mirrored = (wrench == "Fz") == (motion == "vz")  # both change sign with the motor, or neither does
+    mirrored = is_mirrored(wrench, motion)
     turned = not mirrored if rectified is None else rectified
     symbol, d_force = WRENCHES[wrench]
     driver, d_motion = MOTIONS[motion]

@@ -21,7 +21,7 @@ from sim.model.groups import Groups
 from sim.model.scaled_effect import LOCAL_DRAG
 
 # Numbers of the non-local effects, by their names; plain numbers in compiled loops.
-_NONLOCAL = {e.name: e for e in (*catalogue().values(), *LOCAL_DRAG.values()) if e.reach == "nonlocal"}
+_NONLOCAL = {e.term: e for e in (*catalogue().values(), *LOCAL_DRAG.values()) if e.reach == "nonlocal"}
 Nonlocal = namedtuple("Nonlocal", list(_NONLOCAL))  # type: ignore[misc]
 _SHAPES = {"resistance": (4, 5), "tail_load": (3,)}  # of the entries that are not single numbers
 

@@ -74,14 +74,17 @@ def _robots(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     time = UNIT_OF_TIME * body.tail_radius**4 * np.exp(terms.shear_thinning_time)
     rate = np.abs(omega) * a / body.tail_radius  # at the clamps
     thinned = (1 + (time * rate) ** 2) ** (-terms.shear_thinning / 2)
+    thinned = thinned * (rate * UNIT_OF_TIME * body.tail_radius**4) ** terms.tail_drag_by_speed
     parallel, perp = parallel * thinned, perp * thinned
+    end = np.exp(terms.tail_drag_along / 2)  # drag of the rear half over the mean, as yaw feels it
+    a = a * np.exp(terms.natural_splay / 10)
     bent = 1 / (1 + 0.05 * viscosity * np.abs(omega))
     tails = np.zeros_like(head)
     tails[:, 0, 0] = n * perp
     tails[:, 0, 2] = tails[:, 2, 0] = -n * perp / 2
-    tails[:, 2, 2] = n * perp / 3
+    tails[:, 2, 2] = n * perp * end / 3
     tails[:, 1, 1] = n * parallel
-    tails[:, 3, 3] = 3 * n * perp * a**2 * bent
+    tails[:, 3, 3] = n * (3 * perp * a**2 + 4 * np.pi * terms.tail_spin_drag * body.tail_radius**2) * bent
     thrust = 0.5 * n * (perp - parallel) * a**2 * bent
     tails[:, 1, 3] = -thrust * np.sign(omega)
     push = (tails[:, :, 3] + resistance[:, :, 4]) * omega[:, None]

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.laws.law_model import EXPONENTS, SIZE, LawModel
+from calibration.laws.inputs import EXPONENTS
+from calibration.laws.law_model import LEVER, SIZE, LawModel
 from calibration.laws.places import Place, places
 from calibration.report.law_robot import law_handed_on, robot_with_law
 from calibration.report.robot_laws import find_robot_laws
@@ -32,9 +33,8 @@ def place(name: str) -> Place:
 @pytest.mark.parametrize("name", [one.name for one in places()])
 def test_derivatives_are_those_by_differences(name: str) -> None:
     model = LawModel.of(toy_swimmer(toy_table(1)), place(name), 0.1)
-    law = {
-        p.name: value for p, value in zip(model.effects, (0.1, 0.3, -0.4, 0.2)[-len(model.effects) :], strict=True)
-    }
+    values = {SIZE: 0.1, LEVER: place(name).levers[0], **dict(zip(EXPONENTS, (0.3, -0.4, 0.2), strict=True))}
+    law = {p.name: values[p.name] for p in model.effects}
     names = ["C_t", "C_yr", "youngs_modulus", *law]
     parameters = {**start_values(model), **law}
     seen, slopes = model.derivatives(parameters, names)

@@ -21,6 +21,10 @@ LAWS = {
     "Fx_wh": ("law_Fx_wh_speed-93_length425_tails0", 0.4),
     "Cyr": ("law_Cyr_speed100_length400_tails0", 1.0),
     "tail_drag": ("law_tail_drag_speed-150_length-500_tails100", 1.0),
+    "Mz_wt_odd": ("law_Mz_wt_rectified_speed-93_length425_tails0", 0.4),
+    "Fx_wt_at_l": ("law_Fx_wt_l-500_speed0_length1000_tails1000", 0.1),
+    "tail_spin_drag": ("law_tail_spin_drag_speed100_length0_tails0", 1.0),
+    "tail_drag_along": ("law_tail_drag_along_speed100_length0_tails0", 0.4),
 }
 
 
@@ -96,7 +100,7 @@ def test_words_and_names_cannot_end_a_string(tmp_path: Path) -> None:
     [
         ("New Effect", "", "write lower-case letters"),
         ("disc_drag", "", "there is an effect disc_drag already"),
-        ("new_effect", "Mz_wh", "no law 'Mz_wh' was kept; kept are Fx_wh, Cyr, tail_drag"),
+        ("new_effect", "Mz_wh", "no law 'Mz_wh' was kept; kept are Fx_wh, Cyr, tail_drag, "),
     ],
 )
 def test_what_cannot_be_adopted_is_refused_and_nothing_is_written(

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from calibration.attribution.refits import INDISTINGUISHABLE
+from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law_fits import Laws, find_laws
-from calibration.laws.law_model import EXPONENTS, SIZE, LawModel, with_law
+from calibration.laws.law_model import SIZE, LawModel, with_law
 from calibration.laws.partial_residuals import dependences
 from calibration.laws.places import place_named
 from calibration.report.corrected_robot import check_given
