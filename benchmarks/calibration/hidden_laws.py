@@ -1,78 +1,101 @@
-"""Laws on head and disc that no effect of the catalogue states: is the place found, and are the exponents?
+"""Laws that no effect of the catalogue states: is the place found, and are the exponents and the lever?
 
 Tables of 128 runs by `softflagella calibration simulate` (truth on a finer mesh, 2.5 % noise), each with one law
-whose place and exponents are drawn at random, at 8, 16 or 32 standard deviations of its score; one table in four
-has none. The score is what coefficients and nuisance parameters leave of the law in the linear model. Laws of the
-tails are not among the truths.
+whose place, exponents and lever are drawn at random, at 8, 16 or 32 standard deviations of its score; one table in
+four has none. The score is what coefficients and nuisance parameters leave of the law in the linear model. FILE
+keeps the records, and those that it has are not made again.
 
-Usage: python -m benchmarks hidden_laws [TABLES] [FIRST_SEED]
+Usage: python -m benchmarks hidden_laws [TABLES] [FIRST_SEED] [FILE]
 
-Takes half an hour.
+Takes a minute a table.
 """
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from benchmarks.calibration.law_truths import Setting, hidden_law
+from benchmarks.calibration.law_truths import SCORES, HiddenLaw, Setting, hidden_law, record_of
 from benchmarks.calibration.planted import ROBOT
+from benchmarks.markdown import heading, row
 from benchmarks.proportions import per_cent
-from calibration.laws.inputs import EXPONENTS
+from benchmarks.records import Records
+from calibration.laws.places import place_named
 from calibration.report.robot_laws import RobotLaws, find_robot_laws
 from calibration.swimmer.synthetic_table import make_table
 from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 
 
-def main(tables: str = "24", first_seed: str = "0") -> None:
-    setting = Setting.of()
-    in_set = first = laws = covered = exponents = claims = nulls = hedged = 0
-    ratios = []
+def main(tables: str = "24", first_seed: str = "0", file: str = "") -> None:
+    setting, records = Setting.of(), Records(file)
     for seed in range(int(first_seed), int(first_seed) + int(tables)):
+        if seed in records:
+            continue
         began = time.process_time()
         truth = hidden_law(setting, seed, nothing=seed % 4 == 0)
-        place, powers, score, effects = truth.place, truth.powers, truth.score, truth.effects
         try:
-            table = make_table(replace(ROBOT, effects=effects), seed=seed, title="")
+            table = make_table(replace(ROBOT, effects=truth.effects), seed=seed, title="")
             described = find_robot_laws(table, PRESETS["paper-measured"], seed=seed, progress=False)
         except InputError as reason:
-            print(f"{seed}: {effects}: not made: {reason}")
+            print(f"{seed}: {truth.effects}: not made: {reason}")
             continue
-        kept = described.laws.kept if described.laws and described.laws.complete else ()
-        names_kept = [law.place.name for law in kept]
-        error = kept[0].error / described.noise if kept else math.nan
-        said = ", ".join(names_kept) or _short(described)
-        print(f"{seed:4d} λ = {score:5.0f}  {next(iter(effects), 'nothing'):48} -> {said}; "
-              f"{described.error_without / described.noise:.2f} -> {error:.2f}, "
-              f"{time.process_time() - began:.0f} s", flush=True)  # fmt: skip
-        if not effects:
-            nulls += 1
-            claims += bool(kept)
-            continue
-        laws += 1
-        hedged += not kept
-        if kept:
-            ratios.append(error)
-            first += names_kept[0] == place.name
-            in_set += place.name in names_kept
-        for law in kept:
-            if law.place == place:
-                for name, true in zip(EXPONENTS, (powers.speed, powers.length, powers.tails), strict=True):
-                    low, high = law.fit.interval(name)
-                    covered += low <= true <= high
-                    exponents += 1
-    print(f"\nlaws: {laws}; nothing is claimed: {per_cent(hedged, laws)}")
-    print(f"of those that are claimed: place first {per_cent(first, laws - hedged)}, "
-          f"in the set {per_cent(in_set, laws - hedged)}")  # fmt: skip
-    print(f"exponents within their 95 % intervals: {per_cent(covered, exponents)}")
-    print(f"error on the held-out runs over the noise of a run: {np.median(ratios):.2f} at the median, "
-          f"{np.max(ratios):.2f} at most")  # fmt: skip
-    print(f"tables with nothing: {nulls}; a law is claimed in {per_cent(claims, nulls)}")
+        record = {
+            "seed": seed,
+            "score": abs(truth.score),
+            "law": next(iter(truth.effects), ""),
+            "place": truth.place.name,
+            **_numbers(described, truth),
+            **record_of(described),
+        }
+        records.add(record)
+        said = ", ".join(record["kept"]) or ("within the noise" if described.laws is None else "no law")
+        part = "" if record["complete"] or not record["kept"] else "not the whole residual, the nearest "
+        print(f"{seed:4d} λ = {truth.score:5.0f}  {record['law'] or 'nothing':48} -> {part}{said}; "
+              f"{record['before']:.2f} -> {record['after']:.2f}, {time.process_time() - began:.0f} s",
+              flush=True)  # fmt: skip
+    _summary(records.all)
 
 
-def _short(described: RobotLaws) -> str:
-    return "within the noise" if described.laws is None else "no law"
+def _numbers(described: RobotLaws, truth: HiddenLaw) -> dict[str, int]:
+    """Count the exponents and levers of the true place, and those within their 95 % intervals."""
+    laws = described.laws.kept if described.laws else ()
+    law = next((one for one in laws if one.place == truth.place), None)
+    if law is None or not truth.effects:
+        return {"numbers": 0, "covered": 0}
+    intervals = {name: law.fit.interval(name) for name in truth.exponents if name in law.fit.names}
+    covered = sum(low <= truth.exponents[name] <= high for name, (low, high) in intervals.items())
+    return {"numbers": len(intervals), "covered": covered}
+
+
+def _summary(records: list[dict[str, Any]]) -> None:
+    columns = ("score", "tables", "described", "the true place in the set", "first in it", "on the true part",
+               "a wrong part", "error over noise, median (largest)")  # fmt: skip
+    with_law = [one for one in records if one["law"]]
+    print("\n" + heading(*columns))
+    for score in (*SCORES, None):
+        ones = [one for one in with_law if score in (one["score"], None)]
+        described = [one for one in ones if one["complete"]]
+        in_set = [one for one in described if one["place"] in one["kept"]]
+        parts = [{place_named(name).part for name in one["kept"]} for one in described]
+        true = [place_named(one["place"]).part for one in described]
+        after = [one["after"] for one in described]
+        print(row(
+            f"{score:g}" if score else "all", len(ones), len(described), len(in_set),
+            sum(one["kept"][0] == one["place"] for one in described),
+            sum(part == {part_true} for part, part_true in zip(parts, true, strict=True)),
+            sum(part_true not in part for part, part_true in zip(parts, true, strict=True)),
+            f"{np.median(after):.2f} ({np.max(after):.2f})" if after else "-",
+        ))  # fmt: skip
+    described = [one for one in with_law if one["complete"]]
+    print(f"\nof those that are described, the true place is in the set: "
+          f"{per_cent(sum(one['place'] in one['kept'] for one in described), len(described))}")  # fmt: skip
+    numbers = sum(one["numbers"] for one in with_law)
+    covered = sum(one["covered"] for one in with_law)
+    print(f"exponents and levers within their 95 % intervals: {per_cent(covered, numbers)}")
+    nulls = [one for one in records if not one["law"]]
+    claimed = sum(one["complete"] for one in nulls)
+    print(f"tables with nothing: {len(nulls)}; a law is claimed in {per_cent(claimed, len(nulls))}")

@@ -1,7 +1,7 @@
 """Truths for the benchmarks of laws: a design of runs, the score of a signal in it, and laws drawn at random.
 
 The score λ is what coefficients and nuisance parameters leave of a signal in the linear model, in standard
-deviations. Laws of the tails are not among the truths.
+deviations. Truths are drawn from the places of the search (`calibration.laws.places`).
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.calibration.planted import NOISE, ROBOT, SESSION
+from calibration.laws.inputs import EXPONENTS
+from calibration.laws.law_model import LEVER, lever_arms
 from calibration.laws.places import Place, places
 from calibration.report.robot_laws import RobotLaws
 from calibration.statistics.fit import Fit, fit
@@ -32,6 +34,7 @@ SCORES = (8.0, 16.0, 32.0)
 NULL = 1000  # seed of the table in which nothing is missing
 _MULTIPLIED = ("omega_h_rpm", "omega_t_rpm", "omega_yr_rad_s", "R_yr_cm")  # outputs with relative noise
 _STEEP = 1.0  # largest exponent
+_LEVERS = {"l": (-0.9, -0.2), "L": (0.3, 1.0)}
 
 
 @dataclass(frozen=True)
@@ -58,10 +61,15 @@ class Setting:
         column = Directions.plain(signal[..., None])
         return float(examine_residual(self.study, self.base, column, draws=50).scores.length[0])
 
-    def slope(self, place: Place) -> Floats:
-        """Compute the derivative (n, k) along the term or the coefficient of a place on the head."""
+    def slope(self, place: Place, lever: float = 0.0) -> Floats:
+        """Compute the derivative (n, k) along the term, or the logarithm of the factor, of a place."""
         moved = [name for name, _ in place.moves]
-        return self.model.derivatives({**self.base.parameters, **dict.fromkeys(moved, 1.0)}, moved)[1][..., 0]
+        parameters = {**self.base.parameters, **(dict.fromkeys(moved, 1.0) if place.is_term else {})}
+        slopes = self.model.derivatives(parameters, moved)[1]
+        if place.lever_unit:
+            arms = lever_arms(self.model.robot, self.model.runs, place.lever_unit)
+            return np.asarray(slopes[..., 0] + lever * arms[:, None] * slopes[..., 1])
+        return np.asarray(slopes @ [float(power) for _, power in place.moves])
 
     def logarithm(self, powers: Powers) -> Floats:
         """Compute ln m of every run (n,), as `sim.model.power_law` has it."""
@@ -72,35 +80,51 @@ class Setting:
 
 @dataclass(frozen=True)
 class HiddenLaw:
-    """A law on the head, or nothing."""
+    """A law, or nothing."""
 
     place: Place
     powers: Powers
+    lever: float
     score: float
     effects: dict[str, float]  # empty: nothing
 
+    @property
+    def exponents(self) -> dict[str, float]:
+        """True exponents and lever, by the names that a fit has."""
+        powers = zip(EXPONENTS, (self.powers.speed, self.powers.length, self.powers.tails), strict=True)
+        return {**dict(powers), **({LEVER: self.lever} if self.place.lever_unit else {})}
+
 
 def head_places() -> list[Place]:
-    """List the places on head and disc."""
-    return [place for place in places() if place.is_term or place.name in COEFFICIENTS]
+    """List the places at the disc that are even in the direction of the motor."""
+    at_disc = [place for place in places(both_directions=False) if place.part == "head" and not place.lever_unit]
+    assert all(place.is_term or place.name in COEFFICIENTS for place in at_disc)
+    return at_disc
 
 
 def hidden_law(setting: Setting, seed: int, *, nothing: bool) -> HiddenLaw:
-    """Draw place, exponents and sign of a law; one seed after the other has the scores of SCORES in turn."""
+    """Draw place, exponents, lever and sign of a law; one seed after the other has the scores of SCORES in turn.
+
+    One place in two is one at the disc, odd ones included; the others are side forces elsewhere and laws of the
+    tails.
+    """
     rng = np.random.default_rng(seed)
-    on_head = head_places()
-    place = on_head[rng.integers(len(on_head))]
+    kinds = [place.part == "head" and not place.lever_unit for place in places()]
+    at_disc = bool(rng.integers(2))
+    drawn = [place for place, of_head in zip(places(), kinds, strict=True) if of_head == at_disc]
+    place = drawn[rng.integers(len(drawn))]
     powers = Powers(*rng.uniform(-_STEEP, _STEEP, 3))
     score = SCORES[seed % 3] * rng.choice([-1, 1])
+    lever = round(float(rng.uniform(*_LEVERS[place.lever_unit])), 3) if place.lever_unit else 0.0
     if nothing:
-        return HiddenLaw(place, powers, 0.0, {})
+        return HiddenLaw(place, powers, lever, 0.0, {})
     logs = setting.logarithm(powers)
     factor = np.exp(logs) if place.is_term else logs
-    size = score / setting.score(setting.slope(place) * factor[:, None])
+    size = score / setting.score(setting.slope(place, lever) * factor[:, None])
     if place.is_term:
-        return HiddenLaw(place, powers, score, {place.effect(powers).name: size})
+        return HiddenLaw(place, powers, lever, score, {place.effect(powers, lever).name: size})
     powers = Powers(*(np.clip(size * p, -4, 4) for p in (powers.speed, powers.length, powers.tails)))
-    return HiddenLaw(place, powers, score, {place.effect(powers).name: 1.0})
+    return HiddenLaw(place, powers, lever, score, {place.effect(powers).name: 1.0})
 
 
 def with_noise(exact: pd.DataFrame, seed: int) -> pd.DataFrame:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from calibration.laws.inputs import EXPONENTS
-from calibration.laws.law_model import LEVER, SIZE, LawModel
+from calibration.laws.law_model import LEVER, SIZE, LawModel, with_law
 from calibration.laws.places import Place, places
 from calibration.report.law_robot import law_handed_on, robot_with_law
 from calibration.report.robot_laws import find_robot_laws
@@ -22,7 +23,11 @@ from tests.calibration.toy_tables import START, TRUTH, toy_swimmer, toy_table
 LAWS = {
     "Cyr": {"law_Cyr_speed500_length-500_tails0": 1.0},
     "Mz_wh": {"law_Mz_wh_speed1000_length-1000_tails0": 5.0},
+    "Fx_wt_at_l": {"law_Fx_wt_l-500_speed0_length0_tails1000": 3.0},
+    "Mz_wt_odd": {"law_Mz_wt_rectified_speed0_length1000_tails0": 25.0},
+    "tail_drag_along": {"law_tail_drag_along_speed1000_length0_tails0": 0.3},
 }
+WARMER = 0.05  # of C_yr, per kelvin
 
 
 def place(name: str) -> Place:
@@ -79,6 +84,52 @@ def test_the_robot_with_a_law_moves_as_its_fit_says(name: str) -> None:
             toy.steady_columns(group_columns([fitted])),
         )
         assert motions[0]["omega_yr_bar"][0] == pytest.approx(motions[1]["omega_yr_bar"][0], rel=2e-3)
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_the_lever_of_a_side_force_is_found_and_handed_on() -> None:
+    """What is handed on is a force and a couple, whose uncertainty has that of the lever."""
+    table = make_table(replace(TRUTH, effects=LAWS["Fx_wt_at_l"]), seed=4, title="")
+    described = find_robot_laws(table, START, progress=False)
+    assert described.laws is not None
+    law = described.laws.kept[0]
+    low, high = law.fit.interval(LEVER)
+    assert low < -0.5 < high < -0.2
+    assert "l (" in law.words
+    assert "behind the disc" in law.words
+    robot, known = law_handed_on(START, law, described.study.split.kept)
+    force, couple = robot.effects
+    assert (force[:10], couple[:10]) == ("law_Fx_wt_", "law_My_wt_")
+    errors = {
+        name: known.covariance[i, i] ** 0.5 / abs(robot.effects[name])
+        for i, name in enumerate(known.names) if name in robot.effects
+    }  # fmt: skip
+    at = [law.fit.names.index(name) for name in (SIZE, LEVER)]
+    relative = law.fit.covariance[np.ix_(at, at)] / np.outer(*[[law.fit.parameters[n] for n in (SIZE, LEVER)]] * 2)
+    assert errors[couple] == pytest.approx(relative.sum() ** 0.5, rel=0.3)
+    assert abs(errors[couple] / errors[force] - 1) > 0.2
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_a_law_depends_on_what_the_table_notes() -> None:
+    tables = []
+    for seed, kelvin in enumerate((-5.0, 0.0, 5.0)):
+        robot = replace(TRUTH, C_yr=TRUTH.C_yr * float(np.exp(WARMER * kelvin)))
+        tables.append(make_table(robot, seed=seed, title="").assign(temperature_C=20.0 + kelvin))
+    table = pd.concat(tables, ignore_index=True)
+    table["run"] = np.arange(1, len(table) + 1)
+    described = find_robot_laws(table, START, progress=False)
+    assert described.laws is not None
+    law = described.laws.kept[0]
+    assert law.place.name == "Cyr"
+    low, high = law.fit.interval("law_temperature_K")
+    assert low < WARMER < high < 2 * WARMER
+    assert "an exponential of the temperature" in law.words
+    assert "per K" in law.words
+    robot = law_handed_on(START, law, described.study.split.kept)[0]
+    assert robot.C_yr == pytest.approx(TRUTH.C_yr, rel=0.1)
+    again = with_law(toy_swimmer(toy_table(1)), law.model.record)  # a table that notes no temperature
+    assert again.factor(law.fit.parameters) == pytest.approx(np.ones(len(again.runs)), rel=0.2)
 
 
 @pytest.mark.usefixtures("toy_model")
