@@ -45,7 +45,7 @@ def main(tables: str = "24", first_seed: str = "0", file: str = "") -> None:
             continue
         record = {
             "seed": seed,
-            "score": abs(truth.score),
+            "score": float(abs(truth.score)),
             "law": next(iter(truth.effects), ""),
             "place": truth.place.name,
             **_numbers(described, truth),
@@ -67,8 +67,8 @@ def _numbers(described: RobotLaws, truth: HiddenLaw) -> dict[str, int]:
     if law is None or not truth.effects:
         return {"numbers": 0, "covered": 0}
     intervals = {name: law.fit.interval(name) for name in truth.exponents if name in law.fit.names}
-    covered = sum(low <= truth.exponents[name] <= high for name, (low, high) in intervals.items())
-    return {"numbers": len(intervals), "covered": covered}
+    covered = [low <= truth.exponents[name] <= high for name, (low, high) in intervals.items()]
+    return {"numbers": len(intervals), "covered": int(np.count_nonzero(covered))}
 
 
 def _summary(records: list[dict[str, Any]]) -> None:

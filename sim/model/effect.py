@@ -82,7 +82,7 @@ class Effect:
 
     @property
     def term(self) -> str:
-        """Name of its number in `Body.nonlocal_terms`, of a non-local effect."""
+        """Name of the effect whose term it is; a non-local effect has this name in `Body.nonlocal_terms`."""
         return self.name
 
     def adds(self, size: Floats, groups: Groups, body: Body) -> Body:

@@ -103,7 +103,7 @@ def heads_and_tails(columns: Mapping[str, Floats], keep: Collection[str] = ()) -
 def needs_no_learning(effect: str) -> bool:
     """Return whether an effect enters the balance by algebra: it changes head, disc, motor, or all drag alike."""
     entry = catalogue()[effect]
-    return entry.reach == "local" and effect not in _ON_TAILS
+    return entry.reach == "local" and entry.term not in _ON_TAILS
 
 
 def full_motion(heads: Heads, u: Floats) -> Floats:

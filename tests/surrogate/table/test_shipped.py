@@ -74,6 +74,10 @@ def test_fresh_robots_are_near_the_simulator_and_inside_their_intervals() -> Non
         ({"colour": 1.0}, "unknown column"),
         ({"dwell_bar": 0.001}, "dwell_bar = 0.001"),
         ({"tail_sag": 0.1}, "tail_sag changes more than head, disc and motor"),
+        (
+            {"law_tail_sag_speed100_length0_tails0": 0.1},
+            "law_tail_sag_speed100_length0_tails0 changes more than head",
+        ),
     ],
 )
 def test_the_command_refuses_and_writes_nothing(
