@@ -79,17 +79,15 @@ class Law:
         noted = [name for name in self.model.noted if parameter_of(name) in self.fit.names]
         values = [self.fit.parameters[parameter_of(name)] for name in noted]
         also = noted_in_words(noted, values, [self.fit.interval(parameter_of(name)) for name in noted])
-        return ", ".join(filter(None, (self.place.words, self._where, said, also)))
+        return ", ".join(filter(None, (self.place.words, self.where, said, also)))
 
     @property
-    def _where(self) -> str:
+    def where(self) -> str:
         """Where on the axis a side force with a lever acts, in words; empty if it has none."""
         if LEVER not in self.fit.names:
             return ""
-        ends = sorted(map(abs, self.fit.interval(LEVER)))
-        lever, unit = self.fit.parameters[LEVER], self.place.lever_unit
-        side = "behind" if lever < 0 else "ahead of"
-        return f"{abs(lever):.2f} {unit} ({ends[0]:.2f} to {ends[1]:.2f}) {side} the disc"
+        low, high = sorted(map(abs, self.fit.interval(LEVER)))
+        return f"at {abs(self.fit.parameters[LEVER]):.2f} {self.place.lever_unit} ({low:.2f} to {high:.2f})"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the law as laws.json has it; `size` is at the geometric mean of the runs."""

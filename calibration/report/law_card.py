@@ -73,7 +73,7 @@ def add_laws(page: Page, result: Verdict) -> None:
 def _row(law: Law, level: float) -> tuple[str, ...]:
     kept = "describes the runs" if law.p_value >= level / 2 else "leaves more than noise"
     return (
-        law.place.words,
+        ", ".join(filter(None, (law.place.words, law.where))),
         *(_exponent(law, name) for name in EXPONENTS),
         f"{law.gain:.0f}",
         f"{100 * law.error:.2f} %",

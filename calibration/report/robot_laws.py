@@ -18,7 +18,7 @@ import pandas as pd
 
 from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law_fits import Laws, find_laws
-from calibration.laws.law_model import SIZE
+from calibration.laws.law_model import LEVER, SIZE
 from calibration.report.corrected_robot import as_toml, check_given
 from calibration.report.law_robot import law_handed_on
 from calibration.statistics.exclusions import count_of_rows, summary_of_excluded
@@ -70,7 +70,7 @@ class RobotLaws:
 
     def to_frame(self) -> pd.DataFrame:
         """Tabulate the laws that were fitted, the largest gain first."""
-        numbers = [name.removeprefix("law_") for name in (SIZE, *EXPONENTS)]
+        numbers = [name.removeprefix("law_") for name in (SIZE, LEVER, *EXPONENTS)]
         rows = [
             {
                 "place": law.place.name,
