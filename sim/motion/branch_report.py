@@ -233,8 +233,9 @@ def summary(result: Branches) -> str:
     if result.incomplete:
         motions += " (the search ended there; there may be more)"
     kinds = [m.kind for b in result.branches for m in b.special]
-    words = [f"{kinds.count(kind)} {name}" for kind, name in (
-        (FOLD, "folds"), (HOPF, "Hopf points"), (DOUBLING, "period doublings"))]  # fmt: skip
+    names = ((FOLD, "fold"), (HOPF, "Hopf point"), (DOUBLING, "period doubling"))
+    counts = [(kinds.count(kind), name) for kind, name in names]
+    words = [f"{number} {name}{'' if number == 1 else 's'}" for number, name in counts]
     largest, place = largest_hysteresis(result)
     sweeps = "slow sweeps up and down agree"
     if largest > 0.03:

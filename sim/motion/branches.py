@@ -8,7 +8,7 @@
    disc (`sim.motion.revolution`).
 4. Where a motion is unstable, it is perturbed and stepped in time. What it ends in is followed as well.
 
-A motion whose means are those of a branch, to 3 %, is that branch. Folds are located where the input turns back;
+A motion whose means are those of a branch, to 3 %, is on that branch, if its tails move alike as there. Folds are located where the input turns back;
 Hopf points and period doublings where the growth of small perturbations changes its sign.
 
 Left out: motions that none of these searches meets, and motions whose shape does not repeat after a turn of the
@@ -40,6 +40,7 @@ STEPS_OF_A_SWEEP = 24
 _STARTS = 9  # values of the input at which Newton's method and time steps start from straight tails
 _MOST_ALIKE, _MOST_OTHER = 200, 30  # points of a branch in each direction
 _MOST_BRANCHES = 12
+_END = 1e-6  # distance in s at which a point is the end of the range
 _SAME = 0.03  # relative difference of the means up to which motions are one
 _KICK = 0.03  # perturbation of an unstable motion, of the tips, in l
 
@@ -75,7 +76,7 @@ class Branch:
     def has(self, s: float, means: Floats) -> bool:
         """Tell whether a motion is on this branch."""
         for one, next_one in pairwise(self.motions):
-            low, high = min(one.s, next_one.s) - 1e-9, max(one.s, next_one.s) + 1e-9
+            low, high = min(one.s, next_one.s) - _END, max(one.s, next_one.s) + _END
             if low <= s <= high:
                 share = 0.5 if one.s == next_one.s else np.clip((s - one.s) / (next_one.s - one.s), 0, 1)
                 if difference(one.means + share * (next_one.means - one.means), means) < _SAME:
@@ -121,9 +122,9 @@ class _Search:
     starts: list[tuple[Equations, Floats]] = field(default_factory=list)  # of each branch: not yet probed points
     probed: int = 0
 
-    def knows(self, s: float, means: Floats) -> bool:
-        """Tell whether a motion is on a branch."""
-        return any(branch.has(s, means) for branch in self.branches)
+    def knows(self, s: float, means: Floats, alike: bool) -> bool:
+        """Tell whether a motion, whose tails move alike or not, is on a branch."""
+        return any(branch.has(s, means) for branch in self.branches if branch.alike == alike)
 
     @property
     def full(self) -> bool:
@@ -177,17 +178,19 @@ def _stepped(search: _Search, way: str, places: Floats, start: Settled | None = 
 def _from_straight_tails(search: _Search, s: float) -> None:
     """Follow the orbit that Newton's method finds from straight tails, unless it is known."""
     y = search.alike.start(s)
-    if y is not None and not search.full and not search.knows(s, search.alike.means(y)):
+    if y is not None and not search.full and not search.knows(s, search.alike.means(y), True):
         _follow_both_ways(search, search.alike, y, alike=True)
 
 
 def _from_time_steps(search: _Search, motion: Settled) -> None:
     """Follow the motion in which time steps ended, unless it is known."""
-    if not motion.settled or search.full or search.knows(motion.s, motion.means):
+    if not motion.settled or search.full:
         return
     family = Revolutions(search.swept.body_at, search.tails, EDGES, motion.steps)
     turn = family.timed(motion.state, motion.s, motion.time, shapes=True)
     orbit = None if turn is None else orbit_from_turn(turn, search.alike.instants)
+    if search.knows(motion.s, motion.means, orbit is not None):
+        return
     if orbit is not None:
         y = search.alike.pack(*orbit, motion.s)
         if _follow_both_ways(search, search.alike, y, alike=True):
@@ -223,7 +226,7 @@ def _follow_both_ways(search: _Search, equations: Equations, y: Floats, *, alike
     if first is None or not equations.is_valid(first.y):
         return False
     start = _motion(search, equations, first)
-    if search.knows(start.s, start.means):
+    if search.knows(start.s, start.means, alike):
         return True
     most = _MOST_ALIKE if alike else _MOST_OTHER
     parts = []

@@ -107,15 +107,15 @@ def test_what_happens_where_the_growth_changes_its_sign() -> None:
 def test_the_map_over_a_turn_has_the_orbit_as_fixed_point_with_its_growth() -> None:
     swept = SweptInput(TWO_TAILS, "omega_bar", 60.0, 220.0)
     family = alike_family(swept)
-    start = family.start(0.4)
+    start = family.start(0.8)
     assert start is not None
     x, u = family.unpack(start)
-    body = swept.body_at(0.4)
+    body = swept.body_at(0.8)
     means = family.means(start)
     time = 2 * np.pi / abs(means[0])
     turns = Revolutions(swept.body_at, 2, EDGES, 2 * int(48 * abs(body.omega / means[0])))
     state = state_from_orbit(body, x, u)
-    point = first_point(turns, turns.start(state, 0.4, time), 1.0)
+    point = first_point(turns, turns.start(state, 0.8, time), 1.0)
     assert point is not None
     turn = turns.at(point.y)
     assert turn is not None
@@ -193,12 +193,11 @@ def test_a_hopf_point_separates_decay_from_growth_in_time_steps() -> None:
     x, u = family.unpack(crossing.y)
     assert leading_exponent(swept.body_at(crossing.s), 7, x, u).kind == HOPF
     for s, stays in ((crossing.s - 0.3, True), (crossing.s + 0.3, False)):
-        orbit = family.start(s)
-        assert orbit is not None
-        x, u = family.unpack(orbit)
-        body = swept.body_at(s)
-        state = perturbed(state_from_orbit(body, x, u), 1e-3, 0)
-        means = family.means(orbit)
+        beside = first_point(family, np.append(crossing.y[:-1], s), 1.0)
+        assert beside is not None
+        x, u = family.unpack(beside.y)
+        state = perturbed(state_from_orbit(swept.body_at(s), x, u), 1e-3, 0)
+        means = family.means(beside.y)
         settled = settled_from(swept.body_at, 7, s, state, 2 * np.pi / abs(means[0]))
         assert (difference(settled.means, means) < 0.03) == stays
 
@@ -209,7 +208,7 @@ def test_table_and_picture_show_every_branch() -> None:
     table = branch_table(result)
     assert set(table["branch"]) == set(range(len(result.branches) + 1))
     assert (table["origin"] == "time steps, up").sum() == 6
-    assert table.loc[table["branch"] > 0, "omega_bar"].between(60 - 1e-9, 220 + 1e-9).all()
+    assert table.loc[table["branch"] > 0, "omega_bar"].between(60 - 1e-3, 220 + 1e-3).all()
     stable = table[table["branch"] > 0]
     assert (stable["stable"] == (stable["growth"] < 0)).all()
     labels = draw_branches(result).axes[0].get_legend_handles_labels()[1]
