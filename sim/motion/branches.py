@@ -8,8 +8,9 @@
    disc (`sim.motion.revolution`).
 4. Where a motion is unstable, it is perturbed and stepped in time. What it ends in is followed as well.
 
-A motion whose means are those of a branch, to 3 %, is on that branch, if its tails move alike as there. Folds are located where the input turns back;
-Hopf points and period doublings where the growth of small perturbations changes its sign.
+A motion whose means are those of a branch, to 3 %, is on that branch, if its tails move alike as there. Folds are
+located where the input turns back; Hopf points and period doublings where the growth of small perturbations
+changes its sign.
 
 Left out: motions that none of these searches meets, and motions whose shape does not repeat after a turn of the
 disc. Time steps show the latter, as unsettled. All is computed on one mesh of 12 edges. Units: l, μ0 l⁴/EI.
