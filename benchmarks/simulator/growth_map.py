@@ -95,7 +95,7 @@ def border_of(robot: Robot, curvature: float, twist: float) -> Border:
         x, u = family.unpack(point.y)
         return leading_exponent(swept.body_at(point.s), robot.tails, x, u).growth
 
-    before = grows(here)
+    before, trail = grows(here), [here]
     for point in follow(family, here, 150):
         now = grows(point)
         if before < 0 < now:
@@ -103,18 +103,19 @@ def border_of(robot: Robot, curvature: float, twist: float) -> Border:
             if crossing is not None:
                 x, u = family.unpack(crossing.y)
                 kind = leading_exponent(swept.body_at(crossing.s), robot.tails, x, u).kind
-                sides = [_stepped(swept, family, crossing, way) for way in (-_AWAY, _AWAY)]
-                return Border(curvature, twist, swept.value(crossing.s), kind, *sides)
+                border = swept.value(crossing.s)
+                sides = [_stepped(swept, family, [*trail, point], border * (1 + way)) for way in (-_AWAY, _AWAY)]
+                return Border(curvature, twist, border, kind, *sides)
         here, before = point, now
+        trail.append(point)
     return Border(curvature, twist, np.nan, "none", np.nan, np.nan)
 
 
-def _stepped(swept: SweptInput, family: TailsAlike, crossing: Point, away: float) -> float:
-    """Step the orbit at a relative distance from the border, and a perturbed one; log of their growth per turn."""
-    s = (swept.value(crossing.s) * (1 + away) - swept.low) / (swept.high - swept.low)
-    y = crossing.y.copy()
-    y[-1] = s
-    point = first_point(family, y, 1.0)
+def _stepped(swept: SweptInput, family: TailsAlike, trail: list[Point], omega_bar: float) -> float:
+    """Step the orbit at ω̄, found from the nearest point of the trail, and a perturbed one; growth per turn."""
+    s = (omega_bar - swept.low) / (swept.high - swept.low)
+    nearest = min(trail, key=lambda point: abs(point.s - s))
+    point = first_point(family, np.append(nearest.y[:-1], s), 1.0)
     if point is None:
         return np.nan
     x, u = family.unpack(point.y)
