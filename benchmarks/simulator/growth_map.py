@@ -151,7 +151,7 @@ def main(curvatures: str = "5") -> None:
         print(f"\n{fast.name}: where growth begins, and time steps {100 * _AWAY:.0f} % below and above (per turn)")
         borders = []
         for twist in _FAST_TWISTS:
-            for curvature in np.linspace(-0.5, 0.5, int(curvatures)):
+            for curvature in np.linspace(-0.25, 0.25, int(curvatures)):
                 border = border_of(fast, float(curvature), twist)
                 borders.append(border)
                 print(
