@@ -22,7 +22,7 @@ from sim.solve.refinement import difference
 
 PERTURBATION = 1e-3  # of the tips, in l
 _DRIFT = 2e-4  # relative change of the means from turn to turn that counts as settled
-_REPEATS = 1e-3  # largest displacement of a node from turn to turn that counts as settled, in l
+_REPEATS = 3e-5  # largest displacement of a node from turn to turn that counts as settled, in l
 _FEWEST, _MOST = 3, 120  # turns
 _TOLERANCE = 1e-8
 

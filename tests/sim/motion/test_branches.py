@@ -192,7 +192,7 @@ def test_a_hopf_point_separates_decay_from_growth_in_time_steps() -> None:
     assert swept.value(crossing.s) == pytest.approx(82.0, abs=0.5)
     x, u = family.unpack(crossing.y)
     assert leading_exponent(swept.body_at(crossing.s), 7, x, u).kind == HOPF
-    for s, stays in ((crossing.s - 0.3, True), (crossing.s + 0.3, False)):
+    for s, stays in ((crossing.s - 0.1, True), (crossing.s + 0.1, False)):
         beside = first_point(family, np.append(crossing.y[:-1], s), 1.0)
         assert beside is not None
         x, u = family.unpack(beside.y)
