@@ -171,7 +171,7 @@ def test_the_fold_joins_a_stable_to_an_unstable_motion() -> None:
 
 @pytest.mark.slow
 def test_a_hopf_point_separates_decay_from_growth_in_time_steps() -> None:
-    swept = SweptInput(SEVEN_TAILS, "omega_bar", 74.0, 92.0)
+    swept = SweptInput(SEVEN_TAILS, "omega_bar", 60.0, 92.0)
     family = alike_family(swept)
     start = family.start(0.0)
     assert start is not None
@@ -192,7 +192,7 @@ def test_a_hopf_point_separates_decay_from_growth_in_time_steps() -> None:
     assert swept.value(crossing.s) == pytest.approx(82.0, abs=0.5)
     x, u = family.unpack(crossing.y)
     assert leading_exponent(swept.body_at(crossing.s), 7, x, u).kind == HOPF
-    for s, stays in ((crossing.s - 0.1, True), (crossing.s + 0.1, False)):
+    for s, stays in ((crossing.s - 0.06, True), (crossing.s + 0.06, False)):
         beside = first_point(family, np.append(crossing.y[:-1], s), 1.0)
         assert beside is not None
         x, u = family.unpack(beside.y)
