@@ -1,4 +1,4 @@
-"""Command line of the simulator: `steady`, `replay`, `film`, `robot`, `check`, `compile`."""
+"""Command line of the simulator: `steady`, `branches`, `replay`, `film`, `robot`, `check`, `compile`."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 from sim.io.commands import JOBS, Program, argument, out
 from sim.io.errors import InputError, naming
+from sim.model.sweepable import SWEEPABLE, read_range
 
 program = Program("sim", "Simulate swimming robots.")
 main = program.main
@@ -92,6 +93,43 @@ def _steady_points(arguments: Namespace) -> None:
         f"{len(table)} rows, {int(ended.sum())} converged ({direct} solved directly), "
         f"tails touch in {touching} -> {arguments.out}"
     )
+
+
+@program.command(
+    "branches",
+    "all steady motions along an input: folds, Hopf points, stability, hysteresis; where LOW is negative, write "
+    "--INPUT=LOW:HIGH",
+    argument("robot", metavar="ROBOT", help="robot.toml or the name of a preset"),
+    argument("--speed", metavar="LOW:HIGH", help="sweep the motor's speed [rpm], such as 20:200"),
+    *(argument(f"--{name}", metavar="LOW:HIGH", help=f"sweep {what}")
+      for name, what in SWEEPABLE.items()),
+    argument("--steps", type=int, default=24, help="values in a slow sweep by time steps (default: 24)"),
+    out("folder, or the name of a page, FILE.html (default: branches)", default="branches"),
+)  # fmt: skip
+def _branches(arguments: Namespace) -> None:
+    given = [name for name in ("speed", *SWEEPABLE) if getattr(arguments, name) is not None]
+    if len(given) != 1:
+        what = "no range is given" if not given else f"ranges of {' and '.join(given)} are given"
+        raise InputError(f"{what}; give the range of one input, such as --speed 20:200")
+    low, high = read_range(given[0], getattr(arguments, given[0]))
+    from sim.compile_stages import saying_first_use
+    from sim.compiling import CACHE
+    from sim.inputs import load_robot
+    from sim.motion.batches import one_thread
+    from sim.motion.branch_report import special_rows, summary, write_branches
+    from sim.motion.branches import find_branches
+    from sim.motion.swept_input import SweptInput
+
+    swept = SweptInput(load_robot(arguments.robot), given[0], low, high)
+    with one_thread(), saying_first_use("sim", CACHE):
+        result = find_branches(
+            swept, steps=arguments.steps, progress=lambda line: print(line, file=sys.stderr, flush=True)
+        )
+    files = write_branches(result, arguments.out)
+    print(summary(result))
+    for branch, kind, value, yaw, _ in special_rows(result):
+        print(f"  branch {branch}: {kind} at {swept.column} = {value}, yaw rate {yaw}")
+    print(f"-> {', '.join(map(str, files))}")
 
 
 @program.command(

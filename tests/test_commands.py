@@ -77,6 +77,15 @@ def robot(made: Path, out: Path) -> str:
     return "paper-triangle -> "
 
 
+def branches(made: Path, out: Path) -> str:
+    done("sim", "branches", "paper-control", "--speed", "40:80", "--steps", 3, "--out", out / "b.html")
+    table = pd.read_csv(out / "b.csv")
+    assert (table["origin"] == "continuation").sum() > 5
+    assert table["speed_rpm"].between(39.999, 80.001).all()
+    assert (out / "b.png").read_bytes()[:4] == b"\x89PNG"
+    return "1 branch, 0 folds"
+
+
 def film(made: Path, out: Path) -> str:
     done("sim", "film", made / "plan" / "plan.json", "--out", out / "swim.gif", "--speed", 100, "--width", 160)
     assert (out / "swim.gif").read_bytes()[:6] == b"GIF89a"
@@ -326,7 +335,7 @@ def adopt(made: Path, out: Path) -> str:
 
 RUNS: dict[tuple[str, str], Callable[[Path, Path], str]] = {
     ("sim", "steady"): steady, ("sim", "replay"): replay, ("sim", "robot"): robot, ("sim", "check"): check_paper,
-    ("sim", "film"): film, ("planner", "page"): page,
+    ("sim", "film"): film, ("sim", "branches"): branches, ("planner", "page"): page,
     ("sim", "compile"): compiled, ("surrogate", "compile"): compiled_queries,
     ("dataset", "build"): build, ("dataset", "report"): report,
     ("dataset", "verify"): verify, ("dataset", "config"): config,

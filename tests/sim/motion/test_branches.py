@@ -1,0 +1,244 @@
+"""Branches of steady motions: the equations that they solve, and robots with several motions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from sim.effects import catalogue
+from sim.io.errors import InputError
+from sim.model.presets import PRESETS
+from sim.model.robot import Robot
+from sim.model.slopes import SLOPE_INPUTS
+from sim.model.sweepable import SWEEPABLE, read_range
+from sim.motion.branch_report import branch_table, draw_branches, largest_hysteresis
+from sim.motion.branches import Branches, find_branches
+from sim.motion.continuation import first_point, follow, locate
+from sim.motion.exponents import DOUBLING, FOLD, HOPF, Leading, leading_exponent
+from sim.motion.revolution import Revolutions
+from sim.motion.slow_sweep import perturbed, settled_from
+from sim.motion.stability import growth
+from sim.motion.swept_input import SweptInput
+from sim.motion.tails_alike import EDGES, TailsAlike
+from sim.motion.turn_shapes import orbit_from_turn, state_from_orbit
+from sim.solve.refinement import difference
+
+CONTROL = PRESETS["paper-control"]
+
+
+def wide_robot(
+    tails: int, omega_bar: float, l_over_R: float, L_over_R: float, l_over_r0: float, C: tuple[float, float, float]
+) -> Robot:
+    """Make a robot with these groups."""
+    radius = CONTROL.tail_length / l_over_R
+    return replace(
+        CONTROL, name="wide", tails=tails, head_radius=radius, head_length=L_over_R * radius,
+        tail_radius=CONTROL.tail_length / l_over_r0, C_t=C[0], C_r=C[1], C_yr=C[2],
+    ).with_motor(omega_bar)  # fmt: skip
+
+
+# Two robots of `python -m benchmarks robustness`, rows 3507 and 3620, that have several motions.
+TWO_TAILS = wide_robot(2, 207.513, 13.619, 8.686, 24.204, (0.87, 1.815, 14.683))
+SEVEN_TAILS = wide_robot(7, 88.865, 12.674, 11.832, 37.736, (0.604, 2.088, 13.138))
+
+
+@cache
+def two_tails() -> Branches:
+    return find_branches(SweptInput(TWO_TAILS, "omega_bar", 60.0, 220.0), steps=6)
+
+
+def alike_family(swept: SweptInput) -> TailsAlike:
+    return TailsAlike(swept.body_at, swept.robot.tails)
+
+
+def test_the_tangent_is_the_change_of_the_orbit() -> None:
+    swept = SweptInput(CONTROL, "omega_bar", 10.0, 30.0)
+    family = alike_family(swept)
+    ends = []
+    for s in (0.5 - 1e-3, 0.5, 0.5 + 1e-3):
+        start = family.start(s)
+        assert start is not None
+        point = first_point(family, start, 1.0)
+        assert point is not None
+        ends.append(point)
+    slope = (ends[2].y - ends[0].y) / 2e-3
+    assert ends[1].tangent / ends[1].turns == pytest.approx(slope, abs=1e-3 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("effect", ["natural_curvature", "C_t"])
+def test_points_along_an_input_are_orbits(effect: str) -> None:
+    swept = SweptInput(CONTROL, effect, 0.2, 0.9)
+    family = alike_family(swept)
+    start = family.start(0.0)
+    assert start is not None
+    first = first_point(family, start, 1.0)
+    assert first is not None
+    last = list(follow(family, first, 100))[-1]
+    assert last.s == pytest.approx(1.0, abs=1e-6)
+    start = family.start(1.0)
+    assert start is not None
+    direct = first_point(family, start, 1.0)
+    assert direct is not None
+    assert difference(family.means(last.y), family.means(direct.y)) < 1e-5
+
+
+def test_the_leading_exponent_is_the_growth_of_steady() -> None:
+    swept = SweptInput(SEVEN_TAILS, "omega_bar", 40.0, 120.0)
+    family = alike_family(swept)
+    for s in (0.0, 0.5):
+        start = family.start(s)
+        assert start is not None
+        x, u = family.unpack(start)
+        body = swept.body_at(s)
+        expected = growth(body, 7, x, u, vectors=30)
+        assert leading_exponent(body, 7, x, u).growth == pytest.approx(expected, abs=1e-6)
+
+
+def test_what_happens_where_the_growth_changes_its_sign() -> None:
+    assert Leading(0.0, 0.0, 4).kind == FOLD
+    assert Leading(0.0, 2.0, 4).kind == DOUBLING
+    assert Leading(0.0, 1.0, 4).kind == HOPF
+    assert Leading(0.0, 0.5, 1).kind == DOUBLING
+
+
+def test_the_map_over_a_turn_has_the_orbit_as_fixed_point_with_its_growth() -> None:
+    swept = SweptInput(TWO_TAILS, "omega_bar", 60.0, 220.0)
+    family = alike_family(swept)
+    start = family.start(0.8)
+    assert start is not None
+    x, u = family.unpack(start)
+    body = swept.body_at(0.8)
+    means = family.means(start)
+    time = 2 * np.pi / abs(means[0])
+    turns = Revolutions(swept.body_at, 2, EDGES, 2 * int(48 * abs(body.omega / means[0])))
+    state = state_from_orbit(body, x, u)
+    point = first_point(turns, turns.start(state, 0.8, time), 1.0)
+    assert point is not None
+    turn = turns.at(point.y)
+    assert turn is not None
+    assert difference(turn.means, means) < 0.005
+    leading, expected = turns.leading(point.y), leading_exponent(body, 2, x, u)
+    assert leading.growth == pytest.approx(expected.growth, rel=0.05)
+
+
+def test_an_orbit_survives_the_way_to_a_state_and_back() -> None:
+    swept = SweptInput(TWO_TAILS, "omega_bar", 60.0, 220.0)
+    family = alike_family(swept)
+    start = family.start(0.8)
+    assert start is not None
+    x, u = family.unpack(start)
+    state = state_from_orbit(swept.body_at(0.8), x, u)
+    time = 2 * np.pi / abs(family.means(start)[0])
+    turn = Revolutions(swept.body_at, 2, EDGES, 300).timed(state, 0.8, time, shapes=True)
+    assert turn is not None
+    orbit = orbit_from_turn(turn, family.instants)
+    assert orbit is not None
+    assert np.abs(orbit[0] - x).max() < 0.02
+    bent = perturbed(state, 0.3, 1)
+    turn = Revolutions(swept.body_at, 2, EDGES, 300).timed(bent, 0.8, time, shapes=True)
+    assert turn is None or orbit_from_turn(turn, family.instants) is None
+
+
+@pytest.mark.slow
+def test_both_stable_motions_of_two_tails_are_found() -> None:
+    """The direct solution reaches one, time steps from rest the other; docs/branches.md."""
+    result = two_tails()
+    s = (TWO_TAILS.omega_bar - 60.0) / 160.0
+    alike = [motion for branch in result.branches if branch.alike for motion in branch.at(s)]
+    assert sorted(m.means[2] for m in alike if m.stable) == pytest.approx([79.8, 87.0], rel=0.03)
+    assert len(alike) == 3
+    for motion in (*result.up, *result.down):
+        assert motion.settled
+        assert any(branch.has(motion.s, motion.means) for branch in result.branches)
+
+
+@pytest.mark.slow
+def test_the_fold_joins_a_stable_to_an_unstable_motion() -> None:
+    """Below the fold time steps leave the branch; above it they return to the stable motion."""
+    result = two_tails()
+    branch = next(b for b in result.branches if any(m.kind == FOLD for m in b.motions))
+    fold = next(m for m in branch.motions if m.kind == FOLD)
+    assert fold.s == pytest.approx(min(m.s for m in branch.motions), abs=1e-6)
+    assert abs(fold.leading.growth) < 0.05
+    place = branch.motions.index(fold)
+    sides = branch.motions[place - 2].stable, branch.motions[place + 2].stable
+    assert sorted(sides) == [False, True]
+
+
+@pytest.mark.slow
+def test_a_hopf_point_separates_decay_from_growth_in_time_steps() -> None:
+    swept = SweptInput(SEVEN_TAILS, "omega_bar", 60.0, 92.0)
+    family = alike_family(swept)
+    start = family.start(0.0)
+    assert start is not None
+    here = first_point(family, start, 1.0)
+    assert here is not None
+
+    def grows(point: object) -> float:
+        x, u = family.unpack(point.y)  # type: ignore[attr-defined]
+        return leading_exponent(swept.body_at(point.s), 7, x, u).growth  # type: ignore[attr-defined]
+
+    crossing = None
+    for point in follow(family, here, 60):
+        if grows(here) < 0 < grows(point):
+            crossing = locate(family, here, point, grows)
+            break
+        here = point
+    assert crossing is not None
+    assert swept.value(crossing.s) == pytest.approx(82.0, abs=0.5)
+    x, u = family.unpack(crossing.y)
+    assert leading_exponent(swept.body_at(crossing.s), 7, x, u).kind == HOPF
+    for s, stays in ((crossing.s - 0.06, True), (crossing.s + 0.06, False)):
+        beside = first_point(family, np.append(crossing.y[:-1], s), 1.0)
+        assert beside is not None
+        x, u = family.unpack(beside.y)
+        state = perturbed(state_from_orbit(swept.body_at(s), x, u), 1e-3, 0)
+        means = family.means(beside.y)
+        settled = settled_from(swept.body_at, 7, s, state, 2 * np.pi / abs(means[0]))
+        assert (difference(settled.means, means) < 0.03) == stays
+
+
+@pytest.mark.slow
+def test_table_and_picture_show_every_branch() -> None:
+    result = two_tails()
+    table = branch_table(result)
+    assert set(table["branch"]) == set(range(len(result.branches) + 1))
+    assert (table["origin"] == "time steps, up").sum() == 6
+    assert table.loc[table["branch"] > 0, "omega_bar"].between(60 - 1e-3, 220 + 1e-3).all()
+    stable = table[table["branch"] > 0]
+    assert (stable["stable"] == (stable["growth"] < 0)).all()
+    labels = draw_branches(result).axes[0].get_legend_handles_labels()[1]
+    assert "tails alike, stable" in labels
+    assert FOLD in labels
+    assert largest_hysteresis(result)[0] < 0.03
+
+
+def test_every_input_has_an_option() -> None:
+    assert set(SWEEPABLE) == {*SLOPE_INPUTS, *catalogue()}
+    assert read_range("C_t", "1:2.5") == (1.0, 2.5)
+
+
+@pytest.mark.parametrize("text", ["", "1", "1:", ":2", "1:x", "1:inf", "nan:2", "1-2", "1:2:3"])
+def test_other_words_are_no_range(text: str) -> None:
+    with pytest.raises(InputError, match="LOW:HIGH"):
+        read_range("C_t", text)
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high", "words"),
+    [
+        ("speed", 0.0, 20.0, "above 0"),
+        ("omega_bar", -5.0, 20.0, "above 0"),
+        ("C_t", 2.0, 1.0, "the lower one first"),
+        ("C_t", -1.0, 1.0, "above 0"),
+        ("natural_curvature", 0.0, 3.0, "from -1 to 1"),
+        ("colour", 0.0, 1.0, "no input"),
+        ("l_over_r0", 2.0, 20.0, "slender"),
+    ],
+)
+def test_ranges_without_robots_are_refused(name: str, low: float, high: float, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        SweptInput(CONTROL, name, low, high)
