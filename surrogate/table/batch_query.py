@@ -49,8 +49,8 @@ from surrogate.table.flat_table import (
     WRENCH,
 )
 from surrogate.table.support import novelty_block
-from surrogate.wrench.balance import MATRICES, inputs_at
-from surrogate.wrench.balance_blocks import FOUND, LEFT_OVER, STATE
+from surrogate.wrench.balance import LEFT_OVER, MATRICES, inputs_at
+from surrogate.wrench.balance_blocks import STATE
 from surrogate.wrench.heads import HEAD_NUMBERS, ROBOT_NUMBERS
 from surrogate.wrench.motions import solve_many
 
@@ -123,7 +123,7 @@ def query_blocks(
             lane = block[_ANSWER:_SHARE, b]
             lane[REASON] = NOT_LEARNED
             if sizes[0] >= 0 and support >= 0:
-                lane[REASON] = judged(table, at, group[:, rows[k]], lane, lane[NOVELTY], flags[k] == FOUND)
+                lane[REASON] = judged(table, at, group[:, rows[k]], lane, lane[NOVELTY], flags[k])
             put_steady(robot[rows[k]], lane, block[_SHARE, b])
         if wanted & WITH_DWELL:
             _responses(table, at, robot, rows[begin:], dwell, block, work)

@@ -37,7 +37,7 @@ from surrogate.table.flat_table import (
     WRENCH,
 )
 from surrogate.table.support import monomial_count, novelty_at, support_room
-from surrogate.wrench.balance import MATRICES, inputs_at, solve
+from surrogate.wrench.balance import LEFT_OVER, MATRICES, SEVERAL, inputs_at, solve
 from surrogate.wrench.heads import HEAD_LENGTH, HEAD_NUMBERS, RESISTANCE, ROBOT_NUMBERS, SENSE
 from surrogate.wrench.tails import INPUTS, inputs_of_head
 
@@ -45,7 +45,7 @@ GROUPS = len(ROBOT)  # in the order of ROBOT
 MOTION, INPUT, NOVELTY, REASON, STEADY, RESPONSE, HALF = 0, 5, 12, 13, 14, 22, 26  # rows of the answer
 ANSWERS = HALF + len(OUTPUTS)
 WITH_DWELL, WITH_WIDTHS, ASSEMBLED = 1, 2, 4  # what is wanted; whether the robots are given as heads and tails
-INSIDE, NOT_LEARNED, NO_MOTION, STRANGE, QUICK, IMPOSSIBLE = range(6)  # reasons
+INSIDE, NOT_LEARNED, NO_MOTION, STRANGE, QUICK, IMPOSSIBLE, AMBIGUOUS = range(7)  # reasons
 BRANCHES = 0.6  # |ω_yr/ω_t| from which a robot may have several motions
 _C_T, _C_R, _C_YR, _LENGTH, _HEAD, _SLENDERNESS, _SPEED, _NUMBER, _OFFSET = range(GROUPS)
 _KNOTS = len(DWELLS)
@@ -141,7 +141,7 @@ def _motion(
     novelty, reason = 0.0, NOT_LEARNED
     for i in range(5):
         motion[i] = np.nan
-    found = False
+    found = LEFT_OVER
     if possible and sizes[0] >= 0:
         found = solve(table, sizes, robot, motion, solution, matrices)
     inputs_at(robot[HEAD_NUMBERS:], motion, x)
@@ -160,13 +160,15 @@ def _motion(
 
 
 @compiled
-def judged(table: Floats, places: Integers, group: Floats, motion: Floats, novelty: float, found: bool) -> int:
-    """Return why a robot whose number of tails was learned is outside."""
-    if not (found and _within(table, places, group)):
+def judged(table: Floats, places: Integers, group: Floats, motion: Floats, novelty: float, found: int) -> int:
+    """Return why a robot whose number of tails was learned is outside; `found` is what its solution ended with."""
+    if not (found != LEFT_OVER and _within(table, places, group)):
         return NO_MOTION
     if not novelty <= 1:
         return STRANGE
-    return QUICK if abs(motion[2]) > BRANCHES * abs(motion[4]) else INSIDE
+    if abs(motion[2]) > BRANCHES * abs(motion[4]):
+        return QUICK
+    return AMBIGUOUS if found == SEVERAL else INSIDE
 
 
 @compiled

@@ -46,7 +46,7 @@ _ROBOT = GROUPS + 1  # where the parts of one array of numbers begin: groups, dw
 _ANSWER = _ROBOT + ROBOT_NUMBERS
 _ROOM = _ANSWER + ANSWERS
 _BYTES = 8
-_MANY, _CHUNK = 8, 8192  # robots from which they are answered in blocks; that are answered together
+MANY, _CHUNK = 8, 8192  # robots from which they are answered in blocks; that are answered together
 
 
 class QuickQuery:
@@ -85,7 +85,7 @@ class QuickQuery:
         wanted = WITH_DWELL * (dwells is not None) + WITH_WIDTHS * widths + ASSEMBLED * (robots is not None)
         robots = np.empty((count, ROBOT_NUMBERS)) if robots is None else robots
         dwells = np.empty(0) if dwells is None else np.array(dwells, dtype=float)
-        if count >= _MANY:
+        if count >= MANY:
             return self._in_blocks(groups, robots, dwells, wanted)
         answers, room = np.empty((ANSWERS, count)), np.empty(self._table.room)
         query_rows(

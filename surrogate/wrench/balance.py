@@ -3,8 +3,9 @@
 The equations are those of `surrogate.wrench.heads` and `surrogate.wrench.tails`. They are solved by Broyden's
 method. Its first derivative holds the network's numbers y fixed, so it needs no evaluation of the network; five or
 six evaluations are enough. The table of a single tail has second solutions near the true one. So there the
-equations are solved again with the exact first derivative, and of two different solutions that counts whose surge
-is nearer to the first guess (linear theory). Units: l, μ0 l⁴/EI, EI/l².
+equations are solved again with the exact first derivative. Of two different solutions that counts whose surge is
+nearer to the first guess (linear theory), and the robot is marked: it may be the wrong one. Units: l, μ0 l⁴/EI,
+EI/l².
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ DIFFERENCE, LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
 FIRST_SPIN = 0.6  # ω_t/ω in the first guess
 LONGEST = 0.5  # largest relative change of ω_t in one step
 _VECTORS = 64  # numbers for the vectors of one robot, before the room of the network
+LEFT_OVER, FOUND, SEVERAL = 0, 1, 2  # what a solution ends with
+SAME = 1e-6  # two solutions are one, if all velocities agree so
 MATRICES = 4  # 4×4 matrices that a solution works in
 
 
@@ -36,8 +39,8 @@ def solution_room(sizes: Integers) -> int:
 
 
 @compiled
-def solve(numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room: Floats, matrices: Floats) -> bool:
-    """Write the motion (5,) of one robot (37,); return whether the solution converged.
+def solve(numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room: Floats, matrices: Floats) -> int:
+    """Write the motion (5,) of one robot (37,); return LEFT_OVER, FOUND, or SEVERAL if two motions were found.
 
     Args:
         numbers, sizes: network of the tails, see `surrogate.networks.compiled.Packed`.
@@ -54,11 +57,23 @@ def solve(numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room:
             second[i] = guess[i]
         second_found = _solve(numbers, sizes, robot, second, room, matrices, True)
         nearer = abs(second[1] - guess[1]) < abs(motion[1] - guess[1])
+        several = found and second_found and not same_motions(motion, second)
         if second_found and (nearer or not found):
             for i in range(5):
                 motion[i] = second[i]
             found = True
-    return found
+        if several:
+            return SEVERAL
+    return FOUND if found else LEFT_OVER
+
+
+@compiled
+def same_motions(first: Floats, second: Floats) -> bool:
+    """Tell whether two solutions (5,) are one."""
+    same = True
+    for i in range(5):
+        same = same and abs(second[i] - first[i]) <= SAME * abs(first[i])
+    return same
 
 
 def inverses_of(matrices: Floats) -> Floats:

@@ -18,7 +18,16 @@ from sim.arrays import Floats, Integers
 from sim.compiling import compiled
 from surrogate.networks.blocks import BLOCK, evaluate_block, evaluate_roughly
 from surrogate.networks.elementary import angle_of, arcsinh_of, exp_of, log_of
-from surrogate.wrench.balance import CORRECTION, DIFFERENCE, FIRST_SPIN, LEAST_SHARE, LONGEST, STEPS
+from surrogate.wrench.balance import (
+    CORRECTION,
+    DIFFERENCE,
+    FIRST_SPIN,
+    FOUND,
+    LEAST_SHARE,
+    LEFT_OVER,
+    LONGEST,
+    STEPS,
+)
 from surrogate.wrench.heads import HEAD_NUMBERS, RESISTANCE, ROBOT_NUMBERS
 from surrogate.wrench.tails import (
     THRUST,
@@ -40,7 +49,6 @@ _TASK, _TICKS, _X = _SIZE + 1, _SIZE + 2, _SIZE + 3  # which robot, steps taken,
 _Y, _LEFT, _SAVED, _SLOPE = _X + 14, _X + 20, _X + 24, _X + 29  # its answer, balance, a motion, a derivative
 LANES = _SLOPE + 16
 _TAIL = HEAD_NUMBERS
-FOUND, LEFT_OVER = 1, 0
 
 
 @compiled

@@ -11,11 +11,9 @@ from sim.compiling import compiled
 from sim.object_code import COUNT, FLOATS, INTEGERS, array_at, kept
 from surrogate.networks.blocks import BLOCK, block_room, in_single_precision
 from surrogate.networks.compiled import Packed
-from surrogate.wrench.balance import MATRICES, solution_room, solve
-from surrogate.wrench.balance_blocks import FOUND, LANES, LEFT_OVER, STATE, solve_block_rows
+from surrogate.wrench.balance import FOUND, LEFT_OVER, MATRICES, same_motions, solution_room, solve
+from surrogate.wrench.balance_blocks import LANES, STATE, solve_block_rows
 from surrogate.wrench.heads import HEAD_NUMBERS, ROBOT_NUMBERS
-
-_SAME = 1e-6  # two solutions of a robot with one tail are one, if all velocities agree so
 
 
 def solve_robots(network: Packed, robots: Floats) -> tuple[Floats, Flags]:
@@ -33,7 +31,7 @@ def solve_robots(network: Packed, robots: Floats) -> tuple[Floats, Flags]:
         network.numbers, singles, network.sizes, len(network.numbers), count, robots, rows, states, converged,
         lanes, len(lanes), room, len(room), np.empty((MATRICES, 4, 4)),
     )  # fmt: skip
-    return np.ascontiguousarray(states[:count, :5]), converged[:count] == FOUND
+    return np.ascontiguousarray(states[:count, :5]), converged[:count] != LEFT_OVER
 
 
 def lane_rows(sizes: Integers) -> int:
@@ -49,7 +47,7 @@ def solve_rows(
     numbers: Any, singles: Any, sizes: Any, many: int, count: int, robots: Any, rows: Any, states: Any,
     converged: Any, lanes: Any, lane_space: int, room: Any, space: int, matrices: Any,
 ) -> None:  # fmt: skip
-    """Write the motions of robots (M, 37) to the first columns of states (2 M, STATE), and which are FOUND.
+    """Write the motions of robots (M, 37) to the first columns of states (2 M, STATE), and what they ended with.
 
     Args:
         numbers, sizes: network of the tails, see `surrogate.networks.compiled.Packed`, so many numbers.
@@ -79,7 +77,7 @@ def solve_many(
         robots: (M, 37).
         rows: (K,), of the robots to solve for, which have one network.
         states: (2 K, STATE), written: the motion (5,) first, in the first K rows.
-        found: (2 K,), written: FOUND, or LEFT_OVER if there is no solution, in the first K.
+        found: (2 K,), written: what the solutions ended with, see `surrogate.wrench.balance`, in the first K.
         lanes, room, matrices: to work in.
     """
     count, quick = len(rows), singles.view(np.float32)
@@ -87,13 +85,11 @@ def solve_many(
         solve_block_rows(numbers, quick, sizes, robots, rows, states[:count], found[:count], lanes, False, False)
         solve_block_rows(numbers, quick, sizes, robots, rows, states[count:], found[count:], lanes, True, False)
         for k in range(count):
-            for i in range(5):
-                same = abs(states[count + k, i] - states[k, i]) <= _SAME * abs(states[k, i])
-                if not (same and found[count + k] == FOUND):
-                    found[k] = LEFT_OVER
+            if found[count + k] != FOUND or not same_motions(states[k, :5], states[count + k, :5]):
+                found[k] = LEFT_OVER
     else:
         rough = sizes[5] == 1
         solve_block_rows(numbers, quick, sizes, robots, rows, states, found, lanes, False, rough)
     for k in range(count):
-        if found[k] != FOUND and solve(numbers, sizes, robots[rows[k]], states[k, :5], room, matrices):
-            found[k] = FOUND
+        if found[k] != FOUND:
+            found[k] = solve(numbers, sizes, robots[rows[k]], states[k, :5], room, matrices)

@@ -91,7 +91,7 @@ def test_blocks_have_the_numbers_of_one_by_one(monkeypatch: pytest.MonkeyPatch) 
     found = load().query(drawn, flag=True, intervals=True)
     part = np.random.default_rng(0).permutation(4000)[:1000]
     some = load().query({name: values[part] for name, values in drawn.items()}, flag=True, intervals=True)
-    monkeypatch.setattr(quick_query, "_MANY", 10**9)
+    monkeypatch.setattr(quick_query, "MANY", 10**9)
     wanted = load().query(drawn, flag=True, intervals=True)
     assert (found["outside"] == wanted["outside"]).all()
     known = ~wanted["outside"]
