@@ -69,9 +69,8 @@ def main(*words: str) -> None:
     ):
         plain, widths = (_each(lookup, columns, intervals=intervals) for intervals in (False, True))
         alone = _each(lookup, columns, intervals=False, one_by_one=True)
-        print(
-            f"  {name:28}{plain:6.1f}, with intervals{widths:6.1f}; one by one{alone:6.1f}, {alone / plain:.1f} times"
-        )
+        ratio = f"one by one{alone:6.1f}, {alone / plain:.1f} times"
+        print(f"  {name:28}{plain:6.1f}, with intervals{widths:6.1f}; {ratio}")
 
 
 def _each(

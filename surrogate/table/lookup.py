@@ -7,7 +7,8 @@ output can have an interval (`surrogate.table.intervals`).
 
 Rejected, or flagged on request: robots outside the joint support of the training data (`surrogate.table.support`),
 robots that yaw more than BRANCHES times as fast as their tails turn, which may have several motions, and robots
-with one tail whose balance has two solutions. Effects on the tails themselves are always rejected. The table does not extrapolate.
+with one tail whose balance has two solutions. Effects on the tails themselves are always rejected. The table does
+not extrapolate.
 """
 
 from __future__ import annotations
