@@ -5,10 +5,12 @@ from __future__ import annotations
 from sim.compile_stages import run_stages
 from sim.compiling import mark_all_compiled
 from surrogate.loops import FOLDER
-from surrogate.networks.compiled import evaluate_rows
+from surrogate.networks.blocks import evaluate_rows
+from surrogate.table.batch_query import query_blocks
 from surrogate.table.compiled_query import query_rows
 from surrogate.table.support import novelty_rows
-from surrogate.wrench.balance import inverse_rows, solve_rows
+from surrogate.wrench.balance import inverse_rows
+from surrogate.wrench.motions import solve_rows
 
 _KEPT = {
     "networks": evaluate_rows,
@@ -16,6 +18,7 @@ _KEPT = {
     "inverses": inverse_rows,
     "motions": solve_rows,
     "queries": query_rows,
+    "batches": query_blocks,
 }
 
 

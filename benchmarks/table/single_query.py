@@ -4,7 +4,8 @@ Usage: python -m benchmarks single_query [REPEATS]
 
 One robot is the mean of REPEATS queries (default: 2000), the least of five such means. The first answer is the
 processor time from the start of the interpreter, of numpy alone and of all imports, the table and one query, the
-least of five processes. The batch has 4096 robots of the domain, with one tail and more, and with two and more.
+least of five processes. The batch has 4096 robots of the domain; "one by one" is the same batch by the loop that a
+single query takes.
 
 Takes 30 seconds.
 """
@@ -23,6 +24,8 @@ from benchmarks.timing import processor_time
 from sim.arrays import Floats
 from sim.inputs import group_columns, load_robot
 from sim.model.groups import DWELL
+from surrogate.table import quick_query
+from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
 from surrogate.training.simulated import draw_robots
 
@@ -60,14 +63,26 @@ def main(*words: str) -> None:
     several = drawn | {"N": np.maximum(drawn["N"], 2.0)}
     for name, columns in (
         ("one tail and more", drawn),
+        ("one tail", drawn | {"N": np.ones(BATCH)}),
         ("two tails and more", several),
         ("with a dwell", several | {DWELL: np.full(BATCH, 2.0)}),
     ):
-        plain, widths = (
-            1e6 * _least(lambda c=columns, i=i: lookup.query(c, flag=True, intervals=i), 1) / BATCH  # type: ignore[misc]
-            for i in (False, True)
-        )
-        print(f"  {name:28}{plain:6.1f}, with intervals{widths:6.1f}")
+        plain, widths = (_each(lookup, columns, intervals=intervals) for intervals in (False, True))
+        alone = _each(lookup, columns, intervals=False, one_by_one=True)
+        ratio = f"one by one{alone:6.1f}, {alone / plain:.1f} times"
+        print(f"  {name:28}{plain:6.1f}, with intervals{widths:6.1f}; {ratio}")
+
+
+def _each(
+    lookup: NeuralTable, columns: Mapping[str, Floats], *, intervals: bool, one_by_one: bool = False
+) -> float:
+    """Return the time of each robot of a batch [µs], in blocks or by the loop of a single query."""
+    many = quick_query.MANY
+    quick_query.MANY = BATCH + 1 if one_by_one else many
+    try:
+        return 1e6 * _least(lambda: lookup.query(columns, flag=True, intervals=intervals), 1) / BATCH
+    finally:
+        quick_query.MANY = many
 
 
 def _least(work: Callable[[], object], repeats: int) -> float:

@@ -6,13 +6,13 @@ about a microsecond, however short the array is. These loops take about two micr
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats, Integers
 from sim.compiling import compiled
-from sim.object_code import COUNT, FLOATS, INTEGERS, array_at, kept
+from surrogate.networks.blocks import BLOCK, block_room, evaluate_rows
 
 _MAGIC = 6755399441055744.0  # 1.5 · 2^52: a small integer added to it stands in its lowest bits
 _LOG2_E = 1.4426950408889634
@@ -29,24 +29,16 @@ class Packed(NamedTuple):
     def evaluate(self, x: Floats) -> Floats:
         """Return the mean of the members, (M, O), at inputs x (M, F)."""
         x = np.ascontiguousarray(x, dtype=float)
-        y, room = np.empty((len(x), self.sizes[2])), np.empty(room_of(self.sizes))
-        evaluate_rows(self.numbers, self.sizes, len(self.numbers), len(x), x, y, room, len(room))
+        y = np.empty((len(x), self.sizes[2]))
+        rows = int(self.sizes[1] + self.sizes[2]) + block_room(self.sizes)
+        room = np.empty(rows * BLOCK)
+        evaluate_rows(self.numbers, self.sizes, len(self.numbers), len(x), x, y, room, rows)
         return y
 
 
 def room_of(sizes: Integers) -> int:
     """Return how many numbers `evaluate` works in."""
     return int(sizes[1] + sizes[2] + 3 * sizes[3])
-
-
-@kept(FLOATS, INTEGERS, COUNT, COUNT, FLOATS, FLOATS, FLOATS, COUNT)
-def evaluate_rows(numbers: Any, sizes: Any, many: int, count: int, x: Any, y: Any, room: Any, space: int) -> None:
-    """Write the mean of the members at inputs x (M, F) to y (M, O)."""
-    shape = array_at(sizes, 6)
-    inputs, outputs = array_at(x, (count, shape[1])), array_at(y, (count, shape[2]))
-    network, work = array_at(numbers, many), array_at(room, space)
-    for row in range(count):
-        evaluate(network, shape, inputs[row], outputs[row], work)
 
 
 @compiled

@@ -37,7 +37,7 @@ from surrogate.table.flat_table import (
     WRENCH,
 )
 from surrogate.table.support import monomial_count, novelty_at, support_room
-from surrogate.wrench.balance import MATRICES, inputs_at, solve
+from surrogate.wrench.balance import LEFT_OVER, MATRICES, SEVERAL, inputs_at, solve
 from surrogate.wrench.heads import HEAD_LENGTH, HEAD_NUMBERS, RESISTANCE, ROBOT_NUMBERS, SENSE
 from surrogate.wrench.tails import INPUTS, inputs_of_head
 
@@ -45,16 +45,16 @@ GROUPS = len(ROBOT)  # in the order of ROBOT
 MOTION, INPUT, NOVELTY, REASON, STEADY, RESPONSE, HALF = 0, 5, 12, 13, 14, 22, 26  # rows of the answer
 ANSWERS = HALF + len(OUTPUTS)
 WITH_DWELL, WITH_WIDTHS, ASSEMBLED = 1, 2, 4  # what is wanted; whether the robots are given as heads and tails
-INSIDE, NOT_LEARNED, NO_MOTION, STRANGE, QUICK, IMPOSSIBLE = range(6)  # reasons
+INSIDE, NOT_LEARNED, NO_MOTION, STRANGE, QUICK, IMPOSSIBLE, AMBIGUOUS = range(7)  # reasons
 BRANCHES = 0.6  # |ω_yr/ω_t| from which a robot may have several motions
 _C_T, _C_R, _C_YR, _LENGTH, _HEAD, _SLENDERNESS, _SPEED, _NUMBER, _OFFSET = range(GROUPS)
 _KNOTS = len(DWELLS)
 _SHORTEST, _LONGEST = float(DWELLS[0]) * (1 - 1e-9), float(DWELLS[-1])
 _POINTS = 3 * _KNOTS  # of a lag curve
 _SMALL_SURGE = 0.1  # of v_x
-_WIDTH_FEATURES = 11
-_TERMS = monomial_count(len(INPUTS))
-_SUPPORT_NUMBERS = 2 * len(INPUTS) + 1 + _TERMS * _TERMS
+WIDTH_FEATURES = 11
+TERMS = monomial_count(len(INPUTS))
+SUPPORT_NUMBERS = 2 * len(INPUTS) + 1 + TERMS * TERMS
 _SUPPORT_ROOM = support_room(len(INPUTS))
 _MOST = 1.7976931348623157e308
 _SCALES = np.array([SCALES[name] for name in OUTPUTS])
@@ -81,7 +81,7 @@ def query_rows(
     work, squares = array_at(room, space), array_at(matrices, (MATRICES, 4, 4))
     for row in range(count):
         if not wanted & ASSEMBLED:
-            _assemble(group[:, row], robot[row])
+            assemble(group[:, row], robot[row])
         _motion(table, at, group[:, row], robot[row], answer[:, row], work, squares)
         _steady(table, at, robot[row], answer[:, row], work)
         if wanted & WITH_DWELL:
@@ -104,7 +104,7 @@ def _possible(group: Floats) -> bool:
 
 
 @formula
-def _assemble(group: Floats, robot: Floats) -> None:
+def assemble(group: Floats, robot: Floats) -> None:
     """Write head and tails of a robot without effects, as `surrogate.wrench.heads.pack_robots` packs them.
 
     A formula, so that its products are not reordered: the rows of a head with much drag nearly cancel.
@@ -141,19 +141,15 @@ def _motion(
     novelty, reason = 0.0, NOT_LEARNED
     for i in range(5):
         motion[i] = np.nan
-    found = False
+    found = LEFT_OVER
     if possible and sizes[0] >= 0:
         found = solve(table, sizes, robot, motion, solution, matrices)
     inputs_at(robot[HEAD_NUMBERS:], motion, x)
     at = places[SUPPORT + kind]
     if sizes[0] >= 0 and at >= 0:
-        products = places[PRODUCTS : PRODUCTS + 2 * _TERMS]
-        novelty = novelty_at(table[at : at + _SUPPORT_NUMBERS], products, x, work)
-        reason = NO_MOTION
-        if found and _within(table, places, group):
-            reason = STRANGE
-            if novelty <= 1:
-                reason = QUICK if abs(motion[2]) > BRANCHES * abs(motion[4]) else INSIDE
+        products = places[PRODUCTS : PRODUCTS + 2 * TERMS]
+        novelty = novelty_at(table[at : at + SUPPORT_NUMBERS], products, x, work)
+        reason = judged(table, places, group, motion, novelty, found)
     if not possible:
         reason = IMPOSSIBLE
     for i in range(5):
@@ -161,6 +157,18 @@ def _motion(
     for i in range(7):
         answer[INPUT + i] = x[i]
     answer[NOVELTY], answer[REASON] = novelty, reason
+
+
+@compiled
+def judged(table: Floats, places: Integers, group: Floats, motion: Floats, novelty: float, found: int) -> int:
+    """Return why a robot whose number of tails was learned is outside; `found` is what its solution ended with."""
+    if not (found != LEFT_OVER and _within(table, places, group)):
+        return NO_MOTION
+    if not novelty <= 1:
+        return STRANGE
+    if abs(motion[2]) > BRANCHES * abs(motion[4]):
+        return QUICK
+    return AMBIGUOUS if found == SEVERAL else INSIDE
 
 
 @compiled
@@ -177,12 +185,18 @@ def _within(table: Floats, places: Integers, group: Floats) -> bool:
 @compiled
 def _steady(table: Floats, places: Integers, robot: Floats, answer: Floats, room: Floats) -> None:
     """Write STEADY_OUTPUTS."""
-    sense, number = robot[SENSE], robot[HEAD_NUMBERS + 4]
     x, share, work = room[:8], room[8:9], room[9:]
     for i in range(7):
         x[i] = answer[INPUT + i]
-    x[7] = np.log(number)
+    x[7] = np.log(robot[HEAD_NUMBERS + 4])
     evaluate(table, places[GAP : GAP + NETWORK], x, share, work)
+    put_steady(robot, answer, share[0])
+
+
+@compiled
+def put_steady(robot: Floats, answer: Floats, share: float) -> None:
+    """Write STEADY_OUTPUTS for a gap that is this share of the clamps' distance."""
+    sense, number = robot[SENSE], robot[HEAD_NUMBERS + 4]
     yaw, surge = sense * answer[MOTION + 2], answer[MOTION + 1]
     sway = sense * (answer[MOTION] + answer[MOTION + 2] * robot[HEAD_LENGTH] / 2)
     answer[STEADY], answer[STEADY + 1] = sense * answer[MOTION + 4], sense * answer[MOTION + 3]
@@ -190,17 +204,25 @@ def _steady(table: Floats, places: Integers, robot: Floats, answer: Floats, room
     answer[STEADY + 5] = np.hypot(sway, surge) / abs(yaw)
     answer[STEADY + 6] = np.arctan2(abs(sway), surge) * (180 / math.pi)
     clamps = 2 * robot[HEAD_NUMBERS + 2] * np.sin(math.pi / max(number, 2.0))
-    answer[STEADY + 7] = share[0] * clamps / (2 * robot[HEAD_NUMBERS + 3]) if number > 1 else np.inf
+    answer[STEADY + 7] = share * clamps / (2 * robot[HEAD_NUMBERS + 3]) if number > 1 else np.inf
 
 
 @compiled
 def _response(table: Floats, places: Integers, robot: Floats, dwell: float, answer: Floats, room: Floats) -> None:
     """Write net speed and lag at equal dwells, in the order of RESPONSE_OUTPUTS."""
-    number, tail = robot[HEAD_NUMBERS + 4], robot[HEAD_NUMBERS:]
     components, shifts = places[LAG + 2], places[MEMORY + 2]
-    x, lag, weights = room[:15], room[15:18], room[18:22]
-    terms = room[22 : 22 + components + shifts]
+    x, terms = room[:15], room[22 : 22 + components + shifts]
     work = room[22 + components + shifts :]
+    response_inputs(robot, answer, x)
+    evaluate(table, places[LAG : LAG + NETWORK], x, terms[:components], work)
+    evaluate(table, places[MEMORY : MEMORY + NETWORK], x, terms[components:], work)
+    put_response(table, places, robot, dwell, answer, terms, room[15:22])
+
+
+@compiled
+def response_inputs(robot: Floats, answer: Floats, x: Floats) -> None:
+    """Write the inputs of the response's networks to x (15,)."""
+    number, tail = robot[HEAD_NUMBERS + 4], robot[HEAD_NUMBERS:]
     for i in range(7):
         x[i] = answer[INPUT + i]
     for i in range(4):
@@ -208,8 +230,15 @@ def _response(table: Floats, places: Integers, robot: Floats, dwell: float, answ
     x[11], x[12] = tail[11], tail[12]
     x[13] = np.log(number)
     x[14] = 1.0 if number == 2 else 0.0
-    evaluate(table, places[LAG : LAG + NETWORK], x, terms[:components], work)
-    evaluate(table, places[MEMORY : MEMORY + NETWORK], x, terms[components:], work)
+
+
+@compiled
+def put_response(
+    table: Floats, places: Integers, robot: Floats, dwell: float, answer: Floats, terms: Floats, room: Floats
+) -> None:
+    """Write net speed and lag for the networks' terms (C,)."""
+    components, shifts = places[LAG + 2], places[MEMORY + 2]
+    lag, weights = room[:3], room[3:7]
     knots = table[places[CURVES] : places[CURVES] + _KNOTS]
     mean = table[places[CURVES] + _KNOTS : places[CURVES] + _KNOTS + _POINTS]
     vectors = places[CURVES] + _KNOTS + _POINTS
@@ -269,35 +298,50 @@ def _sinc(angle: float) -> float:
 @compiled
 def _half_widths(table: Floats, places: Integers, robot: Floats, answer: Floats, room: Floats) -> None:
     """Write the half-widths of the intervals of steady outputs and response; the members of a network are one."""
+    features, design = room[:WIDTH_FEATURES], room[WIDTH_FEATURES : WIDTH_FEATURES + DESIGN]
+    part = scaled_features(table, places, robot, answer, features)
+    design[0], place = 1.0, 1 + WIDTH_FEATURES
+    for i in range(WIDTH_FEATURES):
+        design[1 + i] = features[i]
+    for i in range(WIDTH_FEATURES):
+        for j in range(i, WIDTH_FEATURES):
+            design[place] = design[1 + i] * design[1 + j]
+            place += 1
+    for k in range(len(_SCALES)):
+        begin, logarithm = places[WIDTHS + k], 0.0
+        if begin >= 0:
+            for i in range(DESIGN):
+                logarithm += design[i] * table[begin + i]
+        put_half_width(table, begin, k, answer, logarithm, part)
+
+
+@compiled
+def scaled_features(table: Floats, places: Integers, robot: Floats, answer: Floats, features: Floats) -> int:
+    """Write the scaled features of the intervals (WIDTH_FEATURES,); return the part of the domain."""
     at, number = places[FEATURES], robot[HEAD_NUMBERS + 4]
-    features, design = room[:_WIDTH_FEATURES], room[_WIDTH_FEATURES : _WIDTH_FEATURES + DESIGN]
     for i in range(7):
         features[i] = _finite(answer[INPUT + i])
     features[7], features[8] = _finite(np.log(answer[NOVELTY] + 1e-12)), np.log(1e-9)
     features[9], features[10] = np.log(number), 1.0 if number == 1 else 0.0
-    middle = table[at + 2 * _WIDTH_FEATURES : at + 2 * _WIDTH_FEATURES + 3]
+    middle = table[at + 2 * WIDTH_FEATURES : at + 2 * WIDTH_FEATURES + 3]
     part = 8
     if number != 1:
         part = int(features[0] > middle[0]) + 2 * int(features[3] > middle[1]) + 4 * int(features[5] > middle[2])
-    design[0], place = 1.0, 1 + _WIDTH_FEATURES
-    for i in range(_WIDTH_FEATURES):
-        scaled = (features[i] - table[at + i]) / table[at + _WIDTH_FEATURES + i]
-        design[1 + i] = min(max(scaled, -5.0), 5.0)
-    for i in range(_WIDTH_FEATURES):
-        for j in range(i, _WIDTH_FEATURES):
-            design[place] = design[1 + i] * design[1 + j]
-            place += 1
-    speed = np.hypot(answer[STEADY + 3], answer[STEADY + 4])
-    for k in range(len(_SCALES)):
-        begin = places[WIDTHS + k]
-        answer[HALF + k] = np.nan
-        if begin >= 0:
-            logarithm = 0.0
-            for i in range(DESIGN):
-                logarithm += design[i] * table[begin + i]
-            logarithm = min(max(logarithm, table[begin + DESIGN]), table[begin + DESIGN + 1])
-            half = table[begin + DESIGN + 2 + part] * np.exp(logarithm) * _scale(k, answer, speed)
-            answer[HALF + k] = half if np.isfinite(answer[STEADY + k]) else 0.0
+    for i in range(WIDTH_FEATURES):
+        scaled = (features[i] - table[at + i]) / table[at + WIDTH_FEATURES + i]
+        features[i] = min(max(scaled, -5.0), 5.0)
+    return part
+
+
+@compiled
+def put_half_width(table: Floats, begin: int, output: int, answer: Floats, logarithm: float, part: int) -> None:
+    """Write the half-width of an output for its logarithm before the bounds; none if the table has none."""
+    answer[HALF + output] = np.nan
+    if begin >= 0:
+        bounded = min(max(logarithm, table[begin + DESIGN]), table[begin + DESIGN + 1])
+        speed = np.hypot(answer[STEADY + 3], answer[STEADY + 4])
+        half = table[begin + DESIGN + 2 + part] * np.exp(bounded) * _scale(output, answer, speed)
+        answer[HALF + output] = half if np.isfinite(answer[STEADY + output]) else 0.0
 
 
 @compiled

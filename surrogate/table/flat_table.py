@@ -21,6 +21,7 @@ import numpy as np
 
 from sim.arrays import Floats, Integers
 from sim.model.response import DWELLS
+from surrogate.networks.blocks import in_single_precision
 from surrogate.networks.ensemble import SHARED, Ensemble
 from surrogate.table.errors import OUTPUTS
 from surrogate.table.intervals import Intervals
@@ -28,6 +29,7 @@ from surrogate.table.response_table import ResponseTable
 from surrogate.table.support import Support, products_of, support_room
 from surrogate.table.wrench_table import WrenchTable
 from surrogate.wrench.balance import solution_room
+from surrogate.wrench.motions import lane_rows
 from surrogate.wrench.tails import INPUTS
 
 NETWORK = 6  # places of a network
@@ -42,6 +44,8 @@ class FlatTable(NamedTuple):
     numbers: Floats
     places: Integers
     room: int  # numbers that a query of one robot works in
+    singles: Floats  # the numbers in single precision, see `surrogate.networks.blocks.in_single_precision`
+    block_rows: int  # rows of a block that a query of many robots works in, beside its own
 
 
 def flat_table(
@@ -86,7 +90,10 @@ def flat_table(
     known = [network.packed.sizes for network in networks if network is not None]
     components = int(places[LAG + 2] + places[MEMORY + 2])
     room = support_room(len(INPUTS)) + max(solution_room(sizes) for sizes in known) + components + DESIGN
-    return FlatTable(np.concatenate(parts), np.concatenate([places, products_of(len(INPUTS)).ravel()]), room)
+    numbers = np.concatenate(parts)
+    block_rows = components + max(support_room(len(INPUTS)), DESIGN, *(lane_rows(sizes) for sizes in known))
+    products = products_of(len(INPUTS)).ravel()
+    return FlatTable(numbers, np.concatenate([places, products]), room, in_single_precision(numbers), block_rows)
 
 
 def first_outputs(network: Ensemble, count: int) -> Ensemble:

@@ -6,8 +6,9 @@ head, disc and motor. Its response to a flip comes from learned curves (`surroga
 output can have an interval (`surrogate.table.intervals`).
 
 Rejected, or flagged on request: robots outside the joint support of the training data (`surrogate.table.support`),
-and robots that yaw more than BRANCHES times as fast as their tails turn, which may have several motions. Effects
-on the tails themselves are always rejected. The table does not extrapolate.
+robots that yaw more than BRANCHES times as fast as their tails turn, which may have several motions, and robots
+with one tail whose balance has two solutions. Effects on the tails themselves are always rejected. The table does
+not extrapolate.
 """
 
 from __future__ import annotations
@@ -60,6 +61,7 @@ _REASONS = (  # why a robot is outside
     "its tails move as none of the learned ones do",
     "it yaws nearly as fast as its tails turn, and may have several motions",
     "no robot has such numbers",
+    "the balance of its single tail has several solutions",
 )
 _MOTION, _INPUTS = slice(MOTION, MOTION + 5), slice(INPUT, INPUT + 7)  # rows of the compiled loop's answer
 _NOT_OF_HEAD = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")

@@ -18,6 +18,8 @@ from sim.model.response import DWELLS
 from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.input_ranges import ROBOT
 from surrogate.loops import compile_once
+from surrogate.networks.blocks import BLOCK
+from surrogate.table.batch_query import BLOCK_ROWS, query_blocks
 from surrogate.table.compiled_query import (
     ANSWERS,
     ASSEMBLED,
@@ -34,6 +36,7 @@ from surrogate.table.compiled_query import (
 from surrogate.table.errors import OUTPUTS
 from surrogate.table.flat_table import FlatTable
 from surrogate.wrench.balance import MATRICES
+from surrogate.wrench.balance_blocks import STATE
 from surrogate.wrench.heads import ROBOT_NUMBERS
 
 OUTSIDE = "outside"  # flag of robots that the table does not know
@@ -43,6 +46,7 @@ _ROBOT = GROUPS + 1  # where the parts of one array of numbers begin: groups, dw
 _ANSWER = _ROBOT + ROBOT_NUMBERS
 _ROOM = _ANSWER + ANSWERS
 _BYTES = 8
+MANY, _CHUNK = 8, 8192  # robots from which they are answered in blocks; that are answered together
 
 
 class QuickQuery:
@@ -81,12 +85,32 @@ class QuickQuery:
         wanted = WITH_DWELL * (dwells is not None) + WITH_WIDTHS * widths + ASSEMBLED * (robots is not None)
         robots = np.empty((count, ROBOT_NUMBERS)) if robots is None else robots
         dwells = np.empty(0) if dwells is None else np.array(dwells, dtype=float)
+        if count >= MANY:
+            return self._in_blocks(groups, robots, dwells, wanted)
         answers, room = np.empty((ANSWERS, count)), np.empty(self._table.room)
         query_rows(
             self._table.numbers, self._table.places, *self._sizes, count, groups, robots, dwells, wanted, answers,
             room, len(room), np.empty((MATRICES, 4, 4)),
         )  # fmt: skip
         return answers
+
+    def _in_blocks(self, groups: Floats, robots: Floats, dwells: Floats, wanted: int) -> Floats:
+        """Return the answers (ANSWERS, M) of the loop over blocks: those with one, two, and more tails apart."""
+        count, table = groups.shape[1], self._table
+        answers, lanes = np.empty((count, ANSWERS)), np.empty((BLOCK_ROWS + table.block_rows, BLOCK))
+        room, matrices = np.empty(table.room), np.empty((MATRICES, 4, 4))
+        most = 2 * min(count, _CHUNK)
+        states, found = np.empty((most, STATE)), np.empty(most, dtype=np.int64)
+        kinds = np.minimum(groups[ROBOT.index("N")], 3)
+        for begin in range(0, count, _CHUNK):
+            some = kinds[begin : begin + _CHUNK]
+            for kind in np.unique(some):
+                chosen = begin + np.flatnonzero(some == kind)
+                query_blocks(
+                    table.numbers, table.places, *self._sizes, table.singles, chosen, len(chosen), count, groups,
+                    robots, dwells, wanted, answers, states, found, lanes, len(lanes), room, len(room), matrices,
+                )  # fmt: skip
+        return answers.T
 
     def one(self, columns: Mapping[str, Any], *, intervals: bool, flag: bool) -> dict[str, Any] | None:
         """Answer a query of one robot without effects; None for any other, and for one that must be refused.

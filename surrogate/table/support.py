@@ -19,6 +19,7 @@ import numpy as np
 from sim.arrays import Floats, Integers
 from sim.compiling import compiled
 from sim.object_code import COUNT, FLOATS, INTEGERS, array_at, kept
+from surrogate.networks.blocks import BLOCK
 
 DEGREE = 3
 _KEPT = 0.998  # share of the rows that are inside
@@ -51,7 +52,8 @@ class Support:
         """Return q over its limit, (M,), at inputs (M, F): at most 1 inside."""
         inputs = np.ascontiguousarray(inputs, dtype=float)
         products, numbers, novelty = products_of(len(self.shift)), self.numbers, np.empty(len(inputs))
-        room = np.empty(support_room(len(self.shift)))
+        rows = support_room(len(self.shift)) + len(self.shift) + 1
+        room = np.empty(rows * BLOCK)
         novelty_rows(len(inputs), len(self.shift), products.shape[1], products, numbers, inputs, novelty, room)
         return novelty
 
@@ -100,10 +102,54 @@ def novelty_rows(
     count: int, size: int, terms: int, products: Any, numbers: Any, inputs: Any, novelty: Any, room: Any
 ) -> None:
     """Write q over its limit of inputs (M, F) to novelty (M,)."""
-    support, work = array_at(numbers, 2 * size + 1 + terms * terms), array_at(room, size + terms)
-    x, q, pairs = array_at(inputs, (count, size)), array_at(novelty, count), array_at(products, 2 * terms)
-    for row in range(count):
-        q[row] = novelty_at(support, pairs, x[row], work)
+    support, pairs = array_at(numbers, 2 * size + 1 + terms * terms), array_at(products, 2 * terms)
+    x, q = array_at(inputs, (count, size)), array_at(novelty, count)
+    work = array_at(room, (2 * size + terms + 1, BLOCK))
+    for begin in range(0, count, BLOCK):
+        for b in range(BLOCK):
+            for i in range(size):
+                work[i, b] = x[min(begin + b, count - 1), i]
+        novelty_block(support, pairs, work[:size], work[size], work[size + 1 :])
+        for b in range(min(BLOCK, count - begin)):
+            q[begin + b] = work[size, b]
+
+
+@compiled
+def novelty_block(support: Floats, products: Integers, inputs: Floats, novelty: Floats, room: Floats) -> None:
+    """Write q over its limit at inputs (F, BLOCK) to novelty (BLOCK,); see `novelty_at`, with rooms of BLOCK."""
+    size, count = len(inputs), len(products) // 2
+    x, features = room[:size], room[size : size + count]
+    for i in range(size):
+        shift, scale, plain, scaled = support[i], support[size + i], inputs[i], x[i]
+        for b in range(BLOCK):
+            scaled[b] = (plain[b] - shift) / scale
+    for b in range(BLOCK):
+        features[0, b] = 1.0
+        novelty[b] = 0.0
+    for p in range(1, count):
+        product, parent, factor = features[p], features[products[p]], x[products[count + p]]
+        for b in range(BLOCK):
+            product[b] = parent[b] * factor[b]
+    factors = 2 * size + 1
+    for i in range(count):
+        row, together = features[i], i - i % 4
+        for j in range(0, together, 4):
+            x0, x1, x2, x3 = features[j], features[j + 1], features[j + 2], features[j + 3]
+            place = factors + j * count + i
+            p, q = support[place], support[place + count]
+            r, s = support[place + 2 * count], support[place + 3 * count]
+            for b in range(BLOCK):
+                row[b] -= p * x0[b] + q * x1[b] + r * x2[b] + s * x3[b]
+        for j in range(together, i):
+            x0, p = features[j], support[factors + j * count + i]
+            for b in range(BLOCK):
+                row[b] -= p * x0[b]
+        diagonal = support[factors + i * count + i]
+        for b in range(BLOCK):
+            row[b] /= diagonal
+            novelty[b] += row[b] * row[b]
+    for b in range(BLOCK):
+        novelty[b] = novelty[b] / count / support[2 * size]
 
 
 @compiled

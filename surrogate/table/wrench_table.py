@@ -14,8 +14,9 @@ from sim.arrays import Flags, Floats, Integers
 from sim.linear.complex_step import angle, length, magnitude
 from surrogate.loops import compile_once
 from surrogate.networks.ensemble import Ensemble
-from surrogate.wrench.balance import inverses_of, solve_robots
+from surrogate.wrench.balance import inverses_of
 from surrogate.wrench.heads import Heads, pack_robots, straight_resistance
+from surrogate.wrench.motions import solve_robots
 from surrogate.wrench.tails import Tails, linear_torque, tail_inputs
 
 CLASSES = (1, 2, 3)  # networks for N = 1, N = 2, and three or more tails

@@ -3,8 +3,9 @@
 The equations are those of `surrogate.wrench.heads` and `surrogate.wrench.tails`. They are solved by Broyden's
 method. Its first derivative holds the network's numbers y fixed, so it needs no evaluation of the network; five or
 six evaluations are enough. The table of a single tail has second solutions near the true one. So there the
-equations are solved again with the exact first derivative, and of two different solutions that counts whose surge
-is nearer to the first guess (linear theory). Units: l, μ0 l⁴/EI, EI/l².
+equations are solved again with the exact first derivative. Of two different solutions that counts whose surge is
+nearer to the first guess (linear theory), and the robot is marked: it may be the wrong one. Units: l, μ0 l⁴/EI,
+EI/l².
 """
 
 from __future__ import annotations
@@ -13,19 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Flags, Floats, Integers
+from sim.arrays import Floats, Integers
 from sim.compiling import compiled
 from sim.linear.dense import solve_dense
-from sim.object_code import COUNT, FLOATS, INTEGERS, array_at, kept
-from surrogate.networks.compiled import Packed, evaluate, room_of
-from surrogate.wrench.heads import HEAD_NUMBERS, RESISTANCE, ROBOT_NUMBERS
+from sim.object_code import COUNT, FLOATS, array_at, kept
+from surrogate.networks.compiled import evaluate, room_of
+from surrogate.wrench.heads import HEAD_NUMBERS, RESISTANCE
 from surrogate.wrench.tails import inputs_of_tail, linear_thrust, linear_torque, wrench_terms
 
-STEPS, CORRECTION = 60, 1e-9  # of Broyden's method; the correction is relative
-_DIFFERENCE, _LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
-_FIRST_SPIN = 0.6  # ω_t/ω in the first guess
-_LONGEST = 0.5  # largest relative change of ω_t in one step
+STEPS, CORRECTION = 60, 2e-12  # of Broyden's method; the correction is relative
+ACCEPTED = 1e-9  # the last of all corrections, where rounding keeps them above CORRECTION
+DIFFERENCE, LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
+FIRST_SPIN = 0.6  # ω_t/ω in the first guess
+LONGEST = 0.5  # largest relative change of ω_t in one step
 _VECTORS = 64  # numbers for the vectors of one robot, before the room of the network
+LEFT_OVER, FOUND, SEVERAL = 0, 1, 2  # what a solution ends with
+SAME = 1e-6  # two solutions are one, if all velocities agree so
 MATRICES = 4  # 4×4 matrices that a solution works in
 
 
@@ -34,38 +38,9 @@ def solution_room(sizes: Integers) -> int:
     return _VECTORS + room_of(sizes)
 
 
-def solve_robots(network: Packed, robots: Floats) -> tuple[Floats, Flags]:
-    """Solve for (v_x, v_z, ω_yr, ω_h, ω_t), (M, 5), of a positive motor; tell which robots converged, (M,).
-
-    Args:
-        network: of the tails.
-        robots: (M, 37), see `surrogate.wrench.heads.pack_robots`.
-    """
-    motions, converged = np.empty((len(robots), 5)), np.empty(len(robots), dtype=np.int64)
-    room, matrices = np.empty(solution_room(network.sizes)), np.empty((MATRICES, 4, 4))
-    solve_rows(
-        network.numbers, network.sizes, len(network.numbers), len(robots), robots, motions, converged, room,
-        len(room), matrices,
-    )  # fmt: skip
-    return motions, converged == 1
-
-
-@kept(FLOATS, INTEGERS, COUNT, COUNT, FLOATS, FLOATS, INTEGERS, FLOATS, COUNT, FLOATS)
-def solve_rows(
-    numbers: Any, sizes: Any, many: int, count: int, robots: Any, motions: Any, converged: Any, room: Any,
-    space: int, matrices: Any,
-) -> None:  # fmt: skip
-    """Write the motions (M, 5) of robots (M, 37), and 1 for those that converged, (M,)."""
-    network, shape = array_at(numbers, many), array_at(sizes, 6)
-    robot, motion = array_at(robots, (count, ROBOT_NUMBERS)), array_at(motions, (count, 5))
-    flags, vectors, work = array_at(converged, count), array_at(room, space), array_at(matrices, (MATRICES, 4, 4))
-    for row in range(count):
-        flags[row] = 1 if solve(network, shape, robot[row], motion[row], vectors, work) else 0
-
-
 @compiled
-def solve(numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room: Floats, matrices: Floats) -> bool:
-    """Write the motion (5,) of one robot (37,); return whether the solution converged.
+def solve(numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room: Floats, matrices: Floats) -> int:
+    """Write the motion (5,) of one robot (37,); return LEFT_OVER, FOUND, or SEVERAL if two motions were found.
 
     Args:
         numbers, sizes: network of the tails, see `surrogate.networks.compiled.Packed`.
@@ -73,7 +48,7 @@ def solve(numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room:
         matrices: to work in, (MATRICES, 4, 4).
     """
     guess, second = room[:5], room[5:10]
-    _first_guess(robot, guess, matrices)
+    first_guess(robot, guess, matrices)
     for i in range(5):
         motion[i] = guess[i]
     found = _solve(numbers, sizes, robot, motion, room, matrices, False)
@@ -82,11 +57,23 @@ def solve(numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room:
             second[i] = guess[i]
         second_found = _solve(numbers, sizes, robot, second, room, matrices, True)
         nearer = abs(second[1] - guess[1]) < abs(motion[1] - guess[1])
+        several = found and second_found and not same_motions(motion, second)
         if second_found and (nearer or not found):
             for i in range(5):
                 motion[i] = second[i]
             found = True
-    return found
+        if several:
+            return SEVERAL
+    return FOUND if found else LEFT_OVER
+
+
+@compiled
+def same_motions(first: Floats, second: Floats) -> bool:
+    """Tell whether two solutions (5,) are one."""
+    same = True
+    for i in range(5):
+        same = same and abs(second[i] - first[i]) <= SAME * abs(first[i])
+    return same
 
 
 def inverses_of(matrices: Floats) -> Floats:
@@ -134,12 +121,12 @@ def _unbalanced(robot: Floats, motion: Floats, y: Floats, residual: Floats) -> N
 
 
 @compiled
-def _first_guess(robot: Floats, motion: Floats, matrices: Floats) -> None:
+def first_guess(robot: Floats, motion: Floats, matrices: Floats) -> None:
     """Write the motion with the torque and thrust of linear theory and the side forces of straight tails."""
     speed, gain, tail = robot[0], robot[1], robot[HEAD_NUMBERS:]
     resistance = robot[RESISTANCE : RESISTANCE + 20]  # four rows of five
     perp, parallel, a, number = tail[0], tail[1], tail[2], tail[4]
-    spin = _FIRST_SPIN * speed
+    spin = FIRST_SPIN * speed
     for _ in range(3):
         torque = number * perp * a**2 * linear_torque(perp * spin)
         spin = speed * resistance[18] / (resistance[18] + gain * (torque + resistance[19]))
@@ -182,7 +169,7 @@ def _solve(
     for j in range(4):
         largest = max(largest, abs(motion[j]))
     for j in range(4):
-        width = _DIFFERENCE * (abs(motion[j]) + _LEAST_SHARE * largest)
+        width = DIFFERENCE * (abs(motion[j]) + LEAST_SHARE * largest)
         for i in range(5):
             moved[i] = motion[i]
         moved[j] += width
@@ -195,6 +182,7 @@ def _solve(
             slope[i, j] = (before[i] - residual[i]) / width
             inverse[i, j] = 1.0 if i == j else 0.0
     solve_dense(slope, inverse)
+    size = np.inf
     for _ in range(STEPS):
         share = 1.0
         for i in range(4):
@@ -202,8 +190,8 @@ def _solve(
             for j in range(4):
                 step[i] -= inverse[i, j] * residual[j]
         turned = abs(gain * step[3]) / motion[4]
-        if turned > _LONGEST:
-            share = _LONGEST / turned
+        if turned > LONGEST:
+            share = LONGEST / turned
         for i in range(4):
             step[i] *= share
             motion[i] += step[i]
@@ -223,7 +211,7 @@ def _solve(
         for i in range(4):
             change[i] = residual[i] - before[i]
         _update(inverse, step, change, room[51:59])
-    return False
+    return size < ACCEPTED
 
 
 @compiled

@@ -50,6 +50,8 @@ TYPICAL = ((0.0, 1.0, 0.0, 0.9, 0.2, 0.0), (0.04, 0.4, 0.03, 0.1, 0.3, 0.05))  #
 SOFT = 12.0  # S from which a tail bends with the flow while it turns
 SMALL_DEFLECTION, SMALL_SURGE = 0.05, 0.05  # below, an input is linear; above, logarithmic
 TINY = 1e-30
+THRUST, THRUST_SOFT, THRUST_POWER = 0.125, 8.0, 1.35  # of T
+TORQUE_SOFT, TORQUE_POWER = 6.0, -0.125  # of Q
 
 
 class Tails(NamedTuple):
@@ -119,13 +121,22 @@ def inputs_of_head(
 @formula
 def linear_thrust(S: Any) -> Any:
     """Return T: thrust/[(ζ⊥ − ζ∥) ω_t a²] of a tail in linear theory, roughly."""
-    return 0.125 * S / (1 + (S / 8) ** 1.35)
+    return THRUST * S / (1 + (S / THRUST_SOFT) ** THRUST_POWER)
 
 
 @formula
 def linear_torque(S: Any) -> Any:
     """Return Q: torque/[ζ⊥ ω_t a²] of a tail in linear theory, roughly."""
-    return (1 + (S / 6) ** 2) ** -0.125
+    return (1 + (S / TORQUE_SOFT) ** 2) ** TORQUE_POWER
+
+
+@formula
+def ratios_of_tail(perp: Any, offset: Any, motion: Any) -> tuple[Any, ...]:
+    """Return S, and δ and v_z over their small values."""
+    v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
+    drag_number = perp * spin
+    deflection = np.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
+    return drag_number, deflection / SMALL_DEFLECTION, v_z / (offset * spin) / SMALL_SURGE
 
 
 @formula
@@ -139,16 +150,14 @@ def inputs_of_tail(
         motion: (v_x of J, v_z, ω_yr, ω_h, ω_t), for a positive motor.
         beta: the angle β.
     """
-    v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
-    drag_number = perp * spin
-    deflection = np.sqrt(v_x**2 + yaw**2 + TINY) / spin * drag_number / (drag_number + SOFT)
+    drag_number, deflection, surge = ratios_of_tail(perp, offset, motion)
     return (
         np.log(drag_number),
         np.log(offset),
         -np.log(radius),
-        np.arcsinh(deflection / SMALL_DEFLECTION),
+        np.arcsinh(deflection),
         beta,
-        np.arcsinh(v_z / (offset * spin) / SMALL_SURGE),
+        np.arcsinh(surge),
         np.log(spin_drag / (number * perp * offset**2)),
     )
 
@@ -161,8 +170,19 @@ def wrench_terms(perp: Any, parallel: Any, offset: Any, number: Any, motion: Any
         F_x, F_z and M_y of straight tails; then what y multiplies: the side force (F_x and M_y), thrust and torque
         at small m, and m².
     """
+    drag_number = perp * motion[4]
+    return scaled_terms(
+        perp, parallel, offset, number, motion, linear_thrust(drag_number), linear_torque(drag_number)
+    )
+
+
+@formula
+def scaled_terms(
+    perp: Any, parallel: Any, offset: Any, number: Any, motion: Any, thrust: Any, torque: Any
+) -> tuple[Any, ...]:
+    """Return `wrench_terms` for T and Q, which are given."""
     v_x, v_z, yaw, spin = motion[0], motion[1], motion[2], motion[4]
-    drag_number, across = perp * spin, number * perp
+    across = number * perp
     sideways = np.sqrt(v_x**2 + yaw**2 + TINY)
     couple = number * spin * offset**2
     return (
@@ -170,8 +190,8 @@ def wrench_terms(perp: Any, parallel: Any, offset: Any, number: Any, motion: Any
         -number * parallel * v_z,
         across * (v_x / 2 - yaw / 3),
         across * sideways,
-        (perp - parallel) * couple * linear_thrust(drag_number),
-        -perp * couple * linear_torque(drag_number),
+        (perp - parallel) * couple * thrust,
+        -perp * couple * torque,
         (sideways / (offset * spin)) ** 2,
     )
 

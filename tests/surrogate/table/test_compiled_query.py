@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from sim.effects import catalogue
+from sim.inputs import check_columns
 from sim.model.groups import DWELL
+from sim.motion.batches import steady_columns
 from surrogate.table.model_file import load
 from surrogate.training.simulated import draw_robots
 from surrogate.wrench.heads import needs_no_learning
@@ -66,10 +68,27 @@ def test_robots_with_one_tail() -> None:
     found, wanted = load().query(drawn, flag=True), answer(load(), drawn)
     known = ~wanted["outside"] & ~found["outside"]
     assert known.sum() > 100
-    assert (wanted["outside"] != found["outside"]).mean() < 0.01
+    reasons = load().motions(check_columns(drawn), flag=True).reason
+    several = np.array(["several solutions" in reason for reason in reasons])
+    assert (found["outside"] >= several).all()
+    assert (wanted["outside"] != found["outside"])[~several].mean() < 0.01
     apart = np.abs(found["omega_yr_bar"] / wanted["omega_yr_bar"] - 1)[known]
     assert np.quantile(apart, 0.98) < 1e-11
     assert np.isinf(found["tail_gap"]).all()
+
+
+def test_a_wrong_solution_for_one_tail_is_flagged() -> None:
+    """Of 740 robots that converge, two get another motion than the simulator's: 5 and 22 % of the speed off."""
+    drawn = draw_robots(6000, 4711, wide=False)
+    drawn = {name: values[drawn["N"] == 1] for name, values in drawn.items()}
+    found, truth = load().query(drawn, flag=True), steady_columns(drawn, title="", stability=False)
+    reasons = load().motions(check_columns(drawn), flag=True).reason
+    several = np.array(["several solutions" in reason for reason in reasons])
+    error = np.abs(found["v_z"] - truth["v_z"]) / np.hypot(truth["v_x"], truth["v_z"])
+    valid = np.asarray(truth["converged"], dtype=bool)
+    assert 0 < several.mean() < 0.04
+    assert error[valid & several].max() > 0.2
+    assert error[valid & ~found["outside"]].max() < 0.1
 
 
 @pytest.mark.parametrize("small", [False, True])

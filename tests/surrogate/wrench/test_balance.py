@@ -13,8 +13,9 @@ from surrogate.table.model_file import load
 from surrogate.table.wrench_table import network_index
 from surrogate.training.fit_wrench import wrench_samples
 from surrogate.training.simulated import draw_robots
-from surrogate.wrench.balance import inverses_of, solve_rows
+from surrogate.wrench.balance import inverses_of
 from surrogate.wrench.heads import heads_and_tails, unbalanced
+from surrogate.wrench.motions import solve_rows
 from tests.oracles.balance import linear_guess, solve
 from tests.surrogate.small import rows, table
 
