@@ -7,6 +7,7 @@ deviations. Laws of the tails are not among the truths.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,6 +43,7 @@ class Setting:
     study: Study
     model: SwimmerModel
     base: Fit
+    design: Mapping[str, Any]  # arguments of `make_table`
 
     @classmethod
     def of(cls, **design: Any) -> Setting:
@@ -51,7 +53,7 @@ class Setting:
         used = ~middle_session(model.runs)
         names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
         base = fit(model, start_values(model), names, used, title="")
-        return cls(table, Study.fitted_to(model, used), model, base)
+        return cls(table, Study.fitted_to(model, used), model, base, design)
 
     def score(self, signal: Floats) -> float:
         """Compute λ of a signal (n, k)."""
