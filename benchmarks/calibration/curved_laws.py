@@ -66,8 +66,13 @@ def main(
     wrong = sum(one["outcome"] == "wrong" for one in named)
     power = [one for one in records.all if one["kind"] == "power law" and one["outcome"] != "no law"]
     doubts = sum(one["outcome"] != "not doubted" or one["elsewhere"] for one in power)
-    print(f"\na name is given: {per_cent(len(named), len(curved))}; of those wrong: {per_cent(wrong, len(named))}")
-    print(f"a true power law is doubted along any input: {per_cent(doubts, len(power))}")
+    print()
+    for said, hits, count in (
+        ("a name is given", len(named), len(curved)),
+        ("of the names, all wrong", wrong, len(named)),
+        ("a true power law is doubted along any input", doubts, len(power)),
+    ):
+        print(f"{said}: {per_cent(hits, count) if count else '-'}")
 
 
 def _add(records: Records, setting: Setting, seed: int) -> None:

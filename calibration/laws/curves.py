@@ -13,7 +13,8 @@ A level that the runs hardly determine, such as a constant that a coefficient of
 from the law (`GroupFactors.levelled`); the name of a curve does not depend on it.
 
 A power law is doubted if its lack of fit is significant at half of the level α, divided by the number of inputs
-that were tested. Only then is a name looked for (`calibration.laws.named_curves`).
+that were tested, and if free factors leave no more than noise; otherwise a wrong place may be the cause. Only then
+is a name given (`calibration.laws.named_curves`).
 
 Source: Green and Silverman (1994), chapter 2.
 """
@@ -51,7 +52,7 @@ class Curve:
     """The factor of a law's load along one input, over that at the mean of the runs, without a power law."""
 
     groups: GroupFactors
-    level: float  # below this p-value the power law is doubted
+    level: float  # below this p-value the power law is contradicted
     complete_from: float  # from this p-value on, what the curve leaves is noise
     inputs: Floats  # (m,) along the curve: rad/s, m, or a number of tails
     factor: Floats  # (m,) of the spline
@@ -59,8 +60,8 @@ class Curve:
     high: Floats
     freedom: float  # effective degrees of freedom of the spline
     turn: tuple[str, float] | None  # "maximum" or "minimum" inside, beyond the noise, and the input where it is
-    fits: tuple[NamedCurve, ...]  # curves with a name, the least BIC first; none unless the power law is doubted
-    left: float = math.nan  # p-value of the residual that free factors along this input leave, if it is doubted
+    fits: tuple[NamedCurve, ...]  # curves with a name, least BIC first; none unless the power law is contradicted
+    left: float = math.nan  # p-value of the residual with free factors along this input, if it is contradicted
 
     @property
     def symbol(self) -> str:
@@ -73,9 +74,14 @@ class Curve:
         return self.groups.p_value
 
     @property
-    def doubted(self) -> bool:
-        """Whether the runs contradict a power law."""
+    def contradicted(self) -> bool:
+        """Whether the lack of fit of the power law is significant, be it a wrong place that causes it."""
         return self.p_value < self.level
+
+    @property
+    def doubted(self) -> bool:
+        """Whether the power law is contradicted, and free factors in its place leave no more than noise."""
+        return self.contradicted and self.left >= self.complete_from
 
     @cached_property
     def named(self) -> tuple[NamedCurve, ...]:
@@ -88,8 +94,7 @@ class Curve:
         if not self.doubted:
             return ""
         course = f"no power law (p = {self.p_value:.2g}): the runs ask for a factor that {self._course}"
-        noise = "no more than noise" if self.left >= self.complete_from else "more than noise"
-        return f"{course}{self._name}; this leaves {noise} (p = {self.left:.2g})"
+        return f"{course}{self._name}; with it no more than noise is left (p = {self.left:.2g})"
 
     @property
     def _course(self) -> str:
@@ -112,7 +117,7 @@ class Curve:
             "input": column,
             "p_value": self.p_value,
             "power_law_doubted": self.doubted,
-            "p_value_with_curve": self.left if self.doubted else None,
+            "p_value_with_curve": self.left if self.contradicted else None,
             "words": self.words,
             "values": (scale * self.groups.inputs).tolist(),
             "factors": factors(self.groups).tolist(),
@@ -157,8 +162,10 @@ def find_curves(study: Study, fitted: Fit, *, draws: int = DRAWS) -> tuple[Curve
     if not isinstance(model, LawModel):
         raise TypeError("a curve is looked for in a LawModel")
     tested = group_factors(model, fitted, used, seed=study.seed, draws=draws)
-    curves = [_curve(groups, study, study.level / 2 / len(tested)) for groups in tested]
-    return tuple(replace(one, left=_left(study, model, fitted, one)) if one.doubted else one for one in curves)
+    curves = [_curve(groups, study.values, study.level, len(tested)) for groups in tested]
+    return tuple(
+        replace(one, left=_left(study, model, fitted, one)) if one.contradicted else one for one in curves
+    )
 
 
 def _left(study: Study, model: LawModel, fitted: Fit, curve: Curve) -> float:
@@ -190,9 +197,9 @@ def _factor(groups: GroupFactors, x: Floats, shifts: Floats) -> Floats:
     return np.asarray(law * (1 + shifts) if groups.is_term else law * np.exp(np.clip(shifts, -20, 20)))
 
 
-def _curve(groups: GroupFactors, study: Study, level: float) -> Curve:
-    """Smooth the shifts, and name the curve where the power law is doubted."""
-    values = study.values
+def _curve(groups: GroupFactors, values: int, alpha: float, tests: int) -> Curve:
+    """Smooth the shifts, and name the curve where the power law is contradicted, in so many tests."""
+    level = alpha / 2 / tests
     fits = tuple(named_curves(groups, values)) if groups.p_value < level else ()
     groups = groups.levelled()
     x, W = groups.x, groups.information
@@ -207,7 +214,7 @@ def _curve(groups: GroupFactors, study: Study, level: float) -> Curve:
     return Curve(
         groups=groups,
         level=level,
-        complete_from=study.level / 2,
+        complete_from=alpha / 2,
         inputs=np.exp(fine + groups.centre),
         factor=_factor(groups, fine, at),
         low=_factor(groups, fine, at - half),

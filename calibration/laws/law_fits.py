@@ -154,8 +154,8 @@ class Laws:
         if curved is None or (self.kept and curved.place == self.kept[0].place):
             return said
         return (
-            f"{said} With a curve in place of a power law, the nearest is {curved.place.words}. "
-            f"{said_of(curved.curves)}"
+            f"{said} With a curve in place of a power law, it is described by {curved.place.words}. "
+            f"{said_of(curved.curves, 'this law')}"
         )
 
     @property

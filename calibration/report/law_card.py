@@ -17,7 +17,7 @@ from calibration.laws.places import Place
 from calibration.laws.readings import INPUTS
 from calibration.report.quantities import plain
 from calibration.verdict.verdict import Verdict
-from sim.arrays import Floats
+from sim.arrays import Flags, Floats
 from sim.io.page_figures import BLUE, INK, PALE, RED
 from sim.io.pages import Page
 from sim.model.robot import Robot
@@ -58,6 +58,7 @@ def add_laws(page: Page, result: Verdict) -> None:
             )
             figures.append((draw_dependences(curves), "the factor of the load against each input", caption))
         page.figures(figures)
+    _add_curved(page, laws, result.conditions.split.fitted)
     if laws.fitted:
         page.table(
             (
@@ -69,6 +70,22 @@ def add_laws(page: Page, result: Verdict) -> None:
             ),
             [_row(law, laws.level) for law in laws.fitted],
         )
+
+
+def _add_curved(page: Page, laws: Laws, used: Flags) -> None:
+    """Show the law that describes the runs with a curve in place of a power law, if it is not the best law."""
+    curved = laws.curved
+    if curved is None or (laws.kept and curved.place == laws.kept[0].place):
+        return
+    page.figures(
+        [
+            (
+                draw_dependences(dependences(curved, used)),
+                f"the factor of another law against each input: {curved.place.words}",
+                f"With a curve in place of a power law: {curved.place.words}.",
+            )
+        ]
+    )
 
 
 def _row(law: Law, level: float) -> tuple[str, ...]:
