@@ -12,7 +12,7 @@ what happens between two values of the input is unknown.
 A level that the runs hardly determine, such as a constant that a coefficient of the head can replace, is taken
 from the law (`GroupFactors.levelled`); the name of a curve does not depend on it.
 
-A power law is doubted if its lack of fit is significant at half of the level α, divided by the number of inputs
+A power law is rejected if its lack of fit is significant at half of the level α, divided by the number of inputs
 that were tested, and if free factors leave no more than noise; otherwise a wrong place may be the cause. Only then
 is a name given (`calibration.laws.named_curves`).
 
@@ -79,19 +79,19 @@ class Curve:
         return self.p_value < self.level
 
     @property
-    def doubted(self) -> bool:
+    def rejected(self) -> bool:
         """Whether the power law is contradicted, and free factors in its place leave no more than noise."""
         return self.contradicted and self.left >= self.complete_from
 
     @cached_property
     def named(self) -> tuple[NamedCurve, ...]:
         """Curves that the runs agree with and do not tell apart, best first; none where there is no simple one."""
-        return tuple(chosen(list(self.fits))) if self.doubted else ()
+        return tuple(chosen(list(self.fits))) if self.rejected else ()
 
     @property
     def words(self) -> str:
-        """What follows "Along ω it is"; empty where the power law is not doubted."""
-        if not self.doubted:
+        """What follows "Along ω it is"; empty where the power law is not rejected."""
+        if not self.rejected:
             return ""
         course = f"no power law (p = {self.p_value:.2g}): the runs ask for a factor that {self._course}"
         return f"{course}{self._name}; with it no more than noise is left (p = {self.left:.2g})"
@@ -116,7 +116,7 @@ class Curve:
         return {
             "input": column,
             "p_value": self.p_value,
-            "power_law_doubted": self.doubted,
+            "power_law_rejected": self.rejected,
             "p_value_with_curve": self.left if self.contradicted else None,
             "words": self.words,
             "values": (scale * self.groups.inputs).tolist(),
@@ -154,7 +154,7 @@ def find_curves(study: Study, fitted: Fit, *, draws: int = DRAWS) -> tuple[Curve
     """Find the curve along each input whose exponent is fitted and that has three values or more.
 
     Args:
-        study: of a `LawModel`; half of its level is α of a doubt about any of the power laws of this law.
+        study: of a `LawModel`; half of its level is α of a rejection of any of the power laws of this law.
         fitted: to the runs that the study uses.
         draws: of the bootstrap of the power law.
     """
@@ -177,7 +177,7 @@ def _left(study: Study, model: LawModel, fitted: Fit, curve: Curve) -> float:
 
 def said_of(curves: Sequence[Curve], subject: str = "it") -> str:
     """Say along which inputs a law, the subject, is no power law; empty if along none."""
-    return " ".join(f"Along {curve.symbol} {subject} is {curve.words}." for curve in curves if curve.doubted)
+    return " ".join(f"Along {curve.symbol} {subject} is {curve.words}." for curve in curves if curve.rejected)
 
 
 def factors(groups: GroupFactors) -> Floats:

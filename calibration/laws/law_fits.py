@@ -135,8 +135,8 @@ class Laws:
 
     @property
     def curved(self) -> Law | None:
-        """The law that describes best with a curve in place of a power law, where one is doubted."""
-        curved = [law for law in self.fitted if any(curve.doubted for curve in law.curves)]
+        """The law that describes best with a curve in place of a power law, where one is rejected."""
+        curved = [law for law in self.fitted if any(curve.rejected for curve in law.curves)]
         return max(curved, key=lambda law: law.gain_with_curve, default=None)
 
     @property

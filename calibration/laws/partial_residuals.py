@@ -64,7 +64,7 @@ def dependences(law: Law, used: Flags) -> list[Dependence]:
         shifts = np.array([(columns[rows] * residual[rows]).sum() for rows in members]) / weights
         middle = np.array([x[used, place][rows].mean() for rows in members])
         by_runs, errors = _partial(power * middle, shifts, np.minimum(weights**-0.5, _LARGEST), law.place.is_term)
-        asked = next((one for one in law.curves if one.symbol == symbol and one.doubted), None)
+        asked = next((one for one in law.curves if one.symbol == symbol and one.rejected), None)
         if asked is not None:
             by_runs, errors = factors(asked.groups), error_bars(asked.groups)
         results.append(

@@ -92,7 +92,7 @@ def linear_model(kind: str) -> _LinearModel:
 
 
 @pytest.mark.slow
-def test_a_true_power_law_is_not_doubted() -> None:
+def test_a_true_power_law_is_not_rejected() -> None:
     curves = fitted("power")[2]
     assert [curve.symbol for curve in curves] == ["ω", "N"]  # there are two lengths only
     for curve in curves:
@@ -106,7 +106,7 @@ def test_a_true_power_law_is_not_doubted() -> None:
 @pytest.mark.parametrize(("kind", "at"), [("resonance", 112.0), ("threshold", 95.0)])
 def test_a_curve_is_found_and_named(kind: str, at: float) -> None:
     curve = along_speed(kind)
-    assert curve.doubted
+    assert curve.rejected
     first = curve.named[0]
     assert first.name == kind
     assert 30 / math.pi * first.numbers["u0"] == pytest.approx(at, abs=4)
@@ -115,7 +115,7 @@ def test_a_curve_is_found_and_named(kind: str, at: float) -> None:
     assert f"like {first.words} at" in said
     record = json.loads(json.dumps(curve.to_dict()))
     assert record["input"] == "omega_rpm"
-    assert record["power_law_doubted"]
+    assert record["power_law_rejected"]
     assert record["named"][0] == kind
     np.testing.assert_allclose(record["values"], SPEEDS, rtol=1e-3)
     assert record["curves"][0]["numbers"]["u0"]["value"] == pytest.approx(at, abs=4)
@@ -125,7 +125,7 @@ def test_a_curve_is_found_and_named(kind: str, at: float) -> None:
 def test_a_curve_that_leaves_more_than_noise_is_not_told() -> None:
     curve = replace(along_speed("resonance"), left=0.001)
     assert curve.contradicted
-    assert not curve.doubted
+    assert not curve.rejected
     assert curve.words == ""
     assert curve.named == ()
 
