@@ -6,6 +6,7 @@ import json
 import math
 from dataclasses import replace
 from functools import cache
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -18,7 +19,7 @@ from calibration.laws.law_model import SIZE, LawModel
 from calibration.laws.named_curves import chosen, named_curves
 from calibration.laws.partial_residuals import dependences
 from calibration.laws.places import place_named
-from calibration.report.law_card import draw_dependences
+from calibration.report.law_card import _add_curved, draw_dependences
 from calibration.report.robot_laws import find_robot_laws
 from calibration.statistics.fit import Fit, fit
 from calibration.statistics.statistical_model import (
@@ -31,6 +32,7 @@ from calibration.statistics.statistical_model import (
 from calibration.statistics.study import Study, middle_session
 from calibration.swimmer.synthetic_table import make_table
 from sim.arrays import Floats
+from sim.io.pages import Page
 from sim.model.power_law import Powers
 from tests.calibration.toy_tables import START, TRUTH, install_toy, toy_swimmer
 
@@ -157,6 +159,13 @@ def test_a_law_with_a_curve_stands_in_the_sentence_the_record_and_the_picture(
     axes = draw_dependences(curves).axes
     assert [one.get_legend() is not None for one in axes] == [curve.curve is not None for curve in curves]
     assert "--" in [line.get_linestyle() for line in axes[0].lines]
+    page = Mock(spec=Page)
+    _add_curved(page, described.laws, described.study.split.fitted)
+    page.figures.assert_not_called()  # it is the best law, which is shown anyway
+    none_kept = replace(described.laws, fitted=(replace(law, reason="a number is at the end of its range"),))
+    assert "With a curve in place of a power law, it is described by a couple on the head" in none_kept.sentence
+    _add_curved(page, none_kept, described.study.split.fitted)
+    page.figures.assert_called_once()
 
 
 @pytest.mark.slow
