@@ -48,22 +48,22 @@ if TYPE_CHECKING:
     from sim.model.body import Body
     from sim.model.groups import Groups
 
-_DESIGN: dict[str, Any] = {"lengths_cm": (5.0, 7.5, 10.0), "motor_rpm": (80.0, 100.0, 125.0, 150.0)}
-_KINDS = ("two places", "resonance", "threshold", "drift", "tail load")
+DESIGN: dict[str, Any] = {"lengths_cm": (5.0, 7.5, 10.0), "motor_rpm": (80.0, 100.0, 125.0, 150.0)}
+KINDS = ("two places", "resonance", "threshold", "drift", "tail load")
 _SCORES = (16.0, 32.0)
 _GOOD = 1.3  # error over noise
 _STEPS = 4  # of a drift
 
 
 def main(tables: str = "20", first_seed: str = "5000", file: str = "") -> None:
-    setting = Setting.of(**_DESIGN)
+    setting = Setting.of(**DESIGN)
     records = Records(file)
     for seed in range(int(first_seed), int(first_seed) + int(tables)):
         if seed in records:
             continue
         began = time.process_time()
         try:
-            kind, score, true, table = _foreign(setting, seed)
+            kind, score, true, table = foreign(setting, seed)
         except InputError as reason:
             print(f"{seed}: not made: {reason}", flush=True)
             continue
@@ -75,7 +75,7 @@ def main(tables: str = "20", first_seed: str = "5000", file: str = "") -> None:
     columns = ("truth", "tables", "described", "with a true place among those named", "a wrong place alone",
                "several, all wrong", "error before", "error after, median (largest)")  # fmt: skip
     print("\n" + heading(*columns))
-    for kind in (*_KINDS, "all"):
+    for kind in (*KINDS, "all"):
         print(_row(kind, [one for one in records.all if kind in (one["kind"], "all")]))
     described_records = [one for one in records.all if one["complete"]]
     wrong = [one for one in described_records if not set(one["kept"]) & set(one["true"])]
@@ -105,11 +105,11 @@ def _said(record: Mapping[str, Any]) -> str:
     return names if record["complete"] else f"not the whole residual, the nearest {names}"
 
 
-def _foreign(setting: Setting, seed: int) -> tuple[str, float, list[str], pd.DataFrame]:
+def foreign(setting: Setting, seed: int) -> tuple[str, float, list[str], pd.DataFrame]:
     """Make a table; return the kind of its truth, its score and the places that are true, too."""
-    rng = np.random.default_rng(seed)
-    kind = _KINDS[seed % len(_KINDS)]
-    score = float(_SCORES[seed // len(_KINDS) % len(_SCORES)])
+    rng, design = np.random.default_rng(seed), setting.design
+    kind = KINDS[seed % len(KINDS)]
+    score = float(_SCORES[seed // len(KINDS) % len(_SCORES)])
     terms = [place for place in head_places() if place.is_term]
     chosen = [terms[i] for i in rng.choice(len(terms), 2, replace=False)]
     sign = rng.choice([-1.0, 1.0], 2)
@@ -120,14 +120,14 @@ def _foreign(setting: Setting, seed: int) -> tuple[str, float, list[str], pd.Dat
             signal = setting.slope(place) * np.exp(setting.logarithm(law))[:, None]
             sizes[place.effect(law).name] = way * score / setting.score(signal)
         return kind, score, [place.name for place in chosen], make_table(
-            replace(ROBOT, effects=sizes), seed=seed, title="", **_DESIGN
+            replace(ROBOT, effects=sizes), seed=seed, title="", **design
         )  # fmt: skip
     if kind == "tail load":
         with _known(TailLoad.of(powers[0])) as effect:
             model = SwimmerModel(ROBOT, setting.model.runs)
             slope = model.derivatives({**setting.base.parameters, effect.name: 0.0}, [effect.name])[1][..., 0]
             robot = replace(ROBOT, effects={effect.name: sign[0] * score / setting.score(slope)})
-            return kind, score, [], make_table(robot, seed=seed, title="", **_DESIGN)
+            return kind, score, [], make_table(robot, seed=seed, title="", **design)
     factor = _factor(kind, setting, rng)
     size = sign[0] * score / setting.score(setting.slope(chosen[0]) * factor[:, None])
     return kind, score, [chosen[0].name], with_noise(_exact(setting, chosen[0], size * factor), seed)
@@ -149,10 +149,10 @@ def _factor(kind: str, setting: Setting, rng: np.random.Generator) -> Floats:
 def _exact(setting: Setting, place: Place, sizes: Floats) -> pd.DataFrame:
     """Make a table without noise, in which a term on the head has a size of its own in every run (n,)."""
     name = place.effect(Powers()).name
-    exact = setting.table.copy()
+    exact, design = setting.table.copy(), setting.design
     for size in np.unique(sizes):
         robot = replace(ROBOT, effects={name: float(size)})
-        table = make_table(robot, seed=NULL, noise=0.0, session_noise=0.0, title="", **_DESIGN)
+        table = make_table(robot, seed=NULL, noise=0.0, session_noise=0.0, title="", **design)
         exact[sizes == size] = table[sizes == size]
     return exact
 

@@ -7,6 +7,7 @@ deviations. Truths are drawn from the places of the search (`calibration.laws.pl
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,6 +46,7 @@ class Setting:
     study: Study
     model: SwimmerModel
     base: Fit
+    design: Mapping[str, Any]  # arguments of `make_table`
 
     @classmethod
     def of(cls, **design: Any) -> Setting:
@@ -54,7 +56,7 @@ class Setting:
         used = ~middle_session(model.runs)
         names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
         base = fit(model, start_values(model), names, used, title="")
-        return cls(table, Study.fitted_to(model, used), model, base)
+        return cls(table, Study.fitted_to(model, used), model, base, design)
 
     def score(self, signal: Floats) -> float:
         """Compute λ of a signal (n, k)."""

@@ -27,6 +27,8 @@ import numpy as np
 from tqdm import tqdm
 
 from calibration.attribution.refits import INDISTINGUISHABLE, session_gain
+from calibration.laws.curves import Curve, find_curves, said_of
+from calibration.laws.group_factors import gain_of_a_curve
 from calibration.laws.inputs import EXPONENTS, noted_in_words, parameter_of
 from calibration.laws.law_model import LEVER, SIZE, LawModel
 from calibration.laws.places import Place, in_common, places
@@ -64,6 +66,8 @@ class Law:
     error: float  # relative rms on the held-out runs
     error_interval: tuple[float, float]  # 95 %
     reason: str  # why it is not kept; empty if it is
+    gain_with_curve: float = -math.inf  # gain with free factors along the best input, linearised
+    curves: tuple[Curve, ...] = ()  # along each input; of the best law, and of the best with a curve
 
     @property
     def words(self) -> str:
@@ -117,6 +121,7 @@ class Law:
             "error": self.error,
             "error_interval": list(self.error_interval),
             "reason": self.reason,
+            "curves": [curve.to_dict() for curve in self.curves],
         }
 
 
@@ -141,8 +146,33 @@ class Laws:
         return bool(self.kept) and self.kept[0].p_value >= self.level / 2
 
     @property
+    def curved(self) -> Law | None:
+        """The law that describes best with a curve in place of a power law, where one is rejected."""
+        curved = [law for law in self.fitted if any(curve.rejected for curve in law.curves)]
+        return max(curved, key=lambda law: law.gain_with_curve, default=None)
+
+    @property
     def sentence(self) -> str:
         """What the runs say, without a claim about the cause."""
+        return f"{self._of_places}{self._of_curves}"
+
+    @property
+    def _of_curves(self) -> str:
+        """Say where a power law is contradicted, with a space before; empty if it is not."""
+        said, curved = "", self.curved
+        subject = "it" if len(self.kept) == 1 else "the first law"
+        if self.kept and (of_best := said_of(self.kept[0].curves, subject)):
+            said = f" {of_best}"
+        if curved is None or (self.kept and curved.place == self.kept[0].place):
+            return said
+        return (
+            f"{said} With a curve in place of a power law, it is described by {curved.place.words}. "
+            f"{said_of(curved.curves, 'this law')}"
+        )
+
+    @property
+    def _of_places(self) -> str:
+        """Say which laws describe the residual."""
         if not self.kept:
             return "No law of the places that were searched describes the residual."
         best = self.kept[0]
@@ -228,6 +258,8 @@ def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
     kept = _kept(laws)
     if not beside_claim and (not kept or kept[0].p_value < study.level / 2):
         laws += _fit_all(study, model, base, [one for one in ranked if one.gain > 0 and one not in likely])
+    if not beside_claim:
+        laws = _with_curves(study, laws)
     return Laws(base, tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), study.level)
 
 
@@ -285,6 +317,24 @@ def _fitted(study: Study, model: SwimmerModel, base: Fit, ranked: Ranked, chosen
 
 def _includes(interval: tuple[float, float], value: float) -> bool:
     return interval[0] <= value <= interval[1]
+
+
+def _with_curves(study: Study, laws: Sequence[Law]) -> list[Law]:
+    """Find the curves of the best law and, where it leaves more than noise, of the best one with a curve."""
+    used = study.split.fitted
+    gains = [law.gain + gain_of_a_curve(law.model, law.fit, used) for law in laws]
+    laws = [replace(law, gain_with_curve=gain) for law, gain in zip(laws, gains, strict=True)]
+    kept = _kept(laws)
+    shown = {kept[0].place.name} if kept else set()
+    converged = [law for law in laws if law.fit.converged]
+    if converged and (not kept or kept[0].p_value < study.level / 2):
+        shown.add(max(converged, key=lambda law: law.gain_with_curve).place.name)
+    return [
+        replace(law, curves=find_curves(replace(study, model=law.model, seed=study.seed + 2), law.fit))
+        if law.place.name in shown
+        else law
+        for law in laws
+    ]
 
 
 def _rival(law: Law) -> Rival:

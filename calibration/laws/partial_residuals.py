@@ -5,7 +5,10 @@ law, the runs g at one value of an input ask for a load that differs by the fact
 
     δ_g = Σ_g cᵀ S⁻¹ r/Σ_g cᵀ S⁻¹ c,
 
-with the standard error (Σ_g cᵀ S⁻¹ c)^(−1/2). The other parameters stay as they were fitted.
+with the standard error (Σ_g cᵀ S⁻¹ c)^(−1/2). A term, in which the motion is nearly linear, differs by 1 + δ_g
+instead. The other parameters stay as they were fitted. Where the runs contradict a power law, they are fitted anew
+(`calibration.laws.curves`).
+
 Source: partial residuals (Larsen and McCleary 1972).
 """
 
@@ -15,15 +18,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.laws.curves import Curve, error_bars, factors
+from calibration.laws.group_factors import along_load, grouped
 from calibration.laws.inputs import EXPONENTS, logarithms
 from calibration.laws.law_fits import Law
-from calibration.laws.law_model import SIZE
 from calibration.laws.readings import INPUTS
 from calibration.statistics.statistical_model import inverse_root
 from sim.arrays import Flags, Floats
 
 _LARGEST = 20.0  # logarithm of a factor
-_MOST_VALUES = 12  # of an input; with more, neighbouring runs are put together
 
 
 @dataclass(frozen=True)
@@ -37,14 +40,15 @@ class Dependence:
     high: Floats
     groups: Floats  # (g,) inputs at which there are runs
     by_runs: Floats  # (g,) the factor that these runs ask for
-    errors: Floats  # (g,) one standard error of its logarithm
+    errors: Floats  # (2, g) one standard error of it, below and above
+    curve: Curve | None  # what the runs ask for where they contradict the power law
 
 
 def dependences(law: Law, used: Flags) -> list[Dependence]:
     """Compute how a law depends on each input that differs between the runs in `used` (n,)."""
     fitted, model = law.fit, law.model
-    x = logarithms(model.runs) - np.array(model.centre)
-    along = _along_load(law)
+    x = logarithms(model.runs) - np.array(model.centre[: len(EXPONENTS)])
+    along = along_load(model, fitted)
     white = inverse_root(fitted.noise.run)
     columns = (along @ white.T)[used]
     residual = ((model.runs.y - fitted.prediction) @ white.T)[used]
@@ -55,10 +59,14 @@ def dependences(law: Law, used: Flags) -> list[Dependence]:
         power, at = fitted.parameters[name], fitted.names.index(name)
         curve = np.linspace(x[used, place].min(), x[used, place].max(), 60)
         half = fitted.half_width(at) * np.abs(curve)
-        members = _grouped(x[used, place])
+        members = grouped(x[used, place])
         weights = np.maximum([(columns[rows] ** 2).sum() for rows in members], np.finfo(float).tiny)
         shifts = np.array([(columns[rows] * residual[rows]).sum() for rows in members]) / weights
         middle = np.array([x[used, place][rows].mean() for rows in members])
+        by_runs, errors = _partial(power * middle, shifts, np.minimum(weights**-0.5, _LARGEST), law.place.is_term)
+        asked = next((one for one in law.curves if one.symbol == symbol and one.rejected), None)
+        if asked is not None:
+            by_runs, errors = factors(asked.groups), error_bars(asked.groups)
         results.append(
             Dependence(
                 symbol,
@@ -67,31 +75,23 @@ def dependences(law: Law, used: Flags) -> list[Dependence]:
                 _factor(power * curve - half),
                 _factor(power * curve + half),
                 np.exp(middle + model.centre[place]),
-                _factor(power * middle + shifts),
-                np.minimum(weights**-0.5, _LARGEST),
+                by_runs,
+                errors,
+                asked,
             )
         )
     return results
 
 
+def _partial(law: Floats, shifts: Floats, errors: Floats, is_term: bool) -> tuple[Floats, Floats]:
+    """Return the factor (g,) with these shifts from a law, and one standard error below and above (2, g)."""
+    if is_term:
+        m = _factor(law)
+        return m * (1 + shifts), np.stack([m * errors, m * errors])
+    middle = _factor(law + shifts)
+    return middle, np.stack([middle * -np.expm1(-errors), middle * np.expm1(errors)])
+
+
 def _factor(logarithm: Floats) -> Floats:
     """Compute e to a power that is limited: what the runs do not determine may be of any size."""
     return np.asarray(np.exp(np.clip(logarithm, -_LARGEST, _LARGEST)))
-
-
-def _along_load(law: Law) -> Floats:
-    """Compute ∂f/∂ ln(load) of every run, (n, k)."""
-    fitted = law.fit
-    if law.place.is_term:
-        return fitted.jacobian[..., fitted.names.index(SIZE)] * fitted.parameters[SIZE]
-    columns = [power * fitted.jacobian[..., fitted.names.index(name)] for name, power in law.place.moves]
-    return np.asarray(sum(columns))
-
-
-def _grouped(values: Floats) -> list[Flags]:
-    """Put runs of equal value together, or of neighbouring values where there are many; (n,) each."""
-    distinct, which = np.unique(values.round(6), return_inverse=True)
-    if len(distinct) > _MOST_VALUES:
-        edges = np.quantile(values, np.linspace(0, 1, _MOST_VALUES + 1)[1:-1])
-        which = np.searchsorted(edges, values)
-    return [which == group for group in np.unique(which)]

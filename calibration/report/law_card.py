@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from calibration.laws.curves import Curve
 from calibration.laws.inputs import EXPONENTS
 from calibration.laws.law_fits import Law, Laws
 from calibration.laws.law_model import LEVER
@@ -17,7 +18,7 @@ from calibration.laws.places import Place
 from calibration.laws.readings import INPUTS
 from calibration.report.quantities import plain
 from calibration.verdict.verdict import Verdict
-from sim.arrays import Floats
+from sim.arrays import Flags, Floats
 from sim.io.page_figures import BLUE, INK, PALE, RED
 from sim.io.pages import Page
 from sim.model.robot import Robot
@@ -53,10 +54,12 @@ def add_laws(page: Page, result: Verdict) -> None:
         if curves:
             caption = (
                 "On what it depends. Line and band: the law. Points: the factor that the runs at this input ask "
-                "for, with one standard error, everything else as fitted."
+                "for, with one standard error, everything else as fitted. Dashed: where they contradict a power "
+                "law, a smooth curve through points for which everything else was fitted anew."
             )
             figures.append((draw_dependences(curves), "the factor of the load against each input", caption))
         page.figures(figures)
+    _add_curved(page, laws, result.conditions.split.fitted)
     if laws.fitted:
         page.table(
             (
@@ -68,6 +71,22 @@ def add_laws(page: Page, result: Verdict) -> None:
             ),
             [_row(law, laws.level) for law in laws.fitted],
         )
+
+
+def _add_curved(page: Page, laws: Laws, used: Flags) -> None:
+    """Show the law that describes the runs with a curve in place of a power law, if it is not the best law."""
+    curved = laws.curved
+    if curved is None or (laws.kept and curved.place == laws.kept[0].place):
+        return
+    page.figures(
+        [
+            (
+                draw_dependences(dependences(curved, used)),
+                f"the factor of another law against each input: {curved.place.words}",
+                f"With a curve in place of a power law: {curved.place.words}.",
+            )
+        ]
+    )
 
 
 def _row(law: Law, level: float) -> tuple[str, ...]:
@@ -138,9 +157,9 @@ def draw_dependences(curves: list[Dependence]) -> Figure:
         scale, label = _SCALES[curve.symbol]
         axes.fill_between(scale * curve.inputs, curve.low, curve.high, color=PALE, lw=0)
         axes.plot(scale * curve.inputs, curve.factor, color=BLUE)
-        below = curve.by_runs * (1 - np.exp(-curve.errors))
-        above = curve.by_runs * (np.exp(curve.errors) - 1)
-        axes.errorbar(scale * curve.groups, curve.by_runs, (below, above), fmt="o", ms=4, color=RED, lw=1.2)
+        axes.errorbar(scale * curve.groups, curve.by_runs, curve.errors, fmt="o", ms=4, color=RED, lw=1.2)
+        if curve.curve is not None:
+            _draw_asked(axes, curve.curve, scale)
         axes.set_xlabel(label, fontsize=9)
         axes.set_ylabel("factor", fontsize=9)
         axes.tick_params(labelsize=8)
@@ -148,3 +167,11 @@ def draw_dependences(curves: list[Dependence]) -> Figure:
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.tight_layout(h_pad=0.5)
     return figure
+
+
+def _draw_asked(axes: Any, asked: Curve, scale: float) -> None:
+    """Draw the smooth curve that the runs ask for in place of a power law, with its band and a legend."""
+    axes.fill_between(scale * asked.inputs, asked.low, asked.high, color=RED, alpha=0.15, lw=0)
+    label = f"the runs' own curve, 95 %; power law: p = {asked.p_value:.2g}"
+    axes.plot(scale * asked.inputs, asked.factor, "--", color=RED, lw=1.2, label=label)
+    axes.legend(frameon=False, fontsize=7)
