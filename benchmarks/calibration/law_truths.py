@@ -7,6 +7,7 @@ deviations. Laws of the tails are not among the truths.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -85,13 +86,13 @@ def head_places() -> list[Place]:
     return [place for place in places() if place.is_term or place.name in COEFFICIENTS]
 
 
-def hidden_law(setting: Setting, seed: int, *, nothing: bool) -> HiddenLaw:
-    """Draw place, exponents and sign of a law; one seed after the other has the scores of SCORES in turn."""
+def hidden_law(setting: Setting, seed: int, *, nothing: bool, scores: Sequence[float] = SCORES) -> HiddenLaw:
+    """Draw place, exponents and sign of a law; one seed after the other has each of the scores in turn."""
     rng = np.random.default_rng(seed)
     on_head = head_places()
     place = on_head[rng.integers(len(on_head))]
     powers = Powers(*rng.uniform(-_STEEP, _STEEP, 3))
-    score = SCORES[seed % 3] * rng.choice([-1, 1])
+    score = scores[seed % len(scores)] * rng.choice([-1, 1])
     if nothing:
         return HiddenLaw(place, powers, 0.0, {})
     logs = setting.logarithm(powers)

@@ -13,7 +13,8 @@ leaves no more than noise and its deviance is not larger by what one parameter c
 
 Kept laws cannot be told apart if their BIC differ by less than one parameter can gain by chance (6.63). The place
 that is true need not be among the places of the search: a law describes the runs, and is no claim about their
-cause. Intervals do not count the choice among the places.
+cause. Laws are claimed only if tables without a law, searched in the same way, hardly ever gain as much
+(`calibration.laws.selection`). The intervals of a law hold for its place; they do not count the choice of it.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ from calibration.attribution.refits import INDISTINGUISHABLE, session_gain
 from calibration.laws.law_model import EXPONENTS, SIZE, LawModel
 from calibration.laws.places import Place, in_common, places
 from calibration.laws.readings import INPUTS, in_words
-from calibration.laws.search import Ranked, rank
+from calibration.laws.search import Ranked, search
+from calibration.laws.selection import Selection, examine_selection
 from calibration.statistics.fit import Fit, fit, noise_at_most
 from calibration.statistics.held_out import error_interval, errors
 from calibration.statistics.residual_tests import Directions, examine_residual
@@ -63,6 +65,11 @@ class Law:
     error: float  # relative rms on the held-out runs
     error_interval: tuple[float, float]  # 95 %
     reason: str  # why it is not kept; empty if it is
+
+    @property
+    def numbers(self) -> int:
+        """How many of its numbers were fitted."""
+        return sum(p.name in self.fit.names for p in self.model.effects)
 
     @property
     def words(self) -> str:
@@ -115,6 +122,7 @@ class Laws:
     base: Fit  # coefficients and nuisance parameters, without a law
     ranked: tuple[Ranked, ...]  # every place, the best first
     fitted: tuple[Law, ...]  # those that were fitted, the largest gain first
+    selection: Selection | None = None  # what the choice among the places costs; None: nothing was searched
     level: float = LEVEL  # α of the residual that a law leaves, as for an effect: half of it decides
 
     @property
@@ -125,8 +133,18 @@ class Laws:
 
     @property
     def complete(self) -> bool:
-        """Whether the best law leaves no more than noise."""
-        return bool(self.kept) and self.kept[0].p_value >= self.level / 2
+        """Whether the best law leaves no more than noise, and tables without a law hardly ever gain as much."""
+        return bool(self.kept) and self.kept[0].p_value >= self.level / 2 and self._significant
+
+    @property
+    def _significant(self) -> bool:
+        """Whether the p-value of the search is below the level."""
+        return self.selection is not None and self.selection.p_value < self.level
+
+    @property
+    def _search(self) -> str:
+        """The p-value of the search in words."""
+        return f"with the choice among all places counted, {self.selection.words}" if self.selection else ""
 
     @property
     def sentence(self) -> str:
@@ -134,6 +152,11 @@ class Laws:
         if not self.kept:
             return "No law of the places that were searched describes the residual."
         best = self.kept[0]
+        if not self._significant:
+            return (
+                "No law is claimed: noise alone can gain as much in a search over all places "
+                f"({self._search}). The nearest is {best.words}."
+            )
         if not self.complete:
             return (
                 "No law of the places that were searched describes the whole residual. The nearest is "
@@ -141,12 +164,15 @@ class Laws:
             )
         if len(self.kept) == 1:
             return (
-                f"The residual is described by {best.words}, and less well by all other places that were searched."
+                f"The residual is described by {best.words}, and less well by all other places that were searched "
+                f"({self._search})."
             )
         rivals = "; or ".join(law.words for law in self.kept)
         shared = in_common([law.place for law in self.kept])
         agree = f" All of them {shared}." if shared else ""
-        return f"The residual is described by {rivals}: these runs cannot tell them apart.{agree}"
+        return (
+            f"The residual is described by {rivals}: these runs cannot tell them apart ({self._search}).{agree}"
+        )
 
     @property
     def prediction(self) -> Floats:
@@ -188,10 +214,21 @@ class Laws:
         return {
             "sentence": self.sentence,
             "complete": self.complete,
-            "places": [{"place": one.place.name, "gain": one.gain} for one in self.ranked],
-            "laws": [law.to_dict() for law in self.fitted],
+            **(self.selection.to_dict() if self.selection else {}),
+            "places": [self._place_record(one) for one in self.ranked],
+            "laws": [{**law.to_dict(), "ebic_gain": self._ebic_gain(law.gain, law.numbers)} for law in self.fitted],
             "kept": [law.place.name for law in self.kept],
         }
+
+    def _place_record(self, ranked: Ranked) -> dict[str, Any]:
+        name = ranked.place.name
+        record = {"place": name, "gain": ranked.gain, "ebic_gain": self._ebic_gain(ranked.gain, ranked.columns)}
+        if self.selection:
+            record |= {"first": self.selection.first[name], "near_first": self.selection.near[name]}
+        return record
+
+    def _ebic_gain(self, gain: float, columns: int) -> float | None:
+        return self.selection.ebic_gain(gain, columns) if self.selection else None
 
 
 def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
@@ -207,14 +244,15 @@ def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
     model = study.model
     if not isinstance(model, SwimmerModel):
         raise TypeError("laws are looked for in a SwimmerModel")
-    ranked = rank(model, base, study.split.fitted, places(), title="places" if study.progress else "")
+    searched = search(model, base, study.split.fitted, places(), title="places" if study.progress else "")
+    ranked, selection = searched.ranked, examine_selection(searched, seed=study.seed + 2)
     least = max(_CURVED * ranked[0].gain, 0.0)
     likely = [one for one in ranked[:_FITTED] if one.gain > least]
     laws = _fit_all(study, model, base, likely, chosen_alone=beside_claim)
     kept = _kept(laws)
     if not beside_claim and (not kept or kept[0].p_value < study.level / 2):
         laws += _fit_all(study, model, base, [one for one in ranked if one.gain > 0 and one not in likely])
-    return Laws(base, tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), study.level)
+    return Laws(base, tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), selection, study.level)
 
 
 def _fit_all(

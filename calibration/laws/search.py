@@ -2,11 +2,7 @@
 
 With the columns d of a place at the fit without laws, the law is the span of d (if it is a term) and of d x_i for
 the chosen inputs i. It is fitted together with the coefficients and the nuisance parameters by generalised least
-squares, and each such model has its own scatter of the sessions:
-
-    BIC = rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| + q ln(n k),   q columns, n runs of k outputs.
-
-All products of columns are made once, so that a model costs the inverse of a small matrix.
+squares (`calibration.laws.linear_models`).
 
 Source: Schwarz (1978).
 """
@@ -14,20 +10,19 @@ Source: Schwarz (1978).
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from calibration.laws.law_model import EXPONENTS, logarithms
+from calibration.laws.linear_models import LinearFits, LinearModels
 from calibration.laws.places import Place
 from calibration.statistics.fit import Fit
-from calibration.statistics.statistical_model import Sums, inverse_root, least_squares, sums, with_prior
+from calibration.statistics.statistical_model import changes, precisions
 from calibration.swimmer.swimmer import SwimmerModel
-from sim.arrays import Flags, Floats
+from sim.arrays import Flags, Floats, Integers
 
-_PASSES = 3  # iterations for the scatter of the sessions
 _POWERS_AT_START = 2.0  # largest exponent with which a fit starts
 
 
@@ -46,16 +41,47 @@ class Ranked:
         return tuple(name for name, value in zip(EXPONENTS, self.exponents, strict=True) if value)
 
     @property
+    def columns(self) -> int:
+        """Number of its columns."""
+        return len(self.chosen) + self.place.is_term
+
+    @property
     def start(self) -> dict[str, float]:
         """Exponents with which a fit starts."""
         limited = np.clip(self.exponents, -_POWERS_AT_START, _POWERS_AT_START)
         return dict(zip(EXPONENTS, limited.tolist(), strict=True))
 
 
-def rank(
-    model: SwimmerModel, base: Fit, used: Flags, candidates: Sequence[Place], *, title: str = ""
-) -> list[Ranked]:
-    """Rank places by the gain in BIC of their best linear model, the best first.
+@dataclass(frozen=True)
+class Search:
+    """All linear models of all places, fitted to the residual of a fit without laws."""
+
+    places: tuple[Place, ...]
+    models: LinearModels
+    varied: tuple[int, ...]  # of a place's columns: 0 is the term itself, the others are of EXPONENTS, from 1
+    residual: Floats  # (n, k) of the fitted runs from the parameters as given
+    fits: LinearFits  # of this residual
+
+    @property
+    def ranked(self) -> list[Ranked]:
+        """The best model of every place, the largest gain first."""
+        best = [self._ranked(model) for model in self.best(self.fits.gain)[0]]
+        return sorted(best, key=lambda ranked: -ranked.gain)
+
+    def best(self, gain: Floats) -> Integers:
+        """Find the best model of every place, by the gains (B, M) of all models; (B, P)."""
+        of_place = np.array([place for place, _ in self.models.models])
+        members = [np.flatnonzero(of_place == number) for number in range(len(self.places))]
+        return np.stack([which[gain[:, which].argmax(1)] for which in members], 1)
+
+    def _ranked(self, model: int) -> Ranked:
+        number, chosen = self.models.models[model]
+        weights = {self.varied[j]: float(self.fits.weights[0, model, j]) for j in chosen}
+        return _ranked(self.places[number], float(self.fits.gain[0, model]), weights)
+
+
+def search(model: SwimmerModel, base: Fit, used: Flags, candidates: Sequence[Place], *, title: str = "") -> Search:
+    """Fit every linear model of places to the residual of a fit.
 
     Args:
         base: the fit without laws.
@@ -65,24 +91,60 @@ def rank(
     directions = _directions(model, base, candidates, title)  # (n, k, places)
     inputs_of_runs = logarithms(model.runs)
     x = np.column_stack([np.ones(len(model.runs)), inputs_of_runs - inputs_of_runs.mean(0)])
-    varied = [0, *(i for i in range(1, x.shape[1]) if np.ptp(x[used, i]) > 0)]
-    by_place = directions[..., None] * x[:, None, None, varied]  # (n, k, places, columns)
-    columns = by_place.reshape(*directions.shape[:2], -1)
-    products = _products(model, base, used, columns)
-    fitted = len(base.names)
-    values = int(used.sum()) * directions.shape[1]
-    without = _deviance(products, [*range(fitted)])[0]
-    best = []
-    for number, place in enumerate(candidates):
-        first = fitted + number * len(varied)
-        models = []
-        for inputs in _subsets(range(1, len(varied)), at_least=0 if place.is_term else 1):
-            places = [*([0] if place.is_term else []), *inputs]
-            deviance, step = _deviance(products, [*range(fitted), *(first + j for j in places)])
-            gain = without - deviance - len(places) * math.log(values)
-            models.append(_ranked(place, gain, dict(zip((varied[j] for j in places), step[fitted:], strict=True))))
-        best.append(max(models, key=lambda ranked: ranked.gain))
-    return sorted(best, key=lambda ranked: -ranked.gain)
+    varied = (0, *(i for i in range(1, x.shape[1]) if np.ptp(x[used, i]) > 0))
+    columns = directions[..., None] * x[:, None, None, varied]  # (n, k, places, columns)
+    kinds = [
+        (number, (*([0] if place.is_term else []), *inputs))
+        for number, place in enumerate(candidates)
+        for inputs in _subsets(range(1, len(varied)), at_least=0 if place.is_term else 1)
+    ]
+    data, absorbed = model.runs, base.jacobian[used]
+    models = LinearModels(
+        absorbed, precisions(base.fitted), columns[used], kinds, data.session[used], data.condition[used]
+    )
+    residual = (data.y - base.prediction)[used] + absorbed @ changes(base.fitted, base.parameters)
+    return Search(tuple(candidates), models, varied, residual, models.fit(residual[None]))
+
+
+def _directions(model: SwimmerModel, base: Fit, candidates: Sequence[Place], title: str) -> Floats:
+    """Compute ∂f/∂F of terms and ∂f/∂ln m of factors at the fit, (n, k, places)."""
+    names = tuple(dict.fromkeys(name for place in candidates for name, _ in place.moves))
+    terms = {name for place in candidates if place.is_term for name, _ in place.moves}
+    table = model.derivatives({**base.parameters, **dict.fromkeys(terms, 1.0)}, names, title=title)[1]
+    slopes = [sum(power * table[..., names.index(name)] for name, power in place.moves) for place in candidates]
+    return np.stack([np.asarray(slope) for slope in slopes], -1)
+
+
+def _ranked(self, model: int) -> Ranked:
+        number, chosen = self.models.models[model]
+        weights = {self.varied[j]: float(self.fits.weights[0, model, j]) for j in chosen}
+        return _ranked(self.places[number], float(self.fits.gain[0, model]), weights)
+
+
+def search(model: SwimmerModel, base: Fit, used: Flags, candidates: Sequence[Place], *, title: str = "") -> Search:
+    """Fit every linear model of places to the residual of a fit.
+
+    Args:
+        base: the fit without laws.
+        used: (n,) runs to which it was fitted.
+        title: of the progress bar for the derivatives; empty for none.
+    """
+    directions = _directions(model, base, candidates, title)  # (n, k, places)
+    inputs_of_runs = logarithms(model.runs)
+    x = np.column_stack([np.ones(len(model.runs)), inputs_of_runs - inputs_of_runs.mean(0)])
+    varied = (0, *(i for i in range(1, x.shape[1]) if np.ptp(x[used, i]) > 0))
+    columns = directions[..., None] * x[:, None, None, varied]  # (n, k, places, columns)
+    kinds = [
+        (number, (*([0] if place.is_term else []), *inputs))
+        for number, place in enumerate(candidates)
+        for inputs in _subsets(range(1, len(varied)), at_least=0 if place.is_term else 1)
+    ]
+    data, absorbed = model.runs, base.jacobian[used]
+    models = LinearModels(
+        absorbed, precisions(base.fitted), columns[used], kinds, data.session[used], data.condition[used]
+    )
+    residual = (data.y - base.prediction)[used] + absorbed @ changes(base.fitted, base.parameters)
+    return Search(tuple(candidates), models, varied, residual, models.fit(residual[None]))
 
 
 def _directions(model: SwimmerModel, base: Fit, candidates: Sequence[Place], title: str) -> Floats:

@@ -41,8 +41,9 @@ def add_laws(page: Page, result: Verdict) -> None:
     page.text(laws.sentence, tone="good" if laws.complete else "bad")
     page.text(
         "A law is a place where a term acts, times a power law in the motor speed ω, the tail length l and the "
-        "number of tails N. It describes the runs; it is no claim about the cause. Intervals are of 95 %; they do "
-        "not count the choice among the places."
+        "number of tails N. It describes the runs; it is no claim about the cause. Intervals are of 95 % for a law at "
+        "this place. The choice among the places is counted by the p-value of the search, and by the share of "
+        "bootstrap tables in which a place ranks first."
     )
     if laws.kept:
         best = laws.kept[0]
@@ -62,19 +63,21 @@ def add_laws(page: Page, result: Verdict) -> None:
                 "place",
                 *(f"exponent of {symbol}" for symbol in INPUTS),
                 "gain in BIC",
+                "first in … of bootstrap tables",
                 "held-out error",
                 "judgement",
             ),
-            [_row(law, laws.level) for law in laws.fitted],
+            [_row(law, laws) for law in laws.fitted],
         )
 
 
-def _row(law: Law, level: float) -> tuple[str, ...]:
-    kept = "describes the runs" if law.p_value >= level / 2 else "leaves more than noise"
+def _row(law: Law, laws: Laws) -> tuple[str, ...]:
+    kept = "describes the runs" if law.p_value >= laws.level / 2 else "leaves more than noise"
     return (
         law.place.words,
         *(_exponent(law, name) for name in EXPONENTS),
         f"{law.gain:.0f}",
+        f"{100 * laws.selection.first[law.place.name]:.0f} %" if laws.selection else "–",
         f"{100 * law.error:.2f} %",
         law.reason or kept,
     )
