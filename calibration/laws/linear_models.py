@@ -30,12 +30,13 @@ from calibration.statistics.statistical_model import (
     averaging_rows,
     inverse_root,
     repeat_covariance,
-    solved,
 )
 from sim.arrays import Floats, Integers
 
 _SHARES = 9  # values of ρ at which the deviance is computed
 _AT_ONCE = 25  # residuals
+_RIDGE = 1e-11  # so that columns without any signal get a large variance
+_SMALLEST = 1e-280  # pivot
 
 
 @dataclass(frozen=True)
@@ -78,11 +79,11 @@ class LinearModels:
         self._picks, self._sizes = averaging_rows(session)
         whole = math.log1p(SESSION_SHARE * self._sizes.mean())
         self._levels = np.linspace(0.0, whole, _SHARES) if len(self._sizes) > 1 else np.array([whole])
-        shares = self._share(np.arange(len(self._levels)))
+        shares = np.expm1(self._levels) / self._sizes.mean()
         table = np.concatenate([absorbed, columns.reshape(n, k, -1)], -1)
         less = 1 / (1 + shares[:, None] * self._sizes) - 1  # (g, s)
-        means = np.tensordot(self._picks, table, 1)
         self._less = less
+        means = np.tensordot(self._picks, table, 1)
         self._weighted = np.stack(
             [(table + np.tensordot(self._picks.T, w[:, None, None] * means, 1)).reshape(n * k, -1) for w in less]
         )
@@ -111,41 +112,38 @@ class LinearModels:
 
     def _fit(self, residual: Floats) -> LinearFits:
         C, b, without, log_determinant = self._absorb(residual)
-        base_at, base_deviance = _at_minimum(without + log_determinant, without)
+        base = _Minimum.of(without + log_determinant)
         count, models = len(residual), len(self.models)
-        gain, share = np.empty((count, models)), np.empty((count, models))
-        weights, errors = np.zeros((count, models, self._count)), np.full((count, models, self._count), np.inf)
-        price = math.log(residual[0].size)
+        gain, share = np.empty((models, count)), np.empty((models, count))
+        weights, errors = np.zeros((models, self._count, count)), np.full((models, self._count, count), np.inf)
         for q in sorted({len(chosen) for _, chosen in self.models}):
-            which = [i for i, (_, chosen) in enumerate(self.models) if len(chosen) == q]
-            place = np.array([self.models[i][0] for i in which])[:, None]
-            chosen = np.array([self.models[i][1] for i in which])
-            normal = np.empty((*C.shape[:2], len(which), q + 1, q + 1))
-            normal[..., :q, :q] = C[:, :, place[..., None], chosen[:, :, None], chosen[:, None, :]]
-            normal[..., :q, q] = b[:, :, place, chosen]
-            step, covariance = solved(normal)
-            deviance = without[..., None] - (step * normal[..., :q, q]).sum(-1)
-            restricted = deviance + log_determinant[..., None] - np.linalg.slogdet(covariance)[1]
-            at, least = _at_minimum(restricted, deviance)
-            gain[:, which] = base_deviance[:, None] - least - q * price
-            share[:, which] = self._share(at)
-            row, column, nearest = np.arange(count)[:, None], np.arange(len(which)), np.rint(at).astype(np.int64)
-            to = (row[..., None], np.array(which)[None, :, None], chosen[None])
-            weights[to] = step[nearest, row, column]
-            variance = np.diagonal(covariance[nearest, row, column], axis1=-2, axis2=-1)
-            errors[to] = np.sqrt(np.maximum(variance, 0.0))
-        return LinearFits(gain, weights, errors, share, self._share(base_at))
+            which = np.array([i for i, (_, chosen) in enumerate(self.models) if len(chosen) == q])
+            place = np.array([self.models[i][0] for i in which])
+            chosen = np.array([self.models[i][1] for i in which]).T  # (q, models)
+            toward = b[chosen, place]  # (q, models, g, b)
+            inverse, step, log_own = _swept(C[chosen[:, None], chosen, place], toward)
+            deviance = without - (step * toward).sum(0)
+            minimum = _Minimum.of((deviance + log_determinant + log_own).swapaxes(0, 1))
+            least = minimum.value(deviance.swapaxes(0, 1))
+            gain[which] = base.value(without) - least - q * math.log(residual[0].size)
+            share[which] = self._share(minimum)
+            for place_of_weight, column in enumerate(chosen):
+                weights[which, column] = minimum.value(step[place_of_weight].swapaxes(0, 1))
+                variance = minimum.value(inverse[place_of_weight, place_of_weight].swapaxes(0, 1))
+                errors[which, column] = np.sqrt(np.maximum(variance, 0.0))
+        of_residual = (np.moveaxis(each, -1, 0) for each in (gain, weights, errors, share))
+        return LinearFits(*of_residual, self._share(base))
 
-    def _share(self, at: Floats | Integers) -> Floats:
-        """Compute ρ at places, which may be between two of those at which the deviance is computed."""
-        levels = np.interp(at, np.arange(len(self._levels)), self._levels)
+    def _share(self, minimum: _Minimum) -> Floats:
+        """Compute ρ at minima."""
+        levels = np.interp(minimum.middle + minimum.fraction, np.arange(len(self._levels)), self._levels)
         return np.asarray(np.expm1(levels) / self._sizes.mean())
 
     def _absorb(self, residual: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Absorb J at every ρ.
 
         Returns:
-            C (g, b, P, v, v), b (g, b, P, v), and without a place the deviance and ln |A| (g, b).
+            C (v, v, P, g, b), b (v, P, g, b), and without a place the deviance and ln |A| (g, b).
         """
         count, _, k = residual.shape
         p, places, columns = self.p, self._places, self._count
@@ -159,28 +157,67 @@ class LinearModels:
         toward = weighted.reshape(count, -1) @ self._weighted  # (g, b, p + P v)
         means, weighted_means = self._picks @ residual, self._picks @ weighted  # (b, s, k)
         square = (weighted * residual).sum((1, 2)) + self._less @ (means * weighted_means).sum(-1).T
-        solution = np.linalg.solve(A, np.concatenate([across, toward[..., :p, None]], -1))
-        step = solution[..., -1]
+        covariance = np.linalg.inv(A)
+        step = (covariance @ toward[..., :p, None])[..., 0]
         left = toward[..., p:] - (step[..., None, :] @ across)[..., 0, :]
-        solution = solution[..., :-1].reshape(-1, count, p, places, columns).transpose(0, 1, 3, 2, 4)
+        solution = (covariance @ across).reshape(-1, count, p, places, columns).transpose(0, 1, 3, 2, 4)
         by_place = across.reshape(-1, count, p, places, columns).transpose(0, 1, 3, 4, 2)
-        C = own.reshape(-1, count, places, columns, columns) - by_place @ solution
+        own = own.reshape(-1, count, places, columns, columns)
+        own[..., range(columns), range(columns)] *= 1 + _RIDGE
+        C = np.ascontiguousarray((own - by_place @ solution).transpose(3, 4, 2, 0, 1))
+        b = np.ascontiguousarray(left.reshape(-1, count, places, columns).transpose(3, 2, 0, 1))
         deviance = square - (step * toward[..., :p]).sum(-1) + self._determinant[:, None]
-        return C, left.reshape(-1, count, places, columns), deviance, np.linalg.slogdet(A)[1]
+        return C, b, deviance, np.linalg.slogdet(A)[1]
 
 
-def _at_minimum(restricted: Floats, deviance: Floats) -> tuple[Floats, Floats]:
-    """Find where the first is smallest along ρ (g, ...), by a parabola, and compute the second there.
+def _swept(normal: Floats, toward: Floats) -> tuple[Floats, Floats, Floats]:
+    """Invert small matrices (q, q, ...) and solve for (q, ...), all at once, by sweeps (Goodnight 1979).
 
     Returns:
-        The place (...) along ρ, which may be between two, and the deviance (...).
+        The inverses (q, q, ...), the solutions (q, ...) and the logarithms of the determinants (...).
     """
-    if len(restricted) == 1:
-        return np.zeros(restricted.shape[1:]), deviance[0]
-    middle = np.clip(restricted.argmin(0), 1, len(restricted) - 2)
-    low, centre, high = (np.take_along_axis(restricted, (middle + i)[None], 0)[0] for i in (-1, 0, 1))
-    curvature = np.maximum(low - 2 * centre + high, 1e-12)
-    t = np.clip((low - high) / (2 * curvature), -1.0, 1.0)
-    low, centre, high = (np.take_along_axis(deviance, (middle + i)[None], 0)[0] for i in (-1, 0, 1))
-    least = centre + t * (high - low) / 2 + t**2 * (low - 2 * centre + high) / 2
-    return middle + t, least
+    table = np.concatenate([normal, toward[:, None]], 1)
+    log_determinant = np.zeros(toward.shape[1:])
+    for k in range(len(table)):
+        pivot = np.maximum(table[k, k], _SMALLEST)
+        log_determinant += np.log(pivot)
+        table[k, k] = 1.0
+        table[k] /= pivot
+        for i in range(len(table)):
+            if i != k:
+                factor = table[i, k].copy()
+                table[i, k] = 0.0
+                table[i] -= factor * table[k]
+    return table[:, :-1], table[:, -1], log_determinant
+
+
+@dataclass(frozen=True)
+class _Minimum:
+    """Where a function of ρ is smallest: between the ρ at `middle` − 1 and those at `middle` + 1."""
+
+    middle: Integers  # (...)
+    fraction: Floats  # (...) of the step between two ρ, from `middle`
+
+    @classmethod
+    def of(cls, values: Floats) -> _Minimum:
+        """Find the minimum of the parabola through three values (g, ...)."""
+        if len(values) == 1:
+            return cls(np.zeros(values.shape[1:], dtype=np.int64), np.zeros(values.shape[1:]))
+        middle = np.clip(values.argmin(0), 1, len(values) - 2)
+        low, centre, high = _neighbours(values, middle)
+        curvature = np.maximum(low - 2 * centre + high, 1e-12)
+        return cls(middle, np.clip((low - high) / (2 * curvature), -1.0, 1.0))
+
+    def value(self, values: Floats) -> Floats:
+        """Interpolate values (g, ..., further axes) there, by the parabola through three of them."""
+        if len(values) == 1:
+            return values[0]
+        low, centre, high = _neighbours(values, self.middle)
+        t = self.fraction.reshape(self.fraction.shape + (1,) * (centre.ndim - self.fraction.ndim))
+        return np.asarray(centre + t * (high - low) / 2 + t**2 * (low - 2 * centre + high) / 2)
+
+
+def _neighbours(values: Floats, middle: Integers) -> tuple[Floats, Floats, Floats]:
+    """Take the values (g, ...) before, at and after the places `middle`."""
+    others = np.indices(middle.shape, sparse=True)
+    return values[(middle - 1, *others)], values[(middle, *others)], values[(middle + 1, *others)]
