@@ -14,7 +14,8 @@ leaves no more than noise and its deviance is not larger by what one parameter c
 Kept laws cannot be told apart if their BIC differ by less than one parameter can gain by chance (6.63). The place
 that is true need not be among the places of the search: a law describes the runs, and is no claim about their
 cause. Laws are claimed only if tables without a law, searched in the same way, hardly ever gain as much
-(`calibration.laws.selection`). The intervals of a law hold for its place; they do not count the choice of it.
+(`calibration.laws.selection`). Intervals do not count the choice among the places; those of
+`Laws.simultaneous_interval` do.
 """
 
 from __future__ import annotations
@@ -170,9 +171,7 @@ class Laws:
         rivals = "; or ".join(law.words for law in self.kept)
         shared = in_common([law.place for law in self.kept])
         agree = f" All of them {shared}." if shared else ""
-        return (
-            f"The residual is described by {rivals}: these runs cannot tell them apart ({self._search}).{agree}"
-        )
+        return f"The residual is described by {rivals}: these runs cannot tell them apart ({self._search}).{agree}"
 
     @property
     def prediction(self) -> Floats:
@@ -216,9 +215,27 @@ class Laws:
             "complete": self.complete,
             **(self.selection.to_dict() if self.selection else {}),
             "places": [self._place_record(one) for one in self.ranked],
-            "laws": [{**law.to_dict(), "ebic_gain": self._ebic_gain(law.gain, law.numbers)} for law in self.fitted],
+            "laws": [self._law_record(law) for law in self.fitted],
             "kept": [law.place.name for law in self.kept],
         }
+
+    def simultaneous_interval(self, law: Law, name: str) -> tuple[float, float]:
+        """Compute the 95 % interval of a number of a law that covers those of all places at once."""
+        assert self.selection is not None
+        place, value = law.fit.names.index(name), law.fit.parameters[name]
+        deviation = math.sqrt(
+            law.fit.covariance[place, place] / law.fit.inflation
+        )  # K contains that S is estimated
+        half = max(self.selection.widest * deviation, law.fit.half_width(place))
+        return value - half, value + half
+
+    def _law_record(self, law: Law) -> dict[str, Any]:
+        record = {**law.to_dict(), "ebic_gain": self._ebic_gain(law.gain, law.numbers)}
+        for name in (SIZE, *EXPONENTS):
+            if self.selection and name in law.fit.names:
+                interval = list(self.simultaneous_interval(law, name))
+                record[name.removeprefix("law_")]["simultaneous_interval"] = interval
+        return record
 
     def _place_record(self, ranked: Ranked) -> dict[str, Any]:
         name = ranked.place.name

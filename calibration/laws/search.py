@@ -56,7 +56,7 @@ class Ranked:
 class Search:
     """All linear models of all places, fitted to the residual of a fit without laws."""
 
-    places: tuple[Place, ...]
+    places: tuple[Place, ...]  # those with one name are variants of a place, of which the best counts
     models: LinearModels
     varied: tuple[int, ...]  # of a place's columns: 0 is the term itself, the others are of EXPONENTS, from 1
     residual: Floats  # (n, k) of the fitted runs from the parameters as given
@@ -68,10 +68,15 @@ class Search:
         best = [self._ranked(model) for model in self.best(self.fits.gain)[0]]
         return sorted(best, key=lambda ranked: -ranked.gain)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the places."""
+        return tuple(dict.fromkeys(place.name for place in self.places))
+
     def best(self, gain: Floats) -> Integers:
-        """Find the best model of every place, by the gains (B, M) of all models; (B, P)."""
-        of_place = np.array([place for place, _ in self.models.models])
-        members = [np.flatnonzero(of_place == number) for number in range(len(self.places))]
+        """Find the best model of every name, by the gains (B, M) of all models; (B, names)."""
+        of_model = np.array([self.places[number].name for number, _ in self.models.models])
+        members = [np.flatnonzero(of_model == name) for name in self.names]
         return np.stack([which[gain[:, which].argmax(1)] for which in members], 1)
 
     def _ranked(self, model: int) -> Ranked:
@@ -113,71 +118,6 @@ def _directions(model: SwimmerModel, base: Fit, candidates: Sequence[Place], tit
     table = model.derivatives({**base.parameters, **dict.fromkeys(terms, 1.0)}, names, title=title)[1]
     slopes = [sum(power * table[..., names.index(name)] for name, power in place.moves) for place in candidates]
     return np.stack([np.asarray(slope) for slope in slopes], -1)
-
-
-def _ranked(self, model: int) -> Ranked:
-        number, chosen = self.models.models[model]
-        weights = {self.varied[j]: float(self.fits.weights[0, model, j]) for j in chosen}
-        return _ranked(self.places[number], float(self.fits.gain[0, model]), weights)
-
-
-def search(model: SwimmerModel, base: Fit, used: Flags, candidates: Sequence[Place], *, title: str = "") -> Search:
-    """Fit every linear model of places to the residual of a fit.
-
-    Args:
-        base: the fit without laws.
-        used: (n,) runs to which it was fitted.
-        title: of the progress bar for the derivatives; empty for none.
-    """
-    directions = _directions(model, base, candidates, title)  # (n, k, places)
-    inputs_of_runs = logarithms(model.runs)
-    x = np.column_stack([np.ones(len(model.runs)), inputs_of_runs - inputs_of_runs.mean(0)])
-    varied = (0, *(i for i in range(1, x.shape[1]) if np.ptp(x[used, i]) > 0))
-    columns = directions[..., None] * x[:, None, None, varied]  # (n, k, places, columns)
-    kinds = [
-        (number, (*([0] if place.is_term else []), *inputs))
-        for number, place in enumerate(candidates)
-        for inputs in _subsets(range(1, len(varied)), at_least=0 if place.is_term else 1)
-    ]
-    data, absorbed = model.runs, base.jacobian[used]
-    models = LinearModels(
-        absorbed, precisions(base.fitted), columns[used], kinds, data.session[used], data.condition[used]
-    )
-    residual = (data.y - base.prediction)[used] + absorbed @ changes(base.fitted, base.parameters)
-    return Search(tuple(candidates), models, varied, residual, models.fit(residual[None]))
-
-
-def _directions(model: SwimmerModel, base: Fit, candidates: Sequence[Place], title: str) -> Floats:
-    """Compute ∂f/∂F of terms and ∂f/∂ln m of factors at the fit, (n, k, places)."""
-    names = tuple(dict.fromkeys(name for place in candidates for name, _ in place.moves))
-    terms = {name for place in candidates if place.is_term for name, _ in place.moves}
-    table = model.derivatives({**base.parameters, **dict.fromkeys(terms, 1.0)}, names, title=title)[1]
-    slopes = [sum(power * table[..., names.index(name)] for name, power in place.moves) for place in candidates]
-    return np.stack([np.asarray(slope) for slope in slopes], -1)
-
-
-def _products(model: SwimmerModel, base: Fit, used: Flags, columns: Floats) -> Sums:
-    """Multiply the columns of the fit, those of the places, and the residual with each other."""
-    data = model.runs
-    residual = (data.y - base.prediction)[..., None]
-    table = np.concatenate([base.jacobian, columns, residual], -1)[used]
-    products = sums(inverse_root(base.noise.run) @ table, data.session[used], len(base.noise.run))
-    p, m = len(base.names), table.shape[-1]
-    ends = np.r_[np.arange(p), m - 1]
-    empty = Sums(np.zeros((p + 1, p + 1)), products.between[:, :1, :1], products.sizes, products.outputs)
-    products.within[np.ix_(ends, ends)] += with_prior(empty, base.fitted, base.parameters).within
-    return products
-
-
-def _deviance(products: Sums, columns: Sequence[int]) -> tuple[float, Floats]:
-    """Compute the least deviance with these columns, and their coefficients."""
-    last = products.within.shape[-1] - 1
-    part = products.take(np.array([[*columns, last]]))
-    linear = least_squares(part, passes=_PASSES)
-    normal, step = part.at(linear.share)[0], linear.step[0]
-    left = normal[-1, -1] - step @ normal[:-1, -1]
-    scatter = products.outputs * np.log1p(float(linear.share[0]) * products.sizes).sum()
-    return float(left + scatter), step
 
 
 def _ranked(place: Place, gain: float, weights: dict[int, float]) -> Ranked:

@@ -1,8 +1,8 @@
 """What choosing among the places costs: how surprising the best law is, and how sure the choice of its place is.
 
 **p-value of the search.** Tables are drawn from the fit without laws: noise of the runs and of the sessions, and
-nuisance parameters from their priors, as in `calibration.statistics.residual_tests`. The whole search runs on each.
-With the largest gain in BIC of the runs, and those of B drawn tables,
+nuisance parameters from their priors, as in `calibration.statistics.residual_tests`. The whole search runs on
+each. With the largest gain in BIC of the runs, and those of B drawn tables,
 
     p = (1 + number of tables that gain as much)/(1 + B).
 
@@ -15,12 +15,12 @@ proportion to its probability e^(−BIC/2) among them. The search runs on each. 
 ranks first, or within `INDISTINGUISHABLE` of the first, says how far other runs of the same design would choose
 it. Whole sessions are not resampled: there are three to six, which differ in their tails.
 
-**Intervals after selection.** K is the 95 % quantile over the tables without a law of the largest |z| of all weights
-of all models. Estimates ± K standard errors cover all weights of all models at once, and so those of any model
-that was chosen by its fit (Berk et al. 2013), to first order in the law.
+**Intervals after selection.** K is the 95 % quantile over the tables without a law of the largest |z| of all
+weights of all models. Estimates ± K standard errors cover all weights of all models at once, and so those of any
+model that was chosen by its fit (Berk et al. 2013), to first order in the law.
 
-Source: Westfall and Young (1993) for the largest of many statistics; Chen and Chen (2008) for EBIC; Kass and Raftery (1995) for BIC as a
-probability; Efron (2014) for the bootstrap of a choice.
+Source: Westfall and Young (1993) for the largest of many statistics; Chen and Chen (2008) for EBIC; Kass and
+Raftery (1995) for BIC as a probability; Efron (2014) for the bootstrap of a choice.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def examine_selection(search: Search, *, seed: int) -> Selection:
     as_large = int(np.count_nonzero(null.gain.max(1) >= search.fits.gain.max()))
     largest = np.abs(null.weights / null.errors).max((1, 2))
     gains = search.models.fit(draws.with_laws(_LAW_DRAWS)).gain
-    of_places = np.take_along_axis(gains, search.best(gains), 1)  # (tables, P)
+    of_places = np.take_along_axis(gains, search.best(gains), 1)  # (tables, names)
     behind = of_places.max(1)[:, None] - of_places
     return Selection(
         p_value=(1 + as_large) / (1 + _NULL_DRAWS),
@@ -92,9 +92,8 @@ def examine_selection(search: Search, *, seed: int) -> Selection:
 
 
 def _shares(search: Search, chosen: Floats) -> dict[str, float]:
-    """Compute the share of tables (tables, P) in which each place is chosen."""
-    names = (place.name for place in search.places)
-    return dict(zip(names, chosen.mean(0).tolist(), strict=True))
+    """Compute the share of tables (tables, names) in which each place is chosen."""
+    return dict(zip(search.names, chosen.mean(0).tolist(), strict=True))
 
 
 class _Draws:

@@ -41,9 +41,9 @@ def add_laws(page: Page, result: Verdict) -> None:
     page.text(laws.sentence, tone="good" if laws.complete else "bad")
     page.text(
         "A law is a place where a term acts, times a power law in the motor speed ω, the tail length l and the "
-        "number of tails N. It describes the runs; it is no claim about the cause. Intervals are of 95 % for a law at "
-        "this place. The choice among the places is counted by the p-value of the search, and by the share of "
-        "bootstrap tables in which a place ranks first."
+        "number of tails N. It describes the runs; it is no claim about the cause. Intervals are of 95 %, at "
+        "this place. The p-value of the search counts the choice among the places; so does the share of "
+        f"bootstrap tables in which a place ranks first.{_simultaneous(laws)}"
     )
     if laws.kept:
         best = laws.kept[0]
@@ -69,6 +69,20 @@ def add_laws(page: Page, result: Verdict) -> None:
             ),
             [_row(law, laws) for law in laws.fitted],
         )
+
+
+def _simultaneous(laws: Laws) -> str:
+    """Say the intervals of the best law that count the choice among the places; empty if it has no exponents."""
+    if not laws.kept or laws.selection is None:
+        return ""
+    best = laws.kept[0]
+    intervals = {
+        symbol: laws.simultaneous_interval(best, name)
+        for name, symbol in zip(EXPONENTS, INPUTS, strict=True)
+        if name in best.fit.names
+    }
+    said = ", ".join(f"{symbol} {plain(low, 2)} to {plain(high, 2)}" for symbol, (low, high) in intervals.items())
+    return f" Intervals of the best law that cover the exponents of all places at once: {said}." if said else ""
 
 
 def _row(law: Law, laws: Laws) -> tuple[str, ...]:

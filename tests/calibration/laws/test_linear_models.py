@@ -34,7 +34,7 @@ def residuals(count: int, *, share: float = 0.3, seed: int = 1) -> Floats:
 
 
 def dense(models: LinearModels, residual: Floats, columns: Floats) -> tuple[float, float, Floats, Floats]:
-    """Fit columns (n, k, q) by the definitions: deviance, ρ, weights of J and of the columns, and their covariance."""
+    """Fit columns (n, k, q) by the definitions; return the deviance, ρ, all weights, their covariance."""
     run = repeat_covariance(residual, CONDITION)
     table = np.concatenate([models.absorbed, columns], -1).reshape(residual.size, -1)
     prior = np.diag(np.r_[PRECISION, np.zeros(columns.shape[-1])])

@@ -1,4 +1,4 @@
-"""The choice among the places of laws: p-value of the search, EBIC, selection frequency, simultaneous intervals."""
+"""The choice among the places of laws: p-value of the search, EBIC, selection frequency, intervals."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from calibration.laws.linear_models import LinearModels
 from calibration.laws.places import places
 from calibration.laws.search import Search
 from calibration.laws.selection import Selection, examine_selection
-from calibration.report.law_card import _row
+from calibration.report.law_card import _row, _simultaneous
 from calibration.report.robot_laws import RobotLaws, find_robot_laws
 from calibration.swimmer.synthetic_table import make_table
 from sim.arrays import Floats
-from tests.calibration.toy_tables import START, TRUTH
+from tests.calibration.toy_tables import START, TRUTH, install_toy
 
 SESSION = np.repeat(np.arange(4), 16)
 CONDITION = np.arange(len(SESSION)) // 2
@@ -96,6 +96,15 @@ def test_simultaneous_intervals_are_those_of_one_weight_where_there_is_one_model
     assert 1.3 * one < every < norm.ppf(1 - 0.025 / (2 * len(MODELS))) * 1.15  # below Bonferroni's
 
 
+def test_of_variants_of_a_place_the_best_counts() -> None:
+    search = searched(noise(1) + 1.2 * TABLE[:, :, 3, 0])
+    first = search.places[0]
+    variants = replace(search, places=(first, first, *search.places[2:3], first, *search.places[4:]))
+    assert len(variants.ranked) == len(variants.names) == PLACES - 2
+    assert variants.ranked[0].place.name == first.name
+    assert variants.ranked[0].gain == search.ranked[0].gain
+
+
 def test_ebic_counts_the_models_with_as_many_columns() -> None:
     selection = Selection(0.5, {}, {}, 2.0, {1: 8, 2: 40})
     assert selection.ebic_gain(30.0, 1) == pytest.approx(30 - 2 * math.log(8))
@@ -104,12 +113,12 @@ def test_ebic_counts_the_models_with_as_many_columns() -> None:
 
 @pytest.fixture(scope="module")
 def described() -> RobotLaws:
-    from tests.calibration.toy_tables import install_toy
-
     effects = {"law_Mz_wh_speed1000_length-1000_tails0": 5.0}
     with pytest.MonkeyPatch.context() as patch:
         install_toy(patch)
-        return find_robot_laws(make_table(replace(TRUTH, effects=effects), seed=4, title=""), START, progress=False)
+        return find_robot_laws(
+            make_table(replace(TRUTH, effects=effects), seed=4, title=""), START, progress=False
+        )
 
 
 def laws_of(described: RobotLaws) -> Laws:
@@ -153,3 +162,20 @@ def test_the_report_shows_in_how_many_tables_a_place_is_first(described: RobotLa
     assert laws.selection is not None
     law = laws.fitted[0]
     assert f"{100 * laws.selection.first[law.place.name]:.0f} %" in _row(law, laws)
+
+
+def test_simultaneous_intervals_contain_those_of_the_place(described: RobotLaws) -> None:
+    laws, record = laws_of(described), described.to_dict()
+    assert laws.selection is not None
+    best = laws.kept[0]
+    numbers = next(one for one in record["laws"] if one["place"] == best.place.name)
+    for name in ("size", "speed", "length", "tails"):
+        (low, high), (lower, higher) = numbers[name]["interval"], numbers[name]["simultaneous_interval"]
+        assert lower < low < high < higher
+    at = best.fit.names.index("law_speed")
+    deviation = math.sqrt(best.fit.covariance[at, at] / best.fit.inflation)
+    assert numbers["speed"]["simultaneous_interval"][1] == pytest.approx(
+        best.fit.parameters["law_speed"] + laws.selection.widest * deviation
+    )
+    low, high = numbers["speed"]["simultaneous_interval"]
+    assert f"ω {low:.2f} to {high:.2f}" in _simultaneous(laws)
