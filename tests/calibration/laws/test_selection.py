@@ -16,6 +16,7 @@ from calibration.laws.places import places
 from calibration.laws.search import Search
 from calibration.laws.selection import Selection, examine_selection
 from calibration.report.law_card import _row, _simultaneous
+from calibration.report.quantities import plain
 from calibration.report.robot_laws import RobotLaws, find_robot_laws
 from calibration.swimmer.synthetic_table import make_table
 from sim.arrays import Floats
@@ -178,4 +179,4 @@ def test_simultaneous_intervals_contain_those_of_the_place(described: RobotLaws)
         best.fit.parameters["law_speed"] + laws.selection.widest * deviation
     )
     low, high = numbers["speed"]["simultaneous_interval"]
-    assert f"ω {low:.2f} to {high:.2f}" in _simultaneous(laws)
+    assert f"ω {plain(low, 2)} to {plain(high, 2)}" in _simultaneous(laws)
