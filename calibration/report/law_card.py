@@ -41,8 +41,8 @@ def add_laws(page: Page, result: Verdict) -> None:
     page.text(laws.sentence, tone="good" if laws.complete else "bad")
     page.text(
         "A law is a place where a term acts, times a power law in the motor speed ω, the tail length l and the "
-        "number of tails N. It describes the runs; it is no claim about the cause. Intervals are of 95 %, at "
-        "this place. The p-value of the search counts the choice among the places; so does the share of "
+        "number of tails N. It describes the runs; it is no claim about the cause. Intervals are of 95 %, "
+        "at this place. The p-value of the search counts the choice among the places; so does the share of "
         f"bootstrap tables in which a place ranks first.{_simultaneous(laws)}"
     )
     if laws.kept:
