@@ -124,7 +124,7 @@ class Laws:
     ranked: tuple[Ranked, ...]  # every place, the best first
     fitted: tuple[Law, ...]  # those that were fitted, the largest gain first
     selection: Selection | None = None  # what the choice among the places costs; None: nothing was searched
-    level: float = LEVEL  # α of the residual that a law leaves, as for an effect: half of it decides
+    level: float = LEVEL  # α of the search, and of the residual that a law leaves; of this, half of it decides
 
     @property
     def kept(self) -> tuple[Law, ...]:
@@ -135,10 +135,10 @@ class Laws:
     @property
     def complete(self) -> bool:
         """Whether the best law leaves no more than noise, and tables without a law hardly ever gain as much."""
-        return bool(self.kept) and self.kept[0].p_value >= self.level / 2 and self._significant
+        return bool(self.kept) and self.kept[0].p_value >= self.level / 2 and self.significant
 
     @property
-    def _significant(self) -> bool:
+    def significant(self) -> bool:
         """Whether the p-value of the search is below the level."""
         return self.selection is not None and self.selection.p_value < self.level
 
@@ -153,7 +153,7 @@ class Laws:
         if not self.kept:
             return "No law of the places that were searched describes the residual."
         best = self.kept[0]
-        if not self._significant:
+        if not self.significant:
             return (
                 "No law is claimed: noise alone can gain as much in a search over all places "
                 f"({self._search}). The nearest is {best.words}."
@@ -223,10 +223,8 @@ class Laws:
         """Compute the 95 % interval of a number of a law that covers those of all places at once."""
         assert self.selection is not None
         place, value = law.fit.names.index(name), law.fit.parameters[name]
-        deviation = math.sqrt(
-            law.fit.covariance[place, place] / law.fit.inflation
-        )  # K contains that S is estimated
-        half = max(self.selection.widest * deviation, law.fit.half_width(place))
+        variance = law.fit.covariance[place, place] / law.fit.inflation  # K contains that S is estimated
+        half = max(self.selection.widest * math.sqrt(variance), law.fit.half_width(place))
         return value - half, value + half
 
     def _law_record(self, law: Law) -> dict[str, Any]:

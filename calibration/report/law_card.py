@@ -86,7 +86,8 @@ def _simultaneous(laws: Laws) -> str:
 
 
 def _row(law: Law, laws: Laws) -> tuple[str, ...]:
-    kept = "describes the runs" if law.p_value >= laws.level / 2 else "leaves more than noise"
+    described = "describes the runs" if laws.significant else "noise alone can gain as much"
+    kept = described if law.p_value >= laws.level / 2 else "leaves more than noise"
     return (
         law.place.words,
         *(_exponent(law, name) for name in EXPONENTS),

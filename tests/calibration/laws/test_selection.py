@@ -156,6 +156,8 @@ def test_a_law_is_claimed_only_if_noise_hardly_ever_gains_as_much(described: Rob
     assert "No law is claimed: noise alone can gain as much" in other.sentence
     assert f"The nearest is {laws.kept[0].words}." in other.sentence
     assert other.rivals == ()
+    assert _row(laws.kept[0], other)[-1] == "noise alone can gain as much"
+    assert _row(laws.kept[0], laws)[-1] == "describes the runs"
 
 
 def test_the_report_shows_in_how_many_tables_a_place_is_first(described: RobotLaws) -> None:
