@@ -131,8 +131,8 @@ class LinearModels:
                 weights[which, column] = minimum.value(step[place_of_weight].swapaxes(0, 1))
                 variance = minimum.value(inverse[place_of_weight, place_of_weight].swapaxes(0, 1))
                 errors[which, column] = np.sqrt(np.maximum(variance, 0.0))
-        gain, weights, errors, share = (np.moveaxis(each, -1, 0) for each in (gain, weights, errors, share))
-        return LinearFits(gain, weights, errors, share, self._share(base))
+        weights, errors = np.moveaxis(weights, -1, 0), np.moveaxis(errors, -1, 0)
+        return LinearFits(gain.T, weights, errors, share.T, self._share(base))
 
     def _share(self, minimum: _Minimum) -> Floats:
         """Compute ρ at minima."""
