@@ -31,7 +31,8 @@ from benchmarks.calibration.planted import ROBOT
 from benchmarks.markdown import heading, row
 from benchmarks.proportions import per_cent
 from benchmarks.records import Records
-from calibration.laws.law_fits import Law, Laws
+from calibration.laws.law import Law
+from calibration.laws.law_fits import Laws
 from calibration.report.robot_laws import find_robot_laws
 from calibration.swimmer.synthetic_table import make_table
 from sim.io.errors import InputError

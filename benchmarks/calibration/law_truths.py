@@ -7,7 +7,7 @@ deviations. Truths are drawn from the places of the search (`calibration.laws.pl
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -104,8 +104,8 @@ def head_places() -> list[Place]:
     return at_disc
 
 
-def hidden_law(setting: Setting, seed: int, *, nothing: bool) -> HiddenLaw:
-    """Draw place, exponents, lever and sign of a law; one seed after the other has the scores of SCORES in turn.
+def hidden_law(setting: Setting, seed: int, *, nothing: bool, scores: Sequence[float] = SCORES) -> HiddenLaw:
+    """Draw place, exponents, lever and sign of a law; one seed after the other has each of the scores in turn.
 
     One place in two is one at the disc, odd ones included; the others are side forces elsewhere and laws of the
     tails.
@@ -116,7 +116,7 @@ def hidden_law(setting: Setting, seed: int, *, nothing: bool) -> HiddenLaw:
     drawn = [place for place, of_head in zip(places(), kinds, strict=True) if of_head == at_disc]
     place = drawn[rng.integers(len(drawn))]
     powers = Powers(*rng.uniform(-_STEEP, _STEEP, 3))
-    score = SCORES[seed % 3] * rng.choice([-1, 1])
+    score = scores[seed % len(scores)] * rng.choice([-1, 1])
     lever = round(float(rng.uniform(*_LEVERS[place.lever_unit])), 3) if place.lever_unit else 0.0
     if nothing:
         return HiddenLaw(place, powers, lever, 0.0, {})

@@ -21,7 +21,7 @@ import numpy as np
 from calibration.laws.curves import Curve, error_bars, factors
 from calibration.laws.group_factors import along_load, grouped
 from calibration.laws.inputs import EXPONENTS, logarithms
-from calibration.laws.law_fits import Law
+from calibration.laws.law import Law
 from calibration.laws.readings import INPUTS
 from calibration.statistics.statistical_model import inverse_root
 from sim.arrays import Flags, Floats

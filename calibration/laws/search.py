@@ -1,14 +1,10 @@
 """Which places are worth a fit: every place and every set of inputs, ranked by BIC in the linear model.
 
 With the columns d of a place at the fit without laws, the law is the span of d (if it is a term) and of d x_i for
-the chosen inputs i, at most three, with exponents within their bounds. A side force elsewhere than at the disc is
-ranked with a few levers, each of which has columns of its own; its lever counts as one parameter more. The law is
-fitted together with the coefficients and the nuisance parameters by generalised least squares, and each such model
-has its own scatter of the sessions:
-
-    BIC = rᵀ Σ⁻¹ r + ln |Σ|/|S ⊗ I| + q ln(n k),   q columns, n runs of k outputs.
-
-All products of columns are made once, so that a model costs the inverse of a small matrix.
+the chosen inputs i, at most three. A side force elsewhere than at the disc is ranked with a few levers, each of
+which has columns of its own; its lever counts as one parameter more. The law is fitted together with the
+coefficients and the nuisance parameters by generalised least squares (`calibration.laws.linear_models`). A place
+is ranked by its best model whose exponents are within their bounds.
 
 Source: Schwarz (1978).
 """
@@ -16,7 +12,6 @@ Source: Schwarz (1978).
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,15 +19,15 @@ import numpy as np
 
 from calibration.laws.inputs import EXPONENTS, logarithms, noted_values, parameter_of
 from calibration.laws.law_model import LEVER, lever_arms
+from calibration.laws.linear_models import LinearFits, LinearModels
 from calibration.laws.places import Place
 from calibration.statistics.fit import Fit
-from calibration.statistics.statistical_model import Sums, inverse_root, least_squares, sums, with_prior
+from calibration.statistics.statistical_model import changes, precisions
 from calibration.swimmer.swimmer import SwimmerModel
-from sim.arrays import Flags, Floats
+from sim.arrays import Flags, Floats, Integers
 from sim.effects import catalogue, effect_named
 from sim.model.power_law import STEEPEST
 
-_PASSES = 3  # iterations for the scatter of the sessions
 _POWERS_AT_START = 2.0  # largest exponent with which a fit starts
 _MOST_INPUTS = 3  # of one law
 
@@ -58,6 +53,11 @@ class Ranked:
         return tuple(name.removeprefix("law_") for name in self.exponents if name not in EXPONENTS)
 
     @property
+    def columns(self) -> int:
+        """Number of its columns."""
+        return len(self.chosen) + self.place.is_term
+
+    @property
     def start(self) -> dict[str, float]:
         """Exponents and lever with which a fit starts."""
         limited = {
@@ -65,44 +65,89 @@ class Ranked:
         }
         return {**dict.fromkeys(EXPONENTS, 0.0), **limited, LEVER: self.lever}
 
+    @property
+    def is_bounded(self) -> bool:
+        """Whether the exponents are within their bounds."""
+        return all(abs(value) <= STEEPEST for value in self.exponents.values())
 
-def rank(
-    model: SwimmerModel, base: Fit, used: Flags, candidates: Sequence[Place], *, title: str = ""
-) -> list[Ranked]:
-    """Rank places by the gain in BIC of their best linear model, the best first.
+
+@dataclass(frozen=True)
+class Search:
+    """All linear models of all places, fitted to the residual of a fit without laws."""
+
+    places: tuple[Place, ...]  # those with one name are variants of a place, of which the best counts
+    levers: tuple[float, ...]  # of each
+    models: LinearModels
+    exponents: tuple[str, ...]  # of a place's columns, after that of the term itself
+    residual: Floats  # (n, k) of the fitted runs from the parameters as given
+    fits: LinearFits  # of this residual
+
+    @property
+    def ranked(self) -> list[Ranked]:
+        """The best model of every place, the largest gain first."""
+        best: dict[str, Ranked] = {}
+        for model in np.argsort(-self.fits.gain[0], kind="stable"):
+            ranked = self._ranked(int(model))
+            if ranked.is_bounded:
+                best.setdefault(ranked.place.name, ranked)
+        return list(best.values())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the places."""
+        return tuple(dict.fromkeys(place.name for place in self.places))
+
+    def best(self, gain: Floats) -> Integers:
+        """Find the best model of every name, by the gains (B, M) of all models; (B, names)."""
+        of_model = np.array([self.places[number].name for number, _ in self.models.models])
+        members = [np.flatnonzero(of_model == name) for name in self.names]
+        return np.stack([which[gain[:, which].argmax(1)] for which in members], 1)
+
+    def _ranked(self, model: int) -> Ranked:
+        number, chosen = self.models.models[model]
+        weights = self.fits.weights[0, model]
+        place = self.places[number]
+        size = float(weights[0]) if place.is_term else 0.0
+        scale = (size or 1.0) if place.is_term else 1.0
+        exponents = {self.exponents[j - 1]: float(weights[j]) / scale for j in chosen if j}
+        return Ranked(place, float(self.fits.gain[0, model]), size, exponents, self.levers[number])
+
+
+def search(model: SwimmerModel, base: Fit, used: Flags, candidates: Sequence[Place], *, title: str = "") -> Search:
+    """Fit every linear model of places to the residual of a fit.
 
     Args:
         base: the fit without laws.
         used: (n,) runs to which it was fitted.
         title: of the progress bar for the derivatives; empty for none.
     """
-    directions, levers = _directions(model, base, candidates, title)  # (n, k, variants)
+    directions, variants = _directions(model, base, candidates, title)  # (n, k, variants)
     noted = model.runs.noted_names
-    names = (*EXPONENTS, *map(parameter_of, noted))
     inputs_of_runs = np.concatenate([logarithms(model.runs), noted_values(model.runs, noted)], 1)
     x = np.column_stack([np.ones(len(model.runs)), inputs_of_runs - inputs_of_runs.mean(0)])
-    varied = [0, *(i for i in range(1, x.shape[1]) if np.ptp(x[used, i]) > 0)]
-    by_variant = directions[..., None] * x[:, None, None, varied]  # (n, k, variants, columns)
-    columns = by_variant.reshape(*directions.shape[:2], -1)
-    products = _products(model, base, used, columns)
-    fitted = len(base.names)
-    values = int(used.sum()) * directions.shape[1]
-    without = _deviance(products, [*range(fitted)])[0]
-    best: dict[str, Ranked] = {}
-    for number, (place, lever) in enumerate(levers):
-        first = fitted + number * len(varied)
-        for inputs in _subsets(range(1, len(varied)), at_least=0 if place.is_term else 1):
-            places = [*([0] if place.is_term else []), *inputs]
-            deviance, step = _deviance(products, [*range(fitted), *(first + j for j in places)])
-            gain = without - deviance - (len(places) + bool(place.lever_unit)) * math.log(values)
-            if place.name in best and gain <= best[place.name].gain:
-                continue
-            weights = dict(zip(places, step[fitted:].tolist(), strict=True))
-            by_name = {names[varied[j] - 1]: weights[j] for j in inputs}
-            law = _ranked(place, gain, weights.get(0, 0.0), by_name, lever)
-            if all(abs(exponent) <= STEEPEST for exponent in law.exponents.values()):
-                best[place.name] = law
-    return sorted(best.values(), key=lambda ranked: -ranked.gain)
+    varied = (0, *(i for i in range(1, x.shape[1]) if np.ptp(x[used, i]) > 0))
+    names = (*EXPONENTS, *map(parameter_of, noted))
+    columns = directions[..., None] * x[:, None, None, varied]  # (n, k, variants, columns)
+    kinds = [
+        (number, (*([0] if place.is_term else []), *inputs))
+        for number, (place, _) in enumerate(variants)
+        for inputs in _subsets(range(1, len(varied)), at_least=0 if place.is_term else 1)
+    ]
+    with_lever = [int(bool(variants[number][0].lever_unit)) for number, _ in kinds]
+    data, absorbed = model.runs, base.jacobian[used]
+    models = LinearModels(
+        absorbed,
+        precisions(base.fitted),
+        columns[used],
+        kinds,
+        data.session[used],
+        data.condition[used],
+        with_lever,
+    )
+    residual = (data.y - base.prediction)[used] + absorbed @ changes(base.fitted, base.parameters)
+    places, levers = zip(*variants, strict=True)
+    exponents = tuple(names[i - 1] for i in varied[1:])
+    return Search(places, levers, models, exponents, residual, models.fit(residual[None]))
 
 
 def _directions(
@@ -139,36 +184,6 @@ def _by_cost(names: Sequence[str]) -> list[tuple[str, ...]]:
         key = (any(e.symmetry == "odd" for e in known), any(e.reach == "nonlocal" for e in known))
         groups.setdefault(key, []).append(name)
     return [tuple(group) for group in groups.values()]
-
-
-def _products(model: SwimmerModel, base: Fit, used: Flags, columns: Floats) -> Sums:
-    """Multiply the columns of the fit, those of the places, and the residual with each other."""
-    data = model.runs
-    residual = (data.y - base.prediction)[..., None]
-    table = np.concatenate([base.jacobian, columns, residual], -1)[used]
-    products = sums(inverse_root(base.noise.run) @ table, data.session[used], len(base.noise.run))
-    p, m = len(base.names), table.shape[-1]
-    ends = np.r_[np.arange(p), m - 1]
-    empty = Sums(np.zeros((p + 1, p + 1)), products.between[:, :1, :1], products.sizes, products.outputs)
-    products.within[np.ix_(ends, ends)] += with_prior(empty, base.fitted, base.parameters).within
-    return products
-
-
-def _deviance(products: Sums, columns: Sequence[int]) -> tuple[float, Floats]:
-    """Compute the least deviance with these columns, and their coefficients."""
-    last = products.within.shape[-1] - 1
-    part = products.take(np.array([[*columns, last]]))
-    linear = least_squares(part, passes=_PASSES)
-    normal, step = part.at(linear.share)[0], linear.step[0]
-    left = normal[-1, -1] - step @ normal[:-1, -1]
-    scatter = products.outputs * np.log1p(float(linear.share[0]) * products.sizes).sum()
-    return float(left + scatter), step
-
-
-def _ranked(place: Place, gain: float, size: float, weights: dict[str, float], lever: float) -> Ranked:
-    """Read exponents from the weights of the columns d x_i; `size` is that of the column d."""
-    scale = (size or 1.0) if place.is_term else 1.0
-    return Ranked(place, gain, size, {name: weight / scale for name, weight in weights.items()}, lever)
 
 
 def _subsets(items: Sequence[int] | range, *, at_least: int) -> list[tuple[int, ...]]:

@@ -11,7 +11,8 @@ from matplotlib.ticker import MaxNLocator
 
 from calibration.laws.curves import Curve
 from calibration.laws.inputs import EXPONENTS
-from calibration.laws.law_fits import Law, Laws
+from calibration.laws.law import Law
+from calibration.laws.law_fits import Laws
 from calibration.laws.law_model import LEVER
 from calibration.laws.partial_residuals import Dependence, dependences
 from calibration.laws.places import Place
@@ -43,8 +44,9 @@ def add_laws(page: Page, result: Verdict) -> None:
     page.text(laws.sentence, tone="good" if laws.complete else "bad")
     page.text(
         "A law is a place where a term acts, times a power law in the motor speed ω, the tail length l and the "
-        "number of tails N. It describes the runs; it is no claim about the cause. Intervals are of 95 %; they do "
-        "not count the choice among the places."
+        "number of tails N. It describes the runs; it is no claim about the cause. Intervals are of 95 %, "
+        "at this place. The p-value of the search counts the choice among the places; so does the share of "
+        f"bootstrap tables in which a place ranks first.{_simultaneous(laws)}"
     )
     if laws.kept:
         best = laws.kept[0]
@@ -66,10 +68,11 @@ def add_laws(page: Page, result: Verdict) -> None:
                 "place",
                 *(f"exponent of {symbol}" for symbol in INPUTS),
                 "gain in BIC",
+                "first in … of bootstrap tables",
                 "held-out error",
                 "judgement",
             ),
-            [_row(law, laws.level) for law in laws.fitted],
+            [_row(law, laws) for law in laws.fitted],
         )
 
 
@@ -89,12 +92,28 @@ def _add_curved(page: Page, laws: Laws, used: Flags) -> None:
     )
 
 
-def _row(law: Law, level: float) -> tuple[str, ...]:
-    kept = "describes the runs" if law.p_value >= level / 2 else "leaves more than noise"
+def _simultaneous(laws: Laws) -> str:
+    """Say the intervals of the best law that count the choice among the places; empty if it has no exponents."""
+    if not laws.kept or laws.selection is None:
+        return ""
+    best = laws.kept[0]
+    intervals = {
+        symbol: laws.simultaneous_interval(best, name)
+        for name, symbol in zip(EXPONENTS, INPUTS, strict=True)
+        if name in best.fit.names
+    }
+    said = ", ".join(f"{symbol} {plain(low, 2)} to {plain(high, 2)}" for symbol, (low, high) in intervals.items())
+    return f" Intervals of the best law that cover the exponents of all places at once: {said}." if said else ""
+
+
+def _row(law: Law, laws: Laws) -> tuple[str, ...]:
+    described = "describes the runs" if laws.significant else "noise alone can gain as much"
+    kept = described if law.p_value >= laws.level / 2 else "leaves more than noise"
     return (
         ", ".join(filter(None, (law.place.words, law.where))),
         *(_exponent(law, name) for name in EXPONENTS),
         f"{law.gain:.0f}",
+        f"{100 * laws.selection.first[law.place.name]:.0f} %" if laws.selection else "–",
         f"{100 * law.error:.2f} %",
         law.reason or kept,
     )

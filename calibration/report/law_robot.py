@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.laws.inputs import EXPONENTS
-from calibration.laws.law_fits import Law
+from calibration.laws.law import Law
 from calibration.laws.law_model import LEVER, SIZE
 from calibration.report.corrected_robot import calibration_knowledge, corrected_robot
 from calibration.statistics.held_out import FinalRefit, refit_to_all

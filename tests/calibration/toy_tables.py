@@ -41,8 +41,8 @@ def shares_verdicts(test: Test) -> Test:
 
 def install_toy(patch: pytest.MonkeyPatch) -> None:
     """The toy in place of the simulator: for tables, and for every SwimmerModel that is not told otherwise."""
-    defaults = SwimmerModel.__init__.__defaults__
-    patch.setattr(SwimmerModel.__init__, "__defaults__", tuple(toy.SOLVER if d is DIRECT else d for d in defaults or ()))
+    defaults = SwimmerModel.__init__.__defaults__ or ()
+    patch.setattr(SwimmerModel.__init__, "__defaults__", tuple(toy.SOLVER if d is DIRECT else d for d in defaults))
     patch.setattr(calibration.swimmer.synthetic_table, "stepped_columns", toy.steady_columns)
     patch.setattr(SwimmerModel, "guess", lambda model, start, used: start)
     for name in ("steady", "sensitivities", "settle"):  # what all of the simulator's batches call

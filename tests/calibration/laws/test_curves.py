@@ -145,7 +145,7 @@ def test_a_resonance_has_its_extreme_where_it_is() -> None:
 def test_a_law_with_a_curve_stands_in_the_sentence_the_record_and_the_picture(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(law_fits, "places", lambda: tuple(map(place_named, (PLACE, "Fz_vz"))))
+    monkeypatch.setattr(law_fits, "places", lambda **_: tuple(map(place_named, (PLACE, "Fz_vz"))))
     described = find_robot_laws(table_of("threshold"), START, progress=False)
     assert described.laws is not None
     law = described.laws.curved
