@@ -99,7 +99,8 @@ def _products(model: SwimmerModel, base: Fit, used: Flags, columns: Floats) -> S
     data = model.runs
     residual = (data.y - base.prediction)[..., None]
     table = np.concatenate([base.jacobian, columns, residual], -1)[used]
-    products = sums(inverse_root(base.noise.run) @ table, data.session[used], len(base.noise.run))
+    root = inverse_root(base.noise.run)
+    products = sums(root @ table, data.session[used], len(root), data.scale[used])
     p, m = len(base.names), table.shape[-1]
     ends = np.r_[np.arange(p), m - 1]
     empty = Sums(np.zeros((p + 1, p + 1)), products.between[:, :1, :1], products.sizes, products.outputs)
