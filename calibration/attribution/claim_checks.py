@@ -60,7 +60,7 @@ def with_checks(study: Study, claims: Sequence[Candidate], base: Fit) -> list[Ca
 def absorbable_shares(study: Study, fitted: Fit, names: Sequence[str]) -> Floats:
     """Draw signals from outside, made from each of the effects `names` of a fit in turn, and return their a."""
     runs, used = study.model.runs, study.split.fitted
-    white = fitted.noise.whitener(runs.session[used])
+    white = fitted.noise.whitener(runs.session[used], runs.scale[used])
     rows = prior_rows(fitted.fitted, fitted.parameters)[0]
     J = np.concatenate([white(fitted.jacobian[used]), rows])
     claimed = [fitted.names.index(name) for name in names]

@@ -282,10 +282,10 @@ def session_gain(study: Study, base: Fit, refit: Fit) -> tuple[float, float]:
 def _left_out_residual(study: Study, fitted: Fit, refit: Fit, learn: Flags, out: Flags) -> Floats:
     """Whiten the residuals of a left-out session, for a model fitted to the others, in the noise of `refit`."""
     data = study.model.runs
-    white = refit.noise.whitener(data.session[learn])
+    white = refit.noise.whitener(data.session[learn], data.scale[learn])
     residual = data.y - fitted.prediction
     rows, prior = prior_rows(fitted.fitted, fitted.parameters)
     derivative = np.concatenate([white(fitted.jacobian[learn]), rows])
     step = np.linalg.lstsq(derivative, np.concatenate([white(residual[learn]), prior]), rcond=None)[0]
     predicted = residual[out] - fitted.jacobian[out] @ step
-    return np.asarray(refit.noise.whitener(data.session[out])(predicted))
+    return np.asarray(refit.noise.whitener(data.session[out], data.scale[out])(predicted))

@@ -152,11 +152,13 @@ def with_shifts(model: LawModel, fitted: Fit, used: Flags, symbol: str) -> Fit:
     columns[used] = linear.load[..., None] * (linear.members @ linear.contrasts)[:, None]
     jacobian = np.concatenate([fitted.jacobian, columns], -1)
     shifts = tuple(Parameter(f"shift_{i}", "a shift", 0.0, (-np.inf, np.inf), 1.0) for i in range(count))
-    design = FixedColumns(jacobian[used], linear.session)
+    design = linear.design(jacobian[used])
     shift = changes(fitted.fitted, fitted.parameters)
     as_given = (model.runs.y - fitted.prediction)[used] + fitted.jacobian[used] @ shift
     root = inverse_root(fitted.noise.run)[None]
-    products = _products(design, as_given[None], root, precisions((*fitted.fitted, *shifts)))
+    products = _products(
+        design, as_given[None] * linear.scale[:, None], root, precisions((*fitted.fitted, *shifts))
+    )
     share = session_share(products, passes=_PASSES)
     step, covariance = (part[0] for part in solved(products.at(share)))
     step[: len(shift)] -= shift
@@ -190,6 +192,7 @@ class _LinearModel:
     as_given: Floats  # (n, k) residual with the nuisance parameters as given
     session: Integers  # (n,)
     condition: Integers  # (n,)
+    scale: Floats  # (n,) roots of the weights of the runs
 
     @cached_property
     def precision(self) -> Floats:
@@ -206,12 +209,16 @@ class _LinearModel:
         """The other parameters, the power law, and the contrasts."""
         power = self.load[..., None] * np.stack([np.ones_like(self.x), self.x], 1)[:, None]
         free = self.load[..., None] * (self.members @ self.contrasts)[:, None]
-        return FixedColumns(np.concatenate([self.J, power, free], -1), self.session)
+        return self.design(np.concatenate([self.J, power, free], -1))
+
+    def design(self, columns: Floats) -> FixedColumns:
+        """Multiply columns (n, k, m) with each other, by the weights of their runs."""
+        return FixedColumns(columns * self.scale[:, None, None], self.session, self.scale)
 
     def gain(self, residual: Floats) -> Floats:
         """Compute T (B,) of residuals (B, n, k), each in its own S and ρ."""
-        root = inverse_root(repeat_covariance(residual, self.condition))
-        products = _products(self.tested, residual, root, self.precision)
+        root = inverse_root(repeat_covariance(residual, self.condition, self.scale))
+        products = _products(self.tested, residual * self.scale[:, None], root, self.precision)
         normal = products.at(session_share(products, passes=_PASSES))
         information, score = _eliminated(normal, normal.shape[-1] - 1 - self.contrasts.shape[1])
         return (score * np.linalg.solve(information, score[..., None])[..., 0]).sum(-1)
@@ -220,7 +227,7 @@ class _LinearModel:
         """Draw residuals (B, n, k) for which the law is right."""
         n, k = self.as_given.shape
         kinds, of_run = np.unique(self.session, return_inverse=True)
-        noise = rng.normal(size=(count, n, k))
+        noise = rng.normal(size=(count, n, k)) / self.scale[:, None]
         noise += math.sqrt(self.fitted.noise.share) * rng.normal(size=(count, len(kinds), k))[:, of_run]
         sigma = np.where(self.precision > 0, np.maximum(self.precision, 1e-300) ** -0.5, 0.0)
         nuisances = rng.normal(size=(count, len(sigma))) * sigma
@@ -259,6 +266,7 @@ def _linear_model(model: LawModel, fitted: Fit, used: Flags, place: int, x: Floa
         as_given=(data.y - fitted.prediction)[used] + J @ shift,
         session=data.session[used],
         condition=data.condition[used],
+        scale=data.scale[used],
     )
 
 
@@ -285,9 +293,10 @@ def _estimated(linear: _LinearModel, rng: np.random.Generator, draws: int) -> Gr
 def _shifts(linear: _LinearModel) -> tuple[Floats, Floats]:
     """Estimate the shifts (G,), with their information W (G, G)."""
     free = linear.load[..., None] * linear.members[:, None]
-    design = FixedColumns(np.concatenate([linear.J, free], -1), linear.session)
+    design = linear.design(np.concatenate([linear.J, free], -1))
     root = inverse_root(linear.fitted.noise.run)[None]
-    products = _products(design, linear.as_given[None], root, linear.precision)
+    as_given = linear.as_given[None] * linear.scale[:, None]
+    products = _products(design, as_given, root, linear.precision)
     normal = products.at(session_share(products, passes=_PASSES))[0]
     information, score = _eliminated(normal, len(linear.precision))
     if not linear.model.place.is_term:  # a factor that all groups have in common is free

@@ -61,6 +61,8 @@ class LinearModels:
         models: Sequence[tuple[int, tuple[int, ...]]],
         session: Integers,
         condition: Integers,
+        *,
+        scale: Floats | None = None,
         further: Sequence[int] = (),
     ):
         """Multiply the columns with each other.
@@ -72,6 +74,7 @@ class LinearModels:
             models: place and columns of each.
             session: (n,) numbers of the runs' sessions.
             condition: (n,) repeats share a number.
+            scale: (n,) roots of the weights of the runs; default 1.
             further: parameters that a model has beside its columns; default none.
         """
         n, k, self.p = absorbed.shape
@@ -79,11 +82,12 @@ class LinearModels:
         self.models, self.session, self.condition = tuple(models), session, condition
         self._further = np.array(further if len(further) else [0] * len(self.models))
         self._places, self._count = columns.shape[2:]
-        self._picks, self._sizes = averaging_rows(session)
+        self.scale = np.ones(n) if scale is None else scale
+        self._picks, self._sizes = averaging_rows(session, self.scale)
         whole = math.log1p(SESSION_SHARE * self._sizes.mean())
         self._levels = np.linspace(0.0, whole, _SHARES) if len(self._sizes) > 1 else np.array([whole])
         shares = np.expm1(self._levels) / self._sizes.mean()
-        table = np.concatenate([absorbed, columns.reshape(n, k, -1)], -1)
+        table = np.concatenate([absorbed, columns.reshape(n, k, -1)], -1) * self.scale[:, None, None]
         less = 1 / (1 + shares[:, None] * self._sizes) - 1  # (g, s)
         self._less = less
         means = np.tensordot(self._picks, table, 1)
@@ -151,7 +155,8 @@ class LinearModels:
         """
         count, _, k = residual.shape
         p, places, columns = self.p, self._places, self._count
-        root = inverse_root(repeat_covariance(residual, self.condition))
+        root = inverse_root(repeat_covariance(residual, self.condition, self.scale))
+        residual = residual * self.scale[:, None]
         inverse = np.swapaxes(root, -1, -2) @ root
         flat = inverse.reshape(count, k * k)
         of_absorbed, across, own = (flat @ part for part in self._products)  # (g, b, ...)

@@ -50,8 +50,9 @@ def dependences(law: Law, used: Flags) -> list[Dependence]:
     x = logarithms(model.runs) - np.array(model.centre[: len(EXPONENTS)])
     along = along_load(model, fitted)
     white = inverse_root(fitted.noise.run)
-    columns = (along @ white.T)[used]
-    residual = ((model.runs.y - fitted.prediction) @ white.T)[used]
+    scale = model.runs.scale[used, None]
+    columns = scale * (along @ white.T)[used]
+    residual = scale * ((model.runs.y - fitted.prediction) @ white.T)[used]
     results = []
     for place, (name, symbol) in enumerate(zip(EXPONENTS, INPUTS, strict=True)):
         if name not in fitted.names:

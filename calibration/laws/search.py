@@ -142,7 +142,8 @@ def search(model: SwimmerModel, base: Fit, used: Flags, candidates: Sequence[Pla
         kinds,
         data.session[used],
         data.condition[used],
-        with_lever,
+        scale=data.scale[used],
+        further=with_lever,
     )
     residual = (data.y - base.prediction)[used] + absorbed @ changes(base.fitted, base.parameters)
     places, levers = zip(*variants, strict=True)

@@ -102,7 +102,7 @@ class _Draws:
     def __init__(self, search: Search, rng: np.random.Generator):
         self._search, self._rng = search, rng
         models = search.models
-        self._root = np.linalg.cholesky(repeat_covariance(search.residual, models.condition))
+        self._root = np.linalg.cholesky(repeat_covariance(search.residual, models.condition, models.scale))
         self._session = np.unique(models.session, return_inverse=True)[1].reshape(-1)
         known = models.precision > 0
         self._sigma = np.where(known, 1 / np.sqrt(np.where(known, models.precision, 1.0)), 0.0)
@@ -110,7 +110,7 @@ class _Draws:
     def noise(self, share: Floats) -> Floats:
         """Draw noise of runs and sessions, and nuisance parameters, (B, n, k), with ρ of each table (B,)."""
         count, shape = len(share), self._search.residual.shape
-        noise = self._rng.normal(size=(count, *shape))
+        noise = self._rng.normal(size=(count, *shape)) / self._search.models.scale[:, None]
         sessions = self._rng.normal(size=(count, self._session.max() + 1, shape[1]))[:, self._session]
         noise += np.sqrt(share)[:, None, None] * sessions
         nuisances = self._rng.normal(size=(count, len(self._sigma))) * self._sigma

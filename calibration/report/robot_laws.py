@@ -22,11 +22,12 @@ from calibration.laws.law_model import LEVER, SIZE
 from calibration.report.corrected_robot import as_toml, check_given
 from calibration.report.law_robot import law_handed_on
 from calibration.statistics.exclusions import count_of_rows, summary_of_excluded
-from calibration.statistics.fit import Fit, fit
+from calibration.statistics.fit import Fit
 from calibration.statistics.held_out import errors
 from calibration.statistics.residual_tests import Directions, examine_residual
 from calibration.statistics.statistical_model import start_values
 from calibration.statistics.study import Study, find_outliers, split_runs
+from calibration.statistics.weighted_fit import fit_weighted
 from calibration.swimmer.measured_table import Measurements, read_measurements
 from calibration.swimmer.protocols import PROTOCOLS
 from calibration.swimmer.swimmer import SwimmerModel
@@ -152,9 +153,7 @@ def find_robot_laws(
     given = model.predict([start], title="as given" if progress else "")[0]
     model.check(given)
     study = Study(model, split_runs(data, held_out, find_outliers(data, given)), seed=seed, progress=progress)
-    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
-    used = study.split.fitted
-    base = fit(model, model.guess(start, used), names, used, title="fit" if progress else "")
+    study, base = fit_weighted(study, model.guess(start, study.split.fitted))
     none = Directions.plain(np.empty((*data.y.shape, 0)))
     p_value = examine_residual(study, base, none).general_p
     laws = find_laws(study, base) if p_value < study.level else None

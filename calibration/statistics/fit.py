@@ -33,6 +33,7 @@ from calibration.statistics.statistical_model import (
     Noise,
     Parameter,
     Parameters,
+    Runs,
     Sums,
     inverse_root,
     least_squares,
@@ -111,7 +112,7 @@ def fit(
     freed = {alike[0].parameter.name for alike in wrong_numbers}
     fitted = tuple(parameter(model, name) for name in names)
     fitted = tuple(replace(p, sigma=None) if p.name in freed else p for p in fitted)
-    run = repeat_covariance(data.y[used], data.condition[used])
+    run = repeat_covariance(data.y[used], data.condition[used], data.scale[used])
     problem = _Problem(model, fitted, used, inverse_root(run), title)
     point = _descend(problem, problem.first(dict(start)), target)
     linear = least_squares(point.products, passes=_PASSES)
@@ -182,7 +183,7 @@ class _Problem:
             prediction = self.model.predict([parameters], title=title)[0]
         data = self.model.runs
         table = np.concatenate([derivative, (data.y - prediction)[..., None]], -1)[self.used]
-        products = sums(self.root @ table, data.session[self.used], len(self.root))
+        products = sums(self.root @ table, data.session[self.used], len(self.root), data.scale[self.used])
         return _Point(parameters, prediction, derivative, with_prior(products, self.fitted, parameters))
 
 
@@ -301,7 +302,6 @@ def profile_intervals(
     covariance.
     """
     data, count = model.runs, len(fitted.names)
-    root = inverse_root(fitted.noise.run)
     sets, ends = [], []
     for i, p in enumerate(fitted.fitted):
         if p.sigma is not None:
@@ -316,13 +316,11 @@ def profile_intervals(
             sets.append(stepped(fitted.fitted, fitted.parameters, step))
             ends.append((i, change))
     predictions = model.predict(sets, title=title)
-    least = _deviance(
-        fitted, fitted.parameters, root, data.y - fitted.prediction, data.session, used, list(range(count))
-    )
+    least = _deviance(fitted, fitted.parameters, data, fitted.prediction, used, list(range(count)))
     intervals: dict[str, list[float]] = {p.name: [] for p in fitted.fitted if p.sigma is None}
     for (i, change), parameters, prediction in zip(ends, sets, predictions, strict=True):
         others = [j for j in range(count) if j != i]
-        rise = _deviance(fitted, parameters, root, data.y - prediction, data.session, used, others) - least
+        rise = _deviance(fitted, parameters, data, prediction, used, others) - least
         expected = change**2 / (fitted.covariance[i, i] / fitted.inflation)
         scale = math.sqrt(expected / rise) if _FLAT * expected < rise < _STEEP * expected else 1.0
         p = fitted.fitted[i]
@@ -332,17 +330,13 @@ def profile_intervals(
 
 
 def _deviance(
-    fitted: Fit,
-    parameters: Parameters,
-    root: Floats,
-    residual: Floats,
-    session: Integers,
-    used: Flags,
-    others: list[int],
+    fitted: Fit, parameters: Parameters, data: Runs, prediction: Floats, used: Flags, others: list[int]
 ) -> float:
     """Compute rᵀ Σ⁻¹ r at `parameters` with those of `others` refitted (linearised), in the noise of the fit."""
-    table = np.concatenate([fitted.jacobian, residual[..., None]], -1)[used]
-    products = with_prior(sums(root @ table, session[used], len(root)), fitted.fitted, parameters)
+    root = inverse_root(fitted.noise.run)
+    table = np.concatenate([fitted.jacobian, (data.y - prediction)[..., None]], -1)[used]
+    products = sums(root @ table, data.session[used], len(root), data.scale[used])
+    products = with_prior(products, fitted.fitted, parameters)
     columns = [*others, len(fitted.fitted)]
     normal = products.at(np.array(fitted.noise.share))[np.ix_(columns, columns)]
     p = len(others)

@@ -26,21 +26,29 @@ _DRAWS = 2000
 
 
 def errors(data: Runs, prediction: Floats, rows: Flags) -> tuple[float, dict[str, float]]:
-    """Compute the relative rms over runs and outputs (θ in rad), and per output."""
-    square = ((data.y - prediction)[rows] ** 2).mean(0)
+    """Compute the relative rms over runs and outputs (θ in rad), and per output; each run by its weight.
+
+    The residual of a run counts as √w times itself, which noise alone makes as large as S says.
+    """
+    square = _scaled_square(data, prediction, rows).mean(0)
     each = dict(zip(data.outputs, np.sqrt(square).tolist(), strict=True))
     return float(np.sqrt(square.mean())), each
 
 
 def error_interval(data: Runs, prediction: Floats, rows: Flags, seed: int) -> tuple[float, float]:
     """Estimate the 95 % interval of the relative rms by resampling conditions."""
-    square = ((data.y - prediction)[rows] ** 2).mean(1)
+    square = _scaled_square(data, prediction, rows).mean(1)
     condition = data.condition[rows]
     kinds = np.unique(condition)
     means = np.array([square[condition == c].mean() for c in kinds])
     rng = np.random.default_rng(seed)
     drawn = np.sqrt(means[rng.integers(0, len(kinds), (_DRAWS, len(kinds)))].mean(1))
     return float(np.quantile(drawn, 0.025)), float(np.quantile(drawn, 0.975))
+
+
+def _scaled_square(data: Runs, prediction: Floats, rows: Flags) -> Floats:
+    """Compute w r² of the runs in `rows`, (n', k)."""
+    return np.asarray(((data.y - prediction) * data.scale[:, None])[rows] ** 2)
 
 
 def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> float:
@@ -50,8 +58,9 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
     noise of runs and sessions, the error of the fitted parameters, and the uncertainty of S.
     """
     root = inverse_root(fitted.noise.run)
-    residual = (data.y - fitted.prediction)[rows] @ root.T
-    J = root @ fitted.jacobian[rows]
+    scale = data.scale[rows, None]
+    residual = scale * (data.y - fitted.prediction)[rows] @ root.T
+    J = scale[..., None] * (root @ fitted.jacobian[rows])
     rng = np.random.default_rng(seed)
     sessions = np.unique(data.session[rows], return_inverse=True)[1].reshape(-1)
     n, k = residual.shape
@@ -60,7 +69,7 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
     count = 0
     for _ in range(_DRAWS):
         drawn = rng.normal(size=(n, k))
-        drawn += np.sqrt(fitted.noise.share) * rng.normal(size=(sessions.max() + 1, k))[sessions]
+        drawn += scale * np.sqrt(fitted.noise.share) * rng.normal(size=(sessions.max() + 1, k))[sessions]
         drawn += J @ (spread @ rng.normal(size=len(spread)))
         repeats = rng.normal(size=(freedom, k))
         drawn = drawn @ inverse_root(repeats.T @ repeats / freedom).T
@@ -71,7 +80,8 @@ def held_out_p_value(fitted: Fit, data: Runs, rows: Flags, *, seed: int) -> floa
 def one_step(data: Runs, fitted: Fit, rows: Flags) -> Linear:
     """Compute the linear step that fits a fitted model to other runs, those in `rows` (n,), with its priors."""
     table = np.concatenate([fitted.jacobian, (data.y - fitted.prediction)[..., None]], -1)
-    products = sums(inverse_root(fitted.noise.run) @ table[rows], data.session[rows], len(fitted.noise.run))
+    root = inverse_root(fitted.noise.run)
+    products = sums(root @ table[rows], data.session[rows], len(root), data.scale[rows])
     return least_squares(with_prior(products, fitted.fitted, fitted.parameters), passes=3)
 
 

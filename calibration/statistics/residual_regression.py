@@ -34,29 +34,31 @@ class Regression:
 def regress_residual(runs: Runs, prediction: Floats, used: Flags) -> Regression:
     """Learn the residual of `prediction` (n, k) from the runs in `used` (n,)."""
     names, table = features(runs, used)
-    scale = np.sqrt(np.diag(repeat_covariance(runs.y[used], runs.condition[used])))
-    residual = (runs.y - prediction) / scale
+    scale = np.sqrt(np.diag(repeat_covariance(runs.y[used], runs.condition[used], runs.scale[used])))
+    residual = runs.scale[:, None] * (runs.y - prediction) / scale
     group = groups(runs)[0]
     start: tuple[int, ...] = ()
+
+    def scaled(chosen: tuple[int, ...]) -> Floats:
+        """Multiply the constant and the features by the roots of the weights; no column without features."""
+        columns = np.column_stack([np.ones(len(table)), table[:, list(chosen)]]) if chosen else table[:, :0]
+        return np.asarray(runs.scale[:, None] * columns)
+
     chosen = select_forward(
         start,
         lambda chosen: [(*chosen, i) for i in range(len(names)) if i not in chosen],
-        lambda chosen: _left_out_error(table[:, list(chosen)], residual, group, used),
+        lambda chosen: _left_out_error(scaled(chosen), residual, group, used),
         most=_MOST,
         gain=_GAIN,
     )
-    columns = table[:, list(chosen)]
+    columns = scaled(chosen)
     weights = _weights(columns[used], residual[used])
-    correction = _with_constant(columns) @ weights * scale if chosen else np.zeros_like(residual)
+    correction = columns / runs.scale[:, None] @ weights * scale
     return Regression(tuple(names[i] for i in chosen), correction)
 
 
-def _with_constant(table: Floats) -> Floats:
-    return np.column_stack([np.ones(len(table)), table])
-
-
 def _weights(table: Floats, residual: Floats) -> Floats:
-    return np.asarray(np.linalg.lstsq(_with_constant(table), residual, rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(table, residual, rcond=None)[0])
 
 
 def _left_out_error(table: Floats, residual: Floats, group: Integers, used: Flags) -> float:
@@ -64,7 +66,7 @@ def _left_out_error(table: Floats, residual: Floats, group: Integers, used: Flag
     if not table.shape[1]:
         return float((residual[used] ** 2).mean())
     errors = [
-        residual[out] - _with_constant(table[out]) @ _weights(table[learn], residual[learn])
+        residual[out] - table[out] @ _weights(table[learn], residual[learn])
         for learn, out in leave_one_group_out(group, used)
     ]
     return float((np.concatenate(errors) ** 2).mean())

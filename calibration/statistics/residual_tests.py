@@ -18,9 +18,9 @@ them.
 
 Their null distribution comes from data drawn with the fitted noise (repeats and sessions) and with nuisance
 parameters drawn from their priors. Each draw goes through the same steps: S and ρ are estimated, and the
-coefficients are refitted (linearised). So the p-values take into account the fit, the estimated noise, and
-correlated candidates. Several statistics are judged together by the smallest of their p-values. Its null
-distribution comes from the same draws (Westfall and Young 1993).
+coefficients are refitted (linearised). A run of weight w keeps its weight and is drawn with S/w. So the p-values
+take into account the fit, the estimated noise, and correlated candidates. Several statistics are judged together
+by the smallest of their p-values. Its null distribution comes from the same draws (Westfall and Young 1993).
 
 An effect with a second number (a time, say) has no such number at its null: the prediction does not depend on it
 there. So it cannot be estimated without the effect, and a score must be taken at each of several values. The test
@@ -144,9 +144,9 @@ class FixedColumns:
     Products of two columns are linear in S⁻¹, so they are made once for every pair of outputs.
     """
 
-    def __init__(self, columns: Floats, session: Integers):
+    def __init__(self, columns: Floats, session: Integers, scale: Floats | None = None):
         n, k, m = columns.shape
-        self.picks, self.sizes = averaging_rows(session)
+        self.picks, self.sizes = averaging_rows(session, scale)
         self._flat = columns.reshape(n * k, m)
         self.means = self.average(columns)  # (s, k, m)
         self._whole = np.einsum("nim,njl->ijml", columns, columns, optimize=True).reshape(k * k, m * m)
@@ -181,24 +181,27 @@ class FixedColumns:
 
 
 class _Tester:
-    """The columns of the fitted runs, which stay the same, and the statistics of any residual."""
+    """The columns of the fitted runs, which stay the same, and the statistics of any residual.
+
+    Rows are multiplied by the roots of the weights of their runs.
+    """
 
     def __init__(self, data: Runs, used: Flags, J: Floats, D: Floats, precision: Floats):
         self.session, self.condition = data.session[used], data.condition[used]
-        self.J, self.D, self.precision = J, D, precision
-        self.design = FixedColumns(np.concatenate([J, D], -1), self.session)
+        self.scale = data.scale[used]
+        self.J, self.D, self.precision = J * self.scale[:, None, None], D * self.scale[:, None, None], precision
+        self.design = FixedColumns(np.concatenate([self.J, self.D], -1), self.session, self.scale)
         inputs = data.inputs[used]
         spread = inputs.std(0)
         inputs = (inputs - inputs.mean(0)) / np.where(spread > 0, spread, 1.0)
         self.places, self.K = _kernel(inputs)
+        self.places = self.places * self.scale
         self.names, self.F = features(data, used)
-        self.F = self.F[used]
-        kinds, place = np.unique(self.condition, return_inverse=True)
-        same = np.arange(len(kinds))[:, None] == place.reshape(-1)
-        self.means = same / np.sqrt(same.sum(1))[:, None]  # (c, n)
+        self.F = self.F[used] * self.scale[:, None]
+        self.means = averaging_rows(self.condition, self.scale)[0]  # (c, n)
         self.F_means = self.design.average(self.F)  # (s, f)
-        self.FJ = np.einsum("nf,nkp->fkp", self.F, J, optimize=True)
-        self.FJ_means = np.einsum("sf,skp->sfkp", self.F_means, self.design.average(J))
+        self.FJ = np.einsum("nf,nkp->fkp", self.F, self.J, optimize=True)
+        self.FJ_means = np.einsum("sf,skp->sfkp", self.F_means, self.design.average(self.J))
 
     def scores(self, residual: Floats) -> Scores:
         """Compute the statistics of residuals (B, n, k) from the parameters as given, after a linear refit.
@@ -206,7 +209,8 @@ class _Tester:
         Each residual is judged in its own noise.
         """
         p, e = self.J.shape[-1], self.D.shape[-1]
-        root = inverse_root(repeat_covariance(residual, self.condition))  # (B, k, k)
+        root = inverse_root(repeat_covariance(residual, self.condition, self.scale))  # (B, k, k)
+        residual = residual * self.scale[:, None]
         products = self.design.sums(np.swapaxes(root, -1, -2) @ root, residual)
         products.within[..., range(p), range(p)] += self.precision
         base = least_squares(products.take(np.r_[np.arange(p), p + e][None]), passes=_PASSES)
@@ -232,8 +236,8 @@ class _Tester:
             residual: (n, k), as `scores` takes it.
         """
         p, e = self.J.shape[-1], self.D.shape[-1]
-        root = inverse_root(repeat_covariance(residual, self.condition))
-        products = self.design.sums((root.T @ root)[None], residual[None])
+        root = inverse_root(repeat_covariance(residual, self.condition, self.scale))
+        products = self.design.sums((root.T @ root)[None], residual[None] * self.scale[:, None])
         products.within[..., range(p), range(p)] += self.precision
         normal = _score_equations(products, p)[0]  # (e, p + 2, p + 2)
         weights, covariance = solved(normal[:, : p + 1, : p + 1])
@@ -318,16 +322,16 @@ def examine_residual(
         decide: stop drawing as soon as it is clear whether the p-value is below this.
     """
     data, used = study.model.runs, study.split.fitted
-    precision = precisions(fitted.fitted)
-    tester = _Tester(data, used, fitted.jacobian[used], directions.table[used], precision)
+    precision, J, D = precisions(fitted.fitted), fitted.jacobian[used], directions.table[used]
+    tester = _Tester(data, used, J, D, precision)
     residual = (data.y - fitted.prediction)[used]
-    residual_as_given = residual + tester.J @ changes(fitted.fitted, fitted.parameters)
+    residual_as_given = residual + J @ changes(fitted.fitted, fitted.parameters)
     observed = tester.scores(residual_as_given[None])
     free = precision == 0
-    exact = _Tester(data, used, tester.J[..., free], tester.D, precision[free]).scores(residual[None])
+    exact = _Tester(data, used, J[..., free], D, precision[free]).scores(residual[None])
     testable = observed.survived[0] >= TESTABLE
     rng = np.random.default_rng(study.seed)
-    root = np.linalg.cholesky(repeat_covariance(residual, data.condition[used]))
+    root = np.linalg.cholesky(repeat_covariance(residual, data.condition[used], tester.scale))
     scatter = float(np.sqrt(observed.share[0]))
     session = np.unique(tester.session, return_inverse=True)[1].reshape(-1)
     sigma = np.where(precision > 0, 1 / np.sqrt(np.where(precision > 0, precision, 1.0)), 0.0)
@@ -335,10 +339,10 @@ def examine_residual(
     batches: list[Floats] = []
     while (drawn := sum(map(len, batches))) < (draws or study.draws):
         count = min(_AT_ONCE, max(1, _VALUES // residual.size), (draws or study.draws) - drawn)
-        noise = rng.normal(size=(count, *residual.shape))
+        noise = rng.normal(size=(count, *residual.shape)) / tester.scale[:, None]
         noise += scatter * rng.normal(size=(count, session.max() + 1, residual.shape[-1]))[:, session]
         nuisances = rng.normal(size=(count, len(sigma))) * sigma
-        null = tester.scores(noise @ root.T + np.einsum("nkp,bp->bnk", tester.J, nuisances))
+        null = tester.scores(noise @ root.T + np.einsum("nkp,bp->bnk", J, nuisances))
         batches.append(np.column_stack([null.general, _largest(null.z, testable)]))
         if decide is not None and _decided(np.concatenate(batches), statistics, decide):
             break

@@ -16,6 +16,12 @@ larger. Therefore it is at most `SESSION_SHARE`: sessions are assumed to scatter
 larger shift of a whole session must be explained by the model. With a single session nothing is known about ρ.
 Then ρ is that limit, and a shift that is equal in all runs has almost no weight.
 
+**Weights.** A run of weight w has the covariance S/w (`calibration.statistics.contaminated_normal`):
+
+    Σ = (W⁻¹ + ρ 1 1ᵀ) ⊗ S = W^−½ (I_n + ρ √w √wᵀ) W^−½ ⊗ S,   W = diag w.
+
+So rows are multiplied by √w, and means over a session are taken along √w. Σ w takes the place of n.
+
 **Priors.** A nuisance parameter with σ was given before the runs were made. It counts as one more measurement of
 itself: a row with derivative 1/σ and residual −x/σ, where x is its change from the value as given, on its own
 scale. With such rows in every least-squares fit, the covariance of the runs is Σ + J P Jᵀ in every test
@@ -26,7 +32,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -74,6 +80,12 @@ class Runs:
     rows: Integers  # (n,) numbers in the table, from 1
     excluded: tuple[str, ...]  # "row 7: …"
     caveats: tuple[str, ...]  # what these runs cannot show, in words
+    weight: Floats | None = field(default=None, kw_only=True)  # (n,) variance of a run is S over it; None: 1
+
+    @property
+    def scale(self) -> Floats:
+        """Root of the weights, (n,)."""
+        return np.ones(len(self.y)) if self.weight is None else np.sqrt(self.weight)
 
     def __len__(self) -> int:
         return len(self.y)
@@ -170,8 +182,9 @@ class Noise:
     run: Floats  # S: covariance (k, k) of a run
     share: float  # ρ: variance of a session over that of a run
 
-    def whitener(self, session: Integers) -> Whitener:
-        return Whitener(self, session)
+    def whitener(self, session: Integers, scale: Floats | None = None) -> Whitener:
+        """Make Σ^−½ for runs of `session` (n,) with `scale` (n,), the roots of their weights."""
+        return Whitener(self, session, np.ones(len(session)) if scale is None else scale)
 
     def covariance(self, session: Integers) -> Floats:
         """Compute Σ of the runs of `session` (n,), (n k, n k)."""
@@ -182,16 +195,18 @@ class Noise:
 class Whitener:
     """Σ^−½ for the runs of `session`; applies to residuals (n, k, ...) and flattens them."""
 
-    def __init__(self, noise: Noise, session: Integers):
+    def __init__(self, noise: Noise, session: Integers, scale: Floats):
         self._inverse = inverse_root(noise.run)
-        self._share = noise.share
+        self._share, self._scale = noise.share, scale
         self._groups = [np.flatnonzero(session == s) for s in np.unique(session)]
 
     def __call__(self, table: Floats) -> Floats:
         """Whiten (n, k, ...) to (n k, ...)."""
-        white = np.einsum("ab,nb...->na...", self._inverse, table)
+        white = np.einsum("n,ab,nb...->na...", self._scale, self._inverse, table, optimize=True)
         for rows in self._groups:
-            white[rows] += (1 / np.sqrt(1 + len(rows) * self._share) - 1) * white[rows].mean(0)
+            along, size = self._scale[rows], float((self._scale[rows] ** 2).sum())
+            mean = np.tensordot(along, white[rows], 1) / size
+            white[rows] += (1 / np.sqrt(1 + size * self._share) - 1) * np.multiply.outer(along, mean)
         return np.asarray(white.reshape(-1, *table.shape[2:]))
 
 
@@ -201,7 +216,7 @@ class Sums:
 
     within: Floats  # (..., m, m)
     between: Floats  # (..., s, m, m)
-    sizes: Floats  # (s,) runs of a session
+    sizes: Floats  # (s,) runs of a session, or their weights
     outputs: int
 
     def at(self, share: Floats) -> Floats:
@@ -233,21 +248,30 @@ def inverse_root(run: Floats) -> Floats:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(run)))
 
 
-def sums(columns: Floats, session: Integers, outputs: int) -> Sums:
-    """Multiply columns (..., n, k, m) that are white in S with each other."""
+def sums(columns: Floats, session: Integers, outputs: int, scale: Floats | None = None) -> Sums:
+    """Multiply columns (..., n, k, m) that are white in S with each other; `scale`: (n,) roots of the weights."""
     *batch, n, k, m = columns.shape
+    if scale is not None:
+        columns = columns * scale[:, None, None]
     flat = columns.reshape(*batch, n * k, m)
     total = np.swapaxes(flat, -1, -2) @ flat
-    picks, count = averaging_rows(session)
+    picks, count = averaging_rows(session, scale)
     means = np.einsum("sn,...nkm->...skm", picks, columns)
     between = np.swapaxes(means, -1, -2) @ means
     return Sums(total - between.sum(-3), between, count, outputs)
 
 
-def averaging_rows(session: Integers) -> tuple[Floats, Floats]:
-    """Make rows (s, n) that take the mean of each session times the root of its size; the sizes (s,)."""
-    kinds, place, count = np.unique(session, return_inverse=True, return_counts=True)
-    return (np.arange(len(kinds))[:, None] == place.reshape(-1)) / np.sqrt(count)[:, None], count.astype(float)
+def averaging_rows(session: Integers, scale: Floats | None = None) -> tuple[Floats, Floats]:
+    """Make rows (s, n) that take the mean of each session times the root of its size; the sizes (s,).
+
+    Args:
+        scale: (n,) roots of the weights, by which the runs were multiplied; their squares are the sizes.
+    """
+    kinds, place = np.unique(session, return_inverse=True)
+    along = np.ones(len(session)) if scale is None else scale
+    rows = (np.arange(len(kinds))[:, None] == place.reshape(-1)) * along
+    sizes = (rows**2).sum(1)
+    return rows / np.sqrt(sizes)[:, None], sizes
 
 
 def least_squares(products: Sums, *, passes: int) -> Linear:
@@ -289,12 +313,19 @@ def solved(normal: Floats) -> tuple[Floats, Floats]:
     return (covariance @ normal[..., :p, p, None])[..., 0], covariance
 
 
-def repeat_covariance(y: Floats, condition: Integers) -> Floats:
-    """Estimate S (..., k, k) from the scatter of (..., n, k) about the mean of each condition, pooled."""
+def repeat_covariance(y: Floats, condition: Integers, scale: Floats | None = None) -> Floats:
+    """Estimate S (..., k, k) from the scatter of (..., n, k) about the mean of each condition, pooled.
+
+    Args:
+        scale: (n,) roots of the weights of the runs.
+    """
     places = np.unique(condition, return_inverse=True)[1].reshape(-1)
-    count = np.bincount(places)
-    picks = (np.arange(len(count))[:, None] == places) / count[:, None]
+    weight = np.ones(len(places)) if scale is None else scale**2
+    count = np.bincount(places, weight)
+    picks = (np.arange(len(count))[:, None] == places) * (weight / count[places])
     centred = y - (picks @ y)[..., places, :]
+    if scale is not None:
+        centred = centred * scale[:, None]
     return np.asarray(np.swapaxes(centred, -1, -2) @ centred / (len(places) - len(count)))
 
 

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from calibration.statistics.contaminated_normal import ContaminatedNormal
 from calibration.statistics.statistical_model import ForwardModel, Runs
 from sim.arrays import Flags, Floats, Integers
 
@@ -51,6 +52,7 @@ class Study:
     seed: int = 0  # of the bootstrap
     draws: int = DRAWS  # of the bootstrap
     progress: bool = False  # show progress bars
+    noise: ContaminatedNormal | None = None  # that weighs the model's runs; None: no weights
 
     @property
     def values(self) -> int:

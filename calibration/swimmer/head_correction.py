@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calibration.statistics.fit import Fit
+from calibration.statistics.held_out import errors
 from calibration.statistics.residual_regression import select_forward
 from calibration.statistics.statistical_model import inverse_root
 from calibration.statistics.study import Split, groups, leave_one_group_out
@@ -83,12 +84,14 @@ class _Problem:
 
     def white(self, prediction: Floats) -> Floats:
         """Whiten the residual (n, k) of a prediction."""
-        return np.asarray((self.model.runs.y - prediction) @ self.root.T)
+        runs = self.model.runs
+        return np.asarray(runs.scale[:, None] * (runs.y - prediction) @ self.root.T)
 
     def design(self, powers: Powers) -> Floats:
         """Compute the derivatives of the whitened outputs in the weights, (n, k, q t)."""
         phi = monomials((self.inputs - self.centre) / self.scale, powers)
-        A = np.einsum("ab,nbq,nt->naqt", self.root, self.slopes, phi, optimize=True)
+        slopes = self.model.runs.scale[:, None, None] * self.slopes
+        A = np.einsum("ab,nbq,nt->naqt", self.root, slopes, phi, optimize=True)
         return np.asarray(A.reshape(*A.shape[:2], -1))
 
     def precision(self, count: int) -> Floats:
@@ -188,9 +191,7 @@ def learn_head_correction(model: SwimmerModel, base: Fit, split: Split) -> HeadC
     none = np.zeros(len(knobs) * len(powers))
     weights, prediction, _ = problem.learn(powers, none, base.prediction, used)
     last, fitted, covariance = problem.learn(powers, weights, prediction, split.kept)
-    error, without = (
-        float(np.sqrt(((model.runs.y - p)[split.test] ** 2).mean())) for p in (prediction, base.prediction)
-    )
+    error, without = (errors(model.runs, p, split.test)[0] for p in (prediction, base.prediction))
     noise = float(np.trace(base.noise.run) / len(base.noise.run))
     correction = problem.correction(powers, last, split.kept)
     return HeadCorrection(

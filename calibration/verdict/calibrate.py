@@ -2,7 +2,8 @@
 
 1. Whole sessions are held out before anything is looked at (by default the middle one).
    Outliers are excluded (`calibration.statistics.study`).
-2. The coefficients and the nuisance parameters are fitted to the other sessions, and the residual is tested.
+2. The coefficients and the nuisance parameters are fitted to the other sessions, with weights of the runs if
+   some were tracked worse than others (`calibration.statistics.weighted_fit`), and the residual is tested.
 3. What explains it is looked for (`explain`). A nuisance parameter that leaves its prior is freed, and comes ahead
    of every effect unless it would be far outside its prior (`calibration.attribution.wrong_numbers`). Single
    effects (`calibration.attribution.refits`), effects beside a wrong number, and pairs follow, each only if
@@ -23,9 +24,9 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TypeVar
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -49,13 +50,19 @@ from calibration.attribution.wrong_numbers import (
     without_wrong_priors,
 )
 from calibration.statistics.exclusions import caveat_of_excluded, count_of_rows
-from calibration.statistics.fit import Fit, fit, profile_intervals
+from calibration.statistics.fit import Fit, profile_intervals
 from calibration.statistics.held_out import error_interval, errors, held_out_p_value, refit_to_all
 from calibration.statistics.pull import Pull
 from calibration.statistics.residual_regression import regress_residual
 from calibration.statistics.residual_tests import TESTABLE, Misfit, directions, examine_residual
 from calibration.statistics.statistical_model import ForwardModel, start_values
 from calibration.statistics.study import DRAWS, LEVEL, Split, Study, find_outliers, split_runs
+from calibration.statistics.weighted_fit import (
+    caveat_of_weights,
+    fit_weighted,
+    noise_of_any_run,
+    rows_of_little_weight,
+)
 from calibration.verdict.contents import Conditions, Corrections, Evidence, Fits, HeldOutErrors, Next
 from calibration.verdict.experiment import Describe, Experiment, LearntCorrection, Rival
 from calibration.verdict.next_runs import next_runs
@@ -99,7 +106,10 @@ def calibrate(
     model.check(uncalibrated)
     split = split_runs(model.runs, held_out, find_outliers(model.runs, uncalibrated))
     study = Study(model, split, level, seed, draws, progress)
-    explained = explain(study, model.guess(start, split.fitted))
+    guess, began = model.guess(start, split.fitted), time.monotonic()
+    study, base = fit_weighted(study, guess)
+    model = cast(Subject, study.model)
+    explained = explain(study, base, time.monotonic() - began)
     evidence = Evidence(
         misfit=explained.misfit,
         draws=draws,
@@ -122,6 +132,8 @@ def calibrate(
     corrections = Corrections(regression, learnt, description)
     laws = description.as_good_as(explained.final) if description and uncertain else ()
     rivals = description.rivals if description and described else explained.rivals(model, laws)
+    rivals = tuple(replace(r, fit=replace(r.fit, noise=noise_of_any_run(study, r.fit.noise))) for r in rivals)
+    little = rows_of_little_weight(study)
     excluded = (*model.runs.excluded, *split.reasons)
     rows = len(model.runs) + count_of_rows(model.runs.excluded)
     return Verdict(
@@ -135,11 +147,13 @@ def calibrate(
             sessions=model.runs.session_names,
             hash=fingerprint(fixed),
             excluded=excluded,
+            little_weight=little,
             rows=rows,
             caveats=(
                 *model.runs.caveats,
                 *caveat_of_excluded(excluded, rows),
                 *split.caveats,
+                *caveat_of_weights(little, int(split.kept.sum())),
                 *_caveats(model, explained),
             ),
         ),
@@ -181,16 +195,9 @@ class Explained:
         return rivals if len(rivals) > 1 else ()
 
 
-def explain(study: Study, guess: Mapping[str, float]) -> Explained:
-    """Fit the model, test the residual, and look for what explains it, from the simplest to the least simple.
-
-    Args:
-        guess: where the fit starts.
-    """
+def explain(study: Study, base: Fit, seconds_of_fit: float) -> Explained:
+    """Test the residual of the fit without effects, and look for what explains it, from the simplest on."""
     model, level = study.model, study.level
-    began = time.monotonic()
-    names = tuple(p.name for p in (*model.coefficients, *model.nuisances))
-    base = fit(model, guess, names, study.split.fitted, title="fit" if study.progress else "")
     fitted = time.monotonic()
     title = "derivatives" if study.progress else ""
     tangents = directions(model, base.parameters, model.effects, title=title)
@@ -208,7 +215,7 @@ def explain(study: Study, guess: Mapping[str, float]) -> Explained:
         gain = base.deviance - freed.deviance
         threshold = min(threshold, math.sqrt(max(gain - INDISTINGUISHABLE, 1.0)))
     if study.progress:
-        print(_forecast(misfit, threshold, fitted - began, derived - fitted), file=sys.stderr)
+        print(_forecast(misfit, threshold, seconds_of_fit, derived - fitted), file=sys.stderr)
     candidates = examine(study, base, misfit, tangents, threshold=threshold)
     best = explaining(candidates)
     if number_explains and not beats_number(best, freed):

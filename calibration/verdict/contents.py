@@ -90,6 +90,7 @@ class Conditions:
     excluded: tuple[str, ...]  # rows and columns that were not used, and why
     rows: int  # of the table, used or not
     caveats: tuple[str, ...]  # what weakens the conclusion, in words
+    little_weight: tuple[int, ...] = ()  # rows of the table whose runs have less than half of the usual weight
 
     @property
     def summary_of_excluded(self) -> list[str]:

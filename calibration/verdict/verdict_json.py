@@ -78,6 +78,7 @@ def verdict_record(result: Verdict, *, table: str) -> dict[str, Any]:
         "locked_p_value": errors.p_value,
         "fixed_before": result.conditions.hash,
         "rows_set_aside": list(result.conditions.excluded),
+        "rows_of_little_weight": list(result.conditions.little_weight),
         "limits": list(result.conditions.caveats),
         "table": table,
         "provenance": provenance({"table": table}),

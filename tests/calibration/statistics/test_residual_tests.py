@@ -19,18 +19,25 @@ from calibration.statistics.statistical_model import (
     sums,
 )
 from calibration.statistics.study import DRAWS, Study, middle_session
+from sim.arrays import Floats
 from tests.calibration.toy_tables import calibrated, toy_swimmer, toy_table
 
 
-def test_a_design_makes_the_same_products_for_many_residuals() -> None:
+@pytest.mark.parametrize(
+    "weights", [np.ones(7), np.array([1.0, 0.1, 1.0, 0.4, 0.02, 0.7, 1.0])], ids=["equal", "weighted"]
+)
+def test_a_design_makes_the_same_products_for_many_residuals(weights: Floats) -> None:
     """Each residual has its own S; against columns that are whitened one residual after the other."""
     rng = np.random.default_rng(3)
     session = np.array([0, 0, 1, 1, 1, 2, 2])
     columns, residuals = rng.normal(size=(7, 3, 4)), rng.normal(size=(5, 7, 3))
     roots = np.linalg.inv(np.linalg.cholesky([np.eye(3) + np.outer(v, v) for v in rng.normal(size=(5, 3))]))
-    products = FixedColumns(columns, session).sums(np.swapaxes(roots, -1, -2) @ roots, residuals)
+    scale = np.sqrt(weights)
+    rows = scale[:, None, None]
+    precision = np.swapaxes(roots, -1, -2) @ roots
+    products = FixedColumns(columns * rows, session, scale).sums(precision, residuals * rows[..., 0])
     for i, (root, residual) in enumerate(zip(roots, residuals, strict=True)):
-        expected = sums(root @ np.concatenate([columns, residual[..., None]], -1), session, 3)
+        expected = sums(root @ np.concatenate([columns, residual[..., None]], -1), session, 3, scale)
         assert products.within[i] == pytest.approx(expected.within)
         assert products.between[i] == pytest.approx(expected.between)
 

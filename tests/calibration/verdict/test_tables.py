@@ -150,6 +150,24 @@ def test_a_slipped_decimal_point_is_named_and_set_aside() -> None:
     assert not result.conditions.split.fitted[17]
 
 
+@pytest.mark.usefixtures("toy_model", "few_candidates")
+def test_mistracked_runs_have_little_weight_and_are_named() -> None:
+    table = toy_table(5, end_over_end_drag=5.0)
+    clean = calibrated(table)
+    rng = np.random.default_rng(0)
+    mistracked = np.flatnonzero(rng.random(len(table)) < 0.05)
+    for run in mistracked:
+        table.loc[run, "R_yr_cm"] *= 1 + rng.uniform(0.1, 0.3)
+    result = calibrated(table)
+    assert result.effects == clean.effects == ("end_over_end_drag",)
+    assert clean.conditions.little_weight == ()
+    assert set(result.conditions.little_weight) <= set((mistracked + 1).tolist())
+    assert len(result.conditions.little_weight) >= 2
+    assert any("have a weight below one half" in line for line in result.conditions.caveats)
+    record = verdict_record(result, table="t")
+    assert record["rows_of_little_weight"] == list(result.conditions.little_weight)
+
+
 @pytest.mark.long
 @pytest.mark.usefixtures("toy_model")
 def test_the_verdict_is_that_of_the_table_without_the_slipped_decimal_point() -> None:

@@ -1,0 +1,174 @@
+"""The contaminated normal distribution of the noise, and the weights of runs that follow from it.
+
+Most runs have the covariance S. A share π of them, those that were tracked wrongly, say, have c² S:
+
+    y − f − b ~ (1 − π) N(0, S) + π N(0, c² S).
+
+b is the departure of a condition from the model f, which all of its repeats share: a missing effect, or a shift of
+the session. It is N(0, B), with B ≥ `_LACK` S, so that a departure of a whole condition costs its runs no weight.
+Where two repeats differ by more than S allows, that one is more likely wrong which is farther from the model.
+
+S, B and π are estimated by expectation maximisation with independent factors for b and for the kinds of the runs
+(variational Bayes), from a robust start. c² is chosen among `_RATIOS` by the lower bound of the log likelihood.
+One normal distribution stays unless the bound rises by more than ln n: BIC, for the two further numbers π and c².
+The weight of a run is the mean of 1 over its factor in the variance,
+
+    w = P(S) + P(c² S)/c².
+
+Sources: Tukey (1960), Dempster, Laird and Rubin (1977); the bound, e.g. Bishop (2006), section 10.1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from calibration.statistics.statistical_model import inverse_root
+from sim.arrays import Floats, Integers
+
+_RATIOS = (9.0, 25.0, 100.0)  # c²
+_LACK = 1.0  # least variance of a condition's departure, in S
+_MOST = 0.3  # largest π
+_AT_START = 0.1  # π
+_MAD = 1.4826  # median absolute deviation to standard deviation
+_PASSES = 100
+_SETTLED = 1e-3  # change of weights, and relative change of S, at which the iteration ends
+
+
+@dataclass(frozen=True)
+class ContaminatedNormal:
+    """Noise of runs, a share of which have a larger variance."""
+
+    run: Floats  # (k, k) S
+    lack: Floats  # (k, k) B
+    share: float  # π
+    ratio: float  # c²
+
+    @property
+    def spread(self) -> float:
+        """Variance of any run over that of a run of S."""
+        return 1 + self.share * (self.ratio - 1)
+
+    def weights(self, residual: Floats, condition: Integers) -> Floats:
+        """Compute the weights (..., n) of runs with residuals (..., n, k) from a model."""
+        groups = _Groups.of(condition)
+        axes, lack = _axes(self.run, self.lack)
+        white = residual[..., groups.order, :] @ axes.T
+        weights = np.ones(white.shape[:-1])
+        for _ in range(_PASSES):
+            expected = _expect(white, weights, groups, lack, self.share, self.ratio)
+            moved = float(np.abs(expected.weights - weights).max())
+            weights = expected.weights
+            if moved < _SETTLED:
+                break
+        return np.asarray(weights[..., groups.back])
+
+
+class _Groups(NamedTuple):
+    """Runs in the order of their conditions."""
+
+    order: Integers  # (n,)
+    back: Integers  # (n,) place of each run in that order
+    first: Integers  # (c,) first run of each condition
+    sizes: Integers  # (c,)
+    place: Integers  # (n,) condition of each run in that order
+
+    @classmethod
+    def of(cls, condition: Integers) -> _Groups:
+        order = np.argsort(condition, kind="stable")
+        first, count = np.unique(condition[order], return_index=True, return_counts=True)[1:]
+        return cls(order, np.argsort(order), first, count, np.repeat(np.arange(len(count)), count))
+
+    def add(self, table: Floats) -> Floats:
+        """Add up the runs of each condition, (..., n, k) to (..., c, k)."""
+        return np.asarray(np.add.reduceat(table, self.first, axis=-2))
+
+
+class _Expected(NamedTuple):
+    """What is expected of conditions and runs, on axes where S is 1 and B is diagonal."""
+
+    weights: Floats  # (..., n)
+    bad: Floats  # (..., n) probability of c² S
+    departure: Floats  # (..., c, k) b
+    variance: Floats  # (..., c, k) of b
+    residual: Floats  # (..., n, k) without b
+    logarithm: Floats  # (..., n) of the density of a run, without its constant
+
+
+def _axes(run: Floats, lack: Floats) -> tuple[Floats, Floats]:
+    """Return axes (k, k), on which S is 1 and B is diagonal, and that diagonal (k,), at least `_LACK`."""
+    root = inverse_root(run)
+    values, vectors = np.linalg.eigh(root @ lack @ root.T)
+    return vectors.T @ root, np.maximum(values, _LACK)
+
+
+def _expect(
+    white: Floats, weights: Floats, groups: _Groups, lack: Floats, share: float, ratio: float
+) -> _Expected:
+    """Compute the departures of the conditions from the weights of the runs, and then these weights."""
+    variance = 1 / (groups.add(weights[..., None]) + 1 / lack)
+    departure = groups.add(weights[..., None] * white) * variance
+    residual = white - departure[..., groups.place, :]
+    distance = (residual**2).sum(-1) + variance.sum(-1)[..., groups.place]
+    good = np.log1p(-share) - distance / 2
+    if share == 0:
+        return _Expected(np.ones_like(distance), np.zeros_like(distance), departure, variance, residual, good)
+    bad = math.log(share) - distance / (2 * ratio) - white.shape[-1] / 2 * math.log(ratio)
+    logarithm = np.logaddexp(good, bad)
+    probability = np.exp(bad - logarithm)
+    return _Expected(1 - probability * (1 - 1 / ratio), probability, departure, variance, residual, logarithm)
+
+
+def estimate(residual: Floats, condition: Integers) -> ContaminatedNormal | None:
+    """Estimate the noise from residuals (n, k) of a model; None where one normal distribution does as well."""
+    groups = _Groups.of(condition)
+    rows = residual[groups.order]
+    repeated = groups.sizes > 1
+    means = groups.add(rows) / groups.sizes[:, None]
+    centred = (rows - means[groups.place])[repeated[groups.place]]
+    scatter = _MAD * np.median(np.abs(centred), 0)
+    if not (scatter > 0).all():
+        return None
+    scatter = scatter / math.sqrt(np.mean(1 - 1 / groups.sizes[repeated]))
+    one = _maximise(rows, groups, scatter, None)[1]
+    best, bound = max((_maximise(rows, groups, scatter, ratio) for ratio in _RATIOS), key=lambda found: found[1])
+    return best if bound - one > math.log(len(rows)) else None
+
+
+def _maximise(
+    rows: Floats, groups: _Groups, scatter: Floats, ratio: float | None
+) -> tuple[ContaminatedNormal, float]:
+    """Estimate S, B and π from residuals (n, k); with the lower bound of the log likelihood.
+
+    Args:
+        scatter: (k,) standard deviations of a run, robust.
+        ratio: c²; None: π = 0.
+    """
+    n = len(rows)
+    share, factor = (_AT_START, ratio) if ratio is not None else (0.0, 1.0)
+    run = np.diag(scatter**2)
+    lack = _LACK * run
+    weights, bound = np.ones(n), -math.inf
+    for _ in range(_PASSES):
+        axes, diagonal = _axes(run, lack)
+        expected = _expect(rows @ axes.T, weights, groups, diagonal, share, factor)
+        b, variance = expected.departure, expected.variance
+        bound = float(expected.logarithm.sum() + n * np.linalg.slogdet(axes)[1])
+        bound += 0.5 * float((np.log(variance / diagonal) - (b**2 + variance) / diagonal + 1).sum())
+        back = np.linalg.inv(axes)
+        weighted = expected.weights[:, None]
+        inner = (weighted * expected.residual).T @ expected.residual
+        inner += np.diag((groups.add(weighted) * variance).sum(0))
+        new = back @ inner @ back.T / n
+        lack = back @ (b.T @ b + np.diag(variance.sum(0))) @ back.T / len(b)
+        grown = np.diag(new) / np.diag(run) - 1
+        moved = max(float(np.abs(expected.weights - weights).max()), float(np.abs(grown).max()))
+        run, weights = new, expected.weights
+        if ratio is not None:
+            share = min(max(float(expected.bad.mean()), 0.5 / n), _MOST)
+        if moved < _SETTLED:
+            break
+    return ContaminatedNormal(run, lack, share, factor), bound
