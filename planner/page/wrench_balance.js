@@ -7,7 +7,7 @@ import { evaluate } from "./ensemble.js";
 import { linearThrust, linearTorque, tailInputs, wrenchTerms } from "./tails.js";
 
 const STEPS = 60;
-const CORRECTION = 1e-11; // relative
+const CORRECTION = 2e-12; // relative
 const DIFFERENCE = 1e-6; // steps of finite differences, relative
 const LEAST_SHARE = 1e-3;
 const FIRST_SPIN = 0.6; // ω_t/ω in the first guess

@@ -30,7 +30,7 @@ typedef float lookup_real;
 typedef double lookup_real;
 #define LOOKUP_F(name) name
 #define LOOKUP_DIFFERENCE 1e-6
-#define LOOKUP_CORRECTION 1e-11
+#define LOOKUP_CORRECTION 2e-12
 #endif
 #define LOOKUP_C(number) ((lookup_real)(number))
 #define LOOKUP_PI LOOKUP_C(3.14159265358979323846)

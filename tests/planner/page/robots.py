@@ -23,6 +23,7 @@ from surrogate.training.simulated import draw_robots
 from tests.planner.page.page_core import typed
 
 EXACT = 1e-12  # relative
+SOLVED = 1e-11  # relative; balances are solved until a correction is 2e-12, on different ways
 
 
 @cache

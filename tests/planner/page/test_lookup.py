@@ -13,7 +13,7 @@ from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.table.errors import RESPONSE_OUTPUTS
 from tests.planner.page.page_core import TABLE, answers, refusal_of, without_digits
 from tests.planner.page.robots import (
-    EXACT,
+    SOLVED,
     check_alike,
     check_equal_outputs,
     columns_of,
@@ -39,7 +39,7 @@ def test_steady_outputs_and_who_is_outside() -> None:
     found = asked("query", robots, {"flag": True})
     assert [answer["outside"] for answer in found] == wanted.pop("outside").tolist()
     for row, answer in enumerate(found):
-        check_equal_outputs(answer, wanted, row, EXACT)
+        check_equal_outputs(answer, wanted, row, SOLVED)
 
 
 def test_one_tail_is_answered() -> None:
@@ -71,7 +71,7 @@ def test_response_at_one_dwell_and_intervals() -> None:
     for row, answer in enumerate(asked("query", robots, {"intervals": True})):
         assert set(answer) == set(wanted)
         for name in RESPONSE_OUTPUTS:
-            assert abs(answer[name] - wanted[name][row]) <= EXACT * scales[name]
+            assert abs(answer[name] - wanted[name][row]) <= SOLVED * scales[name]
         ends = {name: values for name, values in wanted.items() if name.endswith(("_low", "_high"))}
         check_equal_outputs(answer, {name: ends[name] for name in ends if "lag" not in name}, row, 1e-11)
 
@@ -82,7 +82,7 @@ def test_curves_of_the_response() -> None:
     for row, answer in enumerate(asked("response", robots)):
         for name, curve in answer.items():
             expected = getattr(wanted, name)[row].reshape(-1, 3)
-            check_alike(np.reshape(curve, (-1, 3)), expected)
+            check_alike(np.reshape(curve, (-1, 3)), expected, SOLVED)
 
 
 def test_error_modes() -> None:
@@ -115,7 +115,7 @@ def test_refusals_have_the_same_words(change: dict[str, float]) -> None:
 def test_what_the_support_allows_is_refused_by_none(change: dict[str, float]) -> None:
     robot = PAPER | change
     wanted = shipped().query({name: np.array([value]) for name, value in robot.items()})
-    check_equal_outputs(asked("query", [robot])[0], wanted, 0, EXACT)
+    check_equal_outputs(asked("query", [robot])[0], wanted, 0, SOLVED)
 
 
 @pytest.mark.parametrize("dwell", [0.1, -1.0])

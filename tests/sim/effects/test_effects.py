@@ -163,7 +163,11 @@ def test_a_dissipative_effect_takes_power_and_gives_none(name: str, share: float
         assert body.droop.item() >= 0
         # Torque, bending viscosity and friction; their power: see tests/sim/mechanics.
         terms = body.nonlocal_terms._asdict()
-        assert all(number.item() >= 0 for name, number in terms.items() if not catalogue()[name].grid)
+        assert all(
+            number.item() >= 0
+            for name, number in terms.items()
+            if name in catalogue() and not catalogue()[name].grid
+        )
         R = body.resistance[..., 0]
         on_head = np.linalg.eigvalsh((R[:, :4] + R[:, :4].T) / 2)
         assert on_head.min() > -1e-12
