@@ -28,13 +28,27 @@ main = program.main
         help="what the lab can set in its next runs, such as l_cm=5,7,9; for N, l_cm and omega_rpm",
     ),
     argument("--no-laws", action="store_true", help="do not look for laws that describe the runs"),
+    argument(
+        "--path",
+        action="append",
+        default=[],
+        metavar="PATH",
+        help="a path, as for softflagella plan, on which the error is stated before and after; may be given again "
+        "(default: square:3 and circle:2, in tail lengths). It takes some seconds of processor time, up to two "
+        "minutes where the parts of the robot move in each other's flow or touch",
+    ),
+    argument("--no-path", action="store_true", help="do not state the error on a path"),
     JOBS,
     aliases=("close",),
 )
 def _calibrate(arguments: Namespace) -> None:
+    from calibration.report.path_error import PATHS
     from calibration.report.robot_verdict import calibrate_robot
     from calibration.swimmer.possible_runs import owned
     from sim.inputs import load_robot
+
+    if arguments.path and arguments.no_path:
+        raise InputError("--path and --no-path contradict each other; give one of them")
 
     own = owned(arguments.own)
     result = calibrate_robot(
@@ -43,6 +57,7 @@ def _calibrate(arguments: Namespace) -> None:
         protocol=arguments.protocol,
         own=own,
         laws=not arguments.no_laws,
+        paths=() if arguments.no_path else arguments.path or PATHS,
         seed=arguments.seed,
         jobs=arguments.jobs,
         tell=lambda line: print(line, file=sys.stderr),
@@ -55,6 +70,8 @@ def _calibrate(arguments: Namespace) -> None:
         f"calibrated {100 * result.error_before:.2f} %, with effects {100 * result.error_after:.2f} %, "
         f"noise {100 * result.noise_ceiling:.2f} %"
     )
+    for error in result.paths:
+        print(error.sentence)
     for limit in result.conditions.caveats:
         print(f"the conclusion is weaker: {limit}")
     for line in result.conditions.summary_of_excluded:

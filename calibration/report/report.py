@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ from calibration.attribution.halved_tolerances import notable_gains
 from calibration.attribution.refits import IMITABLE, SURE, UNSEEN, Candidate
 from calibration.report.figures import draw_evidence, draw_maps, draw_residuals, draw_summary, final_model
 from calibration.report.law_card import add_laws
+from calibration.report.path_card import add_paths
+from calibration.report.path_error import PathError
 from calibration.report.quantities import (
     LABELS,
     detectable,
@@ -40,17 +43,20 @@ _SMALLEST_GAIN = 0.005  # by which half of a tolerance must lower the detectable
 _TESTS = {"lack": "lack of fit", "kernel": "smooth structure", "shape": "shapes", "score": "effects"}
 
 
-def write_report(result: Verdict, data: Measurements, out: str | Path, *, title: str) -> None:
-    """Write report.html."""
+def write_report(
+    result: Verdict, data: Measurements, out: str | Path, *, title: str, paths: Sequence[PathError] = ()
+) -> None:
+    """Write report.html, with a section on the errors on `paths` where there are some."""
     page = Page(f"Calibration: {title}", result.sentence)
-    add_sections(page, result, data)
+    add_sections(page, result, data, paths)
     page.write(out, f"code {code_version()}; fixed before the data was looked at: {result.conditions.hash}")
 
 
-def add_sections(page: Page, result: Verdict, data: Measurements) -> None:
+def add_sections(page: Page, result: Verdict, data: Measurements, paths: Sequence[PathError]) -> None:
     """Add the sections of the report."""
     _add_next_steps(page, result)
     _add_errors(page, result, data)
+    add_paths(page, paths)
     add_laws(page, result)
     _add_numbers(page, result)
     _add_halved_tolerances(page, result)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,6 +14,7 @@ import pandas as pd
 from calibration.laws.law_fits import Laws, find_laws
 from calibration.report.corrected_robot import as_toml, check_given, handed_on
 from calibration.report.law_robot import law_handed_on
+from calibration.report.path_error import PathError, path_errors, wanted_paths
 from calibration.report.report import write_report
 from calibration.statistics.exclusions import count_of_rows, summary_of_excluded
 from calibration.swimmer.head_correction import learn_head_correction
@@ -49,6 +50,7 @@ class RobotVerdict(Verdict):
     robot: Robot  # as it was given
     runs: Measurements  # of the table
     table: str  # name of the table
+    paths: tuple[PathError, ...] = ()  # the error on paths, where it was asked for
 
     @property
     def corrected(self) -> Robot:
@@ -90,7 +92,8 @@ class RobotVerdict(Verdict):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json."""
-        return verdict_record(self, table=self.table)
+        paths = {error.wanted.words: error.record() for error in self.paths}
+        return {**verdict_record(self, table=self.table), "path": paths or None}
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write verdict.json, report.html and corrected.toml, all or none, and return their paths.
@@ -100,7 +103,7 @@ class RobotVerdict(Verdict):
         """
         corrected = as_toml(*self._handed_on)
         with files_together(folder, FILES) as temporary:
-            write_report(self, self.runs, temporary / "report.html", title=self.table)
+            write_report(self, self.runs, temporary / "report.html", title=self.table, paths=self.paths)
             write_text(temporary / "corrected.toml", corrected)
             write_text(temporary / "verdict.json", json.dumps(self.to_dict(), indent=1) + "\n")
         return [Path(folder, name) for name in FILES]
@@ -113,6 +116,7 @@ def calibrate_robot(
     protocol: Literal["session", "paper"] = "session",
     own: Owned | None = None,
     laws: bool = True,
+    paths: Sequence[str] = (),
     seed: int = 0,
     jobs: int | None = None,
     progress: bool = True,
@@ -126,15 +130,17 @@ def calibrate_robot(
         protocol: what is fitted and tested.
         own: what the lab can set in its next runs.
         laws: whether laws are looked for where no effect explains the runs, or something else could imitate it.
+        paths: files or shapes, such as square:3, on which the error is stated before and after.
         seed: of the bootstrap.
         jobs: threads; default all processors.
         progress: show progress bars.
         tell: is told, before the fit, what was converted and what was excluded, a line at a time.
 
     Raises:
-        InputError: the table cannot be used.
+        InputError: the table or a path cannot be used.
     """
     check_given(robot)
+    wanted = wanted_paths(paths, robot)
     data = read_measurements(table)
     for line in data.converted:
         tell(line)
@@ -151,4 +157,5 @@ def calibrate_robot(
         progress=progress,
     )
     name = "table" if isinstance(table, pd.DataFrame) else Path(table).name
-    return RobotVerdict(**vars(verdict), robot=robot, runs=data, table=name)
+    result = RobotVerdict(**vars(verdict), robot=robot, runs=data, table=name)
+    return replace(result, paths=path_errors(wanted, robot, result.corrected, result.knowledge))

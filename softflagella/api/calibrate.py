@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -28,6 +29,7 @@ def calibrate(
     seed: int = 0,
     own: Owned | None = None,
     laws: bool = True,
+    paths: Sequence[str] = (),
     jobs: int | None = None,
     progress: bool = True,
 ) -> RobotVerdict:
@@ -42,6 +44,8 @@ def calibrate(
         own: what the lab can set in its next runs, such as `{"l_cm": (5, 7, 9)}`; for `N`, `l_cm` and `omega_rpm`
             (both directions). Default: the table's range.
         laws: whether laws are looked for where no effect explains the runs; it takes up to two minutes.
+        paths: files or shapes, such as `("square:3",)`, on which the error with the robot as given and with the
+            corrected one is stated; `verdict.paths` has it.
         jobs: threads; default all processors.
         progress: show progress bars.
 
@@ -59,7 +63,15 @@ def calibrate(
         >>> result = sf.plan(sf.circle(2.0), verdict.corrected, knowledge=verdict.knowledge)  # doctest: +SKIP
     """
     return calibrate_robot(
-        table, one_robot(robot), protocol=protocol, own=own, laws=laws, seed=seed, jobs=jobs, progress=progress
+        table,
+        one_robot(robot),
+        protocol=protocol,
+        own=own,
+        laws=laws,
+        paths=paths,
+        seed=seed,
+        jobs=jobs,
+        progress=progress,
     )
 
 

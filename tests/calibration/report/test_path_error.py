@@ -1,0 +1,163 @@
+"""The error on a path: both schedules on the corrected robot, what the calibration says of it, and refusals."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibration.report.path_error import PATHS, PathError, path_errors, wanted_paths
+from planner.paths.distance import distance_to
+from planner.vehicle.calibration_table import CalibrationKnowledge
+from sim.io.errors import InputError, run_command
+from sim.model.learnt_range import learnt_range
+from sim.model.presets import PRESETS
+from sim.motion.replay import replay
+from tests.calibration.report.test_robot_verdict import verdict_of
+from tests.calibration.toy_tables import shares_verdicts, toy_table
+from tests.page_text import PageText
+
+GIVEN = PRESETS["paper-control"]
+CORRECTED = replace(
+    GIVEN, C_yr=0.92 * GIVEN.C_yr, tail_length=0.998 * GIVEN.tail_length, effects={"end_over_end_drag": 1.0}
+)
+KNOWN = CalibrationKnowledge(("C_yr",), np.array([[0.01**2]]))
+LENGTH = GIVEN.tail_length
+
+
+@cache
+def error_on(words: str, knowledge_index: int = 0) -> PathError:
+    known = (KNOWN, replace(KNOWN, covariance=9 * KNOWN.covariance), replace(KNOWN, current=(2e-5, -1e-5)))
+    return path_errors(wanted_paths([words], GIVEN), GIVEN, CORRECTED, known[knowledge_index])[0]
+
+
+@pytest.mark.parametrize("name", ["as_given", "corrected"])
+def test_the_error_is_that_of_a_replay_in_time_steps(name: str) -> None:
+    error = error_on("circle:1.2")
+    carried = error.carried_out[name]  # type: ignore[index]
+    track = replay([carried.plan.schedule(CORRECTED)])[0]
+    places = CORRECTED.tail_length * track[["x_over_l", "y_over_l"]].to_numpy()
+    distance = distance_to(error.polyline, places)
+    weight = np.gradient(track["time_bar"].to_numpy())
+    rms = math.sqrt((weight * distance**2).sum() / weight.sum())
+    assert carried.rms == pytest.approx(rms, abs=0.01 * LENGTH)
+    assert carried.largest == pytest.approx(distance.max(), abs=0.02 * LENGTH)
+    end = np.hypot(*(places[-1] - error.polyline[-1]))
+    assert carried.end == pytest.approx(end, abs=0.02 * LENGTH)
+    np.testing.assert_allclose(carried.track[-1], places[-1], atol=0.02 * LENGTH)
+
+
+def test_the_corrected_robot_s_plan_leads_along_the_path_and_the_other_does_not() -> None:
+    error = error_on("circle:1.2")
+    as_given, corrected = error.carried_out["as_given"], error.carried_out["corrected"]
+    assert corrected.rms < 0.03 * LENGTH
+    assert as_given.rms > 5 * corrected.rms
+    assert as_given.end > 5 * corrected.end
+    for each in (as_given, corrected):
+        assert each.rms < each.largest < each.within
+    assert as_given.end_interval[0] < as_given.end < as_given.end_interval[1]
+    assert not error.refusals
+
+
+def test_a_less_certain_calibration_states_wider_errors() -> None:
+    sure, unsure = error_on("circle:1.2"), error_on("circle:1.2", 1)
+    for one, two in zip(sure.carried_out.values(), unsure.carried_out.values(), strict=True):
+        assert two.rms == pytest.approx(one.rms, rel=0.2)
+        assert two.within > one.within
+        assert np.ptp(two.end_interval) > 2 * np.ptp(one.end_interval)
+
+
+def test_a_current_carries_the_robot_and_only_the_corrected_plan_knows_it() -> None:
+    still, carried = error_on("circle:1.2").carried_out, error_on("circle:1.2", 2).carried_out
+    seconds = float(still["as_given"].plan.seconds.sum())
+    moved = carried["as_given"].track[-1] - still["as_given"].track[-1]
+    np.testing.assert_allclose(moved, seconds * np.array([2e-5, -1e-5]), rtol=1e-6)
+    assert carried["corrected"].rms < 0.03 * LENGTH
+
+
+def test_the_record_has_each_length_in_l_and_in_cm() -> None:
+    error = error_on("circle:1.2")
+    record = error.record()
+    assert record["refused"] == []
+    for name, carried in error.carried_out.items():
+        entry = record[name]
+        assert entry["rms_cm"] == pytest.approx(100 * carried.rms)
+        for key in ("rms", "largest", "end", "within", "end_interval"):
+            lengths = np.array(entry[f"{key}_over_l"]) * 100 * LENGTH
+            np.testing.assert_allclose(entry[f"{key}_cm"], lengths, rtol=1e-12)
+        assert entry["dwells"] == len(carried.plan.dwells)
+    assert "planned with the robot as given" in error.sentence
+    assert "cm rms" in error.sentence
+
+
+def test_what_cannot_be_planned_is_said_and_nothing_else_is_lost() -> None:
+    small, good = path_errors(wanted_paths(["circle:0.001", "circle:1.2"], GIVEN), GIVEN, CORRECTED, KNOWN)
+    assert not small.carried_out
+    assert len(small.refusals) == 2
+    assert all("too small" in refusal for refusal in small.refusals)
+    assert small.record()["as_given"] is small.record()["corrected"] is None
+    assert "\n" not in small.sentence
+    assert set(good.carried_out) == {"as_given", "corrected"}
+
+
+def test_a_corrected_robot_outside_its_runs_is_refused() -> None:
+    elsewhere = [replace(GIVEN, tail_length=length).group_values() for length in (0.05, 0.06)]
+    outside = replace(CORRECTED, learnt_from=learnt_range(elsewhere))
+    (error,) = path_errors(wanted_paths(["circle:1.2"], GIVEN), GIVEN, outside, KNOWN)
+    assert not error.carried_out
+    assert len(error.refusals) == 1
+    assert error.refusals[0].startswith("not planned with the corrected robot: ")
+
+
+def test_no_path_needs_no_table_and_a_path_that_is_none_is_refused_at_once() -> None:
+    assert path_errors([], GIVEN, CORRECTED, KNOWN) == ()
+    with pytest.raises(InputError, match="square:3"):
+        wanted_paths(["squre:3"], GIVEN)
+    assert [each.words for each in wanted_paths([*PATHS, PATHS[0]], GIVEN)] == list(PATHS)
+
+
+def test_a_path_in_physical_units_keeps_its_size(tmp_path: Path) -> None:
+    file = tmp_path / "path.csv"
+    file.write_text("x_cm,y_cm\n0,0\n22,0\n22,11\n")
+    (wanted,) = wanted_paths([str(file)], GIVEN)
+    assert wanted.path.length == pytest.approx(0.33 / LENGTH)
+
+
+@shares_verdicts
+def test_a_verdict_and_its_report_have_the_error_on_a_path(tmp_path: Path) -> None:
+    verdict = verdict_of(5, end_over_end_drag=5.0)
+    assert verdict.to_dict()["path"] is None
+    small = path_errors(wanted_paths(["circle:0.001"], GIVEN), GIVEN, CORRECTED, KNOWN)
+    paths = replace(verdict, paths=(error_on("circle:1.2"), *small)).save(tmp_path / "out")
+    record = json.loads(paths[0].read_text())["path"]
+    assert set(record) == {"circle:1.2", "circle:0.001"}
+    assert record["circle:1.2"]["corrected"]["rms_cm"] < record["circle:1.2"]["as_given"]["rms_cm"]
+    seen = PageText(paths[1]).text
+    assert "On a path" in seen
+    assert "planned with the corrected robot" in seen
+    assert "too small" in seen
+    assert "On a path" not in PageText(verdict.save(tmp_path / "without")[1]).text
+
+
+@pytest.mark.usefixtures("toy_model", "few_candidates")
+def test_the_command_states_it_unless_it_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from calibration.__main__ import main
+
+    toy_table(3, lengths_cm=(6.0, 9.0)).to_csv(tmp_path / "t.csv", index=False)
+    words = ["calibrate", str(tmp_path / "t.csv"), "--robot", "paper-measured", "--out", str(tmp_path / "out")]
+    assert run_command(main, [*words, "--path", "circle:1.2", "--no-path"]) == 2
+    assert run_command(main, [*words, "--path", "squre:3"]) == 2
+    assert not (tmp_path / "out").exists()
+    capsys.readouterr()
+    assert run_command(main, [*words, "--no-path"]) == 0
+    assert "on the path" not in capsys.readouterr().out
+    assert json.loads((tmp_path / "out" / "verdict.json").read_text())["path"] is None
+    assert run_command(main, words) == 0
+    printed = capsys.readouterr().out
+    assert all(f"on the path {path}: planned with the robot as given" in printed for path in PATHS)
+    assert set(json.loads((tmp_path / "out" / "verdict.json").read_text())["path"]) == set(PATHS)
