@@ -33,22 +33,17 @@ main = program.main
         action="append",
         default=[],
         metavar="PATH",
-        help="a path, as for softflagella plan, on which the error is stated before and after; may be given again "
-        "(default: square:3 and circle:2, in tail lengths). It takes some seconds of processor time, up to two "
-        "minutes where the parts of the robot move in each other's flow or touch",
+        help="a path, as for softflagella plan, such as square:3 in tail lengths, on which the error is stated "
+        "before and after; may be given again. It takes some seconds of processor time, up to two minutes where "
+        "the parts of the robot move in each other's flow or touch",
     ),
-    argument("--no-path", action="store_true", help="do not state the error on a path"),
     JOBS,
     aliases=("close",),
 )
 def _calibrate(arguments: Namespace) -> None:
-    from calibration.report.path_error import PATHS
     from calibration.report.robot_verdict import calibrate_robot
     from calibration.swimmer.possible_runs import owned
     from sim.inputs import load_robot
-
-    if arguments.path and arguments.no_path:
-        raise InputError("--path and --no-path contradict each other; give one of them")
 
     own = owned(arguments.own)
     result = calibrate_robot(
@@ -57,7 +52,7 @@ def _calibrate(arguments: Namespace) -> None:
         protocol=arguments.protocol,
         own=own,
         laws=not arguments.no_laws,
-        paths=() if arguments.no_path else arguments.path or PATHS,
+        paths=arguments.path,
         seed=arguments.seed,
         jobs=arguments.jobs,
         tell=lambda line: print(line, file=sys.stderr),

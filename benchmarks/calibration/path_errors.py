@@ -1,9 +1,9 @@
 """The error on a square, before and after a calibration: as the report states it, and on the true robot.
 
 Each robot has its own coefficients and one hidden effect or law. Its table of 128 runs is simulated on a finer
-mesh by time stepping, with 2.5 % of noise and session scatter; the fitter starts from the paper's coefficients. The
-schedules planned with the robot as given and with the corrected robot are those of the report, and are replayed in
-time steps on the true robot. Distances are from the square as drawn, in tail lengths.
+mesh by time stepping, with 2.5 % of noise and session scatter; the fitter starts from the paper's coefficients.
+The schedules planned with the robot as given and with the corrected robot are those of the report, and are
+replayed in time steps on the true robot. Distances are from the square as drawn, in tail lengths.
 
 Usage: python -m benchmarks path_errors [ROBOTS] [FIRST]
 

@@ -41,7 +41,6 @@ from sim.io.units import format_length
 from sim.model.robot import Robot
 from surrogate.one_robot.tabulate import tabulate
 
-PATHS = ("square:3", "circle:2")  # in tail lengths
 Model = Literal["as_given", "corrected"]
 WORDS: dict[Model, str] = {"as_given": "the robot as given", "corrected": "the corrected robot"}
 _INTERVAL = (0.025, 0.975)
@@ -106,8 +105,9 @@ class PathError:
 
     def record(self) -> dict[str, Any]:
         """Return the content for verdict.json."""
-        planned = {name: each.record(self.tail_length) for name, each in self.carried_out.items()}
-        return {**dict.fromkeys(WORDS), **planned, "refused": list(self.refusals)}
+        record: dict[str, Any] = dict.fromkeys(WORDS)
+        record |= {name: each.record(self.tail_length) for name, each in self.carried_out.items()}
+        return record | {"refused": list(self.refusals)}
 
 
 def wanted_paths(words: Sequence[str], robot: Robot) -> tuple[WantedPath, ...]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.report.path_error import PATHS, PathError, path_errors, wanted_paths
+from calibration.report.path_error import PathError, path_errors, wanted_paths
 from planner.paths.distance import distance_to
 from planner.vehicle.calibration_table import CalibrationKnowledge
 from sim.io.errors import InputError, run_command
@@ -118,7 +118,8 @@ def test_no_path_needs_no_table_and_a_path_that_is_none_is_refused_at_once() -> 
     assert path_errors([], GIVEN, CORRECTED, KNOWN) == ()
     with pytest.raises(InputError, match="square:3"):
         wanted_paths(["squre:3"], GIVEN)
-    assert [each.words for each in wanted_paths([*PATHS, PATHS[0]], GIVEN)] == list(PATHS)
+    twice = wanted_paths(["square:3", "circle:2", "square:3"], GIVEN)
+    assert [each.words for each in twice] == ["square:3", "circle:2"]
 
 
 def test_a_path_in_physical_units_keeps_its_size(tmp_path: Path) -> None:
@@ -145,19 +146,19 @@ def test_a_verdict_and_its_report_have_the_error_on_a_path(tmp_path: Path) -> No
 
 
 @pytest.mark.usefixtures("toy_model", "few_candidates")
-def test_the_command_states_it_unless_it_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_states_it_where_it_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from calibration.__main__ import main
 
     toy_table(3, lengths_cm=(6.0, 9.0)).to_csv(tmp_path / "t.csv", index=False)
     words = ["calibrate", str(tmp_path / "t.csv"), "--robot", "paper-measured", "--out", str(tmp_path / "out")]
-    assert run_command(main, [*words, "--path", "circle:1.2", "--no-path"]) == 2
     assert run_command(main, [*words, "--path", "squre:3"]) == 2
     assert not (tmp_path / "out").exists()
     capsys.readouterr()
-    assert run_command(main, [*words, "--no-path"]) == 0
+    assert run_command(main, words) == 0
     assert "on the path" not in capsys.readouterr().out
     assert json.loads((tmp_path / "out" / "verdict.json").read_text())["path"] is None
-    assert run_command(main, words) == 0
+    paths = ["square:3", "circle:2"]
+    assert run_command(main, [*words, "--path", paths[0], "--path", paths[1]]) == 0
     printed = capsys.readouterr().out
-    assert all(f"on the path {path}: planned with the robot as given" in printed for path in PATHS)
-    assert set(json.loads((tmp_path / "out" / "verdict.json").read_text())["path"]) == set(PATHS)
+    assert all(f"on the path {path}: planned with the robot as given" in printed for path in paths)
+    assert set(json.loads((tmp_path / "out" / "verdict.json").read_text())["path"]) == set(paths)
