@@ -87,7 +87,7 @@ class CarriedOut:
 class PathError:
     """The error on one path with both plans; what could not be planned is among the refusals."""
 
-    wanted: WantedPath
+    wanted: WantedPath  # the path, and how it was asked for
     tail_length: float  # of the robot as given
     carried_out: Mapping[Model, CarriedOut]
     refusals: tuple[str, ...] = ()  # in words
