@@ -89,7 +89,7 @@ class PathError:
 
     wanted: WantedPath  # the path, and how it was asked for
     tail_length: float  # of the robot as given
-    carried_out: Mapping[Model, CarriedOut]
+    carried_out: Mapping[Model, CarriedOut]  # the schedules that could be planned
     refusals: tuple[str, ...] = ()  # in words
 
     @property
