@@ -49,7 +49,7 @@ _INTERVAL = (0.025, 0.975)
 class WantedPath(NamedTuple):
     """A path, and how it was asked for."""
 
-    words: str
+    words: str  # a file or a shape, as it was asked for
     path: Path2D  # in tail lengths of the robot as given
 
 
