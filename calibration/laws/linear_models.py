@@ -36,6 +36,7 @@ from sim.arrays import Floats, Integers
 _SHARES = 9  # values of ρ at which the deviance is computed
 _AT_ONCE = 25  # residuals
 _RIDGE = 1e-11  # so that columns without any signal get a large variance
+_ABSORBED = 1e-9  # share of a column below which what is left of it is rounding
 _SMALLEST = 1e-280  # pivot
 
 
@@ -173,7 +174,10 @@ class LinearModels:
         by_place = across.reshape(-1, count, p, places, columns).transpose(0, 1, 3, 4, 2)
         own = own.reshape(-1, count, places, columns, columns)
         own[..., range(columns), range(columns)] *= 1 + _RIDGE
-        C = np.ascontiguousarray((own - by_place @ solution).transpose(3, 4, 2, 0, 1))
+        C = own - by_place @ solution
+        same = range(columns)
+        C[..., same, same] = np.maximum(C[..., same, same], _ABSORBED * own[..., same, same])
+        C = np.ascontiguousarray(C.transpose(3, 4, 2, 0, 1))
         b = np.ascontiguousarray(left.reshape(-1, count, places, columns).transpose(3, 2, 0, 1))
         deviance = square - (step * toward[..., :p]).sum(-1) + self._determinant[:, None]
         return C, b, deviance, np.linalg.slogdet(A)[1]
@@ -188,7 +192,7 @@ def _swept(normal: Floats, toward: Floats) -> tuple[Floats, Floats, Floats]:
     table = np.concatenate([normal, toward[:, None]], 1)
     log_determinant = np.zeros(toward.shape[1:])
     for k in range(len(table)):
-        pivot = np.maximum(table[k, k], _SMALLEST)
+        pivot = np.maximum(table[k, k], _RIDGE * normal[k, k] + _SMALLEST)  # above rounding
         log_determinant += np.log(pivot)
         table[k, k] = 1.0
         table[k] /= pivot

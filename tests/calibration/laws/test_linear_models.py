@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -102,3 +103,23 @@ def test_what_the_absorbed_columns_explain_gains_nothing() -> None:
     )
     shifted = residual + same.absorbed @ np.array([50.0, -20.0, 0.0])
     np.testing.assert_allclose(same.fit(shifted).gain, same.fit(residual).gain, atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_column_that_repeats_others_gains_nothing(seed: int) -> None:
+    """It is a sum of others up to rounding; the matrix of the model has no inverse."""
+    rng = np.random.default_rng(seed)
+    absorbed = rng.normal(size=(len(SESSION), OUTPUTS, len(PRECISION)))
+    absorbed[..., 1] = absorbed[..., 0] + 1e-4 * absorbed[..., 1]
+    columns = 1e40 * rng.normal(size=(len(SESSION), OUTPUTS, PLACES, COLUMNS))
+    columns[..., 1] = 0.3 * columns[..., 0] + 1e40 * absorbed[..., :1]
+    columns[..., 2] = 1e40 * absorbed[..., 1:2]
+    columns[..., 3, 2] = 0.0
+    with np.errstate(all="raise"):
+        fits = LinearModels(absorbed, PRECISION, columns, MODELS, SESSION, CONDITION).fit(residuals(3))
+    for table in (fits.gain, fits.weights):
+        assert np.isfinite(table).all()
+    price = math.log(len(SESSION) * OUTPUTS)
+    for place, further in itertools.product(range(PLACES), (1, 2)):
+        alone, repeated = (MODELS.index((place, chosen)) for chosen in ((0,), (0, further)))
+        assert (fits.gain[:, repeated] <= fits.gain[:, alone] - price + 0.2).all()
