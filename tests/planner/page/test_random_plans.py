@@ -22,6 +22,7 @@ from tests.planner.page.test_plan import ERRORS, planned, planning_call
 
 COUNT = 200
 AT_ONCE = 10  # plans of one process
+ALIKE = 1e-8  # of lengths, times and angles of plans, which amplify balances that are solved to 2e-12
 FIRM = 1e-10  # by which Python's own plan may move when its input changes by BIT
 BIT = 1e-15
 MOST_LOOSE = 0.05  # share of plans that turn on the last bit
@@ -121,8 +122,8 @@ def test_random_plans() -> None:
         cases = [random_case(seed) for seed in range(start, min(start + AT_ONCE, COUNT))]
         results += [compare(case, found) for case, found in zip(cases, planned(cases), strict=True)]
     differences, moves = np.array(results).T
-    loose = (moves >= FIRM) & (differences > EXACT)
+    loose = (moves >= FIRM) & (differences > ALIKE)
     print(f"{loose.sum()} of {COUNT} turn on the last bit; there the programs differ by {differences[loose]}")
-    assert (differences[moves < FIRM] <= EXACT).all(), np.flatnonzero((moves < FIRM) & (differences > EXACT))
+    assert (differences[moves < FIRM] <= ALIKE).all(), np.flatnonzero((moves < FIRM) & (differences > ALIKE))
     assert loose.mean() <= MOST_LOOSE
     check_reading(np.flatnonzero(loose).tolist())
