@@ -6,15 +6,16 @@ A `Place` is one of
   that are odd in the direction of the motor are among them if the runs have both directions;
 - a side force at one place on the axis, along the tails or along the head. How far ahead of the disc it acts, its
   lever λ, is fitted, too;
-- an effect on the tails: spin drag, splay, sag, and drag that depends on the local speed or on the place along the
-  tail (`sim.model.scaled_effect`);
+- an effect on the tails: spin drag, splay, sag, natural curvature along the circle of the clamps, which is odd, and
+  drag that depends on the local speed or on the place along the tail (`sim.model.scaled_effect`);
 - a coefficient of the head, the drag of the tails, or their stiffness: a factor, which is 1 without a law.
 
 The first three are terms of a size ε. Each is multiplied by m = (ω/ω_m)^p (l/l_m)^q (N/N_m)^r, with ω_m, l_m and
 N_m the geometric means of the runs, and by factors of noted inputs (`calibration.laws.inputs`).
 
 The drag of the tails is that of a more viscous fluid around the tails alone: the viscosity times m, and the
-coefficients of the head divided by m. A side force F_x with a lever is F_x at the disc and the couple
+coefficients of the head divided by m. The stiffness stands for a viscosity of the whole fluid, too: the motion at a
+given speed of the motor depends on their ratio alone, so that no run tells stiffer tails from a thinner fluid. A side force F_x with a lever is F_x at the disc and the couple
 M_y = λ l F_x or λ L F_x.
 """
 
@@ -56,11 +57,13 @@ _COEFFICIENT_WORDS = {
     "Cr": "the spin-drag coefficient C_r of the head",
     "Cyr": "the side-force coefficient C_yr of the head",
 }
+_STIFFNESS_WORDS = "the stiffness of the tails over the viscosity of the fluid"
 _LEVER_WORDS = {"l": "a side force behind the disc", "L": "a side force ahead of the disc"}
 _TAIL_EFFECTS = {
     "tail_spin_drag": "drag on the tails' own spin",
     "natural_splay": "a natural curvature of the tails away from the axis",
     "tail_sag": "a steady load on the tails across the axis",
+    "natural_curvature": "a natural curvature of the tails along the circle of the clamps",
     "tail_drag_by_speed": "drag of the tails by a power of their local speed",
     "tail_drag_along": "drag that grows along the tails",
 }
@@ -108,7 +111,7 @@ class Place:
                 self.wrench, self.motion, powers, rectified=rectified, lever=ahead, lever_unit=self.lever_unit
             )
         if self.is_term:
-            return scaled_effect(LOCAL_DRAG.get(self.name) or catalogue()[self.name], powers)
+            return scaled_effect(_effect_on_tails(self.name), powers)
         return factor_law(self.name, powers)
 
 
@@ -153,8 +156,8 @@ def places(*, both_directions: bool = True) -> tuple[Place, ...]:
         *loads,
         *coefficients,
         Place(drag_of_tails, "the drag of the tails", drag, "tails", is_term=False),
-        Place(stiffness, "the stiffness of the tails", (("youngs_modulus", 1),), "tails", is_term=False),
-        *map(_tail_effect, (*SCALED, *LOCAL_DRAG)),
+        Place(stiffness, _STIFFNESS_WORDS, (("youngs_modulus", 1),), "tails", is_term=False),
+        *(_tail_effect(effect) for effect in _effects_on_tails() if both_directions or effect.symmetry == "even"),
         *elsewhere,
         *odd,
     )
@@ -181,7 +184,18 @@ def _load(wrench: str, motion: str, *, odd: bool, lever_unit: str = "") -> Place
     )
 
 
-def _tail_effect(name: str) -> Place:
+def _effects_on_tails() -> list[Effect]:
+    """List the effects on the tails that a law multiplies."""
+    return [_effect_on_tails(name) for name in (*SCALED, *LOCAL_DRAG)]
+
+
+def _effect_on_tails(name: str) -> Effect:
+    """Return an effect of SCALED or LOCAL_DRAG."""
+    return LOCAL_DRAG.get(name) or catalogue()[name]
+
+
+def _tail_effect(effect: Effect) -> Place:
     """Make the place of an effect on the tails."""
-    effect = scaled_effect(LOCAL_DRAG.get(name) or catalogue()[name], Powers())
-    return Place(name, _TAIL_EFFECTS[name], ((effect.name, 1),), "tails")
+    law = scaled_effect(effect, Powers())
+    odd = effect.symmetry == "odd"
+    return Place(effect.name, _TAIL_EFFECTS[effect.name], ((law.name, 1),), "tails", odd=odd)

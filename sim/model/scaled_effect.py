@@ -29,7 +29,7 @@ from sim.model.effect import Effect, Factors
 from sim.model.groups import Groups
 from sim.model.power_law import Powers
 
-SCALED = ("tail_spin_drag", "natural_splay", "tail_sag")  # effects of the catalogue
+SCALED = ("tail_spin_drag", "natural_splay", "tail_sag", "natural_curvature")  # effects of the catalogue
 _WIDER = 20.0  # bounds of a law over those of its effect
 _LAW = re.compile("law_([a-z_]+)_" + Powers.PATTERN, re.ASCII)
 

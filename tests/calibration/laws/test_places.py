@@ -28,7 +28,7 @@ def test_what_they_have_in_common_is_said(names: tuple[str, ...], said: str) -> 
 
 def test_places_have_names_of_their_own() -> None:
     names = [place.name for place in places()]
-    assert len(set(names)) == len(names) == 60
+    assert len(set(names)) == len(names) == 61
     assert len(places(both_directions=False)) == 40
     with pytest.raises(KeyError):
         place_named("no such place")

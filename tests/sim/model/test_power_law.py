@@ -93,6 +93,18 @@ def test_stiffness_of_the_tails_is_a_slower_motor_in_its_unit_of_time() -> None:
         assert factor * float(getattr(other, output)[0]) == pytest.approx(float(getattr(one, output)[0]), rel=1e-9)
 
 
+def test_no_run_tells_stiffer_tails_from_a_thinner_fluid() -> None:
+    """Drag of head and tails that grows with speed is less stiffness at the same speed."""
+    law = factor_law("tail_stiffness", Powers(speed=-0.42))
+    softer = with_law(law.name, 1.0, N=3, omega_bar=20.0)
+    drag = 1 / float(np.exp(law.powers.logarithm(softer)[0]))  # type: ignore[attr-defined]
+    slow = float(np.exp(Powers(speed=1.0).logarithm(softer)[0]))  # ω/ω_control
+    denser = with_law("inertia", (drag - 1) / slow, N=3, omega_bar=20.0)
+    for output in OUTPUTS:
+        one, other = getattr(steady(softer), output), getattr(steady(denser), output)
+        assert float(one[0]) == pytest.approx(float(other[0]), rel=1e-12)
+
+
 def test_the_power_law_is_in_motor_speed_and_not_in_its_group() -> None:
     """Of one material and fluid, a tail twice as long at the same speed in rad/s has 16 times the ω̄."""
     short = control(omega_bar=10.0)
