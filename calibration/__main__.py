@@ -31,28 +31,35 @@ main = program.main
     argument(
         "--path",
         action="append",
-        default=[],
         metavar="PATH",
-        help="a path, as for softflagella plan, such as square:3 in tail lengths, on which the error is stated "
-        "before and after; may be given again. It takes some seconds of processor time, up to two minutes where "
-        "the parts of the robot move in each other's flow or touch",
+        help="a path, as for softflagella plan, on which the error is stated before and after (default: square:3, in "
+        "tail lengths); may be given again",
+    ),
+    argument(
+        "--no-path",
+        action="store_true",
+        help="state no error on a path, which takes some seconds, up to two minutes where the parts of the robot move "
+        "in each other's flow or touch",
     ),
     JOBS,
     aliases=("close",),
 )
 def _calibrate(arguments: Namespace) -> None:
+    from calibration.report.path_error import DEFAULT_PATHS
     from calibration.report.robot_verdict import calibrate_robot
     from calibration.swimmer.possible_runs import owned
     from sim.inputs import load_robot
 
     own = owned(arguments.own)
+    if arguments.no_path and arguments.path:
+        raise InputError("--path and --no-path exclude each other")
     result = calibrate_robot(
         arguments.table,
         load_robot(arguments.robot),
         protocol=arguments.protocol,
         own=own,
         laws=not arguments.no_laws,
-        paths=arguments.path,
+        paths=() if arguments.no_path else arguments.path or DEFAULT_PATHS,
         seed=arguments.seed,
         jobs=arguments.jobs,
         tell=lambda line: print(line, file=sys.stderr),

@@ -43,6 +43,7 @@ from surrogate.one_robot.tabulate import tabulate
 
 Model = Literal["as_given", "corrected"]
 WORDS: dict[Model, str] = {"as_given": "the robot as given", "corrected": "the corrected robot"}
+DEFAULT_PATHS = ("square:3",)  # of the command
 _INTERVAL = (0.025, 0.975)
 
 

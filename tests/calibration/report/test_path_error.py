@@ -146,19 +146,23 @@ def test_a_verdict_and_its_report_have_the_error_on_a_path(tmp_path: Path) -> No
 
 
 @pytest.mark.usefixtures("toy_model", "few_candidates")
-def test_the_command_states_it_where_it_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_states_it_on_a_square_or_the_paths_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     from calibration.__main__ import main
 
     toy_table(3, lengths_cm=(6.0, 9.0)).to_csv(tmp_path / "t.csv", index=False)
     words = ["calibrate", str(tmp_path / "t.csv"), "--robot", "paper-measured", "--out", str(tmp_path / "out")]
-    assert run_command(main, [*words, "--path", "squre:3"]) == 2
-    assert not (tmp_path / "out").exists()
+    for refused in (["--path", "squre:3"], ["--path", "circle:2", "--no-path"]):
+        assert run_command(main, [*words, *refused]) == 2
+        assert not (tmp_path / "out").exists()
     capsys.readouterr()
-    assert run_command(main, words) == 0
+    assert run_command(main, [*words, "--no-path"]) == 0
     assert "on the path" not in capsys.readouterr().out
     assert json.loads((tmp_path / "out" / "verdict.json").read_text())["path"] is None
-    paths = ["square:3", "circle:2"]
-    assert run_command(main, [*words, "--path", paths[0], "--path", paths[1]]) == 0
-    printed = capsys.readouterr().out
-    assert all(f"on the path {path}: planned with the robot as given" in printed for path in paths)
-    assert set(json.loads((tmp_path / "out" / "verdict.json").read_text())["path"]) == set(paths)
+    both = ["--path", "square:3", "--path", "circle:2"]
+    for options, paths in (([], {"square:3"}), (both, {"square:3", "circle:2"})):
+        assert run_command(main, [*words, *options]) == 0
+        printed = capsys.readouterr().out
+        assert all(f"on the path {path}: planned with the robot as given" in printed for path in paths)
+        assert set(json.loads((tmp_path / "out" / "verdict.json").read_text())["path"]) == paths
