@@ -19,8 +19,9 @@ import numpy as np
 
 from calibration.attribution.refits import session_gain
 from calibration.laws.curves import Curve
-from calibration.laws.inputs import EXPONENTS, noted_in_words, parameter_of
+from calibration.laws.inputs import EXPONENTS, logarithms, noted_in_words, parameter_of
 from calibration.laws.law_model import LEVER, SIZE, LawModel
+from calibration.laws.motion_readings import motion_patterns
 from calibration.laws.places import Place
 from calibration.laws.readings import INPUTS, in_words
 from calibration.laws.search import Ranked
@@ -68,6 +69,7 @@ class Law:
             np.array([self.fit.parameters[EXPONENTS[i]] for i in chosen]),
             self.fit.covariance[np.ix_(at, at)],
             [self.fit.interval(EXPONENTS[i]) for i in chosen],
+            motion_patterns(logarithms(self.model.runs), self.model.runs.outputs, self.fit.prediction),
         )
         noted = [name for name in self.model.noted if parameter_of(name) in self.fit.names]
         values = [self.fit.parameters[parameter_of(name)] for name in noted]

@@ -4,14 +4,18 @@ A pattern of exponents p of (ω, l, N), with covariance V, agrees with a power s
 
     χ² = (p − s g)ᵀ V⁻¹ (p − s g),   s = gᵀ V⁻¹ p/gᵀ V⁻¹ g,
 
-is below the 95 % quantile of χ² with one degree of freedom less than there are exponents. So ω^0.1 l^0.4 is ω̄^0.1.
+is below the 95 % quantile of χ² with one degree of freedom less than there are exponents. So ω^0.1 l^0.4 is ω̄^0.1. The
+quantity may also be one of the robot's motion (`calibration.laws.motion_readings`), which is named if it is nearer than
+all of these.
 Source: Wald (1943) for the test.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from scipy.stats import chi2
@@ -36,7 +40,7 @@ _INTERVAL = 1.96
 class Reading:
     """A power of one quantity with which the exponents of a law agree."""
 
-    symbol: str  # of QUANTITIES
+    symbol: str  # of QUANTITIES, or of the motion
     power: float  # s
     error: float  # one standard deviation
     chi2: float
@@ -53,18 +57,24 @@ class Reading:
         return f"{self.symbol}^{self.power:.2f} ({low:.2f} to {high:.2f})"
 
 
-def readings(inputs: Sequence[str], exponents: Floats, covariance: Floats) -> list[Reading]:
+def readings(
+    inputs: Sequence[str],
+    exponents: Floats,
+    covariance: Floats,
+    quantities: Mapping[str, tuple[float, float, float]] = QUANTITIES,
+) -> list[Reading]:
     """List the powers of one quantity that agree with exponents, the nearest first.
 
     Args:
         inputs: of INPUTS, q of them that differ between the runs.
         exponents: (q,)
         covariance: (q, q) of them.
+        quantities: symbol -> exponents of INPUTS.
     """
     precision = np.linalg.inv(covariance)
     limit = float(chi2.ppf(_AGREES, max(len(inputs) - 1, 1)))
     agreeing = []
-    for symbol, pattern in QUANTITIES.items():
+    for symbol, pattern in quantities.items():
         g = np.array([pattern[INPUTS.index(name)] for name in inputs])
         of_varied = {name for name, power in zip(INPUTS, pattern, strict=True) if power}
         if not of_varied <= set(inputs):
@@ -80,21 +90,28 @@ def readings(inputs: Sequence[str], exponents: Floats, covariance: Floats) -> li
 
 
 def in_words(
-    inputs: Sequence[str], exponents: Floats, covariance: Floats, intervals: Sequence[Sequence[float]]
+    inputs: Sequence[str],
+    exponents: Floats,
+    covariance: Floats,
+    intervals: Sequence[Sequence[float]],
+    of_motion: Mapping[str, tuple[float, float, float]] = MappingProxyType({}),
 ) -> str:
     """Say on which inputs a law depends; empty if no input differs between the runs.
 
     Args:
         intervals: (q, 2), 95 % of the exponents.
+        of_motion: quantities of the motion, symbol -> exponents of INPUTS.
     """
     if not inputs:
         return ""
     agreeing = readings(inputs, exponents, covariance)
+    nearest = agreeing[0].chi2 if agreeing else math.inf
+    moving = readings(inputs, exponents, covariance, of_motion)
+    as_well = [reading.words for reading in moving if reading.chi2 < nearest]
     if agreeing:
         first, *others = agreeing
         said = f"in proportion to {first.words}"
-        if others:
-            said += f", or as well to {_listed([reading.words for reading in others], 'or')}"
+        as_well = [*(reading.words for reading in others), *as_well]
         absent = [name for name in inputs if not _occurs(name, agreeing)]
     else:
         present = [not low <= 0.0 <= high for low, high in intervals]
@@ -105,6 +122,8 @@ def in_words(
         ]
         said = f"in proportion to {' '.join(factors)}" if factors else ""
         absent = [name for name, there in zip(inputs, present, strict=True) if not there]
+    if said and as_well:
+        said += f", or as well to {_listed(as_well, 'or')}"
     independent = f"independent of {_listed(absent, 'and')} within the intervals" if absent else ""
     return ", ".join(filter(None, (said, independent)))
 

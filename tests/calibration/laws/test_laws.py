@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -150,3 +152,26 @@ def test_files_of_a_law_are_read_back(tmp_path) -> None:  # type: ignore[no-unty
     robot = load_robot(tmp_path / "law.toml")
     assert robot == law_handed_on(START, described.laws.kept[0], described.study.split.kept)[0]
     assert SIZE.removeprefix("law_") in described.to_frame().columns
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_a_factor_in_the_speed_of_the_robot_is_read_from_the_inputs() -> None:
+    """C_yr ∝ |v|^−0.5, which no law of the search states; each run has the C_yr of its own speed."""
+    parts = []
+    for seed, (tails, length, speed) in enumerate(product((2, 3, 4, 5), (5.0, 7.0, 9.0, 11.0), (100.0, 150.0))):
+        cell = {"tails": (tails,), "lengths_cm": (length,), "motor_rpm": (speed,), "title": ""}
+        robot = TRUTH
+        for _ in range(20):
+            still = make_table(robot, seed=0, noise=0.0, session_noise=0.0, **cell).iloc[0]
+            swims = abs(still["omega_yr_rad_s"]) * still["R_yr_cm"]
+            robot = replace(TRUTH, C_yr=TRUTH.C_yr * float(swims / 4.0) ** -0.5)
+        parts.append(make_table(robot, seed=100 + seed, session_noise=0.0, **cell))
+    table = pd.concat(parts, ignore_index=True)
+    table["run"] = np.arange(len(table))
+    described = find_robot_laws(table, START, progress=False)
+    assert described.laws is not None
+    law = next(law for law in described.laws.kept if law.place.name == "Cyr")
+    power = re.search(r"\|v\|\^(-[\d.]+) \((-[\d.]+) to (-[\d.]+)\)", law.words)
+    assert power is not None
+    _, low, high = map(float, power.groups())
+    assert low < -0.5 < high
