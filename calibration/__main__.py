@@ -32,14 +32,14 @@ main = program.main
         "--path",
         action="append",
         metavar="PATH",
-        help="a path, as for softflagella plan, on which the error is stated before and after (default: square:3, in "
-        "tail lengths); may be given again",
+        help="a path, as for softflagella plan, on which the error is stated before and after (default: square:3, "
+        "in tail lengths); may be given again",
     ),
     argument(
         "--no-path",
         action="store_true",
-        help="state no error on a path, which takes some seconds, up to two minutes where the parts of the robot move "
-        "in each other's flow or touch",
+        help="state no error on a path, which takes some seconds, up to two minutes where the parts of the robot "
+        "move in each other's flow or touch",
     ),
     JOBS,
     aliases=("close",),

@@ -9,7 +9,8 @@ Tables of 192 runs at four motor speeds (truth on a finer mesh and step, 2.5 % n
     tail load    a steady force per length on the tails along the axis, times a power law
 
 with λ = 16 or 32 (`benchmarks.calibration.law_truths`). A place is wrong if it is true for nothing of the truth;
-for a resonance the place of its term is right. A wrong place is named confidently if no other is named beside it.
+for a resonance the place of its term is right, for a load on the tails along the axis every force along the axis.
+A wrong place is named confidently if no other is named beside it.
 FILE keeps the records, and those that it has are not made again.
 
 Usage: python -m benchmarks foreign_laws [TABLES] [FIRST_SEED] [FILE]
@@ -127,7 +128,8 @@ def foreign(setting: Setting, seed: int) -> tuple[str, float, list[str], pd.Data
             model = SwimmerModel(ROBOT, setting.model.runs)
             slope = model.derivatives({**setting.base.parameters, effect.name: 0.0}, [effect.name])[1][..., 0]
             robot = replace(ROBOT, effects={effect.name: sign[0] * score / setting.score(slope)})
-            return kind, score, [], make_table(robot, seed=seed, title="", **design)
+            along = [place.name for place in terms if place.wrench == "Fz"]
+            return kind, score, along, make_table(robot, seed=seed, title="", **design)
     factor = _factor(kind, setting, rng)
     size = sign[0] * score / setting.score(setting.slope(chosen[0]) * factor[:, None])
     return kind, score, [chosen[0].name], with_noise(_exact(setting, chosen[0], size * factor), seed)

@@ -99,7 +99,7 @@ class HiddenLaw:
 
 def head_places() -> list[Place]:
     """List the places at the disc that are even in the direction of the motor."""
-    at_disc = [place for place in places(both_directions=False) if place.part == "head" and not place.lever_unit]
+    at_disc = [place for place in places(both_directions=False) if place.part != "tails" and not place.lever_unit]
     assert all(place.is_term or place.name in COEFFICIENTS for place in at_disc)
     return at_disc
 
@@ -111,7 +111,7 @@ def hidden_law(setting: Setting, seed: int, *, nothing: bool, scores: Sequence[f
     tails.
     """
     rng = np.random.default_rng(seed)
-    kinds = [place.part == "head" and not place.lever_unit for place in places()]
+    kinds = [place.part != "tails" and not place.lever_unit for place in places()]
     at_disc = bool(rng.integers(2))
     drawn = [place for place, of_head in zip(places(), kinds, strict=True) if of_head == at_disc]
     place = drawn[rng.integers(len(drawn))]
@@ -149,6 +149,7 @@ def record_of(described: RobotLaws) -> dict[str, Any]:
         "p_value": described.p_value,
         "complete": bool(laws and laws.complete),
         "kept": [law.place.name for law in kept],
+        "elsewhere": [one.place.name for law in kept for one in law.elsewhere],
         "words": kept[0].words if kept else "",
         "left": kept[0].p_value if kept else math.nan,
         "before": described.error_without / described.noise,

@@ -7,6 +7,9 @@ noise starts a second time, from the model as given. A law is kept if
 - the interval of at least one of its numbers excludes the null, and that of its lever, if it has one, excludes 0,
   and
 - it predicts left-out sessions better, by more than the uncertainty of that gain.
+
+A lever is a part of the place, as the component of a force is. So laws are told apart by their gain in BIC without
+the price of the lever.
 """
 
 from __future__ import annotations
@@ -32,6 +35,8 @@ from calibration.statistics.study import Study
 from calibration.swimmer.swimmer import SwimmerModel
 from sim.io.errors import InputError
 
+NO_SESSIONS = "does not predict left-out sessions better"
+NO_LEVER = "its lever is not told from none: a side force at the disc"  # unless that one fits worse
 _LARGEST_AT_START = 50.0  # size of a term
 _RPM = 30 / math.pi
 _DRAWS = 400  # of the bootstrap, for the residual that a law leaves
@@ -46,6 +51,7 @@ class Law:
     model: LawModel
     fit: Fit
     gain: float  # BIC of the model without a law less that with it
+    gain_at_lever: float  # the same without the price of its lever, if it has one
     session_gain: tuple[float, float]  # in log likelihood over left-out sessions, and its standard error
     p_value: float  # of the residual that it leaves
     error: float  # relative rms on the held-out runs
@@ -53,6 +59,7 @@ class Law:
     reason: str  # why it is not kept; empty if it is
     gain_with_curve: float = -math.inf  # gain with free factors along the best input, linearised
     curves: tuple[Curve, ...] = ()  # along each input; of the best law, and of the best with a curve
+    elsewhere: tuple[Law, ...] = ()  # of a side force at the disc: the same with a lever that is not told from 0
 
     @property
     def numbers(self) -> int:
@@ -78,11 +85,21 @@ class Law:
 
     @property
     def where(self) -> str:
-        """Where on the axis a side force with a lever acts, in words; empty if it has none."""
+        """Where on the axis a side force acts, in words; empty for what has no lever."""
+        if self.elsewhere:
+            return f"at the disc or up to {' and '.join(law.farthest for law in self.elsewhere)} it"
         if LEVER not in self.fit.names:
             return ""
-        low, high = sorted(map(abs, self.fit.interval(LEVER)))
-        return f"at {abs(self.fit.parameters[LEVER]):.2f} {self.place.lever_unit} ({low:.2f} to {high:.2f})"
+        away = -1 if self.place.lever_unit == "l" else 1
+        low, high = sorted(away * end for end in self.fit.interval(LEVER))
+        return f"at {away * self.fit.parameters[LEVER]:.2f} {self.place.lever_unit} ({low:.2f} to {high:.2f})"
+
+    @property
+    def farthest(self) -> str:
+        """How far from the disc a side force may act, by the interval of its lever."""
+        unit = self.place.lever_unit
+        low, high = np.clip(self.fit.interval(LEVER), *self.place.lever_bounds)
+        return f"{-low:.2f} l behind" if unit == "l" else f"{high:.2f} {unit} ahead of"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the law as laws.json has it; `size` is at the geometric mean of the runs."""
@@ -144,9 +161,9 @@ def fitted_law(
     elif all(_includes(refit.interval(name), 0.0) for name in names if name != LEVER):
         reason = "the intervals of all its numbers include the null"
     elif LEVER in names and _includes(refit.interval(LEVER), 0.0):
-        reason = "its lever is not told from none: a side force at the disc"
-    elif predictive[0] <= predictive[1]:
-        reason = "does not predict left-out sessions better"
+        reason = NO_LEVER
+    else:
+        reason = _of_sessions(predictive)
     again = replace(study, model=with_law, seed=study.seed + 1)
     none = Directions.plain(np.empty((*data.y.shape, 0)))
     return Law(
@@ -155,12 +172,23 @@ def fitted_law(
         model=with_law,
         fit=refit,
         gain=gain,
+        gain_at_lever=gain + (math.log(study.values) if LEVER in names else 0.0),
         session_gain=predictive,
         p_value=examine_residual(again, refit, none, draws=_DRAWS).general_p,
         error=errors(data, refit.prediction, study.split.test)[0],
         error_interval=error_interval(data, refit.prediction, study.split.test, study.seed),
         reason=reason,
     )
+
+
+def _of_sessions(gain: tuple[float, float]) -> str:
+    """Say whether a law fails to predict left-out sessions better."""
+    return NO_SESSIONS if gain[0] <= gain[1] else ""
+
+
+def with_a_lever(law: Law) -> Law:
+    """Return a law whose interval of the lever includes 0, after the same force at the disc has fitted worse."""
+    return replace(law, reason=_of_sessions(law.session_gain))
 
 
 def _includes(interval: tuple[float, float], value: float) -> bool:

@@ -28,7 +28,7 @@ from calibration.attribution.refits import INDISTINGUISHABLE
 from calibration.laws.curves import find_curves, said_of
 from calibration.laws.group_factors import gain_of_a_curve
 from calibration.laws.inputs import EXPONENTS
-from calibration.laws.law import Law, fitted_law
+from calibration.laws.law import NO_LEVER, NO_SESSIONS, Law, fitted_law, with_a_lever
 from calibration.laws.law_model import SIZE
 from calibration.laws.places import in_common, places
 from calibration.laws.search import Ranked, search
@@ -57,9 +57,17 @@ class Laws:
 
     @property
     def kept(self) -> tuple[Law, ...]:
-        """Laws that the runs cannot tell from the best one, best first."""
+        """Laws that the runs cannot tell from the best one, best first.
+
+        Those that would be the best one if they predicted left-out sessions better are among them: they fit the
+        runs at least as well.
+        """
         kept = _kept(self.fitted)
-        return tuple(law for law in kept if kept[0].gain - law.gain < INDISTINGUISHABLE)
+        if not kept:
+            return ()
+        near = [law for law in kept if kept[0].gain_at_lever - law.gain_at_lever < INDISTINGUISHABLE]
+        unconfirmed = [law for law in self.fitted if law.reason == NO_SESSIONS and law.gain >= kept[0].gain]
+        return (*near, *unconfirmed)
 
     @property
     def complete(self) -> bool:
@@ -123,7 +131,7 @@ class Laws:
                 f"({self._search})."
             )
         rivals = "; or ".join(law.words for law in self.kept)
-        shared = in_common([law.place for law in self.kept])
+        shared = in_common([one.place for law in self.kept for one in (law, *law.elsewhere)])
         agree = f" All of them {shared}." if shared else ""
         return f"The residual is described by {rivals}: these runs cannot tell them apart ({self._search}).{agree}"
 
@@ -155,7 +163,7 @@ class Laws:
         laws = self._as_good_as(claim)
         if not laws:
             return "No law of the places that were searched describes it as well."
-        shared = in_common([law.place for law in laws]) if len(laws) > 1 else ""
+        shared = in_common([one.place for law in laws for one in (law, *law.elsewhere)]) if len(laws) > 1 else ""
         agree = f" All of them {shared}." if shared else ""
         named = "; or by ".join(law.words for law in laws[:_NAMED])
         others = len(laws) - _NAMED
@@ -223,6 +231,7 @@ def find_laws(study: Study, base: Fit, *, beside_claim: bool = False) -> Laws:
     kept = _kept(laws)
     if not beside_claim and (not kept or kept[0].p_value < study.level / 2):
         laws += _fit_all(study, model, base, [one for one in ranked if one.gain > 0 and one not in likely])
+    laws = _with_levers(study, model, base, laws, ranked, chosen_alone=beside_claim)
     if not beside_claim:
         laws = _with_curves(study, laws)
     return Laws(base, tuple(ranked), tuple(sorted(laws, key=lambda law: -law.gain)), selection, study.level)
@@ -238,6 +247,32 @@ def _fit_all(
     """
     bar = tqdm(likely, desc="laws", unit="law", delay=1.0, disable=not study.progress)
     return [law for one in bar if (law := fitted_law(study, model, base, one, chosen_alone=chosen_alone))]
+
+
+def _with_levers(
+    study: Study, model: SwimmerModel, base: Fit, laws: list[Law], ranked: Sequence[Ranked], *, chosen_alone: bool
+) -> list[Law]:
+    """Compare side forces at the disc with the same ones elsewhere.
+
+    A lever that the interval does not tell from none is told from it if the same force at the disc fits worse. A
+    force that is kept at the disc says how far from it it may act.
+    """
+    fitted = {law.place.name: law for law in laws}
+    wanted = {name for law in _kept(laws) for name in law.place.elsewhere}
+    wanted |= {law.place.at_disc for law in laws if law.reason == NO_LEVER}
+    missing = [one for one in ranked if one.place.name in wanted - set(fitted)]
+    fitted |= {law.place.name: law for law in _fit_all(study, model, base, missing, chosen_alone=chosen_alone)}
+    for name, law in fitted.items():
+        at_disc = fitted.get(law.place.at_disc)
+        if law.reason == NO_LEVER and at_disc and law.gain_at_lever - at_disc.gain > INDISTINGUISHABLE:
+            fitted[name] = with_a_lever(law)
+    return [
+        replace(law, elsewhere=tuple(
+            fitted[name] for name in law.place.elsewhere if name in fitted and fitted[name].reason == NO_LEVER
+        ))
+        if not law.reason else law
+        for law in fitted.values()
+    ]  # fmt: skip
 
 
 def _with_curves(study: Study, laws: Sequence[Law]) -> list[Law]:

@@ -43,7 +43,7 @@ from sim.model.power_law import STEEPEST, Powers
 from sim.model.robot import Robot
 
 SIZE, LEVER = "law_size", "law_lever"
-_LARGEST = 200.0  # size of a term
+_LARGEST = 2000.0  # size of a term
 
 
 def lever_arm(robot: Robot, unit: str) -> float:

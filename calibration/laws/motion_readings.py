@@ -1,7 +1,7 @@
-"""Powers of the robot's own motion with which the exponents of a law agree: of its speed, its spins or its yaw rate.
+"""Powers of the robot's own motion with which the exponents of a law agree: of its speed, spins or yaw rate.
 
-A robot's speed |v| follows its motor speed, tail length and number of tails nearly as a power law, over the runs of a
-table:
+A robot's speed |v| follows its motor speed, tail length and number of tails nearly as a power law, over the runs
+of a table:
 
     ln |v| ≈ c + g₁ ln ω + g₂ ln l + g₃ ln N,
 

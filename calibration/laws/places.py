@@ -6,17 +6,17 @@ A `Place` is one of
   that are odd in the direction of the motor are among them if the runs have both directions;
 - a side force at one place on the axis, along the tails or along the head. How far ahead of the disc it acts, its
   lever λ, is fitted, too;
-- an effect on the tails: spin drag, splay, sag, natural curvature along the circle of the clamps, which is odd, and
-  drag that depends on the local speed or on the place along the tail (`sim.model.scaled_effect`);
+- an effect on the tails: spin drag, splay, sag, natural curvature along the circle of the clamps, which is odd,
+  and drag that depends on the local speed or on the place along the tail (`sim.model.scaled_effect`);
 - a coefficient of the head, the drag of the tails, or their stiffness: a factor, which is 1 without a law.
 
 The first three are terms of a size ε. Each is multiplied by m = (ω/ω_m)^p (l/l_m)^q (N/N_m)^r, with ω_m, l_m and
 N_m the geometric means of the runs, and by factors of noted inputs (`calibration.laws.inputs`).
 
 The drag of the tails is that of a more viscous fluid around the tails alone: the viscosity times m, and the
-coefficients of the head divided by m. The stiffness stands for a viscosity of the whole fluid, too: the motion at a
-given speed of the motor depends on their ratio alone, so that no run tells stiffer tails from a thinner fluid. A side force F_x with a lever is F_x at the disc and the couple
-M_y = λ l F_x or λ L F_x.
+coefficients of the head divided by m. The stiffness stands for the viscosity of the whole fluid, too: the motion
+at a given speed of the motor depends on their ratio alone, and no run tells stiffer tails from a thinner fluid.
+A side force F_x with a lever is F_x at the disc and the couple M_y = λ l F_x or λ L F_x.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from sim.model.scaled_effect import LOCAL_DRAG, SCALED, scaled_effect
 
 _WRENCH_WORDS = {
     "Fx": "a side force on the head",
-    "Fz": "a force along the axis on the head",
+    "Fz": "a force along the axis",
     "My": "a couple on the head about the vertical",
     "Mz": "a couple on the head about its axis",
 }
@@ -85,7 +85,9 @@ class Place:
     name: str  # in files
     words: str
     moves: tuple[tuple[str, int], ...]  # parameters of the model that it multiplies by m to a power, and terms
-    part: str = "head"  # of the robot on which it acts: "head" or "tails"
+    part: str = (
+        "head"  # on which it acts: "head", "tails", or the "robot", which a force along the axis moves as a whole
+    )
     is_term: bool = True  # of a size of its own, and not a factor
     wrench: str = ""  # of WRENCHES, of a load at one place
     motion: str = ""  # of MOTIONS, of a load at one place
@@ -96,6 +98,17 @@ class Place:
     def levers(self) -> tuple[float, ...]:
         """Levers λ with which the place is ranked; one that means nothing if it has none."""
         return _RANKED_LEVERS.get(self.lever_unit, (0.0,))
+
+    @property
+    def elsewhere(self) -> tuple[str, ...]:
+        """Names of the places where a side force at the disc has a lever; none for all other places."""
+        levered = self.wrench == "Fx" and not self.odd and not self.lever_unit
+        return tuple(f"{self.name}_at_{unit}" for unit in LEVERS) if levered else ()
+
+    @property
+    def at_disc(self) -> str:
+        """Name of the place of the same side force at the disc, of one that has a lever."""
+        return f"{self.wrench}_{self.motion}"
 
     @property
     def lever_bounds(self) -> tuple[float, float]:
@@ -176,7 +189,7 @@ def _load(wrench: str, motion: str, *, odd: bool, lever_unit: str = "") -> Place
         f"{wrench}_{motion}{_ODD if odd else ''}{f'_at_{lever_unit}' if lever_unit else ''}",
         f"{words} that is driven by {_MOTION_WORDS[motion]}{sides}",
         tuple(moves),
-        part="tails" if lever_unit == "l" else "head",
+        part="tails" if lever_unit == "l" else "robot" if wrench == "Fz" else "head",
         wrench=wrench,
         motion=motion,
         odd=odd,

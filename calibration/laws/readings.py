@@ -4,9 +4,9 @@ A pattern of exponents p of (ω, l, N), with covariance V, agrees with a power s
 
     χ² = (p − s g)ᵀ V⁻¹ (p − s g),   s = gᵀ V⁻¹ p/gᵀ V⁻¹ g,
 
-is below the 95 % quantile of χ² with one degree of freedom less than there are exponents. So ω^0.1 l^0.4 is ω̄^0.1. The
-quantity may also be one of the robot's motion (`calibration.laws.motion_readings`), which is named if it is nearer than
-all of these.
+is below the 95 % quantile of χ² with one degree of freedom less than there are exponents. So ω^0.1 l^0.4 is
+ω̄^0.1. The quantity may also be one of the robot's motion (`calibration.laws.motion_readings`), which is named if
+it is nearer than all of these.
 Source: Wald (1943) for the test.
 """
 

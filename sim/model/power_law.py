@@ -208,7 +208,7 @@ def force_law(
         source="a power law, from measured runs",
         unit=unit,
         null=0.0,
-        bounds=(-500.0, 500.0),
+        bounds=(-5000.0, 5000.0),
         typical=0.5,
         symmetry="even" if turned != mirrored else "odd",
         dissipative=False,

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from calibration.laws.inputs import EXPONENTS
+from calibration.laws.law import NO_LEVER, NO_SESSIONS, Law
 from calibration.laws.law_model import LEVER, SIZE, LawModel, with_law
 from calibration.laws.places import Place, places
 from calibration.report.law_robot import law_handed_on, robot_with_law
@@ -175,3 +176,35 @@ def test_a_factor_in_the_speed_of_the_robot_is_read_from_the_inputs() -> None:
     assert power is not None
     _, low, high = map(float, power.groups())
     assert low < -0.5 < high
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_a_side_force_at_the_disc_says_how_far_from_it_it_may_act() -> None:
+    table = make_table(replace(TRUTH, effects={"law_Fx_wt_speed0_length0_tails1000": 4.0}), seed=5, title="")
+    laws = find_robot_laws(table, START, progress=False).laws
+    assert laws is not None
+    law = next(law for law in laws.kept if law.place.name == "Fx_wt")
+    (behind,) = (one for one in law.elsewhere if one.place.name == "Fx_wt_at_l")
+    assert behind.reason == NO_LEVER
+    low, high = behind.fit.interval(LEVER)
+    assert low < 0.0 < high
+    assert f"at the disc or up to {-low:.2f} l behind" in law.words
+
+
+@pytest.mark.usefixtures("toy_model")
+def test_what_fits_better_but_does_not_predict_sessions_stays_in_the_set() -> None:
+    table = make_table(replace(TRUTH, effects=LAWS["Cyr"]), seed=4, title="")
+    laws = find_robot_laws(table, START, progress=False).laws
+    assert laws is not None
+    best = laws.kept[0]
+    worse = replace(best, place=place("Ct"), gain=best.gain - 1, gain_at_lever=best.gain - 1)
+
+    def kept(*fitted: Law) -> list[str]:
+        return [law.place.name for law in replace(laws, fitted=fitted).kept]
+
+    assert kept(replace(best, reason=NO_SESSIONS), worse) == ["Ct", "Cyr"]
+    assert kept(replace(best, reason="its fit did not converge"), worse) == ["Ct"]
+    assert kept(best, replace(worse, reason=NO_SESSIONS)) == ["Cyr"]
+    far = replace(worse, gain=best.gain - 10, gain_at_lever=best.gain - 10)
+    assert kept(best, far) == ["Cyr"]
+    assert kept(best, replace(far, gain_at_lever=best.gain - 4)) == ["Cyr", "Ct"]

@@ -10,7 +10,8 @@ from calibration.laws.places import in_common, place_named, places
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        (("Fz_wt", "Fz_vx"), "are a force along the axis on the head"),
+        (("Fz_wt", "Fz_vx"), "are a force along the axis"),
+        (("Fz_wt", "Cr"), ""),
         (("My_wt", "Fx_wt"), "act on the head, driven by the spin of the tails ω_t"),
         (("Ct", "Fx_wt"), "act on the head"),
         (("Ct", "Cyr"), "act on the head"),

@@ -74,7 +74,9 @@ def in_motion(exponents: tuple[float, ...], covariance: np.ndarray = NARROW) -> 
 
 def test_a_power_of_the_speed_is_named_beside_the_inputs() -> None:
     words = in_motion((0.43, -0.15, 0.30))
-    assert words.startswith("in proportion to ω^0.43 (0.41 to 0.45) l^-0.15 (-0.19 to -0.11) N^0.30 (0.24 to 0.36)")
+    assert words.startswith(
+        "in proportion to ω^0.43 (0.41 to 0.45) l^-0.15 (-0.19 to -0.11) N^0.30 (0.24 to 0.36)"
+    )
     assert ", or as well to |v|^0.50 (0.48 to 0.53)" in words
 
 
