@@ -3,7 +3,8 @@
     v = Δρ g d²/(18 μ) × (1 − ε_w (2.104 x − 2.089 x³ + 0.948 x⁵)) / (1 + ε_i 3/16 Re),   x = d/D, Re = ρ v d/μ
 
 Stokes's law with the viscosity μ as the one coefficient. Effects that it may lack: the wall of the vessel (Faxén;
-ε_w = 1) and inertia (Oseen; ε_i = 1). A table has one row for each fall: set, bead, diam_mm, trial, v_mm_s. The
+ε_w = 1) and inertia (Oseen; ε_i = 1). With their names withheld, a law describes what is missing: drag × (d/d_m)^p,
+with d_m the geometric mean of the diameters. A table has one row for each fall: set, bead, diam_mm, trial, v_mm_s. The
 first falls of all beads are one session, the second ones another, and so on.
 
 Usage: python -m calibration.examples.spheres TABLE.csv [SET]
@@ -28,6 +29,9 @@ from sim.arrays import Flags, Floats
 from sim.io.errors import InputError, run_command
 
 GRAVITY, FLUID, BEAD = 9.81, 1260.0, 2200.0  # m/s², kg/m³ of glycerol and Teflon
+
+
+_LAW = Parameter("drag_exponent", "drag by a power of the diameter", 0.0, (-3.0, 3.0), 0.2)
 
 
 @dataclass(frozen=True)
@@ -56,8 +60,9 @@ class Spheres:
         d, viscosity = self.diameter, parameters["viscosity"]
         x = d / self.vessel
         stokes = (BEAD - FLUID) * GRAVITY * d**2 / (18 * viscosity)
-        stokes = stokes * (1 - parameters["wall"] * (2.104 * x - 2.089 * x**3 + 0.948 * x**5))
-        slope = parameters["inertia"] * 3 / 16 * FLUID * d / viscosity  # of 1 + slope v
+        stokes = stokes * (1 - parameters.get("wall", 0.0) * (2.104 * x - 2.089 * x**3 + 0.948 * x**5))
+        stokes = stokes * (d / np.exp(np.log(d).mean())) ** -parameters.get(_LAW.name, 0.0)
+        slope = parameters.get("inertia", 0.0) * 3 / 16 * FLUID * d / viscosity  # of 1 + slope v
         return np.asarray(2 * stokes / (1 + np.sqrt(1 + 4 * slope * stokes)))
 
     def derivatives(
@@ -124,6 +129,17 @@ def read_spheres(source: str | Path, name: str) -> Spheres:
     return Spheres(runs, diameter)
 
 
+def law_of_diameter(model: Spheres) -> str:
+    """Describe what is missing by a power of the diameter, with the wall and inertia withheld."""
+    verdict = calibrate(replace(model, effects=(_LAW,)), progress=False)
+    if _LAW.name not in verdict.final.names:
+        return "not described by a power of the diameter"
+    power, (low, high) = verdict.final.parameters[_LAW.name], verdict.final.interval(_LAW.name)
+    before, after = 100 * verdict.error_before, 100 * verdict.error_after
+    errors = f"held out {verdict.conditions.split.names}: {before:.1f} % -> {after:.1f} %"
+    return f"drag as d^{power:.2f} ({low:.2f} to {high:.2f}); {errors}"
+
+
 def median_error(model: Spheres, verdict: Verdict, effects: Parameters) -> float:
     """Compute the relative rms of the beads' median speeds, the viscosity fitted to them, with given `effects`."""
     at = {**verdict.base.parameters, **effects}
@@ -147,6 +163,7 @@ def main(table: str, name: str = "KW2023") -> None:
         print(f"  rms of the medians, {label}: {100 * median_error(model, verdict, effects):.1f} %")
     for run in verdict.next_runs:
         print(f"  next: {run.record()}")
+    print(f"  as a law: {law_of_diameter(model)}")
     before, after = 100 * verdict.error_before, 100 * verdict.error_after
     print(f"  held out {verdict.conditions.split.names}: {before:.1f} % -> {after:.1f} %")
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from calibration.examples.spheres import Spheres
+from calibration.examples.spheres import Spheres, law_of_diameter
 from calibration.statistics.fit import fit, profile_intervals
 from calibration.statistics.statistical_model import Noise, Runs, start_values
 from calibration.verdict.calibrate import calibrate
@@ -55,6 +56,19 @@ def test_a_model_that_is_no_robot_is_calibrated() -> None:
     assert result.effects == ("wall",)
     low, high = result.final.interval("wall")
     assert low < 1.0 < high
+
+
+def test_without_the_names_of_effects_the_wall_is_a_power_of_the_diameter() -> None:
+    """Its exponent is the slope of Faxén's correction over the diameters of the beads."""
+    words = law_of_diameter(spheres(1.0, 0.0, 2, BEADS))
+    power = re.search(r"d\^([\d.]+) \(([\d.]+) to ([\d.]+)\)", words)
+    assert power is not None
+    value, low, high = map(float, power.groups())
+    ends = np.array([BEADS[0], BEADS[-1]]) / 0.094
+    slope = -np.diff(np.log(1 - 2.104 * ends + 2.089 * ends**3))[0] / np.log(BEADS[-1] / BEADS[0])
+    assert low < slope < high
+    assert value == pytest.approx(slope, abs=0.03)
+    assert law_of_diameter(spheres(0.0, 0.0, 0, BEADS)) == "not described by a power of the diameter"
 
 
 @pytest.mark.rates
