@@ -3,9 +3,9 @@
     v = Δρ g d²/(18 μ) × (1 − ε_w (2.104 x − 2.089 x³ + 0.948 x⁵)) / (1 + ε_i 3/16 Re),   x = d/D, Re = ρ v d/μ
 
 Stokes's law with the viscosity μ as the one coefficient. Effects that it may lack: the wall of the vessel (Faxén;
-ε_w = 1) and inertia (Oseen; ε_i = 1). With their names withheld, a law describes what is missing: drag × (d/d_m)^p,
-with d_m the geometric mean of the diameters. A table has one row for each fall: set, bead, diam_mm, trial, v_mm_s. The
-first falls of all beads are one session, the second ones another, and so on.
+ε_w = 1) and inertia (Oseen; ε_i = 1). With their names withheld, a law describes what is missing: drag ×
+(d/d_m)^p, with d_m the geometric mean of the diameters. A table has one row for each fall: set, bead, diam_mm,
+trial, v_mm_s. The first falls of all beads are one session, the second ones another, and so on.
 
 Usage: python -m calibration.examples.spheres TABLE.csv [SET]
 """

@@ -60,15 +60,16 @@ def test_a_model_that_is_no_robot_is_calibrated() -> None:
 
 def test_without_the_names_of_effects_the_wall_is_a_power_of_the_diameter() -> None:
     """Its exponent is the slope of Faxén's correction over the diameters of the beads."""
-    words = law_of_diameter(spheres(1.0, 0.0, 2, BEADS))
+    beads = np.array([1.6, 2.4, 3.2, 4.7, 6.3]) / 1000
+    words = law_of_diameter(spheres(1.0, 0.0, 2, beads))
     power = re.search(r"d\^([\d.]+) \(([\d.]+) to ([\d.]+)\)", words)
     assert power is not None
     value, low, high = map(float, power.groups())
-    ends = np.array([BEADS[0], BEADS[-1]]) / 0.094
-    slope = -np.diff(np.log(1 - 2.104 * ends + 2.089 * ends**3))[0] / np.log(BEADS[-1] / BEADS[0])
+    ends = beads[[0, -1]] / 0.094
+    slope = -np.diff(np.log(1 - 2.104 * ends + 2.089 * ends**3))[0] / np.log(beads[-1] / beads[0])
     assert low < slope < high
     assert value == pytest.approx(slope, abs=0.03)
-    assert law_of_diameter(spheres(0.0, 0.0, 0, BEADS)) == "not described by a power of the diameter"
+    assert law_of_diameter(spheres(0.0, 0.0, 0, beads)) == "not described by a power of the diameter"
 
 
 @pytest.mark.rates
