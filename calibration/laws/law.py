@@ -90,9 +90,10 @@ class Law:
             return f"at the disc or up to {' and '.join(law.farthest for law in self.elsewhere)} it"
         if LEVER not in self.fit.names:
             return ""
-        away = -1 if self.place.lever_unit == "l" else 1
+        lever = self.fit.parameters[LEVER]
+        away, side = (-1, "behind") if lever < 0 else (1, "ahead of")
         low, high = sorted(away * end for end in self.fit.interval(LEVER))
-        return f"at {away * self.fit.parameters[LEVER]:.2f} {self.place.lever_unit} ({low:.2f} to {high:.2f})"
+        return f"{abs(lever):.2f} {self.place.lever_unit} ({low:.2f} to {high:.2f}) {side} the disc"
 
     @property
     def farthest(self) -> str:

@@ -58,7 +58,7 @@ _COEFFICIENT_WORDS = {
     "Cyr": "the side-force coefficient C_yr of the head",
 }
 _STIFFNESS_WORDS = "the stiffness of the tails over the viscosity of the fluid"
-_LEVER_WORDS = {"l": "a side force behind the disc", "L": "a side force ahead of the disc"}
+_ELSEWHERE = "a side force away from the disc"
 _TAIL_EFFECTS = {
     "tail_spin_drag": "drag on the tails' own spin",
     "natural_splay": "a natural curvature of the tails away from the axis",
@@ -183,7 +183,7 @@ def _load(wrench: str, motion: str, *, odd: bool, lever_unit: str = "") -> Place
     words = _WRENCH_WORDS[wrench]
     if lever_unit:
         moves.append((force_law("My", motion, Powers()).name, 1))
-        words = _LEVER_WORDS[lever_unit]
+        words = _ELSEWHERE
     sides = ", and that differs between left and right turns" if odd else ""
     return Place(
         f"{wrench}_{motion}{_ODD if odd else ''}{f'_at_{lever_unit}' if lever_unit else ''}",
