@@ -10,6 +10,7 @@ import numpy as np
 
 from calibration.attribution.halved_tolerances import notable_gains
 from calibration.attribution.refits import IMITABLE, SURE, UNSEEN, Candidate
+from calibration.laws.law_fits import Laws
 from calibration.report.figures import draw_evidence, draw_maps, draw_residuals, draw_summary, final_model
 from calibration.report.law_card import add_laws
 from calibration.report.path_card import add_paths
@@ -136,13 +137,7 @@ def _add_errors(page: Page, result: Verdict, data: Measurements) -> None:
         *(output_error(output, error) for output, error in zip(data.outputs, scatter, strict=True)),
     )
     page.table(("model", "all outputs", *(LABELS[o] for o in data.outputs)), [*rows, noise])
-    low, high = errors.after_interval
-    agree = errors.p_value >= DISAGREES
-    page.text(
-        f"The held-out runs {'agree' if agree else 'do not agree'} with the final model (p = "
-        f"{plain(errors.p_value, 2)}). Its error has the 95 % interval {100 * low:.2f} to {100 * high:.2f} %.",
-        tone="good" if agree else "bad",
-    )
+    _add_agreement(page, result)
     if result.held_out_error_falls is False:
         page.text(
             f"The error does not fall with what is claimed: {100 * result.error_before:.2f} % without it, "
@@ -157,6 +152,21 @@ def _add_errors(page: Page, result: Verdict, data: Measurements) -> None:
         f"{', '.join(features) or 'no feature'}."
     )
     _add_correction(page, result, data)
+
+
+def _add_agreement(page: Page, result: Verdict) -> None:
+    """Say whether the held-out runs agree with the final model, and how well its error is known."""
+    errors, law = result.errors, result.corrections.law
+    agree = errors.p_value >= DISAGREES
+    model, whose, (low, high) = "final", "Its", errors.after_interval
+    if result.described and isinstance(law, Laws):
+        model, whose, (low, high) = "calibrated", "With the law, the", law.kept[0].error_interval
+    said = f"The held-out runs {'agree' if agree else 'do not agree'} with the {model} model"
+    page.text(
+        f"{said} (p = {plain(errors.p_value, 2)}). {whose} error has the 95 % interval {100 * low:.2f} to "
+        f"{100 * high:.2f} %.",
+        tone="good" if agree or result.described else "bad",
+    )
 
 
 def _add_correction(page: Page, result: Verdict, data: Measurements) -> None:
