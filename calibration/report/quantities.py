@@ -120,3 +120,9 @@ def direction_in_words(direction: dict[str, float], error: float) -> str:
     changes = {name: 100 * math.expm1(part * error) for name, part in direction.items() if abs(part) > 0.1}
     words = [f"{name} {plain(abs(c), 2)} % {'larger' if c > 0 else 'smaller'}" for name, c in changes.items()]
     return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
+
+
+def range_in_words(name: str, values: Floats, unit: str) -> str:
+    """Say between which values a quantity lies in the runs, values (n,)."""
+    low, high = float(values.min()), float(values.max())
+    return f"{name} = {plain(low)}{unit}" if low == high else f"{name} from {plain(low)} to {plain(high)}{unit}"

@@ -10,8 +10,8 @@ import numpy as np
 
 from calibration.attribution.halved_tolerances import notable_gains
 from calibration.attribution.refits import IMITABLE, SURE, UNSEEN, Candidate
-from calibration.laws.law_fits import Laws
-from calibration.report.figures import draw_evidence, draw_maps, draw_residuals, draw_summary, final_model
+from calibration.report.error_card import add_errors
+from calibration.report.figures import draw_evidence, draw_maps, draw_residuals, final_model
 from calibration.report.law_card import add_laws
 from calibration.report.path_card import add_paths
 from calibration.report.path_error import PathError
@@ -19,11 +19,11 @@ from calibration.report.quantities import (
     LABELS,
     detectable,
     direction_in_words,
-    feature_in_words,
     fitted_value,
     given,
     output_error,
     plain,
+    range_in_words,
     size,
     tolerance,
 )
@@ -34,8 +34,7 @@ from calibration.statistics.statistical_model import Parameter
 from calibration.swimmer.measured_table import Measurements
 from calibration.verdict.next_runs import STOP, Batch
 from calibration.verdict.next_steps import next_steps
-from calibration.verdict.verdict import DISAGREES, Verdict
-from sim.arrays import Floats
+from calibration.verdict.verdict import Verdict
 from sim.io.pages import Page
 from sim.io.provenance import code_version
 
@@ -56,7 +55,7 @@ def write_report(
 def add_sections(page: Page, result: Verdict, data: Measurements, paths: Sequence[PathError]) -> None:
     """Add the sections of the report."""
     _add_next_steps(page, result)
-    _add_errors(page, result, data)
+    add_errors(page, result, data)
     add_paths(page, paths)
     add_laws(page, result)
     _add_numbers(page, result)
@@ -105,86 +104,6 @@ def _add_batch(page: Page, batch: Batch) -> None:
         f"is {STOP:.0f} times as likely. So the right one is given up in about {100 / STOP:.0f} % of cases at "
         "most, however often you look."
     )
-
-
-def _add_errors(page: Page, result: Verdict, data: Measurements) -> None:
-    page.section("Error on the held-out runs")
-    errors, split = result.errors, result.conditions.split
-    page.text(
-        f"{int(split.test.sum())} runs ({split.names}) were held out before anything was fitted. This is how far "
-        "each model is from them."
-    )
-    models = {"uncalibrated": "as given", "before": "calibrated"}
-    if final_model(result):
-        models["after"] = f"calibrated, {final_model(result)}"
-    if "predictive" in errors.rms:
-        models["predictive"] = "calibrated, with the correction in corrected.toml"
-    if "law" in errors.rms:
-        models["law"] = "calibrated, with the best law"
-    models["generic"] = "calibrated, with a regression of the residual"
-    rows = [
-        (
-            words,
-            f"{100 * errors.rms[name]:.2f} %",
-            *(output_error(output, error) for output, error in errors.by_output[name].items()),
-        )
-        for name, words in models.items()
-    ]
-    scatter = np.sqrt(np.diag(result.base.noise.run)).tolist()
-    noise = (
-        "noise of one run",
-        f"{100 * errors.noise:.2f} %",
-        *(output_error(output, error) for output, error in zip(data.outputs, scatter, strict=True)),
-    )
-    page.table(("model", "all outputs", *(LABELS[o] for o in data.outputs)), [*rows, noise])
-    _add_agreement(page, result)
-    if result.held_out_error_falls is False:
-        page.text(
-            f"The error does not fall with what is claimed: {100 * result.error_before:.2f} % without it, "
-            f"{100 * result.error_after:.2f} % with it.",
-            tone="bad",
-        )
-    page.figures([(draw_summary(result, data), "residual of each output over the noise, for each model",
-                   "The same on the runs that were fitted, for each output.")])  # fmt: skip
-    features = [feature_in_words(name) for name in result.corrections.regression.features]
-    page.text(
-        "The regression of the residual describes it, and does not explain it. It uses "
-        f"{', '.join(features) or 'no feature'}."
-    )
-    _add_correction(page, result, data)
-
-
-def _add_agreement(page: Page, result: Verdict) -> None:
-    """Say whether the held-out runs agree with the final model, and how well its error is known."""
-    errors, law = result.errors, result.corrections.law
-    agree = errors.p_value >= DISAGREES
-    model, whose, (low, high) = "final", "Its", errors.after_interval
-    if result.described and isinstance(law, Laws):
-        model, whose, (low, high) = "calibrated", "With the law, the", law.kept[0].error_interval
-    said = f"The held-out runs {'agree' if agree else 'do not agree'} with the {model} model"
-    page.text(
-        f"{said} (p = {plain(errors.p_value, 2)}). {whose} error has the 95 % interval {100 * low:.2f} to "
-        f"{100 * high:.2f} %.",
-        tone="good" if agree or result.described else "bad",
-    )
-
-
-def _add_correction(page: Page, result: Verdict, data: Measurements) -> None:
-    learnt = result.corrections.learnt
-    if learnt is None:
-        return
-    speed = np.abs(data.omega) * 30 / math.pi
-    page.text(
-        "So that the robot can be steered although nothing explains the residual, corrected.toml has a correction "
-        f"of the head's load in {', '.join(learnt.terms)}. It holds between these runs only: "
-        f"{_range('N', data.tails, '')}, {_range('l', 100 * data.length, ' cm')}, {_range('ω', speed, ' rpm')}. "
-        "A robot outside is refused. The response to a flip is simulated with the same load."
-    )
-
-
-def _range(name: str, values: Floats, unit: str) -> str:
-    low, high = float(values.min()), float(values.max())
-    return f"{name} = {plain(low)}{unit}" if low == high else f"{name} from {plain(low)} to {plain(high)}{unit}"
 
 
 def _add_numbers(page: Page, result: Verdict) -> None:
@@ -275,8 +194,8 @@ def _add_data(page: Page, result: Verdict, data: Measurements) -> None:
     speed = np.abs(data.omega) * 30 / math.pi
     page.text(
         f"{len(data)} usable runs in {sessions} session{'s' if sessions > 1 else ''}: "
-        f"{_range('N', data.tails, '')}, {_range('tail length', 100 * data.length, ' cm')}, "
-        f"{_range('motor speed', speed, ' rpm')}. Held out for the test: {conditions.split.names}."
+        f"{range_in_words('N', data.tails, '')}, {range_in_words('tail length', 100 * data.length, ' cm')}, "
+        f"{range_in_words('motor speed', speed, ' rpm')}. Held out for the test: {conditions.split.names}."
     )
     excluded = conditions.summary_of_excluded
     page.text(
