@@ -81,10 +81,14 @@ def _add_correction(page: Page, result: Verdict, data: Measurements) -> None:
     learnt = result.corrections.learnt
     if learnt is None:
         return
-    speed = np.abs(data.omega) * 30 / math.pi
+    ranges = (
+        range_in_words("N", data.tails, ""),
+        range_in_words("l", 100 * data.length, " cm"),
+        range_in_words("ω", np.abs(data.omega) * 30 / math.pi, " rpm"),
+    )
     page.text(
         "So that the robot can be steered although nothing explains the residual, corrected.toml has a correction "
         f"of the head's load in {', '.join(learnt.terms)}. It holds between these runs only: "
-        f"{range_in_words('N', data.tails, '')}, {range_in_words('l', 100 * data.length, ' cm')}, {range_in_words('ω', speed, ' rpm')}. "
+        f"{', '.join(ranges)}. "
         "A robot outside is refused. The response to a flip is simulated with the same load."
     )

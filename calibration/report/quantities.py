@@ -14,6 +14,7 @@ import numpy as np
 from calibration.attribution.refits import UNSEEN
 from calibration.statistics.pull import Pull
 from calibration.statistics.statistical_model import Parameter
+from sim.arrays import Floats
 
 LABELS = {
     "omega_h": "head spin",
