@@ -69,10 +69,11 @@ class Candidate:
     def uncertain(self) -> bool:
         """Whether the claim may be something outside the catalogue that looks like it.
 
-        An effect that explains the runs only beside a wrong nuisance parameter counts as a pair, and is always
-        uncertain.
+        A pair is always uncertain: it is chosen among about 200 pairs, whose shapes lie densely. An effect that
+        explains the runs only beside a wrong nuisance parameter counts as a pair.
         """
-        return self.imitable > IMITABLE or self.transfer < SURE or bool(self.refit and self.refit.wrong_numbers)
+        is_pair = len(self.claimed) > 1 or bool(self.refit and self.refit.wrong_numbers)
+        return is_pair or self.imitable > IMITABLE or self.transfer < SURE
 
     @property
     def title(self) -> str:

@@ -126,6 +126,7 @@ def test_an_effect_beside_a_wrong_number_is_in_doubt() -> None:
     effect = parameter(swimmer, EFFECT)
     sure = Candidate(effect, (effect,), 8.0, 1.0, 1.0, 1.0, "kept", refit, None, 1.0, 0.1)
     assert not sure.uncertain
+    assert replace(sure, claimed=(parameter(swimmer, "disc_drag"), effect)).uncertain
     pull = pulls(
         fit(swimmer, start_values(swimmer), names(swimmer), everywhere(swimmer), title=""), swimmer.nuisances
     )[0]
