@@ -85,9 +85,7 @@ class Place:
     name: str  # in files
     words: str
     moves: tuple[tuple[str, int], ...]  # parameters of the model that it multiplies by m to a power, and terms
-    part: str = (
-        "head"  # on which it acts: "head", "tails", or the "robot", which a force along the axis moves as a whole
-    )
+    part: str = "head"  # on which it acts: "head" or "tails"; "robot" for a force along the axis
     is_term: bool = True  # of a size of its own, and not a factor
     wrench: str = ""  # of WRENCHES, of a load at one place
     motion: str = ""  # of MOTIONS, of a load at one place
