@@ -20,7 +20,7 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.model.body import Body
-from sim.motion.stability import _first_vector
+from sim.motion.stability import first_perturbation
 from sim.solve.floquet import arnoldi
 from sim.solve.orbit import mean_motion
 
@@ -51,7 +51,7 @@ def leading_exponent(body: Body, tails: int, x: Floats, u: Floats) -> Leading:
     omega_t, omega_h = mean_motion(body, u)[:2]
     count = min(2 * tails + _VECTORS, x.size - 1)
     shift = abs(omega_t)
-    projected = arnoldi(body, x, u, shift, _first_vector(tails, *x.shape[:2]), count)
+    projected = arnoldi(body, x, u, shift, first_perturbation(tails, *x.shape[:2]), count)
     if not np.isfinite(projected[-1, -1]):
         return Leading(np.nan, np.nan, tails)
     values, ritz = np.linalg.eig(projected[:count])
