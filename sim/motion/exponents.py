@@ -26,7 +26,7 @@ from sim.solve.orbit import mean_motion
 
 FOLD, DOUBLING, HOPF = "fold", "period doubling", "Hopf"
 _VECTORS = 30  # of Arnoldi's method beside two for each tail
-_CONVERGED = 0.1  # relative residual of an eigenvalue up to which it counts
+_CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it counts; at 0.1 some look unstable
 _SAME = 1e-3  # relative distance of Re σ up to which exponents are copies of one, i N ω_t apart
 _REAL = 1e-3  # distance of k from 0 or N/2 up to which it counts as that
 

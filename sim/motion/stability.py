@@ -31,7 +31,7 @@ from sim.solve.refinement import ROUGH, Orbit
 QUICK = 0.4  # |ω_yr/ω_t| from which a robot yaws fast
 DOUBTFUL = -0.05  # growth from which it is computed again
 _VECTORS, _MORE_VECTORS = 10, 30  # of Arnoldi's method beside two for each tail: first, and again
-_CONVERGED = 0.1  # relative residual of an eigenvalue up to which it counts
+_CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it counts
 
 
 def growth_of_orbit(body: Body, tails: int, orbit: Orbit) -> float:
