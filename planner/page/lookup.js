@@ -25,6 +25,7 @@ const REASONS = [ // why a robot is outside
   "its tails or its motor were not learned, or no motion was found",
   "its tails move as none of the learned ones do",
   "it yaws nearly as fast as its tails turn, and may have several motions",
+  "the balance of its single tail has several solutions",
 ];
 const NOT_OF_HEAD = ["omega_bar", "l_over_R", "l_over_r0", "a_over_R"];
 const STEADY = ["v_z", "v_x", "omega_yr_bar"];
@@ -84,10 +85,10 @@ function tableErrorModes(table, robot) {
 /* Solve for the motion of checked groups: {head, tails, motion, inputs, reason}. NeuralTable.motions */
 function motionOf(table, values, flag = false) {
   const { head, tails } = headAndTails(values), kind = networkIndex(values.N), network = table.wrench[kind];
-  const nothing = { motion: [NaN, NaN, NaN, NaN, NaN], converged: false };
-  const { motion, converged } = network ? solveBalance(network, head, tails) : nothing;
+  const nothing = { motion: [NaN, NaN, NaN, NaN, NaN], converged: false, several: false };
+  const { motion, converged, several } = network ? solveBalance(network, head, tails) : nothing;
   const inputs = tailInputs(tails, motion), known = converged && withinRanges(table, values);
-  const reason = REASONS[reasonOf(table.support[kind], motion, inputs, known)];
+  const reason = REASONS[reasonOf(table.support[kind], motion, inputs, known, several)];
   if (reason && !flag) throw new OutsideError(refusal(table, values, reason), reason);
   return { head, tails, motion, inputs, reason };
 }
@@ -100,11 +101,12 @@ function within([low, high], size) {
   return low * (1 - 1e-9) <= size && size <= high * (1 + 1e-9);
 }
 
-function reasonOf(support, motion, inputs, known) {
+function reasonOf(support, motion, inputs, known, several) {
   if (!support) return 1;
   if (!known) return 2;
   if (!(novelty(support, inputs) <= 1)) return 3;
-  return Math.abs(motion[2]) > BRANCHES * Math.abs(motion[4]) ? 4 : 0;
+  if (Math.abs(motion[2]) > BRANCHES * Math.abs(motion[4])) return 4;
+  return several ? 5 : 0;
 }
 
 function refusal(table, values, reason) {

@@ -8,18 +8,26 @@ import { linearThrust, linearTorque, tailInputs, wrenchTerms } from "./tails.js"
 
 const STEPS = 60;
 const CORRECTION = 2e-12; // relative
+const ACCEPTED = 1e-9; // the last of all corrections, where rounding keeps them above CORRECTION
 const DIFFERENCE = 1e-6; // steps of finite differences, relative
 const LEAST_SHARE = 1e-3;
 const FIRST_SPIN = 0.6; // ω_t/ω in the first guess
 const LONGEST = 0.5; // largest relative change of ω_t in one step
+const SAME = 1e-6; // two solutions are one, if all velocities agree so
 
-/* Solve for the motion; converged is false where none was found. solve_rows */
+/* Solve for the motion; converged is false where none was found, several is true where a single tail has two. solve */
 function solveBalance(network, head, tails) {
   const guess = firstGuess(head, tails), found = solve(network, head, tails, guess, false);
-  if (tails.number !== 1) return found;
+  if (tails.number !== 1) return { ...found, several: false };
   const second = solve(network, head, tails, guess, true);
   const nearer = Math.abs(second.motion[1] - guess[1]) < Math.abs(found.motion[1] - guess[1]);
-  return second.converged && (nearer || !found.converged) ? second : found;
+  const several = found.converged && second.converged && !sameMotions(found.motion, second.motion);
+  return { ...(second.converged && (nearer || !found.converged) ? second : found), several };
+}
+
+/* Tell whether two solutions are one. same_motions */
+function sameMotions(first, second) {
+  return first.every((value, i) => Math.abs(second[i] - value) <= SAME * Math.abs(value));
 }
 
 /* The motion with torque and thrust of linear theory and the side forces of straight tails. _first_guess */
@@ -57,6 +65,7 @@ function solve(network, head, tails, guess, exact) {
   const y = numbers(motion);
   let residual = unbalanced(resistance, tails, motion, y);
   const inverseSlope = inverse(firstSlope(head, tails, motion, residual, exact ? numbers : () => y));
+  let size = Infinity;
   for (let count = 0; count < STEPS; count++) {
     const step = inverseSlope.map((row) => row.reduce((sum, entry, j) => sum - entry * residual[j], 0));
     const turned = Math.abs(gain * step[3]) / motion[4], share = turned > LONGEST ? LONGEST / turned : 1;
@@ -66,14 +75,14 @@ function solve(network, head, tails, guess, exact) {
     }
     motion[4] = speed + gain * motion[3];
     if (!(motion[4] > 0)) return { motion, converged: false };
-    const size = correction(step, motion);
+    size = correction(step, motion);
     if (size < CORRECTION) return { motion, converged: true };
     if (!Number.isFinite(size)) return { motion, converged: false };
     const before = residual;
     residual = unbalanced(resistance, tails, motion, numbers(motion));
     update(inverseSlope, step, residual.map((left, i) => left - before[i]));
   }
-  return { motion, converged: false };
+  return { motion, converged: size < ACCEPTED };
 }
 
 /* The derivative of what is unbalanced, by differences: four rows of four. */

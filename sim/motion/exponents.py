@@ -20,13 +20,13 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.model.body import Body
-from sim.motion.stability import _first_vector
+from sim.motion.stability import first_perturbation
 from sim.solve.floquet import arnoldi
 from sim.solve.orbit import mean_motion
 
 FOLD, DOUBLING, HOPF = "fold", "period doubling", "Hopf"
 _VECTORS = 30  # of Arnoldi's method beside two for each tail
-_CONVERGED = 0.1  # relative residual of an eigenvalue up to which it counts
+_CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it counts; at 0.1 some look unstable
 _SAME = 1e-3  # relative distance of Re σ up to which exponents are copies of one, i N ω_t apart
 _REAL = 1e-3  # distance of k from 0 or N/2 up to which it counts as that
 
@@ -51,7 +51,7 @@ def leading_exponent(body: Body, tails: int, x: Floats, u: Floats) -> Leading:
     omega_t, omega_h = mean_motion(body, u)[:2]
     count = min(2 * tails + _VECTORS, x.size - 1)
     shift = abs(omega_t)
-    projected = arnoldi(body, x, u, shift, _first_vector(tails, *x.shape[:2]), count)
+    projected = arnoldi(body, x, u, shift, first_perturbation(tails, *x.shape[:2]), count)
     if not np.isfinite(projected[-1, -1]):
         return Leading(np.nan, np.nan, tails)
     values, ritz = np.linalg.eig(projected[:count])

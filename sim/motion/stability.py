@@ -31,7 +31,7 @@ from sim.solve.refinement import ROUGH, Orbit
 QUICK = 0.4  # |ω_yr/ω_t| from which a robot yaws fast
 DOUBTFUL = -0.05  # growth from which it is computed again
 _VECTORS, _MORE_VECTORS = 10, 30  # of Arnoldi's method beside two for each tail: first, and again
-_CONVERGED = 0.1  # relative residual of an eigenvalue up to which it counts
+_CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it counts
 
 
 def growth_of_orbit(body: Body, tails: int, orbit: Orbit) -> float:
@@ -59,7 +59,7 @@ def growth(body: Body, tails: int, x: Floats, u: Floats, *, vectors: int = _VECT
     omega_t, omega_h = mean_motion(body, u)[:2]
     count = min(2 * tails + vectors, x.size - 1)
     shift = abs(omega_t)
-    projected = arnoldi(body, x, u, shift, _first_vector(tails, *x.shape[:2]), count)
+    projected = arnoldi(body, x, u, shift, first_perturbation(tails, *x.shape[:2]), count)
     if not np.isfinite(projected[-1, -1]):
         return np.nan
     if vectors == _VECTORS:
@@ -74,10 +74,18 @@ def growth(body: Body, tails: int, x: Floats, u: Floats, *, vectors: int = _VECT
 
 
 @cache
-def _first_vector(tails: int, n: int, columns: int) -> Floats:
-    """Draw a perturbation (n, M, 3) of bent tails, with the same numbers each time.
+def first_perturbation(tails: int, n: int, columns: int) -> Floats:
+    """Draw the perturbation of bent tails that Arnoldi's method starts from, with the same numbers each time.
 
     Its harmonics in the phase are the N lowest. They contain each perturbation of the tails once.
+
+    Args:
+        tails: N.
+        n: edges of a tail.
+        columns: M, phases of the orbit.
+
+    Returns:
+        The displacement of the nodes of one tail at all phases, (n, M, 3). Only its direction counts.
     """
     numbers = np.random.default_rng(0)
     phase = 2 * np.pi * np.arange(columns) / columns

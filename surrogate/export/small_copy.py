@@ -3,8 +3,9 @@
 It has one member of each ensemble. Two tails and more, where the table is most exact, are in single precision. The
 rest is in half precision: one tail (but for its last layer), the gap, and the response to flips with equal dwells.
 What this loses against the whole table is measured on random robots and written into the file. Left out: effects,
-intervals, the memory of other dwells, and the joint support (only the ranges of the inputs and the limit of the
-yaw rate are checked). `surrogate.export.small_copy_files` writes its files.
+intervals, the memory of other dwells, and the joint support (only the ranges of the inputs, the limit of the yaw
+rate, and whether the balance of a single tail has one solution are checked). `surrogate.export.small_copy_files`
+writes its files.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from sim.arrays import Flags, Floats
 from sim.inputs import check_columns
 from sim.io.errors import InputError
 from sim.mechanics import planar
@@ -121,11 +122,8 @@ def measure_losses(table: NeuralTable, small: SmallCopy) -> dict[str, dict[str, 
     the names end with "one_tail".
     """
     robots = _robots(_TRIED, _SEED)
-    wanted_steady, answer = (
-        table.query({k: v for k, v in robots.items() if k != DWELL}, flag=True),
-        small.query(robots),
-    )
-    inside, several = ~wanted_steady["outside"], robots["N"] > 1
+    wanted_steady, answer = table.query(_without_dwells(robots), flag=True), small.query(robots)
+    inside, several = _known(table, small, robots), robots["N"] > 1
     losses: dict[str, dict[str, float]] = {}
     parts = [("", inside & several), (" one_tail", inside & ~several)]
     for words, rows in parts:
@@ -146,9 +144,20 @@ def make_vectors(table: NeuralTable, small: SmallCopy) -> dict[str, Floats]:
     robots = {
         name: np.array([float(f"{v:.5g}") for v in values]) for name, values in _robots(4 * _VECTORS, 21).items()
     }
-    inside = ~table.query({k: v for k, v in robots.items() if k != DWELL}, flag=True)["outside"]
+    inside = _known(table, small, robots)
     chosen = {name: values[inside][:_VECTORS] for name, values in robots.items()}
     return chosen | small.query(chosen)
+
+
+def _known(table: NeuralTable, small: SmallCopy, robots: Mapping[str, Floats]) -> Flags:
+    """Tell which robots are inside the domain for the table and for the small copy, (M,)."""
+    groups = _without_dwells(robots)
+    outside = [each.query(groups, flag=True)["outside"] for each in (table, small.table)]
+    return np.asarray(~(outside[0] | outside[1]))
+
+
+def _without_dwells(robots: Mapping[str, Floats]) -> dict[str, Floats]:
+    return {name: values for name, values in robots.items() if name != DWELL}
 
 
 def _robots(count: int, seed: int) -> dict[str, Floats]:

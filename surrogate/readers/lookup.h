@@ -26,11 +26,15 @@ typedef float lookup_real;
 #define LOOKUP_F(name) name##f
 #define LOOKUP_DIFFERENCE 3e-4f /* steps of finite differences, relative */
 #define LOOKUP_CORRECTION 3e-6f /* where the iteration ends, relative */
+#define LOOKUP_ACCEPTED 3e-6f   /* the last of all corrections, where rounding keeps them above that */
+#define LOOKUP_SAME 1e-2f       /* two solutions are one, if all velocities agree so */
 #else
 typedef double lookup_real;
 #define LOOKUP_F(name) name
 #define LOOKUP_DIFFERENCE 1e-6
 #define LOOKUP_CORRECTION 2e-12
+#define LOOKUP_ACCEPTED 1e-9
+#define LOOKUP_SAME 1e-6
 #endif
 #define LOOKUP_C(number) ((lookup_real)(number))
 #define LOOKUP_PI LOOKUP_C(3.14159265358979323846)
@@ -289,7 +293,7 @@ static void lookup_update(lookup_real inverse[4][4], const lookup_real *way, con
 /* The velocities in balance from the first guess u; 0 if none were found. */
 static int lookup_solve_from(const lookup_body *body, int exact, lookup_real *u)
 {
-    lookup_real left[4], now[4], way[4], change[4], inverse[4][4], y[LOOKUP_OUTPUTS];
+    lookup_real left[4], now[4], way[4], change[4], inverse[4][4], y[LOOKUP_OUTPUTS], size = LOOKUP_C(HUGE_VAL);
     if (!lookup_begin(body, u, exact, left, inverse)) return 0;
     for (int count = 0; count < LOOKUP_STEPS; count++) {
         lookup_real share;
@@ -302,31 +306,42 @@ static int lookup_solve_from(const lookup_body *body, int exact, lookup_real *u)
             if (share > LOOKUP_C(0.5)) way[i] *= LOOKUP_C(0.5) / share;
             u[i] += way[i];
         }
-        if (lookup_size_of(way, u) < LOOKUP_CORRECTION)
-            return isfinite(u[0] + u[1] + u[2]) && body->speed + u[3] > 0;
+        if (!(body->speed + u[3] > 0)) return 0;
+        size = lookup_size_of(way, u);
+        if (size < LOOKUP_CORRECTION) return 1;
+        if (!isfinite(size)) return 0;
         lookup_numbers(body, u, y);
         lookup_unbalanced(body, u, y, now);
         for (int i = 0; i < 4; i++) change[i] = now[i] - left[i];
         lookup_update(inverse, way, change);
         memcpy(left, now, sizeof left);
     }
-    return 0;
+    return size < LOOKUP_ACCEPTED;
+}
+
+/* 1 if all velocities of two solutions agree. */
+static int lookup_same(const lookup_body *body, const lookup_real *u, const lookup_real *other)
+{
+    for (int i = 0; i < 4; i++)
+        if (!(LOOKUP_F(fabs)(other[i] - u[i]) <= LOOKUP_SAME * LOOKUP_F(fabs)(u[i]))) return 0;
+    return LOOKUP_F(fabs)(other[3] - u[3]) <= LOOKUP_SAME * (body->speed + u[3]);
 }
 
 /* The table of a single tail has second solutions near the true one. So two are sought, and the one whose surge is
-   nearer to the first guess counts. */
+   nearer to the first guess counts. 0 if there is none, 2 if there are two: it may be the wrong one. */
 static int lookup_solve(lookup_body *body)
 {
     lookup_real guess[4], other[4], *u = body->u;
-    int found;
+    int found, several;
     lookup_guess(body, guess);
     memcpy(u, guess, sizeof guess);
     found = lookup_solve_from(body, 0, u);
     if (body->tails > LOOKUP_C(1.5)) return found;
     memcpy(other, guess, sizeof guess);
     if (!lookup_solve_from(body, 1, other)) return found;
+    several = found && !lookup_same(body, u, other);
     if (!found || LOOKUP_F(fabs)(other[1] - guess[1]) < LOOKUP_F(fabs)(u[1] - guess[1])) memcpy(u, other, sizeof guess);
-    return 1;
+    return several ? 2 : 1;
 }
 
 static int lookup_within(const lookup_robot *robot)
@@ -342,7 +357,8 @@ static int lookup_within(const lookup_robot *robot)
 static int lookup_answer(const lookup_robot *robot, lookup_body *body, lookup_motion *motion)
 {
     lookup_real x[LOOKUP_INPUTS], share, sway, spin, *u = body->u;
-    if (!lookup_body_of(robot, body) || !lookup_solve(body)) return LOOKUP_NO_ANSWER;
+    int found = lookup_body_of(robot, body) ? lookup_solve(body) : 0;
+    if (!found) return LOOKUP_NO_ANSWER;
     spin = body->speed + u[3];
     sway = u[0] + u[2] * body->length / 2;
     motion->omega_t_bar = body->sense * spin;
@@ -357,7 +373,8 @@ static int lookup_answer(const lookup_robot *robot, lookup_body *body, lookup_mo
     lookup_network_at(&lookup_networks[3], x, &share);
     motion->tail_gap = share * body->offset * LOOKUP_F(sin)(LOOKUP_PI / body->tails) * body->slender;
     if (body->tails < LOOKUP_C(1.5)) motion->tail_gap = LOOKUP_C(HUGE_VAL);
-    return lookup_within(robot) && LOOKUP_F(fabs)(u[2]) <= LOOKUP_C(0.6) * spin ? LOOKUP_INSIDE : LOOKUP_OUTSIDE;
+    if (found > 1 || !lookup_within(robot) || !(LOOKUP_F(fabs)(u[2]) <= LOOKUP_C(0.6) * spin)) return LOOKUP_OUTSIDE;
+    return LOOKUP_INSIDE;
 }
 
 static inline int lookup_query(const lookup_robot *robot, lookup_motion *motion)

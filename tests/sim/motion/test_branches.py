@@ -97,6 +97,28 @@ def test_the_leading_exponent_is_the_growth_of_steady() -> None:
         assert leading_exponent(body, 7, x, u).growth == pytest.approx(expected, abs=1e-6)
 
 
+def test_an_exponent_that_has_not_converged_does_not_count() -> None:
+    """A copy of the leading one, N ω_t away, converges last: at a residual of 0.05 its growth is 0.46."""
+    curved = replace(SEVEN_TAILS, effects={"natural_curvature": -0.2})
+    swept = SweptInput(curved, "omega_bar", 60.0, 115.0)
+    family = alike_family(swept)
+    start = family.start(0.0)
+    assert start is not None
+    first = first_point(family, start, 1.0)
+    assert first is not None
+    point = next(p for p in follow(family, first, 60) if swept.value(p.s) > 75.0)
+    x, u = family.unpack(point.y)
+    body, means = swept.body_at(point.s), family.means(point.y)
+    turns = Revolutions(swept.body_at, 7, EDGES, int(96 * abs(body.omega / means[0])))
+    time = 2 * np.pi / abs(means[0])
+    fixed = first_point(turns, turns.start(state_from_orbit(body, x, u), point.s, time), 1.0)
+    assert fixed is not None
+    found, stepped = leading_exponent(body, 7, x, u), turns.leading(fixed.y)
+    assert stepped.growth > 0.2
+    assert found.growth == pytest.approx(stepped.growth, rel=0.06)
+    assert found.turns == pytest.approx(stepped.turns, abs=0.02)
+
+
 def test_what_happens_where_the_growth_changes_its_sign() -> None:
     assert Leading(0.0, 0.0, 4).kind == FOLD
     assert Leading(0.0, 2.0, 4).kind == DOUBLING

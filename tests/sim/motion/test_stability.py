@@ -17,6 +17,10 @@ from tests.sim.robots import control, first_body
 
 TOP = {"C_t": 0.55, "C_r": 0.54, "C_yr": 4.1, "l_over_R": 3.82, "L_over_R": 4.24, "l_over_r0": 16.2}
 UNSTABLE = {**TOP, "N": 6, "omega_bar": 117.0}  # yaws nearly as fast as its tails spin
+PRESSED = {
+    "C_t": 4.629, "C_r": 1.438, "C_yr": 6.05, "l_over_R": 5.487, "L_over_R": 4.505, "l_over_r0": 26.299, "N": 5,
+    "tail_contact": 1.0,
+}  # fmt: skip
 UNRESOLVED = {
     "C_t": 0.8386, "C_r": 0.6482, "C_yr": 4.3827, "l_over_R": 7.888, "L_over_R": 5.2725, "l_over_r0": 16.1815,
     "omega_bar": 160.783, "N": 5,
@@ -61,6 +65,18 @@ def test_phases_that_do_not_resolve_a_perturbation_do_not_make_a_motion_unstable
     found = growth_of_orbit(body, 5, orbit)
     assert found == pytest.approx(stepped_growth(body, 5, 40.0, edges=12), abs=0.01)
     assert found < DOUBTFUL
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("omega_bar", "stable"), [(40.0, True), (70.0, False)])
+def test_a_ring_of_tails_in_contact_is_unstable_above_a_speed(omega_bar: float, stable: bool) -> None:
+    """Contact presses the five tails together; time steps with contact agree, on the mesh of the growth."""
+    body = first_body(control(**PRESSED, omega_bar=omega_bar))
+    orbit = refined_orbit(body, 5, FEW)
+    assert orbit.ended == SOLVED
+    found = growth_of_orbit(body, 5, orbit)
+    assert (found < -0.2) if stable else (found > 0.2)
+    assert found == pytest.approx(stepped_growth(body, 5, 6.0), abs=0.15)
 
 
 def test_an_unstable_row_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

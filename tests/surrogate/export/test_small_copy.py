@@ -139,9 +139,10 @@ def test_the_reader_in_c_gives_the_vectors(folder: Path) -> None:
 
 def test_the_reader_in_c_answers_for_all_robots(folder: Path) -> None:
     """In double precision as the table of the same numbers, in single precision nearly."""
-    robots = random_robots(1024, 92)
-    wanted = make_small_copy(load()).query(robots)
-    inside = ~load().query({name: robots[name] for name in ROBOT}, flag=True)["outside"]
+    robots, small = random_robots(1024, 92), make_small_copy(load())
+    wanted, groups = small.query(robots), {name: robots[name] for name in ROBOT}
+    inside = ~(load().query(groups, flag=True)["outside"] | small.table.query(groups, flag=True)["outside"])
+    assert inside.mean() > 0.97
     found, states = answers(library(folder), robots)
     assert (states[inside] == 0).all()
     assert all(error[inside].max() < 1e-8 for error in apart(found, wanted).values())
@@ -151,6 +152,22 @@ def test_the_reader_in_c_answers_for_all_robots(folder: Path) -> None:
     for name, error in apart(single, wanted).items():
         assert error[rows].max() < (1e-2 if name in ("tail_gap", "theta_deg") else 1e-3), name
         assert np.quantile(error[rows], 0.95) < 2e-5, name
+
+
+def test_the_reader_in_c_doubts_a_single_tail_whose_balance_has_two_solutions(folder: Path) -> None:
+    """Which of two solutions a sequence of steps meets may depend on rounding, so a few robots may differ."""
+    robots = random_robots(8192, 93)
+    one_tail = {name: values[robots["N"] == 1] for name, values in robots.items()}
+    groups = {name: one_tail[name] for name in ROBOT}
+    doubted = make_small_copy(load()).table.query(groups, flag=True)["outside"]
+    assert 10 < doubted.sum() < 0.05 * len(doubted)
+    states = answers(library(folder), one_tail)[1]
+    assert np.isin(states, (0, 1)).all()
+    assert (states[~doubted] == 0).mean() > 0.99
+    assert (states[doubted] == 1).mean() > 0.8
+    single = answers(library(folder, "-DLOOKUP_FLOAT"), one_tail)[1]
+    assert (single[doubted] == 1).mean() > 0.3
+    assert (single[~doubted] == 0).mean() > 0.95
 
 
 def test_the_reader_in_c_says_when_it_does_not_know(folder: Path) -> None:
