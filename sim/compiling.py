@@ -9,7 +9,8 @@ versions are kept. They are beside this file, or in the user's cache folder if t
 other packages have folders of their own in it, named by a digest of all files of their package. Machine code does
 not depend on the folder that the sources are in.
 
-Sums may be reordered and multiplications fused, so last digits can differ between machines. NaN and infinity keep
+Sums may be reordered and multiplications fused, so last digits can differ between machines. Loops that are
+`compiled_exactly` keep the order of the source: those of `sim.lanes`. NaN and infinity keep
 their meaning.
 
 The first use of a loop compiles it, with a progress bar on stderr. `softflagella sim compile` compiles all loops.
@@ -40,7 +41,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _HERE = Path(__file__).parent
 _SOURCES = (
-    "arrays.py", "compiling.py", "machine_code.py", "object_code.py", "model/body.py",
+    "arrays.py", "compiling.py", "lane*.py", "machine_code.py", "object_code.py", "model/body.py",
     "linear/*.py", "mechanics/*.py", "solve/*.py",
 )  # fmt: skip
 _KEPT = 3  # folders of other versions
@@ -125,6 +126,15 @@ def processor() -> str:
     return str(get_host_cpu_name())
 
 
+def processor_has(feature: str) -> bool:
+    """Tell whether this processor has a feature, by LLVM's name of it; false where it cannot be told."""
+    from llvmlite.binding import get_host_cpu_features
+
+    if os.environ.get("NUMBA_CPU_FEATURES") is not None:
+        return f"+{feature}" in os.environ["NUMBA_CPU_FEATURES"].split(",")
+    return bool(get_host_cpu_features().get(feature, False))
+
+
 def _all_compiled_mark() -> str:
     return f"all-for-{processor()}"
 
@@ -169,14 +179,14 @@ class Loop:
 
     __name__: str
 
-    def __init__(self, function: Callable[..., Any]):
+    def __init__(self, function: Callable[..., Any], exact: bool = False):
         update_wrapper(self, function)
-        self.py_func = function
+        self.py_func, self.exact = function, exact
 
     @cached_property
     def dispatcher(self) -> Any:
         """What numba calls, and calls from other compiled functions."""
-        return import_module(_NUMBA).dispatcher(self.py_func)
+        return import_module(_NUMBA).dispatcher(self.py_func, self.exact)
 
     def __call__(self, *arguments: Any) -> Any:
         return self.dispatcher(*arguments)
@@ -188,6 +198,11 @@ class Loop:
 def compiled(function: F) -> F:
     """Compile a function of numbers and arrays on its first call, without holding the interpreter's lock."""
     return cast(F, Loop(function))
+
+
+def compiled_exactly(function: F) -> F:
+    """Compile a function as `compiled` does, but never reorder its sums nor fuse its products."""
+    return cast(F, Loop(function, exact=True))
 
 
 _formulas: list[Callable[..., Any]] = []  # that numba has not been told of

@@ -18,7 +18,7 @@ from numba.core.caching import _CacheLocator
 from numba.extending import register_jitable, typeof_impl
 from tqdm import tqdm
 
-from sim import compiling
+from sim import compiling, lane_rows  # noqa: F401  (it teaches numba)
 from sim.compiling import Loop, folder_of_package, package_root, take_formulas
 
 _HERE = Path(__file__).parent
@@ -93,14 +93,21 @@ def _type_of_loop(loop: Loop, context: Any) -> Any:
     return types.Dispatcher(loop.dispatcher)
 
 
-def dispatcher(function: Callable[..., Any]) -> Any:
-    """Return what numba compiles on its first call with arguments of some types."""
+def dispatcher(function: Callable[..., Any], exact: bool) -> Any:
+    """Return what numba compiles on its first call with arguments of some types.
+
+    Args:
+        function: in Python.
+        exact: whether sums and products must stay as they are written.
+    """
     _modules.add(function.__module__)
+    mathematics = False if exact else MATHEMATICS
     with _setting("CACHE_LOCATOR_CLASSES", f"{__name__}.{Locator.__name__}"):
-        loop: Any = njit(cache=True, nogil=True, error_model="numpy", fastmath=MATHEMATICS)(function)
+        loop: Any = njit(cache=True, nogil=True, error_model="numpy", fastmath=mathematics)(function)
     compile_loop = loop.compile
 
     def compile_quickly(signature: Any) -> Any:
+        loop.targetoptions["no_cpython_wrapper"] = "Lanes(" in str(signature)  # Python has no such vectors
         with compiler_settings():
             return compile_loop(signature)
 

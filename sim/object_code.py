@@ -28,9 +28,9 @@ from sim.compiling import folder_of_package, package_root
 
 ALLOWED = {
     *("asin", "acos", "atan", "atan2", "asinh", "acosh", "atanh", "cbrt", "ceil", "copysign", "cos", "cosh"),
-    *("erf", "exp", "exp2", "expm1", "fabs", "floor", "fmax", "fmin", "fmod", "hypot", "ldexp", "log", "log10"),
-    *("log1p", "log2", "memcpy", "memmove", "memset", "pow", "rint", "round", "sin", "sinh", "sqrt", "tan"),
-    *("tanh", "trunc"),
+    *("erf", "exp", "exp2", "expm1", "fabs", "floor", "fma", "fmax", "fmin", "fmod", "hypot", "ldexp"),
+    *("log", "log10", "log1p", "log2", "memcpy", "memmove", "memset", "pow", "rint", "round", "sin", "sinh"),
+    *("sqrt", "tan", "tanh", "trunc"),
 }
 _LEVEL = 3  # of LLVM's optimisation of the linked code: these functions are small
 _DIGEST = 32  # bytes at the start of a file

@@ -16,8 +16,9 @@ ROOT = Path(__file__).parents[1]
 # The rooms of each package, folders and single files; each imports only from those before it. Packages import only
 # from packages before them.
 ROOMS = {
-    "sim": ["arrays", "compiling", "machine_code", "object_code", "compile_stages", "io", "linear", "model",
-            "effects", "inputs", "mechanics", "solve", "reference", "motion", "__main__"],
+    "sim": ["arrays", "compiling", "lanes", "lane_code", "lane_rows", "machine_code", "object_code",
+            "compile_stages", "io", "linear", "model", "effects", "inputs", "mechanics", "solve", "reference",
+            "motion", "__main__"],
     "dataset": ["rows", "storage", "report", "workers", "build", "__main__"],
     "surrogate": ["networks", "interface", "error_modes", "input_ranges", "loops", "wrench", "one_robot", "table",
                   "training",

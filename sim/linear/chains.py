@@ -14,12 +14,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled_exactly
+from sim.lanes import zeros
 from sim.linear.blocks import block, put, put_block, vector
-from sim.linear.dense import solve_dense
+from sim.linear.dense import solve_dense_lanes
 from sim.linear.vectors import applied, dot, inverse, minus, product, subtracted, times
 
 
@@ -36,29 +35,29 @@ class Chains(NamedTuple):
     corner: Floats  # (P, 4, 4): D
 
 
-@compiled
-def new_chains(n: int, chains: int, instants: int) -> Chains:
-    """Allocate room for M chains of n ≥ 2 nodes and P instants."""
+@compiled_exactly
+def new_chains(like: Floats, n: int, chains: int, instants: int) -> Chains:
+    """Allocate room for M chains of n ≥ 2 nodes and P instants, of the kind of number that `like` holds."""
     return Chains(
-        np.zeros((n, chains, 3, 3)),
-        np.zeros((n, chains, 3, 3)),
-        np.zeros((n, chains, 3, 3)),
-        np.zeros((n, chains, 3, 3)),
-        np.zeros((n, chains, 3, 3)),
-        np.zeros((n, chains, 4, 3)),
-        np.zeros((2, chains, 4, 3)),
-        np.zeros((instants, 4, 4)),
+        zeros(like, (n, chains, 3, 3)),
+        zeros(like, (n, chains, 3, 3)),
+        zeros(like, (n, chains, 3, 3)),
+        zeros(like, (n, chains, 3, 3)),
+        zeros(like, (n, chains, 3, 3)),
+        zeros(like, (n, chains, 4, 3)),
+        zeros(like, (2, chains, 4, 3)),
+        zeros(like, (instants, 4, 4)),
     )
 
 
-@compiled
+@compiled_exactly
 def factor_and_solve(chains: Chains, s: Floats, t: Floats) -> None:
     """Factor the equations and solve them: s (n, M, 3) becomes δx, t (4,) becomes δu. See `factor`, `solve`."""
     factor(chains)
     solve(chains, s, t)
 
 
-@compiled
+@compiled_exactly
 def factor(chains: Chains) -> None:
     """Eliminate chains of one instant: diagonal becomes its inverse, lower and border A⁻¹ of themselves."""
     corner = chains.corner[0]
@@ -73,7 +72,7 @@ def factor(chains: Chains) -> None:
                 corner[a, c] -= dot(vector(chains.foot[1], m, a), second)
 
 
-@compiled
+@compiled_exactly
 def _eliminate(chains: Chains, m: int) -> None:
     """Eliminate chain m from tip to root."""
     n = chains.diagonal.shape[0]
@@ -106,7 +105,7 @@ def _eliminate(chains: Chains, m: int) -> None:
                 put(chains.border[k - 2], m, c, second)
 
 
-@compiled
+@compiled_exactly
 def solve(chains: Chains, s: Floats, t: Floats) -> None:
     """Solve with the factors, in place: s (n, M, 3) becomes δx, t (4,) becomes δu."""
     n, count, _ = s.shape
@@ -122,7 +121,7 @@ def solve(chains: Chains, s: Floats, t: Floats) -> None:
         second = minus(vector(s, 1, m), applied(block(chains.lower, 1, m), first))
         for a in range(4):
             t[a] -= dot(vector(chains.foot[0], m, a), first) + dot(vector(chains.foot[1], m, a), second)
-    solve_dense(chains.corner[0].copy(), t.reshape(4, 1))
+    solve_dense_lanes(chains.corner[0], t)
     for m in range(count):
         for k in range(n):
             change = vector(s, k, m)

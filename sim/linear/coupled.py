@@ -11,146 +11,158 @@ Blocks at distance two do not couple the chains, so they stay M matrices of 3×3
 Nodes are eliminated from the tip to the root, so that the Schur complement of the body needs the first two nodes
 only:
 
-    Z_k = A_kk⁻¹ [A_{k,k−1} | A_{k,k−2} | B_k | s_k],   rows k−1 and k−2 −= A_{k−1,k} Z_k and A_{k−2,k} Z_k.
+    Z_k = A_kk⁻¹ [B_k | s_k | A_{k,k−1} | A_{k,k−2}],   rows k−1 and k−2 −= A_{k−1,k} Z_k and A_{k−2,k} Z_k.
 
 The first right-hand side is eliminated together with the matrix. `solve` uses the stored factors for further ones.
 
 There is no pivoting between nodes: A is minus (drag plus stiffness), whose symmetric part is definite. Cost: about
-8 m³ multiplications for each node, m = 3 M, nearly all of them in matrix products (BLAS).
+4 m³ multiplications for each node, m = 3 M, nearly all of them in matrix products (`sim.linear.products`).
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled_exactly
+from sim.lanes import empty, fma, zeros
+from sim.linear.blocks import block, block_at
 from sim.linear.chains import Chains
-from sim.linear.dense import invert, solve_dense
+from sim.linear.dense import invert, solve_dense_lanes
+from sim.linear.products import add_block_product, apply, multiply, multiply_block, subtract_product
+from sim.linear.vectors import negative
 
 
 class Coupled(NamedTuple):
     """Room for the equations and their factors; m = 3 M rows a node, u = 4 P unknowns of the body."""
 
-    diagonal: Floats  # (n, m, m): A_kk, then its inverse
-    columns: Floats  # (n, m, 2 m + u + 1): A_{k,k−1} | A_{k,k−2} | B_k | s_k
+    rows: Floats  # (3, m, 2 m + u + 1): B_k | s_k | A_kk | A_{k,k−1} of three nodes; node k is at k mod 3
     upper: Floats  # (n, m, m): A_{k−1,k}
-    folded: Floats  # (n, m, 2 m + u + 1): Z
-    product: Floats  # (m, 2 m + u + 1)
+    inverse: Floats  # (n, m, m): A_kk⁻¹
+    folded: Floats  # (n, m, 2 m + u + 1): Z, in the columns of the row above: body, s, node k − 1, node k − 2
     schur: Floats  # (u, u)
 
 
-@compiled
-def new_coupled(n: int, chains: int, instants: int) -> Coupled:
-    """Allocate room for n ≥ 2 nodes in M chains, and a body with four unknowns at each of P instants."""
+class Coupling(NamedTuple):
+    """What couples the chains in time: the blocks −ω_m D_mj R_m of each node."""
+
+    resistance: Floats  # R, (n, M, 3, 3)
+    speed: Floats  # ω_m, (M,)
+    differentiation: Floats  # D, (M, M)
+
+
+@compiled_exactly
+def new_coupled(like: Floats, n: int, chains: int, instants: int) -> Coupled:
+    """Allocate room for n ≥ 2 nodes in M chains and four unknowns of the body at each of P instants.
+
+    `like` is an array of the kind of number that the equations have.
+    """
     m, unknowns = 3 * chains, 4 * instants
     width = 2 * m + unknowns + 1
     return Coupled(
-        np.zeros((n, m, m)),
-        np.zeros((n, m, width)),
-        np.zeros((n, m, m)),
-        np.zeros((n, m, width)),
-        np.zeros((m, width)),
-        np.zeros((unknowns, unknowns)),
+        empty(like, (3, m, width)),
+        empty(like, (n, m, m)),
+        empty(like, (n, m, m)),
+        empty(like, (n, m, width)),
+        zeros(like, (unknowns, unknowns)),
     )
 
 
-@compiled
-def couple(system: Coupled, chains: Chains, resistance: Floats, speed: Floats, differentiation: Floats) -> None:
-    """Fill `system` with the equations of the chains, coupled in time.
-
-    Args:
-        resistance: R of every node, (n, M, 3, 3).
-        speed: ω_m, (M,).
-        differentiation: D, (M, M).
-    """
-    n, count, _, _ = resistance.shape
-    instants = chains.corner.shape[0]
-    m = 3 * count
-    system.columns[:] = 0.0
-    system.upper[:] = 0.0
-    for k in range(n):
-        diagonal, columns, upper = system.diagonal[k], system.columns[k], system.upper[k]
-        for i in range(count):
-            column = 2 * m + 4 * (i % instants)
-            for a in range(3):
-                row = 3 * i + a
-                for b in range(3):
-                    drag = speed[i] * resistance[k, i, a, b]
-                    for j in range(count):
-                        diagonal[row, 3 * j + b] = -drag * differentiation[i, j]
-                    diagonal[row, 3 * i + b] += chains.diagonal[k, i, a, b]
-                    if k > 0:
-                        columns[row, 3 * i + b] = chains.lower[k, i, a, b]
-                        upper[row, 3 * i + b] = chains.upper[k, i, a, b]
-                    if k > 1:
-                        columns[row, m + 3 * i + b] = chains.lower2[k, i, a, b]
-                for c in range(4):
-                    columns[row, column + c] = chains.border[k, i, c, a]
+@compiled_exactly
+def _fill(system: Coupled, chains: Chains, coupling: Coupling, s: Floats, k: int) -> None:
+    """Fill the row of node k."""
+    resistance, speed, differentiation = coupling
+    instants, count = chains.corner.shape[0], resistance.shape[1]
+    m, body = 3 * count, 4 * instants + 1  # columns of a node; of the body and the right-hand side
+    row, upper = system.rows[k % 3], system.upper[k]
+    row[:, : body - 1] = 0.0
+    row[:, body + m :] = 0.0
+    upper[:] = 0.0
+    for i in range(count):
+        first = 4 * (i % instants)
+        for a in range(3):
+            here = 3 * i + a
+            row[here, body - 1] = s[k, here]
+            for b in range(3):
+                drag = speed[i] * resistance[k, i, a, b]
+                for j in range(count):
+                    row[here, body + 3 * j + b] = -drag * differentiation[i, j]
+                row[here, body + 3 * i + b] += chains.diagonal[k, i, a, b]
+                if k > 0:
+                    row[here, body + m + 3 * i + b] = chains.lower[k, i, a, b]
+                    upper[here, 3 * i + b] = chains.upper[k, i, a, b]
+            for c in range(4):
+                row[here, first + c] = chains.border[k, i, c, a]
 
 
-@compiled
-def factor_and_solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
+@compiled_exactly
+def factor_and_solve(system: Coupled, chains: Chains, coupling: Coupling, s: Floats, t: Floats) -> None:
     """Factor the equations and solve them: s (n, m) becomes δx, t (u,) becomes δu."""
-    n, m, width = system.columns.shape
-    for i in range(n):
-        for a in range(m):
-            system.columns[i, a, width - 1] = s[i, a]
+    n, m, width = system.folded.shape
+    body = width - 2 * m
+    _fill(system, chains, coupling, s, n - 1)
+    _fill(system, chains, coupling, s, n - 2)
     for i in range(n - 1, -1, -1):
-        invert(system.diagonal[i])
-        np.dot(system.diagonal[i], system.columns[i], system.folded[i])
-        if i > 0:
-            np.dot(system.upper[i], system.folded[i], system.product)
-            _fold_up(system, i)
         if i > 1:
-            _fold_two_up(system, chains, i)
+            _fill(system, chains, coupling, s, i - 2)
+        row, folded, inverse = system.rows[i % 3], system.folded[i], system.inverse[i]
         for a in range(m):
-            s[i, a] = system.folded[i, a, width - 1]
+            for j in range(m):
+                inverse[a, j] = row[a, body + j]
+        invert(inverse)
+        if i > 0:
+            for a in range(m):
+                for j in range(body - 1, -1, -1):
+                    row[a, m + j] = row[a, j]  # beside A_{k,k−1}
+            multiply(inverse, row, m, folded, 0, body + m)
+        else:
+            multiply(inverse, row, 0, folded, 0, body)
+        if i > 1:
+            _multiply_blocks(inverse, chains.lower2[i], folded, body + m)
+            _fold_two_up(system, chains, i)
+        if i > 0:
+            subtract_product(system.upper[i], folded, 0, system.rows[(i - 1) % 3], 0, width if i > 1 else body + m)
+        for a in range(m):
+            s[i, a] = folded[a, body - 1]
     _reduce_body(system, chains)
     _substitute(system, chains, s, t)
 
 
-@compiled
-def _fold_up(system: Coupled, i: int) -> None:
-    """Subtract A_{i−1,i} Z_i from row i − 1: columns of nodes i − 1 and i − 2, body and right-hand side."""
-    diagonal, columns, product = system.diagonal[i - 1], system.columns[i - 1], system.product
-    m, width = product.shape
-    for a in range(m):
-        for j in range(m):
-            diagonal[a, j] -= product[a, j]
-            columns[a, j] -= product[a, m + j]
-        for j in range(2 * m, width):
-            columns[a, j] -= product[a, j]
+@compiled_exactly
+def _multiply_blocks(a: Floats, blocks: Floats, out: Floats, first: int) -> None:
+    """Set columns of `out` (m, ·) from `first` on to a (m, m) times a matrix of 3×3 blocks (M, 3, 3)."""
+    for row in range(0, len(a), 3):
+        for chain in range(len(blocks)):
+            at = 3 * chain
+            multiply_block(block_at(a, row, at), blocks[chain], 0, 0, out, row, first + at, 3)
 
 
-@compiled
+@compiled_exactly
 def _fold_two_up(system: Coupled, chains: Chains, i: int) -> None:
-    """Subtract A_{i−2,i} Z_i, whose first columns belong to node i − 1, from row i − 2."""
-    diagonal, columns = system.diagonal[i - 2], system.columns[i - 2]
-    upper, folded = system.upper[i - 1], system.folded[i]
+    """Subtract A_{i−2,i} Z_i from row i − 2; the columns of node i − 1 go to A_{i−2,i−1}."""
+    row, upper, folded = system.rows[(i - 2) % 3], system.upper[i - 1], system.folded[i]
     m, width = folded.shape
+    body = width - 2 * m
     for chain in range(m // 3):
-        for a in range(3):
-            row = 3 * chain + a
-            for b in range(3):
-                share, source = chains.upper2[i, chain, a, b], 3 * chain + b
-                for j in range(m):
-                    upper[row, j] -= share * folded[source, j]
-                    diagonal[row, j] -= share * folded[source, m + j]
-                for j in range(2 * m, width):
-                    columns[row, j] -= share * folded[source, j]
+        at, factor = 3 * chain, negative(block(chains.upper2, i, chain))
+        add_block_product(factor, folded, at, 0, row, at, 0, body)
+        add_block_product(factor, folded, at, body, upper, at, 0, m)
+        add_block_product(factor, folded, at, body + m, row, at, body, m)
 
 
-@compiled
+@compiled_exactly
 def _reduce_body(system: Coupled, chains: Chains) -> None:
     """Form the body's equations with all nodes eliminated."""
     instants, count = chains.corner.shape[0], chains.diagonal.shape[1]
     m, unknowns = 3 * count, 4 * instants
-    first = np.ascontiguousarray(system.folded[0][:, 2 * m : 2 * m + unknowns])
-    second = np.dot(np.ascontiguousarray(system.folded[1][:, :m]), first)
-    second = system.folded[1][:, 2 * m : 2 * m + unknowns] - second
+    first, second = system.folded[0], empty(system.schur, (m, unknowns))
+    by_first = empty(system.schur, (m, m))
+    for a in range(m):
+        for j in range(m):
+            by_first[a, j] = system.folded[1, a, unknowns + 1 + j]
+        for j in range(unknowns):
+            second[a, j] = system.folded[1, a, j]
+    subtract_product(by_first, first, 0, second, 0, unknowns)
     schur = system.schur
     schur[:] = 0.0
     for p in range(instants):
@@ -161,20 +173,21 @@ def _reduce_body(system: Coupled, chains: Chains) -> None:
             for a in range(3):
                 near, far = chains.foot[0, i, c, a], chains.foot[1, i, c, a]
                 for j in range(unknowns):
-                    row[j] -= near * first[3 * i + a, j] + far * second[3 * i + a, j]
+                    row[j] -= fma(near, first[3 * i + a, j], far * second[3 * i + a, j])
 
 
-@compiled
+@compiled_exactly
 def solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
     """Solve with the factors, in place: s (n, m) becomes δx, t (u,) becomes δu."""
     n, m = s.shape
-    image = np.empty(m)
+    image = zeros(s, (m,))
     for i in range(n - 1, -1, -1):
-        np.dot(system.diagonal[i], s[i], image)
+        apply(system.inverse[i], 0, s[i], m, image)
         s[i] = image
         if i > 0:
-            np.dot(system.upper[i], s[i], image)
-            s[i - 1] -= image
+            apply(system.upper[i], 0, s[i], m, image)
+            for a in range(m):
+                s[i - 1, a] -= image[a]
         if i > 1:
             for chain in range(m // 3):
                 for a in range(3):
@@ -183,26 +196,28 @@ def solve(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
     _substitute(system, chains, s, t)
 
 
-@compiled
+@compiled_exactly
 def _substitute(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
     """Solve for the body, then for the nodes from root to tip; on entry s has the values after the elimination."""
     n, m, width = system.folded.shape
-    instants, count = chains.corner.shape[0], m // 3
-    image, around = np.empty(m), np.zeros(width)
-    around[:m] = s[0]
-    np.dot(system.folded[1], around, image)  # of the first node on the second
+    instants, count, body = chains.corner.shape[0], m // 3, width - 2 * m
+    image, around = zeros(s, (m,)), zeros(s, (width,))  # of the columns of Z; that of s is zero
+    apply(system.folded[1], body, s[0], m, image)  # of the first node on the second
     for i in range(count):
         for c in range(4):
             for a in range(3):
                 row = 3 * i + a
                 through = chains.foot[0, i, c, a] * s[0, row] + chains.foot[1, i, c, a] * (s[1, row] - image[row])
                 t[4 * (i % instants) + c] -= through
-    solve_dense(system.schur.copy(), t.reshape(len(t), 1))
-    around[:m], around[2 * m : width - 1] = 0.0, t
+    solve_dense_lanes(system.schur, t)
+    for c in range(body - 1):
+        around[c] = t[c]
     for i in range(n):
-        if i > 1:
-            around[m : 2 * m] = s[i - 2]
-        if i > 0:
-            around[:m] = s[i - 1]
-        np.dot(system.folded[i], around, image)
-        s[i] -= image
+        for a in range(m):
+            if i > 0:
+                around[body + a] = s[i - 1, a]
+            if i > 1:
+                around[body + m + a] = s[i - 2, a]
+        apply(system.folded[i], 0, around, body + min(i, 2) * m, image)
+        for a in range(m):
+            s[i, a] -= image[a]

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled_exactly
+from sim.lanes import fma, lane, lane_count, with_lane
 from sim.linear.blocks import block_at
-from sim.linear.vectors import inverse
+from sim.linear.products import add_block_product, multiply_block
+from sim.linear.vectors import inverse, negative
 
 
-@compiled
+@compiled_exactly
 def invert(a: Floats) -> None:
     """Invert `a` (m, m) in place: Gauss-Jordan with 3×3 pivots, without exchanges."""
     m = a.shape[0]
@@ -17,20 +21,32 @@ def invert(a: Floats) -> None:
         for i in range(3):
             for j in range(3):
                 a[k + i, k + j] = 1.0 if i == j else 0.0
-        for j in range(m):
-            x, y, z = a[k, j], a[k + 1, j], a[k + 2, j]
-            a[k, j] = pivot[0][0] * x + pivot[0][1] * y + pivot[0][2] * z
-            a[k + 1, j] = pivot[1][0] * x + pivot[1][1] * y + pivot[1][2] * z
-            a[k + 2, j] = pivot[2][0] * x + pivot[2][1] * y + pivot[2][2] * z
-        for i in range(m):
-            if i < k or i > k + 2:
-                f, g, h = a[i, k], a[i, k + 1], a[i, k + 2]
-                a[i, k] = a[i, k + 1] = a[i, k + 2] = 0.0
-                for j in range(m):
-                    a[i, j] -= f * a[k, j] + g * a[k + 1, j] + h * a[k + 2, j]
+        multiply_block(pivot, a, k, 0, a, k, 0, m)
+        for i in range(0, m, 3):
+            if i != k:
+                factor = block_at(a, i, k)
+                for row in range(i, i + 3):
+                    for j in range(k, k + 3):
+                        a[row, j] = 0.0
+                add_block_product(negative(factor), a, k, 0, a, i, 0, m)
 
 
-@compiled
+@compiled_exactly
+def solve_dense_lanes(a: Floats, b: Floats) -> None:
+    """Solve b = a⁻¹ b (n,) in place, lane by lane, with pivoting; `a` (n, n) is kept."""
+    n = len(b)
+    matrix, right = np.empty((n, n)), np.empty((n, 1))
+    for i in range(lane_count(a)):
+        for row in range(n):
+            right[row, 0] = lane(b[row], i)
+            for column in range(n):
+                matrix[row, column] = lane(a[row, column], i)
+        solve_dense(matrix, right)
+        for row in range(n):
+            b[row] = with_lane(b[row], i, right[row, 0])
+
+
+@compiled_exactly
 def solve_dense(a: Floats, b: Floats) -> None:
     """Solve b = a⁻¹ b (n, K) in place by Gaussian elimination with pivoting; a is overwritten. NaN in, NaN out."""
     n, columns = b.shape
@@ -44,14 +60,15 @@ def solve_dense(a: Floats, b: Floats) -> None:
                 a[k, j], a[best, j] = a[best, j], a[k, j]
             for j in range(columns):
                 b[k, j], b[best, j] = b[best, j], b[k, j]
+        scale = 1.0 / a[k, k]
         for i in range(k + 1, n):
-            factor = a[i, k] / a[k, k]
+            factor = a[i, k] * scale
             for j in range(k + 1, n):
-                a[i, j] -= factor * a[k, j]
+                a[i, j] = fma(-factor, a[k, j], a[i, j])
             for j in range(columns):
-                b[i, j] -= factor * b[k, j]
+                b[i, j] = fma(-factor, b[k, j], b[i, j])
     for k in range(n - 1, -1, -1):
         for i in range(columns):
             for j in range(k + 1, n):
-                b[k, i] -= a[k, j] * b[j, i]
+                b[k, i] = fma(-a[k, j], b[j, i], b[k, i])
             b[k, i] /= a[k, k]

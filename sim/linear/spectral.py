@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled_exactly
+from sim.lanes import zeros
 
 
-@compiled
+@compiled_exactly
 def differentiation(phases: int) -> Floats:
     """Differentiate the interpolant: the matrix d/dφ, (M, M)."""
     matrix = np.zeros((phases, phases))
@@ -25,7 +26,7 @@ def differentiation(phases: int) -> Floats:
     return matrix
 
 
-@compiled
+@compiled_exactly
 def interpolation(phases: int, at: Floats) -> Floats:
     """Interpolate to angles `at` (F,) from the first phase: the matrix (F, M)."""
     matrix = np.zeros((len(at), phases))
@@ -41,11 +42,11 @@ def interpolation(phases: int, at: Floats) -> Floats:
     return matrix
 
 
-@compiled
+@compiled_exactly
 def with_phases(a: Floats, wanted: int) -> Floats:
     """Resample a periodic array (K, M, c) at `wanted` phases."""
     matrix = interpolation(a.shape[1], 2 * np.pi * np.arange(wanted) / wanted)
-    out = np.zeros((a.shape[0], wanted, a.shape[2]))
+    out = zeros(a, (a.shape[0], wanted, a.shape[2]))
     for k in range(a.shape[0]):
         for i in range(wanted):
             for j in range(a.shape[1]):

@@ -70,6 +70,16 @@ def subtracted(a: Matrix, b: Matrix) -> Matrix:
 
 
 @formula
+def negative(a: Matrix) -> Matrix:
+    """Compute −a."""
+    return (
+        (-a[0][0], -a[0][1], -a[0][2]),
+        (-a[1][0], -a[1][1], -a[1][2]),
+        (-a[2][0], -a[2][1], -a[2][2]),
+    )
+
+
+@formula
 def plus_identity(a: Matrix, s: Any) -> Matrix:
     """Compute a + s I."""
     return (

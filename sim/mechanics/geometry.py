@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled_exactly
+from sim.lanes import zeros
 from sim.linear.blocks import put, vector
 from sim.linear.vectors import ZERO, Matrix, Vector, dot, minus, plus, times
 from sim.mechanics.rod import bend, edge_force, edge_stiffness, joint_stiffness
@@ -32,20 +33,20 @@ class Geometry(NamedTuple):
     force: Floats  # (n, M, 3) ∂E/∂e
 
 
-@compiled
-def new_geometry(n: int, tails: int) -> Geometry:
-    """Allocate room for M tails of n edges."""
+@compiled_exactly
+def new_geometry(like: Floats, n: int, tails: int) -> Geometry:
+    """Allocate room for M tails of n edges, of the kind of number that `like` holds."""
     return Geometry(
-        np.zeros((n + 1, tails, 3)),
-        np.zeros((n, tails)),
-        np.zeros((n, tails, 3)),
-        np.zeros((n, tails, 3)),
-        np.zeros((n, tails, 3)),
-        np.zeros((n, tails, 3)),
+        zeros(like, (n + 1, tails, 3)),
+        zeros(like, (n, tails)),
+        zeros(like, (n, tails, 3)),
+        zeros(like, (n, tails, 3)),
+        zeros(like, (n, tails, 3)),
+        zeros(like, (n, tails, 3)),
     )
 
 
-@compiled
+@compiled_exactly
 def straight(n: int, tails: int, offset: float) -> Floats:
     """Return the free nodes (n, M, 3) of straight tails."""
     x = np.zeros((n, tails, 3))
@@ -55,7 +56,7 @@ def straight(n: int, tails: int, offset: float) -> Floats:
     return x
 
 
-@compiled
+@compiled_exactly
 def turned_edges(x: Floats, dx: Floats, offset: float) -> Floats:
     """Compute the free nodes (n, M, 3) after a correction dx that turns the edges.
 
@@ -78,7 +79,7 @@ def turned_edges(x: Floats, dx: Floats, offset: float) -> Floats:
     return out
 
 
-@compiled
+@compiled_exactly
 def measure(geometry: Geometry, x: Floats, offset: float, axial_stiffness: float) -> None:
     """Fill `geometry` for free nodes x (n, M, 3) of tails clamped at (offset, 0, 0) along −e_z."""
     n, tails, _ = x.shape
@@ -111,13 +112,13 @@ def measure(geometry: Geometry, x: Floats, offset: float, axial_stiffness: float
             put(forces, k, m, force)
 
 
-@compiled
+@compiled_exactly
 def inverse_voronoi(k: int, n: int) -> float:
     """Compute 1/l_k of the bending energy of joint k: 2n at the clamp, n elsewhere."""
     return 2.0 * n if k == 0 else 1.0 * n
 
 
-@compiled
+@compiled_exactly
 def edge_block(geometry: Geometry, k: int, m: int, axial_stiffness: float) -> Matrix:
     """Compute ∂²E/∂e_k²."""
     n = geometry.length.shape[0]
@@ -133,7 +134,7 @@ def edge_block(geometry: Geometry, k: int, m: int, axial_stiffness: float) -> Ma
     )  # fmt: skip
 
 
-@compiled
+@compiled_exactly
 def joint_block(geometry: Geometry, k: int, m: int) -> Matrix:
     """Compute ∂²E/∂e_{k−1} ∂e_k of joint k."""
     c, first, second = vector(geometry.joint, k, m)
@@ -144,7 +145,7 @@ def joint_block(geometry: Geometry, k: int, m: int) -> Matrix:
     )  # fmt: skip
 
 
-@compiled
+@compiled_exactly
 def node_tangent(geometry: Geometry, k: int, m: int) -> tuple[Vector, float]:
     """Compute the unit tangent of node k (0: clamp), the mean of the adjacent edges', and |S| of their sum S."""
     total = vector(geometry.tangent, k, m)

@@ -1,6 +1,6 @@
 """Orbits of many robots: mean motion, whether it was found, the gap between the tails, and derivatives.
 
-The loops over robots are plain Python. What a single robot needs is compiled.
+Robots whose effects are local are solved for in groups (`sim.motion.orbit_groups`), the others one by one.
 """
 
 from __future__ import annotations
@@ -12,11 +12,13 @@ import numpy as np
 
 from sim.arrays import Floats, Integers
 from sim.model.body import Body
+from sim.motion.orbit_groups import orbits_in_groups
 from sim.motion.stability import growth_of_orbit
 from sim.solve.assembly import unpacked
 from sim.solve.derivative import orbit_slopes
 from sim.solve.orbit import mean_motion, residual_on_orbit, smallest_gap
 from sim.solve.refinement import FEW, SOLVED, Orbit, extrapolate, refined_orbit
+from sim.solve.residual import is_local
 
 _NEAR = 1.1  # gap from which tails cannot touch, given the error of the gap
 WIDTH = 1e-5  # finite-difference step in a robot's numbers; the balance depends almost linearly on them
@@ -60,10 +62,13 @@ def solve_orbits(
     """
     count = 0 if directions is None else directions.shape[1]
     slopes = np.full((len(rows), count, 5), np.nan)
+    bodies = unpacked(rows)
+    local = np.flatnonzero([is_local(body) for body in bodies])
+    grouped = dict(zip(local.tolist(), orbits_in_groups(rows[local], tails, phases), strict=True))
     orbits: list[Orbit] = []
     gap, grows = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
-    for i, body in enumerate(unpacked(rows)):
-        orbit = refined_orbit(body, tails, phases)
+    for i, body in enumerate(bodies):
+        orbit = grouped[i] if i in grouped else refined_orbit(body, tails, phases)
         orbits.append(orbit)
         if orbit.ended == SOLVED:
             gap[i] = smallest_gap(body, orbit.x[2], tails)

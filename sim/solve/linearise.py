@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled_exactly
+from sim.lanes import zeros
 from sim.linear.blocks import put, put_block, vector
 from sim.linear.chains import Chains, new_chains
 from sim.linear.vectors import (
@@ -58,15 +59,15 @@ class Equations(NamedTuple):
     t: Floats  # (P, 4)
 
 
-@compiled
+@compiled_exactly
 def new_equations(x: Floats, u: Floats) -> Equations:
     """Allocate room for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, _ = x.shape
-    chains = new_chains(n, columns, u.shape[0])
-    return Equations(chains, np.zeros((n, columns, 3, 3)), np.zeros_like(x), np.zeros_like(u))
+    chains = new_chains(x, n, columns, u.shape[0])
+    return Equations(chains, zeros(x, (n, columns, 3, 3)), zeros(x, x.shape), zeros(u, u.shape))
 
 
-@compiled
+@compiled_exactly
 def linearise(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, equations: Equations) -> None:
     """Fill the equations at x (n, M, 3), u (P, 4)."""
     columns, instants = x.shape[1], u.shape[0]
@@ -81,7 +82,7 @@ def linearise(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, equati
         _clamp(body, motion, rates, room, equations, m, m % instants)
 
 
-@compiled
+@compiled_exactly
 def _head(body: Body, u: Floats, corner: Floats, t: Floats) -> None:
     """Compute the drag on head and disc, and its derivative in u."""
     gain = motor_gain(body)
@@ -92,7 +93,7 @@ def _head(body: Body, u: Floats, corner: Floats, t: Floats) -> None:
         t[a] = -head_drag(body, u, a)
 
 
-@compiled
+@compiled_exactly
 def _tail(body: Body, motion: Motion, rates: Rates, x: Floats, room: Room, equations: Equations, m: int) -> None:
     """Balance of the nodes of column m, its blocks, and its derivative in the robot's velocities."""
     n, gain, rate = x.shape[0], motor_gain(body), rates.rate
@@ -135,7 +136,7 @@ def _tail(body: Body, motion: Motion, rates: Rates, x: Floats, room: Room, equat
         edge, joint, after_below = edge_next, joint_next, after
 
 
-@compiled
+@compiled_exactly
 def _clamp(body: Body, motion: Motion, rates: Rates, room: Room, equations: Equations, m: int, p: int) -> None:
     """Compute the force and moment of column m on the disc at instant p."""
     clamp = clamp_balance(room.geometry, body, m, motion, ZERO, ZERO)
@@ -146,12 +147,10 @@ def _clamp(body: Body, motion: Motion, rates: Rates, room: Room, equations: Equa
     _put_foot(chains.foot[0], m, motion, clamp.force_by_first, clamp.moment_by_first)
     _put_foot(chains.foot[1], m, motion, clamp.force_by_second, clamp.moment_by_second)
     corner = chains.corner[p]
-    directions = (motion.e_x, E_Z, cross(motion.e_y, root), times(motor_gain(body), cross(E_Z, root)))
-    for c in range(4):
-        drag = applied(clamp.resistance, directions[c])  # the half cell at the clamp moves with the disc
-        by_velocity = body_wrench(motion, drag, cross(root, drag))
-        for a in range(4):
-            corner[a, c] -= by_velocity[a]
+    _subtract_clamp_drag(corner, 0, motion, clamp.resistance, root, motion.e_x)
+    _subtract_clamp_drag(corner, 1, motion, clamp.resistance, root, E_Z)
+    _subtract_clamp_drag(corner, 2, motion, clamp.resistance, root, cross(motion.e_y, root))
+    _subtract_clamp_drag(corner, 3, motion, clamp.resistance, root, times(motor_gain(body), cross(E_Z, root)))
     # Body axes and load turn with the phase: ∂e_x/∂φ = −e_y, ∂e_y/∂φ = e_x.
     turning = phase_gain(rates, body)
     corner[0, 3] -= dot(motion.e_y, clamp.force) * turning
@@ -162,13 +161,24 @@ def _clamp(body: Body, motion: Motion, rates: Rates, room: Room, equations: Equa
         corner[a, 3] += by_load[a]
 
 
-@compiled
+@compiled_exactly
+def _subtract_clamp_drag(
+    corner: Floats, c: int, motion: Motion, resistance: Matrix, root: Vector, direction: Vector
+) -> None:
+    """Subtract the drag on the half cell at the clamp, which moves with the disc, from column c of the corner."""
+    drag = applied(resistance, direction)
+    by_velocity = body_wrench(motion, drag, cross(root, drag))
+    for a in range(4):
+        corner[a, c] -= by_velocity[a]
+
+
+@compiled_exactly
 def _load_by_phase(body: Body, motion: Motion) -> Vector:
     """Compute the derivative of the load on a tail, force per length, in the phase."""
     return minus(times(body.tail_load[1], motion.e_x), times(body.tail_load[0], motion.e_y))
 
 
-@compiled
+@compiled_exactly
 def _put_foot(foot: Floats, m: int, motion: Motion, force: Matrix, moment: Matrix) -> None:
     """Put the rows of the robot's equations for one node of column m."""
     put(foot, m, 0, applied(transposed(force), motion.e_x))

@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled_exactly
+from sim.lanes import zeros
 from sim.linear import chains as separate
 from sim.linear import coupled
-from sim.linear.coupled import Coupled, new_coupled
+from sim.linear.coupled import Coupled, Coupling, new_coupled
 from sim.linear.gmres import combine, extend, new_krylov, start
 from sim.mechanics.balance import tail_spin
 from sim.mechanics.geometry import turned_edges
@@ -29,8 +30,8 @@ from sim.solve.residual import Room, fill_residual, is_local, new_room
 FINITE_DIFFERENCE_STEP = 1e-6  # of the largest entry, in l or 1 + |ω|
 RELATIVE_TOLERANCE = 1e-3  # of the residual in one Newton correction by GMRES
 _MOST_PRODUCTS = 60
-_MOST_CORRECTIONS = 30
-_LARGEST_MOVE = 0.3  # of a node in one correction, in l; r0 where tails feel each other
+MOST_CORRECTIONS = 30
+LARGEST_MOVE = 0.3  # of a node in one correction, in l; r0 where tails feel each other
 
 
 class Workspace(NamedTuple):
@@ -41,16 +42,16 @@ class Workspace(NamedTuple):
     system: Coupled
 
 
-@compiled
+@compiled_exactly
 def new_workspace(rates: Rates, x: Floats, u: Floats) -> Workspace:
     """Allocate room for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, instants = x.shape[0], x.shape[1], u.shape[0]
     joined = 1 if is_joined(rates) else 0
-    system = new_coupled(n, joined * columns, joined * instants)
+    system = new_coupled(x, n, joined * columns, joined * instants)
     return Workspace(new_room(x, u), new_equations(x, u), system)
 
 
-@compiled
+@compiled_exactly
 def newton(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float) -> tuple[int, float]:
     """Improve x (n, M, 3) and u (P, 4) in place.
 
@@ -61,7 +62,7 @@ def newton(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tole
         Number of corrections, and size of the last one (in l and 1 + |ω|; above `tolerance`: not converged).
     """
     size = np.inf
-    for count in range(1, _MOST_CORRECTIONS + 1):
+    for count in range(1, MOST_CORRECTIONS + 1):
         dx, du = correct(body, rates, x, u, work, True)
         size = max(np.max(np.abs(dx)), np.max(np.abs(du)) / (1 + abs(body.omega)))
         if not np.isfinite(size):
@@ -71,10 +72,10 @@ def newton(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tole
         u += share * du
         if size < tolerance:
             return count, size
-    return _MOST_CORRECTIONS, size
+    return MOST_CORRECTIONS, size
 
 
-@compiled
+@compiled_exactly
 def correct(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, anew: bool) -> tuple[Floats, Floats]:
     """Compute one correction dx (n, M, 3), du (P, 4), with a new factorisation (`anew`) or the stored factors."""
     local = is_local(body)
@@ -83,18 +84,18 @@ def correct(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, ane
         linearise(body, rates, x, u, work.room, work.equations)
     if not (anew and local):
         fill_residual(body, rates, x, u, work.room, work.equations.r, work.equations.t)
-    _negate(work.equations, dx, du)
+    negate(work.equations, dx, du)
     solve_linear(body, rates, x, u, work, anew, RELATIVE_TOLERANCE, dx, du)
     return dx, du
 
 
-@compiled
+@compiled_exactly
 def largest_move(body: Body) -> float:
     """Bound the move of a node in one correction, in l; tails in contact must not pass through each other."""
-    return body.tail_radius if has_contact(body) else _LARGEST_MOVE
+    return body.tail_radius if has_contact(body) else LARGEST_MOVE
 
 
-@compiled
+@compiled_exactly
 def move(body: Body, x: Floats, dx: Floats) -> None:
     """Correct the nodes x (n, M, 3) by dx; with flow, edges are turned, since stretching them would drive flow."""
     if is_local(body):
@@ -103,8 +104,8 @@ def move(body: Body, x: Floats, dx: Floats) -> None:
         x[:] = turned_edges(x, dx, body.offset)
 
 
-@compiled
-def _negate(equations: Equations, dx: Floats, du: Floats) -> None:
+@compiled_exactly
+def negate(equations: Equations, dx: Floats, du: Floats) -> None:
     """Negate the residual: the right-hand sides of Newton's equations."""
     n, columns, _ = dx.shape
     for k in range(n):
@@ -116,7 +117,7 @@ def _negate(equations: Equations, dx: Floats, du: Floats) -> None:
             du[p, a] = -equations.t[p, a]
 
 
-@compiled
+@compiled_exactly
 def solve_linear(
     body: Body,
     rates: Rates,
@@ -143,7 +144,7 @@ def solve_linear(
         _solve_nonlocal(body, rates, x, u, work, tolerance, dx, du)
 
 
-@compiled
+@compiled_exactly
 def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: Floats, du: Floats) -> None:
     """Factorise Newton's matrix without non-local effects, which `linearise` left in `work`, and solve with it.
 
@@ -155,14 +156,14 @@ def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: F
         separate.factor_and_solve(chains, dx, du[0])
         return
     n, columns, _ = dx.shape
-    speed = np.empty(columns)
+    speed = zeros(dx, (columns,))
     for m in range(columns):
         speed[m] = tail_spin(body, u[m % u.shape[0]])
-    coupled.couple(work.system, chains, work.equations.resistance, speed, rates.differentiation)
-    coupled.factor_and_solve(work.system, chains, dx.reshape(n, 3 * columns), du.reshape(du.size))
+    coupling = Coupling(work.equations.resistance, speed, rates.differentiation)
+    coupled.factor_and_solve(work.system, chains, coupling, dx.reshape((n, 3 * columns)), du.reshape(du.size))
 
 
-@compiled
+@compiled_exactly
 def _solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
     """Solve with the factors, in place: dx (n, M, 3) and du (P, 4) come in as right-hand sides."""
     if not is_joined(rates):
@@ -172,7 +173,7 @@ def _solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
         coupled.solve(work.system, work.equations.chains, dx.reshape(n, 3 * columns), du.reshape(du.size))
 
 
-@compiled
+@compiled_exactly
 def _solve_nonlocal(
     body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, tolerance: float, dx: Floats, du: Floats
 ) -> None:

@@ -22,7 +22,8 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled_exactly
+from sim.lanes import zeros
 from sim.linear.spectral import with_phases
 from sim.mechanics.balance import tail_spin
 from sim.mechanics.contact import tail_gap
@@ -33,25 +34,25 @@ from sim.solve.rates import on_orbit
 from sim.solve.residual import fill_residual, new_room
 
 FIRST_PHASE = np.pi / 2
-_HEAD_SHARE = 0.3  # of the motor's speed, in the first guess
+HEAD_SHARE = 0.3  # of the motor's speed, in the first guess
 
 
-@compiled
+@compiled_exactly
 def straight_start(body: Body, n: int, phases: int, tails: int) -> tuple[Floats, Floats]:
     """Guess x (n, M, 3) and u (P, 4): straight tails, with a part of the motor's speed in the head."""
     u = np.zeros((phases // tails, 4))
-    u[:, 3] = -_HEAD_SHARE * body.omega
+    u[:, 3] = -HEAD_SHARE * body.omega
     return straight(n, phases, body.offset), u
 
 
-@compiled
+@compiled_exactly
 def solve_orbit(body: Body, x: Floats, u: Floats, tolerance: float) -> tuple[int, float]:
     """Improve x (n, M, 3) and u (P, 4) in place; see `sim.solve.newton.newton`."""
     rates = on_orbit(x.shape[1], FIRST_PHASE)
     return newton(body, rates, x, u, new_workspace(rates, x, u), tolerance)
 
 
-@compiled
+@compiled_exactly
 def residual_on_orbit(body: Body, x: Floats, u: Floats) -> tuple[Floats, Floats]:
     """Compute the residual at x (n, M, 3), u (P, 4): r (n, M, 3) on the nodes and t (P, 4) on the robot."""
     room = new_room(x, u)
@@ -60,18 +61,18 @@ def residual_on_orbit(body: Body, x: Floats, u: Floats) -> tuple[Floats, Floats]
     return r, t
 
 
-@compiled
+@compiled_exactly
 def largest_force(body: Body, x: Floats) -> float:
     """Find the largest force that an edge of the tails x (n, M, 3) carries."""
-    geometry = new_geometry(x.shape[0], x.shape[1])
+    geometry = new_geometry(x, x.shape[0], x.shape[1])
     measure(geometry, x, body.offset, body.axial_stiffness)
     return float(np.max(np.abs(geometry.force)))
 
 
-@compiled
+@compiled_exactly
 def mean_motion(body: Body, u: Floats) -> Floats:
     """Average (ω_t, ω_h, ω_yr, v_x, v_z) of the head's centre over time: ∫ u dφ/ω_t over ∫ dφ/ω_t."""
-    total, time = np.zeros(5), 0.0
+    total, time = zeros(u, (5,)), 0.0 * u[0, 0]
     for p in range(u.shape[0]):
         omega_t = tail_spin(body, u[p])
         time += 1 / omega_t
@@ -80,10 +81,12 @@ def mean_motion(body: Body, u: Floats) -> Floats:
         total[2] += u[p, 2] / omega_t
         total[3] += (u[p, 0] + u[p, 2] * body.head_length / 2) / omega_t
         total[4] += u[p, 1] / omega_t
-    return total / time
+    for i in range(5):
+        total[i] = total[i] / time
+    return total
 
 
-@compiled
+@compiled_exactly
 def turns_forward(body: Body, u: Floats) -> bool:
     """Tell whether the tails turn with the motor at all phases."""
     smallest = np.inf
@@ -92,7 +95,7 @@ def turns_forward(body: Body, u: Floats) -> bool:
     return bool(smallest > 0)
 
 
-@compiled
+@compiled_exactly
 def smallest_gap(body: Body, x: Floats, tails: int) -> float:
     """Find the smallest gap between tails in a revolution, over 2 r0."""
     x = with_phases(x, 2 * x.shape[1])

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled_exactly
 from sim.linear.blocks import put, vector
 from sim.linear.spectral import differentiation
 from sim.linear.vectors import ZERO, cross, minus, plus, times
@@ -33,37 +33,37 @@ class Rates(NamedTuple):
     start: Floats  # x*, (n, M, 3); empty for an orbit
 
 
-@compiled
+@compiled_exactly
 def on_orbit(phases: int, first_phase: float) -> Rates:
     """Collocate at M equal phases."""
     return Rates(0.0, first_phase, differentiation(phases), np.zeros((0, 0, 0)))
 
 
-@compiled
+@compiled_exactly
 def in_stage(rate: float, phase: float, start: Floats) -> Rates:
     """Describe a stage with ẋ = rate (x − start) and φ = phase + ω_t/rate."""
     return Rates(rate, phase, np.zeros((0, 0)), start)
 
 
-@compiled
+@compiled_exactly
 def in_transient(rate: float, first_phase: float, start: Floats) -> Rates:
     """Describe a stage with ẋ = ω_t ∂x/∂φ + rate (x − start), at M equal phases."""
     return Rates(rate, first_phase, differentiation(start.shape[1]), start)
 
 
-@compiled
+@compiled_exactly
 def is_joined(rates: Rates) -> bool:
     """Tell whether the columns are phases, joined to each other by ∂x/∂φ."""
     return rates.differentiation.shape[0] > 0
 
 
-@compiled
+@compiled_exactly
 def base_phase(rates: Rates, body: Body, u: Floats) -> float:
     """Return the phase of column 0, for velocities u (P, 4); column m is 2π m/M later."""
     return rates.phase + (0.0 if is_joined(rates) else tail_spin(body, u[0]) / rates.rate)
 
 
-@compiled
+@compiled_exactly
 def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by_spin: Floats) -> None:
     """Compute the velocities of the free nodes in the disc frame and what a faster spin changes in them.
 
@@ -91,12 +91,12 @@ def fill_rates(rates: Rates, body: Body, x: Floats, u: Floats, x_dot: Floats, by
                     slope = plus(slope, times(rates.differentiation[m, j], vector(x, k, j)))
                 put(by_spin, k, m, slope)
                 change = times(omega_t, slope)
-                if rates.rate > 0:
+                if rates.start.shape[0] > 0:
                     change = plus(change, times(rates.rate, minus(vector(x, k, m), vector(rates.start, k, m))))
                 put(x_dot, k, m, change)
 
 
-@compiled
+@compiled_exactly
 def phase_gain(rates: Rates, body: Body) -> float:
     """Compute ∂φ/∂ω_h."""
     return 0.0 if is_joined(rates) else motor_gain(body) / rates.rate

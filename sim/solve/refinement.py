@@ -13,12 +13,13 @@ Every result says whether the robot was solved, and if not, why. Left out: wheth
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled_exactly, formula
+from sim.lanes import fma, larger, zeros
 from sim.linear.spectral import with_phases
 from sim.model.body import Body
 from sim.solve.newton import new_workspace, newton
@@ -47,10 +48,13 @@ CORRECTION = 1e-6  # limit of the last Newton correction on the finest mesh; str
 ROUGH = 1e-5  # the same on coarser meshes, where only the means are needed: their error is then about 1e-9
 BALANCED = 1e-5  # largest unbalanced force over the largest force in an edge
 FEW, MANY = 3, 12  # phases to begin with; MANY for derivatives, which may depend more on the phase than the motion
-_PHASE_ERROR = 1e-4  # relative, in the means
-_DOUBT = 0.03  # share of the extrapolation that counts as error
-_SHRINKS = 0.2  # assumed factor on the phase error with the next number of phases, if only one is known
-_MOST_PHASES = 48
+PHASE_ERROR = 1e-4  # relative, in the means
+DOUBT = 0.03  # share of the extrapolation that counts as error
+SHRINKS = 0.2  # assumed factor on the phase error with the next number of phases, if only one is known
+MOST_PHASES = 48
+_A, _B, _C = (1.0 / edges**2 for edges in MESHES)
+_OF_COARSE, _OF_MIDDLE = _B * _C / ((_A - _B) * (_A - _C)), _A * _C / ((_B - _A) * (_B - _C))
+_OF_FINE, _MORE = _A * _B / ((_C - _A) * (_C - _B)), _C / (_B - _C)
 _SOFTER, _SOFTEST = 5.0, 0.5  # factor from hard contact to softer, and where it ends (EI/l³)
 _SLOW, _FASTER, _LEAST_FASTER = 3.0, 1.5, 1.02  # ω̄ to begin with where tails may touch, and factors from there
 _START, _SOFT = 1e-3, 0.05  # limit of the last Newton correction on the way, and factor on the contact there
@@ -72,7 +76,7 @@ def refined_orbit(body: Body, tails: int, least: int) -> Orbit:
     Returns:
         The orbit; `ended` says why it could not be solved, if so.
     """
-    if tails > _MOST_PHASES:
+    if tails > MOST_PHASES:
         return _unsolved(MANY_PHASES, np.zeros((MESHES[0], tails, 3)), np.zeros((1, 4)))
     ended, error, x, u = _on_coarsest_mesh(body, tails, least)
     orbit = _unsolved(ended, x, u) if ended != SOLVED else _on_finer_meshes(body, error, x, u)
@@ -94,13 +98,13 @@ def _by_softer_contact(body: Body, tails: int, least: int, lost: Orbit) -> Orbit
             return lost
     means = np.array([mean_motion(body, u) for u in found.u])
     limit = extrapolate(means)
-    error = difference(_without_last_term(means), limit) + _DOUBT * difference(means[2], limit) + _PHASE_ERROR
+    error = difference(_without_last_term(means), limit) + DOUBT * difference(means[2], limit) + PHASE_ERROR
     return Orbit(SOLVED, max(error, found.error), limit, found.x, found.u)
 
 
 def orbit_on_mesh(body: Body, tails: int, edges: int) -> tuple[bool, Floats, Floats]:
     """Solve for the orbit on a given mesh: whether there is one, x (n, M, 3) and u (P, 4)."""
-    if tails > _MOST_PHASES:
+    if tails > MOST_PHASES:
         return False, np.zeros((edges, tails, 3)), np.zeros((1, 4))
     ended, _, x, u = _on_coarsest_mesh(body, tails, FEW)
     if ended != SOLVED:
@@ -130,7 +134,7 @@ def _from_a_slow_motor(plain: Body, tails: int) -> tuple[Floats, Floats]:
     soft = plain._replace(nonlocal_terms=terms._replace(tail_contact=_SOFT * terms.tail_contact))
     speed = min(_SLOW / abs(plain.omega), 1.0)
     factor, slow = _FASTER, soft._replace(omega=speed * plain.omega)
-    x, u = straight_start(slow, MESHES[0], _fewest_phases(tails), tails)
+    x, u = straight_start(slow, MESHES[0], fewest_phases(tails), tails)
     _, size = solve_orbit(slow, x, u, _START)
     while size < _START and speed < 1 and factor > _LEAST_FASTER:
         factor = min(factor, 1 / speed)
@@ -143,25 +147,25 @@ def _from_a_slow_motor(plain: Body, tails: int) -> tuple[Floats, Floats]:
     return x, u
 
 
-@compiled
-def _fewest_phases(tails: int) -> int:
+@compiled_exactly
+def fewest_phases(tails: int) -> int:
     """Choose two phases or more, a multiple of N."""
     return tails * int(np.ceil(2 / tails))
 
 
-@compiled
+@compiled_exactly
 def _from_straight_tails(body: Body, plain: Body, tails: int, least: int) -> tuple[int, float, Floats, Floats]:
     """Solve as `_enough_phases` does, from straight tails."""
-    x, u = straight_start(plain, MESHES[0], _fewest_phases(tails), tails)
+    x, u = straight_start(plain, MESHES[0], fewest_phases(tails), tails)
     return _enough_phases(body, plain, x, u, tails, least)
 
 
-@compiled
+@compiled_exactly
 def _unsolved(ended: int, x: Floats, u: Floats) -> Orbit:
     return Orbit(ended, np.nan, np.full(5, np.nan), (x, x, x), (u, u, u))
 
 
-@compiled
+@compiled_exactly
 def _on_finer_meshes(body: Body, error: float, x: Floats, u: Floats) -> Orbit:
     """Solve on all MESHES, from the orbit on the coarsest, and extrapolate; `error` is that of the phases."""
     xs, us = (x, x, x), (u, u, u)
@@ -196,18 +200,18 @@ def _on_finer_meshes(body: Body, error: float, x: Floats, u: Floats) -> Orbit:
     for i in range(3):
         means[i] = mean_motion(body, us[i])
     limit = extrapolate(means)
-    error += difference(_without_last_term(means), limit) + _DOUBT * difference(means[2], limit)
+    error += difference(_without_last_term(means), limit) + DOUBT * difference(means[2], limit)
     return Orbit(SOLVED, error, limit, xs, us)
 
 
-@compiled
+@compiled_exactly
 def _is_balanced(body: Body, x: Floats, u: Floats) -> bool:
     """Tell whether the unbalanced forces are small compared with the forces in the edges."""
     r, t = residual_on_orbit(body, x, u)
     return bool(max(np.max(np.abs(r)), np.max(np.abs(t))) < BALANCED * largest_force(body, x))
 
 
-@compiled
+@compiled_exactly
 def _enough_phases(
     body: Body, plain: Body, x: Floats, u: Floats, tails: int, least: int
 ) -> tuple[int, float, Floats, Floats]:
@@ -234,28 +238,28 @@ def _enough_phases(
         new_means = mean_motion(body, u_more)
         if solved > 1:
             last, change = change, difference(means, new_means)
-            if change <= _PHASE_ERROR:
+            if change <= PHASE_ERROR:
                 return SOLVED, change, x, u
-            fall = _SHRINKS if not np.isfinite(last) else min(max(change / last, 0.05), 1.0)
-            if change * fall <= _PHASE_ERROR:
+            fall = SHRINKS if not np.isfinite(last) else min(max(change / last, 0.05), 1.0)
+            if change * fall <= PHASE_ERROR:
                 return SOLVED, change * fall, x_more, u_more
         x, u, means = x_more, u_more, new_means
-        if phases > _MOST_PHASES:
+        if phases > MOST_PHASES:
             return MANY_PHASES, np.nan, x, u
-        phases = _more_phases(tails, phases)
+        phases = more_phases(tails, phases)
 
 
-@compiled
-def _more_phases(tails: int, phases: int) -> int:
+@compiled_exactly
+def more_phases(tails: int, phases: int) -> int:
     """Choose the next number of phases to try: a multiple of N, about half as many again."""
     return tails * max(phases // tails + 1, int(np.ceil(1.4 * phases / tails)))
 
 
-@compiled
+@compiled_exactly
 def with_edges(x: Floats, offset: float, wanted: int) -> Floats:
     """Move free nodes (n, M, 3) to a mesh of `wanted` edges: cubic interpolation in the arc length."""
     n, phases, _ = x.shape
-    out = np.zeros((wanted, phases, 3))
+    out = zeros(x, (wanted, phases, 3))
     for k in range(wanted):
         place = (k + 1) * n / wanted
         first = min(max(int(np.floor(place)) - 1, 0), n - 3)
@@ -271,28 +275,39 @@ def with_edges(x: Floats, offset: float, wanted: int) -> Floats:
     return out
 
 
-@compiled
-def difference(a: Floats, b: Floats) -> float:
+@compiled_exactly
+def difference(a: Floats, b: Floats) -> Any:
     """Compute the largest relative difference of two sets of means (5,); velocities relative to the speed."""
-    speed = np.hypot(b[3], b[4])
-    change = np.abs(a - b)
-    rates = max(change[0] / abs(b[0]), change[1] / abs(b[1]), change[2] / abs(b[2]))
-    return max(rates, max(change[3], change[4]) / speed)
+    speed = np.sqrt(b[3] * b[3] + b[4] * b[4])
+    rates = larger(abs((a[0] - b[0]) / b[0]), larger(abs((a[1] - b[1]) / b[1]), abs((a[2] - b[2]) / b[2])))
+    return larger(rates, larger(abs(a[3] - b[3]), abs(a[4] - b[4])) / speed)
 
 
-@compiled
+@compiled_exactly
 def extrapolate(found: Floats) -> Floats:
     """Limit for n → ∞ of values on MESHES, (3, K), whose errors go as c₂/n² + c₄/n⁴."""
-    a, b, c = 1.0 / MESHES[0] ** 2, 1.0 / MESHES[1] ** 2, 1.0 / MESHES[2] ** 2
-    return (
-        found[0] * (b * c) / ((a - b) * (a - c))
-        + found[1] * (a * c) / ((b - a) * (b - c))
-        + found[2] * (a * b) / ((c - a) * (c - b))
-    )
+    values = np.empty(found.shape[1])
+    for i in range(len(values)):
+        values[i] = limit(found[0, i], found[1, i], found[2, i])
+    return values
 
 
-@compiled
-def _without_last_term(found: Floats) -> Floats:
+@formula
+def limit(coarse: Any, middle: Any, fine: Any) -> Any:
+    """Compute the limit of one value on MESHES."""
+    return fma(_OF_COARSE, coarse, fma(_OF_MIDDLE, middle, _OF_FINE * fine))
+
+
+@formula
+def limit_of_two(middle: Any, fine: Any) -> Any:
     """Extrapolate from the two finer meshes, with c₂/n² alone."""
-    b, c = 1.0 / MESHES[1] ** 2, 1.0 / MESHES[2] ** 2
-    return (found[2] * b - found[1] * c) / (b - c)
+    return fma(_MORE, fine - middle, fine)
+
+
+@compiled_exactly
+def _without_last_term(found: Floats) -> Floats:
+    """Extrapolate values on MESHES, (3, K), from the two finer meshes."""
+    values = np.empty(found.shape[1])
+    for i in range(len(values)):
+        values[i] = limit_of_two(found[1, i], found[2, i])
+    return values

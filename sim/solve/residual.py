@@ -19,7 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled_exactly
+from sim.lanes import zeros
 from sim.linear.blocks import put, vector, vector_at
 from sim.linear.vectors import cross, minus, plus
 from sim.mechanics.balance import body_wrench, clamp_balance, head_drag, motion_at, node_balance
@@ -50,15 +51,15 @@ class Room(NamedTuple):
     by_spin: Floats  # (n, M, 3), see `sim.solve.rates`
 
 
-@compiled
+@compiled_exactly
 def new_room(x: Floats, u: Floats) -> Room:
     """Allocate room for unknowns like x (n, M, 3) and u (P, 4)."""
     n, columns, _ = x.shape
-    around = Surroundings(np.zeros((n + 1, columns, 3)), np.zeros((columns, 3)), np.zeros_like(u))
-    return Room(new_geometry(n, columns), around, np.zeros_like(x), np.zeros_like(x))
+    around = Surroundings(zeros(x, (n + 1, columns, 3)), zeros(x, (columns, 3)), zeros(u, u.shape))
+    return Room(new_geometry(x, n, columns), around, zeros(x, x.shape), zeros(x, x.shape))
 
 
-@compiled
+@compiled_exactly
 def is_local(body: Body) -> bool:
     """Tell whether no effect reaches further than one node."""
     total = 0.0
@@ -67,7 +68,7 @@ def is_local(body: Body) -> bool:
     return bool(total == 0)
 
 
-@compiled
+@compiled_exactly
 def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r: Floats, t: Floats) -> None:
     """Compute the residual at x (n, M, 3), u (P, 4).
 
@@ -110,7 +111,7 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
             t[m % instants, a] += wrench[a]
 
 
-@compiled
+@compiled_exactly
 def _surround(body: Body, x: Floats, u: Floats, phase: float, p: int, tails: int, room: Room) -> None:
     """Add all non-local effects at instant p; forces in the tails come first, because the flow depends on them."""
     if is_local(body):

@@ -44,7 +44,7 @@ def energy(x: np.ndarray, offset: float) -> float:
 
 
 def test_forces_and_moment_are_slopes_of_the_energy() -> None:
-    body, geometry, moments = tapered(), new_geometry(EDGES, 1), np.zeros((1, 3))
+    body, geometry, moments = tapered(), new_geometry(np.empty(0), EDGES, 1), np.zeros((1, 3))
     x = straight(EDGES, 1, body.offset)
     x += 0.03 * np.random.default_rng(0).normal(size=x.shape)
     measure(geometry, x, body.offset, body.axial_stiffness)

@@ -18,7 +18,7 @@ from sim.machine_code import Locator
 from tests.processes import LIMIT
 
 SIM = Path(sim.__file__).parent
-MARKS = {"compiled", "formula"}
+MARKS = {"compiled", "compiled_exactly", "formula"}
 
 
 def test_only_the_newest_versions_are_kept(tmp_path: Path) -> None:

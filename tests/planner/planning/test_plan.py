@@ -58,7 +58,8 @@ def test_planning_never_calls_the_simulator(monkeypatch: pytest.MonkeyPatch) -> 
         raise AssertionError("the planner simulated")
 
     for module, name in ((sim.motion.steady, "steady"), (sim.motion.switching, "switch_response"),
-                         (sim.motion.orbits, "refined_orbit"), (sim.motion.run, "advance")):  # fmt: skip
+                         (sim.motion.orbits, "refined_orbit"), (sim.motion.orbits, "orbits_in_groups"),
+                         (sim.motion.run, "advance")):  # fmt: skip
         monkeypatch.setattr(module, name, refuse)
     assert len(plan(polygon(4, 3.0), CONTROL).dwells) > 50
 

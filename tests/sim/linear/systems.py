@@ -10,7 +10,7 @@ from sim.linear.chains import Chains, new_chains
 def random_chains(n: int, count: int, instants: int, seed: int) -> Chains:
     """Draw chains with dominant diagonal blocks."""
     rng = np.random.default_rng(seed)
-    chains = new_chains(n, count, instants)
+    chains = new_chains(np.empty(0), n, count, instants)
     for part in chains:
         part[:] = rng.normal(size=part.shape)
     chains.diagonal[:] += 20 * np.eye(3)

@@ -16,13 +16,13 @@ def test_the_factors_solve_the_dense_system_for_any_right_hand_side(n: int, coun
     rng = np.random.default_rng(1)
     resistance, speed, D = rng.normal(size=(n, count, 3, 3)), rng.normal(size=count), differentiation(count)
     matrix = joined_matrix(chains, resistance, speed, D)
-    system = coupled.new_coupled(n, count, instants)
-    coupled.couple(system, chains, resistance, speed, D)
+    system = coupled.new_coupled(np.empty(0), n, count, instants)
+    coupling = coupled.Coupling(resistance, speed, D)
     for first in (True, False):
         s, t = rng.normal(size=(n, 3 * count)), rng.normal(size=4 * instants)
         right = np.concatenate([s.ravel(), t])
         if first:
-            coupled.factor_and_solve(system, chains, s, t)
+            coupled.factor_and_solve(system, chains, coupling, s, t)
         else:
             coupled.solve(system, chains, s, t)
         assert matrix @ np.concatenate([s.ravel(), t]) == pytest.approx(right, abs=1e-10)

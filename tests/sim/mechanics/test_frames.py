@@ -93,7 +93,7 @@ def tail_forces(
     """Compute edge forces (n, 3) and further clamp moment (3,) of one tail whose disc stands still."""
     body = first_body(control(1, N=1, natural_twist=natural_twist, **effects))
     n = len(x)
-    geometry, moments = new_geometry(n, 1), np.zeros((1, 3))
+    geometry, moments = new_geometry(np.empty(0), n, 1), np.zeros((1, 3))
     measure(geometry, x[:, None], body.offset, body.axial_stiffness)
     motion = motion_at(body, np.array([0.0, 0.0, 0.0, -body.omega]), 0.0)
     add_frames(body, geometry, motion, 0, x_dot[:, None], moments)

@@ -51,7 +51,7 @@ def test_effects_add_to_what_the_effects_before_them_made() -> None:
     room, zero = new_room(x, u), new_room(x, u)
     room.around.moment[:], room.around.flow[:] = 0.5, 0.25
     for around in (room.around, zero.around):
-        geometry = new_geometry(*x.shape[:2])
+        geometry = new_geometry(x, *x.shape[:2])
         measure(geometry, x, body.offset, body.axial_stiffness)
         for m in range(x.shape[1]):
             add_frames(body, geometry, motion_at(body, u[0], 0.3), m, room.x_dot, around.moment)

@@ -1,0 +1,126 @@
+"""Steady motions in groups, a robot in each lane, beside one robot at a time: speed, bits, vector instructions.
+
+1. Steady motions of robots of the sweep: loops for plain numbers, one lane, and groups, processor time in one run.
+2. Share of vector instructions among the arithmetic of one Newton correction, from the assembly.
+
+Usage: python -m benchmarks lanes [ROBOTS]
+
+Takes 3 minutes.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from benchmarks.timing import processor_time
+from dataset.rows.design import load_design
+from sim.lanes import ALONE, GROUP, lanes, zeros
+from sim.model.groups import Groups
+from sim.motion.orbit_groups import group_width, orbits_in_groups
+from sim.solve.assembly import Nonlocal, bodies, numbers
+from sim.solve.groups import body_in_lanes
+from sim.solve.linearise import linearise
+from sim.solve.newton import factor_and_solve, negate, new_workspace
+from sim.solve.orbit import FIRST_PHASE
+from sim.solve.rates import on_orbit
+from sim.solve.refinement import FEW, SOLVED, Orbit, refined_orbit
+
+ROBOTS = 48
+REPEATS = 5
+_PACKED = re.compile(r"^\s*v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*|max|min)pd\b.*([xyz])mm", re.MULTILINE)
+_SCALAR = re.compile(r"^\s*v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*|max|min)sd\b", re.MULTILINE)
+
+
+def shortest(work: Callable[[], object]) -> float:
+    """Return the shortest processor time of some runs [s]."""
+    return min(processor_time(work) for _ in range(REPEATS))
+
+
+def same(a: Orbit, b: Orbit) -> bool:
+    """Compare two orbits bit by bit."""
+    pairs = zip([a.means, *a.x, *a.u], [b.means, *b.x, *b.u], strict=True)
+    return a.ended == b.ended and all(np.array_equal(p, q, equal_nan=True) for p, q in pairs)
+
+
+def speeds(count: int) -> None:
+    """Print the time of a steady motion by N."""
+    points = load_design().with_rows(8 * count).points()
+    print(f"A steady motion, {count} robots of the sweep for each N, groups of {len(group_width())}, microseconds")
+    print("  N   plain numbers   one lane   groups   plain/groups   one lane/plain   largest difference   same")
+    for tails in (2, 3, 4, 5):
+        rows = np.flatnonzero(points["N"] == tails)[:count]
+        groups = Groups.from_columns({name: values[rows] for name, values in points.items()})
+        robots, packed = bodies(groups), numbers(groups)
+
+        def plainly(robots: Any = robots, tails: int = tails) -> list[Orbit]:
+            return [refined_orbit(body, tails, FEW) for body in robots]
+
+        def singly(packed: Any = packed, tails: int = tails) -> list[Orbit]:
+            return [orbits_in_groups(packed[i : i + 1], tails, FEW)[0] for i in range(len(packed))]
+
+        def together(packed: Any = packed, tails: int = tails) -> list[Orbit]:
+            return orbits_in_groups(packed, tails, FEW)
+
+        wanted, alone, found = plainly(), singly(), together()
+        apart = max(
+            (float(np.max(np.abs(a.means / b.means - 1))) for a, b in zip(found, wanted, strict=True)
+             if a.ended == b.ended == SOLVED), default=np.nan)  # fmt: skip
+        equal = all(map(same, alone, found))
+        a, b, c = (1e6 * shortest(work) / len(rows) for work in (plainly, singly, together))
+        ratios = f"{a / c:12.2f}   {b / a:14.2f}"
+        print(f"  {tails}   {a:13.0f}   {b:8.0f}   {c:6.0f}   {ratios}   {apart:18.1e}   {equal}")
+
+
+def _correction(numbers: Any, x: Any, u: Any, terms: Any, width: Any) -> None:
+    """Compute one Newton correction of a group, in place of x."""
+    body, x, u = body_in_lanes(lanes(numbers, width), terms), lanes(x, width), lanes(u, width)
+    rates = on_orbit(x.shape[1], FIRST_PHASE)
+    work = new_workspace(rates, x, u)
+    dx, du = zeros(x, x.shape), zeros(u, u.shape)
+    linearise(body, rates, x, u, work.room, work.equations)
+    negate(work.equations, dx, du)
+    factor_and_solve(body, rates, u, work, dx, du)
+    x[:] = dx
+
+
+def instructions(width: tuple[int, ...]) -> Counter[str]:
+    """Count the instructions of double-precision arithmetic in a Newton correction, by kind."""
+    from numba import njit, typeof
+
+    from sim.machine_code import compiler_settings
+
+    with compiler_settings():
+        loop: Any = njit(error_model="numpy")(_correction)
+        terms = Nonlocal(*[0.0] * len(Nonlocal._fields))
+        arrays = np.ones((33, len(width))), np.ones((6, 3, 3, len(width))), np.ones((1, 4, len(width)))
+        kind: Any = typeof
+        given = (*map(kind, arrays), kind(terms), kind(width))
+        loop.compile(given)
+    text = "\n".join(loop.inspect_asm().values())
+    kinds = Counter(f"{kind}mm" for kind in _PACKED.findall(text))
+    kinds["scalar"] = len(_SCALAR.findall(text))
+    return kinds
+
+
+def main(robots: str = str(ROBOTS)) -> None:
+    """Print both tables."""
+    count = int(robots)
+    with threadpool_limits(1), np.errstate(all="ignore"):
+        speeds(count)
+    print("\nArithmetic instructions on doubles in the assembly of a Newton correction (assembly and elimination)")
+    for name, width in (("one lane", ALONE), ("eight lanes", GROUP)):
+        kinds = instructions(width)
+        total = sum(kinds.values())
+        parts = ", ".join(f"{kind} {number}" for kind, number in sorted(kinds.items()))
+        print(f"  {name}: {100 * (total - kinds['scalar']) / max(total, 1):.0f} % packed ({parts})")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

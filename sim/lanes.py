@@ -1,0 +1,112 @@
+"""Numbers of several robots at once: each number of a formula is a vector with one lane for each robot.
+
+A compiled loop works on arrays of plain numbers, one robot, or on arrays of vectors with W lanes, a group of W
+robots. Its source is the same, since vectors are added, multiplied and compared like numbers. A lane never sees
+another lane. So the result of a robot depends neither on its neighbours in a group nor on W: operations are those
+of IEEE 754, in the order of the source, and products are only fused where the source says so (`fma`). Such loops
+are compiled by `sim.compiling.compiled_exactly`.
+
+A condition on lanes is a vector of 1 (true) and 0 (false), by which `choose` picks.
+
+The functions of this file are for compiled loops. `sim.lane_code` gives their machine code; what stands here is
+what they do to plain numbers. W is the length of a tuple (`GROUP`, `ALONE`), so that it is part of a type.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+GROUP, HALF_GROUP = (0,) * 8, (0,) * 4  # the widest registers hold eight numbers, others four
+ALONE = (0,)
+
+
+def lanes(array: Any, width: Any) -> Any:
+    """View an array of numbers (…, W) as an array (…) of vectors, or of numbers if W = 1; `width` has length W."""
+    raise TypeError("lanes are for compiled loops alone")
+
+
+def zeros(like: Any, shape: Any) -> Any:
+    """Allocate zeros of the kind of number that the array `like` holds."""
+    return np.zeros(shape, like.dtype)
+
+
+def empty(like: Any, shape: Any) -> Any:
+    """Allocate room of the kind of number that the array `like` holds."""
+    return np.empty(shape, like.dtype)
+
+
+def lane_count(array: Any) -> int:
+    """Return W for an array of vectors; 1 for numbers."""
+    return 1
+
+
+def lane(value: Any, i: int) -> Any:
+    """Return lane i of a vector."""
+    return value
+
+
+def with_lane(value: Any, i: int, number: Any) -> Any:
+    """Return the vector with another number in lane i."""
+    return number
+
+
+def fma(a: Any, b: Any, c: Any) -> Any:
+    """Compute a b + c, rounded once in compiled loops."""
+    return a * b + c
+
+
+def less(a: Any, b: Any) -> Any:
+    """Compute a < b, as 1 or 0."""
+    return 1.0 if a < b else 0.0
+
+
+def choose(condition: Any, a: Any, b: Any) -> Any:
+    """Return a where the condition is not 0, b elsewhere; NaN in what is not chosen does not matter."""
+    return a if condition != 0 else b
+
+
+def larger(a: Any, b: Any) -> Any:
+    """Return the larger number; NaN if either is NaN."""
+    return a if a > b or a != a else b
+
+
+def somewhere(condition: Any) -> bool:
+    """Tell whether a condition is true in any lane."""
+    return bool(condition != 0)
+
+
+def columns_at_once(matrix: Any) -> int:
+    """Return how many neighbours of a row `load` reads: eight numbers, or one vector of several lanes."""
+    return 1
+
+
+def load(matrix: Any, i: int, j: int) -> Any:
+    """Return entry (i, j) and the next ones of the row that are read at once; `matrix` is in C order."""
+    return matrix[i, j]
+
+
+def store(matrix: Any, i: int, j: int, value: Any) -> None:
+    """Set entry (i, j) and the next ones of the row that are written at once; `matrix` is in C order."""
+    matrix[i, j] = value
+
+
+def load_some(matrix: Any, i: int, j: int, left: int) -> Any:
+    """Return what `load` returns, but read `left` columns only, at least one; the others are zero."""
+    return matrix[i, j]
+
+
+def store_some(matrix: Any, i: int, j: int, value: Any, left: int) -> None:
+    """Set what `store` sets, but in `left` columns only, at least one."""
+    matrix[i, j] = value
+
+
+def spread(value: Any) -> Any:
+    """Return an entry as a factor of what `load` returns."""
+    return value
+
+
+def nothing(matrix: Any) -> Any:
+    """Return zero, as `load` would."""
+    return 0.0
