@@ -69,7 +69,7 @@ def test_products_and_inverses_have_the_same_bits_at_any_width(rows: int, count:
         parts = []
         for at in range(0, 8, len(width)):
             lane = slice(at, at + len(width))
-            x, y, z = (np.ascontiguousarray(array[..., lane]) for array in (a, b, c))
+            x, y, z = (array[..., lane].copy() for array in (a, b, c))
             products(x, y, z, 1, count, width)
             parts.append((x, z))
         found.append([np.concatenate(arrays, -1) for arrays in zip(*parts, strict=True)])
