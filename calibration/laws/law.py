@@ -8,8 +8,8 @@ noise starts a second time, from the model as given. A law is kept if
   and
 - it predicts left-out sessions better, by more than the uncertainty of that gain.
 
-A lever is a part of the place, as the component of a force is. So laws are told apart by their gain in BIC without
-the price of the lever.
+A lever is a part of the place, as the component of a force is. So laws are told apart if their gains in BIC differ
+both with the price of a lever and without it.
 """
 
 from __future__ import annotations
@@ -94,6 +94,10 @@ class Law:
         away, side = (-1, "behind") if lever < 0 else (1, "ahead of")
         low, high = sorted(away * end for end in self.fit.interval(LEVER))
         return f"{abs(lever):.2f} {self.place.lever_unit} ({low:.2f} to {high:.2f}) {side} the disc"
+
+    def behind(self, best: Law) -> float:
+        """Compute how far its gain is behind that of the best law, with the price of levers or without."""
+        return min(best.gain - self.gain, best.gain_at_lever - self.gain_at_lever)
 
     @property
     def farthest(self) -> str:

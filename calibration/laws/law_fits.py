@@ -65,7 +65,7 @@ class Laws:
         kept = _kept(self.fitted)
         if not kept:
             return ()
-        near = [law for law in kept if kept[0].gain_at_lever - law.gain_at_lever < INDISTINGUISHABLE]
+        near = [law for law in kept if law.behind(kept[0]) < INDISTINGUISHABLE]
         unconfirmed = [law for law in self.fitted if law.reason == NO_SESSIONS and law.gain >= kept[0].gain]
         return (*near, *unconfirmed)
 

@@ -15,7 +15,7 @@ const FIRST_SPIN = 0.6; // ω_t/ω in the first guess
 const LONGEST = 0.5; // largest relative change of ω_t in one step
 const SAME = 1e-6; // two solutions are one, if all velocities agree so
 
-/* Solve for the motion; converged is false where none was found, several is true where a single tail has two. solve */
+/* Solve for the motion; converged: it was found; several: a single tail has two. solve */
 function solveBalance(network, head, tails) {
   const guess = firstGuess(head, tails), found = solve(network, head, tails, guess, false);
   if (tails.number !== 1) return { ...found, several: false };

@@ -208,3 +208,4 @@ def test_what_fits_better_but_does_not_predict_sessions_stays_in_the_set() -> No
     far = replace(worse, gain=best.gain - 10, gain_at_lever=best.gain - 10)
     assert kept(best, far) == ["Cyr"]
     assert kept(best, replace(far, gain_at_lever=best.gain - 4)) == ["Cyr", "Ct"]
+    assert kept(replace(best, gain_at_lever=best.gain + 7), worse) == ["Cyr", "Ct"]
