@@ -13,13 +13,16 @@ from __future__ import annotations
 import ast
 import re
 import sys
+from collections.abc import Callable, Sequence
 from importlib import import_module
+from inspect import Parameter, signature
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 FOLDER = Path(__file__).parent
 ROOMS = ("simulator", "data", "table", "planner", "calibration")
 CLAIMED = ("accuracy", "speed", "scaling", "robustness", "lookup", "tracking", "tensors", "physics")
+_USAGE = re.compile(r"^Usage: (.+)$", re.MULTILINE)
 _DURATION = re.compile(r"^Takes (.+)\.$", re.MULTILINE)
 
 
@@ -60,8 +63,26 @@ def listing() -> str:
 
 
 def run(name: str, *words: str) -> None:
-    """Run one benchmark with words of the command line."""
-    import_module(f"benchmarks.{benchmarks()[name].room}.{name}").main(*words)
+    """Run one benchmark with words of the command line; ends the program if they do not fit."""
+    module = import_module(f"benchmarks.{benchmarks()[name].room}.{name}")
+    complaint = misfit(module.main, words)
+    if complaint:
+        _refuse(f"{name}: {complaint}; {_USAGE.findall(module.__doc__ or '')[0]}")
+    module.main(*words)
+
+
+def misfit(function: Callable[..., None], words: Sequence[str]) -> str:
+    """Say which words are too many, or no whole numbers where a default is one; empty if all fit."""
+    parameters = list(signature(function).parameters.values())
+    if not any(p.kind == Parameter.VAR_POSITIONAL for p in parameters) and len(words) > len(parameters):
+        return f"{words[len(parameters)]!r} is an argument too many"
+    wrong = [w for w, p in zip(words, parameters, strict=False) if str(p.default).isdigit() and not w.isdigit()]
+    return f"{wrong[0]!r} is no whole number" if wrong else ""
+
+
+def _refuse(reason: str) -> NoReturn:
+    print(f"error: {reason}", file=sys.stderr)
+    raise SystemExit(2)
 
 
 def main(words: list[str]) -> None:
@@ -74,8 +95,7 @@ def main(words: list[str]) -> None:
     elif words[0] in benchmarks():
         run(*words)
     else:
-        print(f"error: no benchmark {words[0]!r}; `python -m benchmarks` lists all", file=sys.stderr)
-        raise SystemExit(2)
+        _refuse(f"no benchmark {words[0]!r}; `python -m benchmarks` lists all")
 
 
 if __name__ == "__main__":

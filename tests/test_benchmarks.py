@@ -50,3 +50,15 @@ def test_an_unknown_name_is_refused() -> None:
     done = benchmarks("accurracy")
     assert done.returncode == 2
     assert done.stderr == "error: no benchmark 'accurracy'; `python -m benchmarks` lists all\n"
+
+
+def test_arguments_that_do_not_fit_are_refused() -> None:
+    usage = "python -m benchmarks hidden_laws [TABLES] [FIRST_SEED] [FILE]"
+    for words, reason in (
+        (("x",), "'x' is no whole number"),
+        (("1", "1e3"), "'1e3' is no whole number"),
+        (("1", "2", "a", "b"), "'b' is an argument too many"),
+    ):
+        done = benchmarks("hidden_laws", *words)
+        assert done.returncode == 2
+        assert done.stderr == f"error: hidden_laws: {reason}; {usage}\n"
