@@ -10,8 +10,7 @@ other packages have folders of their own in it, named by a digest of all files o
 not depend on the folder that the sources are in.
 
 Sums may be reordered and multiplications fused, so last digits can differ between machines. Loops that are
-`compiled_exactly` keep the order of the source: those of `sim.lanes`. NaN and infinity keep
-their meaning.
+`compiled_exactly` keep the order of the source: those of `sim.lanes`. NaN and infinity keep their meaning.
 
 The first use of a loop compiles it, with a progress bar on stderr. `softflagella sim compile` compiles all loops.
 

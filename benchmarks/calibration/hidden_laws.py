@@ -80,8 +80,8 @@ def _summary(records: list[dict[str, Any]]) -> None:
     for score in (*SCORES, None):
         ones = [one for one in with_law if score in (one["score"], None)]
         described = [one for one in ones if one["complete"]]
-        in_set = [one for one in described if one["place"] in one["kept"] + one["elsewhere"]]
-        parts = [{place_named(name).part for name in one["kept"] + one["elsewhere"]} for one in described]
+        in_set = [one for one in described if one["place"] in one["named"]]
+        parts = [{place_named(name).part for name in one["named"]} for one in described]
         true = [place_named(one["place"]).part for one in described]
         after = [one["after"] for one in described]
         print(row(
@@ -94,7 +94,7 @@ def _summary(records: list[dict[str, Any]]) -> None:
     described = [one for one in with_law if one["complete"]]
     print(
         f"\nof those that are described, the true place is in the set: "
-        f"{per_cent(sum(one['place'] in one['kept'] + one['elsewhere'] for one in described), len(described))}"
+        f"{per_cent(sum(one['place'] in one['named'] for one in described), len(described))}"
     )
     numbers = sum(one["numbers"] for one in with_law)
     covered = sum(one["covered"] for one in with_law)

@@ -149,7 +149,7 @@ def record_of(described: RobotLaws) -> dict[str, Any]:
         "p_value": described.p_value,
         "complete": bool(laws and laws.complete),
         "kept": [law.place.name for law in kept],
-        "elsewhere": [one.place.name for law in kept for one in law.elsewhere],
+        "named": [one.place.name for law in kept for one in (law, *law.elsewhere)],
         "words": kept[0].words if kept else "",
         "left": kept[0].p_value if kept else math.nan,
         "before": described.error_without / described.noise,

@@ -131,9 +131,8 @@ class Laws:
                 f"({self._search})."
             )
         rivals = "; or ".join(law.words for law in self.kept)
-        shared = in_common([one.place for law in self.kept for one in (law, *law.elsewhere)])
-        agree = f" All of them {shared}." if shared else ""
-        return f"The residual is described by {rivals}: these runs cannot tell them apart ({self._search}).{agree}"
+        apart = f"these runs cannot tell them apart ({self._search})"
+        return f"The residual is described by {rivals}: {apart}.{_agreement(self.kept)}"
 
     @property
     def prediction(self) -> Floats:
@@ -163,12 +162,10 @@ class Laws:
         laws = self._as_good_as(claim)
         if not laws:
             return "No law of the places that were searched describes it as well."
-        shared = in_common([one.place for law in laws for one in (law, *law.elsewhere)]) if len(laws) > 1 else ""
-        agree = f" All of them {shared}." if shared else ""
         named = "; or by ".join(law.words for law in laws[:_NAMED])
         others = len(laws) - _NAMED
         more = f"; or by laws at {others} other place{'s' if others > 1 else ''}" if others > 0 else ""
-        return f"It is described as well by {named}{more}.{agree}"
+        return f"It is described as well by {named}{more}.{_agreement(laws)}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the record for laws.json and verdict.json."""
@@ -291,6 +288,12 @@ def _with_curves(study: Study, laws: Sequence[Law]) -> list[Law]:
         else law
         for law in laws
     ]
+
+
+def _agreement(laws: Sequence[Law]) -> str:
+    """Say what several laws have in common, wherever they may act, with a space before; empty if nothing."""
+    shared = in_common([one.place for law in laws for one in (law, *law.elsewhere)]) if len(laws) > 1 else ""
+    return f" All of them {shared}." if shared else ""
 
 
 def _rival(law: Law) -> Rival:

@@ -13,7 +13,7 @@ from typing import Any
 from sim.arrays import Floats
 from sim.compiling import compiled_exactly, formula
 from sim.lanes import columns_at_once, fma, load, load_some, nothing, spread, store, store_some
-from sim.linear.vectors import Matrix
+from sim.linear.vectors import Matrix, Vector
 
 _Four = tuple[Any, Any, Any, Any]
 
@@ -70,6 +70,34 @@ def _put_four(c: Any, i: Any, at: Any, p: _Four) -> None:
 
 
 @formula
+def _three(c: Any, row: Any, at: Any) -> Vector:
+    """Load a vector of columns of three rows."""
+    return load(c, row, at), load(c, row + 1, at), load(c, row + 2, at)
+
+
+@formula
+def _three_of_some(c: Any, row: Any, at: Any, left: Any) -> Vector:
+    """Load fewer columns of one robot than a vector holds, of three rows."""
+    return load_some(c, row, at, left), load_some(c, row + 1, at, left), load_some(c, row + 2, at, left)
+
+
+@formula
+def _put_three(c: Any, row: Any, at: Any, v: Vector) -> None:
+    """Store a vector of columns in three rows."""
+    store(c, row, at, v[0])
+    store(c, row + 1, at, v[1])
+    store(c, row + 2, at, v[2])
+
+
+@formula
+def _put_three_of_some(c: Any, row: Any, at: Any, v: Vector, left: Any) -> None:
+    """Store fewer columns of one robot than a vector holds, in three rows."""
+    store_some(c, row, at, v[0], left)
+    store_some(c, row + 1, at, v[1], left)
+    store_some(c, row + 2, at, v[2], left)
+
+
+@formula
 def _signed(x: Any, subtract: Any) -> Any:
     """Return a factor, negative to subtract."""
     return -spread(x) if subtract else spread(x)
@@ -93,19 +121,25 @@ def _four_vectors(a: Any, b: Any, from_b: Any, c: Any, from_c: Any, i: Any, subt
 
 
 @formula
+def _add_column(a: Any, i: Any, k: Any, subtract: Any, w: Any, p: Any, q: Any, r: Any) -> Vector:
+    """Add entry k of three rows of a, or subtract it, times a vector w to their sums p, q and r."""
+    return (
+        fma(_signed(a[i, k], subtract), w, p),
+        fma(_signed(a[i + 1, k], subtract), w, q),
+        fma(_signed(a[i + 2, k], subtract), w, r),
+    )
+
+
+@formula
 def _one_vector(a: Any, b: Any, from_b: Any, c: Any, from_c: Any, i: Any, subtract: Any) -> None:
     """Compute a vector of columns in three rows."""
     p = q = r = nothing(c)
     if subtract:
-        p, q, r = load(c, i, from_c), load(c, i + 1, from_c), load(c, i + 2, from_c)
+        p, q, r = _three(c, i, from_c)
     for k in range(a.shape[1]):
         w = load(b, k, from_b)
-        p = fma(_signed(a[i, k], subtract), w, p)
-        q = fma(_signed(a[i + 1, k], subtract), w, q)
-        r = fma(_signed(a[i + 2, k], subtract), w, r)
-    store(c, i, from_c, p)
-    store(c, i + 1, from_c, q)
-    store(c, i + 2, from_c, r)
+        p, q, r = _add_column(a, i, k, subtract, w, p, q, r)
+    _put_three(c, i, from_c, (p, q, r))
 
 
 @formula
@@ -113,16 +147,11 @@ def _some_columns(a: Any, b: Any, from_b: Any, c: Any, from_c: Any, i: Any, left
     """Compute fewer columns of one robot than a vector holds, in three rows."""
     p = q = r = nothing(c)
     if subtract:
-        p, q = load_some(c, i, from_c, left), load_some(c, i + 1, from_c, left)
-        r = load_some(c, i + 2, from_c, left)
+        p, q, r = _three_of_some(c, i, from_c, left)
     for k in range(a.shape[1]):
         w = load_some(b, k, from_b, left)
-        p = fma(_signed(a[i, k], subtract), w, p)
-        q = fma(_signed(a[i + 1, k], subtract), w, q)
-        r = fma(_signed(a[i + 2, k], subtract), w, r)
-    store_some(c, i, from_c, p, left)
-    store_some(c, i + 1, from_c, q, left)
-    store_some(c, i + 2, from_c, r, left)
+        p, q, r = _add_column(a, i, k, subtract, w, p, q, r)
+    _put_three_of_some(c, i, from_c, (p, q, r), left)
 
 
 @formula
@@ -136,15 +165,23 @@ def _factors(a: Matrix) -> Matrix:
 
 
 @formula
-def _added(a: Any, x: Any, y: Any, z: Any, sum_before: Any) -> Any:
-    """Compute a row of a 3×3 block times three vectors, plus a sum."""
-    return fma(a[0], x, fma(a[1], y, fma(a[2], z, sum_before)))
+def _product(a: Matrix, v: Vector) -> Vector:
+    """Compute a 3×3 block times three vectors."""
+    return (
+        fma(a[0][0], v[0], fma(a[0][1], v[1], a[0][2] * v[2])),
+        fma(a[1][0], v[0], fma(a[1][1], v[1], a[1][2] * v[2])),
+        fma(a[2][0], v[0], fma(a[2][1], v[1], a[2][2] * v[2])),
+    )
 
 
 @formula
-def _summed(a: Any, x: Any, y: Any, z: Any) -> Any:
-    """Compute a row of a 3×3 block times three vectors."""
-    return fma(a[0], x, fma(a[1], y, a[2] * z))
+def _product_added(a: Matrix, v: Vector, before: Vector) -> Vector:
+    """Compute a 3×3 block times three vectors, plus three others."""
+    return (
+        fma(a[0][0], v[0], fma(a[0][1], v[1], fma(a[0][2], v[2], before[0]))),
+        fma(a[1][0], v[0], fma(a[1][1], v[1], fma(a[1][2], v[2], before[1]))),
+        fma(a[2][0], v[0], fma(a[2][1], v[1], fma(a[2][2], v[2], before[2]))),
+    )
 
 
 @compiled_exactly
@@ -152,21 +189,14 @@ def multiply_block(
     a: Matrix, b: Floats, row_b: int, from_b: int, c: Floats, row_c: int, from_c: int, count: int
 ) -> None:
     """Set `count` columns of three rows of c to a 3×3 block times those of three rows of b; c may be b."""
-    f, g, h = _factors(a)
-    step, j = columns_at_once(b), 0
+    factors, step, j = _factors(a), columns_at_once(b), 0
     while j + step <= count:
-        x, y, z = load(b, row_b, from_b + j), load(b, row_b + 1, from_b + j), load(b, row_b + 2, from_b + j)
-        store(c, row_c, from_c + j, _summed(f, x, y, z))
-        store(c, row_c + 1, from_c + j, _summed(g, x, y, z))
-        store(c, row_c + 2, from_c + j, _summed(h, x, y, z))
+        _put_three(c, row_c, from_c + j, _product(factors, _three(b, row_b, from_b + j)))
         j += step
     if j < count:
         left = count - j
-        x, y = load_some(b, row_b, from_b + j, left), load_some(b, row_b + 1, from_b + j, left)
-        z = load_some(b, row_b + 2, from_b + j, left)
-        store_some(c, row_c, from_c + j, _summed(f, x, y, z), left)
-        store_some(c, row_c + 1, from_c + j, _summed(g, x, y, z), left)
-        store_some(c, row_c + 2, from_c + j, _summed(h, x, y, z), left)
+        product = _product(factors, _three_of_some(b, row_b, from_b + j, left))
+        _put_three_of_some(c, row_c, from_c + j, product, left)
 
 
 @compiled_exactly
@@ -174,21 +204,16 @@ def add_block_product(
     a: Matrix, b: Floats, row_b: int, from_b: int, c: Floats, row_c: int, from_c: int, count: int
 ) -> None:
     """Add a 3×3 block times `count` columns of three rows of b to those of three rows of c."""
-    f, g, h = _factors(a)
-    step, j = columns_at_once(b), 0
+    factors, step, j = _factors(a), columns_at_once(b), 0
     while j + step <= count:
-        x, y, z = load(b, row_b, from_b + j), load(b, row_b + 1, from_b + j), load(b, row_b + 2, from_b + j)
-        store(c, row_c, from_c + j, _added(f, x, y, z, load(c, row_c, from_c + j)))
-        store(c, row_c + 1, from_c + j, _added(g, x, y, z, load(c, row_c + 1, from_c + j)))
-        store(c, row_c + 2, from_c + j, _added(h, x, y, z, load(c, row_c + 2, from_c + j)))
+        before = _three(c, row_c, from_c + j)
+        _put_three(c, row_c, from_c + j, _product_added(factors, _three(b, row_b, from_b + j), before))
         j += step
     if j < count:
         left = count - j
-        x, y = load_some(b, row_b, from_b + j, left), load_some(b, row_b + 1, from_b + j, left)
-        z = load_some(b, row_b + 2, from_b + j, left)
-        store_some(c, row_c, from_c + j, _added(f, x, y, z, load_some(c, row_c, from_c + j, left)), left)
-        store_some(c, row_c + 1, from_c + j, _added(g, x, y, z, load_some(c, row_c + 1, from_c + j, left)), left)
-        store_some(c, row_c + 2, from_c + j, _added(h, x, y, z, load_some(c, row_c + 2, from_c + j, left)), left)
+        before = _three_of_some(c, row_c, from_c + j, left)
+        total = _product_added(factors, _three_of_some(b, row_b, from_b + j, left), before)
+        _put_three_of_some(c, row_c, from_c + j, total, left)
 
 
 @compiled_exactly

@@ -20,13 +20,10 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.model.body import Body
-from sim.motion.stability import first_perturbation
-from sim.solve.floquet import arnoldi
+from sim.motion.stability import exponents, in_motor_revolutions
 from sim.solve.orbit import mean_motion
 
 FOLD, DOUBLING, HOPF = "fold", "period doubling", "Hopf"
-_VECTORS = 30  # of Arnoldi's method beside two for each tail
-_CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it counts; at 0.1 some look unstable
 _SAME = 1e-3  # relative distance of Re σ up to which exponents are copies of one, i N ω_t apart
 _REAL = 1e-3  # distance of k from 0 or N/2 up to which it counts as that
 
@@ -48,19 +45,11 @@ class Leading(NamedTuple):
 
 def leading_exponent(body: Body, tails: int, x: Floats, u: Floats) -> Leading:
     """Find it for an orbit x (n, M, 3), u (P, 4) of N tails; the growth is NaN if none has converged."""
-    omega_t, omega_h = mean_motion(body, u)[:2]
-    count = min(2 * tails + _VECTORS, x.size - 1)
-    shift = abs(omega_t)
-    projected = arnoldi(body, x, u, shift, first_perturbation(tails, *x.shape[:2]), count)
-    if not np.isfinite(projected[-1, -1]):
+    omega_t, found = mean_motion(body, u)[0], exponents(body, tails, x, u)
+    if not len(found):
         return Leading(np.nan, np.nan, tails)
-    values, ritz = np.linalg.eig(projected[:count])
-    values = values[projected[count, count - 1] * np.abs(ritz[-1]) < _CONVERGED * np.abs(values)]
-    if not len(values):
-        return Leading(np.nan, np.nan, tails)
-    exponents = shift + 1 / values
-    copies = exponents[exponents.real > exponents.real.max() - _SAME * shift]
+    copies = found[found.real > found.real.max() - _SAME * abs(omega_t)]
     largest = copies[np.argmin(np.abs(copies.imag))]
     turns = abs(largest.imag / omega_t) % tails
-    growth = float(2 * np.pi * exponents.real.max() / abs(omega_t - omega_h))
+    growth = in_motor_revolutions(found.real.max(), body, u)
     return Leading(growth, float(min(turns, tails - turns)), tails)

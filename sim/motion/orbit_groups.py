@@ -18,7 +18,6 @@ from sim.solve.orbit_groups import Found, orbits_of_robots
 from sim.solve.refinement import MANY_PHASES, MESHES, MOST_PHASES, SOLVED, Orbit
 
 _NONE = Nonlocal(*[0.0] * len(Nonlocal._fields))
-_NUMBERS = 33  # of a robot without the non-local effects
 
 
 @cache
@@ -41,7 +40,7 @@ def orbits_in_groups(rows: Floats, tails: int, least: int) -> list[Orbit]:
     count = len(rows)
     if tails > MOST_PHASES or not count:
         return [_unsolved(MANY_PHASES, tails) for _ in rows]
-    numbers = np.ascontiguousarray(rows[:, :_NUMBERS].T)
+    numbers = np.ascontiguousarray(rows[:, : -len(_NONE)].T)
     most = 2 * MOST_PHASES + 2 * max(tails, least)  # more phases than any orbit has
     x = tuple(np.empty((count, 3 * edges * most)) for edges in MESHES)
     u = tuple(np.empty((count, 4 * (most // tails + 1))) for _ in MESHES)

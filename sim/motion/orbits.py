@@ -14,11 +14,10 @@ from sim.arrays import Floats, Integers
 from sim.model.body import Body
 from sim.motion.orbit_groups import orbits_in_groups
 from sim.motion.stability import growth_of_orbit
-from sim.solve.assembly import unpacked
+from sim.solve.assembly import are_local, unpacked
 from sim.solve.derivative import orbit_slopes
 from sim.solve.orbit import mean_motion, residual_on_orbit, smallest_gap
 from sim.solve.refinement import FEW, SOLVED, Orbit, extrapolate, refined_orbit
-from sim.solve.residual import is_local
 
 _NEAR = 1.1  # gap from which tails cannot touch, given the error of the gap
 WIDTH = 1e-5  # finite-difference step in a robot's numbers; the balance depends almost linearly on them
@@ -62,12 +61,11 @@ def solve_orbits(
     """
     count = 0 if directions is None else directions.shape[1]
     slopes = np.full((len(rows), count, 5), np.nan)
-    bodies = unpacked(rows)
-    local = np.flatnonzero([is_local(body) for body in bodies])
+    local = np.flatnonzero(are_local(rows))
     grouped = dict(zip(local.tolist(), orbits_in_groups(rows[local], tails, phases), strict=True))
     orbits: list[Orbit] = []
     gap, grows = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
-    for i, body in enumerate(bodies):
+    for i, body in enumerate(unpacked(rows)):
         orbit = grouped[i] if i in grouped else refined_orbit(body, tails, phases)
         orbits.append(orbit)
         if orbit.ended == SOLVED:

@@ -20,7 +20,7 @@ from functools import cache
 
 import numpy as np
 
-from sim.arrays import Floats
+from sim.arrays import Complex, Floats
 from sim.linear.spectral import with_phases
 from sim.mechanics.tail_contact import has_contact
 from sim.model.body import Body
@@ -30,7 +30,7 @@ from sim.solve.refinement import ROUGH, Orbit
 
 QUICK = 0.4  # |ω_yr/ω_t| from which a robot yaws fast
 DOUBTFUL = -0.05  # growth from which it is computed again
-_VECTORS, _MORE_VECTORS = 10, 30  # of Arnoldi's method beside two for each tail: first, and again
+_VECTORS, MORE_VECTORS = 10, 30  # of Arnoldi's method beside two for each tail: first, and again
 _CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it counts
 
 
@@ -43,7 +43,7 @@ def growth_of_orbit(body: Body, tails: int, orbit: Orbit) -> float:
     instants = 2 * len(orbit.u[2]) + 1
     x, u = with_phases(orbit.x[2], tails * instants), with_phases(orbit.u[2][None], instants)[0].copy()
     _, size = solve_orbit(body, x, u, ROUGH)
-    return growth(body, tails, x, u, vectors=_MORE_VECTORS) if size < ROUGH else np.nan
+    return growth(body, tails, x, u, vectors=MORE_VECTORS) if size < ROUGH else np.nan
 
 
 def growth(body: Body, tails: int, x: Floats, u: Floats, *, vectors: int = _VECTORS) -> float:
@@ -56,36 +56,45 @@ def growth(body: Body, tails: int, x: Floats, u: Floats, *, vectors: int = _VECT
     Returns:
         The growth in one motor revolution; NaN if it cannot be computed.
     """
-    omega_t, omega_h = mean_motion(body, u)[:2]
+    found = exponents(body, tails, x, u, vectors=vectors, unconverged=vectors == _VECTORS)
+    return in_motor_revolutions(found.real.max(), body, u) if len(found) else np.nan
+
+
+def exponents(
+    body: Body, tails: int, x: Floats, u: Floats, *, vectors: int = MORE_VECTORS, unconverged: bool = False
+) -> Complex:
+    """Compute exponents σ of perturbations e^{σt} of an orbit x (n, M, 3), u (P, 4) of N tails.
+
+    Args:
+        vectors: of Arnoldi's method, beside two for each tail.
+        unconverged: whether those that have not converged count, too; some of them look unstable.
+
+    Returns:
+        The exponents that count, in any order; none if they cannot be computed.
+    """
     count = min(2 * tails + vectors, x.size - 1)
-    shift = abs(omega_t)
-    projected = arnoldi(body, x, u, shift, first_perturbation(tails, *x.shape[:2]), count)
+    shift = abs(mean_motion(body, u)[0])
+    projected = arnoldi(body, x, u, shift, _first_perturbation(tails, *x.shape[:2]), count)
     if not np.isfinite(projected[-1, -1]):
-        return np.nan
-    if vectors == _VECTORS:
-        values = np.linalg.eigvals(projected[:count])
-    else:
-        values, ritz = np.linalg.eig(projected[:count])
-        values = values[projected[count, count - 1] * np.abs(ritz[-1]) < _CONVERGED * np.abs(values)]
-    if not len(values):
-        return np.nan
-    largest = shift + (1 / values).real.max()
-    return float(2 * np.pi * largest / abs(omega_t - omega_h))
+        return np.empty(0, complex)
+    if unconverged:
+        return np.asarray(shift + 1 / np.linalg.eigvals(projected[:count]))
+    values, ritz = np.linalg.eig(projected[:count])
+    values = values[projected[count, count - 1] * np.abs(ritz[-1]) < _CONVERGED * np.abs(values)]
+    return np.asarray(shift + 1 / values)
+
+
+def in_motor_revolutions(exponent: float, body: Body, u: Floats) -> float:
+    """Convert a growth in a unit of time to that in one motor revolution, on an orbit with velocities u (P, 4)."""
+    omega_t, omega_h = mean_motion(body, u)[:2]
+    return float(2 * np.pi * exponent / abs(omega_t - omega_h))
 
 
 @cache
-def first_perturbation(tails: int, n: int, columns: int) -> Floats:
-    """Draw the perturbation of bent tails that Arnoldi's method starts from, with the same numbers each time.
+def _first_perturbation(tails: int, n: int, columns: int) -> Floats:
+    """Draw the perturbation (n, M, 3) of bent tails from which Arnoldi's method starts, with the same numbers.
 
     Its harmonics in the phase are the N lowest. They contain each perturbation of the tails once.
-
-    Args:
-        tails: N.
-        n: edges of a tail.
-        columns: M, phases of the orbit.
-
-    Returns:
-        The displacement of the nodes of one tail at all phases, (n, M, 3). Only its direction counts.
     """
     numbers = np.random.default_rng(0)
     phase = 2 * np.pi * np.arange(columns) / columns

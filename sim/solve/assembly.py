@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats
+from sim.arrays import Flags, Floats
 from sim.effects import catalogue, effect_named
 from sim.mechanics.drag import head_resistance, tail_coefficients
 from sim.model.body import Body
@@ -87,6 +87,11 @@ def numbers(groups: Groups) -> Floats:
     body = assemble(groups)
     parts = [getattr(body, name) for name in body._fields[:-1]] + list(body.nonlocal_terms)
     return np.ascontiguousarray(np.concatenate([part.reshape(-1, len(groups)) for part in parts]).T)
+
+
+def are_local(rows: Floats) -> Flags:
+    """Tell which robots have no effect that reaches further than one node, from their `numbers` (B, K); (B,)."""
+    return np.asarray(~(rows[:, -len(Nonlocal._fields) :] != 0).any(1))
 
 
 def bodies(groups: Groups) -> list[Body]:

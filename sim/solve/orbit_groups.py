@@ -31,14 +31,15 @@ from sim.solve.refinement import (
     BALANCED,
     CORRECTION,
     DOUBT,
+    FIRST,
     LOST,
     MANY_PHASES,
     MESHES,
     MOST_PHASES,
+    NEXT_CHANGE,
     NO_START,
     PHASE_ERROR,
     ROUGH,
-    SHRINKS,
     SOLVED,
     UNBALANCED,
     difference,
@@ -46,10 +47,10 @@ from sim.solve.refinement import (
     limit,
     limit_of_two,
     more_phases,
+    next_change,
     with_edges,
 )
 
-_START = 1e-2  # limit of the last Newton correction on the fewest phases
 _OFFSET = 1  # row of the numbers of a robot with its offset
 
 
@@ -118,7 +119,7 @@ def _on_coarsest_mesh(
     more = _Start(np.empty_like(found.x[0]), np.empty_like(found.u[0]))
     _straight_starts(numbers, n, phases, tails, now)
     means, changes, sizes = np.zeros((5, len(order))), np.full(len(order), np.nan), np.empty(len(order))
-    wanted, solved = _START, -1
+    wanted, solved = FIRST, -1
     while True:
         at = 0
         while at < left:
@@ -167,9 +168,9 @@ def _goes_on(
         changes[robot] = change
         if change <= PHASE_ERROR:
             return _keep(found, robot, now, before, tails, change)
-        fall = SHRINKS if not np.isfinite(last) else min(max(change / last, 0.05), 1.0)
-        if change * fall <= PHASE_ERROR:
-            return _keep(found, robot, more, phases, tails, change * fall)
+        to_come = next_change(last, change)
+        if to_come <= PHASE_ERROR:
+            return _keep(found, robot, more, phases, tails, to_come)
     means[:, robot] = new_means
     return True
 
@@ -285,7 +286,7 @@ def _on_finer_meshes(
     """
     body = body_in_lanes(numbers, terms)
     rates = on_orbit(x0.shape[1], FIRST_PHASE)
-    a, b, c = MESHES
+    _, b, c = MESHES
     x1, u1, u2 = with_edges(x0, body.offset, b), zeros(u0, u0.shape), zeros(u0, u0.shape)
     u1[:] = u0
     going = less(abs(numbers[0]), np.inf)
@@ -294,9 +295,8 @@ def _on_finer_meshes(
     lost = 1 - going
     x2 = with_edges(x1, body.offset, c)
     coarser = with_edges(x0, body.offset, c)
-    more = (1 / b**2 - 1 / c**2) / (1 / a**2 - 1 / b**2)  # the change from mesh to mesh goes as 1/n²
-    _extrapolate(x2, x2, coarser, more)
-    _extrapolate(u2, u1, u0, more)
+    _extrapolate(x2, x2, coarser)
+    _extrapolate(u2, u1, u0)
     work = new_workspace(rates, x2, u2)
     wanted, unbalanced = CORRECTION, going
     for _ in range(2):
@@ -325,11 +325,11 @@ def _on_finer_meshes(
 
 
 @compiled_exactly
-def _extrapolate(out: Floats, a: Floats, b: Floats, more: float) -> None:
-    """Set out = a + more (a − b)."""
+def _extrapolate(out: Floats, a: Floats, b: Floats) -> None:
+    """Extrapolate from two meshes, b and then a, to the next one."""
     flat, first, second = out.reshape(out.size), a.reshape(a.size), b.reshape(b.size)
     for i in range(len(flat)):
-        flat[i] = first[i] + more * (first[i] - second[i])
+        flat[i] = first[i] + NEXT_CHANGE * (first[i] - second[i])
 
 
 @compiled_exactly

@@ -44,17 +44,19 @@ REASONS = {
     BACKWARDS: "the tails stop or turn backwards during a revolution",
     UNBALANCED: "forces are left unbalanced",
 }
-CORRECTION = 1e-6  # limit of the last Newton correction on the finest mesh; stretching is stiff: see BALANCED
+FIRST = 1e-2  # limit of the last Newton correction on the fewest phases
+CORRECTION = 1e-6  # the same on the finest mesh; stretching is stiff: see BALANCED
 ROUGH = 1e-5  # the same on coarser meshes, where only the means are needed: their error is then about 1e-9
 BALANCED = 1e-5  # largest unbalanced force over the largest force in an edge
 FEW, MANY = 3, 12  # phases to begin with; MANY for derivatives, which may depend more on the phase than the motion
 PHASE_ERROR = 1e-4  # relative, in the means
 DOUBT = 0.03  # share of the extrapolation that counts as error
-SHRINKS = 0.2  # assumed factor on the phase error with the next number of phases, if only one is known
+_SHRINKS = 0.2  # assumed factor on the phase error with the next number of phases, if only one is known
 MOST_PHASES = 48
 _A, _B, _C = (1.0 / edges**2 for edges in MESHES)
 _OF_COARSE, _OF_MIDDLE = _B * _C / ((_A - _B) * (_A - _C)), _A * _C / ((_B - _A) * (_B - _C))
 _OF_FINE, _MORE = _A * _B / ((_C - _A) * (_C - _B)), _C / (_B - _C)
+NEXT_CHANGE = (_B - _C) / (_A - _B)  # from the second mesh to the third, over that before: it goes as 1/n²
 _SOFTER, _SOFTEST = 5.0, 0.5  # factor from hard contact to softer, and where it ends (EI/l³)
 _SLOW, _FASTER, _LEAST_FASTER = 3.0, 1.5, 1.02  # ω̄ to begin with where tails may touch, and factors from there
 _START, _SOFT = 1e-3, 0.05  # limit of the last Newton correction on the way, and factor on the contact there
@@ -171,13 +173,12 @@ def _on_finer_meshes(body: Body, error: float, x: Floats, u: Floats) -> Orbit:
     xs, us = (x, x, x), (u, u, u)
     rates = on_orbit(x.shape[1], FIRST_PHASE)
     for i in (1, 2):
-        n, coarse = MESHES[i], MESHES[i - 1]
+        n = MESHES[i]
         x, u = with_edges(xs[1], body.offset, n), us[1].copy()
         wanted = ROUGH
-        if i == 2:  # extrapolate the change from mesh to mesh as 1/n²
-            more = (1 / coarse**2 - 1 / n**2) / (1 / MESHES[0] ** 2 - 1 / coarse**2)
-            x += more * (x - with_edges(xs[0], body.offset, n))
-            u += more * (us[1] - us[0])
+        if i == 2:
+            x += NEXT_CHANGE * (x - with_edges(xs[0], body.offset, n))
+            u += NEXT_CHANGE * (us[1] - us[0])
             wanted = CORRECTION
         work = new_workspace(rates, x, u)
         ended = UNBALANCED
@@ -221,7 +222,7 @@ def _enough_phases(
     fewest phases. Then phases are added, each time from the solution before, until the means stop changing.
     """
     phases = x.shape[1]
-    means, change, robot, wanted = np.zeros(5), np.nan, plain, 1e-2
+    means, change, robot, wanted = np.zeros(5), np.nan, plain, FIRST
     solved = -1  # numbers of phases that the robot itself was solved on, less one
     while True:
         x_more, u_more = with_phases(x, phases), with_phases(u.reshape(1, -1, 4), phases // tails)[0]
@@ -240,13 +241,20 @@ def _enough_phases(
             last, change = change, difference(means, new_means)
             if change <= PHASE_ERROR:
                 return SOLVED, change, x, u
-            fall = SHRINKS if not np.isfinite(last) else min(max(change / last, 0.05), 1.0)
-            if change * fall <= PHASE_ERROR:
-                return SOLVED, change * fall, x_more, u_more
+            to_come = next_change(last, change)
+            if to_come <= PHASE_ERROR:
+                return SOLVED, to_come, x_more, u_more
         x, u, means = x_more, u_more, new_means
         if phases > MOST_PHASES:
             return MANY_PHASES, np.nan, x, u
         phases = more_phases(tails, phases)
+
+
+@compiled_exactly
+def next_change(last: float, change: float) -> float:
+    """Estimate the change of the means with the next number of phases from the last two; `last` may be NaN."""
+    fall = _SHRINKS if not np.isfinite(last) else min(max(change / last, 0.05), 1.0)
+    return change * fall
 
 
 @compiled_exactly

@@ -16,7 +16,7 @@ from sim.model.slopes import SLOPE_INPUTS
 from sim.model.sweepable import SWEEPABLE, read_range
 from sim.motion.branch_report import branch_table, draw_branches, largest_hysteresis
 from sim.motion.branches import Branches, find_branches
-from sim.motion.continuation import first_point, follow, locate
+from sim.motion.continuation import Point, first_point, follow, locate
 from sim.motion.exponents import DOUBLING, FOLD, HOPF, Leading, leading_exponent
 from sim.motion.revolution import Revolutions
 from sim.motion.slow_sweep import perturbed, settled_from
@@ -54,16 +54,21 @@ def alike_family(swept: SweptInput) -> TailsAlike:
     return TailsAlike(swept.body_at, swept.robot.tails)
 
 
+def beginning(family: TailsAlike, s: float = 0.0) -> Point:
+    """Return the first point of a branch of orbits, from straight tails."""
+    start = family.start(s)
+    assert start is not None
+    first = first_point(family, start, 1.0)
+    assert first is not None
+    return first
+
+
 def test_the_tangent_is_the_change_of_the_orbit() -> None:
     swept = SweptInput(CONTROL, "omega_bar", 10.0, 30.0)
     family = alike_family(swept)
     ends = []
     for s in (0.5 - 1e-3, 0.5, 0.5 + 1e-3):
-        start = family.start(s)
-        assert start is not None
-        point = first_point(family, start, 1.0)
-        assert point is not None
-        ends.append(point)
+        ends.append(beginning(family, s))
     slope = (ends[2].y - ends[0].y) / 2e-3
     assert ends[1].tangent / ends[1].turns == pytest.approx(slope, abs=1e-3 * np.abs(slope).max())
 
@@ -72,10 +77,7 @@ def test_the_tangent_is_the_change_of_the_orbit() -> None:
 def test_points_along_an_input_are_orbits(effect: str) -> None:
     swept = SweptInput(CONTROL, effect, 0.2, 0.9)
     family = alike_family(swept)
-    start = family.start(0.0)
-    assert start is not None
-    first = first_point(family, start, 1.0)
-    assert first is not None
+    first = beginning(family)
     last = list(follow(family, first, 100))[-1]
     assert last.s == pytest.approx(1.0, abs=1e-6)
     start = family.start(1.0)
@@ -102,10 +104,7 @@ def test_an_exponent_that_has_not_converged_does_not_count() -> None:
     curved = replace(SEVEN_TAILS, effects={"natural_curvature": -0.2})
     swept = SweptInput(curved, "omega_bar", 60.0, 115.0)
     family = alike_family(swept)
-    start = family.start(0.0)
-    assert start is not None
-    first = first_point(family, start, 1.0)
-    assert first is not None
+    first = beginning(family)
     point = next(p for p in follow(family, first, 60) if swept.value(p.s) > 75.0)
     x, u = family.unpack(point.y)
     body, means = swept.body_at(point.s), family.means(point.y)
@@ -194,10 +193,7 @@ def test_the_fold_joins_a_stable_to_an_unstable_motion() -> None:
 def test_a_hopf_point_separates_decay_from_growth_in_time_steps() -> None:
     swept = SweptInput(SEVEN_TAILS, "omega_bar", 60.0, 92.0)
     family = alike_family(swept)
-    start = family.start(0.0)
-    assert start is not None
-    here = first_point(family, start, 1.0)
-    assert here is not None
+    here = beginning(family)
 
     def grows(point: object) -> float:
         x, u = family.unpack(point.y)  # type: ignore[attr-defined]
