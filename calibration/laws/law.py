@@ -36,6 +36,9 @@ from calibration.swimmer.swimmer import SwimmerModel
 from sim.io.errors import InputError
 
 NO_SESSIONS = "does not predict left-out sessions better"
+NOT_CONVERGED = "its fit did not converge"
+AT_THE_END = "a number is at the end of its range"
+UNDETERMINED = (NOT_CONVERGED, AT_THE_END)  # reasons for which the runs exclude the numbers, not the place
 NO_LEVER = "its lever is not told from none: a side force at the disc"  # unless that one fits worse
 _LARGEST_AT_START = 50.0  # size of a term
 _RPM = 30 / math.pi
@@ -158,9 +161,9 @@ def fitted_law(
     predictive = session_gain(study, base, refit)
     reason = ""
     if not refit.converged:
-        reason = "its fit did not converge"
+        reason = NOT_CONVERGED
     elif any(refit.parameters[p.name] in p.bounds for p in with_law.effects if p.name in names):
-        reason = "a number is at the end of its range"
+        reason = AT_THE_END
     elif gain <= 0:
         reason = "its BIC is not smaller than that without a law"
     elif all(_includes(refit.interval(name), 0.0) for name in names if name != LEVER):

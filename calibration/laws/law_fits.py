@@ -28,7 +28,7 @@ from calibration.attribution.refits import INDISTINGUISHABLE
 from calibration.laws.curves import find_curves, said_of
 from calibration.laws.group_factors import gain_of_a_curve
 from calibration.laws.inputs import EXPONENTS
-from calibration.laws.law import NO_LEVER, NO_SESSIONS, Law, fitted_law, with_a_lever
+from calibration.laws.law import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law, fitted_law, with_a_lever
 from calibration.laws.law_model import SIZE
 from calibration.laws.places import in_common, places
 from calibration.laws.search import Ranked, search
@@ -60,14 +60,17 @@ class Laws:
         """Laws that the runs cannot tell from the best one, best first.
 
         Those that would be the best one if they predicted left-out sessions better are among them: they fit the
-        runs at least as well.
+        runs at least as well. So are those whose numbers these runs do not determine, if they fit nearly as well.
         """
         kept = _kept(self.fitted)
         if not kept:
             return ()
         near = [law for law in kept if law.behind(kept[0]) < INDISTINGUISHABLE]
         unconfirmed = [law for law in self.fitted if law.reason == NO_SESSIONS and law.gain >= kept[0].gain]
-        return (*near, *unconfirmed)
+        undetermined = [
+            law for law in self.fitted if law.reason in UNDETERMINED and law.behind(kept[0]) < INDISTINGUISHABLE
+        ]
+        return (*near, *unconfirmed, *undetermined)
 
     @property
     def complete(self) -> bool:
@@ -130,7 +133,7 @@ class Laws:
                 f"The residual is described by {best.words}, and less well by all other places that were searched "
                 f"({self._search})."
             )
-        rivals = "; or ".join(law.words for law in self.kept)
+        rivals = "; or ".join(map(_in_a_set, self.kept))
         apart = f"these runs cannot tell them apart ({self._search})"
         return f"The residual is described by {rivals}: {apart}.{_agreement(self.kept)}"
 
@@ -288,6 +291,11 @@ def _with_curves(study: Study, laws: Sequence[Law]) -> list[Law]:
         else law
         for law in laws
     ]
+
+
+def _in_a_set(law: Law) -> str:
+    """Say a law among others, and whether the runs do not determine its numbers."""
+    return f"{law.words} ({law.reason})" if law.reason in UNDETERMINED else law.words
 
 
 def _agreement(laws: Sequence[Law]) -> str:

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from calibration.laws.inputs import EXPONENTS
-from calibration.laws.law import NO_LEVER, NO_SESSIONS, Law
+from calibration.laws.law import NO_LEVER, NO_SESSIONS, UNDETERMINED, Law
 from calibration.laws.law_model import LEVER, SIZE, LawModel, with_law
 from calibration.laws.places import Place, places
 from calibration.report.law_robot import law_handed_on, robot_with_law
@@ -192,7 +192,8 @@ def test_a_side_force_at_the_disc_says_how_far_from_it_it_may_act() -> None:
 
 
 @pytest.mark.usefixtures("toy_model")
-def test_what_fits_better_but_does_not_predict_sessions_stays_in_the_set() -> None:
+def test_what_the_runs_do_not_exclude_stays_in_the_set() -> None:
+    """A law that fits better, but does not predict sessions, and one whose numbers the runs do not determine."""
     table = make_table(replace(TRUTH, effects=LAWS["Cyr"]), seed=4, title="")
     laws = find_robot_laws(table, START, progress=False).laws
     assert laws is not None
@@ -203,7 +204,13 @@ def test_what_fits_better_but_does_not_predict_sessions_stays_in_the_set() -> No
         return [law.place.name for law in replace(laws, fitted=fitted).kept]
 
     assert kept(replace(best, reason=NO_SESSIONS), worse) == ["Ct", "Cyr"]
-    assert kept(replace(best, reason="its fit did not converge"), worse) == ["Ct"]
+    for reason in UNDETERMINED:
+        assert kept(replace(best, reason=reason), worse) == ["Ct", "Cyr"]
+        assert kept(best, replace(worse, reason=reason)) == ["Cyr", "Ct"]
+        assert kept(best, replace(worse, gain=best.gain - 10, gain_at_lever=best.gain - 10, reason=reason)) == [
+            "Cyr"
+        ]
+    assert kept(replace(best, reason="its BIC is not smaller than that without a law"), worse) == ["Ct"]
     assert kept(best, replace(worse, reason=NO_SESSIONS)) == ["Cyr"]
     far = replace(worse, gain=best.gain - 10, gain_at_lever=best.gain - 10)
     assert kept(best, far) == ["Cyr"]
