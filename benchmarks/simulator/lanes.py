@@ -81,9 +81,8 @@ def speeds(count: int) -> None:
             (float(np.max(np.abs(a.means / b.means - 1))) for a, b in zip(found, wanted, strict=True)
              if a.ended == b.ended == SOLVED), default=np.nan)  # fmt: skip
         equal = all(map(same, alone, found))
-        print_row(
-            tails, [1e6 * shortest(work) / len(groups) for work in (plainly, singly, together)], apart, equal
-        )
+        microseconds = [1e6 * shortest(work) / len(groups) for work in (plainly, singly, together)]
+        print_row(tails, microseconds, apart, equal)
 
 
 def print_row(tails: int, times: list[float], apart: float, equal: bool) -> None:
@@ -132,9 +131,8 @@ def transients(count: int) -> None:
         wanted, alone, found = plainly(), singly(), together()
         apart = max(float(np.max(np.abs(a - b))) for a, b in zip(found, wanted, strict=True))
         equal = all(map(np.array_equal, alone, found))
-        print_row(
-            tails, [1e6 * shortest(work) / len(groups) for work in (plainly, singly, together)], apart, equal
-        )
+        microseconds = [1e6 * shortest(work) / len(groups) for work in (plainly, singly, together)]
+        print_row(tails, microseconds, apart, equal)
 
 
 def _correction(numbers: Any, x: Any, u: Any, terms: Any, width: Any) -> None:

@@ -120,7 +120,7 @@ def orbits_of_robots(
 def on_coarsest_mesh(
     numbers: Floats, terms: Any, tails: int, least: int, order: Integers, found: Found, wide: Any
 ) -> None:
-    """Add phases until the means of each robot stop changing; fill the first mesh of `found` (`orbits_of_robots`)."""
+    """Add phases until the means of each robot stop changing; fill the first mesh of `found`."""
     n, left = MESHES[0], len(order)
     going = order.copy()
     before = phases = fewest_phases(tails)

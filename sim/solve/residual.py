@@ -116,7 +116,7 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
 
 @compiled_exactly
 def fill_local_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r: Floats, t: Floats) -> None:
-    """Compute the residual as `fill_residual` does, for a robot with local effects or for a group of such robots."""
+    """Compute the residual as `fill_residual` does, for one robot or a group, with local effects."""
     n, columns, _ = x.shape
     instants = u.shape[0]
     measure(room.geometry, x, body.offset, body.axial_stiffness)
