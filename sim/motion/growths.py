@@ -1,8 +1,8 @@
 """Growth of small perturbations of many steady motions.
 
 Robots whose effects are local share groups with a robot in each lane (`sim.lanes`) on the mesh of 8 edges; the
-others are computed one by one, and so is what `sim.motion.stability` computes again. The growth of a robot does not
-depend on its group. Units: l, μ0 l⁴/EI.
+others are computed one by one, and so is what `sim.motion.stability` computes again. The growth of a robot does
+not depend on its group. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ def arnoldi(body: Body, x: Floats, u: Floats, shift: float, first: Floats, count
 
 @compiled_exactly
 def damped_differentiation(columns: int, sense: float) -> Floats:
-    """Differentiate in φ: the matrix (M, M), in which the component (−1)^m of a robot that turns with `sense` decays."""
+    """Differentiate in φ, (M, M); the component (−1)^m decays if the motor turns with `sense`."""
     matrix = differentiation(columns)
     if columns % 2 == 0:
         for i in range(columns):
