@@ -131,12 +131,11 @@ def follow(jump: Jump, terms: Any, marks: Floats, times: Floats, tolerance: floa
     started = min(count, robots)
     body = body_in_lanes(numbers, terms)
     work = new_workspace(in_transient(1.0 * numbers[0], FIRST_PHASE, by_phase, at.x), at.x, at.u)
-    now, dt, going = 0.0 * numbers[0], first_step(body), less(abs(numbers[0]), np.inf)
-    goal = now
+    now, dt = zeros(numbers, (1,))[0], first_step(body)
+    goal, going = now, now
     for i in range(count):
         goal = with_lane(goal, i, _goal(jump, course, i, marks))
-        if i >= started:
-            going = with_lane(going, i, 0.0)
+        going = with_lane(going, i, 1.0 if i < started else 0.0)
     while somewhere(going):
         dt = choose(going, towards(goal - now, dt), dt)
         solved = _try_step(body, twist, at, new, now, dt, going, step, work)
@@ -166,8 +165,7 @@ def follow(jump: Jump, terms: Any, marks: Floats, times: Floats, tolerance: floa
                     going = with_lane(going, i, 0.0)
         if started > before:
             body = body_in_lanes(numbers, terms)
-            dt = choose(less(going, 0.0), first_step(body), dt)
-            going = choose(less(going, 0.0), less(abs(numbers[0]), np.inf), going)
+            dt, going = choose(less(going, 0.0), first_step(body), dt), abs(going)
     return found
 
 
@@ -180,9 +178,10 @@ def _new_state(like: Floats, n: int, columns: int, instants: int, fields: int) -
 
 @compiled_exactly
 def _load(jump: Jump, robot: int, i: int, numbers: Floats, twist: Floats, at: _State, course: _Course) -> None:
-    """Put a robot at its jump into lane i."""
+    """Put a robot at its jump into lane i; one without numbers can only come to its end."""
     course.robot[i] = robot
-    course.steps[i], course.rejected[i], course.marks[i], course.places[i] = 0, 0, 0, 0
+    course.steps[i], course.marks[i], course.places[i] = 0, 0, 0
+    course.rejected[i] = 0 if np.isfinite(np.sum(jump.numbers[robot])) else MOST_REJECTED
     _fill(numbers, i, jump.numbers[robot])
     _fill(twist, i, jump.twist[robot])
     _fill(at.x, i, jump.x[robot])

@@ -43,6 +43,11 @@ def flips_of(groups: Groups, until: float = 1.0) -> list[Flip]:
     return flips
 
 
+def with_speed(flip: Flip, omega: float) -> Flip:
+    """Return the flip of the same robot with another speed of its motor."""
+    return flip._replace(row=np.array([omega, *flip.row[1:]]))
+
+
 def same_bits(a: Course | None, b: Course | None) -> bool:
     assert a is not None
     assert b is not None
@@ -93,12 +98,19 @@ def test_a_robot_that_cannot_be_followed_leaves_the_others_alone() -> None:
     flips = flips_of(robots(3, 10))
     wanted = followed(flips)
     broken: list[Any] = list(flips)
-    broken[2] = flips[2]._replace(row=np.full_like(flips[2].row, np.nan))
+    broken[2] = with_speed(flips[2], np.nan)
     broken[7] = None
-    broken[9] = flips[9]._replace(row=flips[9].row * np.where(np.arange(len(flips[9].row)) == 0, 1e12, 1.0))
+    broken[9] = with_speed(flips[9], 1e12)
     found = followed(broken)
     assert [i for i, course in enumerate(found) if course is None] == [2, 7, 9]
     assert all(same_bits(wanted[i], found[i]) for i in (0, 1, 3, 4, 5, 6, 8))
+
+
+def test_robots_wait_for_lanes_of_robots_without_numbers() -> None:
+    flips = flips_of(robots(3, 2))
+    found = followed([with_speed(flips[0], np.nan)] * 2 * len(GROUP) + flips)
+    assert all(course is None for course in found[:-2])
+    assert all(map(same_bits, found[-2:], followed(flips)))
 
 
 def test_every_robot_is_followed_until_its_own_end() -> None:
