@@ -342,6 +342,11 @@ def _larger_of(a: Any, b: Any) -> Any:
     return (lambda a, b: _larger(a, b)) if _kind(a, b) else (lambda a, b: a if a > b or a != a else b)
 
 
+@overload(plain.smaller, strict=False)
+def _smaller_of(a: Any, b: Any) -> Any:
+    return (lambda a, b: _choose(_less(a, b), a, b)) if _kind(a, b) else (lambda a, b: a if a < b else b)
+
+
 @overload(plain.somewhere, strict=False)
 def _is_somewhere(condition: Any) -> Any:
     if isinstance(condition, Lanes):

@@ -72,6 +72,11 @@ def larger(a: Any, b: Any) -> Any:
     return a if a > b or a != a else b
 
 
+def smaller(a: Any, b: Any) -> Any:
+    """Return the smaller number; b if either is NaN."""
+    return a if a < b else b
+
+
 def somewhere(condition: Any) -> bool:
     """Tell whether a condition is true in any lane."""
     return bool(condition != 0)

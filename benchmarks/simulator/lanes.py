@@ -1,7 +1,8 @@
-"""Steady motions in groups, a robot in each lane, beside one robot at a time: speed, bits, vector instructions.
+"""Robots in groups, one in each lane, beside one robot at a time: speed, bits, vector instructions.
 
 1. Steady motions of robots of the sweep: loops for plain numbers, one lane, and groups, processor time in one run.
-2. Share of vector instructions among the arithmetic of one Newton correction, from the assembly.
+2. The same for the two transients of a response to a flip, on both meshes.
+3. Share of vector instructions among the arithmetic of one Newton correction, from the assembly.
 
 Usage: python -m benchmarks lanes [ROBOTS]
 
@@ -23,17 +24,26 @@ from benchmarks.timing import processor_time
 from dataset.rows.design import load_design
 from sim.lanes import ALONE, GROUP, lanes, zeros
 from sim.model.groups import Groups
-from sim.motion.orbit_groups import group_width, orbits_in_groups
-from sim.solve.assembly import Nonlocal, bodies, numbers
+from sim.motion.flips import Flip, follow_flips
+from sim.motion.grouping import group_width
+from sim.motion.orbit_groups import orbits_in_groups
+from sim.motion.phased_orbits import orbits_with_phases
+from sim.motion.response import MESHES, TOLERANCE
+from sim.solve.assembly import Nonlocal, bodies, numbers, unpacked
 from sim.solve.groups import body_in_lanes
 from sim.solve.linearise import linearise
 from sim.solve.newton import factor_and_solve, negate, new_workspace
 from sim.solve.orbit import FIRST_PHASE
 from sim.solve.rates import on_orbit
 from sim.solve.refinement import FEW, SOLVED, Orbit, refined_orbit
+from sim.solve.transient import lag_at, transient
 
 ROBOTS = 48
 REPEATS = 5
+TAILS = (2, 3, 4, 5)
+_UNTIL = 2.0  # time units that a flip is followed
+_MIRROR = np.array([1.0, -1.0, 1.0])
+_COLUMNS = "  N   plain numbers   one lane   groups   plain/groups   one lane/plain   largest difference   same"
 _PACKED = re.compile(r"^\s*v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*|max|min)pd\b.*([xyz])mm", re.MULTILINE)
 _SCALAR = re.compile(r"^\s*v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*|max|min)sd\b", re.MULTILINE)
 
@@ -51,12 +61,10 @@ def same(a: Orbit, b: Orbit) -> bool:
 
 def speeds(count: int) -> None:
     """Print the time of a steady motion by N."""
-    points = load_design().with_rows(8 * count).points()
     print(f"A steady motion, {count} robots of the sweep for each N, groups of {len(group_width())}, microseconds")
-    print("  N   plain numbers   one lane   groups   plain/groups   one lane/plain   largest difference   same")
-    for tails in (2, 3, 4, 5):
-        rows = np.flatnonzero(points["N"] == tails)[:count]
-        groups = Groups.from_columns({name: values[rows] for name, values in points.items()})
+    print(_COLUMNS)
+    for tails in TAILS:
+        groups = robots_of(tails, count)
         robots, packed = bodies(groups), numbers(groups)
 
         def plainly(robots: Any = robots, tails: int = tails) -> list[Orbit]:
@@ -73,9 +81,58 @@ def speeds(count: int) -> None:
             (float(np.max(np.abs(a.means / b.means - 1))) for a, b in zip(found, wanted, strict=True)
              if a.ended == b.ended == SOLVED), default=np.nan)  # fmt: skip
         equal = all(map(same, alone, found))
-        a, b, c = (1e6 * shortest(work) / len(rows) for work in (plainly, singly, together))
-        ratios = f"{a / c:12.2f}   {b / a:14.2f}"
-        print(f"  {tails}   {a:13.0f}   {b:8.0f}   {c:6.0f}   {ratios}   {apart:18.1e}   {equal}")
+        microseconds = [1e6 * shortest(work) / len(groups) for work in (plainly, singly, together)]
+        print_row(tails, microseconds, apart, equal)
+
+
+def print_row(tails: int, times: list[float], apart: float, equal: bool) -> None:
+    """Print a row of a table of times."""
+    plain, single, together = times
+    ratios = f"{plain / together:12.2f}   {single / plain:14.2f}"
+    print(f"  {tails}   {plain:13.0f}   {single:8.0f}   {together:6.0f}   {ratios}   {apart:18.1e}   {equal}")
+
+
+def robots_of(tails: int, count: int) -> Groups:
+    """Return robots of the sweep with N tails."""
+    points = load_design().with_rows(8 * count).points()
+    rows = np.flatnonzero(points["N"] == tails)[:count]
+    return Groups.from_columns({name: values[rows] for name, values in points.items()})
+
+
+def transients(count: int) -> None:
+    """Print the time of the transients of a response by N."""
+    times = np.linspace(0.2, _UNTIL, 25)
+    print(f"\nThe transients of a response to a flip on {' and '.join(map(str, MESHES))} edges, microseconds")
+    print(_COLUMNS)
+    for tails in TAILS:
+        groups = robots_of(tails, count)
+        rows = numbers(groups)
+        flips = [
+            Flip(row, orbit.x[:, -np.arange(orbit.x.shape[1])] * _MIRROR, orbit.u, orbit.twist, _UNTIL)
+            for mesh in orbits_with_phases(rows, tails, MESHES)
+            for row, orbit in zip(rows, mesh, strict=True)
+            if orbit
+        ]
+
+        def plainly(flips: list[Flip] = flips) -> list[Any]:
+            found = []
+            for flip in flips:
+                body = unpacked(flip.row[None])[0]
+                course = transient(body, flip.x.copy(), flip.u.copy(), flip.twist, _UNTIL, times[:0], TOLERANCE)
+                found.append(lag_at(course, times))
+            return found
+
+        def singly(flips: list[Flip] = flips) -> list[Any]:
+            return [course and course.lag for flip in flips for course in follow_flips([flip], times, TOLERANCE)]
+
+        def together(flips: list[Flip] = flips) -> list[Any]:
+            return [course and course.lag for course in follow_flips(flips, times, TOLERANCE)]
+
+        wanted, alone, found = plainly(), singly(), together()
+        apart = max(float(np.max(np.abs(a - b))) for a, b in zip(found, wanted, strict=True))
+        equal = all(map(np.array_equal, alone, found))
+        microseconds = [1e6 * shortest(work) / len(groups) for work in (plainly, singly, together)]
+        print_row(tails, microseconds, apart, equal)
 
 
 def _correction(numbers: Any, x: Any, u: Any, terms: Any, width: Any) -> None:
@@ -114,6 +171,7 @@ def main(robots: str = str(ROBOTS)) -> None:
     count = int(robots)
     with threadpool_limits(1), np.errstate(all="ignore"):
         speeds(count)
+        transients(count)
     print("\nArithmetic instructions on doubles in the assembly of a Newton correction (assembly and elimination)")
     for name, width in (("one lane", ALONE), ("eight lanes", GROUP)):
         kinds = instructions(width)

@@ -119,7 +119,7 @@ FLAGS = (
     Column("stepped", _flag, "1", "the response was simulated by time steps"),
     Column("history", _flag, "1", "memory and rest were simulated"),
     Column("reason", pa.string(), "1", "why the row failed, did not converge or was stepped in time; else empty"),
-    Column(COST, pa.float32(), "s", "processor time that the row took"),
+    Column(COST, pa.float32(), "s", "processor time: the mean of the robots that were simulated together"),
 )
 
 

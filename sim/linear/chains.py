@@ -121,7 +121,7 @@ def solve(chains: Chains, s: Floats, t: Floats) -> None:
         second = minus(vector(s, 1, m), applied(block(chains.lower, 1, m), first))
         for a in range(4):
             t[a] -= dot(vector(chains.foot[0], m, a), first) + dot(vector(chains.foot[1], m, a), second)
-    solve_dense_lanes(chains.corner[0], t)
+    solve_dense_lanes(chains.corner[0], t.reshape((t.size, 1)))
     for m in range(count):
         for k in range(n):
             change = vector(s, k, m)

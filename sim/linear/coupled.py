@@ -209,7 +209,7 @@ def _substitute(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
                 row = 3 * i + a
                 through = chains.foot[0, i, c, a] * s[0, row] + chains.foot[1, i, c, a] * (s[1, row] - image[row])
                 t[4 * (i % instants) + c] -= through
-    solve_dense_lanes(system.schur, t)
+    solve_dense_lanes(system.schur, t.reshape((t.size, 1)))
     for c in range(body - 1):
         around[c] = t[c]
     for i in range(n):

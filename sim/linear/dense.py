@@ -33,17 +33,19 @@ def invert(a: Floats) -> None:
 
 @compiled_exactly
 def solve_dense_lanes(a: Floats, b: Floats) -> None:
-    """Solve b = a⁻¹ b (n,) in place, lane by lane, with pivoting; `a` (n, n) is kept."""
-    n = len(b)
-    matrix, right = np.empty((n, n)), np.empty((n, 1))
+    """Solve b = a⁻¹ b (n, K) in place, lane by lane, with pivoting; `a` (n, n) is kept."""
+    n, columns = b.shape
+    matrix, right = np.empty((n, n)), np.empty((n, columns))
     for i in range(lane_count(a)):
         for row in range(n):
-            right[row, 0] = lane(b[row], i)
+            for column in range(columns):
+                right[row, column] = lane(b[row, column], i)
             for column in range(n):
                 matrix[row, column] = lane(a[row, column], i)
         solve_dense(matrix, right)
         for row in range(n):
-            b[row] = with_lane(b[row], i, right[row, 0])
+            for column in range(columns):
+                b[row, column] = with_lane(b[row, column], i, right[row, column])
 
 
 @compiled_exactly

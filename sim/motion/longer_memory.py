@@ -14,15 +14,16 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.mechanics import planar
-from sim.model.body import Body
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN
-from sim.motion.response import orbit_with_phases
+from sim.motion.flips import Flip, follow_flips
+from sim.motion.orbit_groups import OnMesh
+from sim.motion.phased_orbits import orbits_with_phases
 from sim.motion.run import REVERSED
-from sim.solve.assembly import bodies, reversed_bodies
-from sim.solve.transient import lag_at, transient
+from sim.solve.assembly import numbers, reversed_numbers
 
 _EDGES = 6
+_NO_TIMES = np.empty(0)
 _TOLERANCE = 4e-4  # of a time step, in l
 _UNTIL = float(BEFORE[-1])  # from here on the difference is constant
 _BEFORE = BEFORE[::2].copy()  # dwells before that are simulated
@@ -31,8 +32,7 @@ _BEFORE = BEFORE[::2].copy()  # dwells before that are simulated
 @np.errstate(all="ignore")  # robots that overflow give NaN
 def longer_memory(groups: Groups) -> Floats:
     """Simulate what two equal dwells before change, (B, K, D, 3) after dwells BEFORE; NaN where it cannot be."""
-    pairs = zip(bodies(groups), reversed_bodies(groups), strict=True)
-    found = np.array([_of_one(body, reverse, groups.N) for body, reverse in pairs])
+    found = _at_some_dwells(groups)
     knots, places = np.log(np.append(_BEFORE, FORGOTTEN)), np.log(BEFORE)
     known = np.concatenate([found, np.zeros_like(found[:, :1])], 1)
     k = np.clip(np.searchsorted(knots, places, side="right") - 1, 0, len(knots) - 2)
@@ -40,31 +40,38 @@ def longer_memory(groups: Groups) -> Floats:
     return np.asarray((1 - share) * known[:, k] + share * known[:, k + 1])
 
 
-def _of_one(body: Body, reverse: Body, tails: int) -> Floats:
-    """Simulate the difference at the dwells before that are simulated, seen as for a positive motor."""
-    unknown = np.full((len(_BEFORE), len(DWELLS), 3), np.nan)
-    forth = orbit_with_phases(body, tails, _EDGES)
-    if forth is None:
-        return unknown
-    back = orbit_with_phases(reverse, tails, _EDGES, instants=forth[1].shape[0])
-    if back is None:
-        return unknown
-    none, dwells = np.empty(0), np.minimum(DWELLS, _UNTIL)
-    once = transient(reverse, forth[0].copy(), forth[1] * REVERSED, back[2], _UNTIL, _BEFORE, _TOLERANCE)
-    first = transient(body, back[0].copy(), back[1] * REVERSED, forth[2], _UNTIL, _BEFORE, _TOLERANCE)
-    if not (once.solved and first.solved):
-        return unknown
-    for k, dwell in enumerate(_BEFORE):
-        mark = np.array([dwell])
-        u = back[1].copy()
-        twice = transient(reverse, first.shapes[k].copy(), u, back[2], float(dwell), mark, _TOLERANCE)
-        if not twice.solved:
-            return unknown
-        curves = []
-        for shape in (twice.shapes[0], once.shapes[k]):
-            flip = transient(body, shape.copy(), forth[1].copy(), forth[2], _UNTIL, none, _TOLERANCE)
-            if not flip.solved:
-                return unknown
-            curves.append(lag_at(flip, dwells).mean(1))
-        unknown[k] = curves[0] - curves[1]
-    return unknown * (planar.MIRROR if body.omega < 0 else np.ones(3))
+def _at_some_dwells(groups: Groups) -> Floats:
+    """Simulate the difference after two dwells of _BEFORE, (B, K, D, 3), seen as for a positive motor."""
+    rows, reverse_rows, count = numbers(groups), reversed_numbers(groups), len(_BEFORE)
+    dwells = np.minimum(DWELLS, _UNTIL)
+    forth = orbits_with_phases(rows, groups.N, [_EDGES])[0]
+    instants = [len(orbit.u) if orbit else 1 for orbit in forth]
+    back = orbits_with_phases(reverse_rows, groups.N, [_EDGES], [instants])[0]
+    orbits = [(f, b) if f and b else None for f, b in zip(forth, back, strict=True)]
+    there = [_flip(row, *pair) if pair else None for row, pair in zip(rows, orbits, strict=True)]
+    and_back = [_flip(row, *pair[::-1]) if pair else None for row, pair in zip(reverse_rows, orbits, strict=True)]
+    first = follow_flips(there, _NO_TIMES, _TOLERANCE, _BEFORE)
+    once = follow_flips(and_back, _NO_TIMES, _TOLERANCE, _BEFORE)
+    second = [
+        flip._replace(x=course.shapes[k], u=pair[1].u, until=dwell) if flip and course and pair else None
+        for flip, course, pair in zip(and_back, first, orbits, strict=True)
+        for k, dwell in enumerate(_BEFORE.tolist())
+    ]
+    twice = follow_flips(second, _NO_TIMES, _TOLERANCE)
+    last: list[Flip | None] = []
+    for i, (flip, course, pair) in enumerate(zip(there, once, orbits, strict=True)):
+        for k, two in enumerate(twice[i * count : (i + 1) * count]):
+            if flip and course and pair and two:
+                last += [flip._replace(x=x, u=pair[0].u) for x in (two.end, course.shapes[k])]
+            else:
+                last += [None, None]
+    unknown = np.full((len(dwells), 3), np.nan)
+    lags = [course.lag.mean(1) if course else unknown for course in follow_flips(last, dwells, _TOLERANCE)]
+    each = np.array(lags).reshape(len(rows), count, 2, len(dwells), 3)
+    mirror = np.where(rows[:, :1] < 0, planar.MIRROR, np.ones(3))
+    return np.asarray((each[:, :, 0] - each[:, :, 1]) * mirror[:, None, None])
+
+
+def _flip(row: Floats, after: OnMesh, before: OnMesh) -> Flip:
+    """Flip the motor of a robot in the steady motion `before`; its numbers afterwards are `row`."""
+    return Flip(row, before.x, before.u * REVERSED, after.twist, _UNTIL)

@@ -11,16 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Integers
-from sim.model.body import Body
+from sim.motion.growths import growths
 from sim.motion.orbit_groups import orbits_in_groups
-from sim.motion.stability import growth_of_orbit
+from sim.motion.orbit_slopes import slopes_of_orbits
 from sim.solve.assembly import are_local, unpacked
-from sim.solve.derivative import orbit_slopes
-from sim.solve.orbit import mean_motion, residual_on_orbit, smallest_gap
-from sim.solve.refinement import FEW, SOLVED, Orbit, extrapolate, refined_orbit
+from sim.solve.orbit import smallest_gap
+from sim.solve.refinement import FEW, SOLVED, refined_orbit
 
 _NEAR = 1.1  # gap from which tails cannot touch, given the error of the gap
-WIDTH = 1e-5  # finite-difference step in a robot's numbers; the balance depends almost linearly on them
 
 
 class Perturbed(Enum):
@@ -61,20 +59,20 @@ def solve_orbits(
     """
     count = 0 if directions is None else directions.shape[1]
     slopes = np.full((len(rows), count, 5), np.nan)
+    gap, grows = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
     local = np.flatnonzero(are_local(rows))
     grouped = dict(zip(local.tolist(), orbits_in_groups(rows[local], tails, phases), strict=True))
-    orbits: list[Orbit] = []
-    gap, grows = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
-    for i, body in enumerate(unpacked(rows)):
-        orbit = grouped[i] if i in grouped else refined_orbit(body, tails, phases)
-        orbits.append(orbit)
-        if orbit.ended == SOLVED:
-            gap[i] = smallest_gap(body, orbit.x[2], tails)
-            touching = body.nonlocal_terms.tail_contact != 0 and gap[i] < _NEAR
-            if perturbed is Perturbed.ALL or (perturbed is Perturbed.TOUCHING and touching):
-                grows[i] = growth_of_orbit(body, tails, orbit)
-            if directions is not None and count:
-                slopes[i] = _slopes(body, rows[i], directions[i], orbit)
+    bodies = unpacked(rows)
+    orbits = [grouped.get(i) or refined_orbit(body, tails, phases) for i, body in enumerate(bodies)]
+    solved = [i for i, orbit in enumerate(orbits) if orbit.ended == SOLVED]
+    for i in solved:
+        gap[i] = smallest_gap(bodies[i], orbits[i].x[2], tails)
+    if perturbed is not Perturbed.NONE:
+        touching = np.array([body.nonlocal_terms.tail_contact != 0 for body in bodies]) & (gap < _NEAR)
+        wanted = [i for i in solved if perturbed is Perturbed.ALL or touching[i]]
+        grows[wanted] = growths(rows[wanted], tails, [orbits[i] for i in wanted])
+    if directions is not None and count:
+        slopes[solved] = slopes_of_orbits(rows[solved], directions[solved], [orbits[i] for i in solved])
     return Orbits(
         np.array([orbit.means for orbit in orbits]),
         slopes,
@@ -83,17 +81,3 @@ def solve_orbits(
         gap,
         grows,
     )
-
-
-def _slopes(body: Body, row: Floats, directions: Floats, orbit: Orbit) -> Floats:
-    """Compute the derivatives of the extrapolated means along `directions` (K, K'), (K, 5)."""
-    moved = list(zip(unpacked(row - WIDTH * directions), unpacked(row + WIDTH * directions), strict=True))
-    slopes = np.empty((3, len(directions), 5))
-    for i, (x, u) in enumerate(zip(orbit.x, orbit.u, strict=True)):
-        ends = [[residual_on_orbit(robot, x, u) for robot in pair] for pair in moved]
-        r, t = (np.array([above[c] - below[c] for below, above in ends]) / (2 * WIDTH) for c in (0, 1))
-        changes = orbit_slopes(body, r, t, x, u)
-        for k, (below, above) in enumerate(moved):
-            rise = mean_motion(above, u + WIDTH * changes[k]) - mean_motion(below, u - WIDTH * changes[k])
-            slopes[i, k] = rise / (2 * WIDTH)
-    return extrapolate(slopes.reshape(3, -1)).reshape(-1, 5)

@@ -1,38 +1,39 @@
 """Simulate the response of robots to a flip of the motor (`sim.model.response` says what the curves are).
 
 One flip from the steady motion in the other direction gives the response to every dwell. Flips from the shapes
-that it passes through give the response after short dwells. Solved for directly (`sim.solve.transient`) where the
+that it passes through give the response after short dwells. Solved for directly (`sim.motion.flips`) where the
 steady motion is, on two meshes, extrapolated; by time steps where it is not. Units: l, μ0 l⁴/EI.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats
 from sim.effects import catalogue
-from sim.linear.spectral import with_phases
 from sim.mechanics import planar
 from sim.mechanics.geometry import straight
-from sim.model.body import Body
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, SETTLED, Responses
+from sim.motion.flips import Flip, follow_flips
 from sim.motion.net_speed import net_speeds, twists
+from sim.motion.orbit_groups import OnMesh
+from sim.motion.phased_orbits import orbits_with_phases
 from sim.motion.run import REVERSED
 from sim.motion.steady import check_groups, steady
 from sim.motion.steady_motion import Steady
 from sim.motion.stepped_response import stepped_response
-from sim.solve.assembly import bodies, reversed_bodies
-from sim.solve.orbit import mean_motion, solve_orbit
-from sim.solve.refinement import CORRECTION, orbit_on_mesh
-from sim.solve.transient import lag_at, transient
+from sim.solve.assembly import numbers, reversed_numbers, unpacked
 
 _SAME = 1.2  # time units from which the memory is constant
 MESHES = (6, 9)  # edges
 TOLERANCE = 1e-3  # of a time step, in l: see `sim.solve.transient`
-_LEAST_INSTANTS = {1: 3, 2: 3}  # by N; with more tails the phase at the flip hardly matters
+_OFFSET = 1  # of a robot's numbers
+_TIMES = np.unique([*np.minimum(DWELLS, SETTLED), *np.minimum(DWELLS, _SAME)])
+_UNTIL_SETTLED, _UNTIL_SAME = (np.searchsorted(_TIMES, np.minimum(DWELLS, end)) for end in (SETTLED, _SAME))
 
 
 class Curves(NamedTuple):
@@ -42,6 +43,15 @@ class Curves(NamedTuple):
     memory: Floats
     rest: Floats
     spread: Floats
+
+
+class _Wanted(NamedTuple):
+    """What is simulated of every robot."""
+
+    tails: int
+    even: bool  # a reversed motor gives the mirror image
+    before: Floats
+    tolerance: float
 
 
 @np.errstate(all="ignore")  # robots that overflow are flagged
@@ -71,10 +81,13 @@ def responses(
     check_groups(groups)
     motion = steady(groups, stability=False) if motion is None else motion
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
-    robots = bodies(groups)
+    wanted = _Wanted(groups.N, even, before, tolerance)
+    rows, reverse_rows = numbers(groups), reversed_numbers(groups)
+    robots, reverse_robots = unpacked(rows), unpacked(reverse_rows)
+    coarse, fine = _on_meshes(rows, reverse_rows, wanted, meshes, (history and extrapolated_memory, history))
     by_robot, stepped = [], np.zeros(len(robots), dtype=bool)
-    for i, (body, reverse) in enumerate(zip(robots, reversed_bodies(groups), strict=True)):
-        curves = _solved(body, reverse, groups.N, even, history, before, tolerance, meshes, extrapolated_memory)
+    for i, (body, reverse) in enumerate(zip(robots, reverse_robots, strict=True)):
+        curves = _extrapolated(coarse[i], fine[i], meshes, history and extrapolated_memory, body.omega < 0)
         if curves is None:
             stepped[i] = True
             values = stepped_response(
@@ -94,103 +107,118 @@ def responses(
     return Responses(lag, memory, rest, spread, speed, failed, stepped, before)
 
 
-def _solved(
-    body: Body,
-    reverse: Body,
-    tails: int,
-    even: bool,
-    history: bool,
-    before: Floats,
-    tolerance: float,
-    meshes: tuple[int, int],
-    extrapolated_memory: bool,
-) -> Curves | None:
-    """Solve for the curves of one robot by transients; None where its motion or a transient has no solution."""
-    a, b = meshes
-    both = history and extrapolated_memory
-    coarse = _on_mesh(body, reverse, tails, even, a, before, tolerance, history=both)
-    if coarse is None:
-        return None
-    fine = _on_mesh(body, reverse, tails, even, b, before, tolerance, history=history)
-    if fine is None:
-        return None
-    share = a**2 / (b**2 - a**2)
-    change = (fine.lag - coarse.lag) * share
-    memory = fine.memory + (fine.memory - coarse.memory) * share if both else fine.memory
-    mirror = planar.MIRROR if body.omega < 0 else np.ones(3)
-    return Curves((fine.lag + change) * mirror, memory * mirror, (fine.rest + change) * mirror, fine.spread)
+def _on_meshes(
+    rows: Floats, reverse_rows: Floats, wanted: _Wanted, meshes: tuple[int, int], history: tuple[bool, bool]
+) -> list[list[Curves | None]]:
+    """Simulate the curves of B robots on each mesh, with memory and rest where `history` says so."""
+    after = orbits_with_phases(rows, wanted.tails, meshes)
+    if wanted.even:
+        starts = [[orbit and orbit._replace(x=_mirrored(orbit.x)) for orbit in mesh] for mesh in after]
+    else:
+        instants = [[len(orbit.u) if orbit else 1 for orbit in mesh] for mesh in after]
+        turned = orbits_with_phases(reverse_rows, wanted.tails, meshes, instants)
+        starts = [[orbit and orbit._replace(u=orbit.u * REVERSED) for orbit in mesh] for mesh in turned]
+    return [
+        _on_mesh(rows, reverse_rows, after[mesh], starts[mesh], wanted, history[mesh])
+        for mesh in range(len(meshes))
+    ]
 
 
 def _on_mesh(
-    body: Body,
-    reverse: Body,
-    tails: int,
-    even: bool,
-    edges: int,
-    before: Floats,
-    tolerance: float,
-    *,
+    rows: Floats,
+    reverse_rows: Floats,
+    after: Sequence[OnMesh | None],
+    starts: Sequence[OnMesh | None],
+    wanted: _Wanted,
     history: bool,
+) -> list[Curves | None]:
+    """Simulate the curves of B robots on one mesh; memory and rest are zero without `history`.
+
+    Args:
+        after: steady motions after the flip.
+        starts: steady shapes before the flip, with the velocities right after it.
+    """
+    flips = [
+        Flip(row, start.x, start.u, orbit.twist, SETTLED) if orbit and start else None
+        for row, orbit, start in zip(rows, after, starts, strict=True)
+    ]
+    courses = follow_flips(flips, _TIMES, wanted.tolerance)
+    pasts: list[tuple[Floats, Floats] | None]
+    pasts = [(np.zeros((len(wanted.before), len(DWELLS), 3)), np.zeros((len(DWELLS), 3)))] * len(rows)
+    if history:
+        solved = [flip if course else None for flip, course in zip(flips, courses, strict=True)]
+        same = [course.lag[_UNTIL_SAME].mean(1) if course else None for course in courses]
+        pasts = _histories(solved, _flips_back(solved, reverse_rows, after, starts, wanted), same, wanted)
+    curves: list[Curves | None] = []
+    for course, past in zip(courses, pasts, strict=True):
+        if course is None or past is None:
+            curves.append(None)
+        else:
+            lag = course.lag[_UNTIL_SETTLED]
+            curves.append(Curves(lag.mean(1), *past, lag.std(1)))
+    return curves
+
+
+def _flips_back(
+    flips: Sequence[Flip | None],
+    reverse_rows: Floats,
+    after: Sequence[OnMesh | None],
+    starts: Sequence[OnMesh | None],
+    wanted: _Wanted,
+) -> list[Flip | None]:
+    """Flip from the steady motion after the flip; an even robot's flip back is the mirror image of its flip."""
+    if wanted.even:
+        return list(flips)
+    return [
+        Flip(row, orbit.x, orbit.u * REVERSED, start.twist, SETTLED) if flip and orbit and start else None
+        for flip, row, orbit, start in zip(flips, reverse_rows, after, starts, strict=True)
+    ]
+
+
+def _histories(
+    flips: Sequence[Flip | None], back: Sequence[Flip | None], same: Sequence[Floats | None], wanted: _Wanted
+) -> list[tuple[Floats, Floats] | None]:
+    """Simulate memory (K, D, 3) and rest (D, 3) of B robots; None where a transient has no solution.
+
+    Args:
+        flips: from the steady motion.
+        back: flips in the other direction.
+        same: lag after a long dwell, at DWELLS up to the time from which the memory is constant, (D, 3).
+    """
+    count, last = len(wanted.before), float(wanted.before[-1])
+    back = [flip and flip._replace(until=last) for flip in back]
+    later: list[Flip | None] = []
+    for flip, course in zip(flips, follow_flips(back, _TIMES, wanted.tolerance, wanted.before), strict=True):
+        if flip is None or course is None:
+            later += [None] * (count + 1)
+            continue
+        shapes = map(_mirrored, course.shapes) if wanted.even else course.shapes
+        later += [flip._replace(x=shape, until=_SAME) for shape in shapes]
+        later.append(flip._replace(x=straight(flip.x.shape[0], flip.x.shape[1], float(flip.row[_OFFSET]))))
+    courses = follow_flips(later, _TIMES, wanted.tolerance)
+    pasts: list[tuple[Floats, Floats] | None] = []
+    for i, lag in enumerate(same):
+        *after_short, from_rest = courses[i * (count + 1) : (i + 1) * (count + 1)]
+        lags = [course.lag[_UNTIL_SAME].mean(1) for course in after_short if course]
+        if from_rest is None or len(lags) < count:
+            pasts.append(None)
+        else:
+            pasts.append((np.array(lags) - lag, from_rest.lag[_UNTIL_SETTLED].mean(1)))
+    return pasts
+
+
+def _extrapolated(
+    coarse: Curves | None, fine: Curves | None, meshes: tuple[int, int], memory_too: bool, mirrored: bool
 ) -> Curves | None:
-    """Solve for the curves on one mesh; memory and rest only with `history`."""
-    after = orbit_with_phases(body, tails, edges)
-    if after is None:
+    """Extrapolate from two meshes; `mirrored` for a negative motor."""
+    if coarse is None or fine is None:
         return None
-    x, u, twist = after
-    if even:
-        start, first = _mirrored(x), u
-    else:
-        before_flip = orbit_with_phases(reverse, tails, edges, instants=u.shape[0])
-        if before_flip is None:
-            return None
-        reverse_twist = before_flip[2]
-        start, first = before_flip[0], before_flip[1] * REVERSED
-    none = np.empty(0)
-    main = transient(body, start.copy(), first.copy(), twist, SETTLED, none, tolerance)
-    if not main.solved:
-        return None
-    dwells = np.minimum(DWELLS, SETTLED)
-    fields = lag_at(main, dwells)
-    lag, spread = fields.mean(1), fields.std(1)
-    memory, rest = np.zeros((len(before), *lag.shape)), np.zeros_like(lag)
-    if not history:
-        return Curves(lag, memory, rest, spread)
-    if even:
-        back = transient(body, start, first.copy(), twist, float(before[-1]), before, tolerance)
-    else:
-        back = transient(reverse, x.copy(), u * REVERSED, reverse_twist, float(before[-1]), before, tolerance)
-    if not back.solved:
-        return None
-    shapes = np.array([_mirrored(shape) for shape in back.shapes]) if even else back.shapes
-    starts = [*shapes, straight(edges, x.shape[1], body.offset)]
-    curves = np.empty((len(starts), *lag.shape))
-    for i, shape in enumerate(starts):
-        until = _SAME if i < len(shapes) else SETTLED
-        flip = transient(body, shape, first.copy(), twist, until, none, tolerance)
-        if not flip.solved:
-            return None
-        curves[i] = lag_at(flip, np.minimum(DWELLS, until)).mean(1)
-    same = lag_at(main, np.minimum(DWELLS, _SAME)).mean(1)
-    return Curves(lag, curves[:-1] - same, curves[-1], spread)
-
-
-def orbit_with_phases(
-    body: Body, tails: int, edges: int, instants: int = 0
-) -> tuple[Floats, Floats, Floats] | None:
-    """Solve for x (n, M, 3), u (P, 4) and (v_z, h_x, ω_yr) on as many instants a turn as the response needs."""
-    solved, x, u = orbit_on_mesh(body, tails, edges)
-    if not solved:
-        return None
-    wanted = instants or max(u.shape[0], _LEAST_INSTANTS.get(tails, 1))
-    if tails in _LEAST_INSTANTS and wanted % 2 == 0:
-        wanted += 1
-    if wanted != u.shape[0]:
-        x, u = with_phases(x, tails * wanted), with_phases(u[None], wanted)[0]
-        _, size = solve_orbit(body, x, u, CORRECTION)
-        if not size < CORRECTION:
-            return None
-    mean = mean_motion(body, u)
-    return x, u, mean[[4, 3, 2]]
+    a, b = meshes
+    share = a**2 / (b**2 - a**2)
+    change = (fine.lag - coarse.lag) * share
+    memory = fine.memory + (fine.memory - coarse.memory) * share if memory_too else fine.memory
+    mirror = planar.MIRROR if mirrored else np.ones(3)
+    return Curves((fine.lag + change) * mirror, memory * mirror, (fine.rest + change) * mirror, fine.spread)
 
 
 def _mirrored(x: Floats) -> Floats:

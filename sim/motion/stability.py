@@ -30,13 +30,17 @@ from sim.solve.refinement import ROUGH, Orbit
 
 QUICK = 0.4  # |ω_yr/ω_t| from which a robot yaws fast
 DOUBTFUL = -0.05  # growth from which it is computed again
-_VECTORS, MORE_VECTORS = 10, 30  # of Arnoldi's method beside two for each tail: first, and again
+FEW_VECTORS, MORE_VECTORS = 10, 30  # of Arnoldi's method beside two for each tail: first, and again
 _CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it counts
 
 
-def growth_of_orbit(body: Body, tails: int, orbit: Orbit) -> float:
-    """Compute the growth on an orbit of a robot with N tails; NaN if it cannot be computed."""
-    value = growth(body, tails, orbit.x[1], orbit.u[1])
+def growth_of_orbit(body: Body, tails: int, orbit: Orbit, value: float | None = None) -> float:
+    """Compute the growth on an orbit of a robot with N tails; NaN if it cannot be computed.
+
+    Args:
+        value: the growth on the second mesh, if it is known.
+    """
+    value = growth(body, tails, orbit.x[1], orbit.u[1]) if value is None else value
     yaws_fast = abs(orbit.means[2]) > QUICK * abs(orbit.means[0])
     if (value <= DOUBTFUL and not yaws_fast) or has_contact(body):
         return value
@@ -46,7 +50,7 @@ def growth_of_orbit(body: Body, tails: int, orbit: Orbit) -> float:
     return growth(body, tails, x, u, vectors=MORE_VECTORS) if size < ROUGH else np.nan
 
 
-def growth(body: Body, tails: int, x: Floats, u: Floats, *, vectors: int = _VECTORS) -> float:
+def growth(body: Body, tails: int, x: Floats, u: Floats, *, vectors: int = FEW_VECTORS) -> float:
     """Compute the growth on an orbit x (n, M, 3), u (P, 4) of N tails.
 
     Args:
@@ -56,7 +60,7 @@ def growth(body: Body, tails: int, x: Floats, u: Floats, *, vectors: int = _VECT
     Returns:
         The growth in one motor revolution; NaN if it cannot be computed.
     """
-    found = exponents(body, tails, x, u, vectors=vectors, unconverged=vectors == _VECTORS)
+    found = exponents(body, tails, x, u, vectors=vectors, unconverged=vectors == FEW_VECTORS)
     return in_motor_revolutions(found.real.max(), body, u) if len(found) else np.nan
 
 
@@ -74,7 +78,7 @@ def exponents(
     """
     count = min(2 * tails + vectors, x.size - 1)
     shift = abs(mean_motion(body, u)[0])
-    projected = arnoldi(body, x, u, shift, _first_perturbation(tails, *x.shape[:2]), count)
+    projected = arnoldi(body, x, u, shift, first_perturbation(tails, *x.shape[:2]), count)
     if not np.isfinite(projected[-1, -1]):
         return np.empty(0, complex)
     if unconverged:
@@ -91,7 +95,7 @@ def in_motor_revolutions(exponent: float, body: Body, u: Floats) -> float:
 
 
 @cache
-def _first_perturbation(tails: int, n: int, columns: int) -> Floats:
+def first_perturbation(tails: int, n: int, columns: int) -> Floats:
     """Draw the perturbation (n, M, 3) of bent tails from which Arnoldi's method starts, with the same numbers.
 
     Its harmonics in the phase are the N lowest. They contain each perturbation of the tails once.

@@ -9,6 +9,7 @@ import numpy as np
 
 from sim.compile_stages import Stage, run_stages
 from sim.compiling import CACHE, all_compiled, compile_apart, mark_all_compiled
+from sim.model.groups import Groups
 from sim.model.presets import PRESETS
 from sim.model.schedule import Schedule
 from sim.motion.replay import replay
@@ -19,11 +20,12 @@ from sim.motion.shapes import tails_over_a_revolution
 from sim.motion.steady import steady
 
 _ROBOT = PRESETS["paper-control"]
+_PAIR = Groups.from_columns({name: np.full(2, value) for name, value in _ROBOT.group_values().items()})
 _TOUCHING = replace(PRESETS["paper-measured"], effects={"tail_contact": 1.0})
 _STAGES: tuple[Stage, ...] = (
     ("steady motion", lambda: steady(_ROBOT.groups())),
     ("time steps", lambda: settle(_ROBOT.groups())),
-    ("response to flips", lambda: responses(_ROBOT.groups())),
+    ("response to flips", lambda: [responses(_PAIR.select(rows)) for rows in (np.arange(1), np.arange(2))]),
     ("replay", lambda: replay([Schedule(_ROBOT.group_values(), 1, np.array([0.1]), (0.0, 0.0, 0.0), 1.0)])),
     ("derivatives", lambda: sensitivities(_ROBOT.groups(), ("C_t", "tail_interaction"))),
     ("contact between tails", lambda: steady(_TOUCHING.groups())),

@@ -99,9 +99,14 @@ def bodies(groups: Groups) -> list[Body]:
     return unpacked(numbers(groups))
 
 
+def reversed_numbers(groups: Groups) -> Floats:
+    """Return the numbers of the same robots with their motors reversed: an odd effect changes more than ω̄."""
+    return numbers(replace(groups, omega_bar=-groups.omega_bar))
+
+
 def reversed_bodies(groups: Groups) -> list[Body]:
-    """Return the same robots with their motors reversed; an odd effect changes more than the sign of ω̄."""
-    return bodies(replace(groups, omega_bar=-groups.omega_bar))
+    """Return the same robots with their motors reversed, one by one."""
+    return unpacked(reversed_numbers(groups))
 
 
 def unpacked(rows: Floats) -> list[Body]:

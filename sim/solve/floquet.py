@@ -23,7 +23,8 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled
+from sim.compiling import compiled, compiled_exactly
+from sim.lanes import zeros
 from sim.linear.blocks import block, put, vector
 from sim.linear.spectral import differentiation
 from sim.linear.vectors import applied
@@ -35,7 +36,7 @@ from sim.solve.rates import Rates
 from sim.solve.residual import fill_residual, is_local
 
 _TOLERANCE = 1e-3  # of GMRES
-_CANCELS = 0.1  # smaller parts of a vector are made orthogonal again
+CANCELS = 0.1  # smaller parts of a vector are made orthogonal again
 _STEP = 1e-6  # finite-difference step of the largest entry, in l
 
 
@@ -52,12 +53,7 @@ def arnoldi(body: Body, x: Floats, u: Floats, shift: float, first: Floats, count
     Returns:
         The Hessenberg matrix with the part of its last vector outside the space, (K + 1, K).
     """
-    columns = x.shape[1]
-    x, matrix = _without_highest(x), differentiation(columns)
-    if columns % 2 == 0:
-        for i in range(columns):
-            for j in range(columns):
-                matrix[i, j] += 0.5 * np.sign(body.omega) * (-1.0) ** (i - j)
+    x, matrix = without_highest(x), damped_differentiation(x.shape[1], np.sign(body.omega))
     rates = Rates(shift, FIRST_PHASE, matrix, x)
     work = new_workspace(rates, x, u)
     linearise(body, rates, x, u, work.room, work.equations)
@@ -69,7 +65,7 @@ def arnoldi(body: Body, x: Floats, u: Floats, shift: float, first: Floats, count
         solve_linear(body, rates, x, u, work, i == 0, _TOLERANCE, dx, du)
         image = dx.reshape(x.size)
         before, size = np.inf, np.sqrt(np.dot(image, image))
-        while size < _CANCELS * before:  # Gram-Schmidt, again where digits cancelled
+        while size < CANCELS * before:  # Gram-Schmidt, again where digits cancelled
             parts = np.dot(basis[: i + 1], image)
             projected[: i + 1, i] += parts
             image -= np.dot(parts, basis[: i + 1])
@@ -79,15 +75,27 @@ def arnoldi(body: Body, x: Floats, u: Floats, shift: float, first: Floats, count
     return projected
 
 
-@compiled
-def _without_highest(x: Floats) -> Floats:
+@compiled_exactly
+def damped_differentiation(columns: int, sense: float) -> Floats:
+    """Differentiate in φ, (M, M); the component (−1)^m decays if the motor turns with `sense`."""
+    matrix = differentiation(columns)
+    if columns % 2 == 0:
+        for i in range(columns):
+            for j in range(columns):
+                matrix[i, j] += 0.5 * sense * (-1.0) ** (i - j)
+    return matrix
+
+
+@compiled_exactly
+def without_highest(x: Floats) -> Floats:
     """Remove the component (−1)^m of x (n, M, 3), if M is even."""
     n, columns, _ = x.shape
-    smooth = x.copy()
+    smooth = zeros(x, x.shape)
+    smooth[:] = x
     if columns % 2 == 0:
         for k in range(n):
             for c in range(3):
-                total = 0.0
+                total = 0.0 * x[k, 0, c]
                 for m in range(columns):
                     total += (-1.0) ** m * x[k, m, c]
                 for m in range(columns):
@@ -95,17 +103,22 @@ def _without_highest(x: Floats) -> Floats:
     return smooth
 
 
+@compiled_exactly
+def by_rate(resistance: Floats, q: Floats, out: Floats) -> None:
+    """Compute −B q of robots with local effects: the drag on moving nodes, (n, M, 3)."""
+    for k in range(q.shape[0]):
+        for m in range(q.shape[1]):
+            put(out, k, m, applied(block(resistance, k, m), vector(q, k, m)))
+
+
 @compiled
 def _by_rate(
     body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace, q: Floats, dx: Floats, du: Floats
 ) -> None:
     """Compute −B q, (n, M, 3) and (P, 4): the drag on moving nodes, and by differences what else depends on ẋ."""
-    n, columns, _ = x.shape
     du[:] = 0.0
     if is_local(body):
-        for k in range(n):
-            for m in range(columns):
-                put(dx, k, m, applied(block(work.equations.resistance, k, m), vector(q, k, m)))
+        by_rate(work.equations.resistance, q, dx)
         return
     step = _STEP / np.max(np.abs(q))
     r, t = np.empty_like(x), np.empty_like(u)

@@ -139,7 +139,7 @@ def solve_linear(
     if anew:
         factor_and_solve(body, rates, u, work, dx, du)
     else:
-        _solve_local(rates, work, dx, du)
+        solve_local(rates, work, dx, du)
     if not is_local(body):
         _solve_nonlocal(body, rates, x, u, work, tolerance, dx, du)
 
@@ -164,7 +164,7 @@ def factor_and_solve(body: Body, rates: Rates, u: Floats, work: Workspace, dx: F
 
 
 @compiled_exactly
-def _solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
+def solve_local(rates: Rates, work: Workspace, dx: Floats, du: Floats) -> None:
     """Solve with the factors, in place: dx (n, M, 3) and du (P, 4) come in as right-hand sides."""
     if not is_joined(rates):
         separate.solve(work.equations.chains, dx, du[0])
@@ -181,7 +181,7 @@ def _solve_nonlocal(
 
     Args:
         tolerance: share of the preconditioned right-hand side that may be left.
-        dx, du: come in as the right-hand side after `_solve_local`, (n, M, 3) and (P, 4).
+        dx, du: come in as the right-hand side after `solve_local`, (n, M, 3) and (P, 4).
     """
     nodes, size = dx.size, dx.size + du.size
     scale = 1 + abs(body.omega)
@@ -202,7 +202,7 @@ def _solve_nonlocal(
                     side[:nodes].reshape(x.shape), side[nodes:].reshape(u.shape),
                 )  # fmt: skip
             image = (above - below) / (2 * step)
-            _solve_local(rates, work, image[:nodes].reshape(x.shape), image[nodes:].reshape(u.shape))
+            solve_local(rates, work, image[:nodes].reshape(x.shape), image[nodes:].reshape(u.shape))
             image[nodes:] /= scale
             count = i + 1
             if extend(krylov, i, image) < tolerance:

@@ -64,6 +64,15 @@ class Found(NamedTuple):
     u: tuple[Floats, Floats, Floats]
 
 
+class OnMesh(NamedTuple):
+    """Orbits of a group on one mesh."""
+
+    x: Floats  # (n, M, 3, W)
+    u: Floats  # (P, 4, W)
+    means: Floats  # (5, W), see `sim.solve.orbit.mean_motion`
+    solved: Floats  # (W,), 1 or 0
+
+
 class _Start(NamedTuple):
     """The last solution of each robot on the coarsest mesh, rows as in `Found`."""
 
@@ -86,7 +95,7 @@ def orbits_of_robots(
         found: filled; its rows have room for more phases than any orbit has.
         wide: width of the groups, see `sim.lanes`.
     """
-    _on_coarsest_mesh(numbers, terms, tails, least, order, found, wide)
+    on_coarsest_mesh(numbers, terms, tails, least, order, found, wide)
     done = np.zeros(len(order), dtype=np.bool_)
     group, count = np.empty(len(wide), np.int64), 0
     for first in range(len(order)):
@@ -108,7 +117,7 @@ def orbits_of_robots(
 
 
 @compiled_exactly
-def _on_coarsest_mesh(
+def on_coarsest_mesh(
     numbers: Floats, terms: Any, tails: int, least: int, order: Integers, found: Found, wide: Any
 ) -> None:
     """Add phases until the means of each robot stop changing; fill the first mesh of `found`."""
@@ -338,3 +347,49 @@ def _balanced(body: Body, rates: Rates, x: Floats, u: Floats, work: Workspace) -
     linearise(body, rates, x, u, work.room, work.equations)
     left = larger(largest_entry(work.equations.r), largest_entry(work.equations.t))
     return less(left, BALANCED * largest_entry(work.room.geometry.force))
+
+
+@compiled_exactly
+def on_mesh(
+    numbers: Floats, terms: Any, tails: int, x: Floats, u: Floats, edges: int, instants: int, width: Any
+) -> OnMesh:
+    """Solve for a group on a mesh and a number of instants, from its orbits on the coarsest mesh.
+
+    Args:
+        numbers, terms, tails, width: as in `orbits_of_robots`, (K, W).
+        x, u: on the coarsest mesh, (n, M, 3, W) and (P, 4, W).
+        edges: wanted.
+        instants: wanted.
+    """
+    body = body_in_lanes(lanes(numbers, width), terms)
+    start, velocities = lanes(x, width), lanes(u, width)
+    phases = tails * instants
+    count = len(width)
+    found = OnMesh(
+        np.empty((edges, phases, 3, count)), np.empty((instants, 4, count)), np.empty((5, count)), np.empty(count)
+    )
+    moved = with_edges(start, body.offset, edges)
+    going = _corrected(body, moved, velocities, less(abs(body.omega), np.inf))
+    for p in range(velocities.shape[0]):
+        going = going * less(0.0, tail_spin(body, velocities[p]) * body.omega)
+    new_x, new_u, means = lanes(found.x, width), lanes(found.u, width), lanes(found.means, width)
+    if velocities.shape[0] == instants:
+        new_x[:], new_u[:] = moved, velocities
+    else:
+        new_x[:] = with_phases(moved, phases)
+        new_u[:] = with_phases(velocities.reshape((1, velocities.shape[0], 4)), instants)[0]
+        going = _corrected(body, new_x, new_u, going)
+    mean = mean_motion(body, new_u)
+    for i in range(5):
+        means[i] = mean[i]
+    for i in range(count):
+        found.solved[i] = lane(going, i)
+    return found
+
+
+@compiled_exactly
+def _corrected(body: Body, x: Floats, u: Floats, going: Any) -> Any:
+    """Solve in place, where `going` is 1; return where that succeeded."""
+    rates = on_orbit(x.shape[1], FIRST_PHASE)
+    size = newton_in_lanes(body, rates, x, u, new_workspace(rates, x, u), CORRECTION, going)
+    return going * less(size, CORRECTION)

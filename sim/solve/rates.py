@@ -46,9 +46,9 @@ def in_stage(rate: float, phase: float, start: Floats) -> Rates:
 
 
 @compiled_exactly
-def in_transient(rate: float, first_phase: float, start: Floats) -> Rates:
-    """Describe a stage with ẋ = ω_t ∂x/∂φ + rate (x − start), at M equal phases."""
-    return Rates(rate, first_phase, differentiation(start.shape[1]), start)
+def in_transient(rate: float, first_phase: float, by_phase: Floats, start: Floats) -> Rates:
+    """Describe a stage with ẋ = ω_t ∂x/∂φ + rate (x − start), at M equal phases; `by_phase` is D, (M, M)."""
+    return Rates(rate, first_phase, by_phase, start)
 
 
 @compiled_exactly

@@ -22,7 +22,7 @@ from sim.arrays import Floats
 from sim.compiling import compiled_exactly
 from sim.lanes import zeros
 from sim.linear.blocks import put, vector, vector_at
-from sim.linear.vectors import cross, minus, plus
+from sim.linear.vectors import ZERO, cross, minus, plus
 from sim.mechanics.balance import body_wrench, clamp_balance, head_drag, motion_at, node_balance
 from sim.mechanics.contact_line import add_contact_line
 from sim.mechanics.flow import add_flow, has_flow
@@ -76,6 +76,9 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
         r: (n, M, 3), filled.
         t: (P, 4), filled.
     """
+    if is_local(body):
+        fill_local_residual(body, rates, x, u, room, r, t)
+        return
     n, columns, _ = x.shape
     instants = u.shape[0]
     measure(room.geometry, x, body.offset, body.axial_stiffness)
@@ -112,10 +115,30 @@ def fill_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r:
 
 
 @compiled_exactly
+def fill_local_residual(body: Body, rates: Rates, x: Floats, u: Floats, room: Room, r: Floats, t: Floats) -> None:
+    """Compute the residual as `fill_residual` does, for one robot or a group, with local effects."""
+    n, columns, _ = x.shape
+    instants = u.shape[0]
+    measure(room.geometry, x, body.offset, body.axial_stiffness)
+    fill_rates(rates, body, x, u, room.x_dot, room.by_spin)
+    base = base_phase(rates, body, u)
+    for p in range(instants):
+        for a in range(4):
+            t[p, a] = -head_drag(body, u[p], a)
+    for m in range(columns):
+        motion = motion_at(body, u[m % instants], base + 2 * np.pi * m / columns)
+        for k in range(n):
+            velocity = plus(plus(motion.linear, cross(motion.spin, vector(x, k, m))), vector(room.x_dot, k, m))
+            put(r, k, m, node_balance(room.geometry, body, motion, k, m, velocity)[0])
+        clamp = clamp_balance(room.geometry, body, m, motion, ZERO, ZERO)
+        wrench = body_wrench(motion, clamp.force, clamp.moment)
+        for a in range(4):
+            t[m % instants, a] += wrench[a]
+
+
+@compiled_exactly
 def _surround(body: Body, x: Floats, u: Floats, phase: float, p: int, tails: int, room: Room) -> None:
     """Add all non-local effects at instant p; forces in the tails come first, because the flow depends on them."""
-    if is_local(body):
-        return
     geometry, around, columns = room.geometry, room.around, x.shape[1]
     if has_frames(body):
         for m in range(p, columns, columns // tails):

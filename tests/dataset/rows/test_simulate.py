@@ -106,7 +106,7 @@ def test_failed_rows_are_kept_and_flagged(monkeypatch: pytest.MonkeyPatch) -> No
         return Orbits(means, slopes, none, np.full(count, NO_START), none, none)
 
     monkeypatch.setattr(steady, "solve_orbits", lost)
-    monkeypatch.setattr(response, "orbit_on_mesh", lambda *_: (False, None, None))
+    monkeypatch.setattr(response, "orbits_with_phases", lambda rows, _, meshes: [[None] * len(rows)] * len(meshes))
     monkeypatch.setattr(settling, "state_on_orbit", lambda *_: None)
     monkeypatch.setattr(run, "advance", lambda *_: False)
     columns = simulate(some_rows({}))

@@ -13,6 +13,7 @@ from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, FORGOTTEN, Responses, at_equal_dwells, memory_after
 from sim.model.schedule import Schedule
 from sim.motion import response
+from sim.motion.flips import NO_MARKS, Course, follow_flips
 from sim.motion.replay import replay
 from sim.motion.resolution import Resolution
 from sim.motion.response import responses
@@ -20,7 +21,6 @@ from sim.motion.steady import steady
 from sim.motion.stepped_response import stepped_response
 from sim.motion.switching import switch_response
 from sim.solve.assembly import reversed_bodies
-from sim.solve.transient import Transient, transient
 from tests.sim.robots import CONTROL_VALUES, control, first_body
 
 FINE = Resolution(24, 72)
@@ -120,11 +120,16 @@ def test_without_history_the_net_speed_of_quick_flips_is_not_known() -> None:
 
 def test_a_robot_that_cannot_be_solved_for_is_stepped(monkeypatch: pytest.MonkeyPatch) -> None:
     direct = responses(control())
-    monkeypatch.setattr(response, "orbit_on_mesh", lambda *_: (False, None, None))
+    monkeypatch.setattr(response, "orbits_with_phases", no_orbits)
     stepped = responses(control())
     assert stepped.stepped.all()
     assert not stepped.failed.any()
     assert stepped.lag == pytest.approx(direct.lag, abs=1e-3)
+
+
+def no_orbits(rows: np.ndarray, _: int, meshes: tuple[int, int], *__: Any) -> list[list[None]]:
+    """Find no orbits."""
+    return [[None] * len(rows) for _ in meshes]
 
 
 def test_a_robot_that_breaks_down_is_flagged_and_the_others_go_on() -> None:
@@ -152,10 +157,10 @@ def test_steps_end_at_the_dwells_before_only_where_they_are_wanted(
     """Without them a response took a sixth more steps."""
     counts = set()
 
-    def counting(*arguments: Any) -> Transient:
-        counts.add(len(arguments[5]))
-        return transient(*arguments)
+    def counting(flips: Any, times: Any, tolerance: float, marks: Any = NO_MARKS) -> list[Course | None]:
+        counts.add(len(marks))
+        return follow_flips(flips, times, tolerance, marks)
 
-    monkeypatch.setattr(response, "transient", counting)
+    monkeypatch.setattr(response, "follow_flips", counting)
     responses(control(), history=history)
     assert counts == marks

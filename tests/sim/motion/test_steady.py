@@ -146,7 +146,7 @@ def test_tails_in_contact_that_leave_the_orbit_are_stepped_and_say_so(monkeypatc
     groups = control(1, N=4, omega_bar=30.0, tail_contact=1.0)
     plain = steady(groups)
     assert plain.method.tolist() == [DIRECT]
-    monkeypatch.setattr(sim.motion.orbits, "growth_of_orbit", lambda *_: 0.1)
+    monkeypatch.setattr(sim.motion.orbits, "growths", lambda rows, *_: np.full(len(rows), 0.1))
     assert steady(groups).method.tolist() == [DIRECT]  # stepping reaches the same motion
     monkeypatch.setattr(sim.motion.steady, "SAME", 0.0)
     other = steady(groups)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sim.effects import catalogue
+from sim.linear.spectral import differentiation
 from sim.model.body import Body
 from sim.solve.linearise import linearise, new_equations
 from sim.solve.newton import factor_and_solve, new_workspace, newton
@@ -49,7 +50,8 @@ def stage_case() -> tuple[Body, Rates, Unknowns]:
 def transient_case() -> tuple[Body, Rates, Unknowns]:
     body = strange(2)
     x, u = somewhere(body, 2, 6, 4)
-    return body, in_transient(30.0, FIRST_PHASE, x + 0.01 * np.random.default_rng(2).normal(size=x.shape)), (x, u)
+    start = x + 0.01 * np.random.default_rng(2).normal(size=x.shape)
+    return body, in_transient(30.0, FIRST_PHASE, differentiation(x.shape[1]), start), (x, u)
 
 
 def residual(body: Body, rates: Rates, z: np.ndarray, like: Unknowns) -> np.ndarray:

@@ -1,0 +1,345 @@
+"""How robots come to their steady motions, one robot in each lane; their effects are local.
+
+The steps are those of `sim.solve.transient`. Each lane has its own time, and its own length of steps. In each
+round every lane tries a step; a lane whose step is rejected keeps its state, and one whose robot has come to its
+end takes the next robot. So the numbers of a robot depend neither on its neighbours nor on the number of lanes
+(`sim.lanes`). Units: l, μ0 l⁴/EI.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sim.arrays import Flags, Floats, Integers
+from sim.compiling import compiled_exactly
+from sim.lanes import choose, lane, lanes, larger, less, smaller, somewhere, with_lane, zeros
+from sim.linear.spectral import differentiation
+from sim.model.body import Body
+from sim.solve.groups import add_chosen, body_in_lanes, largest_entry
+from sim.solve.lag import advance_lag, between, turning
+from sim.solve.linearise import linearise
+from sim.solve.march import GAMMA
+from sim.solve.newton import LARGEST_MOVE, Workspace, factor_and_solve, negate, new_workspace, solve_local
+from sim.solve.orbit import FIRST_PHASE
+from sim.solve.rates import Rates, in_transient
+from sim.solve.residual import fill_local_residual
+from sim.solve.transient import (
+    CORRECTION,
+    MOST_CORRECTIONS,
+    MOST_REJECTED,
+    MOST_STEPS,
+    embedded_error,
+    first_step,
+    next_step,
+    shorter_step,
+    towards,
+)
+
+
+class Jump(NamedTuple):
+    """B robots at a jump of the motor's speed."""
+
+    numbers: Floats  # with the speed after the jump, (B, K), see `sim.solve.assembly.numbers`
+    x: Floats  # shapes, (B, n, M, 3)
+    u: Floats  # guessed velocities, (B, P, 4)
+    twist: Floats  # steady (v_z, h_x, ω_yr) after the jump, (B, 3), see `sim.solve.transient.transient`
+    until: Floats  # times to follow, (B,)
+
+
+class Followed(NamedTuple):
+    """B robots after a jump of the motor's speed."""
+
+    lag: Floats  # (B, T, Q, 3): (Δz, Δx, Δψ), Q phases, or one entry for the mean over a turn
+    shapes: Floats  # at the marks, (B, marks, n, M, 3)
+    end: Floats  # shapes at the end, (B, n, M, 3)
+    solved: Flags  # (B,)
+
+
+class _State(NamedTuple):
+    """Where the lanes are: at the start of a step, or in one."""
+
+    x: Floats  # (n, M, 3)
+    u: Floats  # (P, 4)
+    slope: Floats  # ∂x/∂t, (n, M, 3)
+    lag: Floats  # (Q, 3)
+    lag_rate: Floats  # (Q, 3)
+
+
+class _Step(NamedTuple):
+    """One step in the making."""
+
+    slope: Floats  # (2, n, M, 3): ∂x/∂t of the stages
+    lag_slope: Floats  # (2, Q, 3)
+    start: Floats  # (n, M, 3)
+    lag_start: Floats  # (Q, 3)
+    dx: Floats  # (n, M, 3)
+    du: Floats  # (P, 4)
+    by_phase: Floats  # d/dφ of x, (M, M)
+    lag_by_phase: Floats  # d/dφ of the lag, (Q, Q)
+
+
+class _Course(NamedTuple):
+    """Which robot each lane has, and how far it has come; (W,)."""
+
+    robot: Integers
+    steps: Integers
+    rejected: Integers
+    marks: Integers  # passed
+    places: Integers  # times at which the lag is known
+
+
+@compiled_exactly
+def follow(jump: Jump, terms: Any, marks: Floats, times: Floats, tolerance: float, width: Any) -> Followed:
+    """Follow robots from their shapes at a jump of the motor's speed.
+
+    Args:
+        jump: of robots with local effects.
+        terms: numbers of the non-local effects, all zero.
+        marks: times at which shapes are kept, increasing.
+        times: at which the lag is wanted, (T,), increasing.
+        tolerance: on the shape in one step, in l.
+        width: of the group, see `sim.lanes`.
+
+    Returns:
+        NaN at marks and times after a robot's end.
+    """
+    robots, n, columns, _ = jump.x.shape
+    count = len(width)
+    numbers = lanes(np.empty((jump.numbers.shape[1], count)), width)
+    twist = lanes(np.empty((3, count)), width)
+    by_phase, lag_by_phase = differentiation(columns), turning(columns, jump.u.shape[1])
+    fields = lag_by_phase.shape[0]
+    at = _new_state(numbers, n, columns, jump.u.shape[1], fields)
+    new = _new_state(numbers, n, columns, jump.u.shape[1], fields)
+    step = _Step(
+        zeros(numbers, (2, n, columns, 3)), zeros(numbers, (2, fields, 3)), zeros(numbers, at.x.shape),
+        zeros(numbers, (fields, 3)), zeros(numbers, at.x.shape), zeros(numbers, at.u.shape), by_phase,
+        lag_by_phase,
+    )  # fmt: skip
+    found = Followed(
+        np.full((robots, len(times), fields, 3), np.nan),
+        np.full((robots, len(marks), n, columns, 3), np.nan),
+        np.full(jump.x.shape, np.nan),
+        np.zeros(robots, np.bool_),
+    )
+    waiting = np.full(count, -1)
+    course = _Course(waiting, waiting.copy(), waiting.copy(), waiting.copy(), waiting.copy())
+    for i in range(count):
+        _load(jump, min(i, robots - 1), i, numbers, twist, at, course)
+    started = min(count, robots)
+    body = body_in_lanes(numbers, terms)
+    work = new_workspace(in_transient(1.0 * numbers[0], FIRST_PHASE, by_phase, at.x), at.x, at.u)
+    now, dt = zeros(numbers, (1,))[0], first_step(body)
+    goal, going = now, now
+    for i in range(count):
+        goal = with_lane(goal, i, _goal(jump, course, i, marks))
+        going = with_lane(going, i, 1.0 if i < started else 0.0)
+    while somewhere(going):
+        dt = choose(going, towards(goal - now, dt), dt)
+        solved = _try_step(body, twist, at, new, now, dt, going, step, work)
+        error = choose(solved, embedded_error(step.slope, dt), np.inf)
+        accepted = going * less(error, 2 * tolerance)
+        ended = 1 - less(now + dt, goal - 1e-12)
+        new_now = choose(accepted, choose(ended, goal, now + dt), now)
+        for i in range(count):
+            if lane(accepted, i) != 0:
+                course.steps[i] += 1
+                _record(i, course, at, new, step.lag_slope[1], now, new_now, marks, times, found)
+                goal = with_lane(goal, i, _goal(jump, course, i, marks))
+            elif lane(going, i) != 0:
+                course.rejected[i] += 1
+        _accept(at, new, step, accepted)
+        now = new_now
+        dt = choose(accepted, next_step(dt, error, tolerance), shorter_step(dt, error, solved, tolerance))
+        before = started
+        for i in range(count):
+            if lane(going, i) != 0 and _has_ended(jump, course, i, at, lane(now, i), found):
+                if started < robots:
+                    _load(jump, started, i, numbers, twist, at, course)
+                    now, goal = with_lane(now, i, 0.0), with_lane(goal, i, _goal(jump, course, i, marks))
+                    started += 1
+                    going = with_lane(going, i, -1.0)
+                else:
+                    going = with_lane(going, i, 0.0)
+        if started > before:
+            body = body_in_lanes(numbers, terms)
+            dt, going = choose(less(going, 0.0), first_step(body), dt), abs(going)
+    return found
+
+
+@compiled_exactly
+def _new_state(like: Floats, n: int, columns: int, instants: int, fields: int) -> _State:
+    """Allocate the state of the lanes."""
+    x, lag = (n, columns, 3), (fields, 3)
+    return _State(zeros(like, x), zeros(like, (instants, 4)), zeros(like, x), zeros(like, lag), zeros(like, lag))
+
+
+@compiled_exactly
+def _load(jump: Jump, robot: int, i: int, numbers: Floats, twist: Floats, at: _State, course: _Course) -> None:
+    """Put a robot at its jump into lane i; one without numbers can only come to its end."""
+    course.robot[i] = robot
+    course.steps[i], course.marks[i], course.places[i] = 0, 0, 0
+    course.rejected[i] = 0 if np.isfinite(np.sum(jump.numbers[robot])) else MOST_REJECTED
+    _fill(numbers, i, jump.numbers[robot])
+    _fill(twist, i, jump.twist[robot])
+    _fill(at.x, i, jump.x[robot])
+    _fill(at.u, i, jump.u[robot])
+    _fill(at.slope, i, np.zeros(at.slope.shape))
+    _fill(at.lag, i, np.zeros(at.lag.shape))
+    _fill(at.lag_rate, i, np.zeros(at.lag.shape))
+
+
+@compiled_exactly
+def _fill(out: Floats, i: int, values: Floats) -> None:
+    """Set lane i of an array of vectors."""
+    flat, given = out.reshape(out.size), values.reshape(values.size)
+    for j in range(len(flat)):
+        flat[j] = with_lane(flat[j], i, given[j])
+
+
+@compiled_exactly
+def _has_ended(jump: Jump, course: _Course, i: int, at: _State, now: float, found: Followed) -> bool:
+    """Tell whether the robot of lane i has come to its end, or cannot; keep its shape at the end."""
+    robot = course.robot[i]
+    if now >= jump.until[robot]:
+        found.solved[robot] = True
+        _keep(found.end[robot], at.x, i)
+        return True
+    return bool(course.steps[i] >= MOST_STEPS or course.rejected[i] >= MOST_REJECTED)
+
+
+@compiled_exactly
+def _keep(out: Floats, values: Floats, i: int) -> None:
+    """Copy lane i of an array of vectors."""
+    flat, given = out.reshape(out.size), values.reshape(values.size)
+    for j in range(len(flat)):
+        flat[j] = lane(given[j], i)
+
+
+@compiled_exactly
+def _goal(jump: Jump, course: _Course, i: int, marks: Floats) -> float:
+    """Return the time at which a step of lane i must end next."""
+    until, mark = jump.until[course.robot[i]], course.marks[i]
+    return float(marks[mark]) if mark < len(marks) and marks[mark] < until else float(until)
+
+
+@compiled_exactly
+def _try_step(
+    body: Body, twist: Floats, at: _State, new: _State, now: Any, dt: Any, going: Any, step: _Step, work: Workspace
+) -> Any:
+    """Solve both stages; `new` and `step` hold the end of the step. Return where Newton's method converged."""
+    tau = GAMMA * dt
+    solved = going
+    new.u[:] = at.u
+    for stage in range(2):
+        _begin_stage(at, new, step, stage, dt, tau)
+        rates = in_transient(1 / tau, FIRST_PHASE, step.by_phase, step.start)
+        solved = _solve_stage(body, rates, new.x, new.u, stage == 0, solved, step, work)
+        if not somewhere(solved):
+            break
+        _rate_of_change(step.slope[stage], new.x, step.start, tau)
+        end = now + (tau if stage == 0 else dt)
+        advance_lag(body, new.u, twist, end, 1 / tau, step.lag_start, step.lag_by_phase, new.lag)
+        _rate_of_change(step.lag_slope[stage], new.lag, step.lag_start, tau)
+    return solved
+
+
+@compiled_exactly
+def _begin_stage(at: _State, new: _State, step: _Step, stage: int, dt: Any, tau: Any) -> None:
+    """Fill the starts of a stage, and guess its shape."""
+    n, columns, _ = at.x.shape
+    for k in range(n):
+        for m in range(columns):
+            for c in range(3):
+                start = at.x[k, m, c]
+                if stage == 1:
+                    start += (1 - GAMMA) * dt * step.slope[0, k, m, c]
+                step.start[k, m, c] = start
+                slope = at.slope[k, m, c] if stage == 0 else step.slope[0, k, m, c]
+                new.x[k, m, c] = start + tau * slope
+    for p in range(at.lag.shape[0]):
+        for c in range(3):
+            step.lag_start[p, c] = at.lag[p, c]
+            if stage == 1:
+                step.lag_start[p, c] += (1 - GAMMA) * dt * step.lag_slope[0, p, c]
+
+
+@compiled_exactly
+def _solve_stage(
+    body: Body, rates: Rates, x: Floats, u: Floats, anew: bool, going: Any, step: _Step, work: Workspace
+) -> Any:
+    """Solve for x and u at the end of a stage, where `going` is 1; return where it converged.
+
+    Args:
+        anew: factorise once; else the stored factors are used.
+    """
+    before, solved = going * np.inf, 0.0 * going
+    equations = work.equations
+    for count in range(MOST_CORRECTIONS):
+        if anew and count == 0:
+            linearise(body, rates, x, u, work.room, equations)
+            negate(equations, step.dx, step.du)
+            factor_and_solve(body, rates, u, work, step.dx, step.du)
+        else:
+            fill_local_residual(body, rates, x, u, work.room, equations.r, equations.t)
+            negate(equations, step.dx, step.du)
+            solve_local(rates, work, step.dx, step.du)
+        size = largest_entry(step.dx)
+        going = going * less(size, smaller(LARGEST_MOVE, 2 * before))
+        add_chosen(x, 1.0, step.dx, going)
+        add_chosen(u, 1.0, step.du, going)
+        converged = going * less(size, CORRECTION)
+        solved, going, before = larger(solved, converged), going - converged, size
+        if not somewhere(going):
+            break
+    return solved
+
+
+@compiled_exactly
+def _rate_of_change(out: Floats, end: Floats, start: Floats, tau: Any) -> None:
+    """Set out = (end − start)/tau."""
+    flat, last, first = out.reshape(out.size), end.reshape(end.size), start.reshape(start.size)
+    for i in range(len(flat)):
+        flat[i] = (last[i] - first[i]) / tau
+
+
+@compiled_exactly
+def _accept(at: _State, new: _State, step: _Step, accepted: Any) -> None:
+    """Let accepted steps be the state."""
+    _choose_all(at.x, accepted, new.x, at.x)
+    _choose_all(at.u, accepted, new.u, at.u)
+    _choose_all(at.slope, accepted, step.slope[1], at.slope)
+    _choose_all(at.lag, accepted, new.lag, at.lag)
+    _choose_all(at.lag_rate, accepted, step.lag_slope[1], at.lag_rate)
+
+
+@compiled_exactly
+def _choose_all(out: Floats, condition: Any, a: Floats, b: Floats) -> None:
+    """Set every entry to that of a where the condition is true, else to that of b."""
+    flat, first, second = out.reshape(out.size), a.reshape(a.size), b.reshape(b.size)
+    for i in range(len(flat)):
+        flat[i] = choose(condition, first[i], second[i])
+
+
+@compiled_exactly
+def _record(
+    i: int, course: _Course, at: _State, new: _State, new_rate: Floats, now: Any, new_now: Any, marks: Floats,
+    times: Floats, found: Followed,
+) -> None:  # fmt: skip
+    """Keep the lags that lie in an accepted step of lane i, and the shape if the step ends at a mark."""
+    robot, begin, end = course.robot[i], lane(now, i), lane(new_now, i)
+    while course.steps[i] > 1 and course.places[i] < len(times) and times[course.places[i]] <= end:
+        place = course.places[i]
+        share = (times[place] - begin) / (end - begin)
+        for p in range(new.lag.shape[0]):
+            for c in range(3):
+                found.lag[robot, place, p, c] = between(
+                    share, end - begin, lane(at.lag[p, c], i), lane(new.lag[p, c], i),
+                    lane(at.lag_rate[p, c], i), lane(new_rate[p, c], i),
+                )  # fmt: skip
+        course.places[i] += 1
+    if course.marks[i] < len(marks) and end == marks[course.marks[i]]:
+        _keep(found.shapes[robot, course.marks[i]], new.x, i)
+        course.marks[i] += 1
