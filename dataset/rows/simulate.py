@@ -28,7 +28,6 @@ from sim.motion.steady_motion import STEADY_COLUMNS
 Columns = dict[str, Any]
 NO_RESPONSE = "the response to a flip broke down, or asked for more time steps than a row may"
 HISTORY = "history"  # not a property of the robot: whether memory and rest are simulated
-_AT_ONCE = 128  # robots; their flips take 20 MB
 
 
 def simulate(inputs: dict[str, Any], *, sensitivities: bool = False) -> Columns:
@@ -48,11 +47,9 @@ def simulate(inputs: dict[str, Any], *, sensitivities: bool = False) -> Columns:
     places: list[Integers] = []
     for with_history, tails in sorted(set(zip(history.tolist(), values["N"].tolist(), strict=True))):
         alike = np.flatnonzero((history == with_history) & (values["N"] == tails))
-        for first in range(0, len(alike), _AT_ONCE):
-            rows = alike[first : first + _AT_ONCE]
-            picked = {name: array[rows] for name, array in values.items()}
-            parts.append(_rows(picked, with_history, sensitivities))
-            places.append(rows)
+        picked = {name: array[alike] for name, array in values.items()}
+        parts.append(_rows(picked, with_history, sensitivities))
+        places.append(alike)
     order = np.argsort(np.concatenate(places))
     return {name: np.concatenate([part[name] for part in parts])[order] for name in parts[0]}
 

@@ -15,6 +15,14 @@ from sim.solve.assembly import Nonlocal
 NONE = Nonlocal(*[0.0] * len(Nonlocal._fields))  # non-local effects of robots in groups
 
 
+AT_ONCE = 128  # robots; their orbits take 40 MB, their flips 50 MB
+
+
+def slices(count: int) -> list[slice]:
+    """Split robots into runs of at most AT_ONCE, at least one run, so that memory does not grow with their number."""
+    return [slice(first, first + AT_ONCE) for first in range(0, max(count, 1), AT_ONCE)]
+
+
 @cache
 def group_width() -> tuple[int, ...]:
     """Return the width of groups on this processor, as a tuple: eight lanes with AVX-512, else four."""

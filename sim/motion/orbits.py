@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Integers
+from sim.motion.grouping import slices
 from sim.motion.growths import growths
 from sim.motion.orbit_groups import orbits_in_groups
 from sim.motion.orbit_slopes import slopes_of_orbits
@@ -57,6 +58,17 @@ def solve_orbits(
         phases: number of phases to begin with.
         perturbed: robots that get a growth.
     """
+    parts = [
+        _solve_at_once(rows[part], tails, None if directions is None else directions[part], phases, perturbed)
+        for part in slices(len(rows))
+    ]
+    return Orbits(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def _solve_at_once(
+    rows: Floats, tails: int, directions: Floats | None, phases: int, perturbed: Perturbed
+) -> Orbits:
+    """Solve for the orbits of as many robots as there is room for; see `solve_orbits`."""
     count = 0 if directions is None else directions.shape[1]
     slopes = np.full((len(rows), count, 5), np.nan)
     gap, grows = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
@@ -74,10 +86,10 @@ def solve_orbits(
     if directions is not None and count:
         slopes[solved] = slopes_of_orbits(rows[solved], directions[solved], [orbits[i] for i in solved])
     return Orbits(
-        np.array([orbit.means for orbit in orbits]),
+        np.array([orbit.means for orbit in orbits]).reshape(-1, 5),
         slopes,
         np.array([orbit.error for orbit in orbits]),
-        np.array([orbit.ended for orbit in orbits]),
+        np.array([orbit.ended for orbit in orbits], dtype=int),
         gap,
         grows,
     )

@@ -19,6 +19,7 @@ from sim.mechanics.geometry import straight
 from sim.model.groups import Groups
 from sim.model.response import BEFORE, DWELLS, SETTLED, Responses
 from sim.motion.flips import Flip, follow_flips
+from sim.motion.grouping import slices
 from sim.motion.net_speed import net_speeds, twists
 from sim.motion.orbit_groups import OnMesh
 from sim.motion.phased_orbits import orbits_with_phases
@@ -84,10 +85,16 @@ def responses(
     wanted = _Wanted(groups.N, even, before, tolerance)
     rows, reverse_rows = numbers(groups), reversed_numbers(groups)
     robots, reverse_robots = unpacked(rows), unpacked(reverse_rows)
-    coarse, fine = _on_meshes(rows, reverse_rows, wanted, meshes, (history and extrapolated_memory, history))
+    both = history and extrapolated_memory
+    solved = [
+        _extrapolated(coarse, fine, meshes, both, row[0] < 0)
+        for part in slices(len(rows))
+        for row, coarse, fine in zip(
+            rows[part], *_on_meshes(rows[part], reverse_rows[part], wanted, meshes, (both, history)), strict=True
+        )
+    ]
     by_robot, stepped = [], np.zeros(len(robots), dtype=bool)
-    for i, (body, reverse) in enumerate(zip(robots, reverse_robots, strict=True)):
-        curves = _extrapolated(coarse[i], fine[i], meshes, history and extrapolated_memory, body.omega < 0)
+    for i, (body, reverse, curves) in enumerate(zip(robots, reverse_robots, solved, strict=True)):
         if curves is None:
             stepped[i] = True
             values = stepped_response(

@@ -10,7 +10,7 @@ import pytest
 from sim.lanes import ALONE, GROUP, HALF_GROUP
 from sim.model.groups import Groups
 from sim.motion import flips as module
-from sim.motion import orbit_groups
+from sim.motion import grouping, orbit_groups
 from sim.motion.flips import Course, Flip, follow_flips
 from sim.motion.phased_orbits import orbits_with_phases
 from sim.motion.response import responses
@@ -80,6 +80,15 @@ def test_the_width_of_groups_does_not_matter(width: tuple[int, ...], monkeypatch
     found = responses(groups)
     for name in ("lag", "memory", "rest", "spread", "net_speed"):
         assert np.array_equal(getattr(wanted, name), getattr(found, name)), name
+
+
+def test_responses_of_many_robots_are_simulated_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    groups = robots(3, 5)
+    wanted = responses(groups, history=False)
+    monkeypatch.setattr(grouping, "AT_ONCE", 2)
+    found = responses(groups, history=False)
+    assert np.array_equal(wanted.lag, found.lag)
+    assert np.array_equal(wanted.net_speed, found.net_speed, equal_nan=True)
 
 
 @pytest.mark.parametrize("tails", [2, 3, 5])

@@ -9,8 +9,9 @@ import pytest
 
 from sim.lanes import ALONE, GROUP, HALF_GROUP
 from sim.model.groups import Groups
-from sim.motion import orbit_groups
+from sim.motion import grouping, orbit_groups, orbits
 from sim.motion.orbit_groups import orbits_in_groups
+from sim.motion.orbits import solve_orbits
 from sim.solve.assembly import bodies, numbers
 from sim.solve.refinement import FEW, NO_START, SOLVED, Orbit, refined_orbit
 from tests.sim.points import sweep_points
@@ -44,6 +45,23 @@ def test_a_robot_has_the_same_bits_in_any_group(tails: int) -> None:
     backwards = orbits_in_groups(rows[::-1], tails, FEW)[::-1]
     assert all(same_bits(*pair) for pair in zip(together, parts, strict=True))
     assert all(same_bits(*pair) for pair in zip(together, backwards, strict=True))
+
+
+def test_the_room_does_not_grow_with_the_number_of_robots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Room for 4,000 robots at once was 1.1 GB."""
+    rows, sizes = numbers(robots(3, 11)), []
+    wanted = solve_orbits(rows, 3)
+
+    def counting(some: Any, *rest: Any) -> list[Orbit]:
+        sizes.append(len(some))
+        return orbits_in_groups(some, *rest)
+
+    monkeypatch.setattr(grouping, "AT_ONCE", 4)
+    monkeypatch.setattr(orbits, "orbits_in_groups", counting)
+    found = solve_orbits(rows, 3)
+    assert sizes == [4, 4, 3]
+    for name, values in wanted._asdict().items():
+        assert np.array_equal(values, getattr(found, name), equal_nan=True), name
 
 
 @pytest.mark.parametrize("width", [ALONE, HALF_GROUP, GROUP])
