@@ -19,7 +19,7 @@ AT_ONCE = 128  # robots; their orbits take 40 MB, their flips 50 MB
 
 
 def slices(count: int) -> list[slice]:
-    """Split robots into runs of at most AT_ONCE, so that memory does not grow with their number; at least one run."""
+    """Split robots into one run or more of at most AT_ONCE, so that memory does not grow with their number."""
     return [slice(first, first + AT_ONCE) for first in range(0, max(count, 1), AT_ONCE)]
 
 
