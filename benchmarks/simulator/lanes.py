@@ -6,7 +6,7 @@
 
 Usage: python -m benchmarks lanes [ROBOTS]
 
-Takes 3 minutes.
+Takes a minute.
 """
 
 from __future__ import annotations
