@@ -51,5 +51,5 @@ def compile_once() -> bool:
     """
     if all_compiled():
         return True
-    print("first use: compiling the simulator's loops, about a minute", file=sys.stderr, flush=True)
+    print("first use: compiling the simulator's loops, a few minutes", file=sys.stderr, flush=True)
     return compile_apart(__name__)
