@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.markdown import heading, row
-from benchmarks.simulator.lanes import robots_of, shortest
+from benchmarks.simulator.lanes import TAILS, robots_of, shortest
 from sim.effects import catalogue
 from sim.model.groups import Groups
 from sim.model.slopes import SLOPE_INPUTS
@@ -29,7 +29,6 @@ from sim.motion.sensitivity import sensitivities
 from sim.motion.steady import orbits, steady
 
 ROBOTS = 64
-_TAILS = (2, 3, 4, 5)
 _FEW = 16  # robots with each effect
 _WORK: dict[str, Callable[[Groups], object]] = {
     "steady motion": lambda groups: steady(groups, stability=False),
@@ -51,9 +50,9 @@ def times(work: Callable[[Groups], object], groups: Groups) -> tuple[float, floa
     return shortest(singly) / len(groups), shortest(lambda: work(groups)) / len(groups)
 
 
-def line(name: str, alone: float, together: float) -> str:
+def line(*words: str, alone: float, together: float) -> str:
     """Return a row of a table, from times in seconds."""
-    return row(name, f"{1e3 * alone:.2f}", f"{1e3 * together:.2f}", f"{alone / together:.1f}")
+    return row(*words, f"{1e3 * alone:.2f}", f"{1e3 * together:.2f}", f"{alone / together:.1f}")
 
 
 def main(robots: str = str(ROBOTS)) -> None:
@@ -63,12 +62,13 @@ def main(robots: str = str(ROBOTS)) -> None:
         print(f"{robots} robots of the sweep for each of N = 2 to 5, processor time a robot\n")
         print(heading("what", *columns))
         for name, work in _WORK.items():
-            found = [times(work, robots_of(tails, int(robots))) for tails in _TAILS]
-            print(line(name, *np.mean(found, 0)), flush=True)
+            found = [times(work, robots_of(tails, int(robots))) for tails in TAILS]
+            alone, together = np.mean(found, 0)
+            print(line(name, alone=alone, together=together), flush=True)
         print(f"\n{_FEW} robots with N = 3 and one effect, steady motion\n")
         print(heading("effect", "reach", *columns))
         base = robots_of(3, _FEW)
         for name, effect in sorted(catalogue().items()):
             groups = Groups(**{**vars(base), "effects": {name: np.full(len(base), effect.typical)}})
             alone, together = times(orbits, groups)
-            print(line(f"{effect.title} | {effect.reach}", alone, together), flush=True)
+            print(line(effect.title, effect.reach, alone=alone, together=together), flush=True)

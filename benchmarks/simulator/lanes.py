@@ -24,25 +24,23 @@ from benchmarks.timing import processor_time
 from dataset.rows.design import load_design
 from sim.lanes import ALONE, GROUP, lanes, zeros
 from sim.model.groups import Groups
-from sim.motion.flips import Flip, follow_flips
+from sim.motion.flips import Flip, follow_alone, follow_flips
 from sim.motion.grouping import group_width
 from sim.motion.orbit_groups import orbits_in_groups
 from sim.motion.phased_orbits import orbits_with_phases
-from sim.motion.response import MESHES, TOLERANCE
-from sim.solve.assembly import Nonlocal, bodies, numbers, unpacked
+from sim.motion.response import MESHES, TOLERANCE, mirrored
+from sim.solve.assembly import Nonlocal, bodies, numbers
 from sim.solve.groups import body_in_lanes
 from sim.solve.linearise import linearise
 from sim.solve.newton import factor_and_solve, negate, new_workspace
 from sim.solve.orbit import FIRST_PHASE
 from sim.solve.rates import on_orbit
 from sim.solve.refinement import FEW, SOLVED, Orbit, refined_orbit
-from sim.solve.transient import lag_at, transient
 
 ROBOTS = 48
 REPEATS = 5
 TAILS = (2, 3, 4, 5)
 _UNTIL = 2.0  # time units that a flip is followed
-_MIRROR = np.array([1.0, -1.0, 1.0])
 _COLUMNS = "  N   plain numbers   one lane   groups   plain/groups   one lane/plain   largest difference   same"
 _PACKED = re.compile(r"^\s*v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*|max|min)pd\b.*([xyz])mm", re.MULTILINE)
 _SCALAR = re.compile(r"^\s*v?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d*|max|min)sd\b", re.MULTILINE)
@@ -108,19 +106,14 @@ def transients(count: int) -> None:
         groups = robots_of(tails, count)
         rows = numbers(groups)
         flips = [
-            Flip(row, orbit.x[:, -np.arange(orbit.x.shape[1])] * _MIRROR, orbit.u, orbit.twist, _UNTIL)
+            Flip(row, mirrored(orbit.x), orbit.u, orbit.twist, _UNTIL)
             for mesh in orbits_with_phases(rows, tails, MESHES)
             for row, orbit in zip(rows, mesh, strict=True)
             if orbit
         ]
 
         def plainly(flips: list[Flip] = flips) -> list[Any]:
-            found = []
-            for flip in flips:
-                body = unpacked(flip.row[None])[0]
-                course = transient(body, flip.x.copy(), flip.u.copy(), flip.twist, _UNTIL, times[:0], TOLERANCE)
-                found.append(lag_at(course, times))
-            return found
+            return [course and course.lag for flip in flips for course in [follow_alone(flip, times, TOLERANCE)]]
 
         def singly(flips: list[Flip] = flips) -> list[Any]:
             return [course and course.lag for flip in flips for course in follow_flips([flip], times, TOLERANCE)]

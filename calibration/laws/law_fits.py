@@ -165,7 +165,7 @@ class Laws:
         laws = self._as_good_as(claim)
         if not laws:
             return "No law of the places that were searched describes it as well."
-        named = "; or by ".join(law.words for law in laws[:_NAMED])
+        named = "; or by ".join(map(_in_a_set, laws[:_NAMED]))
         others = len(laws) - _NAMED
         more = f"; or by laws at {others} other place{'s' if others > 1 else ''}" if others > 0 else ""
         return f"It is described as well by {named}{more}.{_agreement(laws)}"

@@ -61,12 +61,12 @@ def follow_flips(
             if found.solved[at]:
                 courses[i] = Course(found.lag[at], found.shapes[at], found.end[at])
     for i in sorted(made.keys() - set(local)):
-        courses[i] = _alone(made[i], times, tolerance, marks)
+        courses[i] = follow_alone(made[i], times, tolerance, marks)
     return courses
 
 
-def _alone(flip: Flip, times: Floats, tolerance: float, marks: Floats) -> Course | None:
-    """Follow a robot with non-local effects."""
+def follow_alone(flip: Flip, times: Floats, tolerance: float, marks: Floats = NO_MARKS) -> Course | None:
+    """Follow one robot, with plain numbers, whatever its effects; see `follow_flips`."""
     body, x = unpacked(flip.row[None])[0], flip.x.copy()
     early = marks[marks <= flip.until]
     course = transient(body, x, flip.u.copy(), flip.twist, flip.until, early, tolerance)

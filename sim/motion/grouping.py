@@ -13,8 +13,6 @@ from sim.lanes import ALONE, GROUP, HALF_GROUP
 from sim.solve.assembly import Nonlocal
 
 NONE = Nonlocal(*[0.0] * len(Nonlocal._fields))  # non-local effects of robots in groups
-
-
 AT_ONCE = 128  # robots; their orbits take 40 MB, their flips 50 MB
 
 
@@ -50,3 +48,8 @@ def in_lanes(arrays: Sequence[Floats], width: tuple[int, ...]) -> Floats:
     """Stack the arrays of a group's robots along a last axis of W lanes; the last robot fills empty ones."""
     missing = len(width) - len(arrays)
     return np.stack([*arrays, *[arrays[-1]] * missing], -1)
+
+
+def numbers_in_lanes(rows: Floats, width: tuple[int, ...]) -> Floats:
+    """Stack the numbers (B, K) of a group's robots as `in_lanes` does, without those of non-local effects."""
+    return in_lanes(list(rows[:, : -len(NONE)]), width)

@@ -12,8 +12,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from sim.arrays import Floats
-from sim.motion.grouping import NONE, grouped, in_lanes
-from sim.motion.stability import FEW_VECTORS, first_perturbation, growth_of_orbit, in_motor_revolutions
+from sim.motion.grouping import NONE, grouped, in_lanes, numbers_in_lanes
+from sim.motion.stability import (
+    FEW_VECTORS,
+    first_perturbation,
+    growth_of_orbit,
+    in_motor_revolutions,
+    vector_count,
+)
 from sim.solve.assembly import are_local, unpacked
 from sim.solve.floquet_groups import arnoldi_of_group
 from sim.solve.orbit import mean_motion
@@ -40,10 +46,10 @@ def _on_second_mesh(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats
     shapes, velocities = [orbit.x[1] for orbit in orbits], [orbit.u[1] for orbit in orbits]
     senses, bodies = np.sign(rows[:, 0]), unpacked(rows)
     for robots, width in grouped(range(len(rows)), lambda i: (shapes[i].shape, senses[i])):
-        numbers = in_lanes([rows[i, : -len(NONE)] for i in robots], width)
+        numbers = numbers_in_lanes(rows[robots], width)
         x, u = (in_lanes([part[i] for i in robots], width) for part in (shapes, velocities))
         n, columns, _ = shapes[robots[0]].shape
-        count = min(2 * tails + FEW_VECTORS, 3 * n * columns - 1)
+        count = vector_count(tails, 3 * n * columns, FEW_VECTORS)
         first = first_perturbation(tails, n, columns)
         projected = arnoldi_of_group(numbers, NONE, x, u, senses[robots[0]], first, count, width)
         known = [lane for lane in range(len(robots)) if np.isfinite(projected[-1, -1, lane])]

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Integers
-from sim.motion.grouping import NONE, group_width, grouped, in_lanes
-from sim.solve.orbit_groups import Found, on_coarsest_mesh, on_mesh, orbits_of_robots
+from sim.motion.grouping import NONE, group_width, grouped, in_lanes, numbers_in_lanes
+from sim.solve.orbit_groups import Found, on_all_meshes, on_coarsest_mesh, on_mesh
 from sim.solve.refinement import FEW, MANY_PHASES, MESHES, MOST_PHASES, SOLVED, Orbit
 
 
@@ -30,7 +30,8 @@ def orbits_in_groups(rows: Floats, tails: int, least: int) -> list[Orbit]:
     """
     found, numbers, order = _room(rows, tails, least)
     if tails <= MOST_PHASES and len(rows):
-        orbits_of_robots(numbers, NONE, tails, least, order, found, group_width())
+        on_coarsest_mesh(numbers, NONE, tails, least, order, found, group_width())
+        on_all_meshes(numbers, NONE, tails, order, found, group_width())
     return [_orbit_of(found, i, tails) for i in range(len(rows))]
 
 
@@ -70,7 +71,7 @@ def orbits_on_mesh(
     orbits: list[OnMesh | None] = [None] * len(rows)
     starts = {i: orbit for i, orbit in enumerate(coarse) if orbit is not None}
     for robots, width in grouped(starts, lambda i: (len(starts[i][1]), instants[i])):
-        numbers = in_lanes([rows[i, : -len(NONE)] for i in robots], width)
+        numbers = numbers_in_lanes(rows[robots], width)
         x, u = (in_lanes(part, width) for part in zip(*(starts[i] for i in robots), strict=True))
         found = on_mesh(numbers, NONE, tails, x, u, edges, instants[robots[0]], width)
         for lane, i in enumerate(robots):

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sim.arrays import Floats
-from sim.motion.grouping import NONE, grouped, in_lanes
+from sim.motion.grouping import NONE, grouped, in_lanes, numbers_in_lanes
 from sim.solve.assembly import are_local, unpacked
 from sim.solve.derivative import orbit_slopes
 from sim.solve.derivative_groups import slopes_of_group
@@ -33,7 +33,7 @@ def slopes_of_orbits(rows: Floats, directions: Floats, orbits: Sequence[Orbit]) 
     slopes = np.empty((len(rows), len(MESHES), count, 5))
     stay_local = are_local(rows) & ~(directions[:, :, -len(NONE) :] != 0).any((1, 2))
     for robots, width in grouped(np.flatnonzero(stay_local).tolist(), lambda i: orbits[i].x[0].shape):
-        numbers = in_lanes([rows[i, : -len(NONE)] for i in robots], width)
+        numbers = numbers_in_lanes(rows[robots], width)
         along = in_lanes([directions[i, :, : -len(NONE)] for i in robots], width)
         for mesh in range(len(MESHES)):
             x = in_lanes([orbits[i].x[mesh] for i in robots], width)

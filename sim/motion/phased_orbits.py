@@ -35,7 +35,9 @@ def orbits_with_phases(
     Returns:
         A list of B orbits for every mesh.
     """
-    local = np.flatnonzero(are_local(rows)).tolist()
+    is_local = are_local(rows)
+    local, rest = np.flatnonzero(is_local).tolist(), np.flatnonzero(~is_local).tolist()
+    others = dict(zip(rest, unpacked(rows[rest]), strict=True))
     coarse = coarse_orbits(rows[local], tails)
     enough = [_enough(len(orbit[1]), tails) if orbit else 1 for orbit in coarse]
     orbits: list[list[OnMesh | None]] = []
@@ -43,19 +45,14 @@ def orbits_with_phases(
         given = None if instants is None else instants[mesh]
         counts = enough if given is None else [given[i] for i in local]
         grouped = dict(zip(local, orbits_on_mesh(rows[local], tails, edges, coarse, counts), strict=True))
-        orbits.append(
-            [
-                grouped[i] if i in grouped else _alone(body, tails, edges, given[i] if given else None)
-                for i, body in enumerate(unpacked(rows))
-            ]
-        )
+        alone = {i: _alone(body, tails, edges, given[i] if given else None) for i, body in others.items()}
+        orbits.append([(grouped | alone)[i] for i in range(len(rows))])
     return orbits
 
 
 def _enough(instants: int, tails: int) -> int:
     """Choose a number of instants, at least as many as an orbit has; odd where the phase at the flip matters."""
-    least = _LEAST_INSTANTS.get(tails, 1)
-    return max(instants, least) | 1 if tails in _LEAST_INSTANTS else max(instants, least)
+    return max(instants, _LEAST_INSTANTS[tails]) | 1 if tails in _LEAST_INSTANTS else instants
 
 
 def _alone(body: Body, tails: int, edges: int, instants: int | None) -> OnMesh | None:

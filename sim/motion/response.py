@@ -84,7 +84,6 @@ def responses(
     even = all(catalogue()[name].symmetry == "even" for name in groups.effects)
     wanted = _Wanted(groups.N, even, before, tolerance)
     rows, reverse_rows = numbers(groups), reversed_numbers(groups)
-    robots, reverse_robots = unpacked(rows), unpacked(reverse_rows)
     both = history and extrapolated_memory
     solved = [
         _extrapolated(coarse, fine, meshes, both, row[0] < 0)
@@ -93,17 +92,18 @@ def responses(
             rows[part], *_on_meshes(rows[part], reverse_rows[part], wanted, meshes, (both, history)), strict=True
         )
     ]
-    by_robot, stepped = [], np.zeros(len(robots), dtype=bool)
-    for i, (body, reverse, curves) in enumerate(zip(robots, reverse_robots, solved, strict=True)):
+    stepped = np.array([curves is None for curves in solved])
+    by_robot = []
+    for i, curves in enumerate(solved):
         if curves is None:
-            stepped[i] = True
+            body, reverse = unpacked(rows[[i]])[0], unpacked(reverse_rows[[i]])[0]
             values = stepped_response(
                 body, groups.N, DWELLS, before, reverse=reverse, history=history, settled=SETTLED
             )
             curves = Curves(*values)
         by_robot.append(curves)
     lag, memory, rest, spread = (np.array(column) for column in zip(*by_robot, strict=True))
-    sense = np.sign([body.omega for body in robots])
+    sense = np.sign(rows[:, 0])
     twist = twists(motion.v_z, motion.v_x, motion.omega_yr, sense)
     if not history:
         memory[:], rest[:] = np.nan, np.nan
@@ -120,7 +120,7 @@ def _on_meshes(
     """Simulate the curves of B robots on each mesh, with memory and rest where `history` says so."""
     after = orbits_with_phases(rows, wanted.tails, meshes)
     if wanted.even:
-        starts = [[orbit and orbit._replace(x=_mirrored(orbit.x)) for orbit in mesh] for mesh in after]
+        starts = [[orbit and orbit._replace(x=mirrored(orbit.x)) for orbit in mesh] for mesh in after]
     else:
         instants = [[len(orbit.u) if orbit else 1 for orbit in mesh] for mesh in after]
         turned = orbits_with_phases(reverse_rows, wanted.tails, meshes, instants)
@@ -174,10 +174,11 @@ def _flips_back(
     wanted: _Wanted,
 ) -> list[Flip | None]:
     """Flip from the steady motion after the flip; an even robot's flip back is the mirror image of its flip."""
+    last = float(wanted.before[-1])
     if wanted.even:
-        return list(flips)
+        return [flip and flip._replace(until=last) for flip in flips]
     return [
-        Flip(row, orbit.x, orbit.u * REVERSED, start.twist, SETTLED) if flip and orbit and start else None
+        Flip(row, orbit.x, orbit.u * REVERSED, start.twist, last) if flip and orbit and start else None
         for flip, row, orbit, start in zip(flips, reverse_rows, after, starts, strict=True)
     ]
 
@@ -192,14 +193,13 @@ def _histories(
         back: flips in the other direction.
         same: lag after a long dwell, at DWELLS up to the time from which the memory is constant, (D, 3).
     """
-    count, last = len(wanted.before), float(wanted.before[-1])
-    back = [flip and flip._replace(until=last) for flip in back]
+    count = len(wanted.before)
     later: list[Flip | None] = []
     for flip, course in zip(flips, follow_flips(back, _TIMES, wanted.tolerance, wanted.before), strict=True):
         if flip is None or course is None:
             later += [None] * (count + 1)
             continue
-        shapes = map(_mirrored, course.shapes) if wanted.even else course.shapes
+        shapes = map(mirrored, course.shapes) if wanted.even else course.shapes
         later += [flip._replace(x=shape, until=_SAME) for shape in shapes]
         later.append(flip._replace(x=straight(flip.x.shape[0], flip.x.shape[1], float(flip.row[_OFFSET]))))
     courses = follow_flips(later, _TIMES, wanted.tolerance)
@@ -228,6 +228,6 @@ def _extrapolated(
     return Curves((fine.lag + change) * mirror, memory * mirror, (fine.rest + change) * mirror, fine.spread)
 
 
-def _mirrored(x: Floats) -> Floats:
+def mirrored(x: Floats) -> Floats:
     """Mirror a robot's shape (n, M, 3), as a reversed motor does."""
     return np.ascontiguousarray(x[:, -np.arange(x.shape[1])] * np.array([1.0, -1.0, 1.0]))

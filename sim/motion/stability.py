@@ -76,7 +76,7 @@ def exponents(
     Returns:
         The exponents that count, in any order; none if they cannot be computed.
     """
-    count = min(2 * tails + vectors, x.size - 1)
+    count = vector_count(tails, x.size, vectors)
     shift = abs(mean_motion(body, u)[0])
     projected = arnoldi(body, x, u, shift, first_perturbation(tails, *x.shape[:2]), count)
     if not np.isfinite(projected[-1, -1]):
@@ -94,11 +94,24 @@ def in_motor_revolutions(exponent: float, body: Body, u: Floats) -> float:
     return float(2 * np.pi * exponent / abs(omega_t - omega_h))
 
 
+def vector_count(tails: int, unknowns: int, vectors: int) -> int:
+    """Count the vectors of Arnoldi's method: `vectors` beside two for each tail, fewer than the unknowns."""
+    return min(2 * tails + vectors, unknowns - 1)
+
+
 @cache
 def first_perturbation(tails: int, n: int, columns: int) -> Floats:
-    """Draw the perturbation (n, M, 3) of bent tails from which Arnoldi's method starts, with the same numbers.
+    """Draw the perturbation of bent tails that Arnoldi's method starts from, with the same numbers each time.
 
     Its harmonics in the phase are the N lowest. They contain each perturbation of the tails once.
+
+    Args:
+        tails: N.
+        n: edges of a tail.
+        columns: M, phases of the orbit.
+
+    Returns:
+        The displacement of the nodes of one tail at all phases, (n, M, 3). Only its direction counts.
     """
     numbers = np.random.default_rng(0)
     phase = 2 * np.pi * np.arange(columns) / columns

@@ -13,7 +13,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.compiling import compiled_exactly
 from sim.lanes import lanes, zeros
-from sim.solve.groups import body_in_lanes
+from sim.solve.groups import add_chosen, body_in_lanes
 from sim.solve.linearise import linearise
 from sim.solve.newton import factor_and_solve, new_workspace, solve_local
 from sim.solve.orbit import FIRST_PHASE, mean_motion
@@ -54,16 +54,16 @@ def slopes_of_group(
         _set(dx, 1 / (2 * step), r)
         _set(du, 1 / (2 * step), t)
         fill_local_residual(above, rates, x, u, work.room, r, t)
-        _add(dx, -1 / (2 * step), r)
-        _add(du, -1 / (2 * step), t)
+        add_chosen(dx, -1 / (2 * step), r, 1.0)
+        add_chosen(du, -1 / (2 * step), t, 1.0)
         if i == 0:
             factor_and_solve(body, rates, u, work, dx, du)
         else:
             solve_local(rates, work, dx, du)
-        _set(t, 1.0, u)
-        _add(t, step, du)
+        t[:] = u
+        add_chosen(t, step, du, 1.0)
         rise = mean_motion(above, t)
-        _add(t, -2 * step, du)
+        add_chosen(t, -2 * step, du, 1.0)
         fall = mean_motion(below, t)
         for c in range(5):
             slopes[i, c] = (rise[c] - fall[c]) / (2 * step)
@@ -76,11 +76,3 @@ def _set(out: Floats, factor: float, values: Floats) -> None:
     flat, given = out.reshape(out.size), values.reshape(values.size)
     for i in range(len(flat)):
         flat[i] = factor * given[i]
-
-
-@compiled_exactly
-def _add(out: Floats, factor: float, values: Floats) -> None:
-    """Add in place: out += factor · values."""
-    flat, given = out.reshape(out.size), values.reshape(values.size)
-    for i in range(len(flat)):
-        flat[i] = flat[i] + factor * given[i]

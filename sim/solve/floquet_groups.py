@@ -49,10 +49,10 @@ def arnoldi_of_group(
     projected = lanes(out, width)
     _fill(basis[0], first.reshape(size))
     _normalise(basis[0], basis[0], np.sqrt(_product(basis[0], basis[0])))
-    image, du, parts, nothing = zeros(x, x.shape), zeros(u, u.shape), zeros(x, (count,)), np.zeros(u.size)
+    image, parts = zeros(x, x.shape), zeros(x, (count,))
     for i in range(count):
         by_rate(work.equations.resistance, basis[i].reshape(x.shape), image)
-        _fill(du.reshape(du.size), nothing)
+        du = zeros(u, u.shape)
         if i == 0:
             factor_and_solve(body, rates, u, work, image, du)
         else:

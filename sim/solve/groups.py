@@ -13,7 +13,7 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.compiling import compiled_exactly
-from sim.lanes import choose, larger, less, somewhere, zeros
+from sim.lanes import choose, lane, larger, less, somewhere, with_lane, zeros
 from sim.model.body import Body
 from sim.solve.linearise import linearise
 from sim.solve.newton import LARGEST_MOVE, MOST_CORRECTIONS, Workspace, factor_and_solve, negate
@@ -74,6 +74,22 @@ def largest_entry(a: Floats) -> Any:
     for i in range(1, len(flat)):
         largest = larger(largest, abs(flat[i]))
     return largest
+
+
+@compiled_exactly
+def put_lane(out: Floats, i: int, values: Floats) -> None:
+    """Set lane i of an array of vectors to the numbers of an array of the same size."""
+    flat, given = out.reshape(out.size), values.reshape(values.size)
+    for j in range(len(flat)):
+        flat[j] = with_lane(flat[j], i, given[j])
+
+
+@compiled_exactly
+def take_lane(out: Floats, values: Floats, i: int) -> None:
+    """Set the numbers of an array to lane i of an array of vectors of the same size."""
+    flat, given = out.reshape(out.size), values.reshape(values.size)
+    for j in range(len(flat)):
+        flat[j] = lane(given[j], i)
 
 
 @compiled_exactly

@@ -21,7 +21,7 @@ from sim.lanes import ALONE, choose, lane, lanes, larger, less, somewhere, zeros
 from sim.linear.spectral import with_phases
 from sim.mechanics.balance import tail_spin
 from sim.model.body import Body
-from sim.solve.groups import body_in_lanes, largest_entry, newton_in_lanes
+from sim.solve.groups import body_in_lanes, largest_entry, newton_in_lanes, take_lane
 from sim.solve.linearise import linearise
 from sim.solve.newton import Workspace, new_workspace
 from sim.solve.orbit import FIRST_PHASE, HEAD_SHARE, mean_motion
@@ -81,21 +81,8 @@ class _Start(NamedTuple):
 
 
 @compiled_exactly
-def orbits_of_robots(
-    numbers: Floats, terms: Any, tails: int, least: int, order: Integers, found: Found, wide: Any
-) -> None:
-    """Solve for the orbits of B robots with N tails and local effects.
-
-    Args:
-        numbers: of the robots, (K, B), in the order of `sim.solve.assembly.numbers`.
-        terms: numbers of the non-local effects, all zero.
-        tails: N.
-        least: number of phases to begin with.
-        order: (B,), the robots, similar ones beside each other.
-        found: filled; its rows have room for more phases than any orbit has.
-        wide: width of the groups, see `sim.lanes`.
-    """
-    on_coarsest_mesh(numbers, terms, tails, least, order, found, wide)
+def on_all_meshes(numbers: Floats, terms: Any, tails: int, order: Integers, found: Found, wide: Any) -> None:
+    """Solve on the finer meshes, and extrapolate, for the robots that `on_coarsest_mesh` has solved for."""
     done = np.zeros(len(order), dtype=np.bool_)
     group, count = np.empty(len(wide), np.int64), 0
     for first in range(len(order)):
@@ -120,7 +107,17 @@ def orbits_of_robots(
 def on_coarsest_mesh(
     numbers: Floats, terms: Any, tails: int, least: int, order: Integers, found: Found, wide: Any
 ) -> None:
-    """Add phases until the means of each robot stop changing; fill the first mesh of `found`."""
+    """Add phases until the means of each robot stop changing; fill the first mesh of `found`.
+
+    Args:
+        numbers: of B robots with N tails and local effects, (K, B), in the order of `sim.solve.assembly.numbers`.
+        terms: numbers of the non-local effects, all zero.
+        tails: N.
+        least: number of phases to begin with.
+        order: (B,), the robots, similar ones beside each other.
+        found: filled; its rows have room for more phases than any orbit has.
+        wide: width of the groups, see `sim.lanes`.
+    """
     n, left = MESHES[0], len(order)
     going = order.copy()
     before = phases = fewest_phases(tails)
@@ -247,11 +244,8 @@ def _take(rows: Floats, group: Integers, out: Floats) -> None:
 @compiled_exactly
 def _give(rows: Floats, group: Integers, values: Floats) -> None:
     """Fill the rows of a group from an array of vectors."""
-    flat = values.reshape(values.size)
-    for j in range(len(flat)):
-        value = flat[j]
-        for i in range(len(group)):
-            rows[group[i], j] = lane(value, i)
+    for i in range(len(group)):
+        take_lane(rows[group[i], : values.size], values, i)
 
 
 @compiled_exactly
@@ -288,7 +282,7 @@ def _on_finer_meshes(
         numbers: of the robots, (K,).
         result: (7,): error of the phases in entry 1. Filled: SOLVED or why not, error, and the five means.
         x0, u0: on the coarsest mesh, (n, M, 3) and (P, 4).
-        terms: as in `orbits_of_robots`.
+        terms: as in `on_coarsest_mesh`.
 
     Returns:
         x (n, M, 3) on the two finer meshes and u (P, 4) on them.
@@ -356,7 +350,7 @@ def on_mesh(
     """Solve for a group on a mesh and a number of instants, from its orbits on the coarsest mesh.
 
     Args:
-        numbers, terms, tails, width: as in `orbits_of_robots`, (K, W).
+        numbers, terms, tails, width: as in `on_coarsest_mesh`, (K, W).
         x, u: on the coarsest mesh, (n, M, 3, W) and (P, 4, W).
         edges: wanted.
         instants: wanted.

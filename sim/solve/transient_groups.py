@@ -17,7 +17,7 @@ from sim.compiling import compiled_exactly
 from sim.lanes import choose, lane, lanes, larger, less, smaller, somewhere, with_lane, zeros
 from sim.linear.spectral import differentiation
 from sim.model.body import Body
-from sim.solve.groups import add_chosen, body_in_lanes, largest_entry
+from sim.solve.groups import add_chosen, body_in_lanes, largest_entry, put_lane, take_lane
 from sim.solve.lag import advance_lag, between, turning
 from sim.solve.linearise import linearise
 from sim.solve.march import GAMMA
@@ -182,21 +182,13 @@ def _load(jump: Jump, robot: int, i: int, numbers: Floats, twist: Floats, at: _S
     course.robot[i] = robot
     course.steps[i], course.marks[i], course.places[i] = 0, 0, 0
     course.rejected[i] = 0 if np.isfinite(np.sum(jump.numbers[robot])) else MOST_REJECTED
-    _fill(numbers, i, jump.numbers[robot])
-    _fill(twist, i, jump.twist[robot])
-    _fill(at.x, i, jump.x[robot])
-    _fill(at.u, i, jump.u[robot])
-    _fill(at.slope, i, np.zeros(at.slope.shape))
-    _fill(at.lag, i, np.zeros(at.lag.shape))
-    _fill(at.lag_rate, i, np.zeros(at.lag.shape))
-
-
-@compiled_exactly
-def _fill(out: Floats, i: int, values: Floats) -> None:
-    """Set lane i of an array of vectors."""
-    flat, given = out.reshape(out.size), values.reshape(values.size)
-    for j in range(len(flat)):
-        flat[j] = with_lane(flat[j], i, given[j])
+    put_lane(numbers, i, jump.numbers[robot])
+    put_lane(twist, i, jump.twist[robot])
+    put_lane(at.x, i, jump.x[robot])
+    put_lane(at.u, i, jump.u[robot])
+    put_lane(at.slope, i, np.zeros(at.slope.shape))
+    put_lane(at.lag, i, np.zeros(at.lag.shape))
+    put_lane(at.lag_rate, i, np.zeros(at.lag.shape))
 
 
 @compiled_exactly
@@ -205,17 +197,9 @@ def _has_ended(jump: Jump, course: _Course, i: int, at: _State, now: float, foun
     robot = course.robot[i]
     if now >= jump.until[robot]:
         found.solved[robot] = True
-        _keep(found.end[robot], at.x, i)
+        take_lane(found.end[robot], at.x, i)
         return True
     return bool(course.steps[i] >= MOST_STEPS or course.rejected[i] >= MOST_REJECTED)
-
-
-@compiled_exactly
-def _keep(out: Floats, values: Floats, i: int) -> None:
-    """Copy lane i of an array of vectors."""
-    flat, given = out.reshape(out.size), values.reshape(values.size)
-    for j in range(len(flat)):
-        flat[j] = lane(given[j], i)
 
 
 @compiled_exactly
@@ -341,5 +325,5 @@ def _record(
                 )  # fmt: skip
         course.places[i] += 1
     if course.marks[i] < len(marks) and end == marks[course.marks[i]]:
-        _keep(found.shapes[robot, course.marks[i]], new.x, i)
+        take_lane(found.shapes[robot, course.marks[i]], new.x, i)
         course.marks[i] += 1

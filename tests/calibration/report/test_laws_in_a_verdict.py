@@ -136,7 +136,7 @@ def test_an_uncertain_claim_is_set_beside_the_laws_that_fit_as_well(tmp_path: Pa
     assert len(as_good) > 2
     assert all(rival.fit.deviance < claim.deviance + INDISTINGUISHABLE for rival in as_good)
     assert f"It is described as well by {as_good[0].title}; or by {as_good[1].title}" in verdict.sentence
-    assert f"or by laws at {len(as_good) - 2} other places." in verdict.sentence
+    assert verdict.sentence.endswith("or by laws at 6 other places.")
     titles = [e.title for e in verdict.next.explanations]
     assert titles == ["head's end-over-end drag", *(rival.title for rival in as_good[:3])]
     record, report, corrected = verdict.save(tmp_path)

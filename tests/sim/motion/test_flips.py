@@ -13,23 +13,15 @@ from sim.motion import flips as module
 from sim.motion import grouping, orbit_groups
 from sim.motion.flips import Course, Flip, follow_flips
 from sim.motion.phased_orbits import orbits_with_phases
-from sim.motion.response import responses
+from sim.motion.response import mirrored, responses
 from sim.solve.assembly import numbers, unpacked
 from sim.solve.transient import lag_at, transient
-from tests.sim.points import sweep_points
+from tests.sim.motion.test_orbit_groups import robots
 from tests.sim.robots import control
 
 TIMES, MARKS = np.linspace(0.3, 1.0, 5), np.array([0.4, 0.7])
 TOLERANCE = 1e-3
 EDGES = 6
-
-
-def robots(tails: int, count: int) -> Groups:
-    """Return robots of the shipped sweep with N tails."""
-    columns = sweep_points(32 * count)
-    rows = np.flatnonzero(columns["N"] == tails)[:count]
-    assert len(rows) == count
-    return Groups.from_columns({name: values[rows] for name, values in columns.items()})
 
 
 def flips_of(groups: Groups, until: float = 1.0) -> list[Flip]:
@@ -38,8 +30,7 @@ def flips_of(groups: Groups, until: float = 1.0) -> list[Flip]:
     flips = []
     for row, orbit in zip(rows, orbits_with_phases(rows, groups.N, [EDGES])[0], strict=True):
         assert orbit is not None
-        x = orbit.x[:, -np.arange(orbit.x.shape[1])] * np.array([1.0, -1.0, 1.0])
-        flips.append(Flip(row, x, orbit.u, orbit.twist, until))
+        flips.append(Flip(row, mirrored(orbit.x), orbit.u, orbit.twist, until))
     return flips
 
 
@@ -75,8 +66,8 @@ def test_a_course_does_not_depend_on_the_group(tails: int) -> None:
 def test_the_width_of_groups_does_not_matter(width: tuple[int, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     groups = robots(3, 6)
     wanted = responses(groups)
-    for name in (module, orbit_groups):
-        monkeypatch.setattr(name, "group_width", lambda: width)
+    for place in (module, orbit_groups, grouping):
+        monkeypatch.setattr(place, "group_width", lambda: width)
     found = responses(groups)
     for name in ("lag", "memory", "rest", "spread", "net_speed"):
         assert np.array_equal(getattr(wanted, name), getattr(found, name)), name
@@ -143,6 +134,10 @@ def test_robots_with_non_local_effects_are_followed_beside_the_others() -> None:
     for flip, course in zip(flips, together, strict=True):
         assert same_bits(course, followed([flip])[0])
     assert together[1] is not None
+    early = followed([flips[1]._replace(until=0.7)])[0]
+    assert early is not None
+    assert (np.isfinite(early.lag).all((1, 2)) == (TIMES <= 0.7)).all()
+    assert np.array_equal(early.end, early.shapes[1])
     plain = followed(flips_of(control(omega_bar=14.0)))[0]
     assert plain is not None
     assert np.abs(together[1].lag - plain.lag).max() > 1e-3

@@ -12,7 +12,7 @@ from sim.motion.orbit_groups import orbits_in_groups
 from sim.motion.stability import growth
 from sim.solve.assembly import numbers, unpacked
 from sim.solve.refinement import FEW, Orbit
-from tests.sim.motion.test_flips import robots
+from tests.sim.motion.test_orbit_groups import robots
 
 
 def orbits_of(tails: int, count: int) -> tuple[np.ndarray, list[Orbit]]:

@@ -11,7 +11,7 @@ from sim.motion.orbit_groups import orbits_in_groups
 from sim.motion.orbit_slopes import slopes_of_orbits
 from sim.solve.assembly import Nonlocal, numbers
 from sim.solve.refinement import MANY
-from tests.sim.motion.test_flips import robots
+from tests.sim.motion.test_orbit_groups import robots
 
 TAILS = 3
 ALONG = (0, 4, 8, 9)  # ω̄, tail radius, ζ_perp, an entry of the resistance
