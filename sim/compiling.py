@@ -14,10 +14,11 @@ Sums may be reordered and multiplications fused, so last digits can differ betwe
 
 The first use of a loop compiles it, with a progress bar on stderr. `softflagella sim compile` compiles all loops.
 
-A loop that this process compiles can give other last digits than the same loop read from disk: of a loop that
-several others call, the first copy in the process is used by all of them, and the copies were not optimised with
-the same neighbours. So where results must be the same in each process, loops are compiled in another one
-(`compile_apart`), and only read here.
+Large loops that are `compiled_exactly` are called by others (`sim.called_code`). Other loops are copied into those
+that call them. Where sums may be reordered, such a loop that this process compiles can give other last digits than
+the same loop read from disk: of a loop that several others call, the first copy in the process is used by all of
+them, and the copies were not optimised with the same neighbours. So where results must be the same in each
+process, loops are compiled in another one (`compile_apart`), and only read here.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _HERE = Path(__file__).parent
 _SOURCES = (
-    "arrays.py", "compiling.py", "lane*.py", "machine_code.py", "object_code.py", "model/body.py",
-    "linear/*.py", "mechanics/*.py", "solve/*.py",
+    "arrays.py", "called_code.py", "compiling.py", "lane*.py", "machine_code.py", "object_code.py",
+    "model/body.py", "linear/*.py", "mechanics/*.py", "solve/*.py",
 )  # fmt: skip
 _KEPT = 3  # folders of other versions
 _NUMBA = "sim.machine_code"  # by name: this module imports us, and numba
@@ -75,6 +76,13 @@ def _add_code(digest: Any, code: CodeType) -> None:
         else:
             members = sorted(constant, key=repr) if isinstance(constant, frozenset) else constant
             digest.update(repr(members).encode())
+
+
+def digest_of_code(code: CodeType) -> str:
+    """Return twelve characters that name what a function does."""
+    digest = sha256()
+    _add_code(digest, code)
+    return digest.hexdigest()[:12]
 
 
 def prune(folder: Path, kept: int) -> None:
@@ -180,7 +188,7 @@ class Loop:
 
     def __init__(self, function: Callable[..., Any], exact: bool = False):
         update_wrapper(self, function)
-        self.py_func, self.exact = function, exact
+        self.py_func, self.exact, self.is_copied = function, exact, False
 
     @cached_property
     def dispatcher(self) -> Any:
@@ -202,6 +210,12 @@ def compiled(function: F) -> F:
 def compiled_exactly(function: F) -> F:
     """Compile a function as `compiled` does, but never reorder its sums nor fuse its products."""
     return cast(F, Loop(function, exact=True))
+
+
+def copied(function: F) -> F:
+    """Let callers of a compiled function have copies of it, however large, for `sim.object_code`."""
+    cast(Loop, function).is_copied = True
+    return function
 
 
 _formulas: list[Callable[..., Any]] = []  # that numba has not been told of

@@ -19,6 +19,7 @@ from numba.extending import register_jitable, typeof_impl
 from tqdm import tqdm
 
 from sim import compiling, lane_rows  # noqa: F401  (it teaches numba)
+from sim.called_code import LoopCache, LoopCompiler
 from sim.compiling import Loop, folder_of_package, package_root, take_formulas
 
 _HERE = Path(__file__).parent
@@ -102,8 +103,10 @@ def dispatcher(function: Callable[..., Any], exact: bool) -> Any:
     """
     _modules.add(function.__module__)
     mathematics = False if exact else MATHEMATICS
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    loop: Any = njit(**options, fastmath=mathematics, pipeline_class=LoopCompiler)(function)
     with _setting("CACHE_LOCATOR_CLASSES", f"{__name__}.{Locator.__name__}"):
-        loop: Any = njit(cache=True, nogil=True, error_model="numpy", fastmath=mathematics)(function)
+        loop._cache = LoopCache(function)  # type: ignore[no-untyped-call]
     compile_loop = loop.compile
 
     def compile_quickly(signature: Any) -> Any:

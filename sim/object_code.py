@@ -8,7 +8,7 @@ missing, is damaged, or belongs to another kind of processor, the function is co
 Such a function must not allocate and must not raise: the only symbols that it may need from outside are those of
 the C library's mathematics (ALLOWED). Others are refused when it is compiled. So its callers bring the memory that
 it works in. Its own sums, and those of the formulas that it calls, are not reordered; those of the compiled
-functions that it calls are.
+functions that it calls are. Large loops of the simulator, which are called by a symbol, must be `copied` for that.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 # The rooms of each package, folders and single files; each imports only from those before it. Packages import only
 # from packages before them.
 ROOMS = {
-    "sim": ["arrays", "compiling", "lanes", "lane_code", "lane_rows", "machine_code", "object_code",
+    "sim": ["arrays", "compiling", "lanes", "lane_code", "lane_rows", "called_code", "machine_code", "object_code",
             "compile_stages", "io", "linear", "model", "effects", "inputs", "mechanics", "solve", "reference",
             "motion", "__main__"],
     "dataset": ["rows", "storage", "report", "workers", "build", "__main__"],

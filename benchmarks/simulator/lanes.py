@@ -140,6 +140,21 @@ def _correction(numbers: Any, x: Any, u: Any, terms: Any, width: Any) -> None:
     x[:] = dx
 
 
+def assembly(loop: Any, given: Any, done: set[Any]) -> str:
+    """Return the assembly of a compiled loop, and of the large loops that it calls (`sim.called_code`)."""
+    import numba
+
+    njit: Any = numba.njit
+    loop.compile(given)
+    text = "\n".join(loop.inspect_asm().values())
+    for needed in loop.overloads[given].library._reload_init - done:
+        if needed not in done:
+            done.add(needed)
+            again = njit(error_model="numpy", no_cpython_wrapper=True)(needed.loop.py_func)
+            text += assembly(again, needed.types, done)
+    return text
+
+
 def instructions(width: tuple[int, ...]) -> Counter[str]:
     """Count the instructions of double-precision arithmetic in a Newton correction, by kind."""
     from numba import njit, typeof
@@ -152,8 +167,7 @@ def instructions(width: tuple[int, ...]) -> Counter[str]:
         arrays = np.ones((33, len(width))), np.ones((6, 3, 3, len(width))), np.ones((1, 4, len(width)))
         kind: Any = typeof
         given = (*map(kind, arrays), kind(terms), kind(width))
-        loop.compile(given)
-    text = "\n".join(loop.inspect_asm().values())
+        text = assembly(loop, given, set())
     kinds = Counter(f"{kind}mm" for kind in _PACKED.findall(text))
     kinds["scalar"] = len(_SCALAR.findall(text))
     return kinds

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats
-from sim.compiling import compiled_exactly
+from sim.compiling import compiled_exactly, copied
 from sim.lanes import fma, lane, lane_count, with_lane
 from sim.linear.blocks import block_at
 from sim.linear.products import add_block_product, multiply_block
@@ -48,6 +48,7 @@ def solve_dense_lanes(a: Floats, b: Floats) -> None:
                 b[row, column] = with_lane(b[row, column], i, right[row, column])
 
 
+@copied
 @compiled_exactly
 def solve_dense(a: Floats, b: Floats) -> None:
     """Solve b = a⁻¹ b (n, K) in place by Gaussian elimination with pivoting; a is overwritten. NaN in, NaN out."""
