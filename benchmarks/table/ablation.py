@@ -90,7 +90,7 @@ def _judge(
     name: str, rows: WrenchSamples, numbers: Callable[[Floats], Floats], seconds: float, size: float
 ) -> Result:
     began = time.process_time()
-    motion, _ = solve(rows.heads, rows.tails, numbers)
+    motion, _ = solve(rows.heads, rows.tails, lambda tails, motion: numbers(tail_inputs(tails, motion)))
     query = 1e6 * (time.process_time() - began) / len(motion)
     errors = [np.nan_to_num(np.abs(motion[:, i] / rows.motion[:, i] - 1), nan=9.0) * 100 for i in (2, 1)]
     return name, seconds, query, size, tuple(float(q) for e in errors for q in np.quantile(e, [0.5, 0.95]))

@@ -4,15 +4,18 @@ Usage: softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
        python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
        python -m benchmarks shipped_table WORK --test MODEL   errors and coverage on the held-out robots
        python -m benchmarks shipped_table WORK --spread-of MODEL --sweep TWO --out NEW
+       python -m benchmarks shipped_table WORK --tails-of MODEL --out NEW
 
-The last one learns the spread over the disc's phase anew, from a sweep of robots with two tails. That of the
-shipped file is from domain.toml with 8192 rows, the seed 20261123, N = 2 and a history every 64 rows.
+The third one learns the spread over the disc's phase anew, from a sweep of robots with two tails. That of the
+shipped file is from domain.toml with 8192 rows, the seed 20261123, N = 2 and a history every 64 rows. The last one
+learns all but the response to a flip anew; so the shipped file was made.
 
-The tails are learned from robots with heads far wider than those of the sweep, a single tail from robots of the
-sweep as well. The response to a flip is learned from the sweep, and from some of these wide robots. All robots are
-drawn from Sobol sequences with the seeds below. The held-out robots led to no choice of any kind.
+The tails are learned from robots with heads far wider than those of the domain, a single tail from robots of the
+domain as well, most of them with effects on head and motor. The response to a flip is learned from the sweep, and
+from some of these wide robots. All robots are drawn from Sobol sequences with the seeds below. The locked robots
+led to no choice of any kind.
 
-Takes a day with its simulations.
+Takes two hours with its simulations.
 """
 
 from __future__ import annotations
@@ -28,13 +31,17 @@ import numpy as np
 from dataset.report.figures import plain_logarithms
 from dataset.storage.data_set import read_manifest
 from sim.arrays import Floats
+from sim.io.files import write_text
 from sim.motion.batches import steady_columns
+from surrogate.input_ranges import ROBOT
 from surrogate.networks.checkpoints import TrainingContext, remove_states
 from surrogate.networks.training_loop import Settings
 from surrogate.table.errors import coverage, curve_errors, error_table, relative_errors, summary
 from surrogate.table.lookup import NeuralTable
 from surrogate.table.model_file import load
 from surrogate.table.response_table import ResponseTable
+from surrogate.training.model_card import model_card
+from surrogate.training.response_errors import with_response_errors
 from surrogate.training.simulated import (
     MOTION,
     SimulatedRobots,
@@ -43,13 +50,19 @@ from surrogate.training.simulated import (
     read_robots,
     simulate_robots,
 )
-from surrogate.training.train import fit_spread, learn, split, with_radius
+from surrogate.training.train import fit_spread, learn, learn_tails_again, split, with_radius
 
 TAILS = Settings(width=64, depth=3, members=1, epochs=60, iterations=3000)
+SINGLE = replace(TAILS, iterations=6000)
 CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)
 SPREAD = Settings(width=32, depth=2, members=1, epochs=60, iterations=600)
-ROWS = {"tails": (32768, 101), "widths": (4096, 202), "held_out": (4096, 402), "locked": (4096, 20261201)}
+ROWS = {
+    "tails": (32768, 101), "single": (16384, 505), "widths": (8192, 202), "held_out": (8192, 402),
+    "locked": (4096, 20261205), "locked_effects": (4096, 20261206),
+}  # fmt: skip
 FLIPS = {"flips": (1400, 301), "locked_flips": (400, 20261202)}
+_HALF_WITH_EFFECTS = ("single", "widths", "held_out")
+_STEADY_ONLY = ("surface_couple", "motor_droop")  # effects that the response to a flip is not learned with
 _SWEPT = 16384  # rows of the sweep without history whose lags are learned
 _FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated
 
@@ -63,9 +76,16 @@ def robots(name: str) -> dict[str, Floats]:
         tails = 1.0 + np.arange(_FLIPS_DRAWN) % 8
         np.random.default_rng(seed).shuffle(tails)
         every = {**draw_robots(_FLIPS_DRAWN, seed, wide=True), "N": tails}
-        return {n: np.asarray(values[:count]) for n, values in every.items()}
+        return {n: np.asarray(values[:count]) for n, values in every.items() if n not in _STEADY_ONLY}
     count, seed = ROWS[name]
-    return draw_robots(count, seed, wide=name == "tails")
+    drawn = draw_robots(count, seed, wide=name == "tails", effects=name not in ("locked", "flips"))
+    if name in _HALF_WITH_EFFECTS:  # every second robot of a Sobol sequence has a small C_t
+        without = np.random.default_rng((seed, 2)).uniform(size=count) < 0.5
+        for effect in [n for n in drawn if n not in ROBOT]:
+            drawn[effect][without] = 0.0
+    if name == "single":
+        drawn["N"][:] = 1.0
+    return drawn
 
 
 def kept(work: Path, name: str) -> SimulatedRobots:
@@ -76,7 +96,8 @@ def kept(work: Path, name: str) -> SimulatedRobots:
             parts = [{k.split("/")[1]: file[k] for k in file if k.startswith(f"{i}/")} for i in range(3)]
         return SimulatedRobots(*parts)
     began = time.process_time()
-    make: Callable[..., SimulatedRobots] = simulate_robots if name == "tails" or name in FLIPS else as_reached
+    drawn_wide = name in ("tails", "single") or name in FLIPS
+    make: Callable[..., SimulatedRobots] = simulate_robots if drawn_wide else as_reached
     rows = make(robots(name), title=name, **({"curves": True} if name in FLIPS else {}))
     print(f"{name}: {len(rows)} rows, {time.process_time() - began:.0f} s")
     work.mkdir(parents=True, exist_ok=True)
@@ -85,18 +106,16 @@ def kept(work: Path, name: str) -> SimulatedRobots:
     return rows
 
 
-def swept(folder: str) -> tuple[SimulatedRobots, SimulatedRobots, SimulatedRobots]:
-    """Read the rows of a sweep in three parts.
+def swept(folder: str) -> tuple[SimulatedRobots, SimulatedRobots]:
+    """Read the rows of a sweep in two parts.
 
-    They are those with one tail; those to learn, with response curves (with memory and rest, and _SWEPT without);
-    and the held-out ones.
+    They are those to learn, with response curves (with memory and rest, and _SWEPT without), and those held out.
     """
     rows, numbers = read_robots(folder)
     part, history = split(numbers), np.isfinite(rows.curves["rest"]).all((1, 2))
     lags = np.flatnonzero((part == 0) & ~history & (rows.robots["N"] > 1))[:_SWEPT]
     learned = np.union1d(lags, np.flatnonzero((part == 0) & history))
-    single = np.flatnonzero((part == 0) & (rows.robots["N"] == 1))
-    return rows.at(single), rows.at(learned), rows.at(np.flatnonzero((part > 0) & history))
+    return rows.at(learned), rows.at(np.flatnonzero((part > 0) & history))
 
 
 def test(lookup: NeuralTable, rows: SimulatedRobots, flips: SimulatedRobots) -> None:
@@ -172,6 +191,18 @@ def relearned_spread(lookup: NeuralTable, folder: str) -> NeuralTable:
     return changed
 
 
+def tails_again(lookup: NeuralTable, work: Path) -> NeuralTable:
+    """Learn all of a table anew but the response to a flip, and print the errors."""
+    tails, single, widths, held_out = (kept(work, n) for n in ("tails", "single", "widths", "held_out"))
+    source = {name: part for name, part in lookup.provenance.items() if name in ("data_hash", "spread")}
+    changed = learn_tails_again(
+        lookup, join_robots([tails, single]), widths, held_out, TAILS, single_settings=SINGLE,
+        source={**source, "seeds": {**ROWS, **FLIPS}}, work=TrainingContext("train", folder=work / "states"),
+    )  # fmt: skip
+    print(error_table(changed.errors))
+    return with_response_errors(changed, title="errors of the response")
+
+
 def as_reached(robots: Mapping[str, Floats], *, title: str = "") -> SimulatedRobots:
     """Simulate robots as a data set does: the motion that straight tails reach, if it is steady."""
     columns = steady_columns(robots, title=title)
@@ -185,23 +216,29 @@ def main(*words: str) -> None:
     parser.add_argument("--out")
     parser.add_argument("--sweep", help="data set built from surrogate/shipped/domain.toml")
     parser.add_argument("--test")
+    parser.add_argument("--tails-of", help="model whose tails are learned anew")
     parser.add_argument("--spread-of", help="model whose spread is learned anew from --sweep")
+    parser.add_argument("--card", help="with --test: write the card, from the held-out robots of the training")
     parser.add_argument("--picture", help="with --test: draw the errors of the held-out robots")
     arguments = parser.parse_args(words)
     if arguments.out:
+        if arguments.tails_of:
+            tails_again(load(arguments.tails_of), arguments.work).save(arguments.out)
+            remove_states(arguments.work / "states")
+            return
         if not arguments.sweep:
             parser.error("--out needs --sweep")
         if arguments.spread_of:
             relearned_spread(load(arguments.spread_of), arguments.sweep).save(arguments.out)
             return
-        tails, widths, held_out, flips = (
-            kept(arguments.work, n) for n in ("tails", "widths", "held_out", "flips")
+        tails, single, widths, held_out, flips = (
+            kept(arguments.work, n) for n in ("tails", "single", "widths", "held_out", "flips")
         )
         source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(arguments.sweep)["config_hash"]}
-        single, learned, swept_held_out = swept(arguments.sweep)
-        tails = join_robots([tails, single])
+        learned, swept_held_out = swept(arguments.sweep)
         lookup = learn(
-            tails, widths, held_out, join_robots([flips, learned]), TAILS, CURVES, source=source,
+            join_robots([tails, single]), widths, held_out, join_robots([flips, learned]), TAILS, CURVES,
+            single_settings=SINGLE, source=source,
             flips_held_out=swept_held_out, work=TrainingContext("train", folder=arguments.work / "states"),
         )  # fmt: skip
         lookup.save(arguments.out)
@@ -210,5 +247,7 @@ def main(*words: str) -> None:
     if arguments.test:
         lookup, locked = load(arguments.test), kept(arguments.work, "locked")
         test(lookup, locked, kept(arguments.work, "locked_flips"))
+        if arguments.card:
+            write_text(arguments.card, model_card(lookup, kept(arguments.work, "held_out")))
         if arguments.picture:
             draw(lookup, locked, arguments.picture)

@@ -28,12 +28,13 @@ function headAndTails(robot) {
   const radius = 1 / robot.l_over_R, length = robot.L_over_R * radius, number = robot.N;
   const [parallel, perp] = tailCoefficients(robot.l_over_r0);
   const resistance = headResistance(robot.C_t, robot.C_r, robot.C_yr, radius, length);
+  const gain = 1, offset = robot.a_over_R * radius;
   const head = {
-    speed: Math.abs(robot.omega_bar), gain: 1, resistance, length, sense: Math.sign(robot.omega_bar),
+    speed: Math.abs(robot.omega_bar), gain, resistance, length, sense: Math.sign(robot.omega_bar),
   };
   const tails = {
-    perp, parallel, offset: robot.a_over_R * radius, radius: 1 / robot.l_over_r0, number,
-    spinDrag: resistance[3][3], head: headInputs(resistance, length, number * perp),
+    perp, parallel, offset, radius: 1 / robot.l_over_r0, number,
+    spinDrag: resistance[3][3], head: headInputs(resistance, length, gain, number * perp, offset),
   };
   return { head, tails };
 }

@@ -14,7 +14,7 @@ import { DWELLS } from "./response.js";
 import { betweenDwells, curveSpeeds, lagAtEqualDwells, responseCurves } from "./response_table.js";
 import { novelty } from "./support.js";
 import { readData } from "./table_data.js";
-import { tailInputs, wrenchSlopes } from "./tails.js";
+import { networkInputs, tailInputs, wrenchSlopes } from "./tails.js";
 import { solveBalance } from "./wrench_balance.js";
 import { motionSensitivity, networkIndex, steadyOutputs } from "./wrench_table.js";
 
@@ -25,7 +25,6 @@ const REASONS = [ // why a robot is outside
   "its tails or its motor were not learned, or no motion was found",
   "its tails move as none of the learned ones do",
   "it yaws nearly as fast as its tails turn, and may have several motions",
-  "the balance of its single tail has several solutions",
 ];
 const NOT_OF_HEAD = ["omega_bar", "l_over_R", "l_over_r0", "a_over_R"];
 const STEADY = ["v_z", "v_x", "omega_yr_bar"];
@@ -85,10 +84,11 @@ function tableErrorModes(table, robot) {
 /* Solve for the motion of checked groups: {head, tails, motion, inputs, reason}. NeuralTable.motions */
 function motionOf(table, values, flag = false) {
   const { head, tails } = headAndTails(values), kind = networkIndex(values.N), network = table.wrench[kind];
-  const nothing = { motion: [NaN, NaN, NaN, NaN, NaN], converged: false, several: false };
-  const { motion, converged, several } = network ? solveBalance(network, head, tails) : nothing;
+  const nothing = { motion: [NaN, NaN, NaN, NaN, NaN], converged: false };
+  const { motion, converged } = network ? solveBalance(network, head, tails) : nothing;
   const inputs = tailInputs(tails, motion), known = converged && withinRanges(table, values);
-  const reason = REASONS[reasonOf(table.support[kind], motion, inputs, known, several)];
+  const own = network ? networkInputs(tails, motion, network.shift.length) : inputs;
+  const reason = REASONS[reasonOf(table.support[kind], motion, own, known)];
   if (reason && !flag) throw new OutsideError(refusal(table, values, reason), reason);
   return { head, tails, motion, inputs, reason };
 }
@@ -101,12 +101,11 @@ function within([low, high], size) {
   return low * (1 - 1e-9) <= size && size <= high * (1 + 1e-9);
 }
 
-function reasonOf(support, motion, inputs, known, several) {
+function reasonOf(support, motion, inputs, known) {
   if (!support) return 1;
   if (!known) return 2;
   if (!(novelty(support, inputs) <= 1)) return 3;
-  if (Math.abs(motion[2]) > BRANCHES * Math.abs(motion[4])) return 4;
-  return several ? 5 : 0;
+  return Math.abs(motion[2]) > BRANCHES * Math.abs(motion[4]) ? 4 : 0;
 }
 
 function refusal(table, values, reason) {
@@ -143,10 +142,10 @@ function widthFeatures(table, { head, tails, motion, inputs }) {
   const kind = networkIndex(tails.number), network = table.wrench[kind], support = table.support[kind];
   let away = 0, spread = 0;
   if (network && support) {
-    const members = membersAt(network, [...inputs, ...tails.head]);
+    const own = networkInputs(tails, motion, network.shift.length), members = membersAt(network, own);
     const sensitivity = motionSensitivity(head, tails, motion), slopes = wrenchSlopes(tails, motion);
     const middle = slopes[0].map((_, i) => members.reduce((total, y) => total + y[i], 0) / members.length);
-    away = novelty(support, inputs);
+    away = novelty(support, own);
     for (const y of members) {
       const wrench = slopes.map((row) => row.reduce((total, slope, i) => total + slope * (y[i] - middle[i]), 0));
       const moved = sensitivity.map((row) => row.reduce((total, entry, i) => total + entry * wrench[i], 0));

@@ -8,6 +8,7 @@ const SOFT = 12; // S from which a tail bends with the flow while it turns
 const SMALL_DEFLECTION = 0.05;
 const SMALL_SURGE = 0.05;
 const TINY = 1e-30;
+const SINGLE_INPUTS = 13;
 
 /* Thrust of a tail in linear theory over (ζ⊥ − ζ∥) ω_t a², roughly, at drag number S. linear_thrust */
 function linearThrust(S) {
@@ -30,13 +31,26 @@ function tailInputs({ perp, offset, radius, number, spinDrag }, [vX, vZ, yaw, , 
   ];
 }
 
-/* What a single tail feels of its head, from the resistance (4 rows of 5), L, and N ζ⊥. head_inputs */
-function headInputs(resistance, length, across) {
+/* What a single tail feels of its head, from the resistance (4 rows of 5), L, ∂ω_t/∂ω_h, N ζ⊥ and a.
+ * head_inputs */
+function headInputs(resistance, length, gain, across, offset) {
   const [sway, surge, turn, spin] = [0, 1, 2, 3].map((i) => resistance[i][i]);
   return [
     Math.log(sway / across), Math.log(surge / across), Math.log(turn / across), Math.log(length),
     resistance[0][2] / Math.sqrt(sway * turn), Math.log(resistance[0][3] / across), resistance[3][4] / spin,
+    resistance[2][4] / (across * offset ** 2), Math.log(gain),
   ];
+}
+
+/* The inputs of the network of robots with one tail. single_inputs */
+function singleInputs({ perp, offset, radius, spinDrag, head }, [, , , , spin]) {
+  const drag = Math.log(spinDrag / (perp * offset ** 2));
+  return [Math.log(perp * spin), Math.log(offset), -Math.log(radius), drag, ...head];
+}
+
+/* The inputs of the network of the wrench that has so many. network_inputs */
+function networkInputs(tails, motion, count) {
+  return count === SINGLE_INPUTS ? singleInputs(tails, motion) : tailInputs(tails, motion);
 }
 
 /* The terms of the wrench: F_x, F_z, M_y of straight tails; then side force, thrust, torque and m².
@@ -62,4 +76,4 @@ function wrenchSlopes(tails, motion) {
   ];
 }
 
-export { linearThrust, linearTorque, tailInputs, headInputs, wrenchTerms, wrenchSlopes };
+export { linearThrust, linearTorque, tailInputs, headInputs, networkInputs, wrenchTerms, wrenchSlopes };

@@ -4,7 +4,7 @@
  * motor. Units: l, μ0 l⁴/EI, EI/l². */
 import { inverse, solveDense } from "./dense.js";
 import { evaluate } from "./ensemble.js";
-import { linearThrust, linearTorque, tailInputs, wrenchTerms } from "./tails.js";
+import { linearThrust, linearTorque, networkInputs, wrenchTerms } from "./tails.js";
 
 const STEPS = 60;
 const CORRECTION = 2e-12; // relative
@@ -13,22 +13,6 @@ const DIFFERENCE = 1e-6; // steps of finite differences, relative
 const LEAST_SHARE = 1e-3;
 const FIRST_SPIN = 0.6; // ω_t/ω in the first guess
 const LONGEST = 0.5; // largest relative change of ω_t in one step
-const SAME = 1e-6; // two solutions are one, if all velocities agree so
-
-/* Solve for the motion; converged: it was found; several: a single tail has two. solve */
-function solveBalance(network, head, tails) {
-  const guess = firstGuess(head, tails), found = solve(network, head, tails, guess, false);
-  if (tails.number !== 1) return { ...found, several: false };
-  const second = solve(network, head, tails, guess, true);
-  const nearer = Math.abs(second.motion[1] - guess[1]) < Math.abs(found.motion[1] - guess[1]);
-  const several = found.converged && second.converged && !sameMotions(found.motion, second.motion);
-  return { ...(second.converged && (nearer || !found.converged) ? second : found), several };
-}
-
-/* Tell whether two solutions are one. same_motions */
-function sameMotions(first, second) {
-  return first.every((value, i) => Math.abs(second[i] - value) <= SAME * Math.abs(value));
-}
 
 /* The motion with torque and thrust of linear theory and the side forces of straight tails. _first_guess */
 function firstGuess({ speed, gain, resistance }, { perp, parallel, offset, number }) {
@@ -58,13 +42,13 @@ function unbalanced(resistance, tails, motion, y) {
   return wrench.map((part, i) => resistance[i].reduce((left, entry, j) => left - entry * motion[j], part));
 }
 
-/* Solve by Broyden's method; `exact`: the first derivative is that of the network, too. */
-function solve(network, head, tails, guess, exact) {
-  const { speed, gain, resistance } = head, motion = [...guess];
-  const numbers = (at) => evaluate(network, [...tailInputs(tails, at), ...tails.head]);
+/* Solve for the motion; converged: it was found. solve */
+function solveBalance(network, head, tails) {
+  const { speed, gain, resistance } = head, motion = firstGuess(head, tails);
+  const numbers = (at) => evaluate(network, networkInputs(tails, at, network.shift.length));
   const y = numbers(motion);
   let residual = unbalanced(resistance, tails, motion, y);
-  const inverseSlope = inverse(firstSlope(head, tails, motion, residual, exact ? numbers : () => y));
+  const inverseSlope = inverse(firstSlope(head, tails, motion, residual, y));
   let size = Infinity;
   for (let count = 0; count < STEPS; count++) {
     const step = inverseSlope.map((row) => row.reduce((sum, entry, j) => sum - entry * residual[j], 0));
@@ -85,14 +69,14 @@ function solve(network, head, tails, guess, exact) {
   return { motion, converged: size < ACCEPTED };
 }
 
-/* The derivative of what is unbalanced, by differences: four rows of four. */
-function firstSlope({ speed, gain, resistance }, tails, motion, residual, numbers) {
+/* The derivative of what is unbalanced for numbers y of the tails, by differences: four rows of four. */
+function firstSlope({ speed, gain, resistance }, tails, motion, residual, y) {
   const largest = Math.max(...motion.slice(0, 4).map(Math.abs)), slope = [[], [], [], []];
   for (let j = 0; j < 4; j++) {
     const width = DIFFERENCE * (Math.abs(motion[j]) + LEAST_SHARE * largest), moved = [...motion];
     moved[j] += width;
     moved[4] = speed + gain * moved[3];
-    const left = unbalanced(resistance, tails, moved, numbers(moved));
+    const left = unbalanced(resistance, tails, moved, y);
     for (let i = 0; i < 4; i++) slope[i][j] = (left[i] - residual[i]) / width;
   }
   return slope;

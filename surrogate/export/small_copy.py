@@ -3,9 +3,8 @@
 It has one member of each ensemble. Two tails and more, where the table is most exact, are in single precision. The
 rest is in half precision: one tail (but for its last layer), the gap, and the response to flips with equal dwells.
 What this loses against the whole table is measured on random robots and written into the file. Left out: effects,
-intervals, the memory of other dwells, and the joint support (only the ranges of the inputs, the limit of the yaw
-rate, and whether the balance of a single tail has one solution are checked). `surrogate.export.small_copy_files`
-writes its files.
+intervals, the memory of other dwells, and the joint support (only the ranges of the inputs and the limit of the
+yaw rate are checked). `surrogate.export.small_copy_files` writes its files.
 """
 
 from __future__ import annotations

@@ -27,14 +27,12 @@ typedef float lookup_real;
 #define LOOKUP_DIFFERENCE 3e-4f /* steps of finite differences, relative */
 #define LOOKUP_CORRECTION 3e-6f /* where the iteration ends, relative */
 #define LOOKUP_ACCEPTED 3e-6f   /* the last of all corrections, where rounding keeps them above that */
-#define LOOKUP_SAME 1e-2f       /* two solutions are one, if all velocities agree so */
 #else
 typedef double lookup_real;
 #define LOOKUP_F(name) name
 #define LOOKUP_DIFFERENCE 1e-6
 #define LOOKUP_CORRECTION 2e-12
 #define LOOKUP_ACCEPTED 1e-9
-#define LOOKUP_SAME 1e-6
 #endif
 #define LOOKUP_C(number) ((lookup_real)(number))
 #define LOOKUP_PI LOOKUP_C(3.14159265358979323846)
@@ -148,7 +146,7 @@ static int lookup_body_of(const lookup_robot *robot, lookup_body *body)
     return body->wrench->inputs > 0;
 }
 
-/* Inputs of the tails, and from x[7] on what a single tail feels of its head. */
+/* Inputs of the tails, and from x[7] on those of the head. */
 static void lookup_tail_inputs(const lookup_body *body, const lookup_real *u, lookup_real *x)
 {
     lookup_real total = body->tails * body->across;
@@ -169,11 +167,16 @@ static void lookup_tail_inputs(const lookup_body *body, const lookup_real *u, lo
     x[13] = 0;
 }
 
-/* The numbers of the tails at the velocities u. */
+/* The numbers of the tails at the velocities u. The network of a single tail sees the head, and no velocity. */
 static void lookup_numbers(const lookup_body *body, const lookup_real *u, lookup_real *y)
 {
     lookup_real x[LOOKUP_INPUTS];
     lookup_tail_inputs(body, u, x);
+    if (body->tails < LOOKUP_C(1.5)) {
+        x[3] = x[6];
+        for (int i = 4; i < 11; i++) x[i] = x[i + 3];
+        x[11] = x[12] = 0; /* couple of the tails' spin, ln gain of the motor */
+    }
     lookup_network_at(body->wrench, x, y);
 }
 
@@ -241,9 +244,8 @@ static int lookup_inverse(lookup_real matrix[4][4], lookup_real inverse[4][4])
     return 1;
 }
 
-/* What is unbalanced, and the inverse of its derivative, by differences; if it need not be exact, with the tails'
-   numbers held. */
-static int lookup_begin(const lookup_body *body, const lookup_real *u, int exact, lookup_real *left,
+/* What is unbalanced, and the inverse of its derivative, by differences, with the tails' numbers held. */
+static int lookup_begin(const lookup_body *body, const lookup_real *u, lookup_real *left,
                         lookup_real inverse[4][4])
 {
     lookup_real slope[4][4], moved[4], there[4], y[LOOKUP_OUTPUTS], largest = 0;
@@ -255,7 +257,6 @@ static int lookup_begin(const lookup_body *body, const lookup_real *u, int exact
         memcpy(moved, u, sizeof moved);
         moved[j] += width;
         width = moved[j] - u[j];
-        if (exact) lookup_numbers(body, moved, y);
         lookup_unbalanced(body, moved, y, there);
         for (int i = 0; i < 4; i++) slope[i][j] = (there[i] - left[i]) / width;
     }
@@ -290,11 +291,13 @@ static void lookup_update(lookup_real inverse[4][4], const lookup_real *way, con
         }
 }
 
-/* The velocities in balance from the first guess u; 0 if none were found. */
-static int lookup_solve_from(const lookup_body *body, int exact, lookup_real *u)
+/* The velocities in balance; 0 if none were found. */
+static int lookup_solve(lookup_body *body)
 {
+    lookup_real *u = body->u;
     lookup_real left[4], now[4], way[4], change[4], inverse[4][4], y[LOOKUP_OUTPUTS], size = LOOKUP_C(HUGE_VAL);
-    if (!lookup_begin(body, u, exact, left, inverse)) return 0;
+    lookup_guess(body, u);
+    if (!lookup_begin(body, u, left, inverse)) return 0;
     for (int count = 0; count < LOOKUP_STEPS; count++) {
         lookup_real share;
         for (int i = 0; i < 4; i++) {
@@ -317,31 +320,6 @@ static int lookup_solve_from(const lookup_body *body, int exact, lookup_real *u)
         memcpy(left, now, sizeof left);
     }
     return size < LOOKUP_ACCEPTED;
-}
-
-/* 1 if all velocities of two solutions agree. */
-static int lookup_same(const lookup_body *body, const lookup_real *u, const lookup_real *other)
-{
-    for (int i = 0; i < 4; i++)
-        if (!(LOOKUP_F(fabs)(other[i] - u[i]) <= LOOKUP_SAME * LOOKUP_F(fabs)(u[i]))) return 0;
-    return LOOKUP_F(fabs)(other[3] - u[3]) <= LOOKUP_SAME * (body->speed + u[3]);
-}
-
-/* The table of a single tail has second solutions near the true one. So two are sought, and the one whose surge is
-   nearer to the first guess counts. 0 if there is none, 2 if there are two: it may be the wrong one. */
-static int lookup_solve(lookup_body *body)
-{
-    lookup_real guess[4], other[4], *u = body->u;
-    int found, several;
-    lookup_guess(body, guess);
-    memcpy(u, guess, sizeof guess);
-    found = lookup_solve_from(body, 0, u);
-    if (body->tails > LOOKUP_C(1.5)) return found;
-    memcpy(other, guess, sizeof guess);
-    if (!lookup_solve_from(body, 1, other)) return found;
-    several = found && !lookup_same(body, u, other);
-    if (!found || LOOKUP_F(fabs)(other[1] - guess[1]) < LOOKUP_F(fabs)(u[1] - guess[1])) memcpy(u, other, sizeof guess);
-    return several ? 2 : 1;
 }
 
 static int lookup_within(const lookup_robot *robot)
@@ -373,7 +351,7 @@ static int lookup_answer(const lookup_robot *robot, lookup_body *body, lookup_mo
     lookup_network_at(&lookup_networks[3], x, &share);
     motion->tail_gap = share * body->offset * LOOKUP_F(sin)(LOOKUP_PI / body->tails) * body->slender;
     if (body->tails < LOOKUP_C(1.5)) motion->tail_gap = LOOKUP_C(HUGE_VAL);
-    if (found > 1 || !lookup_within(robot) || !(LOOKUP_F(fabs)(u[2]) <= LOOKUP_C(0.6) * spin)) return LOOKUP_OUTSIDE;
+    if (!lookup_within(robot) || !(LOOKUP_F(fabs)(u[2]) <= LOOKUP_C(0.6) * spin)) return LOOKUP_OUTSIDE;
     return LOOKUP_INSIDE;
 }
 

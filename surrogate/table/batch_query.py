@@ -23,18 +23,18 @@ from surrogate.table.compiled_query import (
     NOT_LEARNED,
     NOVELTY,
     REASON,
-    SUPPORT_NUMBERS,
-    TERMS,
     WIDTH_FEATURES,
     WITH_DWELL,
     WITH_WIDTHS,
     assemble,
     judged,
+    products_at,
     put_half_width,
     put_response,
     put_steady,
     response_inputs,
     scaled_features,
+    support_numbers,
 )
 from surrogate.table.errors import OUTPUTS
 from surrogate.table.flat_table import (
@@ -43,22 +43,21 @@ from surrogate.table.flat_table import (
     LAG,
     MEMORY,
     NETWORK,
-    PRODUCTS,
     SUPPORT,
     WIDTHS,
     WRENCH,
 )
 from surrogate.table.support import novelty_block
-from surrogate.wrench.balance import LEFT_OVER, MATRICES, inputs_at
+from surrogate.wrench.balance import LEFT_OVER, MATRICES, SINGLE, inputs_at, network_inputs_at
 from surrogate.wrench.balance_blocks import STATE
 from surrogate.wrench.heads import HEAD_NUMBERS, ROBOT_NUMBERS
 from surrogate.wrench.motions import solve_many
 
 _OUTPUTS = len(OUTPUTS)
-_X, _ANSWER = 0, 15  # rows of a block: inputs of networks; answers
-_SHARE = (
-    _ANSWER + ANSWERS
-)  # of the gap; of this, parts of the domain, logarithms of widths, what else is worked in
+# Rows of a block: inputs of networks, and of the wrench's own; answers; share of the gap; part of the domain;
+# logarithms of widths; what else is worked in.
+_X, _OWN, _ANSWER = 0, 15, 15 + SINGLE
+_SHARE = _ANSWER + ANSWERS
 _PART, _LOGARITHM, _WORK = _SHARE + 1, _SHARE + 2, _SHARE + 2 + _OUTPUTS
 BLOCK_ROWS = _WORK  # and those of novelty, design, or terms with a network
 
@@ -80,7 +79,7 @@ def query_blocks(
         singles: the numbers in single precision.
         chosen: indices of the robots, so many.
         groups, robots, dwells, wanted: of all robots, see `surrogate.table.compiled_query.query_rows`.
-        states, found: to work in, (2 K, STATE) and (2 K,).
+        states, found: to work in, (K, STATE) and (K,).
         lanes: to work in, so many rows of BLOCK.
         room, matrices: to work in, as for one robot.
     """
@@ -88,8 +87,8 @@ def query_blocks(
     group, robot = array_at(groups, (GROUPS, count)), array_at(robots, (count, ROBOT_NUMBERS))
     dwell, answer = array_at(dwells, count), array_at(answers, (count, ANSWERS))
     state, flags, block = (
-        array_at(states, (2 * some, STATE)),
-        array_at(found, 2 * some),
+        array_at(states, (some, STATE)),
+        array_at(found, some),
         array_at(lanes, (lane_space, BLOCK)),
     )
     work, squares = array_at(room, space), array_at(matrices, (MATRICES, 4, 4))
@@ -111,9 +110,12 @@ def query_blocks(
             k = min(begin + b, some - 1)
             _put_motion(robot[rows[k]], state[k, :5], block[:, b])
         if support >= 0:
+            for b in range(BLOCK):
+                k = min(begin + b, some - 1)
+                network_inputs_at(robot[rows[k], HEAD_NUMBERS:], state[k, :5], block[_OWN : _OWN + sizes[1], b])
             novelty_block(
-                table[support : support + SUPPORT_NUMBERS], at[PRODUCTS : PRODUCTS + 2 * TERMS],
-                block[_X : _X + 7], block[_ANSWER + NOVELTY], block[_WORK:],
+                table[support : support + support_numbers(kind)], products_at(at, kind),
+                block[_OWN : _OWN + sizes[1]], block[_ANSWER + NOVELTY], block[_WORK:],
             )  # fmt: skip
         evaluate_block(
             table, at[GAP : GAP + NETWORK], block[_X : _X + 8], block[_SHARE : _SHARE + 1], block[_WORK:]
@@ -123,7 +125,7 @@ def query_blocks(
             lane = block[_ANSWER:_SHARE, b]
             lane[REASON] = NOT_LEARNED
             if sizes[0] >= 0 and support >= 0:
-                lane[REASON] = judged(table, at, group[:, rows[k]], lane, lane[NOVELTY], flags[k])
+                lane[REASON] = judged(table, at, group[:, rows[k]], lane, lane[NOVELTY], flags[k] != LEFT_OVER)
             put_steady(robot[rows[k]], lane, block[_SHARE, b])
         if wanted & WITH_DWELL:
             _responses(table, at, robot, rows[begin:], dwell, block, work)

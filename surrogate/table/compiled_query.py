@@ -32,20 +32,21 @@ from surrogate.table.flat_table import (
     NETWORK,
     PRODUCTS,
     RANGES,
+    SINGLE_PRODUCTS,
     SUPPORT,
     WIDTHS,
     WRENCH,
 )
 from surrogate.table.support import monomial_count, novelty_at, support_room
-from surrogate.wrench.balance import LEFT_OVER, MATRICES, SEVERAL, inputs_at, solve
+from surrogate.wrench.balance import MATRICES, SINGLE, inputs_at, network_inputs_at, solve
 from surrogate.wrench.heads import HEAD_LENGTH, HEAD_NUMBERS, RESISTANCE, ROBOT_NUMBERS, SENSE
-from surrogate.wrench.tails import INPUTS, inputs_of_head
+from surrogate.wrench.tails import INPUTS, SINGLE_INPUTS, inputs_of_head
 
 GROUPS = len(ROBOT)  # in the order of ROBOT
 MOTION, INPUT, NOVELTY, REASON, STEADY, RESPONSE, HALF = 0, 5, 12, 13, 14, 22, 26  # rows of the answer
 ANSWERS = HALF + len(OUTPUTS)
 WITH_DWELL, WITH_WIDTHS, ASSEMBLED = 1, 2, 4  # what is wanted; whether the robots are given as heads and tails
-INSIDE, NOT_LEARNED, NO_MOTION, STRANGE, QUICK, IMPOSSIBLE, AMBIGUOUS = range(7)  # reasons
+INSIDE, NOT_LEARNED, NO_MOTION, STRANGE, QUICK, IMPOSSIBLE = range(6)  # reasons
 BRANCHES = 0.6  # |ω_yr/ω_t| from which a robot may have several motions
 _C_T, _C_R, _C_YR, _LENGTH, _HEAD, _SLENDERNESS, _SPEED, _NUMBER, _OFFSET = range(GROUPS)
 _KNOTS = len(DWELLS)
@@ -53,9 +54,8 @@ _SHORTEST, _LONGEST = float(DWELLS[0]) * (1 - 1e-9), float(DWELLS[-1])
 _POINTS = 3 * _KNOTS  # of a lag curve
 _SMALL_SURGE = 0.1  # of v_x
 WIDTH_FEATURES = 11
-TERMS = monomial_count(len(INPUTS))
-SUPPORT_NUMBERS = 2 * len(INPUTS) + 1 + TERMS * TERMS
-_SUPPORT_ROOM = support_room(len(INPUTS))
+_TERMS, _SINGLE_TERMS = monomial_count(len(INPUTS)), monomial_count(len(SINGLE_INPUTS))
+_SUPPORT_ROOM = max(support_room(len(INPUTS)), support_room(len(SINGLE_INPUTS)))
 _MOST = 1.7976931348623157e308
 _SCALES = np.array([SCALES[name] for name in OUTPUTS])
 
@@ -122,9 +122,9 @@ def assemble(group: Floats, robot: Floats) -> None:
     robot[SENSE] = 1.0 if group[_SPEED] > 0 else -1.0
     tail[0], tail[1], tail[2], tail[3] = perp, parallel, offset, 1 / group[_SLENDERNESS]
     tail[4], tail[5] = count, resistance[18]
-    tail[6], tail[7], tail[8], tail[9], tail[10], tail[11], tail[12] = inputs_of_head(
+    tail[6], tail[7], tail[8], tail[9], tail[10], tail[11], tail[12], tail[13], tail[14] = inputs_of_head(
         resistance[0], resistance[6], resistance[12], resistance[18],
-        resistance[2], resistance[3], resistance[19], length, count * perp,
+        resistance[2], resistance[3], resistance[19], resistance[14], length, robot[1], count * perp, offset,
     )  # fmt: skip
 
 
@@ -136,39 +136,53 @@ def _motion(
     possible = _possible(group)
     kind = int(min(group[_NUMBER], 3.0)) - 1 if possible else 0
     sizes = places[WRENCH + NETWORK * kind : WRENCH + NETWORK * (kind + 1)]
-    motion, x = room[:5], room[5:12]
-    work, solution = room[12 : 12 + _SUPPORT_ROOM], room[12 + _SUPPORT_ROOM :]
+    motion, x = room[:5], room[5 : 5 + sizes[1]]
+    work, solution = room[5 + SINGLE : 5 + SINGLE + _SUPPORT_ROOM], room[5 + SINGLE + _SUPPORT_ROOM :]
     novelty, reason = 0.0, NOT_LEARNED
     for i in range(5):
         motion[i] = np.nan
-    found = LEFT_OVER
+    converged = False
     if possible and sizes[0] >= 0:
-        found = solve(table, sizes, robot, motion, solution, matrices)
-    inputs_at(robot[HEAD_NUMBERS:], motion, x)
+        converged = solve(table, sizes, robot, motion, solution, matrices)
     at = places[SUPPORT + kind]
     if sizes[0] >= 0 and at >= 0:
-        products = places[PRODUCTS : PRODUCTS + 2 * TERMS]
-        novelty = novelty_at(table[at : at + SUPPORT_NUMBERS], products, x, work)
-        reason = judged(table, places, group, motion, novelty, found)
+        network_inputs_at(robot[HEAD_NUMBERS:], motion, x)
+        novelty = novelty_at(table[at : at + support_numbers(kind)], products_at(places, kind), x, work)
+        reason = judged(table, places, group, motion, novelty, converged)
     if not possible:
         reason = IMPOSSIBLE
     for i in range(5):
         answer[MOTION + i] = motion[i]
-    for i in range(7):
-        answer[INPUT + i] = x[i]
+    inputs_at(robot[HEAD_NUMBERS:], motion, answer[INPUT : INPUT + 7])
     answer[NOVELTY], answer[REASON] = novelty, reason
 
 
 @compiled
-def judged(table: Floats, places: Integers, group: Floats, motion: Floats, novelty: float, found: int) -> int:
-    """Return why a robot whose number of tails was learned is outside; `found` is what its solution ended with."""
-    if not (found != LEFT_OVER and _within(table, places, group)):
+def support_numbers(kind: int) -> int:
+    """Return how many numbers the support of one of the classes of tails has."""
+    if kind == 0:
+        return 2 * SINGLE + 1 + _SINGLE_TERMS * _SINGLE_TERMS
+    return 2 * len(INPUTS) + 1 + _TERMS * _TERMS
+
+
+@compiled
+def products_at(places: Integers, kind: int) -> Integers:
+    """Return the monomials of the support of one of the classes of tails."""
+    if kind == 0:
+        return places[SINGLE_PRODUCTS : SINGLE_PRODUCTS + 2 * _SINGLE_TERMS]
+    return places[PRODUCTS : PRODUCTS + 2 * _TERMS]
+
+
+@compiled
+def judged(table: Floats, places: Integers, group: Floats, motion: Floats, novelty: float, converged: bool) -> int:
+    """Return why a robot whose number of tails was learned is outside."""
+    if not (converged and _within(table, places, group)):
         return NO_MOTION
     if not novelty <= 1:
         return STRANGE
     if abs(motion[2]) > BRANCHES * abs(motion[4]):
         return QUICK
-    return AMBIGUOUS if found == SEVERAL else INSIDE
+    return INSIDE
 
 
 @compiled

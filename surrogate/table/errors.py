@@ -90,13 +90,14 @@ def summary(errors: Mapping[str, Floats], valid: Flags) -> dict[str, dict[str, f
 
 
 def coverage(answer: Columns, truth: Columns) -> dict[str, float]:
-    """Return the share of rows whose true value lies inside the interval, by output."""
+    """Return the share of rows whose true value lies inside the interval, by output; not of one without rows."""
     shares = {}
     for name in COMPARED:
         if f"{name}_low" in answer:
             known = np.isfinite(truth[name])
             inside = (truth[name] >= answer[f"{name}_low"]) & (truth[name] <= answer[f"{name}_high"])
-            shares[name] = float(np.mean(inside[known]))
+            if known.any():
+                shares[name] = float(np.mean(inside[known]))
     return shares
 
 

@@ -5,7 +5,7 @@
     WRENCH    three networks of the tails' wrench, each as in `surrogate.networks.compiled.Packed`
     GAP       the network of the gap
     LAG, MEMORY   the networks of the response; that of the memory without its other outputs
-    SUPPORT   three supports, see `surrogate.table.support.Support.numbers`
+    SUPPORT   three supports, see `surrogate.table.support.Support.numbers`; the first is of a single tail's inputs
     RANGES    least and greatest of ω̄, l/R, l/r0 and a/R
     CURVES    logarithms of DWELLS; mean and components of the lag at equal dwells
     FEATURES  shift, scale and halves of the features of the intervals
@@ -26,15 +26,17 @@ from surrogate.networks.ensemble import SHARED, Ensemble
 from surrogate.table.errors import OUTPUTS
 from surrogate.table.intervals import Intervals
 from surrogate.table.response_table import ResponseTable
-from surrogate.table.support import Support, products_of, support_room
+from surrogate.table.support import Support, monomial_count, products_of, support_room
 from surrogate.table.wrench_table import WrenchTable
 from surrogate.wrench.balance import solution_room
 from surrogate.wrench.motions import lane_rows
-from surrogate.wrench.tails import INPUTS
+from surrogate.wrench.tails import INPUTS, SINGLE_INPUTS
 
 NETWORK = 6  # places of a network
 WRENCH, GAP, LAG, MEMORY, SUPPORT, RANGES, CURVES, FEATURES, WIDTHS = 0, 18, 24, 30, 36, 39, 40, 41, 42
-PRODUCTS = WIDTHS + len(OUTPUTS)  # where the monomials of the supports begin among the places
+# where the monomials of the supports begin among the places: those of INPUTS, and of SINGLE_INPUTS
+PRODUCTS = WIDTHS + len(OUTPUTS)
+SINGLE_PRODUCTS = PRODUCTS + 2 * monomial_count(len(INPUTS))
 DESIGN = 78  # numbers that the logarithm of a width is linear in
 
 
@@ -89,11 +91,12 @@ def flat_table(
                 put(WIDTHS + i, intervals.weights[name], bounds, intervals.factor[name])
     known = [network.packed.sizes for network in networks if network is not None]
     components = int(places[LAG + 2] + places[MEMORY + 2])
-    room = support_room(len(INPUTS)) + max(solution_room(sizes) for sizes in known) + components + DESIGN
+    of_support = max(support_room(len(names)) for names in (INPUTS, SINGLE_INPUTS))
+    room = of_support + max(solution_room(sizes) for sizes in known) + components + DESIGN
     numbers = np.concatenate(parts)
-    block_rows = components + max(support_room(len(INPUTS)), DESIGN, *(lane_rows(sizes) for sizes in known))
-    products = products_of(len(INPUTS)).ravel()
-    return FlatTable(numbers, np.concatenate([places, products]), room, in_single_precision(numbers), block_rows)
+    block_rows = components + max(of_support, DESIGN, *(lane_rows(sizes) for sizes in known))
+    products = [products_of(len(names)).ravel() for names in (INPUTS, SINGLE_INPUTS)]
+    return FlatTable(numbers, np.concatenate([places, *products]), room, in_single_precision(numbers), block_rows)
 
 
 def first_outputs(network: Ensemble, count: int) -> Ensemble:

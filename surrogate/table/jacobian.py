@@ -17,6 +17,7 @@ from surrogate.networks.ensemble import Ensemble
 from surrogate.table.wrench_table import WrenchTable, network_index
 from surrogate.wrench.balance import inverses_of
 from surrogate.wrench.heads import full_motion, heads_and_tails, slope_at, unbalanced
+from surrogate.wrench.tails import Tails, network_inputs
 
 
 def slopes(
@@ -46,12 +47,16 @@ def _changes(
     table: WrenchTable, network: Ensemble, columns: dict[str, Floats], u: Floats, parameters: Sequence[str]
 ) -> dict[str, tuple[Floats, ...]]:
     """Return derivatives of STEADY_OUTPUTS by parameter, of robots with one network and the solution u (M, 4)."""
+
+    def numbers(tails: Tails, motion: Floats) -> Floats:
+        return network(network_inputs(tails, motion, network.shape["inputs"]))
+
     heads, tails = heads_and_tails(columns, keep=parameters)
-    inverse = inverses_of(slope_at(lambda v: unbalanced(heads, tails, v, network), u))
+    inverse = inverses_of(slope_at(lambda v: unbalanced(heads, tails, v, numbers), u))
 
     def outputs(robots: dict[str, Floats]) -> tuple[Floats, ...]:
         heads, tails = heads_and_tails(robots, keep=parameters)
-        residual = unbalanced(heads, tails, u, network)
+        residual = unbalanced(heads, tails, u, numbers)
         motion = full_motion(heads, u - (inverse @ residual[..., None])[..., 0])
         return table.outputs(heads, motion, table.tail_gap(tails, motion))
 

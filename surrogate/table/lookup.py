@@ -6,9 +6,8 @@ head, disc and motor. Its response to a flip comes from learned curves (`surroga
 output can have an interval (`surrogate.table.intervals`).
 
 Rejected, or flagged on request: robots outside the joint support of the training data (`surrogate.table.support`),
-robots that yaw more than BRANCHES times as fast as their tails turn, which may have several motions, and robots
-with one tail whose balance has two solutions. Effects on the tails themselves are always rejected. The table does
-not extrapolate.
+and robots that yaw more than BRANCHES times as fast as their tails turn, which may have several motions. Effects
+on the tails themselves are always rejected. The table does not extrapolate.
 """
 
 from __future__ import annotations
@@ -46,13 +45,13 @@ from surrogate.table.support import Support
 from surrogate.table.tensor_file import digest, write
 from surrogate.table.wrench_table import WrenchTable, motion_sensitivity, network_index, rows_by_network
 from surrogate.wrench.heads import Heads, heads_and_tails, needs_no_learning, pack_robots
-from surrogate.wrench.tails import Tails, wrench_slopes
+from surrogate.wrench.tails import Tails, network_inputs, wrench_slopes
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-FORMAT = 6  # of model files
+FORMAT = 7  # of model files
 CERTIFIED = "certified_error"
 _REASONS = (  # why a robot is outside
     "",
@@ -61,7 +60,6 @@ _REASONS = (  # why a robot is outside
     "its tails move as none of the learned ones do",
     "it yaws nearly as fast as its tails turn, and may have several motions",
     "no robot has such numbers",
-    "the balance of its single tail has several solutions",
 )
 _MOTION, _INPUTS = slice(MOTION, MOTION + 5), slice(INPUT, INPUT + 7)  # rows of the compiled loop's answer
 _NOT_OF_HEAD = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
@@ -266,15 +264,15 @@ class NeuralTable:
     def width_features(self, motions: Motions) -> Floats:
         """Return what the width of an interval may depend on, (M, 11)."""
         heads, tails, motion = motions.heads, motions.tails, motions.motion
-        inputs = motions.inputs
         novelty, spread = np.zeros(len(motion)), np.zeros(len(motion))
         weight = motion_sensitivity(heads, tails, motion) @ wrench_slopes(tails, motion)
         kind = network_index(tails.number)
         for k, rows in rows_by_network(kind):
             network, support = self.tails.wrench[k], self.support[k]
             if network is not None and support is not None:
-                novelty[rows] = support.novelty(inputs[rows])
-                members = network.members_at(np.concatenate([inputs[rows], tails.head[rows]], -1))
+                own = network_inputs(tails.at(rows), motion[rows], network.shape["inputs"])
+                novelty[rows] = support.novelty(own)
+                members = network.members_at(own)
                 apart = (weight[rows] @ (members - members.mean(0))[..., None])[..., 0]
                 spread[rows] = np.linalg.norm(apart, axis=-1).mean(0)
         extra = [
@@ -283,7 +281,7 @@ class NeuralTable:
             np.log(tails.number),
             kind == 0,
         ]
-        return np.nan_to_num(np.column_stack([inputs, *extra]))
+        return np.nan_to_num(np.column_stack([motions.inputs, *extra]))
 
     def _intervals(self, motions: Motions, result: Mapping[str, Floats]) -> dict[str, Floats]:
         if self.intervals is None:

@@ -19,10 +19,10 @@ from surrogate.table.intervals import PARTS as INTERVAL_PARTS
 from surrogate.table.response_table import PARTS, SHAPES
 from surrogate.table.support import monomial_count
 from surrogate.table.wrench_table import CLASSES
-from surrogate.wrench.tails import HEAD_INPUTS, INPUTS, TYPICAL
+from surrogate.wrench.tails import INPUTS, SINGLE_INPUTS, TYPICAL
 
 _ENTRIES = ("wrench", "gap", "curves", "bases", "support", "intervals", "ranges", "errors", "provenance")
-_WRENCH_INPUTS = (len(INPUTS), len(INPUTS) + len(HEAD_INPUTS))
+_WRENCH_INPUTS = (len(SINGLE_INPUTS), len(INPUTS), len(INPUTS))  # of each of CLASSES
 _GAP_INPUTS, _CURVE_INPUTS, _WIDTH_FEATURES = 8, 15, 11  # as wrench_table, response_table and lookup give them
 
 
@@ -47,14 +47,14 @@ def check_form(content: Mapping[str, Any]) -> None:
     if len(content["curves"]) != len(PARTS) or set(content["bases"]) != set(SHAPES):
         raise IncompleteError("it has no response to a flip")
     _check_numbers(content)
-    for part in wrench:
+    for part, inputs in zip(wrench, _WRENCH_INPUTS, strict=True):
         if part is not None:
-            _check_network(part, _WRENCH_INPUTS, len(TYPICAL[0]))
-    _check_network(content["gap"], (_GAP_INPUTS,), 1)
+            _check_network(part, inputs, len(TYPICAL[0]))
+    _check_network(content["gap"], _GAP_INPUTS, 1)
     _check_curves(content["curves"], content["bases"])
-    for part in support:
+    for part, inputs in zip(support, _WRENCH_INPUTS, strict=True):
         if part is not None:
-            _check_support(part)
+            _check_support(part, inputs)
     if content["intervals"] is not None:
         _check_intervals(content["intervals"])
     if CURVE_ERRORS in content:
@@ -80,14 +80,14 @@ def _check_numbers(content: Mapping[str, Any]) -> None:
         raise IncompleteError("some of its intervals are no numbers")
 
 
-def _check_network(stored: Mapping[str, Any], inputs: tuple[int, ...], outputs: int) -> None:
+def _check_network(stored: Mapping[str, Any], inputs: int, outputs: int) -> None:
     shape, state = stored["shape"], stored["state"]
     sizes = state["bypass"].shape + state["weights.0"].shape[2:]
     stated = tuple(shape[name] for name in ("members", "inputs", "outputs", "width"))
     whole = all(type(size) is int and size > 0 for size in shape.values())
     if not whole or sizes != stated or shape["depth"] > len(state):
         raise IncompleteError("a network has another shape than is said")
-    if shape["inputs"] not in inputs or shape["outputs"] != outputs:
+    if shape["inputs"] != inputs or shape["outputs"] != outputs:
         raise IncompleteError("a network has other inputs or outputs than are needed")
     for name, expected in state_shapes(**shape).items():
         _check_array(state[name], expected)
@@ -99,12 +99,12 @@ def _check_curves(networks: list[Any], bases: Mapping[str, Any]) -> None:
         _check_array(basis["mean"], (points,))
         _check_array(basis["vectors"], (len(basis["vectors"]), points))
     for names, network in zip(PARTS, networks, strict=True):
-        _check_network(network, (_CURVE_INPUTS,), sum(len(bases[name]["vectors"]) for name in names))
+        _check_network(network, _CURVE_INPUTS, sum(len(bases[name]["vectors"]) for name in names))
 
 
-def _check_support(part: Mapping[str, Any]) -> None:
-    size = monomial_count(len(INPUTS))
-    for name, shape in (("shift", (len(INPUTS),)), ("scale", (len(INPUTS),)), ("factor", (size, size))):
+def _check_support(part: Mapping[str, Any], inputs: int) -> None:
+    size = monomial_count(inputs)
+    for name, shape in (("shift", (inputs,)), ("scale", (inputs,)), ("factor", (size, size))):
         _check_array(part[name], shape)
     if not isinstance(part["limit"], float) or not part["limit"] > 0:
         raise IncompleteError("its domain has no limit")

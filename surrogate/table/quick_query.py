@@ -99,7 +99,7 @@ class QuickQuery:
         count, table = groups.shape[1], self._table
         answers, lanes = np.empty((count, ANSWERS)), np.empty((BLOCK_ROWS + table.block_rows, BLOCK))
         room, matrices = np.empty(table.room), np.empty((MATRICES, 4, 4))
-        most = 2 * min(count, _CHUNK)
+        most = min(count, _CHUNK)
         states, found = np.empty((most, STATE)), np.empty(most, dtype=np.int64)
         kinds = np.minimum(groups[ROBOT.index("N")], 3)
         for begin in range(0, count, _CHUNK):

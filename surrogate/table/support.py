@@ -1,10 +1,12 @@
 """The domain of the table: the joint support of its training data, as a smooth measure.
 
-    q(x) = φ(x)ᵀ M⁻¹ φ(x)/F,   M = mean of φ φᵀ over the rows,   φ: the F monomials up to degree 3
+    q(x) = φ(x)ᵀ M⁻¹ φ(x)/F,   M = mean of φ φᵀ over the rows,   φ: the F monomials up to degree 3 (of seven
+    inputs) or 2 (of more)
 
 1/q is the Christoffel function of the rows. q is about 1 inside their support and grows with a high power
 outside of it, in every direction, also where each input alone looks harmless. Its limit is its largest value
-over almost all rows. Source: Lasserre and Pauwels, Adv. Comput. Math. 45, 1439 (2019).
+over almost all rows. Along one input alone q grows slowly at first. So each input must be within the range of the
+rows as well. Source: Lasserre and Pauwels, Adv. Comput. Math. 45, 1439 (2019).
 """
 
 from __future__ import annotations
@@ -21,9 +23,10 @@ from sim.compiling import compiled
 from sim.object_code import COUNT, FLOATS, INTEGERS, array_at, kept
 from surrogate.networks.blocks import BLOCK
 
-DEGREE = 3
+_DEGREE, _DEGREE_OF_MANY, _MANY = 3, 2, 8  # of the monomials; of so many inputs and more
 _KEPT = 0.998  # share of the rows that are inside
 _SLACK = 1.5
+_END = 1.02  # of half an input's range
 _REGULAR = 1e-9
 
 
@@ -49,7 +52,11 @@ class Support:
         return Support(shift, scale, plain.factor, limit)
 
     def novelty(self, inputs: Floats) -> Floats:
-        """Return q over its limit, (M,), at inputs (M, F): at most 1 inside."""
+        """Return the novelty, (M,), at inputs (M, F): at most 1 inside.
+
+        It is q over its limit. Outside the range of an input, by more than a hundredth of its width, it is the
+        distance from the middle of the range over half its width, if that is larger.
+        """
         inputs = np.ascontiguousarray(inputs, dtype=float)
         products, numbers, novelty = products_of(len(self.shift)), self.numbers, np.empty(len(inputs))
         rows = support_room(len(self.shift)) + len(self.shift) + 1
@@ -64,7 +71,7 @@ class Support:
 
 
 def monomial_count(inputs: int) -> int:
-    """Return the number of monomials up to DEGREE of some inputs, P."""
+    """Return the number of monomials of some inputs, P."""
     return products_of(inputs).shape[1]
 
 
@@ -75,13 +82,13 @@ def support_room(inputs: int) -> int:
 
 @cache
 def products_of(inputs: int) -> Integers:
-    """List the monomials up to DEGREE of some inputs, the constant first: parents and last inputs, (2, P).
+    """List the monomials of some inputs, the constant first: parents and last inputs, (2, P).
 
     Monomial p is monomial parents[p] times the input last[p].
     """
     parents, last = [0], [0]
     index: dict[tuple[int, ...], int] = {(): 0}
-    for degree in range(1, DEGREE + 1):
+    for degree in range(1, 1 + (_DEGREE_OF_MANY if inputs >= _MANY else _DEGREE)):
         for names in combinations_with_replacement(range(inputs), degree):
             index[names] = len(parents)
             parents.append(index[names[:-1]])
@@ -90,7 +97,7 @@ def products_of(inputs: int) -> Integers:
 
 
 def _monomials(x: Floats) -> Floats:
-    """Return all monomials up to DEGREE of x (M, F), (M, P)."""
+    """Return all monomials of x (M, F), (M, P)."""
     columns = [np.ones(len(x))]
     for parent, factor in products_of(x.shape[1]).T[1:].tolist():
         columns.append(columns[parent] * x[:, factor])
@@ -101,7 +108,7 @@ def _monomials(x: Floats) -> Floats:
 def novelty_rows(
     count: int, size: int, terms: int, products: Any, numbers: Any, inputs: Any, novelty: Any, room: Any
 ) -> None:
-    """Write q over its limit of inputs (M, F) to novelty (M,)."""
+    """Write `Support.novelty` of inputs (M, F) to novelty (M,)."""
     support, pairs = array_at(numbers, 2 * size + 1 + terms * terms), array_at(products, 2 * terms)
     x, q = array_at(inputs, (count, size)), array_at(novelty, count)
     work = array_at(room, (2 * size + terms + 1, BLOCK))
@@ -116,7 +123,7 @@ def novelty_rows(
 
 @compiled
 def novelty_block(support: Floats, products: Integers, inputs: Floats, novelty: Floats, room: Floats) -> None:
-    """Write q over its limit at inputs (F, BLOCK) to novelty (BLOCK,); see `novelty_at`, with rooms of BLOCK."""
+    """Write `Support.novelty` at inputs (F, BLOCK) to novelty (BLOCK,); see `novelty_at`, with rooms of BLOCK."""
     size, count = len(inputs), len(products) // 2
     x, features = room[:size], room[size : size + count]
     for i in range(size):
@@ -150,11 +157,16 @@ def novelty_block(support: Floats, products: Integers, inputs: Floats, novelty: 
             novelty[b] += row[b] * row[b]
     for b in range(BLOCK):
         novelty[b] = novelty[b] / count / support[2 * size]
+    for i in range(size):
+        scaled = x[i]
+        for b in range(BLOCK):
+            away = abs(scaled[b])
+            novelty[b] = max(novelty[b], away) if away > _END else novelty[b]
 
 
 @compiled
 def novelty_at(support: Floats, products: Integers, inputs: Floats, room: Floats) -> float:
-    """Return q over its limit at inputs (F,).
+    """Return `Support.novelty` at inputs (F,).
 
     Args:
         support: `Support.numbers`.
@@ -175,4 +187,9 @@ def novelty_at(support: Floats, products: Integers, inputs: Floats, room: Floats
         for i in range(j + 1, count):
             features[i] -= column[i] * solved
         novelty += solved**2
-    return novelty / count / support[2 * size]
+    novelty = novelty / count / support[2 * size]
+    for i in range(size):
+        away = abs(x[i])
+        if away > _END:
+            novelty = max(novelty, away)
+    return novelty

@@ -35,11 +35,11 @@ from surrogate.table.wrench_table import (
 )
 from surrogate.wrench.heads import Heads, heads_and_tails
 from surrogate.wrench.tails import (
-    HEAD_SMOOTHNESS,
+    SINGLE_SMOOTHNESS,
     SMOOTHNESS,
     TYPICAL,
     Tails,
-    inputs_with_head,
+    single_inputs,
     straight_wrench,
     tail_inputs,
     wrench_slopes,
@@ -86,15 +86,25 @@ def learnable(rows: WrenchSamples) -> Flags:
     return (spin > 0) & (yaw > 0) & (yaw < TURNS * spin)
 
 
-def fit_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext) -> WrenchTable:
-    """Fit the networks of all CLASSES to samples that are `learnable`."""
+def fit_wrench(
+    rows: WrenchSamples, settings: Settings, work: TrainingContext, *, single_settings: Settings | None = None
+) -> WrenchTable:
+    """Fit the networks of all CLASSES to samples that are `learnable`.
+
+    Args:
+        rows: the samples.
+        settings: of the networks.
+        work: device, progress bars, and where states are kept.
+        single_settings: of the network of robots with one tail; by default `settings`.
+    """
     kind = network_index(rows.tails.number)
     networks: list[Ensemble | None] = []
     for k, count in enumerate(CLASSES):
         context = work.part(f"tails of N = {count}{' and more' if count == CLASSES[-1] else ''}")
         samples = rows.at(kind == k)
         known = len(samples.motion) > 0
-        networks.append(_learn_wrench(samples, settings, context, count) if known else None)
+        own = single_settings or settings if count == 1 else settings
+        networks.append(_learn_wrench(samples, own, context, count) if known else None)
     several_tails = rows.at(rows.tails.number > 1)
     gap = _learn_gap(several_tails, _GAP, work.part("gap"))
     return WrenchTable(tuple(networks), gap)
@@ -102,7 +112,7 @@ def fit_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext) -
 
 def _learn_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext, count: int) -> Ensemble:
     """Fit the network of one of CLASSES."""
-    inputs = (inputs_with_head if count == 1 else tail_inputs)(rows.tails, rows.motion)
+    inputs = (single_inputs if count == 1 else tail_inputs)(rows.tails, rows.motion)
     weight = motion_sensitivity(rows.heads, rows.tails, rows.motion)
     matrix = weight @ wrench_slopes(rows.tails, rows.motion)
     wrench = (rows.heads.resistance @ rows.motion[..., None])[..., 0]
@@ -124,7 +134,7 @@ def _learn_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext
 def _prepare(network: TrainableEnsemble, mean: Floats, spread: Floats, count: int) -> None:
     network.mean.copy_(torch.from_numpy(mean))
     network.spread.copy_(torch.from_numpy(spread))
-    smoothness = (*SMOOTHNESS, *HEAD_SMOOTHNESS)[: len(network.scale)]
+    smoothness = SINGLE_SMOOTHNESS if count == 1 else SMOOTHNESS
     network.scale.mul_(torch.tensor(smoothness, dtype=torch.float64) / 1.5)
     if count == CLASSES[-1]:
         network.scale[-1] = 1e9  # the head's spin drag plays no part

@@ -103,26 +103,34 @@ def _lists(column: Any, shape: Sequence[int]) -> Floats:
     return np.array([empty if row is None else np.asarray(row, dtype=float).reshape(shape) for row in column])
 
 
-def draw_robots(count: int, seed: int, *, wide: bool) -> dict[str, Floats]:
+def draw_robots(count: int, seed: int, *, wide: bool, effects: bool | None = None) -> dict[str, Floats]:
     """Draw robots of a scrambled Sobol sequence, even in the logarithms of DOMAIN.
 
     Args:
-        count: number of robots. seed: of the scrambling. wide: from WIDE, half of them with effects on the head,
-        a quarter each with one and two tails; else robots of
-            DOMAIN, every N alike, without effects.
+        count: number of robots.
+        seed: of the scrambling.
+        wide: from WIDE, a quarter each with one and two tails; else robots of DOMAIN, every N alike.
+        effects: give most of them effects on head and motor; by default those of WIDE.
     """
     sampler = qmc.Sobol(len(DOMAIN) + 5, scramble=True, rng=np.random.default_rng(seed))
     share = sampler.random_base2(math.ceil(math.log2(max(count, 2))))[:count]
     ranges = WIDE if wide else DOMAIN
     robots = {n: low * (high / low) ** share[:, i] for i, (n, (low, high)) in enumerate(ranges.items())}
     eighth, more, end_over_end, axial, disc = share[:, len(DOMAIN) :].T
-    if not wide:
-        return robots | {"N": 1 + np.floor(MOST_TAILS * eighth)}
-    tails = np.array(_TAILS, dtype=float)[(8 * eighth).astype(int)]
-    robots["N"] = tails + (tails >= 5) * (more > 0.5)
+    if wide:
+        tails = np.array(_TAILS, dtype=float)[(8 * eighth).astype(int)]
+        robots["N"] = tails + (tails >= 5) * (more > 0.5)
+    else:
+        robots["N"] = 1 + np.floor(MOST_TAILS * eighth)
+    if not (wide if effects is None else effects):
+        return robots
     robots["end_over_end_drag"] = np.where(end_over_end < 0.5, 0.0, 0.1 * 150 ** (2 * end_over_end - 1))
     robots["anisotropic_head_drag"] = np.where(axial < 0.5, 0.0, -0.5 + 1.5 * (2 * axial - 1))
     robots["disc_drag"] = np.where(disc < 0.6, 0.0, 3 * (disc - 0.6) / 0.4)
+    couple, sense, droop = np.random.default_rng((seed, 1)).uniform(size=(3, count))
+    size = np.where(couple < 0.5, 0.0, 0.01 * 300 ** (2 * couple - 1))
+    robots["surface_couple"] = np.where(sense < 0.5, -size, size)
+    robots["motor_droop"] = np.where(droop < 0.7, 0.0, 0.05 * 160 ** ((droop - 0.7) / 0.3))
     return robots
 
 

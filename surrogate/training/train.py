@@ -36,7 +36,7 @@ from surrogate.training.fit_response import SETTINGS, fit_part, fit_response
 from surrogate.training.fit_wrench import WrenchSamples, fit_wrench, learnable, wrench_samples
 from surrogate.training.response_errors import held_out_curve_errors
 from surrogate.training.simulated import SimulatedRobots, join_robots, read_robots, simulate_robots
-from surrogate.wrench.tails import tail_inputs
+from surrogate.wrench.tails import single_inputs, tail_inputs
 
 _FEWEST_INSIDE = 10
 _FEWEST_ROWS, _FEWEST_OF_A_CLASS = 64, 16
@@ -127,6 +127,7 @@ def learn(
     settings: Settings | None = None,
     curve_settings: Settings | None = None,
     *,
+    single_settings: Settings | None = None,
     flips_held_out: SimulatedRobots | None = None,
     source: dict[str, Any] | None = None,
     work: TrainingContext = _QUIET,
@@ -138,6 +139,7 @@ def learn(
         width_rows: robots for the local widths of the intervals.
         held_out: robots for the errors and the factor of the intervals.
         flipped: robots with response curves.
+        single_settings: of the network of robots with one tail; by default `settings`.
         flips_held_out: robots with curves for the errors of the response; by default a tenth of `flipped`.
         source: more provenance.
         work: device, progress bars, and where states are kept.
@@ -148,9 +150,7 @@ def learn(
         tenth = np.arange(len(flipped)) % 10 == 9
         flipped, flips_held_out = flipped.at(~tenth), flipped.at(tenth)
     rows = _learnable(learned)
-    table = fit_wrench(rows, wrench_settings, work)
-    kind = network_index(rows.tails.number)
-    inputs = tail_inputs(rows.tails, rows.motion)
+    table = fit_wrench(rows, wrench_settings, work, single_settings=single_settings)
     flipped, flips_held_out = _several_tails(flipped), _several_tails(flips_held_out)
     flip_samples = _learnable(flipped)
     usable = np.flatnonzero(learnable(wrench_samples(flipped.robots, flipped.motion)))
@@ -170,15 +170,67 @@ def learn(
     lookup = NeuralTable(
         tails=table,
         curves=response,
-        support=tuple(
-            Support.learned(inputs[kind == k]) if (kind == k).any() else None for k in range(len(CLASSES))
-        ),
+        support=_supports(rows),
         intervals=None,
         ranges={name: _range(learned.robots[name]) for name in learned.robots if name in ROBOT},
         errors={},
         provenance={**created, **(source or {}), "rows": counts},
     )
     return _judged(lookup, width_rows, held_out, flips_held_out)
+
+
+def learn_tails_again(
+    lookup: NeuralTable,
+    learned: SimulatedRobots,
+    width_rows: SimulatedRobots,
+    held_out: SimulatedRobots,
+    settings: Settings | None = None,
+    *,
+    single_settings: Settings | None = None,
+    source: dict[str, Any] | None = None,
+    work: TrainingContext = _QUIET,
+) -> NeuralTable:
+    """Learn networks, domain and intervals of a table's tails anew; its response to a flip stays.
+
+    The errors of the response depend on the domain: `surrogate.training.response_errors` learns them anew.
+
+    Args:
+        lookup: the table.
+        learned, width_rows, held_out: steady motions, see `learn`.
+        settings: networks of the tails and their optimiser.
+        single_settings: of the network of robots with one tail; by default `settings`.
+        source: more provenance.
+        work: device, progress bars, and where states are kept.
+    """
+    compile_once()
+    wrench_settings, rows = settings or Settings(), _learnable(learned)
+    created = provenance(
+        {
+            "tails": asdict(wrench_settings),
+            "single": asdict(single_settings or wrench_settings),
+            "curves": lookup.provenance["config"]["curves"],
+            "device": work.device,
+        }
+    )
+    counts = {"train": len(rows.motion), "widths": len(width_rows), "held_out": len(held_out)}
+    changed = replace(
+        lookup,
+        tails=fit_wrench(rows, wrench_settings, work, single_settings=single_settings),
+        support=_supports(rows),
+        ranges={name: _range(learned.robots[name]) for name in learned.robots if name in ROBOT},
+        provenance={**created, **(source or {}), "rows": {**lookup.provenance["rows"], **counts}},
+    )
+    return _with_intervals(changed, width_rows, held_out)
+
+
+def _supports(rows: WrenchSamples) -> tuple[Support | None, ...]:
+    """Learn the domain of each of CLASSES, from the inputs of its network; None where there are no rows."""
+    kind, supports = network_index(rows.tails.number), list[Support | None]()
+    for k, count in enumerate(CLASSES):
+        some = rows.at(kind == k)
+        inputs = (single_inputs if count == 1 else tail_inputs)(some.tails, some.motion)
+        supports.append(Support.learned(inputs) if len(inputs) else None)
+    return tuple(supports)
 
 
 def fit_spread(
@@ -195,20 +247,30 @@ def fit_spread(
 def _judged(
     lookup: NeuralTable, width_rows: SimulatedRobots, held_out: SimulatedRobots, flips: SimulatedRobots
 ) -> NeuralTable:
-    """Add intervals and held-out errors to a table; the errors are those of robots with two tails and more."""
+    """Add intervals and held-out errors to a table."""
+    lookup = _with_intervals(lookup, width_rows, held_out)
+    flips = flips.at(np.abs(flips.motion["omega_yr_bar"]) < BRANCHES * np.abs(flips.motion["omega_t_bar"]))
+    response = lookup.response(flips.robots, flag=True)
+    truth = {**flips.motion, **flips.curves}
+    report = summary(curve_errors(response, truth), flips.motion["tail_gap"] >= 1)
+    return replace(lookup, errors={**lookup.errors, **report}, curve_errors=held_out_curve_errors(lookup, flips))
+
+
+def _with_intervals(lookup: NeuralTable, width_rows: SimulatedRobots, held_out: SimulatedRobots) -> NeuralTable:
+    """Add intervals and held-out errors of the steady motion to a table.
+
+    The intervals are those of all rows, the errors those of robots with two tails and more without effects.
+    """
     (first_features, first, _), (features, errors, inside) = (
         _errors(lookup, rows) for rows in (width_rows, held_out)
     )
     intervals = Intervals.learned(first_features, first, features, errors)
     apart = held_out.motion["tail_gap"][inside] >= 1
-    several = held_out.robots["N"][inside] > 1
-    several = several if several.any() else ~several
+    plain = without_effects(held_out.robots)[inside]
+    several = plain & (held_out.robots["N"][inside] > 1)
+    several = several if several.any() else plain
     report = summary({name: error[several] for name, error in errors.items()}, apart[several])
-    flips = flips.at(np.abs(flips.motion["omega_yr_bar"]) < BRANCHES * np.abs(flips.motion["omega_t_bar"]))
-    response = lookup.response(flips.robots, flag=True)
-    truth = {**flips.motion, **flips.curves}
-    report |= summary(curve_errors(response, truth), flips.motion["tail_gap"] >= 1)
-    return replace(lookup, intervals=intervals, errors=report, curve_errors=held_out_curve_errors(lookup, flips))
+    return replace(lookup, intervals=intervals, errors={**lookup.errors, **report})
 
 
 def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[str, Floats], Flags]:
@@ -224,6 +286,12 @@ def _errors(lookup: NeuralTable, rows: SimulatedRobots) -> tuple[Floats, dict[st
         {name: error[inside] for name, error in errors.items()},
         inside,
     )
+
+
+def without_effects(robots: dict[str, Floats]) -> Flags:
+    """Return the robots without effects, (M,)."""
+    effects = [sizes for name, sizes in robots.items() if name not in ROBOT]
+    return ~np.any([sizes != 0 for sizes in effects], axis=0) if effects else np.ones(len(robots["N"]), dtype=bool)
 
 
 def _several_tails(rows: SimulatedRobots) -> SimulatedRobots:

@@ -2,10 +2,7 @@
 
 The equations are those of `surrogate.wrench.heads` and `surrogate.wrench.tails`. They are solved by Broyden's
 method. Its first derivative holds the network's numbers y fixed, so it needs no evaluation of the network; five or
-six evaluations are enough. The table of a single tail has second solutions near the true one. So there the
-equations are solved again with the exact first derivative. Of two different solutions that counts whose surge is
-nearer to the first guess (linear theory), and the robot is marked: it may be the wrong one. Units: l, μ0 l⁴/EI,
-EI/l².
+six evaluations are enough. Units: l, μ0 l⁴/EI, EI/l².
 """
 
 from __future__ import annotations
@@ -20,60 +17,29 @@ from sim.linear.dense import solve_dense
 from sim.object_code import COUNT, FLOATS, array_at, kept
 from surrogate.networks.compiled import evaluate, room_of
 from surrogate.wrench.heads import HEAD_NUMBERS, RESISTANCE
-from surrogate.wrench.tails import inputs_of_tail, linear_thrust, linear_torque, wrench_terms
+from surrogate.wrench.tails import (
+    SINGLE_INPUTS,
+    inputs_of_single,
+    inputs_of_tail,
+    linear_thrust,
+    linear_torque,
+    wrench_terms,
+)
 
 STEPS, CORRECTION = 60, 2e-12  # of Broyden's method; the correction is relative
 ACCEPTED = 1e-9  # the last of all corrections, where rounding keeps them above CORRECTION
 DIFFERENCE, LEAST_SHARE = 1e-6, 1e-3  # steps of finite differences, relative
 FIRST_SPIN = 0.6  # ω_t/ω in the first guess
 LONGEST = 0.5  # largest relative change of ω_t in one step
-_VECTORS = 64  # numbers for the vectors of one robot, before the room of the network
-LEFT_OVER, FOUND, SEVERAL = 0, 1, 2  # what a solution ends with
-SAME = 1e-6  # two solutions are one, if all velocities agree so
+SINGLE = len(SINGLE_INPUTS)
+_VECTORS = 49  # numbers for the vectors of one robot, before the room of the network
+LEFT_OVER, FOUND = 0, 1  # what a solution ends with
 MATRICES = 4  # 4×4 matrices that a solution works in
 
 
 def solution_room(sizes: Integers) -> int:
     """Return how many numbers `solve` works in with a network."""
     return _VECTORS + room_of(sizes)
-
-
-@compiled
-def solve(numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room: Floats, matrices: Floats) -> int:
-    """Write the motion (5,) of one robot (37,); return LEFT_OVER, FOUND, or SEVERAL if two motions were found.
-
-    Args:
-        numbers, sizes: network of the tails, see `surrogate.networks.compiled.Packed`.
-        room: to work in, see `solution_room`.
-        matrices: to work in, (MATRICES, 4, 4).
-    """
-    guess, second = room[:5], room[5:10]
-    first_guess(robot, guess, matrices)
-    for i in range(5):
-        motion[i] = guess[i]
-    found = _solve(numbers, sizes, robot, motion, room, matrices, False)
-    if robot[HEAD_NUMBERS + 4] == 1:
-        for i in range(5):
-            second[i] = guess[i]
-        second_found = _solve(numbers, sizes, robot, second, room, matrices, True)
-        nearer = abs(second[1] - guess[1]) < abs(motion[1] - guess[1])
-        several = found and second_found and not same_motions(motion, second)
-        if second_found and (nearer or not found):
-            for i in range(5):
-                motion[i] = second[i]
-            found = True
-        if several:
-            return SEVERAL
-    return FOUND if found else LEFT_OVER
-
-
-@compiled
-def same_motions(first: Floats, second: Floats) -> bool:
-    """Tell whether two solutions (5,) are one."""
-    same = True
-    for i in range(5):
-        same = same and abs(second[i] - first[i]) <= SAME * abs(first[i])
-    return same
 
 
 def inverses_of(matrices: Floats) -> Floats:
@@ -97,13 +63,22 @@ def inverse_rows(count: int, size: int, matrices: Any, inverses: Any) -> None:
 
 @compiled
 def inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
-    """Write `surrogate.wrench.tails.INPUTS` of one robot to x (7,), or HEAD_INPUTS after them to x (14,)."""
+    """Write `surrogate.wrench.tails.INPUTS` of one robot to x (7,)."""
     beta = np.arctan2(motion[0], motion[2])
     x[0], x[1], x[2], x[3], x[4], x[5], x[6] = inputs_of_tail(
         tail[0], tail[2], tail[3], tail[4], tail[5], motion, beta
     )
-    for i in range(7, len(x)):
-        x[i] = tail[i - 1]
+
+
+@compiled
+def network_inputs_at(tail: Floats, motion: Floats, x: Floats) -> None:
+    """Write the inputs of the network of one robot to x: SINGLE_INPUTS to x (13,), else INPUTS to x (7,)."""
+    if len(x) == SINGLE:
+        x[0], x[1], x[2], x[3] = inputs_of_single(tail[0], tail[2], tail[3], tail[5], motion[4])
+        for i in range(4, SINGLE):
+            x[i] = tail[i + 2]
+    else:
+        inputs_at(tail, motion, x)
 
 
 @compiled
@@ -149,20 +124,20 @@ def first_guess(robot: Floats, motion: Floats, matrices: Floats) -> None:
 
 
 @compiled
-def _solve(
-    numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room: Floats, matrices: Floats, exact: bool
-) -> bool:
-    """Solve by Broyden's method for one robot, from the motion given; return whether it converged.
+def solve(numbers: Floats, sizes: Integers, robot: Floats, motion: Floats, room: Floats, matrices: Floats) -> bool:
+    """Write the motion (5,) of one robot (39,); return whether the method converged.
 
     Args:
-        motion: first guess, replaced by the result, (5,).
-        exact: the first derivative is that of the network, too.
+        numbers, sizes: network of the tails, see `surrogate.networks.compiled.Packed`.
+        room: to work in, see `solution_room`.
+        matrices: to work in, (MATRICES, 4, 4).
     """
     speed, gain, tail = robot[0], robot[1], robot[HEAD_NUMBERS:]
-    x, y, residual, before = room[10 : 10 + sizes[1]], room[24:30], room[30:34], room[34:38]
-    step, change, moved, work = room[38:42], room[42:46], room[46:51], room[_VECTORS:]
+    x, y, residual, before = room[: sizes[1]], room[14:20], room[20:24], room[24:28]
+    step, change, moved, work = room[28:32], room[32:36], room[36:41], room[_VECTORS:]
     slope, inverse = matrices[2], matrices[3]
-    inputs_at(tail, motion, x)
+    first_guess(robot, motion, matrices)
+    network_inputs_at(tail, motion, x)
     evaluate(numbers, sizes, x, y, work)
     _unbalanced(robot, motion, y, residual)
     largest = 0.0
@@ -174,9 +149,6 @@ def _solve(
             moved[i] = motion[i]
         moved[j] += width
         moved[4] = speed + gain * moved[3]
-        if exact:
-            inputs_at(tail, moved, x)
-            evaluate(numbers, sizes, x, y, work)
         _unbalanced(robot, moved, y, before)
         for i in range(4):
             slope[i, j] = (before[i] - residual[i]) / width
@@ -205,12 +177,12 @@ def _solve(
             return True
         if not np.isfinite(size):
             return False
-        inputs_at(tail, motion, x)
+        network_inputs_at(tail, motion, x)
         evaluate(numbers, sizes, x, y, work)
         _unbalanced(robot, motion, y, residual)
         for i in range(4):
             change[i] = residual[i] - before[i]
-        _update(inverse, step, change, room[51:59])
+        _update(inverse, step, change, room[41:49])
     return size < ACCEPTED
 
 

@@ -26,6 +26,7 @@ from surrogate.wrench.balance import (
     LEAST_SHARE,
     LEFT_OVER,
     LONGEST,
+    SINGLE,
     STEPS,
 )
 from surrogate.wrench.heads import HEAD_NUMBERS, RESISTANCE, ROBOT_NUMBERS
@@ -46,7 +47,8 @@ STATE = 29  # numbers of a robot between steps: motion, balance before, step, in
 _MOTION, _BEFORE, _STEP, _INVERSE = ROBOT_NUMBERS, ROBOT_NUMBERS + 5, ROBOT_NUMBERS + 9, ROBOT_NUMBERS + 13
 _SIZE = _MOTION + STATE  # rows of a block: robot, state, size of the correction,
 _TASK, _TICKS, _X = _SIZE + 1, _SIZE + 2, _SIZE + 3  # which robot, steps taken, inputs of the network,
-_Y, _LEFT, _SAVED, _SLOPE = _X + 14, _X + 20, _X + 24, _X + 29  # its answer, balance, a motion, a derivative
+_Y = _X + SINGLE
+_LEFT, _SAVED, _SLOPE = _Y + 6, _Y + 10, _Y + 15  # its answer, balance, a motion, a derivative
 LANES = _SLOPE + 16
 _TAIL = HEAD_NUMBERS
 
@@ -54,26 +56,25 @@ _TAIL = HEAD_NUMBERS
 @compiled
 def solve_block_rows(
     numbers: Floats, singles: Any, sizes: Integers, robots: Floats, rows: Integers, states: Floats,
-    found: Integers, lanes: Floats, exact: bool, rough: bool,
+    found: Integers, lanes: Floats, rough: bool,
 ) -> None:  # fmt: skip
     """Solve for the motions of robots, from linear theory.
 
     Args:
         numbers, sizes: network of the tails, see `surrogate.networks.compiled.Packed`.
         singles: its numbers in single precision.
-        robots: (M, 37), see `surrogate.wrench.heads.pack_robots`.
+        robots: (M, 39), see `surrogate.wrench.heads.pack_robots`.
         rows: (K,), of the robots to solve for.
         states: (K, STATE), written: the motion (5,) first.
         found: (K,), written: FOUND or LEFT_OVER.
         lanes: to work in, (R, BLOCK): LANES and those of the network.
-        exact: the first derivative is that of the network, too.
-        rough: use single precision first; for networks of one member, with a derivative that is not exact.
+        rough: use single precision first; for networks of one member.
     """
     for begin in range(0, len(rows), BLOCK):
         for b in range(BLOCK):
             _take_robot(robots[rows[min(begin + b, len(rows) - 1)]], lanes, b)
         _first_guesses(lanes)
-        _start(numbers, singles, sizes, lanes, exact, rough)
+        _start(numbers, singles, sizes, lanes, rough)
         for b in range(min(BLOCK, len(rows) - begin)):
             found[begin + b] = FOUND
             for i in range(STATE):
@@ -85,12 +86,9 @@ def solve_block_rows(
 
 @compiled
 def _take_robot(robot: Floats, lanes: Floats, lane: int) -> None:
-    """Write a robot, and the inputs that do not depend on its motion, to a lane."""
+    """Write a robot to a lane."""
     for i in range(ROBOT_NUMBERS):
         lanes[i, lane] = robot[i]
-    tail = robot[HEAD_NUMBERS:]
-    for i in range(7):
-        lanes[_X + 7 + i, lane] = tail[6 + i]
 
 
 @compiled
@@ -122,7 +120,7 @@ def _iterate(
         if following >= len(rows) and active <= _FEW and len(rows) > _FEW:
             _leave(states, found, lanes, rough)
             return
-        _inputs(lanes)
+        _inputs(lanes, x)
         if rough:
             evaluate_roughly(numbers, singles, sizes, x, y, room)
         else:
@@ -212,10 +210,10 @@ def _first_guesses(lanes: Floats) -> None:
 
 
 @compiled
-def _start(numbers: Floats, singles: Any, sizes: Integers, lanes: Floats, exact: bool, rough: bool) -> None:
+def _start(numbers: Floats, singles: Any, sizes: Integers, lanes: Floats, rough: bool) -> None:
     """Take the first step, with the derivative at the first guess."""
     x, y, room = lanes[_X : _X + sizes[1]], lanes[_Y : _Y + 6], lanes[LANES:]
-    _inputs(lanes)
+    _inputs(lanes, x)
     if rough:
         evaluate_roughly(numbers, singles, sizes, x, y, room)
     else:
@@ -235,9 +233,6 @@ def _start(numbers: Floats, singles: Any, sizes: Integers, lanes: Floats, exact:
             lanes[_SIZE, b] = width
             lanes[_MOTION + j, b] += width
             lanes[_MOTION + 4, b] = lanes[0, b] + lanes[1, b] * lanes[_MOTION + 3, b]
-        if exact:
-            _inputs(lanes)
-            evaluate_block(numbers, sizes, x, y, room)
         _balance(lanes)
         for i in range(4):
             for b in range(BLOCK):
@@ -253,21 +248,44 @@ def _start(numbers: Floats, singles: Any, sizes: Integers, lanes: Floats, exact:
 
 
 @compiled
-def _inputs(lanes: Floats) -> None:
-    """Write `surrogate.wrench.tails.inputs_of_tail`."""
+def _inputs(lanes: Floats, x: Floats) -> None:
+    """Write `surrogate.wrench.balance.network_inputs_at` to x (F, BLOCK)."""
+    if len(x) == SINGLE:
+        _single_inputs(lanes, x)
+    else:
+        _tail_inputs(lanes, x)
+
+
+@compiled
+def _single_inputs(lanes: Floats, x: Floats) -> None:
+    """Write `surrogate.wrench.tails.SINGLE_INPUTS`."""
+    for b in range(BLOCK):
+        perp, offset = lanes[_TAIL, b], lanes[_TAIL + 2, b]
+        x[0, b] = log_of(perp * lanes[_MOTION + 4, b])
+        x[1, b] = log_of(offset)
+        x[2, b] = -log_of(lanes[_TAIL + 3, b])
+        x[3, b] = log_of(lanes[_TAIL + 5, b] / (perp * offset * offset))
+    for i in range(4, SINGLE):
+        for b in range(BLOCK):
+            x[i, b] = lanes[_TAIL + 2 + i, b]
+
+
+@compiled
+def _tail_inputs(lanes: Floats, x: Floats) -> None:
+    """Write `surrogate.wrench.tails.INPUTS`."""
     for b in range(BLOCK):
         perp, offset, radius = lanes[_TAIL, b], lanes[_TAIL + 2, b], lanes[_TAIL + 3, b]
         motion = (
             lanes[_MOTION, b], lanes[_MOTION + 1, b], lanes[_MOTION + 2, b], 0.0, lanes[_MOTION + 4, b],
         )  # fmt: skip
         drag_number, deflection, surge = ratios_of_tail(perp, offset, motion)
-        lanes[_X, b] = log_of(drag_number)
-        lanes[_X + 1, b] = log_of(offset)
-        lanes[_X + 2, b] = -log_of(radius)
-        lanes[_X + 3, b] = arcsinh_of(deflection)
-        lanes[_X + 4, b] = angle_of(motion[0], motion[2])
-        lanes[_X + 5, b] = arcsinh_of(surge)
-        lanes[_X + 6, b] = log_of(lanes[_TAIL + 5, b] / (lanes[_TAIL + 4, b] * perp * offset * offset))
+        x[0, b] = log_of(drag_number)
+        x[1, b] = log_of(offset)
+        x[2, b] = -log_of(radius)
+        x[3, b] = arcsinh_of(deflection)
+        x[4, b] = angle_of(motion[0], motion[2])
+        x[5, b] = arcsinh_of(surge)
+        x[6, b] = log_of(lanes[_TAIL + 5, b] / (lanes[_TAIL + 4, b] * perp * offset * offset))
 
 
 @compiled

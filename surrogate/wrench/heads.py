@@ -25,11 +25,9 @@ from sim.io.errors import InputError
 from sim.linear.complex_step import derivative, magnitude, sign
 from sim.model.groups import Groups
 from sim.solve.assembly import assemble
-from surrogate.wrench.tails import TAIL_NUMBERS, Tails, head_inputs, inputs_with_head, pack_tails, total_wrench
+from surrogate.wrench.tails import TAIL_NUMBERS, Tails, head_inputs, pack_tails, total_wrench
 
-Numbers = Callable[
-    [Floats], Floats
-]  # inputs with those of the head (M, 14) -> y (M, 6) of `surrogate.wrench.tails`
+Numbers = Callable[[Tails, Floats], Floats]  # tails and motion (M, 5) -> y (M, 6) of `surrogate.wrench.tails`
 
 # A robot for the compiled loops: |ω|, gain, resistance (20), L and sense of the head; then the tails, as packed.
 RESISTANCE, HEAD_LENGTH, SENSE, HEAD_NUMBERS = 2, 22, 23, 24
@@ -92,8 +90,9 @@ def heads_and_tails(columns: Mapping[str, Floats], keep: Collection[str] = ()) -
     resistance = np.ascontiguousarray(
         body.resistance.transpose(2, 0, 1) * mirror[:, :4, None] * mirror[:, None, :]
     )
-    heads = Heads(magnitude(body.omega), 1 + body.droop * resistance[:, 3, 3], resistance, body.head_length, sense)
-    around = head_inputs(resistance, body.head_length, count * body.zeta_perp)
+    gain = 1 + body.droop * resistance[:, 3, 3]
+    heads = Heads(magnitude(body.omega), gain, resistance, body.head_length, sense)
+    around = head_inputs(resistance, body.head_length, gain, count * body.zeta_perp, body.offset)
     tails = Tails(
         body.zeta_perp, body.zeta_parallel, body.offset, body.tail_radius, count, resistance[:, 3, 3], around
     )
@@ -114,7 +113,7 @@ def full_motion(heads: Heads, u: Floats) -> Floats:
 def unbalanced(heads: Heads, tails: Tails, u: Floats, numbers: Numbers) -> Floats:
     """Return W − R (v_x, v_z, ω_yr, ω_h, ω_t), (M, 4)."""
     motion = full_motion(heads, u)
-    wrench = total_wrench(tails, motion, numbers(inputs_with_head(tails, motion)))
+    wrench = total_wrench(tails, motion, numbers(tails, motion))
     return wrench - (heads.resistance @ motion[..., None])[..., 0]
 
 

@@ -11,9 +11,9 @@ from sim.compiling import compiled
 from sim.object_code import COUNT, FLOATS, INTEGERS, array_at, kept
 from surrogate.networks.blocks import BLOCK, block_room, in_single_precision
 from surrogate.networks.compiled import Packed
-from surrogate.wrench.balance import FOUND, LEFT_OVER, MATRICES, same_motions, solution_room, solve
+from surrogate.wrench.balance import FOUND, LEFT_OVER, MATRICES, solution_room, solve
 from surrogate.wrench.balance_blocks import LANES, STATE, solve_block_rows
-from surrogate.wrench.heads import HEAD_NUMBERS, ROBOT_NUMBERS
+from surrogate.wrench.heads import ROBOT_NUMBERS
 
 
 def solve_robots(network: Packed, robots: Floats) -> tuple[Floats, Flags]:
@@ -21,17 +21,17 @@ def solve_robots(network: Packed, robots: Floats) -> tuple[Floats, Flags]:
 
     Args:
         network: of the tails.
-        robots: (M, 37), see `surrogate.wrench.heads.pack_robots`.
+        robots: (M, 39), see `surrogate.wrench.heads.pack_robots`.
     """
     count, singles = len(robots), in_single_precision(network.numbers)
-    states, converged = np.empty((2 * count, STATE)), np.empty(2 * count, dtype=np.int64)
+    states, converged = np.empty((count, STATE)), np.empty(count, dtype=np.int64)
     rows, lanes = np.arange(count), np.empty((lane_rows(network.sizes), BLOCK))
     room = np.empty(solution_room(network.sizes))
     solve_rows(
         network.numbers, singles, network.sizes, len(network.numbers), count, robots, rows, states, converged,
         lanes, len(lanes), room, len(room), np.empty((MATRICES, 4, 4)),
     )  # fmt: skip
-    return np.ascontiguousarray(states[:count, :5]), converged[:count] != LEFT_OVER
+    return np.ascontiguousarray(states[:, :5]), converged != LEFT_OVER
 
 
 def lane_rows(sizes: Integers) -> int:
@@ -47,7 +47,7 @@ def solve_rows(
     numbers: Any, singles: Any, sizes: Any, many: int, count: int, robots: Any, rows: Any, states: Any,
     converged: Any, lanes: Any, lane_space: int, room: Any, space: int, matrices: Any,
 ) -> None:  # fmt: skip
-    """Write the motions of robots (M, 37) to the first columns of states (2 M, STATE), and what they ended with.
+    """Write the motions of robots (M, 39) to the first columns of states (M, STATE), and what they ended with.
 
     Args:
         numbers, sizes: network of the tails, see `surrogate.networks.compiled.Packed`, so many numbers.
@@ -57,8 +57,8 @@ def solve_rows(
     """
     solve_many(
         array_at(numbers, many), array_at(singles, (many + 1) // 2), array_at(sizes, 6),
-        array_at(robots, (count, ROBOT_NUMBERS)), array_at(rows, count), array_at(states, (2 * count, STATE)),
-        array_at(converged, 2 * count), array_at(lanes, (lane_space, BLOCK)), array_at(room, space),
+        array_at(robots, (count, ROBOT_NUMBERS)), array_at(rows, count), array_at(states, (count, STATE)),
+        array_at(converged, count), array_at(lanes, (lane_space, BLOCK)), array_at(room, space),
         array_at(matrices, (MATRICES, 4, 4)),
     )  # fmt: skip
 
@@ -70,26 +70,17 @@ def solve_many(
 ) -> None:  # fmt: skip
     """Solve for the motions of robots in blocks, and alone for those that are left over.
 
-    A robot with one tail is solved twice, as in `surrogate.wrench.balance.solve`, and alone if the two differ.
-
     Args:
         numbers, sizes, singles: see `solve_rows`.
-        robots: (M, 37).
+        robots: (M, 39).
         rows: (K,), of the robots to solve for, which have one network.
-        states: (2 K, STATE), written: the motion (5,) first, in the first K rows.
-        found: (2 K,), written: what the solutions ended with, see `surrogate.wrench.balance`, in the first K.
+        states: (K, STATE), written: the motion (5,) first.
+        found: (K,), written: what the solutions ended with, see `surrogate.wrench.balance`.
         lanes, room, matrices: to work in.
     """
-    count, quick = len(rows), singles.view(np.float32)
-    if count > 0 and robots[rows[0], HEAD_NUMBERS + 4] == 1:
-        solve_block_rows(numbers, quick, sizes, robots, rows, states[:count], found[:count], lanes, False, False)
-        solve_block_rows(numbers, quick, sizes, robots, rows, states[count:], found[count:], lanes, True, False)
-        for k in range(count):
-            if found[count + k] != FOUND or not same_motions(states[k, :5], states[count + k, :5]):
-                found[k] = LEFT_OVER
-    else:
-        rough = sizes[5] == 1
-        solve_block_rows(numbers, quick, sizes, robots, rows, states, found, lanes, False, rough)
-    for k in range(count):
+    rough = sizes[5] == 1
+    solve_block_rows(numbers, singles.view(np.float32), sizes, robots, rows, states, found, lanes, rough)
+    for k in range(len(rows)):
         if found[k] != FOUND:
-            found[k] = solve(numbers, sizes, robots[rows[k]], states[k, :5], room, matrices)
+            converged = solve(numbers, sizes, robots[rows[k]], states[k, :5], room, matrices)
+            found[k] = FOUND if converged else LEFT_OVER

@@ -11,9 +11,13 @@ the mean wrench of one tail over a turn. In the units of the simulator it depend
 
 The network sees m as the deflection δ = m a S/(S + 12) that this motion makes. With three or more tails the
 velocities hardly change over a turn, and the wrench of one tail does not depend on N. With one or two tails they
-do. So N = 1 and N = 2 have networks of their own, with one more input: the head's spin drag over that of the
-tails. A single tail pushes the robot from side to side in each turn, and how far it goes depends on all drag of
-the head. So the network of N = 1 has HEAD_INPUTS, too.
+do. So N = 1 and N = 2 have networks of their own. That of N = 2 has one more input: the head's spin drag over that
+of the tails.
+
+A single tail pushes the robot from side to side in each turn, and how far it goes depends on all drag of the head.
+So the network of N = 1 sees S, a, r0 and the whole resistance of the head (HEAD_INPUTS). These determine the
+motion, and the network must not see it: from the drag of the head and the velocities it would learn that
+forces are in balance, and a query could not tell the true motion from others.
 
 The network gives six numbers y, near (0, 1, 0, 1, 0, 0):
 
@@ -42,10 +46,11 @@ from sim.linear.complex_step import angle
 INPUTS = ("ln S", "ln a", "ln 1/r0", "asinh δ", "β", "asinh v_z", "ln spin drag of head over tails")
 HEAD_INPUTS = (
     "ln sway drag", "ln surge drag", "ln drag against turning", "ln L", "coupling of sway and turn",
-    "ln side force", "spin drag of the disc over that of the head",
+    "ln side force", "spin drag of the disc over that of the head", "yaw couple of the tails' spin", "ln gain",
 )  # fmt: skip
+SINGLE_INPUTS = ("ln S", "ln a", "ln 1/r0", "ln spin drag of head over tails", *HEAD_INPUTS)
 SMOOTHNESS = (0.7, 1.3, 8.0, 2.0, 4.0, 4.0, 5.0)  # over how many standard deviations the wrench changes
-HEAD_SMOOTHNESS = (3.0,) * len(HEAD_INPUTS)
+SINGLE_SMOOTHNESS = (0.7, 1.3, 8.0, 5.0) + (3.0,) * len(HEAD_INPUTS)
 TYPICAL = ((0.0, 1.0, 0.0, 0.9, 0.2, 0.0), (0.04, 0.4, 0.03, 0.1, 0.3, 0.05))  # mean and spread of y
 SOFT = 12.0  # S from which a tail bends with the flow while it turns
 SMALL_DEFLECTION, SMALL_SURGE = 0.05, 0.05  # below, an input is linear; above, logarithmic
@@ -63,10 +68,10 @@ class Tails(NamedTuple):
     radius: Floats  # r0
     number: Floats  # N
     head_spin_drag: Floats  # moment on the head per ω_h
-    head: Floats  # (M, 7) HEAD_INPUTS; drag over that of the tails
+    head: Floats  # (M, 9) HEAD_INPUTS; drag over that of the tails
 
-    def at(self, rows: Integers | Flags) -> Tails:
-        """Return the tails of the robots at indices or flags (M',)."""
+    def at(self, rows: Integers | Flags | slice) -> Tails:
+        """Return the tails of the robots at indices, flags or a slice (M',)."""
         return Tails(*[part[rows] for part in self])
 
 
@@ -74,7 +79,7 @@ TAIL_NUMBERS = len(Tails._fields) - 1 + len(HEAD_INPUTS)  # of a robot
 
 
 def pack_tails(tails: Tails) -> Floats:
-    """Return the fields as columns, (M, 13)."""
+    """Return the fields as columns, (M, 15)."""
     packed = np.empty((len(tails.number), TAIL_NUMBERS))
     for i, part in enumerate(tails[:-1]):
         packed[:, i] = part
@@ -83,29 +88,34 @@ def pack_tails(tails: Tails) -> Floats:
 
 
 @np.errstate(all="ignore")  # a robot that cannot be has no motion, and is refused for that
-def head_inputs(resistance: Floats, length: Floats, across: Floats) -> Floats:
-    """Return HEAD_INPUTS, (M, 7).
+def head_inputs(resistance: Floats, length: Floats, gain: Floats, across: Floats, offset: Floats) -> Floats:
+    """Return HEAD_INPUTS, (M, 9).
 
     Args:
         resistance: of head and disc, (M, 4, 5).
         length: L, (M,).
+        gain: ∂ω_t/∂ω_h, (M,).
         across: N ζ⊥, (M,).
+        offset: a, (M,).
     """
     sway, surge, turn, spin = (resistance[:, i, i] for i in range(4))
-    coupling, side, disc = resistance[:, 0, 2], resistance[:, 0, 3], resistance[:, 3, 4]
-    return np.stack(inputs_of_head(sway, surge, turn, spin, coupling, side, disc, length, across), -1)
+    coupling, side, disc, couple = (resistance[:, i, j] for i, j in ((0, 2), (0, 3), (3, 4), (2, 4)))
+    return np.stack(
+        inputs_of_head(sway, surge, turn, spin, coupling, side, disc, couple, length, gain, across, offset), -1
+    )
 
 
 @formula
 def inputs_of_head(
-    sway: Any, surge: Any, turn: Any, spin: Any, coupling: Any, side: Any, disc: Any, length: Any, across: Any
-) -> tuple[Any, ...]:
+    sway: Any, surge: Any, turn: Any, spin: Any, coupling: Any, side: Any, disc: Any, couple: Any,
+    length: Any, gain: Any, across: Any, offset: Any,
+) -> tuple[Any, ...]:  # fmt: skip
     """Return HEAD_INPUTS.
 
     Args:
         sway, surge, turn, spin: the diagonal of the resistance of head and disc.
-        coupling, side, disc: its entries for sway and turn, for sway and ω_h, for spin and ω_t.
-        length, across: L and N ζ⊥.
+        coupling, side, disc, couple: its entries for sway and turn, sway and ω_h, spin and ω_t, turn and ω_t.
+        length, gain, across, offset: L, ∂ω_t/∂ω_h, N ζ⊥ and a.
     """
     return (
         np.log(sway / across),
@@ -115,6 +125,8 @@ def inputs_of_head(
         coupling / np.sqrt(sway * turn),
         np.log(side / across),
         disc / spin,
+        couple / (across * offset**2),
+        np.log(gain),
     )
 
 
@@ -163,6 +175,17 @@ def inputs_of_tail(
 
 
 @formula
+def inputs_of_single(perp: Any, offset: Any, radius: Any, spin_drag: Any, spin: Any) -> tuple[Any, ...]:
+    """Return the SINGLE_INPUTS before those of the head.
+
+    Args:
+        perp, offset, radius, spin_drag: ζ⊥, a, r0 and the moment on the head per ω_h.
+        spin: ω_t.
+    """
+    return np.log(perp * spin), np.log(offset), -np.log(radius), np.log(spin_drag / (perp * offset**2))
+
+
+@formula
 def wrench_terms(perp: Any, parallel: Any, offset: Any, number: Any, motion: Any) -> tuple[Any, ...]:
     """Return the terms of the tails' wrench.
 
@@ -203,9 +226,15 @@ def tail_inputs(tails: Tails, motion: Floats) -> Floats:
     return np.stack(inputs_of_tail(perp, offset, radius, number, spin_drag, motion.T, beta), -1)
 
 
-def inputs_with_head(tails: Tails, motion: Floats) -> Floats:
-    """Return INPUTS and HEAD_INPUTS, (M, 14)."""
-    return np.concatenate([tail_inputs(tails, motion), tails.head], -1)
+def single_inputs(tails: Tails, motion: Floats) -> Floats:
+    """Return SINGLE_INPUTS, (M, 13), of robots with one tail."""
+    own = inputs_of_single(tails.zeta_perp, tails.offset, tails.radius, tails.head_spin_drag, motion[:, 4])
+    return np.concatenate([np.stack(own, -1), tails.head], -1)
+
+
+def network_inputs(tails: Tails, motion: Floats, count: int) -> Floats:
+    """Return the inputs of a network of the wrench that has so many: SINGLE_INPUTS or INPUTS, (M, F)."""
+    return single_inputs(tails, motion) if count == len(SINGLE_INPUTS) else tail_inputs(tails, motion)
 
 
 def straight_wrench(tails: Tails, motion: Floats) -> Floats:

@@ -18,7 +18,7 @@ from surrogate.table.lookup import Motions, NeuralTable
 from surrogate.table.response_table import SHAPES, between_dwells, curve_speeds
 from surrogate.table.wrench_table import network_index, rows_by_network
 from surrogate.wrench.heads import heads_and_tails
-from surrogate.wrench.tails import tail_inputs
+from surrogate.wrench.tails import network_inputs, tail_inputs
 
 _RANGES = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 
@@ -58,7 +58,8 @@ def _motions(table: NeuralTable, columns: dict[str, Floats]) -> tuple[Motions, F
     for k, rows in rows_by_network(network_index(tails.number)):
         support = table.support[k]
         if support is not None:
-            inside[rows] = support.novelty(inputs[rows]) <= 1
+            own = network_inputs(tails.at(rows), motion[rows], len(support.shift))
+            inside[rows] = support.novelty(own) <= 1
     for name in _RANGES:
         low, high = table.ranges[name]
         inside &= (low * (1 - 1e-9) <= np.abs(values[name])) & (np.abs(values[name]) <= high * (1 + 1e-9))

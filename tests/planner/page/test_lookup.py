@@ -10,9 +10,7 @@ import pytest
 from sim.io.errors import InputError
 from sim.model.groups import DWELL
 from sim.motion.steady_motion import STEADY_OUTPUTS
-from surrogate.input_ranges import ROBOT
 from surrogate.table.errors import RESPONSE_OUTPUTS
-from surrogate.training.simulated import draw_robots
 from tests.planner.page.page_core import TABLE, answers, refusal_of, without_digits
 from tests.planner.page.robots import (
     SOLVED,
@@ -55,20 +53,6 @@ def test_one_tail_is_answered() -> None:
             outputs = {name: wanted[name] for name in STEADY_OUTPUTS if name != "tail_gap"}
             check_equal_outputs(answer, outputs, row, 1e-11)
             assert answer["tail_gap"] == np.inf
-
-
-def test_a_single_tail_whose_balance_has_two_solutions_is_refused() -> None:
-    columns = draw_robots(2048, 0, wide=False)
-    one_tail = {name: columns[name][columns["N"] == 1] for name in ROBOT}
-    robots = [{name: float(values[row]) for name, values in one_tail.items()} for row in range(256)]
-    refused = shipped().query(columns_of(robots), flag=True)["outside"]
-    assert 1 < refused.sum() < 16
-    answered = asked("query", robots, {"flag": True})
-    assert [answer["outside"] for answer in answered] == refused.tolist()
-    robot = robots[int(np.flatnonzero(refused)[0])]
-    wanted = refusal_of(shipped().query, {name: np.array([value]) for name, value in robot.items()})
-    assert "several solutions" in wanted
-    assert str(asked("query", [robot])[0]) == wanted
 
 
 def known(count: int) -> list[dict[str, float]]:

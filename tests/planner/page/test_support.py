@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from surrogate.table.support import Support
 from tests.planner.page.page_core import answers, typed
 from tests.planner.page.robots import check_alike
 
 
-def test_novelty() -> None:
+@pytest.mark.parametrize("size", [7, 13])
+def test_novelty(size: int) -> None:
     rng = np.random.default_rng(0)
-    support = Support.learned(rng.normal(size=(4000, 7)) @ rng.normal(size=(7, 7)))
+    support = Support.learned(rng.normal(size=(4000, size)) @ rng.normal(size=(size, size)))
     page = {"limit": support.limit} | {
         name: {"values": typed(getattr(support, name).ravel())} for name in ("shift", "scale", "factor")
     }
-    inputs = rng.normal(size=(20, 7)) * np.geomspace(0.1, 10, 20)[:, None]
+    inputs = rng.normal(size=(20, size)) * np.geomspace(0.1, 10, 20)[:, None]
     found = answers([("support.js", "novelty", page, row) for row in inputs])
     wanted = support.novelty(inputs)
     assert (wanted > 1).any()

@@ -6,7 +6,14 @@ import numpy as np
 
 from sim.model.groups import checked_values
 from surrogate.wrench.heads import heads_and_tails
-from surrogate.wrench.tails import linear_thrust, linear_torque, tail_inputs, wrench_slopes, wrench_terms
+from surrogate.wrench.tails import (
+    linear_thrust,
+    linear_torque,
+    single_inputs,
+    tail_inputs,
+    wrench_slopes,
+    wrench_terms,
+)
 from tests.planner.page.page_core import answers
 from tests.planner.page.robots import check_alike, columns_of, random_groups
 
@@ -25,10 +32,11 @@ def test_inputs_terms_and_slopes() -> None:
         for i in range(COUNT)
     ]  # fmt: skip
 
-    def each(name: str) -> list[list[float]]:
-        return answers([("tails.js", name, page, move) for page, move in zip(pages, motion, strict=True)])
+    def each(name: str, *more: int) -> list[list[float]]:
+        return answers([("tails.js", name, page, move, *more) for page, move in zip(pages, motion, strict=True)])
 
     check_alike(each("tailInputs"), tail_inputs(tails, motion), 1e-14)
+    check_alike(each("networkInputs", 13), single_inputs(tails, motion), 1e-14)
     terms = np.stack(wrench_terms(perp, parallel, offset, number, motion.T), -1)
     check_alike(each("wrenchTerms"), terms, 1e-14)
     assert np.abs(np.array(each("wrenchSlopes")) - wrench_slopes(tails, motion)).max() < 1e-12

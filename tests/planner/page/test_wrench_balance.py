@@ -8,6 +8,7 @@ from sim.model.groups import checked_values
 from surrogate.wrench.heads import heads_and_tails, unbalanced
 from tests.planner.page.page_core import TABLE, answers
 from tests.planner.page.robots import columns_of, random_groups, shipped, shipped_data
+from tests.surrogate.small import numbers_of
 
 
 def test_forces_are_in_balance() -> None:
@@ -19,5 +20,5 @@ def test_forces_are_in_balance() -> None:
     u = np.column_stack([sway, [one["v_z"] for one in found], yaw, spin])
     network = shipped().tails.wrench[2]
     assert network is not None
-    left = unbalanced(heads, tails, u, network)
+    left = unbalanced(heads, tails, u, numbers_of(network))
     assert np.abs(left / (heads.resistance[:, :, :4] @ np.abs(u)[..., None])[..., 0]).max() < 1e-8

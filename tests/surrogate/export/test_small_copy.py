@@ -108,7 +108,7 @@ def test_it_is_small_and_states_its_loss(folder: Path) -> None:
             name
         )  # nothing beside the table's own errors
         thrust = name in ("v_z", "R_yr_over_l")  # a small difference of large numbers, with one tail
-        assert loss[f"{name} one_tail"]["p95"] < (0.02 if thrust else 0.001)
+        assert loss[f"{name} one_tail"]["p95"] < (0.002 if thrust else 0.001)
     for name in (*RESPONSE_OUTPUTS, "tail_gap"):
         assert loss[name]["p95"] < load().errors[name]["p95"], name
 
@@ -147,34 +147,20 @@ def test_the_reader_in_c_answers_for_all_robots(folder: Path) -> None:
     assert (states[inside] == 0).all()
     assert all(error[inside].max() < 1e-8 for error in apart(found, wanted).values())
     single, states = answers(library(folder, "-DLOOKUP_FLOAT"), robots)
-    rows = inside & (robots["N"] > 1)
-    assert (states[rows] == 0).all()
+    assert (states[inside] == 0).all()
     for name, error in apart(single, wanted).items():
-        assert error[rows].max() < (1e-2 if name in ("tail_gap", "theta_deg") else 1e-3), name
-        assert np.quantile(error[rows], 0.95) < 2e-5, name
-
-
-def test_the_reader_in_c_doubts_a_single_tail_whose_balance_has_two_solutions(folder: Path) -> None:
-    """Which of two solutions a sequence of steps meets may depend on rounding, so a few robots may differ."""
-    robots = random_robots(8192, 93)
-    one_tail = {name: values[robots["N"] == 1] for name, values in robots.items()}
-    groups = {name: one_tail[name] for name in ROBOT}
-    doubted = make_small_copy(load()).table.query(groups, flag=True)["outside"]
-    assert 10 < doubted.sum() < 0.05 * len(doubted)
-    states = answers(library(folder), one_tail)[1]
-    assert np.isin(states, (0, 1)).all()
-    assert (states[~doubted] == 0).mean() > 0.99
-    assert (states[doubted] == 1).mean() > 0.8
-    single = answers(library(folder, "-DLOOKUP_FLOAT"), one_tail)[1]
-    assert (single[doubted] == 1).mean() > 0.3
-    assert (single[~doubted] == 0).mean() > 0.95
+        assert error[inside].max() < (1e-2 if name in ("tail_gap", "theta_deg") else 1e-3), name
+        several = robots["N"] > 1
+        for some, most in ((several, 4e-5 if name == "theta_deg" else 2e-5), (~several, 1e-3)):
+            assert np.quantile(error[inside & some], 0.95) < most, name
 
 
 def test_the_reader_in_c_says_when_it_does_not_know(folder: Path) -> None:
     made = library(folder)
-    good = {name: values[:1] for name, values in vectors(folder).items() if name in (*ROBOT, DWELL)}
+    several = vectors(folder)["N"] > 1
+    good = {name: values[several][:1] for name, values in vectors(folder).items() if name in (*ROBOT, DWELL)}
     for name, value, state in (
-        ("omega_bar", 1e4, 1), ("l_over_R", 100.0, 1), ("N", 20.0, 1), ("omega_bar", 0.0, 2), ("C_t", -1.0, 2),
+        ("omega_bar", 1e3, 1), ("l_over_R", 100.0, 1), ("N", 20.0, 1), ("omega_bar", 0.0, 2), ("C_t", -1.0, 2),
         ("C_t", np.nan, 2), ("N", 0.0, 2),
     ):  # fmt: skip
         assert answers(made, {**good, name: np.array([value])})[1][0] == state, (name, value)

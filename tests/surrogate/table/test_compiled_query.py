@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from sim.effects import catalogue
-from sim.inputs import check_columns
 from sim.model.groups import DWELL
-from sim.motion.batches import steady_columns
 from surrogate.table.model_file import load
 from surrogate.training.simulated import draw_robots
 from surrogate.wrench.heads import needs_no_learning
@@ -16,6 +14,7 @@ from tests.oracles.query import answer, half_widths
 from tests.surrogate.small import robots_inside, table
 
 KNOWN = [name for name in catalogue() if needs_no_learning(name)]
+OF_SPEED = ("v_x", "v_z", "lag_x", "lag_z", "net_speed_bar")  # differences of numbers of this size
 FLAT = ("R_yr_over_l", "theta_deg")  # ill-conditioned where a robot moves straight ahead, or hardly at all
 
 
@@ -35,10 +34,11 @@ def check_same(found: dict[str, np.ndarray], wanted: dict[str, np.ndarray], tole
     speed = np.hypot(wanted["v_x"], wanted["v_z"])
     for name in wanted:
         if name != "outside":
-            size = speed if name in ("v_x", "v_z", "lag_x", "lag_z") else np.abs(wanted[name])
-            apart = np.abs(found[name] - wanted[name])[known]
+            size = speed if name in OF_SPEED else np.abs(wanted[name])
+            finite = known & np.isfinite(wanted[name])
+            apart = np.abs(found[name][finite] - wanted[name][finite])
             bound = tolerance * (100 if name in FLAT else 1)
-            assert (apart[np.isfinite(apart)] <= bound * size[known][np.isfinite(apart)] + 1e-300).all(), name
+            assert (apart <= bound * size[finite] + 1e-300).all(), name
 
 
 def test_plain_robots() -> None:
@@ -63,32 +63,16 @@ def test_the_response_at_equal_dwells() -> None:
 
 
 def test_robots_with_one_tail() -> None:
-    """They have several solutions, and the flow around them is ill-conditioned: a few differ more."""
     drawn = robots() | {"N": np.ones(400)}
-    found, wanted = load().query(drawn, flag=True), answer(load(), drawn)
-    known = ~wanted["outside"] & ~found["outside"]
-    assert known.sum() > 100
-    reasons = load().motions(check_columns(drawn), flag=True).reason
-    several = np.array(["several solutions" in reason for reason in reasons])
-    assert (found["outside"] >= several).all()
-    assert (wanted["outside"] != found["outside"])[~several].mean() < 0.01
-    apart = np.abs(found["omega_yr_bar"] / wanted["omega_yr_bar"] - 1)[known]
-    assert np.quantile(apart, 0.98) < 1e-11
+    found = load().query(drawn, flag=True)
+    check_same(found, answer(load(), drawn), 1e-11)
     assert np.isinf(found["tail_gap"]).all()
 
 
-def test_a_wrong_solution_for_one_tail_is_flagged() -> None:
-    """Of 740 robots that converge, two get another motion than the simulator's: 5 and 22 % of the speed off."""
-    drawn = draw_robots(6000, 4711, wide=False)
-    drawn = {name: values[drawn["N"] == 1] for name, values in drawn.items()}
-    found, truth = load().query(drawn, flag=True), steady_columns(drawn, title="", stability=False)
-    reasons = load().motions(check_columns(drawn), flag=True).reason
-    several = np.array(["several solutions" in reason for reason in reasons])
-    error = np.abs(found["v_z"] - truth["v_z"]) / np.hypot(truth["v_x"], truth["v_z"])
-    valid = np.asarray(truth["converged"], dtype=bool)
-    assert 0 < several.mean() < 0.04
-    assert error[valid & several].max() > 0.2
-    assert error[valid & ~found["outside"]].max() < 0.1
+def test_one_tail_with_every_effect_of_the_head() -> None:
+    drawn = robots() | {"N": np.ones(400), "surface_couple": np.linspace(-1, 1, 400)}
+    drawn["motor_droop"] = np.tile([0.0, 2.0], 200)
+    check_same(load().query(drawn, flag=True), answer(load(), drawn), 1e-11)
 
 
 @pytest.mark.parametrize("small", [False, True])

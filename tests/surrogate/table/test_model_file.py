@@ -74,8 +74,8 @@ def test_a_file_of_torch_and_one_of_another_format_are_refused(tmp_path: Path) -
     path = tmp_path / "model.pt"
     torch.save({"format": 4, "content": {}}, path)
     assert "older version; train it again" in refusal(path)
-    tensor_file.write(path, table_content(load()), 7)
-    assert "has format 7, this version reads 6; train it again" in refusal(path)
+    tensor_file.write(path, table_content(load()), 8)
+    assert "has format 8, this version reads 7; train it again" in refusal(path)
 
 
 def edited(change: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:

@@ -98,7 +98,7 @@ def test_blocks_have_the_numbers_of_one_by_one(monkeypatch: pytest.MonkeyPatch) 
     assert known.sum() > 2000
     speed = np.hypot(wanted["v_x"], wanted["v_z"])
     for name in ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap", "omega_yr_bar_low"):
-        size = (np.abs(wanted[name]) + (speed if name.startswith("v_") else 0))[known]
+        size = (np.abs(wanted[name]) + (speed if name.startswith("v_") else name == "tail_gap"))[known]
         assert (np.abs(found[name] - wanted[name])[known] <= 1e-12 * size).all(), name
         chosen = known[part]
         apart = np.abs(some[name] - found[name][part])[chosen]

@@ -47,21 +47,59 @@ def test_the_shipped_table_states_its_errors() -> None:
         assert table.errors[name]["median"] < 0.001
 
 
+def answered(robots: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], np.ndarray]:
+    """Return the table's answers, the simulator's, and which robots both know."""
+    simulated = steady_columns(robots, title="", stability=False)
+    truth = with_radius({name: np.asarray(simulated[name], dtype=float) for name in
+                         ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap")})  # fmt: skip
+    answer = load().query(robots, intervals=True, flag=True)
+    return answer, truth, np.asarray(simulated["converged"] & ~answer["outside"])
+
+
 def test_fresh_robots_are_near_the_simulator_and_inside_their_intervals() -> None:
     """Robots of the whole domain with two tails and more; what the table states holds for them."""
     robots = {name: values[::2] for name, values in draw_robots(512, 77, wide=False).items()}
     robots = {name: values[robots["N"] > 1] for name, values in robots.items()}
-    simulated = steady_columns(robots, title="")
-    truth = with_radius({name: np.asarray(simulated[name], dtype=float) for name in
-                         ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap")})  # fmt: skip
-    answer = load().query(robots, intervals=True, flag=True)
-    good = simulated["converged"] & ~answer["outside"]
+    answer, truth, good = answered(robots)
     assert good.mean() > 0.95
     errors = relative_errors(answer, truth)
     for name, limit in (("omega_t_bar", 2e-4), ("omega_yr_bar", 1e-3), ("R_yr_over_l", 1e-3), ("v_z", 5e-4)):
         assert np.median(np.abs(errors[name][good])) < limit, name
     covered = coverage({n: v[good] for n, v in answer.items()}, {n: v[good] for n, v in truth.items()})
     assert 0.82 < np.mean([*covered.values()]) < 0.98
+
+
+def test_one_tail_has_one_motion() -> None:
+    """None of these robots gets another motion than the simulator's."""
+    drawn = draw_robots(6000, 4711, wide=False)
+    answer, truth, good = answered({name: values[drawn["N"] == 1] for name, values in drawn.items()})
+    assert good.mean() > 0.97
+    error = np.abs(relative_errors(answer, truth)["v_z"])[good]
+    assert error.max() < 0.03
+    of_itself = np.abs(answer["v_z"] / truth["v_z"] - 1)[good]
+    assert np.median(of_itself) < 6e-4
+    assert np.quantile(of_itself, 0.95) < 0.02
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_intervals_hold_with_effects_on_head_and_motor(single: bool) -> None:
+    """Drag, disc, couples and droop, as strong as they were learned."""
+    robots = draw_robots(512, 79, wide=False, effects=True)
+    robots["N"] = np.ones(512) if single else np.maximum(robots["N"], 2.0)
+    answer, truth, good = answered(robots)
+    assert good.mean() > 0.7
+    covered = coverage({n: v[good] for n, v in answer.items()}, {n: v[good] for n, v in truth.items()})
+    assert 0.82 < np.mean([*covered.values()]) < 0.98
+
+
+@pytest.mark.parametrize("tails", [1.0, 2.0, 4.0])
+def test_a_drag_number_that_was_not_learned_is_outside(tails: float) -> None:
+    """Inertia raises the drag of thick, fast tails up to twentyfold, at a motor speed that is in its range."""
+    robots = draw_robots(512, 80, wide=False)
+    robots |= {"N": np.full(512, tails), "inertia": np.random.default_rng(5).uniform(0, 0.3, 512)}
+    answer, truth, good = answered(robots)
+    assert 0.5 < good.mean() < 0.95
+    assert np.quantile(np.abs(relative_errors(answer, truth)["omega_yr_bar"])[good], 0.99) < 0.02
 
 
 @pytest.mark.parametrize(

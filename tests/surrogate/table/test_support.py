@@ -19,6 +19,18 @@ def test_the_support_is_joint() -> None:
     assert (support.novelty(points) <= 1).tolist() == [True, True, True, False, False]
 
 
+@pytest.mark.parametrize("size", [7, 13])
+def test_each_input_must_be_in_its_range(size: int) -> None:
+    """Along one input alone the joint measure grows slowly: a tenth beyond the range it is below its limit."""
+    x = np.random.default_rng(3).uniform(-1, 1, (4000, size))
+    support = Support.learned(x)
+    points = np.zeros((2, size))
+    points[:, 2] = [0.99, 1.1]
+    inside, beyond = support.novelty(points)
+    assert inside < 1
+    assert beyond == pytest.approx((1.1 - support.shift[2]) / support.scale[2])
+
+
 def one_robot(**changes: float) -> dict[str, np.ndarray]:
     robot = {"C_t": 3.0, "C_r": 2.8, "C_yr": 2.0, "l_over_R": 6.875, "L_over_R": 3.75, "l_over_r0": 34.375,
              "omega_bar": 10.0, "N": 3.0, "a_over_R": 1.0}  # fmt: skip

@@ -17,7 +17,7 @@ from surrogate.wrench.balance import inverses_of
 from surrogate.wrench.heads import heads_and_tails, unbalanced
 from surrogate.wrench.motions import solve_rows
 from tests.oracles.balance import linear_guess, solve
-from tests.surrogate.small import rows, table
+from tests.surrogate.small import numbers_of, rows, table
 
 
 def test_loops_are_kept_by_all_files_of_the_package() -> None:
@@ -37,7 +37,7 @@ def test_motions_are_those_of_another_method() -> None:
     for k, network in enumerate(lookup.wrench[1:], 1):
         rows = np.flatnonzero(kind == k)
         assert network is not None
-        wanted, known = solve(heads.at(rows), tails.at(rows), network)
+        wanted, known = solve(heads.at(rows), tails.at(rows), numbers_of(network))
         both = known & converged[rows]
         assert motion[rows][both] == pytest.approx(wanted[both], rel=1e-6)
 
@@ -60,7 +60,7 @@ def test_forces_are_in_balance() -> None:
     assert converged.mean() > 0.97
     network = table().tails.wrench[2]
     assert network is not None
-    left = unbalanced(heads, tails, found[:, :4], network)
+    left = unbalanced(heads, tails, found[:, :4], numbers_of(network))
     size = (np.abs(heads.resistance) @ np.abs(found)[..., None])[..., 0]
     assert np.abs((left / size)[converged]).max() < 1e-6
 

@@ -11,7 +11,7 @@ from sim.motion.batches import steady_columns
 from surrogate.table.model_file import load
 from surrogate.wrench.heads import heads_and_tails, needs_no_learning, slope_at, unbalanced
 from tests.oracles.balance import linear_guess
-from tests.surrogate.small import rows, table
+from tests.surrogate.small import numbers_of, rows, table
 
 
 @pytest.mark.parametrize("effect", [name for name in catalogue() if needs_no_learning(name)])
@@ -42,10 +42,11 @@ def test_the_derivative_is_that_of_differences() -> None:
     heads, tails = heads_and_tails(robots)
     network = table().tails.wrench[2]
     assert network is not None
+    numbers = numbers_of(network)
     u = linear_guess(heads, tails)
-    value = unbalanced(heads, tails, u, network)
-    slope = slope_at(lambda v: unbalanced(heads, tails, v, network), u)
+    value = unbalanced(heads, tails, u, numbers)
+    slope = slope_at(lambda v: unbalanced(heads, tails, v, numbers), u)
     direction = np.array([0.3, -0.2, 0.5, 0.1]) * u
-    moved = unbalanced(heads, tails, u + 1e-6 * direction, network)
+    moved = unbalanced(heads, tails, u + 1e-6 * direction, numbers)
     wanted = (slope @ direction[..., None])[..., 0]
     assert np.allclose((moved - value) / 1e-6, wanted, rtol=1e-3, atol=1e-4 * np.abs(wanted).max())

@@ -46,7 +46,7 @@ def test_the_wrench_from_the_robots_own_motion_is_that_of_the_tails() -> None:
         solved, x, u = orbit_on_mesh(body, int(one["N"][0]), 8)
         assert solved
         mean = u.mean(0)
-        motion = np.append(mean, body.omega + mean[3])
+        motion = np.append(mean, body.omega + heads.gain[i] * mean[3])
         wrench = heads.resistance[i] @ motion
         assert wrench == pytest.approx(mean_tail_wrench(body, x, u), rel=1e-4, abs=1e-6 * np.abs(wrench).max())
 

@@ -1,0 +1,56 @@
+"""Errors and coverage of the look-up table for robots with one effect on head, disc or motor.
+
+Usage: python -m benchmarks head_effects [MODEL]
+
+Random robots of the domain with one, two, and three to eight tails; the effect's size is drawn evenly from its
+plausible range. A robot that the table refuses is counted, and left out of the errors.
+
+Takes 5 minutes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.effects import catalogue
+from sim.motion.batches import steady_columns
+from surrogate.table.errors import coverage, relative_errors
+from surrogate.table.model_file import load
+from surrogate.training.simulated import draw_robots
+from surrogate.training.train import with_radius
+from surrogate.wrench.heads import needs_no_learning
+
+COUNT, SEED = 384, 20261207
+_WALL, _DRIFT = (0.0, 0.5), (-1.0, 1.0)  # of the effects without a plausible range: tank_wall, viscosity_drift
+_OUTPUTS = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z", "tail_gap")
+
+
+def main(*words: str) -> None:
+    lookup = load(words[0] if words else None)
+    names = ["", *(name for name in catalogue() if needs_no_learning(name))]
+    print(f"{'effect':24}{'N':>5}{'refused':>9}{'yaw rate: median, 95 %, worst':>32}{'surge (of the speed)':>26}"
+          f"{'coverage':>10}")  # fmt: skip
+    for place, name in enumerate(names):
+        for tails in (1, 2, 3):
+            robots = draw_robots(COUNT, SEED + 10 * place + tails, wide=False)
+            rows = np.arange(COUNT)
+            robots["N"] = np.where(tails < 3, float(tails), 3.0 + rows % 6)
+            if name:
+                low, high = catalogue()[name].plausible or (_WALL if name == "tank_wall" else _DRIFT)
+                robots[name] = np.random.default_rng(place).uniform(low, high, COUNT)
+            truth = steady_columns(robots, title="", stability=False)
+            known = np.asarray(truth["converged"], dtype=bool)
+            answer = lookup.query(robots, intervals=True, flag=True)
+            inside = known & ~answer["outside"]
+            motion = with_radius({n: np.asarray(truth[n], dtype=float)[inside] for n in _OUTPUTS})
+            answer = {n: values[inside] for n, values in answer.items()}
+            errors = relative_errors(answer, motion)
+            covered = [*coverage(answer, motion).values()]
+            print(f"{name or 'none':24}{tails if tails < 3 else '3–8':>5}"
+                  f"{100 * (1 - inside.sum() / known.sum()):8.0f} %{_figures(errors['omega_yr_bar']):>32}"
+                  f"{_figures(errors['v_z']):>26}{100 * np.mean(covered):8.0f} %", flush=True)  # fmt: skip
+
+
+def _figures(errors: np.ndarray) -> str:
+    size = 100 * np.abs(errors)
+    return f"{np.median(size):.4f}, {np.quantile(size, 0.95):.3f}, {size.max():.2g}"
