@@ -33,6 +33,7 @@ from surrogate.networks.training_loop import _HARDEST, Problem, Settings
 from surrogate.training import fit_wrench
 from surrogate.training.fit_wrench import WrenchSamples, learnable, wrench_samples
 from surrogate.training.simulated import SimulatedRobots
+from surrogate.training.train import without_effects
 from surrogate.wrench.tails import SMOOTHNESS, straight_wrench, tail_inputs, wrench_slopes
 from tests.oracles.balance import solve
 
@@ -81,7 +82,7 @@ def main(*words: str) -> None:
 
 
 def _several(rows: SimulatedRobots) -> WrenchSamples:
-    rows = rows.at(rows.robots["N"] > 2)
+    rows = rows.at((rows.robots["N"] > 2) & without_effects(rows.robots))
     samples = wrench_samples(rows.robots, rows.motion)
     return samples.at(learnable(samples))
 

@@ -2,13 +2,14 @@
 
 Usage: softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
        python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
-       python -m benchmarks shipped_table WORK --test MODEL   errors and coverage on the held-out robots
+       python -m benchmarks shipped_table WORK --test MODEL [--card CARD] [--picture PICTURE]
        python -m benchmarks shipped_table WORK --spread-of MODEL --sweep TWO --out NEW
        python -m benchmarks shipped_table WORK --tails-of MODEL --out NEW
 
-The third one learns the spread over the disc's phase anew, from a sweep of robots with two tails. That of the
-shipped file is from domain.toml with 8192 rows, the seed 20261123, N = 2 and a history every 64 rows. The last one
-learns all but the response to a flip anew; so the shipped file was made.
+--test prints errors and coverage on locked robots. --spread-of learns the spread over the disc's phase anew,
+from a sweep of robots with two tails. That of the shipped file is from domain.toml with 8192 rows, the seed
+20261123, N = 2 and a history every 64 rows. --tails-of learns all but the response to a flip anew; so the
+shipped file was made.
 
 The tails are learned from robots with heads far wider than those of the domain, a single tail from robots of the
 domain as well, most of them with effects on head and motor. The response to a flip is learned from the sweep, and
@@ -78,8 +79,8 @@ def robots(name: str) -> dict[str, Floats]:
         every = {**draw_robots(_FLIPS_DRAWN, seed, wide=True), "N": tails}
         return {n: np.asarray(values[:count]) for n, values in every.items() if n not in _STEADY_ONLY}
     count, seed = ROWS[name]
-    drawn = draw_robots(count, seed, wide=name == "tails", effects=name not in ("locked", "flips"))
-    if name in _HALF_WITH_EFFECTS:  # every second robot of a Sobol sequence has a small C_t
+    drawn = draw_robots(count, seed, wide=name == "tails", effects=name != "locked")
+    if name in _HALF_WITH_EFFECTS:  # every second robot of a Sobol sequence has a small C_r
         without = np.random.default_rng((seed, 2)).uniform(size=count) < 0.5
         for effect in [n for n in drawn if n not in ROBOT]:
             drawn[effect][without] = 0.0
@@ -96,8 +97,8 @@ def kept(work: Path, name: str) -> SimulatedRobots:
             parts = [{k.split("/")[1]: file[k] for k in file if k.startswith(f"{i}/")} for i in range(3)]
         return SimulatedRobots(*parts)
     began = time.process_time()
-    drawn_wide = name in ("tails", "single") or name in FLIPS
-    make: Callable[..., SimulatedRobots] = simulate_robots if drawn_wide else as_reached
+    learned = name in ("tails", "single") or name in FLIPS
+    make: Callable[..., SimulatedRobots] = simulate_robots if learned else as_reached
     rows = make(robots(name), title=name, **({"curves": True} if name in FLIPS else {}))
     print(f"{name}: {len(rows)} rows, {time.process_time() - began:.0f} s")
     work.mkdir(parents=True, exist_ok=True)

@@ -17,7 +17,7 @@ function networkOf({ shape, state }) {
   return { shift, scale, mean, spread, members };
 }
 
-/* The mean of the members, as an array of the outputs. Of more inputs than it has, a network takes the first. */
+/* The mean of the members, as an array of the outputs. */
 function evaluate(network, inputs) {
   const first = scaledInputs(network, inputs), { mean, spread, members } = network;
   const total = new Float64Array(mean.length);

@@ -20,7 +20,7 @@ function linearTorque(S) {
   return (1 + (S / 6) ** 2) ** -0.125;
 }
 
-/* The seven inputs that all networks have in common. tail_inputs */
+/* The inputs of the networks for two tails and more, of the gap and of the response. tail_inputs */
 function tailInputs({ perp, offset, radius, number, spinDrag }, [vX, vZ, yaw, , spin]) {
   const dragNumber = perp * spin;
   const deflection = ((Math.sqrt(vX ** 2 + yaw ** 2 + TINY) / spin) * dragNumber) / (dragNumber + SOFT);

@@ -14,7 +14,7 @@ const LEAST_SHARE = 1e-3;
 const FIRST_SPIN = 0.6; // ω_t/ω in the first guess
 const LONGEST = 0.5; // largest relative change of ω_t in one step
 
-/* The motion with torque and thrust of linear theory and the side forces of straight tails. _first_guess */
+/* The motion with torque and thrust of linear theory and the side forces of straight tails. first_guess */
 function firstGuess({ speed, gain, resistance }, { perp, parallel, offset, number }) {
   let spin = FIRST_SPIN * speed;
   for (let i = 0; i < 3; i++) {

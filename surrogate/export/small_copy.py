@@ -160,13 +160,15 @@ def _without_dwells(robots: Mapping[str, Floats]) -> dict[str, Floats]:
 
 
 def _robots(count: int, seed: int) -> dict[str, Floats]:
-    """Return random robots of the domain, every second one with a reversed motor, with dwells."""
+    """Return random robots of the domain, half of them with a reversed motor, with dwells."""
     robots = {
         name: np.array(values) for name, values in draw_robots(count, seed, wide=False).items() if name in ROBOT
     }
     robots = {name: robots[name] for name in ROBOT}
-    robots["omega_bar"][::2] *= -1
-    return robots | {DWELL: 0.25 * 12 ** np.random.default_rng(seed).uniform(size=count)}
+    random = np.random.default_rng(seed)
+    dwells = 0.25 * 12 ** random.uniform(size=count)
+    robots["omega_bar"] *= np.where(random.uniform(size=count) < 0.5, -1, 1)
+    return robots | {DWELL: dwells}
 
 
 def _figures(apart: Floats) -> dict[str, float]:

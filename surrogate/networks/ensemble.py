@@ -81,8 +81,8 @@ class Ensemble:
         return Ensemble.from_state({n: part if n in SHARED else part[k : k + 1] for n, part in state.items()})
 
     def members_at(self, inputs: Floats) -> Floats:
-        """Return outputs of every member, (K, M, O); of more inputs than it has, a network takes the first."""
-        x = (inputs[..., : len(self.shift)] - self.shift) / self.scale
+        """Return outputs of every member, (K, M, O)."""
+        x = (inputs - self.shift) / self.scale
         y = perceptrons(x, self.weights, self.biases, self.bypass, _tanh)
         return np.asarray(y * self.spread + self.mean)
 

@@ -109,7 +109,7 @@ def query_blocks(
         for b in range(BLOCK):
             k = min(begin + b, some - 1)
             _put_motion(robot[rows[k]], state[k, :5], block[:, b])
-        if support >= 0:
+        if sizes[0] >= 0 and support >= 0:
             for b in range(BLOCK):
                 k = min(begin + b, some - 1)
                 network_inputs_at(robot[rows[k], HEAD_NUMBERS:], state[k, :5], block[_OWN : _OWN + sizes[1], b])

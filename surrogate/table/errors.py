@@ -4,8 +4,8 @@ For outputs that keep their sign, the error is relative. For θ it is in degrees
 a flip it is relative to the distance (or turn) of the robot in one unit of time. For the net speed it is
 relative to v_z, its limit for long dwells. Reported are the root mean square, the median, the 95th percentile
 and the largest error over rows whose tails do not touch, where the model is valid, and the same over all rows.
-Stated errors are those of robots with two tails and more; robots with one tail have errors ten times as large,
-and wider intervals. `coverage` is the share of rows inside their interval.
+Stated errors are those of robots with two tails and more without effects; robots with one tail have errors several
+times as large, and wider intervals. `coverage` is the share of rows inside their interval.
 """
 
 from __future__ import annotations

@@ -74,12 +74,13 @@ def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
         _what(lookup),
         "## What it learned",
         _lines(("input", "from", "to"), ranges),
-        "The domain is not this box but the joint support of what was learned. Effects on head, disc and motor "
-        "need no learning.",
+        "The domain is not this box but the joint support of what was learned. Robots with effects on head, disc "
+        "and motor are answered, too.",
         "## Errors",
         _about_errors(int(known.sum()), int((~known).sum())),
     ]
     plain = without_effects(held_out.robots)
+    shown = known & plain if (known & plain).any() else known
     kinds = (
         ("Two tails and more, which do not touch:", plain & (tails > 1) & apart),
         ("Two tails and more, touching or not:", plain & (tails > 1)),
@@ -94,10 +95,10 @@ def model_card(lookup: NeuralTable, held_out: SimulatedRobots) -> str:
     regions = [
         (words, *row[1:])
         for words, kind in _regions(held_out.robots)
-        if (row := _row("", "omega_yr_bar", errors, inside, known & plain & kind))
+        if (row := _row("", "omega_yr_bar", errors, inside, shown & kind))
     ]
     parts += ["## Yaw rate by region", _lines(("robots", "median", "95 %", "worst", "coverage"), regions)]
-    parts += ["## The worst robots", _worst(held_out, answer, errors["omega_yr_bar"], known & plain)]
+    parts += ["## The worst robots", _worst(held_out, answer, errors["omega_yr_bar"], shown)]
     parts += ["## More rows", _MORE_ROWS.strip()]
     parts += ["## Where not to trust it", _NO_TRUST.strip()]
     return "\n\n".join(parts) + "\n"

@@ -165,7 +165,12 @@ def learn(
         "flips": len(usable),
     }
     created = provenance(
-        {"tails": asdict(wrench_settings), "curves": asdict(response_settings), "device": work.device}
+        {
+            "tails": asdict(wrench_settings),
+            "single": asdict(single_settings or wrench_settings),
+            "curves": asdict(response_settings),
+            "device": work.device,
+        }
     )
     lookup = NeuralTable(
         tails=table,
@@ -259,17 +264,18 @@ def _judged(
 def _with_intervals(lookup: NeuralTable, width_rows: SimulatedRobots, held_out: SimulatedRobots) -> NeuralTable:
     """Add intervals and held-out errors of the steady motion to a table.
 
-    The intervals are those of all rows, the errors those of robots with two tails and more without effects.
+    The intervals are those of all rows. The errors are those of robots without effects and with two tails and
+    more, as far as there are any.
     """
     (first_features, first, _), (features, errors, inside) = (
         _errors(lookup, rows) for rows in (width_rows, held_out)
     )
     intervals = Intervals.learned(first_features, first, features, errors)
     apart = held_out.motion["tail_gap"][inside] >= 1
-    plain = without_effects(held_out.robots)[inside]
-    several = plain & (held_out.robots["N"][inside] > 1)
-    several = several if several.any() else plain
-    report = summary({name: error[several] for name, error in errors.items()}, apart[several])
+    stated = np.ones(len(apart), dtype=bool)
+    for kind in (without_effects(held_out.robots)[inside], held_out.robots["N"][inside] > 1):
+        stated = stated & kind if (stated & kind).any() else stated
+    report = summary({name: error[stated] for name, error in errors.items()}, apart[stated])
     return replace(lookup, intervals=intervals, errors={**lookup.errors, **report})
 
 

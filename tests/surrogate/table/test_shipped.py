@@ -58,7 +58,7 @@ def answered(robots: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict
 
 def test_fresh_robots_are_near_the_simulator_and_inside_their_intervals() -> None:
     """Robots of the whole domain with two tails and more; what the table states holds for them."""
-    robots = {name: values[::2] for name, values in draw_robots(512, 77, wide=False).items()}
+    robots = draw_robots(256, 77, wide=False)
     robots = {name: values[robots["N"] > 1] for name, values in robots.items()}
     answer, truth, good = answered(robots)
     assert good.mean() > 0.95

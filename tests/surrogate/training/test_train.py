@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,10 @@ import pytest
 import surrogate.training.train as training
 from dataset.build.build import build
 from sim.io.errors import InputError
+from surrogate.training.model_card import model_card
 from surrogate.training.simulated import draw_robots, simulate_robots
 from tests.dataset.sweeps import design, invented
-from tests.surrogate.small import CURVES, TAILS, flips
+from tests.surrogate.small import CURVES, TAILS, flips, rows, table
 
 
 def test_training_is_repeatable_and_reads_a_folder(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -30,6 +32,16 @@ def test_training_is_repeatable_and_reads_a_folder(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(training, "read_robots", lambda folder: (few, np.arange(40)))
     with pytest.raises(InputError, match="training needs 64"):
         training.train("folder", TAILS, CURVES, title="")
+
+
+def test_a_table_of_robots_with_effects_alone_states_its_errors() -> None:
+    held = rows(256, 13, wide=False)
+    held = replace(held, robots={**held.robots, "disc_drag": np.full(len(held), 0.2)})
+    lookup = training._with_intervals(table(), held, held)
+    assert lookup.errors["omega_yr_bar"]["median"] > 0
+    card = model_card(lookup, held)
+    assert "with effects on head and motor" in card
+    assert "| N = 3 |" in card
 
 
 def test_the_split_is_fixed_and_disjoint() -> None:
