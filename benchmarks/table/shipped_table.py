@@ -6,15 +6,15 @@ Usage: softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
        python -m benchmarks shipped_table WORK --spread-of MODEL --sweep TWO --out NEW
        python -m benchmarks shipped_table WORK --tails-of MODEL --out NEW
 
---test prints errors and coverage on locked robots. --spread-of learns the spread over the disc's phase anew,
-from a sweep of robots with two tails. That of the shipped file is from domain.toml with 8192 rows, the seed
-20261123, N = 2 and a history every 64 rows. --tails-of learns all but the response to a flip anew; so the
+--test prints errors and coverage on robots of the test set. --spread-of learns the spread over the disc's phase
+anew, from a sweep of robots with two tails. That of the shipped file is from domain.toml with 8192 rows, the
+seed 20261123, N = 2 and a history every 64 rows. --tails-of learns all but the response to a flip anew; so the
 shipped file was made.
 
 The tails are learned from robots with heads far wider than those of the domain, a single tail from robots of the
 domain as well, most of them with effects on head and motor. The response to a flip is learned from the sweep, and
-from some of these wide robots. All robots are drawn from Sobol sequences with the seeds below. The locked robots
-led to no choice of any kind.
+from some of these wide robots. All robots are drawn from Sobol sequences with the seeds below. The test set led to
+no choice of any kind.
 
 Takes two hours with its simulations.
 """
@@ -59,7 +59,7 @@ CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)
 SPREAD = Settings(width=32, depth=2, members=1, epochs=60, iterations=600)
 ROWS = {
     "tails": (32768, 101), "single": (16384, 505), "widths": (8192, 202), "held_out": (8192, 402),
-    "locked": (4096, 20261205), "locked_effects": (4096, 20261206),
+    "locked": (4096, 20261205),
 }  # fmt: skip
 FLIPS = {"flips": (1400, 301), "locked_flips": (400, 20261202)}
 _HALF_WITH_EFFECTS = ("single", "widths", "held_out")
