@@ -7,6 +7,7 @@ import pytest
 
 from sim.effects import catalogue
 from sim.model.groups import DWELL
+from surrogate.input_ranges import ROBOT
 from surrogate.table.model_file import load
 from surrogate.training.simulated import draw_robots
 from surrogate.wrench.heads import needs_no_learning
@@ -67,6 +68,11 @@ def test_robots_with_one_tail() -> None:
     found = load().query(drawn, flag=True)
     check_same(found, answer(load(), drawn), 1e-11)
     assert np.isinf(found["tail_gap"]).all()
+
+
+def test_one_tail_without_effects() -> None:
+    drawn = {name: values for name, values in robots().items() if name in ROBOT} | {"N": np.ones(400)}
+    check_same(load().query(drawn, flag=True), answer(load(), drawn), 1e-11)
 
 
 def test_one_tail_with_every_effect_of_the_head() -> None:

@@ -37,7 +37,7 @@ def test_training_is_repeatable_and_reads_a_folder(monkeypatch: pytest.MonkeyPat
 def test_a_table_of_robots_with_effects_alone_states_its_errors() -> None:
     held = rows(256, 13, wide=False)
     held = replace(held, robots={**held.robots, "disc_drag": np.full(len(held), 0.2)})
-    lookup = training._with_intervals(table(), held, held)
+    lookup = training._with_intervals(replace(table(), errors={}), held, held)
     assert lookup.errors["omega_yr_bar"]["median"] > 0
     card = model_card(lookup, held)
     assert "with effects on head and motor" in card
