@@ -181,7 +181,9 @@ class Revolutions:
         return Leading(float(np.log(abs(largest)) * share), float(abs(np.angle(largest)) / _TURN), 1)
 
     def _image(self, y: Floats) -> Floats | None:
-        """Compute Φ(y), scaled like y."""
+        """Compute Φ(y), scaled like y; None where time steps fail, and where y has numbers that are not finite."""
+        if not np.isfinite(y).all():
+            return None
         turn = self.turn(self.state(y), float(y[-1]), self._time)
         return None if turn is None else turn.state.x.ravel() / self._scale
 

@@ -260,3 +260,13 @@ def test_other_words_are_no_range(text: str) -> None:
 def test_ranges_without_robots_are_refused(name: str, low: float, high: float, words: str) -> None:
     with pytest.raises(InputError, match=words):
         SweptInput(CONTROL, name, low, high)
+
+
+def test_a_correction_near_a_turn_that_fails_is_not_finite(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where time steps fail beside a fixed point, the branch ends there."""
+    swept = SweptInput(PRESETS["paper-control"], "omega_bar", 5.0, 8.0)
+    family = Revolutions(swept.body_at, 2, 4, 12)
+    monkeypatch.setattr(family, "turn", lambda state, s, time, **_: swept.body_at(s) and None)
+    y = np.append(np.full(4 * 2 * 3, 0.1), 0.5)
+    row = np.append(np.zeros(len(y) - 1), 1.0)
+    assert not np.isfinite(family._solved(y, y[:-1], row, np.ones(len(y)), 1e-6)).all()
