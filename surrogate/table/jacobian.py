@@ -16,8 +16,8 @@ from sim.motion.steady_motion import STEADY_OUTPUTS
 from surrogate.networks.ensemble import Ensemble
 from surrogate.table.wrench_table import WrenchTable, network_index
 from surrogate.wrench.balance import inverses_of
-from surrogate.wrench.heads import full_motion, heads_and_tails, slope_at, unbalanced
-from surrogate.wrench.tails import Tails, network_inputs
+from surrogate.wrench.heads import Numbers, full_motion, heads_and_tails, slope_at, unbalanced
+from surrogate.wrench.tails import network_inputs
 
 
 def slopes(
@@ -43,14 +43,17 @@ def slopes(
     return derivatives
 
 
+def numbers_of(network: Ensemble) -> Numbers:
+    """Return what a network of the wrench gives, from tails and motion."""
+    return lambda tails, motion: network(network_inputs(tails, motion, network.shape["inputs"]))
+
+
 def _changes(
     table: WrenchTable, network: Ensemble, columns: dict[str, Floats], u: Floats, parameters: Sequence[str]
 ) -> dict[str, tuple[Floats, ...]]:
     """Return derivatives of STEADY_OUTPUTS by parameter, of robots with one network and the solution u (M, 4)."""
 
-    def numbers(tails: Tails, motion: Floats) -> Floats:
-        return network(network_inputs(tails, motion, network.shape["inputs"]))
-
+    numbers = numbers_of(network)
     heads, tails = heads_and_tails(columns, keep=parameters)
     inverse = inverses_of(slope_at(lambda v: unbalanced(heads, tails, v, numbers), u))
 

@@ -18,11 +18,10 @@ from surrogate.table.curve_errors import CURVE_ERRORS, SIZES
 from surrogate.table.intervals import PARTS as INTERVAL_PARTS
 from surrogate.table.response_table import PARTS, SHAPES
 from surrogate.table.support import monomial_count
-from surrogate.table.wrench_table import CLASSES
-from surrogate.wrench.tails import INPUTS, SINGLE_INPUTS, TYPICAL
+from surrogate.table.wrench_table import CLASSES, INPUT_COUNTS
+from surrogate.wrench.tails import TYPICAL
 
 _ENTRIES = ("wrench", "gap", "curves", "bases", "support", "intervals", "ranges", "errors", "provenance")
-_WRENCH_INPUTS = (len(SINGLE_INPUTS), len(INPUTS), len(INPUTS))  # of each of CLASSES
 _GAP_INPUTS, _CURVE_INPUTS, _WIDTH_FEATURES = 8, 15, 11  # as wrench_table, response_table and lookup give them
 
 
@@ -47,12 +46,12 @@ def check_form(content: Mapping[str, Any]) -> None:
     if len(content["curves"]) != len(PARTS) or set(content["bases"]) != set(SHAPES):
         raise IncompleteError("it has no response to a flip")
     _check_numbers(content)
-    for part, inputs in zip(wrench, _WRENCH_INPUTS, strict=True):
+    for part, inputs in zip(wrench, INPUT_COUNTS, strict=True):
         if part is not None:
             _check_network(part, inputs, len(TYPICAL[0]))
     _check_network(content["gap"], _GAP_INPUTS, 1)
     _check_curves(content["curves"], content["bases"])
-    for part, inputs in zip(support, _WRENCH_INPUTS, strict=True):
+    for part, inputs in zip(support, INPUT_COUNTS, strict=True):
         if part is not None:
             _check_support(part, inputs)
     if content["intervals"] is not None:

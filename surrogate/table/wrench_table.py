@@ -17,9 +17,10 @@ from surrogate.networks.ensemble import Ensemble
 from surrogate.wrench.balance import inverses_of
 from surrogate.wrench.heads import Heads, pack_robots, straight_resistance
 from surrogate.wrench.motions import solve_robots
-from surrogate.wrench.tails import Tails, linear_torque, tail_inputs
+from surrogate.wrench.tails import INPUTS, SINGLE_INPUTS, Tails, linear_torque, tail_inputs
 
 CLASSES = (1, 2, 3)  # networks for N = 1, N = 2, and three or more tails
+INPUT_COUNTS = (len(SINGLE_INPUTS), len(INPUTS), len(INPUTS))  # of these networks
 _LEAST_SURGE = 0.05  # of the speed: errors of v_z are relative to this at least
 
 

@@ -27,6 +27,7 @@ from surrogate.networks.trainable import TrainableEnsemble
 from surrogate.networks.training_loop import Settings, fit
 from surrogate.table.wrench_table import (
     CLASSES,
+    INPUT_COUNTS,
     WrenchTable,
     clamp_distance,
     gap_inputs,
@@ -39,9 +40,8 @@ from surrogate.wrench.tails import (
     SMOOTHNESS,
     TYPICAL,
     Tails,
-    single_inputs,
+    network_inputs,
     straight_wrench,
-    tail_inputs,
     wrench_slopes,
 )
 
@@ -112,7 +112,7 @@ def fit_wrench(
 
 def _learn_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext, count: int) -> Ensemble:
     """Fit the network of one of CLASSES."""
-    inputs = (single_inputs if count == 1 else tail_inputs)(rows.tails, rows.motion)
+    inputs = network_inputs(rows.tails, rows.motion, INPUT_COUNTS[CLASSES.index(count)])
     weight = motion_sensitivity(rows.heads, rows.tails, rows.motion)
     matrix = weight @ wrench_slopes(rows.tails, rows.motion)
     wrench = (rows.heads.resistance @ rows.motion[..., None])[..., 0]

@@ -31,12 +31,12 @@ from surrogate.table.intervals import Intervals
 from surrogate.table.lookup import NeuralTable, steady_outputs
 from surrogate.table.response_table import Basis
 from surrogate.table.support import Support
-from surrogate.table.wrench_table import CLASSES, network_index
+from surrogate.table.wrench_table import CLASSES, INPUT_COUNTS, network_index
 from surrogate.training.fit_response import SETTINGS, fit_part, fit_response
 from surrogate.training.fit_wrench import WrenchSamples, fit_wrench, learnable, wrench_samples
 from surrogate.training.response_errors import held_out_curve_errors
 from surrogate.training.simulated import SimulatedRobots, join_robots, read_robots, simulate_robots
-from surrogate.wrench.tails import single_inputs, tail_inputs
+from surrogate.wrench.tails import network_inputs
 
 _FEWEST_INSIDE = 10
 _FEWEST_ROWS, _FEWEST_OF_A_CLASS = 64, 16
@@ -164,20 +164,13 @@ def learn(
         "held_out": len(held_out),
         "flips": len(usable),
     }
-    created = provenance(
-        {
-            "tails": asdict(wrench_settings),
-            "single": asdict(single_settings or wrench_settings),
-            "curves": asdict(response_settings),
-            "device": work.device,
-        }
-    )
+    created = _created(wrench_settings, single_settings, asdict(response_settings), work)
     lookup = NeuralTable(
         tails=table,
         curves=response,
         support=_supports(rows),
         intervals=None,
-        ranges={name: _range(learned.robots[name]) for name in learned.robots if name in ROBOT},
+        ranges=_ranges(learned),
         errors={},
         provenance={**created, **(source or {}), "rows": counts},
     )
@@ -209,33 +202,32 @@ def learn_tails_again(
     """
     compile_once()
     wrench_settings, rows = settings or Settings(), _learnable(learned)
-    created = provenance(
-        {
-            "tails": asdict(wrench_settings),
-            "single": asdict(single_settings or wrench_settings),
-            "curves": lookup.provenance["config"]["curves"],
-            "device": work.device,
-        }
-    )
+    created = _created(wrench_settings, single_settings, lookup.provenance["config"]["curves"], work)
     counts = {"train": len(rows.motion), "widths": len(width_rows), "held_out": len(held_out)}
     changed = replace(
         lookup,
         tails=fit_wrench(rows, wrench_settings, work, single_settings=single_settings),
         support=_supports(rows),
-        ranges={name: _range(learned.robots[name]) for name in learned.robots if name in ROBOT},
+        ranges=_ranges(learned),
         provenance={**created, **(source or {}), "rows": {**lookup.provenance["rows"], **counts}},
     )
     return _with_intervals(changed, width_rows, held_out)
 
 
+def _created(
+    settings: Settings, single_settings: Settings | None, curves: dict[str, Any], work: TrainingContext
+) -> dict[str, Any]:
+    """Return the provenance of a table that is trained with these settings."""
+    single = asdict(single_settings or settings)
+    return provenance({"tails": asdict(settings), "single": single, "curves": curves, "device": work.device})
+
+
 def _supports(rows: WrenchSamples) -> tuple[Support | None, ...]:
     """Learn the domain of each of CLASSES, from the inputs of its network; None where there are no rows."""
-    kind, supports = network_index(rows.tails.number), list[Support | None]()
-    for k, count in enumerate(CLASSES):
-        some = rows.at(kind == k)
-        inputs = (single_inputs if count == 1 else tail_inputs)(some.tails, some.motion)
-        supports.append(Support.learned(inputs) if len(inputs) else None)
-    return tuple(supports)
+    kind = network_index(rows.tails.number)
+    parts = [rows.at(kind == k) for k in range(len(CLASSES))]
+    inputs = [network_inputs(p.tails, p.motion, size) for p, size in zip(parts, INPUT_COUNTS, strict=True)]
+    return tuple(Support.learned(x) if len(x) else None for x in inputs)
 
 
 def fit_spread(
@@ -323,5 +315,7 @@ def _learnable(rows: SimulatedRobots) -> WrenchSamples:
     return kept
 
 
-def _range(values: Floats) -> tuple[float, float]:
-    return float(np.abs(values).min()), float(np.abs(values).max())
+def _ranges(learned: SimulatedRobots) -> dict[str, tuple[float, float]]:
+    """Return least and greatest size of each group that was learned."""
+    sizes = {name: np.abs(values) for name, values in learned.robots.items() if name in ROBOT}
+    return {name: (float(size.min()), float(size.max())) for name, size in sizes.items()}

@@ -6,21 +6,13 @@ from functools import cache
 
 import numpy as np
 
-from surrogate.networks.ensemble import Ensemble
 from surrogate.networks.training_loop import Settings
 from surrogate.table.lookup import NeuralTable
 from surrogate.training.simulated import SimulatedRobots, draw_robots, simulate_robots
 from surrogate.training.train import learn
-from surrogate.wrench.heads import Numbers
-from surrogate.wrench.tails import network_inputs
 
 TAILS = Settings(width=20, depth=2, members=2, epochs=40, iterations=60)
 CURVES = Settings(width=16, depth=1, members=1, epochs=30, iterations=20)
-
-
-def numbers_of(network: Ensemble) -> Numbers:
-    """Return what a network of the wrench gives, from tails and motion."""
-    return lambda tails, motion: network(network_inputs(tails, motion, network.shape["inputs"]))
 
 
 @cache

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from sim.model.groups import checked_values
+from surrogate.table.jacobian import numbers_of
 from surrogate.wrench.heads import heads_and_tails, unbalanced
 from tests.planner.page.page_core import TABLE, answers
 from tests.planner.page.robots import columns_of, random_groups, shipped, shipped_data
-from tests.surrogate.small import numbers_of
 
 
 def test_forces_are_in_balance() -> None:

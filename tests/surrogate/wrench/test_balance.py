@@ -9,6 +9,7 @@ import pytest
 
 import surrogate
 from sim.compiling import folder_of_package
+from surrogate.table.jacobian import numbers_of
 from surrogate.table.model_file import load
 from surrogate.table.wrench_table import network_index
 from surrogate.training.fit_wrench import wrench_samples
@@ -17,7 +18,7 @@ from surrogate.wrench.balance import inverses_of
 from surrogate.wrench.heads import heads_and_tails, unbalanced
 from surrogate.wrench.motions import solve_rows
 from tests.oracles.balance import linear_guess, solve
-from tests.surrogate.small import numbers_of, rows, table
+from tests.surrogate.small import rows, table
 
 
 def test_loops_are_kept_by_all_files_of_the_package() -> None:

@@ -8,10 +8,11 @@ import pytest
 from sim.effects import catalogue
 from sim.io.errors import InputError
 from sim.motion.batches import steady_columns
+from surrogate.table.jacobian import numbers_of
 from surrogate.table.model_file import load
 from surrogate.wrench.heads import heads_and_tails, needs_no_learning, slope_at, unbalanced
 from tests.oracles.balance import linear_guess
-from tests.surrogate.small import numbers_of, rows, table
+from tests.surrogate.small import rows, table
 
 
 @pytest.mark.parametrize("effect", [name for name in catalogue() if needs_no_learning(name)])
