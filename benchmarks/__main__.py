@@ -19,6 +19,8 @@ from inspect import Parameter, signature
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
+from sim.io.errors import run_command
+
 FOLDER = Path(__file__).parent
 ROOMS = ("simulator", "data", "table", "planner", "calibration")
 CLAIMED = ("accuracy", "speed", "scaling", "robustness", "lookup", "tracking", "tensors", "physics")
@@ -85,7 +87,7 @@ def _refuse(reason: str) -> NoReturn:
     raise SystemExit(2)
 
 
-def main(words: list[str]) -> None:
+def main(words: list[str] | None) -> None:
     """List benchmarks, or run one or those that are claimed."""
     if not words or words[0] in ("-h", "--help"):
         print(listing())
@@ -99,4 +101,4 @@ def main(words: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    sys.exit(run_command(main, sys.argv[1:]))

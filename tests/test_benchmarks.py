@@ -62,3 +62,10 @@ def test_arguments_that_do_not_fit_are_refused() -> None:
         done = benchmarks("hidden_laws", *words)
         assert done.returncode == 2
         assert done.stderr == f"error: hidden_laws: {reason}; {usage}\n"
+
+
+def test_bad_input_ends_with_one_line() -> None:
+    done = benchmarks("head_effects", "/nowhere.safetensors")
+    assert done.returncode == 2
+    assert "no model /nowhere.safetensors" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
