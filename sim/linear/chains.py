@@ -18,7 +18,7 @@ from sim.arrays import Floats
 from sim.compiling import compiled_exactly
 from sim.lanes import zeros
 from sim.linear.blocks import block, put, put_block, vector
-from sim.linear.dense import solve_dense_lanes
+from sim.linear.dense import factor_dense, solve_factored
 from sim.linear.vectors import applied, dot, inverse, minus, product, subtracted, times
 
 
@@ -32,7 +32,8 @@ class Chains(NamedTuple):
     upper2: Floats  # A_{k−2,k}
     border: Floats  # (n, M, 4, 3): B, columns of the body's unknowns
     foot: Floats  # (2, M, 4, 3): C in the first two nodes, rows of the body's equations
-    corner: Floats  # (P, 4, 4): D
+    corner: Floats  # (P, 4, 4): D; then, for one instant, the factors of the body's equations
+    exchanged: Floats  # (4, 4): row exchanges of these factors
 
 
 @compiled_exactly
@@ -47,6 +48,7 @@ def new_chains(like: Floats, n: int, chains: int, instants: int) -> Chains:
         zeros(like, (n, chains, 4, 3)),
         zeros(like, (2, chains, 4, 3)),
         zeros(like, (instants, 4, 4)),
+        zeros(like, (4, 4)),
     )
 
 
@@ -70,6 +72,7 @@ def factor(chains: Chains) -> None:
             for a in range(4):
                 corner[a, c] -= dot(vector(chains.foot[0], m, a), first)
                 corner[a, c] -= dot(vector(chains.foot[1], m, a), second)
+    factor_dense(corner, chains.exchanged)
 
 
 @compiled_exactly
@@ -121,7 +124,7 @@ def solve(chains: Chains, s: Floats, t: Floats) -> None:
         second = minus(vector(s, 1, m), applied(block(chains.lower, 1, m), first))
         for a in range(4):
             t[a] -= dot(vector(chains.foot[0], m, a), first) + dot(vector(chains.foot[1], m, a), second)
-    solve_dense_lanes(chains.corner[0], t.reshape((t.size, 1)))
+    solve_factored(chains.corner[0], chains.exchanged, t.reshape((t.size, 1)))
     for m in range(count):
         for k in range(n):
             change = vector(s, k, m)

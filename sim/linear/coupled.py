@@ -28,7 +28,7 @@ from sim.compiling import compiled_exactly
 from sim.lanes import empty, fma, zeros
 from sim.linear.blocks import block, block_at
 from sim.linear.chains import Chains
-from sim.linear.dense import invert, solve_dense_lanes
+from sim.linear.dense import factor_dense, invert, solve_factored
 from sim.linear.products import add_block_product, apply, multiply, multiply_block, subtract_product
 from sim.linear.vectors import negative
 
@@ -40,7 +40,8 @@ class Coupled(NamedTuple):
     upper: Floats  # (n, m, m): A_{k−1,k}
     inverse: Floats  # (n, m, m): A_kk⁻¹
     folded: Floats  # (n, m, 2 m + u + 1): Z, in the columns of the row above: body, s, node k − 1, node k − 2
-    schur: Floats  # (u, u)
+    schur: Floats  # (u, u): factors of the body's equations with all nodes eliminated
+    exchanged: Floats  # (u, u): row exchanges of these factors
 
 
 class Coupling(NamedTuple):
@@ -64,6 +65,7 @@ def new_coupled(like: Floats, n: int, chains: int, instants: int) -> Coupled:
         empty(like, (n, m, m)),
         empty(like, (n, m, m)),
         empty(like, (n, m, width)),
+        zeros(like, (unknowns, unknowns)),
         zeros(like, (unknowns, unknowns)),
     )
 
@@ -152,7 +154,7 @@ def _fold_two_up(system: Coupled, chains: Chains, i: int) -> None:
 
 @compiled_exactly
 def _reduce_body(system: Coupled, chains: Chains) -> None:
-    """Form the body's equations with all nodes eliminated."""
+    """Form the body's equations with all nodes eliminated, and factor them."""
     instants, count = chains.corner.shape[0], chains.diagonal.shape[1]
     m, unknowns = 3 * count, 4 * instants
     first, second = system.folded[0], empty(system.schur, (m, unknowns))
@@ -174,6 +176,7 @@ def _reduce_body(system: Coupled, chains: Chains) -> None:
                 near, far = chains.foot[0, i, c, a], chains.foot[1, i, c, a]
                 for j in range(unknowns):
                     row[j] -= fma(near, first[3 * i + a, j], far * second[3 * i + a, j])
+    factor_dense(schur, system.exchanged)
 
 
 @compiled_exactly
@@ -209,7 +212,7 @@ def _substitute(system: Coupled, chains: Chains, s: Floats, t: Floats) -> None:
                 row = 3 * i + a
                 through = chains.foot[0, i, c, a] * s[0, row] + chains.foot[1, i, c, a] * (s[1, row] - image[row])
                 t[4 * (i % instants) + c] -= through
-    solve_dense_lanes(system.schur, t.reshape((t.size, 1)))
+    solve_factored(system.schur, system.exchanged, t.reshape((t.size, 1)))
     for c in range(body - 1):
         around[c] = t[c]
     for i in range(n):

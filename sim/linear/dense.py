@@ -1,12 +1,12 @@
-"""Small dense matrices in compiled loops: inverse by 3×3 pivots, and solution with row exchanges."""
+"""Small dense matrices in compiled loops: inverse by 3×3 pivots, and elimination with row exchanges."""
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
 from sim.arrays import Floats
 from sim.compiling import compiled_exactly, copied
-from sim.lanes import fma, lane, lane_count, with_lane
+from sim.lanes import choose, fma, less, somewhere
 from sim.linear.blocks import block_at
 from sim.linear.products import add_block_product, multiply_block
 from sim.linear.vectors import inverse, negative
@@ -31,47 +31,81 @@ def invert(a: Floats) -> None:
                 add_block_product(negative(factor), a, k, 0, a, i, 0, m)
 
 
-@compiled_exactly
-def solve_dense_lanes(a: Floats, b: Floats) -> None:
-    """Solve b = a⁻¹ b (n, K) in place, lane by lane, with pivoting; `a` (n, n) is kept."""
-    n, columns = b.shape
-    matrix, right = np.empty((n, n)), np.empty((n, columns))
-    for i in range(lane_count(a)):
-        for row in range(n):
-            for column in range(columns):
-                right[row, column] = lane(b[row, column], i)
-            for column in range(n):
-                matrix[row, column] = lane(a[row, column], i)
-        solve_dense(matrix, right)
-        for row in range(n):
-            for column in range(columns):
-                b[row, column] = with_lane(b[row, column], i, right[row, column])
-
-
 @copied
 @compiled_exactly
 def solve_dense(a: Floats, b: Floats) -> None:
     """Solve b = a⁻¹ b (n, K) in place by Gaussian elimination with pivoting; a is overwritten. NaN in, NaN out."""
-    n, columns = b.shape
+    n = len(a)
     for k in range(n):
-        best = k
         for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[best, k]):
-                best = i
-        if best != k:
-            for j in range(k, n):
-                a[k, j], a[best, j] = a[best, j], a[k, j]
-            for j in range(columns):
-                b[k, j], b[best, j] = b[best, j], b[k, j]
+            exchanged = less(abs(a[k, k]), abs(a[i, k]))
+            if somewhere(exchanged):
+                _exchange(a, k, i, k, exchanged)
+                _exchange(b, k, i, 0, exchanged)
         scale = 1.0 / a[k, k]
         for i in range(k + 1, n):
             factor = a[i, k] * scale
-            for j in range(k + 1, n):
-                a[i, j] = fma(-factor, a[k, j], a[i, j])
-            for j in range(columns):
-                b[i, j] = fma(-factor, b[k, j], b[i, j])
+            _subtract(a, k, i, k + 1, factor)
+            _subtract(b, k, i, 0, factor)
+    _substitute(a, b)
+
+
+@compiled_exactly
+def factor_dense(a: Floats, exchanged: Floats) -> None:
+    """Factor a (n, n) in place for `solve_factored`, with pivoting in each lane.
+
+    Args:
+        exchanged: (n, n), filled below the diagonal: 1 where row i takes the place of row k.
+    """
+    n = len(a)
+    for k in range(n):
+        for i in range(k + 1, n):
+            exchanged[i, k] = less(abs(a[k, k]), abs(a[i, k]))
+            if somewhere(exchanged[i, k]):
+                _exchange(a, k, i, k, exchanged[i, k])
+        scale = 1.0 / a[k, k]
+        for i in range(k + 1, n):
+            a[i, k] = a[i, k] * scale
+            _subtract(a, k, i, k + 1, a[i, k])
+
+
+@compiled_exactly
+def solve_factored(a: Floats, exchanged: Floats, b: Floats) -> None:
+    """Solve b = a⁻¹ b (n, K) in place with the factors that `factor_dense` left."""
+    n = len(a)
+    for k in range(n):
+        for i in range(k + 1, n):
+            if somewhere(exchanged[i, k]):
+                _exchange(b, k, i, 0, exchanged[i, k])
+        for i in range(k + 1, n):
+            _subtract(b, k, i, 0, a[i, k])
+    _substitute(a, b)
+
+
+@copied
+@compiled_exactly
+def _exchange(a: Floats, k: int, i: int, first: int, where: Any) -> None:
+    """Exchange rows k and i from column `first` on, in the lanes where a condition holds."""
+    for j in range(first, a.shape[1]):
+        upper, lower = a[k, j], a[i, j]
+        a[k, j], a[i, j] = choose(where, lower, upper), choose(where, upper, lower)
+
+
+@copied
+@compiled_exactly
+def _subtract(a: Floats, k: int, i: int, first: int, factor: Any) -> None:
+    """Subtract a multiple of row k from row i, from column `first` on."""
+    for j in range(first, a.shape[1]):
+        a[i, j] = fma(-factor, a[k, j], a[i, j])
+
+
+@copied
+@compiled_exactly
+def _substitute(a: Floats, b: Floats) -> None:
+    """Solve b = u⁻¹ b (n, K) in place, with u the upper triangle of a."""
+    n, columns = b.shape
     for k in range(n - 1, -1, -1):
         for i in range(columns):
             for j in range(k + 1, n):
                 b[k, i] = fma(-a[k, j], b[j, i], b[k, i])
-            b[k, i] /= a[k, k]
+            b[k, i] = b[k, i] / a[k, k]

@@ -14,15 +14,15 @@ import numpy as np
 from sim.arrays import Floats
 from sim.motion.grouping import NONE, grouped, in_lanes, numbers_in_lanes
 from sim.motion.stability import (
-    FEW_VECTORS,
+    few_vectors,
     first_perturbation,
     growth_of_orbit,
-    in_motor_revolutions,
-    vector_count,
+    growth_on_more_phases,
+    is_doubtful,
+    largest_growths,
 )
 from sim.solve.assembly import are_local, unpacked
 from sim.solve.floquet_groups import arnoldi_of_group
-from sim.solve.orbit import mean_motion
 from sim.solve.refinement import Orbit
 
 
@@ -34,28 +34,28 @@ def growths(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
         tails: N.
         orbits: of the robots, all solved.
     """
-    local = np.flatnonzero(are_local(rows)).tolist()
-    first = dict(zip(local, _on_second_mesh(rows[local], tails, [orbits[i] for i in local]).tolist(), strict=True))
-    bodies = unpacked(rows)
-    return np.array([growth_of_orbit(bodies[i], tails, orbit, first.get(i)) for i, orbit in enumerate(orbits)])
+    by_robot, local = np.full(len(rows), np.nan), are_local(rows)
+    in_groups = np.flatnonzero(local)
+    some = [orbits[i] for i in in_groups.tolist()]
+    by_robot[in_groups] = _on_second_mesh(rows[in_groups], tails, some)
+    again = in_groups[is_doubtful(np.array([orbit.means for orbit in some]).reshape(-1, 5), by_robot[in_groups])]
+    for compute, robots in ((growth_of_orbit, np.flatnonzero(~local)), (growth_on_more_phases, again)):
+        for i, body in zip(robots.tolist(), unpacked(rows[robots]), strict=True):
+            by_robot[i] = compute(body, tails, orbits[i])
+    return by_robot
 
 
 def _on_second_mesh(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
     """Compute the growth (B,) on the second mesh, of robots with local effects."""
-    by_robot = np.full(len(rows), np.nan)
+    count, spins = few_vectors(tails), np.empty((2, len(rows)))
+    projected = np.empty((len(rows), count + 1, count))
     shapes, velocities = [orbit.x[1] for orbit in orbits], [orbit.u[1] for orbit in orbits]
-    senses, bodies = np.sign(rows[:, 0]), unpacked(rows)
+    senses = np.sign(rows[:, 0]).tolist()
     for robots, width in grouped(range(len(rows)), lambda i: (shapes[i].shape, senses[i])):
-        numbers = numbers_in_lanes(rows[robots], width)
         x, u = (in_lanes([part[i] for i in robots], width) for part in (shapes, velocities))
-        n, columns, _ = shapes[robots[0]].shape
-        count = vector_count(tails, 3 * n * columns, FEW_VECTORS)
-        first = first_perturbation(tails, n, columns)
-        projected = arnoldi_of_group(numbers, NONE, x, u, senses[robots[0]], first, count, width)
-        known = [lane for lane in range(len(robots)) if np.isfinite(projected[-1, -1, lane])]
-        values = np.linalg.eigvals(np.moveaxis(projected[:count, :, known], -1, 0))
-        for lane, largest in zip(known, (1 / values).real.max(1).tolist(), strict=True):
-            i = robots[lane]
-            shift = abs(mean_motion(bodies[i], velocities[i])[0])
-            by_robot[i] = in_motor_revolutions(shift + largest, bodies[i], velocities[i])
-    return by_robot
+        first = first_perturbation(tails, *x.shape[:2])
+        numbers = numbers_in_lanes(rows[robots], width)
+        found = arnoldi_of_group(numbers, NONE, x, u, senses[robots[0]], first, count, width)
+        projected[robots] = np.moveaxis(found[0], -1, 0)[: len(robots)]
+        spins[:, robots] = found[1][:, : len(robots)]
+    return largest_growths(projected, *spins)

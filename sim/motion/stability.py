@@ -17,6 +17,7 @@ Units: l, μ0 l⁴/EI.
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -30,61 +31,79 @@ from sim.solve.refinement import ROUGH, Orbit
 
 QUICK = 0.4  # |ω_yr/ω_t| from which a robot yaws fast
 DOUBTFUL = -0.05  # growth from which it is computed again
-FEW_VECTORS, MORE_VECTORS = 10, 30  # of Arnoldi's method beside two for each tail: first, and again
-_CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it counts
+_MORE_VECTORS = 30  # of Arnoldi's method beside two for each tail, of which the leading eigenvalues have converged
+_CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it has converged
+_KNOWN = 1.0  # the same from which even its sign is unknown
 
 
-def growth_of_orbit(body: Body, tails: int, orbit: Orbit, value: float | None = None) -> float:
-    """Compute the growth on an orbit of a robot with N tails; NaN if it cannot be computed.
+def growth_of_orbit(body: Body, tails: int, orbit: Orbit) -> float:
+    """Compute the growth on an orbit of a robot with N tails; NaN if it cannot be computed."""
+    value = growth(body, tails, orbit.x[1], orbit.u[1])
+    again = is_doubtful(orbit.means, value) and not has_contact(body)
+    return growth_on_more_phases(body, tails, orbit) if again else value
 
-    Args:
-        value: the growth on the second mesh, if it is known.
-    """
-    value = growth(body, tails, orbit.x[1], orbit.u[1]) if value is None else value
-    yaws_fast = abs(orbit.means[2]) > QUICK * abs(orbit.means[0])
-    if (value <= DOUBTFUL and not yaws_fast) or has_contact(body):
-        return value
+
+def is_doubtful(means: Floats, value: Any) -> Any:
+    """Tell whether growths (…) on the second mesh, of orbits with `means` (…, 5), must be computed again."""
+    yaws_fast = np.abs(means[..., 2]) > QUICK * np.abs(means[..., 0])
+    return yaws_fast | np.isnan(value) | (value > DOUBTFUL)
+
+
+def growth_on_more_phases(body: Body, tails: int, orbit: Orbit) -> float:
+    """Compute the growth on the third mesh, from eigenvalues that have converged; NaN if it cannot be computed."""
     instants = 2 * len(orbit.u[2]) + 1
     x, u = with_phases(orbit.x[2], tails * instants), with_phases(orbit.u[2][None], instants)[0].copy()
     _, size = solve_orbit(body, x, u, ROUGH)
-    return growth(body, tails, x, u, vectors=MORE_VECTORS) if size < ROUGH else np.nan
+    values = exponents(body, tails, x, u) if size < ROUGH else np.empty(0)
+    return in_motor_revolutions(values.real.max(), body, u) if len(values) else np.nan
 
 
-def growth(body: Body, tails: int, x: Floats, u: Floats, *, vectors: int = FEW_VECTORS) -> float:
-    """Compute the growth on an orbit x (n, M, 3), u (P, 4) of N tails.
+def growth(body: Body, tails: int, x: Floats, u: Floats) -> float:
+    """Compute the growth on an orbit x (n, M, 3), u (P, 4) of N tails; NaN if it cannot be computed."""
+    means = mean_motion(body, u)
+    first, count = first_perturbation(tails, *x.shape[:2]), few_vectors(tails)
+    projected = arnoldi(body, x, u, abs(means[0]), first, min(count, x.size - 1))
+    return float(largest_growths(projected[None], means[:1], means[1:2])[0])
+
+
+def largest_growths(projected: Floats, omega_t: Floats, omega_h: Floats) -> Floats:
+    """Compute growths (B,) from projections of Arnoldi's method with the shift |ω_t|.
+
+    Eigenvalues near 0 converge last, and before, their inverses can have any sign. So where perturbations seem to
+    grow, only eigenvalues larger than their residuals count.
 
     Args:
-        vectors: of Arnoldi's method, beside two for each tail. If they are more than by default, only eigenvalues
-            that have converged count.
+        projected: Hessenberg matrices, see `sim.solve.floquet.arnoldi`, (B, K + 1, K).
+        omega_t, omega_h: mean spins of the orbits, (B,).
 
     Returns:
-        The growth in one motor revolution; NaN if it cannot be computed.
+        The growths in one motor revolution; NaN where unknown.
     """
-    found = exponents(body, tails, x, u, vectors=vectors, unconverged=vectors == FEW_VECTORS)
-    return in_motor_revolutions(found.real.max(), body, u) if len(found) else np.nan
+    shifts, rates, out = np.abs(omega_t), np.abs(omega_t - omega_h) / (2 * np.pi), np.full(len(projected), np.nan)
+    finite = np.flatnonzero(np.isfinite(projected[:, -1, -1]))
+    inverses = 1 / np.linalg.eigvals(projected[finite, :-1])
+    out[finite] = (shifts[finite] + inverses.real.max(1)) / rates[finite]
+    for i in np.flatnonzero(out > DOUBTFUL).tolist():
+        out[i] = max(_ritz(projected[i], shifts[i], _KNOWN).real, default=np.nan) / rates[i]
+    return out
 
 
-def exponents(
-    body: Body, tails: int, x: Floats, u: Floats, *, vectors: int = MORE_VECTORS, unconverged: bool = False
-) -> Complex:
+def exponents(body: Body, tails: int, x: Floats, u: Floats) -> Complex:
     """Compute exponents σ of perturbations e^{σt} of an orbit x (n, M, 3), u (P, 4) of N tails.
 
-    Args:
-        vectors: of Arnoldi's method, beside two for each tail.
-        unconverged: whether those that have not converged count, too; some of them look unstable.
-
     Returns:
-        The exponents that count, in any order; none if they cannot be computed.
+        Those that have converged, in any order; none if they cannot be computed.
     """
-    count = vector_count(tails, x.size, vectors)
     shift = abs(mean_motion(body, u)[0])
-    projected = arnoldi(body, x, u, shift, first_perturbation(tails, *x.shape[:2]), count)
-    if not np.isfinite(projected[-1, -1]):
-        return np.empty(0, complex)
-    if unconverged:
-        return np.asarray(shift + 1 / np.linalg.eigvals(projected[:count]))
-    values, ritz = np.linalg.eig(projected[:count])
-    values = values[projected[count, count - 1] * np.abs(ritz[-1]) < _CONVERGED * np.abs(values)]
+    first, count = first_perturbation(tails, *x.shape[:2]), 2 * tails + _MORE_VECTORS
+    projected = arnoldi(body, x, u, shift, first, min(count, x.size - 1))
+    return _ritz(projected, shift, _CONVERGED) if np.isfinite(projected[-1, -1]) else np.empty(0, complex)
+
+
+def _ritz(projected: Floats, shift: float, residual: float) -> Complex:
+    """Compute the exponents whose eigenvalues have at most a relative residual, from a projection (K + 1, K)."""
+    values, vectors = np.linalg.eig(projected[:-1])
+    values = values[projected[-1, -1] * np.abs(vectors[-1]) < residual * np.abs(values)]
     return np.asarray(shift + 1 / values)
 
 
@@ -94,9 +113,9 @@ def in_motor_revolutions(exponent: float, body: Body, u: Floats) -> float:
     return float(2 * np.pi * exponent / abs(omega_t - omega_h))
 
 
-def vector_count(tails: int, unknowns: int, vectors: int) -> int:
-    """Count the vectors of Arnoldi's method: `vectors` beside two for each tail, fewer than the unknowns."""
-    return min(2 * tails + vectors, unknowns - 1)
+def few_vectors(tails: int) -> int:
+    """Choose the number of vectors of Arnoldi's method for a growth on the second mesh."""
+    return max(2 * tails + 8, 14)
 
 
 @cache

@@ -12,7 +12,7 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.compiling import compiled_exactly
-from sim.lanes import choose, lanes, less, somewhere, zeros
+from sim.lanes import choose, fma, lanes, less, somewhere, zeros
 from sim.solve.floquet import CANCELS, by_rate, damped_differentiation, without_highest
 from sim.solve.groups import body_in_lanes
 from sim.solve.linearise import linearise
@@ -24,7 +24,7 @@ from sim.solve.rates import Rates
 @compiled_exactly
 def arnoldi_of_group(
     numbers: Floats, terms: Any, x: Floats, u: Floats, sense: float, first: Floats, count: int, width: Any
-) -> Floats:
+) -> tuple[Floats, Floats]:
     """Project −(J + s B)⁻¹ B on a Krylov space for each robot, with s its mean |ω_t|.
 
     Args:
@@ -37,12 +37,15 @@ def arnoldi_of_group(
         width: of the group, see `sim.lanes`.
 
     Returns:
-        The Hessenberg matrices as `sim.solve.floquet.arnoldi` returns them, (K + 1, K, W).
+        The Hessenberg matrices as `sim.solve.floquet.arnoldi` returns them, (K + 1, K, W), and the means of ω_t
+        and ω_h, (2, W).
     """
     body, u = body_in_lanes(lanes(numbers, width), terms), lanes(u, width)
     x = without_highest(lanes(x, width))
     size = x.size
-    rates = Rates(abs(mean_motion(body, u)[0]), FIRST_PHASE, damped_differentiation(x.shape[1], sense), x)
+    means, spins = mean_motion(body, u), np.empty((2, len(width)))
+    lanes(spins, width)[:] = means[:2]
+    rates = Rates(abs(means[0]), FIRST_PHASE, damped_differentiation(x.shape[1], sense), x)
     work = new_workspace(rates, x, u)
     linearise(body, rates, x, u, work.room, work.equations)
     basis, out = zeros(x, (count + 1, size)), np.zeros((count + 1, count, len(width)))
@@ -59,7 +62,7 @@ def arnoldi_of_group(
             solve_local(rates, work, image, du)
         projected[i + 1, i] = _orthogonalise(basis, i, image.reshape(size), parts, projected)
         _normalise(basis[i + 1], image.reshape(size), projected[i + 1, i])
-    return out
+    return out, spins
 
 
 @compiled_exactly
@@ -74,7 +77,7 @@ def _orthogonalise(basis: Floats, i: int, image: Floats, parts: Floats, projecte
         for j in range(i + 1):
             projected[j, i] += parts[j]
             for k in range(len(image)):
-                image[k] -= parts[j] * basis[j, k]
+                image[k] = fma(-parts[j], basis[j, k], image[k])
         before = choose(going, size, before)
         size = choose(going, np.sqrt(_product(image, image)), size)
         going = going * less(size, CANCELS * before)
@@ -83,11 +86,15 @@ def _orthogonalise(basis: Floats, i: int, image: Floats, parts: Floats, projecte
 
 @compiled_exactly
 def _product(a: Floats, b: Floats) -> Any:
-    """Compute the scalar product of two vectors in each lane."""
-    total = 0.0 * a[0]
-    for k in range(len(a)):
-        total += a[k] * b[k]
-    return total
+    """Compute the scalar product of two vectors in each lane; four sums do not wait for each other."""
+    first = second = third = fourth = 0.0 * a[0]
+    whole = len(a) - len(a) % 4
+    for k in range(0, whole, 4):
+        first, second = fma(a[k], b[k], first), fma(a[k + 1], b[k + 1], second)
+        third, fourth = fma(a[k + 2], b[k + 2], third), fma(a[k + 3], b[k + 3], fourth)
+    for k in range(whole, len(a)):
+        first = fma(a[k], b[k], first)
+    return (first + second) + (third + fourth)
 
 
 @compiled_exactly

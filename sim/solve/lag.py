@@ -19,7 +19,7 @@ import numpy as np
 from sim.arrays import Floats
 from sim.compiling import compiled_exactly, formula
 from sim.lanes import choose, less, zeros
-from sim.linear.dense import solve_dense_lanes
+from sim.linear.dense import factor_dense, solve_factored
 from sim.linear.spectral import differentiation
 from sim.mechanics.balance import tail_spin
 from sim.model.body import Body
@@ -50,13 +50,15 @@ def advance_lag(
     """
     fields = start.shape[0]
     matrix, right = zeros(start, (fields, fields)), zeros(start, (fields, 1))
+    exchanged = zeros(start, (fields, fields))
     motion = _instants(body, u, fields)
     for p in range(fields):
         for q in range(fields):
             matrix[p, q] = motion[p, 3] * by_phase[p, q]
         matrix[p, p] += rate
         right[p, 0] = motion[p, 2] - twist[2] + rate * start[p, 2]
-    solve_dense_lanes(matrix, right)
+    factor_dense(matrix, exchanged)
+    solve_factored(matrix, exchanged, right)
     forward, leftward = _on_circle(twist, time)
     plane = zeros(start, (fields, 2))
     for p in range(fields):
@@ -67,7 +69,7 @@ def advance_lag(
         x = np.sin(angle) * forward + np.cos(angle) * leftward
         plane[p, 0] = np.cos(heading) * surge - np.sin(heading) * sway + yaw * x + rate * start[p, 0]
         plane[p, 1] = np.sin(heading) * surge + np.cos(heading) * sway - yaw * z + rate * start[p, 1]
-    solve_dense_lanes(matrix, plane)
+    solve_factored(matrix, exchanged, plane)
     for p in range(fields):
         lag[p, 0], lag[p, 1] = plane[p, 0], plane[p, 1]
 

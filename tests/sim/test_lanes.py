@@ -10,7 +10,7 @@ import pytest
 from sim.arrays import Floats
 from sim.compiling import compiled_exactly
 from sim.lanes import ALONE, GROUP, HALF_GROUP, choose, fma, lanes, larger, less, somewhere
-from sim.linear.dense import invert
+from sim.linear.dense import factor_dense, invert, solve_factored
 from sim.linear.products import multiply, subtract_product
 
 WIDTHS = [ALONE, HALF_GROUP, GROUP]
@@ -36,6 +36,30 @@ def products(a: Floats, b: Floats, c: Floats, first: int, count: int, width: Any
     subtract_product(x, y, first, z, first, count)
     multiply(x, y, first, z, first + count, count)
     invert(x)
+
+
+@compiled_exactly
+def factored(a: Floats, exchanged: Floats, b: Floats, width: Any) -> None:
+    """Factor a and solve for b with the factors, twice."""
+    x, y, z = lanes(a, width), lanes(exchanged, width), lanes(b, width)
+    factor_dense(x, y)
+    solve_factored(x, y, z)
+    solve_factored(x, y, z)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_each_lane_exchanges_its_own_rows(width: tuple[int, ...]) -> None:
+    rng = np.random.default_rng(7)
+    a, b = rng.normal(size=(8, 8, len(width))), rng.normal(size=(8, 3, len(width)))
+    factors, found, exchanged = a.copy(), b.copy(), np.zeros_like(a)
+    factored(factors, exchanged, found, width)
+    for i in range(len(width)):
+        matrix = a[:, :, i]
+        assert matrix @ matrix @ found[:, :, i] == pytest.approx(b[:, :, i], abs=1e-9)
+        alone = [np.ascontiguousarray(part[:, :, i : i + 1]) for part in (a, np.zeros_like(a), b)]
+        factored(*alone, ALONE)
+        assert np.array_equal(alone[2][:, :, 0], found[:, :, i])
+    assert len({part.tobytes() for part in np.moveaxis(exchanged, -1, 0)}) == len(width)
 
 
 @pytest.mark.parametrize("width", WIDTHS)

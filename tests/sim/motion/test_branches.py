@@ -15,7 +15,7 @@ from sim.model.robot import Robot
 from sim.model.slopes import SLOPE_INPUTS
 from sim.model.sweepable import SWEEPABLE, read_range
 from sim.motion.branch_report import branch_table, draw_branches, largest_hysteresis
-from sim.motion.branches import Branches, find_branches
+from sim.motion.branches import Branch, Branches, Motion, find_branches
 from sim.motion.continuation import Point, first_point, follow, locate
 from sim.motion.exponents import DOUBLING, FOLD, HOPF, Leading, leading_exponent
 from sim.motion.revolution import Revolutions
@@ -232,6 +232,16 @@ def test_table_and_picture_show_every_branch() -> None:
     assert "tails alike, stable" in labels
     assert FOLD in labels
     assert largest_hysteresis(result)[0] < 0.03
+
+
+def test_the_picture_of_growth_shows_where_stability_changes() -> None:
+    """However large the growth of an unstable branch is."""
+    means = np.array([20.0, -10.0, 1.0, 0.1, 0.1])
+    leading = [Leading(growth, 0.0, 2) for growth in (-0.2, 15.0, -20.0)]
+    branches = [Branch(True, [Motion(s, means, one) for s in (0.0, 1.0)]) for one in leading]
+    swept = SweptInput(CONTROL, "omega_bar", 10.0, 20.0)
+    low, high = draw_branches(Branches(swept, branches, [], [])).axes[1].get_ylim()
+    assert -10 < low < -0.2 < 0 < high < 10
 
 
 def test_every_input_has_an_option() -> None:

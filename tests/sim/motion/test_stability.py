@@ -8,7 +8,7 @@ import pytest
 from sim.motion import stability
 from sim.motion import steady as steady_module
 from sim.motion.batches import steady_columns
-from sim.motion.stability import DOUBTFUL, growth, growth_of_orbit
+from sim.motion.stability import DOUBTFUL, growth, growth_of_orbit, growth_on_more_phases
 from sim.motion.steady import orbits, steady
 from sim.motion.steady_motion import DIRECT, STABILITY_COLUMNS, STEPPING
 from sim.solve.refinement import FEW, SOLVED, Orbit, refined_orbit
@@ -24,6 +24,11 @@ PRESSED = {
 UNRESOLVED = {
     "C_t": 0.8386, "C_r": 0.6482, "C_yr": 4.3827, "l_over_R": 7.888, "L_over_R": 5.2725, "l_over_r0": 16.1815,
     "omega_bar": 160.783, "N": 5,
+}  # fmt: skip
+
+EARLY = {
+    "C_t": 5.5826, "C_r": 2.27309, "C_yr": 1.90152, "l_over_R": 4.95686, "L_over_R": 3.28364, "l_over_r0": 36.1076,
+    "omega_bar": 7.21687,
 }  # fmt: skip
 
 
@@ -132,6 +137,16 @@ def control_values() -> dict[str, float]:
 def test_a_growth_without_a_converged_exponent_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     orbit = orbit_of({"N": 2, "omega_bar": 10.0})
     body = first_body(control(N=2, omega_bar=10.0))
-    assert growth(body, 2, orbit.x[1], orbit.u[1], vectors=30) < 0
+    assert growth_on_more_phases(body, 2, orbit) < 0
     monkeypatch.setattr(stability, "_CONVERGED", 0.0)
-    assert np.isnan(growth(body, 2, orbit.x[1], orbit.u[1], vectors=30))
+    assert np.isnan(growth_on_more_phases(body, 2, orbit))
+
+
+def test_unconverged_eigenvalues_do_not_make_a_motion_unstable(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of this robot of the sweep one is close to zero; its inverse, the exponent, would be a growth of 6900."""
+    body, orbit = first_body(control(**EARLY, N=2)), orbit_of({**EARLY, "N": 2})
+    monkeypatch.setattr(stability, "few_vectors", lambda _: 14)
+    found = growth(body, 2, orbit.x[1], orbit.u[1])
+    assert found == pytest.approx(growth_on_more_phases(body, 2, orbit), rel=0.05)
+    monkeypatch.setattr(stability, "_KNOWN", np.inf)
+    assert growth(body, 2, orbit.x[1], orbit.u[1]) > 1000
