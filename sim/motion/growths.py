@@ -40,7 +40,8 @@ def growths(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
     by_robot[in_groups] = _on_second_mesh(rows[in_groups], tails, some)
     again = in_groups[is_doubtful(np.array([orbit.means for orbit in some]).reshape(-1, 5), by_robot[in_groups])]
     for compute, robots in ((growth_of_orbit, np.flatnonzero(~local)), (growth_on_more_phases, again)):
-        for i, body in zip(robots.tolist(), unpacked(rows[robots]), strict=True):
+        bodies = unpacked(rows[robots]) if len(robots) else []
+        for i, body in zip(robots.tolist(), bodies, strict=True):
             by_robot[i] = compute(body, tails, orbits[i])
     return by_robot
 

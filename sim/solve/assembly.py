@@ -7,6 +7,7 @@ Source of the base model: Du, Miller, Jawed (arXiv 2103.05712).
 
 from __future__ import annotations
 
+import math
 from collections import namedtuple
 from dataclasses import replace
 from typing import Any
@@ -115,7 +116,7 @@ def unpacked(rows: Floats) -> list[Body]:
     at = 0
     for name in Body._fields[:-1]:
         shape = _SHAPES.get(name, ())
-        part = rows[:, at : at + int(np.prod(shape))]
+        part = rows[:, at : at + math.prod(shape)]
         at += part.shape[1]
         if len(shape) == 2:
             columns.append(np.ascontiguousarray(part).reshape(-1, *shape))
