@@ -23,7 +23,7 @@ BAR_AFTER = 1.0  # s
              "C_t,C_r,C_yr,l_over_R,L_over_R,l_over_r0,omega_bar,N,…"),
     out("CSV with the same rows and their motion; needed for a table of points", default=None),
     argument("--no-stability", action="store_true",
-             help="do not compute whether small perturbations decay, which takes about a third as long again"),
+             help="do not compute whether small perturbations decay, which adds a quarter to the time"),
     JOBS,
 )  # fmt: skip
 def _steady(arguments: Namespace) -> None:

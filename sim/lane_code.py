@@ -302,12 +302,6 @@ overload(plain.zeros, strict=False)(_allocated(np.zeros))
 overload(plain.empty, strict=False)(_allocated(np.empty))
 
 
-@overload(plain.lane_count, strict=False)
-def _lane_count(array: Any) -> Any:
-    width = array.dtype.width if isinstance(array.dtype, Lanes) else 1
-    return lambda array: width
-
-
 @overload(plain.lane, strict=False)
 def _lane_of(value: Any, i: Any) -> Any:
     return (lambda value, i: _lane(value, i)) if isinstance(value, Lanes) else (lambda value, i: value)

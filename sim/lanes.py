@@ -37,11 +37,6 @@ def empty(like: Any, shape: Any) -> Any:
     return np.empty(shape, like.dtype)
 
 
-def lane_count(array: Any) -> int:
-    """Return W for an array of vectors; 1 for numbers."""
-    return 1
-
-
 def lane(value: Any, i: int) -> Any:
     """Return lane i of a vector."""
     return value

@@ -61,7 +61,10 @@ def factor_and_solve(chains: Chains, s: Floats, t: Floats) -> None:
 
 @compiled_exactly
 def factor(chains: Chains) -> None:
-    """Eliminate chains of one instant: diagonal becomes its inverse, lower and border A⁻¹ of themselves."""
+    """Eliminate chains of one instant, and factor the body's equations.
+
+    The diagonal becomes its inverse, lower and border A⁻¹ of themselves, the corner the factors.
+    """
     corner = chains.corner[0]
     for m in range(chains.diagonal.shape[1]):
         _eliminate(chains, m)

@@ -34,7 +34,10 @@ def invert(a: Floats) -> None:
 @copied
 @compiled_exactly
 def solve_dense(a: Floats, b: Floats) -> None:
-    """Solve b = a⁻¹ b (n, K) in place by Gaussian elimination with pivoting; a is overwritten. NaN in, NaN out."""
+    """Solve b = a⁻¹ b (n, K) in place by Gaussian elimination with pivoting; a is overwritten. NaN in, NaN out.
+
+    It needs no room for factors, and so can be in an object file (`sim.object_code`).
+    """
     n = len(a)
     for k in range(n):
         for i in range(k + 1, n):

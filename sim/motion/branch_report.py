@@ -22,7 +22,7 @@ from sim.motion.slow_sweep import Settled
 
 UP, DOWN = "time steps, up", "time steps, down"
 _MARKS = {FOLD: ("o", RED), HOPF: ("s", VIOLET), DOUBLING: ("D", GREEN)}
-_SHOWN = 4.0  # largest magnitude of a growth that is drawn
+_SHOWN = 4.0  # of the growth, beyond the one that is nearest to 0
 _NAMES = ("omega_t_bar", "omega_h_bar", "omega_yr_bar", "v_x", "v_z")
 
 
@@ -133,7 +133,9 @@ def draw_branches(result: Branches) -> Figure:
     lower.axhline(0.0, color=SOFT, lw=0.8)
     growths = [m.leading.growth for b in result.branches for m in b.motions if np.isfinite(m.leading.growth)]
     if growths:
-        lower.set_ylim(max(min(*growths, 0.0), -_SHOWN) - 0.1, min(max(*growths, 0.0), _SHOWN) + 0.1)
+        least = min(map(abs, growths))
+        low, high = np.clip([min(*growths, 0.0), max(*growths, 0.0)], -_SHOWN - least, _SHOWN + least)
+        lower.set_ylim(low - 0.1, high + 0.1)
     upper.set_ylabel("yaw rate [rpm]")
     lower.set_ylabel("growth in a motor revolution")
     lower.set_xlabel(result.swept.label)

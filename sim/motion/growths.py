@@ -7,11 +7,12 @@ not depend on its group. Units: l, μ0 l⁴/EI.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from sim.arrays import Floats
+from sim.arrays import Floats, Integers
+from sim.model.body import Body
 from sim.motion.grouping import NONE, grouped, in_lanes, numbers_in_lanes
 from sim.motion.stability import (
     few_vectors,
@@ -36,14 +37,23 @@ def growths(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
     """
     by_robot, local = np.full(len(rows), np.nan), are_local(rows)
     in_groups = np.flatnonzero(local)
-    some = [orbits[i] for i in in_groups.tolist()]
-    by_robot[in_groups] = _on_second_mesh(rows[in_groups], tails, some)
-    again = in_groups[is_doubtful(np.array([orbit.means for orbit in some]).reshape(-1, 5), by_robot[in_groups])]
-    for compute, robots in ((growth_of_orbit, np.flatnonzero(~local)), (growth_on_more_phases, again)):
-        bodies = unpacked(rows[robots]) if len(robots) else []
-        for i, body in zip(robots.tolist(), bodies, strict=True):
-            by_robot[i] = compute(body, tails, orbits[i])
+    local_orbits = [orbits[i] for i in in_groups.tolist()]
+    by_robot[in_groups] = _on_second_mesh(rows[in_groups], tails, local_orbits)
+    means = np.array([orbit.means for orbit in local_orbits]).reshape(-1, 5)
+    doubtful = in_groups[is_doubtful(means, by_robot[in_groups])]
+    _one_by_one(growth_on_more_phases, doubtful, rows, tails, orbits, by_robot)
+    _one_by_one(growth_of_orbit, np.flatnonzero(~local), rows, tails, orbits, by_robot)
     return by_robot
+
+
+def _one_by_one(
+    compute: Callable[[Body, int, Orbit], float], robots: Integers, rows: Floats, tails: int,
+    orbits: Sequence[Orbit], by_robot: Floats,
+) -> None:  # fmt: skip
+    """Fill in what `compute` gives for some robots."""
+    if len(robots):  # packing takes its time for no robot, too
+        for i, body in zip(robots.tolist(), unpacked(rows[robots]), strict=True):
+            by_robot[i] = compute(body, tails, orbits[i])
 
 
 def _on_second_mesh(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats:
@@ -56,7 +66,7 @@ def _on_second_mesh(rows: Floats, tails: int, orbits: Sequence[Orbit]) -> Floats
         x, u = (in_lanes([part[i] for i in robots], width) for part in (shapes, velocities))
         first = first_perturbation(tails, *x.shape[:2])
         numbers = numbers_in_lanes(rows[robots], width)
-        found = arnoldi_of_group(numbers, NONE, x, u, senses[robots[0]], first, count, width)
-        projected[robots] = np.moveaxis(found[0], -1, 0)[: len(robots)]
-        spins[:, robots] = found[1][:, : len(robots)]
+        in_group, spins_in_group = arnoldi_of_group(numbers, NONE, x, u, senses[robots[0]], first, count, width)
+        projected[robots] = np.moveaxis(in_group, -1, 0)[: len(robots)]
+        spins[:, robots] = spins_in_group[:, : len(robots)]
     return largest_growths(projected, *spins)

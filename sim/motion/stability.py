@@ -31,9 +31,9 @@ from sim.solve.refinement import ROUGH, Orbit
 
 QUICK = 0.4  # |ω_yr/ω_t| from which a robot yaws fast
 DOUBTFUL = -0.05  # growth from which it is computed again
-_MORE_VECTORS = 30  # of Arnoldi's method beside two for each tail, of which the leading eigenvalues have converged
+_MORE_VECTORS = 30  # of Arnoldi's method, beyond two for each tail: enough for the leading eigenvalues to converge
 _CONVERGED = 1e-3  # relative residual of an eigenvalue up to which it has converged
-_KNOWN = 1.0  # the same from which even its sign is unknown
+_SIGN_KNOWN = 1.0  # the same from which not even the sign of its real part is known
 
 
 def growth_of_orbit(body: Body, tails: int, orbit: Orbit) -> float:
@@ -44,7 +44,7 @@ def growth_of_orbit(body: Body, tails: int, orbit: Orbit) -> float:
 
 
 def is_doubtful(means: Floats, value: Any) -> Any:
-    """Tell whether growths (…) on the second mesh, of orbits with `means` (…, 5), must be computed again."""
+    """Tell which growths (…) on the second mesh must be computed again, for orbits with `means` (…, 5)."""
     yaws_fast = np.abs(means[..., 2]) > QUICK * np.abs(means[..., 0])
     return yaws_fast | np.isnan(value) | (value > DOUBTFUL)
 
@@ -61,16 +61,22 @@ def growth_on_more_phases(body: Body, tails: int, orbit: Orbit) -> float:
 def growth(body: Body, tails: int, x: Floats, u: Floats) -> float:
     """Compute the growth on an orbit x (n, M, 3), u (P, 4) of N tails; NaN if it cannot be computed."""
     means = mean_motion(body, u)
-    first, count = first_perturbation(tails, *x.shape[:2]), few_vectors(tails)
-    projected = arnoldi(body, x, u, abs(means[0]), first, min(count, x.size - 1))
-    return float(largest_growths(projected[None], means[:1], means[1:2])[0])
+    return float(
+        largest_growths(_projected(body, tails, x, u, few_vectors(tails))[None], means[:1], means[1:2])[0]
+    )
+
+
+def _projected(body: Body, tails: int, x: Floats, u: Floats, count: int) -> Floats:
+    """Project with at most `count` vectors and the shift |ω_t|, see `sim.solve.floquet.arnoldi`."""
+    first = first_perturbation(tails, *x.shape[:2])
+    return arnoldi(body, x, u, abs(mean_motion(body, u)[0]), first, min(count, x.size - 1))
 
 
 def largest_growths(projected: Floats, omega_t: Floats, omega_h: Floats) -> Floats:
     """Compute growths (B,) from projections of Arnoldi's method with the shift |ω_t|.
 
-    Eigenvalues near 0 converge last, and before, their inverses can have any sign. So where perturbations seem to
-    grow, only eigenvalues larger than their residuals count.
+    Eigenvalues near 0 converge last; until then their inverses can have any sign. So where the growth exceeds
+    DOUBTFUL, only eigenvalues larger than their residuals count.
 
     Args:
         projected: Hessenberg matrices, see `sim.solve.floquet.arnoldi`, (B, K + 1, K).
@@ -84,7 +90,8 @@ def largest_growths(projected: Floats, omega_t: Floats, omega_h: Floats) -> Floa
     inverses = 1 / np.linalg.eigvals(projected[finite, :-1])
     out[finite] = (shifts[finite] + inverses.real.max(1)) / rates[finite]
     for i in np.flatnonzero(out > DOUBTFUL).tolist():
-        out[i] = max(_ritz(projected[i], shifts[i], _KNOWN).real, default=np.nan) / rates[i]
+        known = _exponents_with_residuals_below(_SIGN_KNOWN, projected[i], shifts[i])
+        out[i] = max(known.real, default=np.nan) / rates[i]
     return out
 
 
@@ -94,16 +101,16 @@ def exponents(body: Body, tails: int, x: Floats, u: Floats) -> Complex:
     Returns:
         Those that have converged, in any order; none if they cannot be computed.
     """
-    shift = abs(mean_motion(body, u)[0])
-    first, count = first_perturbation(tails, *x.shape[:2]), 2 * tails + _MORE_VECTORS
-    projected = arnoldi(body, x, u, shift, first, min(count, x.size - 1))
-    return _ritz(projected, shift, _CONVERGED) if np.isfinite(projected[-1, -1]) else np.empty(0, complex)
+    projected = _projected(body, tails, x, u, 2 * tails + _MORE_VECTORS)
+    if not np.isfinite(projected[-1, -1]):
+        return np.empty(0, complex)
+    return _exponents_with_residuals_below(_CONVERGED, projected, abs(mean_motion(body, u)[0]))
 
 
-def _ritz(projected: Floats, shift: float, residual: float) -> Complex:
-    """Compute the exponents whose eigenvalues have at most a relative residual, from a projection (K + 1, K)."""
+def _exponents_with_residuals_below(limit: float, projected: Floats, shift: float) -> Complex:
+    """Compute the exponents of a projection (K + 1, K) whose eigenvalues have relative residuals below a limit."""
     values, vectors = np.linalg.eig(projected[:-1])
-    values = values[projected[-1, -1] * np.abs(vectors[-1]) < residual * np.abs(values)]
+    values = values[projected[-1, -1] * np.abs(vectors[-1]) < limit * np.abs(values)]
     return np.asarray(shift + 1 / values)
 
 
@@ -114,7 +121,7 @@ def in_motor_revolutions(exponent: float, body: Body, u: Floats) -> float:
 
 
 def few_vectors(tails: int) -> int:
-    """Choose the number of vectors of Arnoldi's method for a growth on the second mesh."""
+    """Choose the number of vectors of Arnoldi's method for a growth."""
     return max(2 * tails + 8, 14)
 
 

@@ -37,8 +37,8 @@ def steady(groups: Groups, *, stability: bool = True) -> Steady:
 
     Args:
         groups: B robots; ω̄ may have either sign.
-        stability: whether to compute the growth of small perturbations of every robot, which takes a quarter of
-            the time in addition. If not, only robots whose tails push against each other get one.
+        stability: whether to compute the growth of small perturbations of every robot, which adds a quarter to the
+            time. If not, only robots whose tails push against each other get one.
 
     Returns:
         Their mean motion, dimensionless (lengths in l, times in μ0 l⁴/EI), and how good it is.

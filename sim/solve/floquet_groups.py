@@ -1,7 +1,7 @@
 """Small perturbations of the orbits of a group of robots, one in each lane; their effects are local.
 
-The method is that of `sim.solve.floquet`, and so is each lane's sequence of operations (`sim.lanes`).
-Units: l, μ0 l⁴/EI, EI/l².
+The method is that of `sim.solve.floquet`. The order of a lane's operations does not depend on the group
+(`sim.lanes`). Units: l, μ0 l⁴/EI, EI/l².
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _orthogonalise(basis: Floats, i: int, image: Floats, parts: Floats, projecte
 
 @compiled_exactly
 def _product(a: Floats, b: Floats) -> Any:
-    """Compute the scalar product of two vectors in each lane; four sums do not wait for each other."""
+    """Compute the scalar product of two vectors in each lane, as four sums that are added at the same time."""
     first = second = third = fourth = 0.0 * a[0]
     whole = len(a) - len(a) % 4
     for k in range(0, whole, 4):

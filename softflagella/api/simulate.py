@@ -32,8 +32,8 @@ def steady(robots: Robots, *, stability: bool = True, jobs: int | None = None) -
     Args:
         robots: a `Robot`, the path of a robot.toml, the name of a preset, or a list of these; or dimensionless
             robots, a table with M rows (single values stand for all rows).
-        stability: whether to compute `stable` and `growth`, which adds about a third of the time, and one to three
-            times the time for robots with non-local effects (flow, contact, natural shape, thinning).
+        stability: whether to compute `stable` and `growth`, which adds a quarter to the time, and about as much as
+            the rest for robots with non-local effects (flow, contact, natural shape, thinning).
         jobs: threads; default all processors.
 
     Returns:

@@ -59,6 +59,7 @@ def test_each_lane_exchanges_its_own_rows(width: tuple[int, ...]) -> None:
         alone = [np.ascontiguousarray(part[:, :, i : i + 1]) for part in (a, np.zeros_like(a), b)]
         factored(*alone, ALONE)
         assert np.array_equal(alone[2][:, :, 0], found[:, :, i])
+    assert exchanged.any(axis=(0, 1)).all()
     assert len({part.tobytes() for part in np.moveaxis(exchanged, -1, 0)}) == len(width)
 
 

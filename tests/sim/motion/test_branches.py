@@ -95,8 +95,7 @@ def test_the_leading_exponent_is_the_growth_of_steady() -> None:
         assert start is not None
         x, u = family.unpack(start)
         body = swept.body_at(s)
-        expected = growth(body, 7, x, u, vectors=30)
-        assert leading_exponent(body, 7, x, u).growth == pytest.approx(expected, abs=1e-6)
+        assert leading_exponent(body, 7, x, u).growth == pytest.approx(growth(body, 7, x, u), rel=0.02)
 
 
 def test_an_exponent_that_has_not_converged_does_not_count() -> None:
@@ -234,14 +233,16 @@ def test_table_and_picture_show_every_branch() -> None:
     assert largest_hysteresis(result)[0] < 0.03
 
 
-def test_the_picture_of_growth_shows_where_stability_changes() -> None:
-    """However large the growth of an unstable branch is."""
+@pytest.mark.parametrize("growths", [(-0.2, 15.0, -20.0), (-10.0, -12.0), (8.0, 30.0)])
+def test_the_picture_of_growth_shows_zero_and_what_is_near_it(growths: tuple[float, ...]) -> None:
     means = np.array([20.0, -10.0, 1.0, 0.1, 0.1])
-    leading = [Leading(growth, 0.0, 2) for growth in (-0.2, 15.0, -20.0)]
+    leading = [Leading(growth, 0.0, 2) for growth in growths]
     branches = [Branch(True, [Motion(s, means, one) for s in (0.0, 1.0)]) for one in leading]
     swept = SweptInput(CONTROL, "omega_bar", 10.0, 20.0)
     low, high = draw_branches(Branches(swept, branches, [], [])).axes[1].get_ylim()
-    assert -10 < low < -0.2 < 0 < high < 10
+    assert low < min(growths, key=abs) < high
+    assert low < 0 < high
+    assert high - low < 20
 
 
 def test_every_input_has_an_option() -> None:

@@ -9,10 +9,12 @@ from sim.lanes import ALONE, GROUP, HALF_GROUP
 from sim.motion import grouping
 from sim.motion.growths import growths
 from sim.motion.orbit_groups import orbits_in_groups
-from sim.motion.stability import growth
+from sim.motion.stability import growth, growth_of_orbit
 from sim.solve.assembly import numbers, unpacked
-from sim.solve.refinement import FEW, Orbit
+from sim.solve.refinement import FEW, Orbit, refined_orbit
 from tests.sim.motion.test_orbit_groups import robots
+from tests.sim.motion.test_stability import UNSTABLE
+from tests.sim.robots import control
 
 
 def orbits_of(tails: int, count: int) -> tuple[np.ndarray, list[Orbit]]:
@@ -51,3 +53,14 @@ def test_the_direction_of_the_motor_does_not_matter() -> None:
     mixed = np.concatenate([rows, rows * np.where(np.arange(rows.shape[1]) == 0, -1.0, 1.0)])
     found = growths(mixed, 3, orbits_in_groups(mixed, 3, FEW))
     assert found[3:] == pytest.approx(growths(rows, 3, orbits), rel=1e-9)
+
+
+def test_local_and_nonlocal_and_doubtful_robots_keep_their_places() -> None:
+    """The growth of the robot that yaws fast is computed again; that of the curved one is computed alone."""
+    plain, curved, quick = control(1, N=6), control(1, N=6, natural_curvature=0.5), control(1, **UNSTABLE)
+    rows = np.concatenate([numbers(groups) for groups in (quick, curved, plain, quick, plain)])
+    orbits = [refined_orbit(body, 6, FEW) for body in unpacked(rows)]
+    wanted = [growth_of_orbit(body, 6, orbit) for body, orbit in zip(unpacked(rows), orbits, strict=True)]
+    assert wanted[0] > 0 > wanted[1] != wanted[2]
+    assert growths(rows, 6, orbits) == pytest.approx(wanted, rel=1e-6)
+    assert growths(rows[:0], 6, []).shape == (0,)

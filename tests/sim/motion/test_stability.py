@@ -26,7 +26,7 @@ UNRESOLVED = {
     "omega_bar": 160.783, "N": 5,
 }  # fmt: skip
 
-EARLY = {
+SPURIOUS = {
     "C_t": 5.5826, "C_r": 2.27309, "C_yr": 1.90152, "l_over_R": 4.95686, "L_over_R": 3.28364, "l_over_r0": 36.1076,
     "omega_bar": 7.21687,
 }  # fmt: skip
@@ -143,10 +143,10 @@ def test_a_growth_without_a_converged_exponent_is_unknown(monkeypatch: pytest.Mo
 
 
 def test_unconverged_eigenvalues_do_not_make_a_motion_unstable(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of this robot of the sweep one is close to zero; its inverse, the exponent, would be a growth of 6900."""
-    body, orbit = first_body(control(**EARLY, N=2)), orbit_of({**EARLY, "N": 2})
-    monkeypatch.setattr(stability, "few_vectors", lambda _: 14)
+    """One eigenvalue of this robot of the sweep is close to zero; its inverse would be a growth of 6900."""
+    body, orbit = first_body(control(**SPURIOUS, N=2)), orbit_of({**SPURIOUS, "N": 2})
+    monkeypatch.setattr(stability, "few_vectors", lambda _: 14)  # however many a growth takes
     found = growth(body, 2, orbit.x[1], orbit.u[1])
     assert found == pytest.approx(growth_on_more_phases(body, 2, orbit), rel=0.05)
-    monkeypatch.setattr(stability, "_KNOWN", np.inf)
+    monkeypatch.setattr(stability, "_SIGN_KNOWN", np.inf)
     assert growth(body, 2, orbit.x[1], orbit.u[1]) > 1000
