@@ -4,17 +4,20 @@ Usage: softflagella sweep --config surrogate/shipped/domain.toml --out SWEEP
        python -m benchmarks shipped_table WORK --sweep SWEEP --out MODEL    simulate the rest (kept in WORK), train
        python -m benchmarks shipped_table WORK --test MODEL [--card CARD] [--picture PICTURE]
        python -m benchmarks shipped_table WORK --spread-of MODEL --sweep TWO --out NEW
-       python -m benchmarks shipped_table WORK --tails-of MODEL --out NEW
+       python -m benchmarks shipped_table WORK --tails-of MODEL [--single] --out NEW
 
 --test prints errors and coverage on robots of the test set. --spread-of learns the spread over the disc's phase
 anew, from a sweep of robots with two tails. That of the shipped file is from domain.toml with 8192 rows, the
-seed 20261123, N = 2 and a history every 64 rows. --tails-of learns all but the response to a flip anew; so the
-shipped file was made.
+seed 20261123, N = 2 and a history every 64 rows. --tails-of learns all but the response to a flip anew; with
+--single, the network of a single tail only. The shipped file was made in this order: --sweep, --spread-of,
+--tails-of, --tails-of with --single.
 
-The tails are learned from robots with heads far wider than those of the domain, a single tail from robots of the
-domain as well, most of them with effects on head and motor. The response to a flip is learned from the sweep, and
-from some of these wide robots. All robots are drawn from Sobol sequences with the seeds below. The test set led to
-no choice of any kind.
+The tails are learned from robots with heads far wider than those of the domain, a single tail also from robots of
+the domain, half of which have effects on head and motor, and from 8192 robots with all these effects and a surface
+couple of −1.5 to 1.5. The intervals are learned from robots of the domain, half of them with effects, and from
+robots with such a couple, half of them with one tail. The response to a flip is learned from the sweep, and from
+some of the wide robots. All robots are drawn from Sobol sequences with the seeds below. The test set led to no
+choice of any kind.
 
 Takes two hours with its simulations.
 """
@@ -23,7 +26,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -58,11 +61,22 @@ SINGLE = replace(TAILS, iterations=6000)
 CURVES = Settings(width=64, depth=2, members=1, epochs=60, iterations=1500)
 SPREAD = Settings(width=32, depth=2, members=1, epochs=60, iterations=600)
 ROWS = {
-    "tails": (32768, 101), "single": (16384, 505), "widths": (8192, 202), "held_out": (8192, 402),
+    "tails": (32768, 101), "single": (16384, 505), "couples": (8192, 606),
+    "widths": (8192, 202), "widths_couples": (6144, 911),
+    "held_out": (8192, 402), "held_out_couples": (2048, 912),
     "locked": (4096, 20261205),
 }  # fmt: skip
 FLIPS = {"flips": (1400, 301), "locked_flips": (400, 20261202)}
 _HALF_WITH_EFFECTS = ("single", "widths", "held_out")
+_LEARNED = ("tails", "single", "couples")
+_WIDTHS, _HELD_OUT = ("widths", "widths_couples"), ("held_out", "held_out_couples")
+_COUPLES = ("couples", "widths_couples", "held_out_couples")
+_SINGLE = {
+    "single": 1.0,
+    "couples": 1.0,
+    "widths_couples": 0.5,
+    "held_out_couples": 0.5,
+}  # share that gets one tail
 _STEADY_ONLY = ("surface_couple", "motor_droop")  # effects that the response to a flip is not learned with
 _SWEPT = 16384  # rows of the sweep without history whose lags are learned
 _FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated
@@ -84,8 +98,10 @@ def robots(name: str) -> dict[str, Floats]:
         without = np.random.default_rng((seed, 2)).uniform(size=count) < 0.5
         for effect in [n for n in drawn if n not in ROBOT]:
             drawn[effect][without] = 0.0
-    if name == "single":
-        drawn["N"][:] = 1.0
+    if name in _SINGLE:
+        drawn["N"][np.random.default_rng((seed, 4)).uniform(size=count) < _SINGLE[name]] = 1.0
+    if name in _COUPLES:
+        drawn["surface_couple"] = np.random.default_rng((seed, 3)).uniform(-1.5, 1.5, count)
     return drawn
 
 
@@ -97,7 +113,7 @@ def kept(work: Path, name: str) -> SimulatedRobots:
             parts = [{k.split("/")[1]: file[k] for k in file if k.startswith(f"{i}/")} for i in range(3)]
         return SimulatedRobots(*parts)
     began = time.process_time()
-    learned = name in ("tails", "single") or name in FLIPS
+    learned = name in _LEARNED or name in FLIPS
     make: Callable[..., SimulatedRobots] = simulate_robots if learned else as_reached
     rows = make(robots(name), title=name, **({"curves": True} if name in FLIPS else {}))
     print(f"{name}: {len(rows)} rows, {time.process_time() - began:.0f} s")
@@ -105,6 +121,11 @@ def kept(work: Path, name: str) -> SimulatedRobots:
     named = {f"{i}/{k}": values for i, part in enumerate(vars(rows).values()) for k, values in part.items()}
     np.savez(path, allow_pickle=False, **named)
     return rows
+
+
+def _joined(work: Path, names: Sequence[str]) -> SimulatedRobots:
+    """Join sets, see `kept`."""
+    return join_robots([kept(work, name) for name in names])
 
 
 def swept(folder: str) -> tuple[SimulatedRobots, SimulatedRobots]:
@@ -192,12 +213,12 @@ def relearned_spread(lookup: NeuralTable, folder: str) -> NeuralTable:
     return changed
 
 
-def tails_again(lookup: NeuralTable, work: Path) -> NeuralTable:
-    """Learn all of a table anew but the response to a flip, and print the errors."""
-    tails, single, widths, held_out = (kept(work, n) for n in ("tails", "single", "widths", "held_out"))
+def tails_again(lookup: NeuralTable, work: Path, *, single_only: bool) -> NeuralTable:
+    """Learn all of a table anew but the response to a flip, and print the errors; see `learn_tails_again`."""
+    learned, widths, held_out = (_joined(work, names) for names in (_LEARNED, _WIDTHS, _HELD_OUT))
     source = {name: part for name, part in lookup.provenance.items() if name in ("data_hash", "spread")}
     changed = learn_tails_again(
-        lookup, join_robots([tails, single]), widths, held_out, TAILS, single_settings=SINGLE,
+        lookup, learned, widths, held_out, TAILS, single_settings=SINGLE, single_only=single_only,
         source={**source, "seeds": {**ROWS, **FLIPS}}, work=TrainingContext("train", folder=work / "states"),
     )  # fmt: skip
     print(error_table(changed.errors))
@@ -206,7 +227,7 @@ def tails_again(lookup: NeuralTable, work: Path) -> NeuralTable:
 
 def as_reached(robots: Mapping[str, Floats], *, title: str = "") -> SimulatedRobots:
     """Simulate robots as a data set does: the motion that straight tails reach, if it is steady."""
-    columns = steady_columns(robots, title=title)
+    columns = steady_columns(robots, title=title, stability=False)
     reached = SimulatedRobots(dict(robots), {name: columns[name] for name in MOTION}, {})
     return reached.at(np.asarray(columns["converged"], dtype=bool))
 
@@ -218,13 +239,16 @@ def main(*words: str) -> None:
     parser.add_argument("--sweep", help="data set built from surrogate/shipped/domain.toml")
     parser.add_argument("--test")
     parser.add_argument("--tails-of", help="model whose tails are learned anew")
+    parser.add_argument("--single", action="store_true", help="with --tails-of: learn that of one tail only")
     parser.add_argument("--spread-of", help="model whose spread is learned anew from --sweep")
-    parser.add_argument("--card", help="with --test: write the card, from the held-out robots of the training")
+    parser.add_argument("--card", help="with --test: write the card, from held-out robots of the domain")
     parser.add_argument("--picture", help="with --test: draw the errors of the held-out robots")
     arguments = parser.parse_args(words)
+    if arguments.single and not arguments.tails_of:
+        parser.error("--single needs --tails-of")
     if arguments.out:
         if arguments.tails_of:
-            tails_again(load(arguments.tails_of), arguments.work).save(arguments.out)
+            tails_again(load(arguments.tails_of), arguments.work, single_only=arguments.single).save(arguments.out)
             remove_states(arguments.work / "states")
             return
         if not arguments.sweep:
@@ -232,13 +256,12 @@ def main(*words: str) -> None:
         if arguments.spread_of:
             relearned_spread(load(arguments.spread_of), arguments.sweep).save(arguments.out)
             return
-        tails, single, widths, held_out, flips = (
-            kept(arguments.work, n) for n in ("tails", "single", "widths", "held_out", "flips")
-        )
+        steady, widths, held_out = (_joined(arguments.work, names) for names in (_LEARNED, _WIDTHS, _HELD_OUT))
+        flips = kept(arguments.work, "flips")
         source = {"seeds": {**ROWS, **FLIPS}, "data_hash": read_manifest(arguments.sweep)["config_hash"]}
         learned, swept_held_out = swept(arguments.sweep)
         lookup = learn(
-            join_robots([tails, single]), widths, held_out, join_robots([flips, learned]), TAILS, CURVES,
+            steady, widths, held_out, join_robots([flips, learned]), TAILS, CURVES,
             single_settings=SINGLE, source=source,
             flips_held_out=swept_held_out, work=TrainingContext("train", folder=arguments.work / "states"),
         )  # fmt: skip

@@ -81,33 +81,43 @@ def wrench_samples(robots: Mapping[str, Floats], motion: Mapping[str, Floats]) -
 
 
 def learnable(rows: WrenchSamples) -> Flags:
-    """Return rows that a table may learn, (M,): tails that turn with the motor, faster than the robot yaws."""
+    """Return rows that a table may learn, (M,): tails turn with the motor, and the robot yaws up to TURNS as fast.
+
+    Two tails or more must yaw to the side to which the tails drive the robot: β jumps where a couple reverses the
+    yaw. The network of one tail does not see β.
+    """
     _, _, yaw, _, spin = rows.motion.T
-    return (spin > 0) & (yaw > 0) & (yaw < TURNS * spin)
+    to_its_side = (yaw > 0) | (rows.tails.number == 1)
+    return (spin > 0) & to_its_side & (np.abs(yaw) < TURNS * spin)
 
 
 def fit_wrench(
-    rows: WrenchSamples, settings: Settings, work: TrainingContext, *, single_settings: Settings | None = None
-) -> WrenchTable:
-    """Fit the networks of all CLASSES to samples that are `learnable`.
+    rows: WrenchSamples, settings: Settings, work: TrainingContext, *, single_settings: Settings | None = None,
+    kept: WrenchTable | None = None,
+) -> WrenchTable:  # fmt: skip
+    """Fit the networks of CLASSES, and that of the gap, to samples that are `learnable`.
 
     Args:
         rows: the samples.
         settings: of the networks.
         work: device, progress bars, and where states are kept.
         single_settings: of the network of robots with one tail; by default `settings`.
+        kept: networks of the gap and of two tails or more, which are kept; only that of one tail is fitted.
     """
     kind = network_index(rows.tails.number)
     networks: list[Ensemble | None] = []
     for k, count in enumerate(CLASSES):
+        if kept is not None and count > 1:
+            networks.append(kept.wrench[k])
+            continue
         context = work.part(f"tails of N = {count}{' and more' if count == CLASSES[-1] else ''}")
         samples = rows.at(kind == k)
         known = len(samples.motion) > 0
         own = single_settings or settings if count == 1 else settings
         networks.append(_learn_wrench(samples, own, context, count) if known else None)
-    several_tails = rows.at(rows.tails.number > 1)
-    gap = _learn_gap(several_tails, _GAP, work.part("gap"))
-    return WrenchTable(tuple(networks), gap)
+    if kept is not None:
+        return WrenchTable(tuple(networks), kept.gap)
+    return WrenchTable(tuple(networks), _learn_gap(rows.at(rows.tails.number > 1), _GAP, work.part("gap")))
 
 
 def _learn_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext, count: int) -> Ensemble:

@@ -185,6 +185,7 @@ def learn_tails_again(
     settings: Settings | None = None,
     *,
     single_settings: Settings | None = None,
+    single_only: bool = False,
     source: dict[str, Any] | None = None,
     work: TrainingContext = _QUIET,
 ) -> NeuralTable:
@@ -197,6 +198,7 @@ def learn_tails_again(
         learned, width_rows, held_out: steady motions, see `learn`.
         settings: networks of the tails and their optimiser.
         single_settings: of the network of robots with one tail; by default `settings`.
+        single_only: learn only network and domain of robots with one tail, and keep the others.
         source: more provenance.
         work: device, progress bars, and where states are kept.
     """
@@ -204,11 +206,17 @@ def learn_tails_again(
     wrench_settings, rows = settings or Settings(), _learnable(learned)
     created = _created(wrench_settings, single_settings, lookup.provenance["config"]["curves"], work)
     counts = {"train": len(rows.motion), "widths": len(width_rows), "held_out": len(held_out)}
+    kept, support, ranges = None, _supports(rows), _ranges(learned)
+    if single_only:
+        kept, support = lookup.tails, (support[0], *lookup.support[1:])
+        ends = {name: (*lookup.ranges[name], *ranges[name]) for name in ranges}
+        ranges = {name: (min(values), max(values)) for name, values in ends.items()}
+        created["several_tails_of"] = lookup.identity
     changed = replace(
         lookup,
-        tails=fit_wrench(rows, wrench_settings, work, single_settings=single_settings),
-        support=_supports(rows),
-        ranges=_ranges(learned),
+        tails=fit_wrench(rows, wrench_settings, work, single_settings=single_settings, kept=kept),
+        support=support,
+        ranges=ranges,
         provenance={**created, **(source or {}), "rows": {**lookup.provenance["rows"], **counts}},
     )
     return _with_intervals(changed, width_rows, held_out)

@@ -92,6 +92,22 @@ def test_intervals_hold_with_effects_on_head_and_motor(single: bool) -> None:
     assert 0.82 < np.mean([*covered.values()]) < 0.98
 
 
+def test_a_single_tail_that_a_couple_turns_to_either_side() -> None:
+    """Robots that the couple turns against their tail used to be left out of training, but not refused."""
+    robots = draw_robots(512, 83, wide=False)
+    couple = np.random.default_rng(6).uniform(-1.5, 1.5, 512)
+    answer, truth, good = answered(robots | {"N": np.ones(512), "surface_couple": couple})
+    assert good.mean() > 0.95
+    error = np.abs(relative_errors(answer, truth)["omega_yr_bar"])
+    for side in (truth["omega_yr_bar"] > 0, truth["omega_yr_bar"] < 0):
+        kind = good & side
+        assert kind.sum() > 100
+        assert np.median(error[kind]) < 0.004
+        assert np.quantile(error[kind], 0.95) < 0.1
+        covered = coverage({n: v[kind] for n, v in answer.items()}, {n: v[kind] for n, v in truth.items()})
+        assert np.mean([*covered.values()]) > 0.74
+
+
 @pytest.mark.parametrize("tails", [1.0, 2.0, 4.0])
 def test_a_drag_number_that_was_not_learned_is_outside(tails: float) -> None:
     """Inertia raises the drag of thick, fast tails up to twentyfold, at a motor speed that is in its range."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,9 @@ import pytest
 import surrogate.training.train as training
 from dataset.build.build import build
 from sim.io.errors import InputError
+from surrogate.training.fit_wrench import learnable, wrench_samples
 from surrogate.training.model_card import model_card
-from surrogate.training.simulated import draw_robots, simulate_robots
+from surrogate.training.simulated import SimulatedRobots, draw_robots, join_robots, simulate_robots
 from tests.dataset.sweeps import design, invented
 from tests.surrogate.small import CURVES, TAILS, flips, rows, table
 
@@ -42,6 +44,42 @@ def test_a_table_of_robots_with_effects_alone_states_its_errors() -> None:
     card = model_card(lookup, held)
     assert "with effects on head and motor" in card
     assert "| N = 3 |" in card
+
+
+@cache
+def turned(tails: float, seed: int = 17) -> SimulatedRobots:
+    """Simulate robots, some of which a couple in yaw turns against their tails."""
+    robots = draw_robots(256, seed, wide=False) | {"N": np.full(256, tails)}
+    return simulate_robots(robots | {"surface_couple": np.linspace(-1.0, 1.0, 256)})
+
+
+def test_robots_that_couples_turn_against_their_tails_are_learned_with_one_tail_only() -> None:
+    for tails in (1.0, 2.0):
+        some = turned(tails)
+        against = some.motion["omega_yr_bar"] < 0
+        assert 20 < against.sum() < len(some) - 20
+        learned = learnable(wrench_samples(some.robots, some.motion))
+        assert learned[~against].mean() > 0.9
+        assert learned[against].mean() > 0.9 if tails == 1 else not learned[against].any()
+
+
+def test_a_single_tail_can_be_learned_again_alone() -> None:
+    """The table knows robots with more tails as before, though it learns none."""
+    before, several = table(), rows(256, 13, wide=False)
+    held = join_robots([several, turned(1.0, 18)])
+    after = training.learn_tails_again(before, turned(1.0), held, held, TAILS, single_only=True)
+    first, second = (lookup.query(several.robots, flag=True) for lookup in (before, after))
+    assert before.tails.wrench[0] is None
+    assert not first["outside"].all()
+    assert all(np.array_equal(first[name], second[name]) for name in first)
+    assert after.provenance["several_tails_of"] == before.identity
+    fresh = turned(1.0, 19)
+    answer = after.query(fresh.robots, intervals=True, flag=True)
+    wanted, inside = fresh.motion["omega_yr_bar"], ~answer["outside"]
+    assert inside.mean() > 0.5
+    assert np.median(np.abs(answer["omega_yr_bar"] / wanted - 1)[inside]) < 0.2
+    low, high = answer["omega_yr_bar_low"], answer["omega_yr_bar_high"]
+    assert 0.75 < np.mean(((low <= wanted) & (wanted <= high))[inside]) < 0.99
 
 
 def test_the_split_is_fixed_and_disjoint() -> None:
