@@ -8,7 +8,7 @@ import pytest
 from sim.motion import stability
 from sim.motion import steady as steady_module
 from sim.motion.batches import steady_columns
-from sim.motion.stability import DOUBTFUL, growth, growth_of_orbit, growth_on_more_phases
+from sim.motion.stability import DOUBTFUL, growth, growth_of_orbit, growth_on_more_phases, is_doubtful
 from sim.motion.steady import orbits, steady
 from sim.motion.steady_motion import DIRECT, STABILITY_COLUMNS, STEPPING
 from sim.solve.refinement import FEW, SOLVED, Orbit, refined_orbit
@@ -140,6 +140,15 @@ def test_a_growth_without_a_converged_exponent_is_unknown(monkeypatch: pytest.Mo
     assert growth_on_more_phases(body, 2, orbit) < 0
     monkeypatch.setattr(stability, "_CONVERGED", 0.0)
     assert np.isnan(growth_on_more_phases(body, 2, orbit))
+
+
+def test_which_growths_are_computed_again() -> None:
+    """Those near zero and above, unknown ones, and those of robots that yaw fast, to either side."""
+    slow, fast = np.array([30.0, -10.0, 5.0, 0.1, 0.1]), np.array([30.0, -10.0, -13.0, 0.1, 0.1])
+    means = np.array([slow, slow, slow, slow, fast])
+    values = np.array([-1.0, -0.01, 0.5, np.nan, -1.0])
+    assert is_doubtful(means, values).tolist() == [False, True, True, True, True]
+    assert not is_doubtful(slow, -1.0)
 
 
 def test_unconverged_eigenvalues_do_not_make_a_motion_unstable(monkeypatch: pytest.MonkeyPatch) -> None:
