@@ -4,7 +4,7 @@ The robots are those of `robustness` that reach another motion from rest (docs/b
 
 Usage: python -m benchmarks branches [ROW …]
 
-Takes 10 minutes.
+Takes 25 minutes.
 """
 
 from __future__ import annotations
