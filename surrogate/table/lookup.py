@@ -33,7 +33,7 @@ from surrogate.error_modes import STEADY, error_modes, joined
 from surrogate.input_ranges import ROBOT
 from surrogate.interface import ErrorModes, OutsideError
 from surrogate.networks.ensemble import Ensemble
-from surrogate.table.compiled_query import INPUT, MOTION, REASON
+from surrogate.table.compiled_query import INPUT, MOTION, REASON, STRANGE
 from surrogate.table.curve_errors import CURVE_ERRORS, NORMAL_90, CurveErrors
 from surrogate.table.errors import RELATIVE, error_scale
 from surrogate.table.flat_table import flat_table
@@ -61,6 +61,7 @@ _REASONS = (  # why a robot is outside
     "it yaws nearly as fast as its tails turn, and may have several motions",
     "no robot has such numbers",
 )
+_AGAINST = "a couple turns it against its tails, and such robots were learned with one tail only"
 _MOTION, _INPUTS = slice(MOTION, MOTION + 5), slice(INPUT, INPUT + 7)  # rows of the compiled loop's answer
 _NOT_OF_HEAD = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 
@@ -258,8 +259,10 @@ class NeuralTable:
     def _check_known(self, values: Mapping[str, Floats], answers: Floats, *, flag: bool) -> None:
         """Refuse the first robot that is outside, unless such robots are flagged."""
         if not flag:
-            for row in np.flatnonzero(outside(answers))[:1]:
-                raise self._refusal(values, int(row), _REASONS[int(answers[REASON, row])])
+            for row in np.flatnonzero(outside(answers))[:1].tolist():
+                number, yaw = int(answers[REASON, row]), answers[_MOTION][2, row]
+                against = number == STRANGE and yaw < 0 and values["N"][row] > 1
+                raise self._refusal(values, row, _AGAINST if against else _REASONS[number])
 
     def width_features(self, motions: Motions) -> Floats:
         """Return what the width of an interval may depend on, (M, 11)."""

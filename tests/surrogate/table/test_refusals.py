@@ -65,6 +65,13 @@ def test_where_no_motor_speed_is_known_none_is_named() -> None:
     assert "motor speed 43.26 rpm (omega_bar = 10); change the robot" in message
 
 
+def test_a_robot_that_a_couple_turns_against_its_tails_is_told_so() -> None:
+    against = {"surface_couple": -1.2}
+    assert "a couple turns it against its tails" in refusal(replace(CONTROL, tails=3, effects=against))
+    single = replace(CONTROL, tails=1, effects=against)
+    assert load().query(group_columns([single]))["omega_yr_bar"][0] < 0
+
+
 def test_the_command_and_python_say_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     save_robot(replace(CONTROL, motor_speed=to_si(1000.0, "rpm")), tmp_path / "fast.toml")
     assert run_command(main, ["query", str(tmp_path / "fast.toml")]) == 2
