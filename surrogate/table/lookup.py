@@ -33,12 +33,13 @@ from surrogate.error_modes import STEADY, error_modes, joined
 from surrogate.input_ranges import ROBOT
 from surrogate.interface import ErrorModes, OutsideError
 from surrogate.networks.ensemble import Ensemble
-from surrogate.table.compiled_query import INPUT, MOTION, REASON, STRANGE
+from surrogate.table.compiled_query import INPUT, MOTION, REASON
 from surrogate.table.curve_errors import CURVE_ERRORS, NORMAL_90, CurveErrors
 from surrogate.table.errors import RELATIVE, error_scale
 from surrogate.table.flat_table import flat_table
 from surrogate.table.intervals import Intervals
 from surrogate.table.jacobian import slopes
+from surrogate.table.outside_reasons import REASONS, reason_of
 from surrogate.table.quick_query import OUTSIDE, SHORTEST, QuickQuery, outside
 from surrogate.table.response_table import ResponseTable, curve_speeds
 from surrogate.table.support import Support
@@ -53,15 +54,6 @@ if TYPE_CHECKING:
 
 FORMAT = 7  # of model files
 CERTIFIED = "certified_error"
-_REASONS = (  # why a robot is outside
-    "",
-    "none with as many tails were learned",
-    "its tails or its motor were not learned, or no motion was found",
-    "its tails move as none of the learned ones do",
-    "it yaws nearly as fast as its tails turn, and may have several motions",
-    "no robot has such numbers",
-)
-_AGAINST = "a couple turns it against its tails, and such robots were learned with one tail only"
 _MOTION, _INPUTS = slice(MOTION, MOTION + 5), slice(INPUT, INPUT + 7)  # rows of the compiled loop's answer
 _NOT_OF_HEAD = ("omega_bar", "l_over_R", "l_over_r0", "a_over_R")
 
@@ -231,7 +223,7 @@ class NeuralTable:
         answers = self._quick.rows(values, pack_robots(heads, tails), None)
         self._check_known(values, answers, flag=flag)
         motion, inputs = (np.ascontiguousarray(answers[place].T) for place in (_MOTION, _INPUTS))
-        return Motions(heads, tails, motion, inputs, [_REASONS[int(number)] for number in answers[REASON]])
+        return Motions(heads, tails, motion, inputs, [REASONS[int(number)] for number in answers[REASON]])
 
     @cached_property
     def _quick(self) -> QuickQuery:
@@ -260,9 +252,7 @@ class NeuralTable:
         """Refuse the first robot that is outside, unless such robots are flagged."""
         if not flag:
             for row in np.flatnonzero(outside(answers))[:1].tolist():
-                number, yaw = int(answers[REASON, row]), answers[_MOTION][2, row]
-                against = number == STRANGE and yaw < 0 and values["N"][row] > 1
-                raise self._refusal(values, row, _AGAINST if against else _REASONS[number])
+                raise self._refusal(values, row, reason_of(answers[:, row], values["N"][row]))
 
     def width_features(self, motions: Motions) -> Floats:
         """Return what the width of an interval may depend on, (M, 11)."""
