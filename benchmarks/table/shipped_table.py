@@ -71,12 +71,8 @@ _HALF_WITH_EFFECTS = ("single", "widths", "held_out")
 _LEARNED = ("tails", "single", "couples")
 _WIDTHS, _HELD_OUT = ("widths", "widths_couples"), ("held_out", "held_out_couples")
 _COUPLES = ("couples", "widths_couples", "held_out_couples")
-_SINGLE = {
-    "single": 1.0,
-    "couples": 1.0,
-    "widths_couples": 0.5,
-    "held_out_couples": 0.5,
-}  # share that gets one tail
+# share that gets one tail
+_SINGLE = {"single": 1.0, "couples": 1.0, "widths_couples": 0.5, "held_out_couples": 0.5}
 _STEADY_ONLY = ("surface_couple", "motor_droop")  # effects that the response to a flip is not learned with
 _SWEPT = 16384  # rows of the sweep without history whose lags are learned
 _FLIPS_DRAWN = 6400  # of this sequence, the first ones are simulated

@@ -61,15 +61,14 @@ def growth_on_more_phases(body: Body, tails: int, orbit: Orbit) -> float:
 def growth(body: Body, tails: int, x: Floats, u: Floats) -> float:
     """Compute the growth on an orbit x (n, M, 3), u (P, 4) of N tails; NaN if it cannot be computed."""
     means = mean_motion(body, u)
-    return float(
-        largest_growths(_projected(body, tails, x, u, few_vectors(tails))[None], means[:1], means[1:2])[0]
-    )
+    projected = _projected(body, tails, x, u, abs(means[0]), few_vectors(tails))
+    return float(largest_growths(projected[None], means[:1], means[1:2])[0])
 
 
-def _projected(body: Body, tails: int, x: Floats, u: Floats, count: int) -> Floats:
-    """Project with at most `count` vectors and the shift |ω_t|, see `sim.solve.floquet.arnoldi`."""
+def _projected(body: Body, tails: int, x: Floats, u: Floats, shift: float, count: int) -> Floats:
+    """Project with at most `count` vectors, see `sim.solve.floquet.arnoldi`."""
     first = first_perturbation(tails, *x.shape[:2])
-    return arnoldi(body, x, u, abs(mean_motion(body, u)[0]), first, min(count, x.size - 1))
+    return arnoldi(body, x, u, shift, first, min(count, x.size - 1))
 
 
 def largest_growths(projected: Floats, omega_t: Floats, omega_h: Floats) -> Floats:
@@ -101,10 +100,11 @@ def exponents(body: Body, tails: int, x: Floats, u: Floats) -> Complex:
     Returns:
         Those that have converged, in any order; none if they cannot be computed.
     """
-    projected = _projected(body, tails, x, u, 2 * tails + _MORE_VECTORS)
+    shift = abs(mean_motion(body, u)[0])
+    projected = _projected(body, tails, x, u, shift, 2 * tails + _MORE_VECTORS)
     if not np.isfinite(projected[-1, -1]):
         return np.empty(0, complex)
-    return _exponents_with_residuals_below(_CONVERGED, projected, abs(mean_motion(body, u)[0]))
+    return _exponents_with_residuals_below(_CONVERGED, projected, shift)
 
 
 def _exponents_with_residuals_below(limit: float, projected: Floats, shift: float) -> Complex:

@@ -33,13 +33,13 @@ from surrogate.error_modes import STEADY, error_modes, joined
 from surrogate.input_ranges import ROBOT
 from surrogate.interface import ErrorModes, OutsideError
 from surrogate.networks.ensemble import Ensemble
-from surrogate.table.compiled_query import INPUT, MOTION, REASON
+from surrogate.table.compiled_query import INPUT, MOTION
 from surrogate.table.curve_errors import CURVE_ERRORS, NORMAL_90, CurveErrors
 from surrogate.table.errors import RELATIVE, error_scale
 from surrogate.table.flat_table import flat_table
 from surrogate.table.intervals import Intervals
 from surrogate.table.jacobian import slopes
-from surrogate.table.outside_reasons import REASONS, reason_of
+from surrogate.table.outside_reasons import reason_of
 from surrogate.table.quick_query import OUTSIDE, SHORTEST, QuickQuery, outside
 from surrogate.table.response_table import ResponseTable, curve_speeds
 from surrogate.table.support import Support
@@ -223,7 +223,7 @@ class NeuralTable:
         answers = self._quick.rows(values, pack_robots(heads, tails), None)
         self._check_known(values, answers, flag=flag)
         motion, inputs = (np.ascontiguousarray(answers[place].T) for place in (_MOTION, _INPUTS))
-        return Motions(heads, tails, motion, inputs, [REASONS[int(number)] for number in answers[REASON]])
+        return Motions(heads, tails, motion, inputs, list(map(reason_of, answers.T, tails.number)))
 
     @cached_property
     def _quick(self) -> QuickQuery:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.arrays import Floats
 from surrogate.table.compiled_query import MOTION, REASON, STRANGE
 
-REASONS = (  # by the numbers of `surrogate.table.compiled_query`
+_REASONS = (  # by the numbers of `surrogate.table.compiled_query`
     "",
     "none with as many tails were learned",
     "its tails or its motor were not learned, or no motion was found",
@@ -20,4 +20,4 @@ def reason_of(answer: Floats, tails: float) -> str:
     """Say why a robot with N tails is outside, from the compiled loop's answer (ANSWERS,); empty if it is not."""
     number = int(answer[REASON])
     against = number == STRANGE and tails > 1 and answer[MOTION + 2] < 0
-    return _AGAINST if against else REASONS[number]
+    return _AGAINST if against else _REASONS[number]

@@ -92,32 +92,27 @@ def learnable(rows: WrenchSamples) -> Flags:
 
 
 def fit_wrench(
-    rows: WrenchSamples, settings: Settings, work: TrainingContext, *, single_settings: Settings | None = None,
-    kept: WrenchTable | None = None,
-) -> WrenchTable:  # fmt: skip
-    """Fit the networks of CLASSES, and that of the gap, to samples that are `learnable`.
+    rows: WrenchSamples, settings: Settings, work: TrainingContext, *, single_settings: Settings | None = None
+) -> WrenchTable:
+    """Fit the networks of all CLASSES, and that of the gap, to samples that are `learnable`.
 
     Args:
         rows: the samples.
         settings: of the networks.
         work: device, progress bars, and where states are kept.
         single_settings: of the network of robots with one tail; by default `settings`.
-        kept: networks of the gap and of two tails or more, which are kept; only that of one tail is fitted.
     """
-    kind = network_index(rows.tails.number)
-    networks: list[Ensemble | None] = []
-    for k, count in enumerate(CLASSES):
-        if kept is not None and count > 1:
-            networks.append(kept.wrench[k])
-            continue
-        context = work.part(f"tails of N = {count}{' and more' if count == CLASSES[-1] else ''}")
-        samples = rows.at(kind == k)
-        known = len(samples.motion) > 0
-        own = single_settings or settings if count == 1 else settings
-        networks.append(_learn_wrench(samples, own, context, count) if known else None)
-    if kept is not None:
-        return WrenchTable(tuple(networks), kept.gap)
-    return WrenchTable(tuple(networks), _learn_gap(rows.at(rows.tails.number > 1), _GAP, work.part("gap")))
+    own = {1: single_settings or settings}
+    networks = tuple(fit_class(rows, count, own.get(count, settings), work) for count in CLASSES)
+    several_tails = rows.at(rows.tails.number > 1)
+    return WrenchTable(networks, _learn_gap(several_tails, _GAP, work.part("gap")))
+
+
+def fit_class(rows: WrenchSamples, count: int, settings: Settings, work: TrainingContext) -> Ensemble | None:
+    """Fit the network of one of CLASSES to its samples among `rows`; None if there are none."""
+    samples = rows.at(network_index(rows.tails.number) == CLASSES.index(count))
+    context = work.part(f"tails of N = {count}{' and more' if count == CLASSES[-1] else ''}")
+    return _learn_wrench(samples, settings, context, count) if len(samples.motion) else None
 
 
 def _learn_wrench(rows: WrenchSamples, settings: Settings, work: TrainingContext, count: int) -> Ensemble:

@@ -33,7 +33,7 @@ from surrogate.table.response_table import Basis
 from surrogate.table.support import Support
 from surrogate.table.wrench_table import CLASSES, INPUT_COUNTS, network_index
 from surrogate.training.fit_response import SETTINGS, fit_part, fit_response
-from surrogate.training.fit_wrench import WrenchSamples, fit_wrench, learnable, wrench_samples
+from surrogate.training.fit_wrench import WrenchSamples, fit_class, fit_wrench, learnable, wrench_samples
 from surrogate.training.response_errors import held_out_curve_errors
 from surrogate.training.simulated import SimulatedRobots, join_robots, read_robots, simulate_robots
 from surrogate.wrench.tails import network_inputs
@@ -206,15 +206,19 @@ def learn_tails_again(
     wrench_settings, rows = settings or Settings(), _learnable(learned)
     created = _created(wrench_settings, single_settings, lookup.provenance["config"]["curves"], work)
     counts = {"train": len(rows.motion), "widths": len(width_rows), "held_out": len(held_out)}
-    kept, support, ranges = None, _supports(rows), _ranges(learned)
+    support, ranges = _supports(rows), _ranges(learned)
     if single_only:
-        kept, support = lookup.tails, (support[0], *lookup.support[1:])
+        single = fit_class(rows, 1, single_settings or wrench_settings, work)
+        tails = replace(lookup.tails, wrench=(single, *lookup.tails.wrench[1:]))
+        support = (support[0], *lookup.support[1:])
         ends = {name: (*lookup.ranges[name], *ranges[name]) for name in ranges}
         ranges = {name: (min(values), max(values)) for name, values in ends.items()}
         created["several_tails_of"] = lookup.identity
+    else:
+        tails = fit_wrench(rows, wrench_settings, work, single_settings=single_settings)
     changed = replace(
         lookup,
-        tails=fit_wrench(rows, wrench_settings, work, single_settings=single_settings, kept=kept),
+        tails=tails,
         support=support,
         ranges=ranges,
         provenance={**created, **(source or {}), "rows": {**lookup.provenance["rows"], **counts}},

@@ -20,7 +20,7 @@ from sim.motion.continuation import Point, first_point, follow, locate
 from sim.motion.exponents import DOUBLING, FOLD, HOPF, Leading, leading_exponent
 from sim.motion.revolution import Revolutions
 from sim.motion.slow_sweep import perturbed, settled_from
-from sim.motion.stability import growth
+from sim.motion.stability import exponents, growth, in_motor_revolutions
 from sim.motion.swept_input import SweptInput
 from sim.motion.tails_alike import EDGES, TailsAlike
 from sim.motion.turn_shapes import orbit_from_turn, state_from_orbit
@@ -95,7 +95,10 @@ def test_the_leading_exponent_is_the_growth_of_steady() -> None:
         assert start is not None
         x, u = family.unpack(start)
         body = swept.body_at(s)
-        assert leading_exponent(body, 7, x, u).growth == pytest.approx(growth(body, 7, x, u), rel=0.02)
+        found = leading_exponent(body, 7, x, u).growth
+        expected = in_motor_revolutions(exponents(body, 7, x, u).real.max(), body, u)
+        assert found == pytest.approx(expected, abs=1e-6)
+        assert found == pytest.approx(growth(body, 7, x, u), rel=0.02)
 
 
 def test_an_exponent_that_has_not_converged_does_not_count() -> None:
