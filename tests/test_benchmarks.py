@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -64,8 +66,16 @@ def test_arguments_that_do_not_fit_are_refused() -> None:
         assert done.stderr == f"error: hidden_laws: {reason}; {usage}\n"
 
 
-def test_bad_input_ends_with_one_line() -> None:
-    done = benchmarks("head_effects", "/nowhere.safetensors")
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("head_effects", "/nowhere.safetensors"), "no model /nowhere.safetensors"),
+        (("branches", "x"), "no row 'x' of robustness; give whole numbers from 0 to 4095"),
+        (("branches", "2571", "4096"), "no row '4096' of robustness"),
+    ],
+)
+def test_bad_input_ends_with_one_line(words: tuple[str, ...], expected: str) -> None:
+    done = benchmarks(*words)
     assert done.returncode == 2
-    assert "no model /nowhere.safetensors" in done.stderr
+    assert expected in done.stderr
     assert len(done.stderr.splitlines()) == 1

@@ -18,6 +18,7 @@ import numpy as np
 from benchmarks.pictures import save_picture
 from benchmarks.simulator.robustness import robots
 from sim.arrays import Floats
+from sim.io.errors import InputError
 from sim.model.presets import PRESETS
 from sim.model.robot import Robot
 from sim.motion.batches import one_thread
@@ -25,7 +26,7 @@ from sim.motion.branch_report import draw_branches, special_rows, summary
 from sim.motion.branches import find_branches
 from sim.motion.swept_input import SweptInput
 
-_ROWS = ("3620", "2571")
+_ROBOTS, _ROWS = 4096, ("3620", "2571")
 _RANGE = (0.1, 1.3)  # of the robot's own motor speed
 
 
@@ -48,7 +49,10 @@ def robot_of(columns: Mapping[str, Floats], row: int) -> Robot:
 
 
 def main(*rows: str) -> None:
-    columns = robots(4096)
+    for row in rows:
+        if not row.isdecimal() or int(row) >= _ROBOTS:
+            raise InputError(f"no row {row!r} of robustness; give whole numbers from 0 to {_ROBOTS - 1}")
+    columns = robots(_ROBOTS)
     for row in rows or _ROWS:
         robot = robot_of(columns, int(row))
         low, high = (share * robot.omega_bar for share in _RANGE)
