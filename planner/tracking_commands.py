@@ -7,6 +7,7 @@ import sys
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
+from io import TextIOWrapper
 from typing import TYPE_CHECKING
 
 from planner.command_line import TABLE, say_job
@@ -47,6 +48,8 @@ def track(arguments: Namespace, planned: Callable[[Namespace], Plan], planning: 
             raise InputError(f"--{name.replace('_', '-')} {getattr(arguments, name)}; give a number above 0")
     if not 0 <= arguments.latency < math.inf:
         raise InputError(f"--latency {arguments.latency}; give a number of seconds, 0 or more")
+    if isinstance(sys.stdin, TextIOWrapper):  # a damaged line must not end the tracker
+        sys.stdin.reconfigure(errors="replace")
     saved = is_plan(arguments.path)
     with redirect_stdout(sys.stderr):
         if saved:

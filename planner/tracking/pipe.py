@@ -13,8 +13,8 @@ and is answered by one line:
     DIRECTION FLIP_AT ERROR ALARM
 
 with the direction of the motor (1, −1, or 0 at the end), the time of the next flip, the present error bound,
-and 1 if the robot is incompatible with the model. A line that cannot be parsed counts as one without a pose. After
-a flip a line must be sent, so that the next flip is announced. From a pose where it begins, the tracker plans the
+and 1 if the robot is incompatible with the model. The first line that cannot be parsed is refused; a later one
+counts as one without a pose. After a flip a line must be sent, so that the next flip is announced. From a pose where it begins, the tracker plans the
 way to the path; what it has learned of the robot is forgotten.
 
 The first line may be a header with other units, such as `time_s x_cm y_cm heading_deg`
@@ -60,7 +60,8 @@ def answers(
     last = 0.0  # time of the last line that has one
     for line in lines:
         words = line.replace(",", " ").split()
-        if first and is_header(words):
+        command_word = words[:1] in ([BEGIN], [FINISH])
+        if first and not command_word and is_header(words):
             columns, first = Columns.named(words, robot), False
             unit = from_si(robot.tail_length, columns.length) if columns.length else 1.0
             yield f"direction flip_at_s error_{columns.length or 'over_l'} alarm"

@@ -34,7 +34,7 @@ def told(
     words: list[str], lines: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> list[str]:
     """Run the command on lines; return its answers."""
-    monkeypatch.setattr("sys.stdin", io.StringIO(lines))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(lines.encode("latin-1")), "utf-8"))
     capsys.readouterr()
     assert run_command(main, ["track", *words]) == 0
     return capsys.readouterr().out.splitlines()
@@ -63,7 +63,8 @@ def test_a_goal_trip_is_tracked_from_its_goal_json(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_goal_plan(to_goal((0, 0, 0), (3, 1, 1), ROBOT), tmp_path)
-    first, second = told([str(tmp_path / "goal.json")], "0\n1 0 0.1 0.1\n", monkeypatch, capsys)
+    lines = "0\n1 0 0.1 0.1\n1.5 \xb0\n"  # the last one is no UTF-8
+    first, second, _ = told([str(tmp_path / "goal.json")], lines, monkeypatch, capsys)
     assert first == "0 1.000000000 nan 0"
     assert second.split()[0] in ("1", "-1")
 

@@ -116,9 +116,20 @@ def test_a_header_says_the_units_of_the_laboratory() -> None:
         ("time_s x_deg y_cm heading_deg", "'x_deg' needs a unit of length, such as x_cm"),
         ("time_s x_cm y_cm angle_deg", "'angle_deg' is not one of time, x, y, heading, seen"),
         ("time_s x_cm x_mm heading_deg", "'x_mm' is there twice"),
+        ("\ufefftime_s,x_cm,y_cm,heading_deg", "'\\\\ufefftime_s' is not one of"),
+        ('"time_s","x_cm","y_cm","heading_deg"', "is not one of"),
+        ("time_s;x_cm;y_cm;heading_deg", "is not one of"),
+        ("x_cm,y_cm,heading_deg,time_s", "give time first"),
+        ("timestamp_s,x_cm,y_cm,heading_deg", "'timestamp_s' is not one of"),
+        ("# time_s,x_cm,y_cm,heading_deg", "'#' is not one of"),
+        ("0.9;22.2;3.2;70", "give numbers, or a header such as time_s x_cm y_cm heading_deg"),
+        ("0,9 22,2 3,2 70", "give numbers, or a header"),
+        ("0 22.2 3.2", "give numbers, or a header"),
+        ("", "give time first"),
     ],
 )
-def test_a_header_that_cannot_be_is_refused(header: str, message: str) -> None:
+def test_a_first_line_that_is_neither_numbers_nor_a_header_is_refused(header: str, message: str) -> None:
+    """Such a header was ignored, and cm and degrees were taken for tail lengths and rad."""
     result = plan(circle(2.0), PRESETS["paper-control"])
     with pytest.raises(InputError, match=message):
-        list(answers(Tracker(result), [header], result.robot))
+        list(answers(Tracker(result), [header, "0.9,22.2,3.2,70"], result.robot))
