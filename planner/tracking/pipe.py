@@ -13,9 +13,9 @@ and is answered by one line:
     DIRECTION FLIP_AT ERROR ALARM
 
 with the direction of the motor (1, −1, or 0 at the end), the time of the next flip, the present error bound,
-and 1 if the robot is incompatible with the model. The first line that cannot be parsed is refused; a later one
-counts as one without a pose. After a flip a line must be sent, so that the next flip is announced. From a pose where it begins, the tracker plans the
-way to the path; what it has learned of the robot is forgotten.
+and 1 if the robot is incompatible with the model. The first line is refused if it cannot be parsed; a later one
+then counts as one without a pose. After a flip a line must be sent, so that the next flip is announced. From a
+pose where it begins, the tracker plans the way to the path; what it has learned of the robot is forgotten.
 
 The first line may be a header with other units, such as `time_s x_cm y_cm heading_deg`
 (`planner.tracking.pipe_columns`). The error is then in the unit of x. Numbers are separated by spaces or commas. A
