@@ -5,9 +5,10 @@ numba takes a second to import. So a loop imports it, with `sim.machine_code`, o
 numba's own cache depends on the time stamp of the loop's file. If a formula in another file changes, it would use
 old machine code; if a comment changes, it would compile again. So the cache is a folder whose name has a digest of
 the code of all files that compiled loops are made of, without comments and docstrings. The folders of the last few
-versions are kept. They are beside this file, or in the user's cache folder if this one cannot be written. Loops of
-other packages have folders of their own in it, named by a digest of all files of their package. Machine code does
-not depend on the folder that the sources are in.
+versions are kept. They are beside this file, or in the user's cache folder. Machine code runs with the user's
+rights, so a folder is used only if it belongs to the user and nobody else can write it. Loops of other packages
+have folders of their own in it, named by a digest of all files of their package. Machine code does not depend on
+the folder that the sources are in.
 
 Sums may be reordered and multiplications fused, so last digits can differ between machines. Loops that are
 `compiled_exactly` keep the order of the source: those of `sim.lanes`. NaN and infinity keep their meaning.
@@ -24,6 +25,7 @@ process, loops are compiled in another one (`compile_apart`), and only read here
 from __future__ import annotations
 
 import ast
+import errno
 import os
 import subprocess
 import sys
@@ -34,6 +36,7 @@ from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 from shutil import rmtree
+from stat import S_ISDIR
 from types import CodeType
 from typing import Any, TypeVar, cast
 
@@ -112,17 +115,34 @@ def folder_for_code(parent: Path, name: str, root: Path, patterns: Iterable[str]
     return folder
 
 
-def _cache_folder() -> Path:
-    """Return where this version's loops are kept."""
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    parent = _HERE / "__pycache__" if os.access(_HERE, os.W_OK) else home / "softflagella"
-    return folder_for_code(parent, "compiled", _HERE)
+def _is_private(folder: Path) -> bool:
+    """Whether a folder belongs to this user, and nobody else can write it."""
+    found = folder.lstat()
+    own = S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & 0o022
+    return own and os.access(folder, os.W_OK)
 
 
-CACHE = _cache_folder()
+def cache_folder(beside: Path = _HERE / "__pycache__") -> Path:
+    """Return where this version's loops are kept: `beside` the code, or in the user's cache folder.
+
+    Raises:
+        PermissionError: there is no folder that this user alone can write.
+    """
+    home = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "softflagella")
+    for parent in filter(Path.is_absolute, (beside, home)):  # "~" stays where the user is unknown
+        with suppress(OSError):
+            folder = folder_for_code(parent, "compiled", _HERE)
+            if not folder.exists():
+                prune(parent, _KEPT)
+                folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if _is_private(folder):
+                return folder
+    remedy = "no folder for compiled loops that this user alone can write; set XDG_CACHE_HOME to the path of one"
+    raise PermissionError(errno.EACCES, remedy, str(home))
+
+
+CACHE = cache_folder()
 _APART = "SOFTFLAGELLA_COMPILES"  # environment of a process that compiles for others
-if not CACHE.exists():
-    prune(CACHE.parent, _KEPT)
 
 
 @cache
@@ -160,7 +180,8 @@ def mark_all_compiled(folder: Path = CACHE) -> None:
 def compile_apart(module: str) -> bool:
     """Call `compile_all` of a module in a process of its own; whether it came to its end."""
     code = f"import sys; sys.path[:] = {sys.path!r}; from {module} import compile_all; compile_all()"
-    process = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, _APART: "1"})
+    environment = {**os.environ, _APART: "1", "NUMBA_DISABLE_JIT": "0"}
+    process = subprocess.Popen([sys.executable, "-c", code], env=environment)
     try:
         return process.wait() == 0
     finally:

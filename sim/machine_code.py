@@ -7,6 +7,7 @@ a function is compiled.
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,9 @@ from tqdm import tqdm
 from sim import compiling, lane_rows  # noqa: F401  (it teaches numba)
 from sim.called_code import LoopCache, LoopCompiler
 from sim.compiling import Loop, folder_of_package, package_root, take_formulas
+
+if config.DISABLE_JIT:  # type: ignore[attr-defined]
+    raise OSError(errno.ENOTSUP, "it is set, and the loops need numba's compiler; unset it", "NUMBA_DISABLE_JIT")
 
 _HERE = Path(__file__).parent
 _LEVEL = 1  # of optimisation: loops run as fast as at level 3 and compile in less than half the time

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -116,7 +117,7 @@ def run_demo(out: str | Path) -> None:
 def _command(*words: str, quiet: bool = False) -> None:
     """Print and run a command of softflagella."""
     if not quiet:
-        print("  softflagella", " ".join(words), flush=True)
+        print("  softflagella", shlex.join(words), flush=True)
     output = subprocess.DEVNULL if quiet else None
     subprocess.run([sys.executable, "-m", "softflagella", *words], check=True, stdout=output, stderr=output)
 
@@ -124,7 +125,7 @@ def _command(*words: str, quiet: bool = False) -> None:
 @contextmanager
 def _beside(*words: str) -> Iterator[None]:
     """Print and start a command of softflagella; at the end of the block, wait for it and print its output."""
-    print("  softflagella", " ".join(words), flush=True)
+    print("  softflagella", shlex.join(words), flush=True)
     command = [sys.executable, "-m", "softflagella", *words]
     with tempfile.TemporaryFile("w+") as output:
         process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
@@ -160,7 +161,7 @@ def _plan_and_replay(folder: Path) -> dict[str, tuple[dict[str, Any], TrackingEr
         _command("replay", str(plan), "--out", str(track), "--no-error", quiet=True)
 
     for case in CASES:
-        print(f"  softflagella replay {folder / case.name / 'plan.json'} --out …/track.csv")
+        print(f"  softflagella replay {shlex.quote(str(folder / case.name / 'plan.json'))} --out …/track.csv")
     with (
         ThreadPoolExecutor(min(available_jobs(), len(CASES))) as pool,
         tqdm(total=len(CASES), desc="replay", unit="plan") as bar,

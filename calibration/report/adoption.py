@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 import textwrap
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
@@ -105,9 +106,10 @@ def adopt_law(source: str | Path, name: str, folder: str | Path, *, place: str =
     Raises:
         InputError: there is no such law, the name cannot be used, or the files cannot be written.
     """
-    if not _NAME.fullmatch(name):
+    if not _NAME.fullmatch(name) or iskeyword(name):
         raise InputError(
-            f"name {name!r}: write lower-case letters, digits and _, such as speed_dependent_side_force"
+            f"name {name!r}: write lower-case letters, digits and _, such as speed_dependent_side_force, and no "
+            "keyword of Python"
         )
     if name in catalogue():
         raise InputError(f"there is an effect {name} already; give another name")

@@ -10,6 +10,7 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
+from shlex import quote
 from typing import Any, cast
 
 from dataset.build import scheduler
@@ -101,7 +102,7 @@ def mend(
     storage = open_storage(folder)
     if not storage.names():
         raise InputError(f"{storage.address} is no data set; make it with softflagella sweep")
-    message = _Message(storage, f"softflagella dataset verify {storage.address} --mend")
+    message = _Message(storage, f"softflagella dataset verify {quote(storage.address)} --mend")
     workers = _Workers(lambda: open_backend("loky", jobs=jobs), message)
     with interruptible(message.text), locked(storage, force=force):
         design, source = load_sweep(storage, same_version=True)

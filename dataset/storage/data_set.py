@@ -17,6 +17,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,7 +76,7 @@ def _damage(storage: Storage, what: str) -> InputError:
         theirs = rows_version()
     if theirs != rows_version():
         return InputError(f"{what}; {_other_version(storage, theirs)}")
-    return InputError(f"{what}; repair it with softflagella dataset verify {storage.address} --mend")
+    return InputError(f"{what}; repair it with softflagella dataset verify {quote(storage.address)} --mend")
 
 
 def write_manifest(storage: Storage, content: dict[str, Any]) -> dict[str, Any]:

@@ -12,11 +12,12 @@ import os
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from typing import IO
 
 from dataset.storage.storage import LocalStorage, RemoteStorage, Storage, StorageError
 from sim.io.errors import InputError
+from sim.io.files import open_no_link
 
 LOCK = ".lock"
 
@@ -60,7 +61,7 @@ def _lock_folder(storage: LocalStorage) -> Iterator[None]:
         os.makedirs(storage.address, exist_ok=True)
         file = _acquired(storage)
     except OSError as refusal:
-        raise StorageError(f"cannot write {storage.path(LOCK)}: {refusal.strerror}") from None
+        raise StorageError(f"cannot write {storage.path(LOCK)}: {refusal.strerror or refusal}") from None
     try:
         yield
     finally:
@@ -70,32 +71,33 @@ def _lock_folder(storage: LocalStorage) -> Iterator[None]:
 
 
 def _acquired(storage: LocalStorage) -> IO[str]:
-    """Open the lock file, lock it, and write who holds it."""
+    """Make the lock file, lock it, and write who holds it; one that nobody holds is removed, not written into."""
     path = storage.path(LOCK)
     while True:
-        file = open(path, "a+")  # noqa: SIM115
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            file.seek(0)
-            refusal = _refusal(storage, file.read(), "wait until it ends, or give another folder")
-            file.close()
-            raise refusal from None
-        except OSError:
-            file.close()
-            raise
+        file, is_new = _opened(path)
+        with ExitStack() as closing:
+            closing.callback(file.close)
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise _refusal(storage, file.read(), "wait until it ends, or give another folder") from None
+            with suppress(FileNotFoundError):  # its owner removed it after we had opened and before we locked it
+                if os.path.samestat(os.fstat(file.fileno()), os.lstat(path)):
+                    if is_new:
+                        file.write(_note())
+                        file.flush()
+                        closing.pop_all()
+                        return file
+                    os.unlink(path)
+
+
+def _opened(path: str) -> tuple[IO[str], bool]:
+    """Open the lock file, and tell whether it is new."""
+    while True:
+        with suppress(FileExistsError):
+            return os.fdopen(open_no_link(path, new=True), "r+"), True
         with suppress(FileNotFoundError):
-            if os.fstat(file.fileno()).st_ino == os.stat(path).st_ino:
-                break
-        file.close()  # its owner removed it after we had opened and before we locked it
-    try:
-        file.truncate(0)
-        file.write(_note())
-        file.flush()
-    except OSError:
-        file.close()
-        raise
-    return file
+            return os.fdopen(open_no_link(path, new=False), "r+"), False
 
 
 @contextmanager

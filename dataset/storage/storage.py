@@ -10,16 +10,17 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import socket
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
+from uuid import uuid4
 
 import pyarrow as pa
 
 from sim.io.errors import InputError
+from sim.io.files import open_no_link
 
 _URL = re.compile(r"^[a-zA-Z][a-zA-Z0-9+.-]+://")
 
@@ -134,11 +135,11 @@ class LocalStorage(Storage):
     @contextmanager
     def writer(self, name: str) -> Iterator[Sink]:
         path = Path(self.path(name))
-        part = path.with_name(f".{path.name}.{socket.gethostname()}.{os.getpid()}")
+        part = path.with_name(f".{path.name}.{uuid4().hex}")
         with _refusals(f"write {path}"):
             path.parent.mkdir(parents=True, exist_ok=True)
             try:
-                with open(part, "wb", buffering=0) as file:
+                with open(open_no_link(part, new=True), "wb", buffering=0) as file:
                     sink = Sink(_Unbuffered(file))  # type: ignore[arg-type]
                     yield sink
                     os.fsync(file.fileno())

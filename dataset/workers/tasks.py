@@ -10,9 +10,7 @@ import fcntl
 import os
 import socket
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from dataset.rows.design import SweepDesign
@@ -147,23 +145,9 @@ def compile_on_this_host() -> None:
 
     if all_compiled():
         return
-    with _alone_on_this_host(CACHE.name):
+    with open(CACHE / f"{socket.gethostname()}.lock", "a") as lock:  # nobody else can put a link there
+        fcntl.flock(lock, fcntl.LOCK_EX)
         from sim.motion.warm import compile_once
 
         if not compile_once():
             raise InputError("the simulator's loops do not compile; softflagella sim compile says why")
-
-
-@contextmanager
-def _alone_on_this_host(task: str) -> Iterator[None]:
-    """Wait until no other process of this user and host does the task; without a place for a lock, do not wait."""
-    folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "softflagella")
-    try:  # the folder is the user's alone: nobody else can put a link there
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        lock = open(folder / f"{task}-{socket.gethostname()}.lock", "a")  # noqa: SIM115
-    except OSError:
-        yield
-        return
-    with lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield

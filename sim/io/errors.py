@@ -8,12 +8,18 @@ All other errors are bugs and keep their traceback.
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from io import TextIOWrapper
 from pathlib import Path
 
 INTERRUPTED, CLOSED_PIPE = 130, 141  # exit statuses as shells give them: 128 + SIGINT, 128 + SIGPIPE
+_LIMITS = re.compile(
+    "Too many open files|[Cc]annot allocate memory|failed to map segment|can't start new thread"
+    "|Resource temporarily unavailable|No space left on device"
+)
 
 
 class InputError(ValueError):
@@ -49,10 +55,14 @@ def naming(source: object) -> Iterator[None]:
 def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None = None) -> int:
     """Run a command-line entry point and return its exit status.
 
+    Signs that the encoding of the standard output lacks are printed as question marks.
+
     Returns:
         0; 2, or the error's status, for bad input, after one line on stderr; 130 after Ctrl-C; 141 where the
         reader of a pipe has gone.
     """
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
     try:
         main(argv)
         sys.stdout.flush()
@@ -63,18 +73,31 @@ def run_command(main: Callable[[list[str] | None], None], argv: list[str] | None
         return CLOSED_PIPE
     except FileNotFoundError as missing:
         return _end(f"no such file: {missing.filename}; check the path", 2)
-    except OSError as refusal:
-        if refusal.filename is None:
-            raise
-        return _end(f"{refusal.filename}: {refusal.strerror}", 2)
     except RecursionError:
         return _end("the input is nested too deeply; give a simpler one", 2)
-    except MemoryError:
-        return _end("the memory of this machine does not suffice; give a smaller input", 2)
     except KeyboardInterrupt as stop:
         print("interrupted", file=sys.stderr)
         return getattr(stop, "status", INTERRUPTED)
+    except Exception as error:
+        refused = _refused(error)
+        if refused is None:
+            raise
+        return _end(refused, 2)
     return 0
+
+
+def _refused(error: BaseException) -> str | None:
+    """Say what the operating system refused, a file or, at the root of the error, its limits; None if neither."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    root: BaseException | None = error
+    while root is not None:
+        if isinstance(root, MemoryError):
+            return "the memory of this machine does not suffice; give a smaller input, or raise ulimit -v"
+        if limit := _LIMITS.search(str(root)):
+            return f"the system refuses: {limit[0]}; free some, or raise this shell's limits (ulimit -n, -u, -v)"
+        root = root.__cause__ or root.__context__
+    return None
 
 
 def _end(message: str, status: int) -> int:

@@ -1,12 +1,13 @@
 """Write files completely or not at all, one alone or several together.
 
-A regular file is written under another name in the same folder and renamed when it is complete. So an error or an
-interruption leaves either the old file or the new one. A device, a pipe or the standard output is written into
-when the content is complete.
+A regular file is written in a new folder of its own, which others cannot write, and moved when it is complete.
+So an error or an interruption leaves either the old file or the new one. A device, a pipe or the standard output
+is written into when the content is complete.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import shutil
@@ -41,15 +42,14 @@ def whole_file(path: str | Path) -> Iterator[Path]:
             yield part
             _write_into(target, part)
         return
-    target = target.resolve()  # a link stays, and what it points to is written
+    if target.is_symlink() and target.lstat().st_uid != os.geteuid():
+        raise InputError(f"{target} is a symbolic link of another user; remove it, or give another name")
+    target = target.resolve()  # a link of one's own stays, and what it points to is written
     make_folder(target.parent)
-    part = target.with_name(f".{target.name}.part{os.getpid()}")
-    try:
-        with _refusals(target):
-            yield part
-            os.replace(part, target)
-    finally:
-        part.unlink(missing_ok=True)
+    with _refusals(target), TemporaryDirectory(dir=target.parent, prefix=".part-") as folder:
+        part = Path(folder, target.name)
+        yield part
+        os.replace(part, target)
 
 
 @contextmanager
@@ -86,6 +86,25 @@ def files_together(folder: str | Path, names: Sequence[str]) -> Iterator[Path]:
             for source, place in reversed(moved):
                 os.replace(place, source)
             raise
+
+
+def open_no_link(path: str | Path, *, new: bool) -> int:
+    """Open a file in a folder that others can write, for reading and writing; return its descriptor.
+
+    Args:
+        new: make the file.
+
+    Raises:
+        InputError: the file is a symbolic link.
+        FileExistsError: the file is there, and should be new.
+        OSError: it cannot be opened.
+    """
+    try:
+        return os.open(path, os.O_RDWR | os.O_NOFOLLOW | (os.O_CREAT | os.O_EXCL if new else 0), 0o666)
+    except OSError as refusal:
+        if refusal.errno == errno.ELOOP:
+            raise InputError(f"{path} is a symbolic link; remove it") from None
+        raise
 
 
 def make_folder(folder: str | Path) -> None:

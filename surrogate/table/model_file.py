@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from sim.io.errors import InputError
@@ -35,7 +36,7 @@ def load(path: str | Path | None = None) -> NeuralTable:
     """
     path = SHIPPED if path is None else path
     if not Path(path).is_file():
-        raise InputError(f"no model {path}; train one with softflagella train DATA --out {path}")
+        raise InputError(f"no model {path}; train one with softflagella train DATA --out {quote(str(path))}")
     remedy = "train it again with softflagella train"
     content = tensor_file.read(path, FORMAT, remedy)
     try:

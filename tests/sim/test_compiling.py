@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import sim
 from sim import compiling
-from sim.compiling import CACHE, code_digest, folder_for_code, folder_of_package, prune
+from sim.compiling import CACHE, cache_folder, code_digest, folder_for_code, folder_of_package, prune
+from sim.io.errors import run_command
 from sim.machine_code import Locator
 from tests.processes import LIMIT
 
@@ -29,6 +32,65 @@ def test_only_the_newest_versions_are_kept(tmp_path: Path) -> None:
     prune(tmp_path, 2)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["compiled-a", "compiled-c", "other"]
     prune(tmp_path / "nowhere", 2)
+
+
+@pytest.fixture
+def apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of code with a folder for its loops, the user's cache folder beside it."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    monkeypatch.setattr(compiling, "code_digest", lambda *_: "digest")
+    (tmp_path / "code" / "compiled-digest").mkdir(mode=0o700, parents=True)
+    return tmp_path
+
+
+def test_loops_are_kept_beside_the_code(apart: Path) -> None:
+    assert cache_folder(apart / "code") == apart / "code" / "compiled-digest"
+    shutil.rmtree(apart / "code")
+    (apart / "code").mkdir()
+    assert cache_folder(apart / "code").stat().st_mode & 0o777 == 0o700
+
+
+def let_others_write(folder: Path) -> None:
+    folder.chmod(0o775)
+
+
+def put_a_link(folder: Path) -> None:
+    folder.rmdir()
+    (folder.parent / "elsewhere").mkdir(mode=0o700)
+    folder.symlink_to("elsewhere")
+
+
+def take_the_code_away(folder: Path) -> None:
+    folder.rmdir()
+    folder.parent.rmdir()
+    folder.parent.write_text("no folder can be made in a file")
+
+
+@pytest.mark.parametrize("spoil", [let_others_write, put_a_link, take_the_code_away])
+def test_loops_that_others_could_write_are_not_run(spoil: Callable[[Path], None], apart: Path) -> None:
+    spoil(apart / "code" / "compiled-digest")
+    assert cache_folder(apart / "code") == apart / "home" / "softflagella" / "compiled-digest"
+
+
+@pytest.mark.parametrize("variable", ["", "relative"])
+def test_without_a_folder_one_line_says_what_to_set(
+    variable: str, apart: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A user without a home used to get a traceback; no folder belongs to this one, and `~` is not known."""
+    monkeypatch.setenv("XDG_CACHE_HOME", variable)
+    monkeypatch.setattr(os.path, "expanduser", lambda path: path)
+    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+    assert run_command(lambda _: print(cache_folder(apart / "code"))) == 2
+    assert re.fullmatch("error: .* set XDG_CACHE_HOME to the path of one\n", capsys.readouterr().err)
+
+
+def test_numba_without_its_compiler_is_refused_in_one_line() -> None:
+    """`NUMBA_DISABLE_JIT=1 softflagella steady robot.toml` used to end with a traceback."""
+    code = "from sim.io.errors import run_command as run; run(lambda _: __import__('sim.machine_code'))"
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=LIMIT)
+    assert re.fullmatch("error: NUMBA_DISABLE_JIT: .*; unset it\n", done.stderr)
 
 
 def has_loops(file: Path) -> bool:

@@ -91,7 +91,7 @@ class Runs {
 /* Quote a file's name for a shell. */
 function quoted(name) {
   const file = name.startsWith("-") ? `./${name}` : name;
-  return PLAIN.test(file) ? file : `"${file.replace(/["\\$`]/g, "\\$&")}"`;
+  return PLAIN.test(file) ? file : `'${file.replaceAll("'", `'"'"'`)}'`;
 }
 
 function summary({ rows, left, columns, medians }) {

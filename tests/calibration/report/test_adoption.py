@@ -99,6 +99,7 @@ def test_words_and_names_cannot_end_a_string(tmp_path: Path) -> None:
     ("name", "place", "message"),
     [
         ("New Effect", "", "write lower-case letters"),
+        ("lambda", "", "no keyword of Python"),
         ("disc_drag", "", "there is an effect disc_drag already"),
         ("new_effect", "Mz_wh", "no law 'Mz_wh' was kept; kept are Fx_wh, Cyr, tail_drag, "),
     ],

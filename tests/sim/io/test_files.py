@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import stat
 import subprocess
@@ -79,6 +80,23 @@ def test_a_link_stays_and_its_file_is_written(tmp_path: Path) -> None:
     assert (tmp_path / "file").read_text() == "new"
 
 
+def test_a_link_of_another_user_is_not_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("old")
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+    with pytest.raises(InputError, match="symbolic link of another user"):
+        write_text(tmp_path / "link", "new")
+    assert (tmp_path / "file").read_text() == "old"
+
+
+def test_an_unfinished_file_is_no_link(tmp_path: Path) -> None:
+    """Its name used to be known in advance, so that somebody else could put a link there."""
+    (tmp_path / "precious").write_text("old")
+    (tmp_path / f".a.txt.part{os.getpid()}").symlink_to("precious")
+    write_text(tmp_path / "a.txt", "new")
+    assert ((tmp_path / "a.txt").read_text(), (tmp_path / "precious").read_text()) == ("new", "old")
+
+
 def test_several_files_appear_together_and_what_is_old_goes(tmp_path: Path) -> None:
     names = ("a", "b", "c")
     for name in (*names, "notes"):
@@ -136,10 +154,33 @@ def test_an_interruption_is_one_line_and_a_status(capsys: pytest.CaptureFixture[
     assert capsys.readouterr().err == "interrupted\n"
 
 
-@pytest.mark.parametrize("error", [RecursionError(), MemoryError(), PermissionError(13, "Permission denied", "x")])
+def caused(error: Exception, cause: Exception) -> Exception:
+    error.__cause__ = cause
+    return error
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        RecursionError(),
+        MemoryError(),
+        PermissionError(13, "Permission denied", "x"),
+        OSError(24, "Too many open files"),
+        RuntimeError("can't start new thread"),
+        caused(ImportError("a page of words\nof numpy"), ImportError("x.so: failed to map segment")),
+    ],
+)
 def test_what_a_machine_refuses_is_one_line(error: BaseException, capsys: pytest.CaptureFixture[str]) -> None:
     assert raising(error) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_signs_that_the_output_lacks_are_printed_as_question_marks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`PYTHONIOENCODING=latin-1 softflagella steady robot.toml` used to end with a traceback."""
+    output = io.TextIOWrapper(io.BytesIO(), encoding="latin-1")
+    monkeypatch.setattr(sys, "stdout", output)
+    assert run_command(lambda _: print("ω̄ = 3 ± 1")) == 0
+    assert output.buffer.getvalue() == "?? = 3 ± 1\n".encode("latin-1")
 
 
 def test_a_reader_that_goes_ends_the_command_without_a_word() -> None:

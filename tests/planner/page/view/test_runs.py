@@ -31,7 +31,7 @@ def test_runs_are_compared_and_the_command_is_copied(browser: Any, address: str,
         assert "row 5: theta_deg = -3.0 is not above 0" in seen
         assert "all have N = 3" in seen
         assert "elapsed_min: tests a drift of the viscosity" in seen
-        command = 'softflagella calibrate "my table.csv" --robot robot.toml --out calibrated'
+        command = "softflagella calibrate 'my table.csv' --robot robot.toml --out calibrated"
         assert text_of(page, "#runs pre") == command
         page.get_by_role("button", name="Copy the command").click()
         page.locator("#runs [role=status]", has_text="Copied.").wait_for()
